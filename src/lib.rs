@@ -1,0 +1,15 @@
+//! Ballast: nonparametric adaptive robust control of an investor, as a library and a service.
+//!
+//! Five floors; a floor may name only the floors below it (a test reads `src` and checks).
+//!
+//! - [`numerics`]: mathematics with no investor in it: Gaussian processes, empirical laws, bridges, transport.
+//! - [`control`]: the paper: the problem, its uncertainty sets, the robust Bellman step, the policy.
+//! - [`store`]: durable facts: jobs, policies, sessions, observations.
+//! - [`service`]: use cases: train, open a session, observe, act. No HTTP types.
+//! - [`http`]: translation between the wire and the use cases, and nothing else.
+
+pub mod control;
+pub mod http;
+pub mod numerics;
+pub mod service;
+pub mod store;
