@@ -1,0 +1,82 @@
+//! Interpolation: Chebyshev nodes on the unit interval, and local cubics on an irregular grid.
+
+use std::f64::consts::PI;
+
+/// Barycentric interpolation in Chebyshev points of the first kind, moved to `[0, 1]`.
+///
+/// Source: Berrut and Trefethen (2004), Barycentric Lagrange interpolation, SIAM Review 46.
+#[derive(Debug, Clone)]
+pub struct Chebyshev {
+    nodes: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+impl Chebyshev {
+    /// `count` nodes, at least one.
+    pub fn new(count: usize) -> Self {
+        let angle = |index: usize| (2 * index + 1) as f64 * PI / (2 * count) as f64;
+        let nodes = (0..count).map(|index| 0.5 - 0.5 * angle(index).cos()).collect();
+        let weights =
+            (0..count).map(|index| if index % 2 == 0 { angle(index).sin() } else { -angle(index).sin() }).collect();
+        Chebyshev { nodes, weights }
+    }
+
+    pub fn nodes(&self) -> &[f64] {
+        &self.nodes
+    }
+
+    /// The polynomial through `values` at the nodes, evaluated at `position`. Cost O(count).
+    pub fn evaluate(&self, values: &[f64], position: f64) -> f64 {
+        let (mut numerator, mut denominator) = (0.0, 0.0);
+        for ((&node, &weight), &value) in self.nodes.iter().zip(&self.weights).zip(values) {
+            let distance = position - node;
+            if distance == 0.0 {
+                return value;
+            }
+            let ratio = weight / distance;
+            numerator += ratio * value;
+            denominator += ratio;
+        }
+        numerator / denominator
+    }
+}
+
+/// Weights of the cubic through the four nodes around `position` (fewer on a shorter grid): first index, weights.
+///
+/// `nodes` ascending and distinct, at least one. Error O(h^4) times the fourth derivative.
+pub fn local_cubic(nodes: &[f64], position: f64) -> (usize, [f64; 4]) {
+    let count = nodes.len().min(4);
+    let above = nodes.partition_point(|&node| node < position);
+    let first = above.saturating_sub(2).min(nodes.len() - count);
+    let mut weights = [0.0; 4];
+    for i in 0..count {
+        let mut weight = 1.0;
+        for j in 0..count {
+            if j != i {
+                weight *= (position - nodes[first + j]) / (nodes[first + i] - nodes[first + j]);
+            }
+        }
+        weights[i] = weight;
+    }
+    (first, weights)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_reproduce_a_cubic() {
+        let cubic = |x: f64| 1.0 - 2.0 * x + 0.5 * x * x + 3.0 * x * x * x;
+        let chebyshev = Chebyshev::new(5);
+        let values: Vec<f64> = chebyshev.nodes().iter().map(|&x| cubic(x)).collect();
+        let grid = [-1.0, -0.4, -0.3, 0.0, 0.5, 0.6, 1.2];
+        for step in 0..=20 {
+            let x = step as f64 / 20.0;
+            assert!((chebyshev.evaluate(&values, x) - cubic(x)).abs() < 1e-13);
+            let (first, weights) = local_cubic(&grid, x);
+            let sum: f64 = weights.iter().zip(&grid[first..]).map(|(w, &node)| w * cubic(node)).sum();
+            assert!((sum - cubic(x)).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Laws that can be drawn from and integrated against.
+
+use rand::{Rng, RngExt};
+use rand_distr::{Distribution, StandardNormal, StudentT};
+
+/// A continuous law on the line.
+#[derive(Debug, Clone)]
+pub enum ContinuousLaw {
+    /// Components (weight, mean, standard deviation); weights sum to 1.
+    GaussianMixture(Vec<(f64, f64, f64)>),
+    /// Location, scale, degrees of freedom.
+    StudentT { location: f64, scale: f64, degrees_of_freedom: f64 },
+}
+
+/// Nodes of a standard normal component: the trapezoidal rule of step 1/4 on [-8, 8] is exact to rounding
+/// for integrands that are smooth on the scale of the standard deviation.
+const NORMAL_NODES: i32 = 32;
+const NORMAL_STEP: f64 = 0.25;
+/// Coarser rule where a mixture has many components: step 1/2, error below 1e-12 for the density itself.
+const COARSE_STEP: f64 = 0.5;
+const MANY_COMPONENTS: usize = 16;
+
+impl ContinuousLaw {
+    /// Smoothed bootstrap of a sample: a normal of Silverman's bandwidth around each value, shrunk towards the mean
+    /// so that the mean and variance are the sample's own. Source: Silverman (1986), section 6.4.1.
+    pub fn smoothed_bootstrap(sample: &[f64]) -> Self {
+        let size = sample.len() as f64;
+        let mean = sample.iter().sum::<f64>() / size;
+        let variance = sample.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / size;
+        let bandwidth = 1.06 * variance.sqrt() * size.powf(-0.2);
+        let shrink = (1.0 + bandwidth * bandwidth / variance).sqrt().recip();
+        let component = |z: &f64| (1.0 / size, mean + shrink * (z - mean), shrink * bandwidth);
+        ContinuousLaw::GaussianMixture(sample.iter().map(component).collect())
+    }
+
+    /// One draw.
+    pub fn draw(&self, generator: &mut impl Rng) -> f64 {
+        match self {
+            ContinuousLaw::GaussianMixture(components) => {
+                let uniform: f64 = generator.random();
+                let normal: f64 = generator.sample(StandardNormal);
+                let mut cumulative = 0.0;
+                let mut chosen = components.last().copied().unwrap_or((1.0, 0.0, 0.0));
+                for &component in components {
+                    cumulative += component.0;
+                    if uniform < cumulative {
+                        chosen = component;
+                        break;
+                    }
+                }
+                chosen.1 + chosen.2 * normal
+            }
+            ContinuousLaw::StudentT { location, scale, degrees_of_freedom } => match StudentT::new(*degrees_of_freedom)
+            {
+                Ok(standard) => location + scale * standard.sample(generator),
+                Err(_) => *location,
+            },
+        }
+    }
+
+    /// Quadrature: ascending atoms and positive masses that sum to 1, by the trapezoidal rule
+    /// (in z / sd for normals, in asinh of z / scale for Student's t), which converges faster than any power
+    /// of the step for such densities. Source: Trefethen and Weideman (2014), SIAM Review 56.
+    pub fn quadrature(&self) -> (Vec<f64>, Vec<f64>) {
+        let mut nodes: Vec<(f64, f64)> = Vec::new();
+        match self {
+            ContinuousLaw::GaussianMixture(components) => {
+                let step = if components.len() > MANY_COMPONENTS { COARSE_STEP } else { NORMAL_STEP };
+                let reach = (NORMAL_NODES as f64 * NORMAL_STEP / step) as i32;
+                for &(weight, mean, deviation) in components {
+                    for index in -reach..=reach {
+                        let normal = index as f64 * step;
+                        nodes.push((mean + deviation * normal, weight * (-0.5 * normal * normal).exp()));
+                    }
+                }
+            }
+            ContinuousLaw::StudentT { location, scale, degrees_of_freedom } => {
+                const NODES: i32 = 200;
+                const STEP: f64 = 0.05;
+                for index in -NODES..=NODES {
+                    let parameter = index as f64 * STEP;
+                    let t = parameter.sinh();
+                    let log_density = -0.5 * (degrees_of_freedom + 1.0) * (t * t / degrees_of_freedom).ln_1p();
+                    nodes.push((location + scale * t, log_density.exp() * parameter.cosh()));
+                }
+            }
+        }
+        let total: f64 = nodes.iter().map(|node| node.1).sum();
+        nodes.retain(|node| node.1 > 1e-18 * total);
+        nodes.sort_by(|left, right| left.0.total_cmp(&right.0));
+        let total: f64 = nodes.iter().map(|node| node.1).sum();
+        nodes.into_iter().map(|(atom, mass)| (atom, mass / total)).unzip()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::streams::stream;
+
+    #[test]
+    fn quadrature_has_the_moments_of_the_law() {
+        let mixture =
+            ContinuousLaw::GaussianMixture(vec![(0.4, 0.006, 0.016_f64.sqrt()), (0.6, 0.016, 0.00625_f64.sqrt())]);
+        let (atoms, masses) = mixture.quadrature();
+        let exact: f64 = 0.4 * (0.006_f64 + 0.008).exp() + 0.6 * (0.016_f64 + 0.003125).exp();
+        let sum: f64 = atoms.iter().zip(&masses).map(|(z, p)| p * z.exp()).sum();
+        // Trapezoidal rule on a Gaussian: aliasing error exp(-2 pi^2 / h^2) is below rounding, 1e-15 per node.
+        assert!((sum - exact).abs() < 1e-13);
+        let student = ContinuousLaw::StudentT { location: 0.01, scale: 0.05, degrees_of_freedom: 6.0 };
+        let (atoms, masses) = student.quadrature();
+        let variance: f64 = atoms.iter().zip(&masses).map(|(z, p)| p * (z - 0.01).powi(2)).sum();
+        // Variance of t is nu / (nu - 2); the tails beyond sinh(10) carry less than 1e-12 of it.
+        assert!((variance / (0.05 * 0.05 * 1.5) - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_smoothed_bootstrap_keeps_mean_and_variance() {
+        let law = ContinuousLaw::smoothed_bootstrap(&[0.02, -0.05, 0.11, 0.04, 0.07]);
+        let mut generator = stream(3, "test", 0, 0);
+        let draws: Vec<f64> = (0..200_000).map(|_| law.draw(&mut generator)).collect();
+        let mean = draws.iter().sum::<f64>() / draws.len() as f64;
+        let variance = draws.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / draws.len() as f64;
+        // Standard deviation 0.053; four standard errors of 200,000 draws are 0.00048 for the mean.
+        assert!((mean - 0.038).abs() < 5e-4, "{mean}");
+        assert!((variance / 0.002_856 - 1.0).abs() < 0.02, "{variance}");
+    }
+}
