@@ -1,0 +1,41 @@
+//! Errors of the store: what the caller, the operator and the process must do next.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use thiserror::Error;
+
+/// Why the store could not answer. Clones share the cause, since one failed commit answers a whole group.
+#[derive(Debug, Clone, Error)]
+pub enum StoreError {
+    /// No room for the write; nothing of it was kept, and reads go on. HTTP 507.
+    #[error("the disk is full")]
+    Full { source: Arc<sqlx::Error> },
+    /// An I/O error, a failed fsync or a damaged file: what is in memory can no longer be trusted. The process must exit.
+    #[error("the store failed while {doing}; the process must restart")]
+    Fatal { doing: &'static str, source: Arc<sqlx::Error> },
+    /// Busy, or closing. The same request may succeed later. HTTP 503.
+    #[error("the store is unavailable while {doing}")]
+    Unavailable { doing: &'static str },
+    /// The file was written by a later release.
+    #[error("the store has schema {found}, newer than {known}, the newest this binary knows")]
+    NewerSchema { found: i64, known: i64 },
+    /// Another process holds the folder.
+    #[error("{} is locked by another process", path.display())]
+    Locked { path: PathBuf },
+    /// SQLite before 3.51.3 can lose committed rows when it resets the write-ahead log.
+    #[error("SQLite {found} is older than 3.51.3")]
+    OldEngine { found: String },
+    /// One stored thing is not what was written; everything else may be sound.
+    #[error("{what} is damaged")]
+    Corrupt { what: String },
+    /// The folder or the lock file cannot be used.
+    #[error("cannot use {}", path.display())]
+    Folder { path: PathBuf, source: Arc<std::io::Error> },
+    /// The database refused a statement: a defect of this program.
+    #[error("the store refused a statement while {doing}")]
+    Refused { doing: &'static str, source: Arc<sqlx::Error> },
+    /// The schema could not be brought up to date.
+    #[error("cannot migrate the store")]
+    Migration { source: Arc<sqlx::migrate::MigrateError> },
+}
