@@ -438,3 +438,21 @@ async fn damage_to_what_an_action_rests_on_is_detected() {
         assert!(matches!(damaged, Some(StoreError::Corrupt { .. })), "{damage}: {damaged:?}");
     }
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn reads_run_on_any_thread() {
+    let (_dir, store) = fresh().await;
+    with_session(&store, "s", &[0.1, 0.2]).await;
+    let read = tokio::spawn(async move {
+        store.ping().await?;
+        store.checkpoints("j").await?;
+        store.count_jobs_by_state().await?;
+        store.policy(&content_hash(POLICY)).await?;
+        store.policies(1, None).await?;
+        store.jobs(1, None).await?;
+        store.observations("s").await?;
+        store.sessions(1, None).await?;
+        store.session("s").await
+    });
+    assert_eq!(read.await.unwrap().unwrap().unwrap().session, "s");
+}

@@ -16,7 +16,7 @@ pub enum StoreError {
     Fatal { doing: &'static str, source: Arc<sqlx::Error> },
     /// Busy, or closing. The same request may succeed later. HTTP 503.
     #[error("the store is unavailable while {doing}")]
-    Unavailable { doing: &'static str },
+    Unavailable { doing: &'static str, source: Option<Arc<sqlx::Error>> },
     /// The file was written by a later release.
     #[error("the store has schema {found}, newer than {known}, the newest this binary knows")]
     NewerSchema { found: i64, known: i64 },
@@ -98,7 +98,7 @@ fn classify(doing: &'static str, error: sqlx::Error) -> StoreError {
         }
         sqlx::Error::Io(_) => StoreError::Fatal { doing, source: Arc::new(error) },
         sqlx::Error::PoolTimedOut | sqlx::Error::PoolClosed | sqlx::Error::WorkerCrashed => {
-            StoreError::Unavailable { doing }
+            StoreError::Unavailable { doing, source: Some(Arc::new(error)) }
         }
         sqlx::Error::ColumnDecode { .. } | sqlx::Error::Decode(_) => {
             StoreError::Corrupt { what: format!("a row read while {doing}: {error}") }
@@ -113,7 +113,9 @@ fn classify_code(code: i32, doing: &'static str, error: sqlx::Error) -> StoreErr
     match (code, code & 0xff) {
         (_, FULL) | (IO_ERROR_INDEX_SIZE, _) => StoreError::Full { source },
         (_, IO_ERROR | CORRUPT | NOT_A_DATABASE | READ_ONLY) => StoreError::Fatal { doing, source },
-        (_, BUSY | LOCKED | NO_MEMORY | INTERRUPTED | CANNOT_OPEN) => StoreError::Unavailable { doing },
+        (_, BUSY | LOCKED | NO_MEMORY | INTERRUPTED | CANNOT_OPEN) => {
+            StoreError::Unavailable { doing, source: Some(source) }
+        }
         _ => StoreError::Refused { doing, source },
     }
 }

@@ -71,7 +71,7 @@ impl Store {
         let doing = "answering a ping";
         self.refuse_after_fatal()?;
         if self.requests.is_closed() {
-            return Err(StoreError::Unavailable { doing });
+            return Err(StoreError::Unavailable { doing, source: None });
         }
         self.read(doing, async { Ok(sqlx::query("SELECT 1 FROM jobs").fetch_optional(&self.readers).await?) }).await?;
         Ok(())
@@ -113,7 +113,7 @@ impl Store {
         let _ = self.requests.send(Request::Write(operation)).await;
         match answer.await {
             Ok(result) => result,
-            Err(_) => self.refuse_after_fatal().and(Err(StoreError::Unavailable { doing })),
+            Err(_) => self.refuse_after_fatal().and(Err(StoreError::Unavailable { doing, source: None })),
         }
     }
 
