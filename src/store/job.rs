@@ -1,0 +1,145 @@
+//! What a job is, as stored.
+
+use serde::{Deserialize, Serialize};
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use utoipa::ToSchema;
+
+use super::codec::from_sql;
+use super::error::Failure;
+use super::job_state::JobState;
+
+/// What a job computes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum JobKind {
+    Train,
+    Evaluate,
+}
+
+impl JobKind {
+    /// The name on the wire and in SQL.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            JobKind::Train => "train",
+            JobKind::Evaluate => "evaluate",
+        }
+    }
+
+    pub(super) fn parse(name: &str) -> Option<JobKind> {
+        [JobKind::Train, JobKind::Evaluate].into_iter().find(|kind| kind.as_str() == name)
+    }
+}
+
+/// A job to queue.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NewJob {
+    pub job: String,
+    pub kind: JobKind,
+    /// The completed request, as the worker reads it back.
+    pub request_json: String,
+    /// Hash of the request as the user sent it: tells a repeat from another request under the same key.
+    pub request_hash: String,
+    pub idempotency_key: Option<String>,
+    pub steps_total: usize,
+    pub created_ms: i64,
+}
+
+/// A job as stored.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JobRow {
+    /// Order of creation; the cursor of [`Store::jobs`](super::Store::jobs).
+    pub sequence: i64,
+    pub job: String,
+    pub kind: JobKind,
+    pub state: JobState,
+    pub request_json: String,
+    pub steps_total: usize,
+    /// Number of checkpoints saved; equals `steps_total` once succeeded.
+    pub steps_done: usize,
+    /// A user asked for it to stop; its worker has yet to.
+    pub cancel_requested: bool,
+    /// How often it was claimed: the fencing token of its present worker.
+    pub attempt: i64,
+    /// The policy of a succeeded training, even where that policy was deleted since.
+    pub policy: Option<String>,
+    /// The report of a succeeded evaluation.
+    pub report_json: Option<String>,
+    /// Why it failed.
+    pub error: Option<String>,
+    pub created_ms: i64,
+    /// When it was first claimed.
+    pub started_ms: Option<i64>,
+    /// When it reached its terminal state.
+    pub finished_ms: Option<i64>,
+}
+
+/// What became of a [`NewJob`].
+#[derive(Debug, Clone, PartialEq)]
+pub enum CreateJob {
+    Created(JobRow),
+    /// The idempotency key was used with the same request: the job it made, as it is now.
+    Repeated(JobRow),
+    /// The idempotency key was used with another request.
+    KeyConflict,
+}
+
+/// A job in the hands of a worker, until its lease runs out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClaimedJob {
+    pub row: JobRow,
+    /// To be named in every write of this worker.
+    pub attempt: i64,
+}
+
+/// How a worker ends a job.
+#[derive(Debug, Clone, PartialEq)]
+pub enum JobOutcome {
+    /// `policy_id` is the [content hash](crate::control::policy::content_hash) of `policy_json`.
+    Succeeded {
+        policy_id: String,
+        policy_json: Vec<u8>,
+    },
+    /// A job whose result is a report and no policy.
+    Reported {
+        report_json: String,
+    },
+    Failed {
+        reason: String,
+    },
+    Cancelled,
+}
+
+/// Number of jobs in each state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct JobCounts {
+    pub queued: u64,
+    pub running: u64,
+    pub succeeded: u64,
+    pub failed: u64,
+    pub cancelled: u64,
+}
+
+impl JobRow {
+    pub(super) fn from_row(row: &SqliteRow) -> Result<Self, Failure> {
+        let job: String = row.try_get("job")?;
+        let damaged = |column: &str| Failure::Corrupt(format!("the {column} of job {job}"));
+        Ok(JobRow {
+            sequence: row.try_get("sequence")?,
+            kind: JobKind::parse(row.try_get("kind")?).ok_or_else(|| damaged("kind"))?,
+            state: JobState::parse(row.try_get("state")?).ok_or_else(|| damaged("state"))?,
+            request_json: row.try_get("request_json")?,
+            steps_total: from_sql(row.try_get("steps_total")?)?,
+            steps_done: from_sql(row.try_get("steps_done")?)?,
+            cancel_requested: row.try_get("cancel_requested")?,
+            attempt: row.try_get("attempt")?,
+            policy: row.try_get("policy")?,
+            report_json: row.try_get("report_json")?,
+            error: row.try_get("error")?,
+            created_ms: row.try_get("created_ms")?,
+            started_ms: row.try_get("started_ms")?,
+            finished_ms: row.try_get("finished_ms")?,
+            job,
+        })
+    }
+}
