@@ -2,8 +2,13 @@
 
 pub mod bridge;
 pub mod chebyshev;
+pub mod cholesky;
 pub mod empirical;
+pub mod gp;
+pub mod gp_fit;
 pub mod law;
+pub mod matern;
+pub mod minimise;
 pub mod moments;
 pub mod streams;
 pub mod wasserstein;

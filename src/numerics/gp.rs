@@ -1,0 +1,215 @@
+//! Gaussian process regression with zero prior mean and the Matern-5/2 kernel.
+//!
+//!   k(x, y) = s2 (1 + sqrt5 r + 5 r^2 / 3) exp(-sqrt5 r),   r^2 = sum_i ((x_i - y_i) / l_i)^2
+//!
+//! Source: Rasmussen and Williams 2006, sections 2.2 and 5.4.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use super::cholesky::{Cholesky, Singular, factor_with_jitter};
+use super::matern;
+
+/// The scales of a Gaussian process: l_i in the units of input i, s2 and noise in the units of the target squared.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Hyperparameters {
+    pub lengthscales: Vec<f64>,
+    pub signal_variance: f64,
+    pub noise_variance: f64,
+}
+
+impl Hyperparameters {
+    /// Each column of `inputs` (n rows, d columns) divided by its length scale. Cost O(n d).
+    pub(super) fn scale(&self, inputs: &DMatrix<f64>) -> DMatrix<f64> {
+        assert_eq!(inputs.ncols(), self.lengthscales.len(), "one length scale for each column");
+        let mut scaled = inputs.clone();
+        for (mut column, lengthscale) in scaled.column_iter_mut().zip(&self.lengthscales) {
+            column.iter_mut().for_each(|x| *x /= lengthscale);
+        }
+        scaled
+    }
+}
+
+/// Squared distances from row `row` of `scaled` to each later row, written to `out` of length n - row - 1.
+pub(super) fn squared_distances_below(scaled: &DMatrix<f64>, row: usize, out: &mut [f64]) {
+    for (i, column) in scaled.as_slice().chunks_exact(scaled.nrows()).enumerate() {
+        matern::add_squared_differences(&column[row + 1..], column[row], i == 0, out);
+    }
+}
+
+/// The lower triangle of K + noise I over the rows of `scaled`; the upper is left at zero. Cost O(n^2 d / 2).
+pub(super) fn kernel_lower(scaled: &DMatrix<f64>, hyper: &Hyperparameters) -> DMatrix<f64> {
+    let n = scaled.nrows();
+    let mut kernel = DMatrix::zeros(n, n);
+    for (j, column) in kernel.as_mut_slice().chunks_exact_mut(n.max(1)).enumerate() {
+        column[j] = hyper.signal_variance + hyper.noise_variance;
+        let below = &mut column[j + 1..];
+        squared_distances_below(scaled, j, below);
+        matern::matern_from_squared(below);
+        below.iter_mut().for_each(|value| *value *= hyper.signal_variance);
+    }
+    kernel
+}
+
+/// ln p(y) = -y^T alpha / 2 - ln det K / 2 - n ln(2 pi) / 2. Source: Rasmussen and Williams 2006, eq. (2.30).
+pub(super) fn log_likelihood(factor: &Cholesky, targets: &[f64], weights: &[f64]) -> f64 {
+    -0.5 * matern::dot(targets, weights) - 0.5 * factor.log_determinant() - 0.5 * targets.len() as f64 * TAU.ln()
+}
+
+/// The posterior mean alone: all that has to be kept of a process to evaluate it.
+///
+///   m(x) = s2 sum_j w_j (1 + r_j + r_j^2/3) exp(-r_j),   r_j^2 = 5 sum_i ((x_i - x_ji) / l_i)^2
+#[derive(Debug, Clone, PartialEq)]
+pub struct GpMean {
+    /// n rows, d columns, already divided by the length scales.
+    inputs: DMatrix<f64>,
+    /// K^-1 y times the signal variance.
+    weights: Vec<f64>,
+    lengthscales: Vec<f64>,
+}
+
+impl GpMean {
+    /// From `inputs` (n rows, d columns, in their own units) and `weights` K^-1 y of length n. Cost O(n d).
+    pub fn new(inputs: &DMatrix<f64>, weights: &[f64], hyper: &Hyperparameters) -> GpMean {
+        assert_eq!(inputs.nrows(), weights.len(), "one weight for each row");
+        GpMean {
+            inputs: hyper.scale(inputs),
+            weights: weights.iter().map(|weight| weight * hyper.signal_variance).collect(),
+            lengthscales: hyper.lengthscales.clone(),
+        }
+    }
+
+    /// m(query), where `query` has d entries. Cost O(n d) and one allocation of n.
+    pub fn mean(&self, query: &[f64]) -> f64 {
+        self.mean_with(query, &mut Vec::new())
+    }
+
+    /// As [`GpMean::mean`], with the distances kept in `scratch`: no allocation once it has grown to n.
+    pub fn mean_with(&self, query: &[f64], scratch: &mut Vec<f64>) -> f64 {
+        scratch.resize(self.weights.len(), 0.0);
+        self.squared_distances(query, 0..self.lengthscales.len(), scratch);
+        self.mean_from_squared(scratch)
+    }
+
+    /// Overwrites `out[j]` with sum_i ((query_i - x_ji) / l_i)^2 over i in `dimensions`.
+    ///
+    /// `query` has all d entries, of which those outside `dimensions` are not read; `out` has n. The sums over
+    /// disjoint ranges add up to the whole, so the part that does not change between queries can be reused.
+    /// Cost O(n |dimensions|).
+    pub fn squared_distances(&self, query: &[f64], dimensions: Range<usize>, out: &mut [f64]) {
+        assert_eq!(query.len(), self.lengthscales.len(), "one query entry for each column");
+        assert_eq!(out.len(), self.weights.len(), "one distance for each row");
+        if dimensions.is_empty() {
+            out.fill(0.0);
+        }
+        for (position, i) in dimensions.enumerate() {
+            let column = &self.inputs.as_slice()[i * out.len()..(i + 1) * out.len()];
+            matern::add_squared_differences(column, query[i] / self.lengthscales[i], position == 0, out);
+        }
+    }
+
+    /// m at the point whose squared scaled distances to the n inputs are given. Cost O(n), no allocation.
+    pub fn mean_from_squared(&self, squared_distances: &[f64]) -> f64 {
+        matern::weighted_sum(squared_distances, &self.weights)
+    }
+
+    /// Number of inputs, n.
+    pub fn input_count(&self) -> usize {
+        self.weights.len()
+    }
+}
+
+/// What each target would have been predicted to be without it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeaveOneOut {
+    /// y_i minus its prediction from the other targets.
+    pub errors: Vec<f64>,
+    /// Standard deviation of the noise-free value at input i given the other targets.
+    pub latent_sd: Vec<f64>,
+}
+
+/// A Gaussian process conditioned on noisy values at n inputs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GaussianProcess {
+    hyper: Hyperparameters,
+    cholesky: Cholesky,
+    jitter: f64,
+    weights: Vec<f64>,
+    mean: GpMean,
+}
+
+impl GaussianProcess {
+    /// Conditions the process with zero prior mean on `targets` (n) at `inputs` (n rows, d columns).
+    ///
+    ///   weights = (K + noise I)^-1 y
+    ///
+    /// A kernel matrix that is singular to working precision gets the least jitter that factors, see
+    /// [`GaussianProcess::jitter`]. Cost O(n^3 / 3). Source: Rasmussen and Williams 2006, algorithm 2.1.
+    pub fn condition(
+        inputs: &DMatrix<f64>,
+        targets: &[f64],
+        hyper: &Hyperparameters,
+    ) -> Result<GaussianProcess, Singular> {
+        assert_eq!(inputs.nrows(), targets.len(), "one target for each row");
+        let kernel = kernel_lower(&hyper.scale(inputs), hyper);
+        let (cholesky, jitter) = factor_with_jitter(&kernel)?;
+        let weights = cholesky.solve(targets);
+        let mean = GpMean::new(inputs, &weights, hyper);
+        Ok(GaussianProcess { hyper: hyper.clone(), cholesky, jitter, weights, mean })
+    }
+
+    /// Posterior mean k^T (K + noise I)^-1 y at `query`. Cost O(n d).
+    pub fn mean(&self, query: &[f64]) -> f64 {
+        self.mean.mean(query)
+    }
+
+    /// Posterior variance of the noise-free value, s2 - |L^-1 k|^2, at least 0. Cost O(n^2).
+    pub fn latent_variance(&self, query: &[f64]) -> f64 {
+        let mut covariances = vec![0.0; self.weights.len()];
+        self.mean.squared_distances(query, 0..query.len(), &mut covariances);
+        matern::matern_from_squared(&mut covariances);
+        covariances.iter_mut().for_each(|value| *value *= self.hyper.signal_variance);
+        let whitened = self.cholesky.solve_lower(&covariances);
+        (self.hyper.signal_variance - matern::dot(&whitened, &whitened)).max(0.0)
+    }
+
+    /// (K + noise I)^-1 y, one for each input.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
+    /// Amount added to the diagonal beyond the noise to make the matrix factor, in the units of the target squared.
+    pub fn jitter(&self) -> f64 {
+        self.jitter
+    }
+
+    pub fn hyperparameters(&self) -> &Hyperparameters {
+        &self.hyper
+    }
+
+    /// The part that evaluates means, which is all that a stored process needs.
+    pub fn posterior_mean(&self) -> &GpMean {
+        &self.mean
+    }
+
+    /// Errors and standard deviations of each target predicted from the others, without refitting.
+    ///
+    ///   error_i = alpha_i / (A^-1)_ii,   latent variance_i = 1 / (A^-1)_ii - noise, at least 0,   A = K + noise I
+    ///
+    /// Cost O(2 n^3 / 3). Source: Rasmussen and Williams 2006, eqs. (5.10) to (5.12).
+    pub fn leave_one_out(&self, targets: &[f64]) -> LeaveOneOut {
+        let precision = self.cholesky.inverse().diagonal();
+        let weights = self.cholesky.solve(targets);
+        let errors = weights.iter().zip(precision.iter()).map(|(weight, p)| weight / p).collect();
+        let latent_sd = precision.iter().map(|p| (1.0 / p - self.hyper.noise_variance).max(0.0).sqrt()).collect();
+        LeaveOneOut { errors, latent_sd }
+    }
+
+    /// ln p(targets) under the conditioned inputs and scales. Cost O(n^2).
+    pub fn log_marginal_likelihood(&self, targets: &[f64]) -> f64 {
+        log_likelihood(&self.cholesky, targets, &self.cholesky.solve(targets))
+    }
+}
