@@ -26,6 +26,8 @@ const BRIDGE_NUMBERS: usize = 30_000_000;
 const DESIGN_NUMBERS: usize = 100_000_000;
 /// Above this product of risk aversion and wealth, exponential utility is flat in double precision over the design.
 const EXPONENTIAL_SCALE: f64 = 300.0;
+/// Smallest and largest wealth.
+pub const WEALTH: (f64, f64) = (1e-6, 1e15);
 const MOMENTS: std::ops::RangeInclusive<usize> = 1..=6;
 
 /// Checks every field; the first that breaks its rule is the error.

@@ -2,8 +2,15 @@
 
 pub mod advisor;
 pub mod backward;
+pub mod bellman;
+pub mod design;
 pub mod error;
+pub mod features;
+pub mod gain_field;
 pub mod limits;
 pub mod policy;
 pub mod specification;
 pub mod state;
+pub mod surrogate;
+pub mod uncertainty;
+pub mod utility;

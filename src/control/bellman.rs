@@ -1,0 +1,266 @@
+//! One robust Bellman step: the best action against the worst law of the ball.
+//!
+//!   g = max_a  u^{-1}( min_{W1(F, F^) <= radius} E_F[ u( w(a, Z) ) ] ),
+//!   w(a, z) = ln( ((1-a)(1+r) + a e^z) / (1+r) ) + g_next( x'(a,z), (n F^ + delta_z)/(n+1) ),
+//!
+//! u the utility relative to the all-bank floor, so that g is the floor gain ln(CE / floor). Source: paper
+//! eqs. (max2), (max3), with V taken at the adversary's z.
+
+use super::gain_field::{FieldContext, FieldRows, GainField};
+use super::specification::Interval;
+use super::state::{State, growth};
+use super::utility::RelativeUtility;
+use crate::numerics::minimise::maximise_concave_scalar;
+use crate::numerics::wasserstein::{WassersteinBall, WorstLaw};
+
+/// Equal parts of the action interval that are tried before the search between the best one's neighbours.
+const COARSE_ACTIONS: usize = 12;
+const ACTION_TOLERANCE: f64 = 1e-7;
+/// Step of the one-sided derivative at a bound.
+const DERIVATIVE_STEP: f64 = 1e-4;
+/// How far past a bound the policy target may be extended.
+const LARGEST_EXTENSION: f64 = 2.0;
+/// Exact returns of the field across the atoms, and the ratio by which spacing grows outside them.
+const CORE_RETURNS: usize = 40;
+const TAIL_RATIO: f64 = 1.3;
+/// First reach of the window below and above the atoms; doubled until certified, at most this often.
+const REACH: (f64, f64) = (1.5, 0.75);
+const WINDOW_GROWTHS: usize = 4;
+/// Parts into which each interval between exact returns is cut for the support, and again around destinations.
+const SUPPORT_PARTS: usize = 4;
+const REFINED_PARTS: usize = 16;
+
+/// The problem of one state, complete.
+pub struct RobustStep<'a> {
+    pub field: FieldContext<'a>,
+    pub utility: RelativeUtility,
+    pub support: Option<Interval>,
+    /// Centre of the ball: ascending distinct atoms and their masses.
+    pub atoms: &'a [f64],
+    pub masses: &'a [f64],
+    pub radius: f64,
+    /// Variance of the centre, for the reference curvature of the extended target.
+    pub variance: f64,
+}
+
+/// The solution of one state.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobustSolution {
+    pub action: f64,
+    /// The action, moved past a bound by the one-sided derivative there over a reference curvature.
+    pub extended_action: f64,
+    /// Log certainty equivalent over the all-bank floor, at least 0.
+    pub floor_gain: f64,
+    /// Primal minus dual value, in log certainty equivalent.
+    pub duality_gap: f64,
+    /// Lost relative utility per unit of radius.
+    pub multiplier: f64,
+    pub support: Vec<f64>,
+    pub worst: WorstLaw,
+    /// True where the multiplier proves that no mass wants to leave the window.
+    pub certified: bool,
+}
+
+/// The support with the centre's masses on it.
+struct Grid {
+    support: Vec<f64>,
+    masses: Vec<f64>,
+}
+
+impl RobustStep<'_> {
+    /// Solves the step at `state`. Windows grow until certified; then the support is refined around the
+    /// destinations of the worst law and the action polished.
+    pub fn solve(&self, state: &State) -> RobustSolution {
+        let (mut reach, mut solved) = (REACH, None);
+        for growth in 0..=WINDOW_GROWTHS {
+            let found = self.solve_in_window(state, reach);
+            let done = found.certified || self.support.is_some() || self.radius <= 0.0 || growth == WINDOW_GROWTHS;
+            solved = Some(found);
+            if done {
+                break;
+            }
+            reach = (2.0 * reach.0, 2.0 * reach.1);
+        }
+        solved.unwrap_or_else(|| self.solve_in_window(state, reach))
+    }
+
+    fn solve_in_window(&self, state: &State, reach: (f64, f64)) -> RobustSolution {
+        let returns = self.exact_returns(reach);
+        let field = GainField::tabulate(self.field, state, returns.clone());
+        let mut grid = self.grid(subdivided(&returns, SUPPORT_PARTS, |_| true));
+        let highest = self.field.highest_action;
+        let mut rows = field.at(&grid.support);
+        let (action, _) = self.best_action(&grid, &rows, 0.0, highest);
+        if self.radius > 0.0 && action > 0.0 {
+            let near: Vec<bool> = self.destinations(&grid, &rows, action);
+            let refined = subdivided(&grid.support, REFINED_PARTS, |interval| near[interval] || near[interval + 1]);
+            grid = self.grid(refined);
+            rows = field.at(&grid.support);
+        }
+        let part = highest / COARSE_ACTIONS as f64;
+        let (low, high) = ((action - part).max(0.0), (action + part).min(highest));
+        let (action, _) = maximise_concave_scalar(|a| self.robust_value(&grid, &rows, a), low, high, ACTION_TOLERANCE);
+        self.solution(grid, &rows, action)
+    }
+
+    fn solution(&self, grid: Grid, rows: &FieldRows, action: f64) -> RobustSolution {
+        let payoff = self.payoff(&grid.support, rows, action);
+        let worst = self.ball(&grid).worst_law(&payoff);
+        let gain = self.utility.inverse(worst.expectation);
+        RobustSolution {
+            action,
+            extended_action: self.extended(&grid, rows, action, gain),
+            floor_gain: gain.max(0.0),
+            duality_gap: gain - self.utility.inverse(worst.dual),
+            multiplier: worst.multiplier,
+            certified: self.certified(&grid, &payoff, &worst, action),
+            worst,
+            support: grid.support,
+        }
+    }
+
+    fn ball<'g>(&self, grid: &'g Grid) -> WassersteinBall<'g> {
+        WassersteinBall { support: &grid.support, masses: &grid.masses, radius: self.radius }
+    }
+
+    /// Relative utility of the next state's certainty equivalent at every support point.
+    fn payoff(&self, support: &[f64], rows: &FieldRows, action: f64) -> Vec<f64> {
+        let rate = self.field.rate_per_step;
+        let bank = rate.ln_1p();
+        let payoff = |(index, &log_return): (usize, &f64)| {
+            let log_growth = growth(action, log_return, rate).ln();
+            self.utility.value(log_growth - bank + rows.gain(index, log_growth))
+        };
+        support.iter().enumerate().map(payoff).collect()
+    }
+
+    /// Worst expected relative utility of an action.
+    fn robust_value(&self, grid: &Grid, rows: &FieldRows, action: f64) -> f64 {
+        self.ball(grid).worst_expectation(&self.payoff(&grid.support, rows, action)).0
+    }
+
+    fn best_action(&self, grid: &Grid, rows: &FieldRows, low: f64, high: f64) -> (f64, f64) {
+        let value = |action: f64| self.robust_value(grid, rows, action);
+        let part = (high - low) / COARSE_ACTIONS as f64;
+        let mut best = (low, value(low));
+        for index in 1..=COARSE_ACTIONS {
+            let action = low + index as f64 * part;
+            let tried = value(action);
+            if tried > best.1 {
+                best = (action, tried);
+            }
+        }
+        best
+    }
+
+    /// Support points that receive mass from elsewhere.
+    fn destinations(&self, grid: &Grid, rows: &FieldRows, action: f64) -> Vec<bool> {
+        let mut near = vec![false; grid.support.len()];
+        for moved in self.ball(grid).worst_law(&self.payoff(&grid.support, rows, action)).moves {
+            near[moved.to] |= moved.to != moved.from;
+        }
+        near
+    }
+
+    fn extended(&self, grid: &Grid, rows: &FieldRows, action: f64, gain: f64) -> f64 {
+        let highest = self.field.highest_action;
+        let inward = if action <= 0.0 {
+            1.0
+        } else if action >= highest {
+            -1.0
+        } else {
+            return action;
+        };
+        let near = self.utility.inverse(self.robust_value(grid, rows, action + inward * DERIVATIVE_STEP));
+        let derivative = inward * (near - gain) / DERIVATIVE_STEP;
+        let curvature = self.utility.relative_risk_aversion() * self.variance;
+        let extension = (derivative / curvature).clamp(-LARGEST_EXTENSION, LARGEST_EXTENSION);
+        if inward > 0.0 { action + extension.min(0.0) } else { action + extension.max(0.0) }
+    }
+
+    /// Proves from the multiplier that no law with mass outside the window does worse.
+    ///
+    /// Outside, the payoff is at least u at zero gain. Mass of atom j stays if, for every z outside,
+    /// `u0(z) + gamma |z - z_j| >= E_j`, E the envelope; checked interval by interval, u0 being increasing.
+    fn certified(&self, grid: &Grid, payoff: &[f64], worst: &WorstLaw, action: f64) -> bool {
+        let (Some(&first), Some(&last)) = (grid.support.first(), grid.support.last()) else { return true };
+        let rate = self.field.rate_per_step;
+        let lowest = |z: f64| self.utility.value(growth(action, z, rate).ln() - rate.ln_1p());
+        let gamma = worst.multiplier;
+        let envelope = self.ball(grid).envelope(payoff, gamma);
+        let (mut below, mut above) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        for ((&point, &mass), &value) in grid.support.iter().zip(&grid.masses).zip(&envelope) {
+            if mass > 0.0 {
+                below = below.max(value - gamma * (point - first));
+                above = above.max(value - gamma * (last - point));
+            }
+        }
+        // Rounding of the envelope, in relative utility.
+        const SLACK: f64 = 1e-12;
+        let mut edge = 0.0;
+        while edge < 40.0 {
+            let far = edge + 0.02 + 0.1 * edge;
+            if lowest(first - far) + gamma * edge < below - SLACK {
+                return false;
+            }
+            edge = far;
+        }
+        lowest(last) >= above - SLACK
+    }
+
+    /// Returns at which the field is exact: evenly across the atoms, then with growing gaps to the window's edges.
+    fn exact_returns(&self, reach: (f64, f64)) -> Vec<f64> {
+        let (Some(&lowest), Some(&highest)) = (self.atoms.first(), self.atoms.last()) else { return vec![0.0] };
+        let gap = ((highest - lowest) / CORE_RETURNS as f64).max(1e-4);
+        let mut returns: Vec<f64> = (0..=CORE_RETURNS).map(|index| lowest + index as f64 * gap).collect();
+        if self.radius > 0.0 {
+            let (low, high) = match self.support {
+                Some(Interval { min, max }) => (min, max),
+                None => (lowest - reach.0, highest + reach.1),
+            };
+            for (start, limit, sign) in [(lowest, low, -1.0), (returns[CORE_RETURNS], high, 1.0)] {
+                let (mut at, mut step) = (start, gap);
+                while sign * (limit - at) > 1e-12 {
+                    at = if sign * (limit - at) > 1.5 * step { at + sign * step } else { limit };
+                    returns.push(at);
+                    step *= TAIL_RATIO;
+                }
+            }
+            returns.retain(|&z| z >= low && z <= high);
+        }
+        returns.sort_by(f64::total_cmp);
+        returns.dedup();
+        returns
+    }
+
+    /// Merges the atoms into `points`. Without a radius the atoms alone are the support.
+    fn grid(&self, points: Vec<f64>) -> Grid {
+        if self.radius <= 0.0 {
+            return Grid { support: self.atoms.to_vec(), masses: self.masses.to_vec() };
+        }
+        let mut all: Vec<(f64, f64)> = self.atoms.iter().copied().zip(self.masses.iter().copied()).collect();
+        all.extend(
+            points
+                .into_iter()
+                .filter(|point| self.atoms.binary_search_by(|a| a.total_cmp(point)).is_err())
+                .map(|p| (p, 0.0)),
+        );
+        all.sort_by(|left, right| left.0.total_cmp(&right.0));
+        all.dedup_by(|next, kept| next.0 == kept.0);
+        let (support, masses) = all.into_iter().unzip();
+        Grid { support, masses }
+    }
+}
+
+/// `points` with the chosen intervals cut into equal parts.
+fn subdivided(points: &[f64], parts: usize, chosen: impl Fn(usize) -> bool) -> Vec<f64> {
+    let mut all = Vec::with_capacity(points.len() * parts);
+    for (interval, pair) in points.windows(2).enumerate() {
+        all.push(pair[0]);
+        if chosen(interval) {
+            all.extend((1..parts).map(|part| pair[0] + (pair[1] - pair[0]) * part as f64 / parts as f64));
+        }
+    }
+    all.extend(points.last());
+    all
+}

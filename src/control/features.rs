@@ -1,0 +1,134 @@
+//! From a state to the inputs of a surrogate.
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use super::specification::{FeatureMap, Specification};
+use super::utility::depends_on_wealth;
+use crate::numerics::moments::CentralMoments;
+
+/// Standard deviations below this count as this: the log stays finite.
+const SMALLEST_DEVIATION: f64 = 1e-8;
+/// Radii below this count as this.
+const SMALLEST_RADIUS: f64 = 1e-12;
+/// A feature whose spread over the design is below this share of its size carries no information.
+const SMALLEST_SPREAD: f64 = 1e-9;
+
+/// Which features a specification has, in order: wealth first, then the law, then the radius.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FeatureSelection {
+    map: FeatureMap,
+    wealth: bool,
+    moments: usize,
+    radius: bool,
+}
+
+impl FeatureSelection {
+    /// `radius_varies`: whether laws of one sample size have different radii.
+    pub fn new(specification: &Specification, radius_varies: bool) -> Self {
+        let learns = specification.problem.framework.learns();
+        let map = specification.surrogate.features;
+        FeatureSelection {
+            map,
+            wealth: depends_on_wealth(specification.problem.utility),
+            moments: if learns { specification.surrogate.moment_count } else { 0 },
+            radius: learns && radius_varies && map == FeatureMap::Standardized,
+        }
+    }
+
+    /// True where wealth is the first feature.
+    pub fn has_wealth(&self) -> bool {
+        self.wealth
+    }
+
+    /// True where the radius is the last feature.
+    pub fn has_radius(&self) -> bool {
+        self.radius
+    }
+
+    /// Names, in order.
+    pub fn names(&self) -> Vec<String> {
+        let standardized = self.map == FeatureMap::Standardized;
+        let mut names = Vec::new();
+        if self.wealth {
+            names.push(if standardized { "log_wealth" } else { "wealth" }.to_owned());
+        }
+        for order in 1..=self.moments {
+            names.push(match (standardized, order) {
+                (false, _) => format!("moment_{order}"),
+                (true, 1) => "mean".to_owned(),
+                (true, 2) => "log_standard_deviation".to_owned(),
+                (true, 3) => "skewness".to_owned(),
+                (true, 4) => "log_kurtosis".to_owned(),
+                (true, _) => format!("shape_{order}"),
+            });
+        }
+        if self.radius {
+            names.push("log_radius".to_owned());
+        }
+        names
+    }
+
+    /// The wealth feature.
+    pub fn wealth(&self, wealth: f64) -> f64 {
+        if self.map == FeatureMap::Standardized { wealth.ln() } else { wealth }
+    }
+
+    /// All features of a state, unscaled.
+    pub fn of(&self, wealth: f64, moments: &CentralMoments, radius: f64) -> Vec<f64> {
+        let mut features = Vec::with_capacity(self.moments + 2);
+        if self.wealth {
+            features.push(self.wealth(wealth));
+        }
+        for order in 1..=self.moments {
+            features.push(match self.map {
+                FeatureMap::Standardized => moments.shape(order, SMALLEST_DEVIATION),
+                FeatureMap::RawMoments => moments.raw(order),
+            });
+        }
+        if self.radius {
+            features.push(radius.max(SMALLEST_RADIUS).ln());
+        }
+        features
+    }
+}
+
+/// Centre and spread of the features that vary over a step's design.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scaling {
+    /// Indices, among all features, of those that vary.
+    pub active: Vec<usize>,
+    pub centre: Vec<f64>,
+    pub spread: Vec<f64>,
+}
+
+impl Scaling {
+    /// Mean and standard deviation over `rows`, one vector of features a design point.
+    pub fn of(rows: &[Vec<f64>]) -> Self {
+        let mut scaling = Scaling { active: Vec::new(), centre: Vec::new(), spread: Vec::new() };
+        let count = rows.len() as f64;
+        for feature in 0..rows.first().map_or(0, Vec::len) {
+            let mean = rows.iter().map(|row| row[feature]).sum::<f64>() / count;
+            let variance = rows.iter().map(|row| (row[feature] - mean).powi(2)).sum::<f64>() / count;
+            if variance.sqrt() > SMALLEST_SPREAD * (1.0 + mean.abs()) {
+                scaling.active.push(feature);
+                scaling.centre.push(mean);
+                scaling.spread.push(variance.sqrt());
+            }
+        }
+        scaling
+    }
+
+    /// The surrogate's inputs: the active features in units of their spread.
+    pub fn apply(&self, features: &[f64]) -> Vec<f64> {
+        let scaled = self.active.iter().zip(self.centre.iter().zip(&self.spread));
+        scaled.map(|(&feature, (centre, spread))| (features[feature] - centre) / spread).collect()
+    }
+
+    /// One scaled row a design point.
+    pub fn matrix(&self, rows: &[Vec<f64>]) -> DMatrix<f64> {
+        let flat: Vec<f64> = rows.iter().flat_map(|row| self.apply(row)).collect();
+        DMatrix::from_row_slice(rows.len(), self.active.len(), &flat)
+    }
+}

@@ -1,0 +1,114 @@
+//! Utilities, in units of the all-bank floor.
+//!
+//! A utility enters the Bellman step only up to a positive affine map, so it is taken relative to the terminal
+//! wealth L of all-bank: with `w = ln(x_T / L)`, `u(0) = 0` and `u'(0) = 1`. Rounding is then relative to the gain
+//! the investor cares about, at any wealth and risk aversion.
+
+use super::specification::UtilitySpecification;
+
+/// Largest exponent taken: exp(600) is finite, and a loss that deep is never chosen.
+const LARGEST_EXPONENT: f64 = 600.0;
+
+/// Utility of the log gain over the floor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RelativeUtility {
+    /// `u(w) = (1 - exp(-k (e^w - 1))) / k`, k the risk aversion times the floor.
+    Exponential { k: f64 },
+    /// `u(w) = (e^((1 - eta) w) - 1) / (1 - eta)`, eta the risk aversion.
+    Power { eta: f64 },
+    /// `u(w) = w`.
+    Log,
+}
+
+impl RelativeUtility {
+    /// The utility seen from a floor of terminal wealth `floor`.
+    pub fn new(utility: UtilitySpecification, floor: f64) -> Self {
+        match utility {
+            UtilitySpecification::Exponential { risk_aversion } => {
+                RelativeUtility::Exponential { k: risk_aversion * floor }
+            }
+            UtilitySpecification::Power { risk_aversion } => RelativeUtility::Power { eta: risk_aversion },
+            UtilitySpecification::Log {} => RelativeUtility::Log,
+        }
+    }
+
+    /// u(w).
+    pub fn value(self, log_gain: f64) -> f64 {
+        match self {
+            RelativeUtility::Exponential { k } => -(-k * log_gain.exp_m1()).min(LARGEST_EXPONENT).exp_m1() / k,
+            RelativeUtility::Power { eta } => ((1.0 - eta) * log_gain).min(LARGEST_EXPONENT).exp_m1() / (1.0 - eta),
+            RelativeUtility::Log => log_gain.max(-LARGEST_EXPONENT),
+        }
+    }
+
+    /// The log gain whose utility is `value`: the log certainty equivalent over the floor.
+    pub fn inverse(self, value: f64) -> f64 {
+        match self {
+            RelativeUtility::Exponential { k } => (-(-k * value).ln_1p() / k).ln_1p(),
+            RelativeUtility::Power { eta } => ((1.0 - eta) * value).ln_1p() / (1.0 - eta),
+            RelativeUtility::Log => value,
+        }
+    }
+
+    /// Relative risk aversion at the floor, `-u''(0) + 1` in log wealth.
+    pub fn relative_risk_aversion(self) -> f64 {
+        match self {
+            RelativeUtility::Exponential { k } => k,
+            RelativeUtility::Power { eta } => eta,
+            RelativeUtility::Log => 1.0,
+        }
+    }
+}
+
+/// U(x), as the request defines it.
+pub fn utility(utility: UtilitySpecification, wealth: f64) -> f64 {
+    match utility {
+        UtilitySpecification::Exponential { risk_aversion } => -(-risk_aversion * wealth).exp_m1() / risk_aversion,
+        UtilitySpecification::Power { risk_aversion } => {
+            ((1.0 - risk_aversion) * wealth.ln()).exp_m1() / (1.0 - risk_aversion)
+        }
+        UtilitySpecification::Log {} => wealth.ln(),
+    }
+}
+
+/// U^{-1}(v): the certainty equivalent of the value v.
+pub fn certainty_equivalent(utility: UtilitySpecification, value: f64) -> f64 {
+    match utility {
+        UtilitySpecification::Exponential { risk_aversion } => -(-risk_aversion * value).ln_1p() / risk_aversion,
+        UtilitySpecification::Power { risk_aversion } => {
+            (((1.0 - risk_aversion) * value).ln_1p() / (1.0 - risk_aversion)).exp()
+        }
+        UtilitySpecification::Log {} => value.exp(),
+    }
+}
+
+/// True where the floor gain depends on wealth: power and log utility are homogeneous.
+pub fn depends_on_wealth(utility: UtilitySpecification) -> bool {
+    matches!(utility, UtilitySpecification::Exponential { .. })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn relative_utility_is_an_affine_map_of_the_utility() {
+        let floor = 120.0;
+        for kind in [
+            UtilitySpecification::Exponential { risk_aversion: 0.02 },
+            UtilitySpecification::Power { risk_aversion: 3.0 },
+            UtilitySpecification::Log {},
+        ] {
+            let relative = RelativeUtility::new(kind, floor);
+            let slope = floor * (utility(kind, floor * 1.000_001) - utility(kind, floor * 0.999_999)) / (2e-6 * floor);
+            for gain in [-1.5, -0.1, 0.0, 0.02, 0.7_f64] {
+                let direct = (utility(kind, floor * gain.exp()) - utility(kind, floor)) / slope;
+                // The slope is a central difference: relative error 1e-12 of curvature plus 1e-9 of cancellation.
+                assert!((relative.value(gain) - direct).abs() < 1e-8 * (1.0 + direct.abs()), "{kind:?} {gain}");
+                assert!((relative.inverse(relative.value(gain)) - gain).abs() < 1e-12);
+                let back = certainty_equivalent(kind, utility(kind, floor * gain.exp()));
+                assert!((back / (floor * gain.exp()) - 1.0).abs() < 1e-9);
+            }
+        }
+    }
+}
