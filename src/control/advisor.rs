@@ -1,14 +1,21 @@
 //! A policy made ready to answer: what to hold in a state, what the law and the radius are, where the next return leads.
-//! Live sessions and the simulator call these same functions.  (STUB BODIES)
+//! Live sessions and the simulator call these same functions.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use std::sync::OnceLock;
+
+use super::backward::{ProblemContext, StepSolution};
+use super::bellman::RobustSolution;
 use super::error::{FieldError, PolicyError};
 use super::policy::Policy;
-use super::specification::Specification;
-use super::state::State;
+use super::specification::{Framework, Specification, UtilitySpecification};
+use super::state::{State, next_state};
+use super::surrogate::{NextValue, SingleSolution, Solution, TargetMap, ValueSurrogate};
+use super::utility::depends_on_wealth;
 use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::gp::{GaussianProcess, GpMean};
 
 /// How an allocation is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,11 +95,40 @@ pub struct Uncertainty {
 /// A policy with what its evaluation needs prepared. Cheap to share behind an `Arc`; all methods are pure.
 pub struct Advisor {
     policy: Policy,
+    context: ProblemContext,
+    steps: Vec<PreparedStep>,
+}
+
+/// One step ready for evaluation. The factor behind the predicted deviation is built on first use.
+enum PreparedStep {
+    Single(SingleSolution),
+    Surrogates { value: Box<ValueSurrogate>, policy: GpMean, deviation: OnceLock<Option<GaussianProcess>> },
+}
+
+/// What the surrogates say of a state.
+struct Prediction {
+    action: f64,
+    floor_gain: f64,
+    deviation: f64,
+    in_design: bool,
 }
 
 impl Advisor {
+    /// # Errors
+    /// None today; kept fallible because a stored policy is outside input.
     pub fn new(policy: Policy) -> Result<Self, PolicyError> {
-        Ok(Advisor { policy })
+        let context = ProblemContext::new(policy.specification());
+        let prepare = |step: &StepSolution| match &step.solution {
+            Solution::Single(single) => PreparedStep::Single(*single),
+            Solution::Surrogates(stored) => {
+                let policy = GpMean::new(&stored.matrix(), &stored.policy.weights, &stored.policy.hyperparameters);
+                let target = TargetMap::new(&context.specification, step.step);
+                let value = Box::new(ValueSurrogate::new(stored, target));
+                PreparedStep::Surrogates { value, policy, deviation: OnceLock::new() }
+            }
+        };
+        let steps = policy.steps().iter().map(prepare).collect();
+        Ok(Advisor { policy, context, steps })
     }
 
     pub fn policy(&self) -> &Policy {
@@ -106,64 +142,209 @@ impl Advisor {
     /// The state a session starts from: `history` and `wealth` default to the specification's.
     ///
     /// # Errors
-    /// A history or wealth that breaks a rule; a history other than the policy's own under the static framework.
+    /// A history or wealth that breaks a rule; a history other than the policy's own under the static framework,
+    /// whose ball is frozen at it.
     pub fn initial_state(&self, history: Option<&[f64]>, wealth: Option<f64>) -> Result<State, FieldError> {
         let problem = &self.specification().problem;
-        let history = history.unwrap_or(&problem.history);
-        super::limits::history("history", history)?;
-        let wealth = wealth.unwrap_or(problem.initial_wealth);
-        super::limits::within("wealth", wealth, 1e-6, 1e15)?;
-        Ok(State { wealth, law: EmpiricalDistribution::new(history) })
+        let own = &problem.history;
+        let history = history.unwrap_or(own);
+        if problem.framework == Framework::Static && history != own {
+            let value = format!("{} values", history.len());
+            return Err(FieldError::new("history", value, "must be the policy's own under the static framework"));
+        }
+        State::new(history, wealth.unwrap_or(problem.initial_wealth))
     }
 
-    /// The advice for the period that follows `step` periods already observed; `step < horizon`.
+    /// The advice for the period after `step` observed periods. `step` must be below the horizon.
+    /// Cost: two kernel sums and one triangular solve; a robust step where it re-solves.
     pub fn advise(&self, step: usize, state: &State, mode: AdviceMode) -> Advice {
-        let floor = state.wealth
-            * (1.0 + self.specification().problem.rate_per_step)
-                .powi((self.specification().problem.horizon - step) as i32);
-        Advice {
-            allocation: 0.5,
-            certainty_equivalent: floor * 1.01,
-            floor,
-            radius: 0.01,
-            sample_size: state.law.sample_size(),
-            surrogate_sd: 0.0,
-            in_design: true,
-            source: if mode == AdviceMode::Resolve { AdviceSource::Resolved } else { AdviceSource::PolicySurrogate },
+        let predicted = self.predict(step, state);
+        if mode == AdviceMode::Surrogate && predicted.in_design {
+            let source = AdviceSource::PolicySurrogate;
+            return self.advice(step, state, predicted.action, predicted.floor_gain, &predicted, source);
         }
+        self.resolved(step, state, mode, &predicted).0
     }
 
     /// The re-solved advice and the worst-case law behind it.
     pub fn explain(&self, step: usize, state: &State) -> (Advice, WorstCase) {
-        let transport = state
-            .law
-            .atoms()
-            .iter()
-            .map(|&atom| TransportedMass { atom, moved_to: atom, mass: 1.0 / state.law.sample_size() as f64 })
-            .collect();
-        (
-            self.advise(step, state, AdviceMode::Resolve),
-            WorstCase { multiplier: 1.0, transport, duality_gap: 0.0, sentence: "stub".into() },
-        )
+        let predicted = self.predict(step, state);
+        let (advice, solution) = self.resolved(step, state, AdviceMode::Resolve, &predicted);
+        let worst = match solution {
+            Some(solution) => worst_case(&solution, &advice, self.utility_per_radius(step, state)),
+            None => WorstCase::unknown(),
+        };
+        (advice, worst)
+    }
+
+    fn resolved(
+        &self,
+        step: usize,
+        state: &State,
+        mode: AdviceMode,
+        predicted: &Prediction,
+    ) -> (Advice, Option<RobustSolution>) {
+        let after = self.policy.steps().get(step + 1).map(|after| &after.solution);
+        let next = NextValue::new(self.specification(), step + 1, after);
+        let source =
+            if mode == AdviceMode::Resolve { AdviceSource::Resolved } else { AdviceSource::ResolvedOutsideDesign };
+        match self.context.solve(step, state, &next) {
+            Ok(solution) if solution.action.is_finite() && solution.floor_gain.is_finite() => {
+                let advice = self.advice(step, state, solution.action, solution.floor_gain, predicted, source);
+                (advice, Some(solution))
+            }
+            // All-bank is feasible and no law can hurt it.
+            _ => (self.advice(step, state, 0.0, 0.0, predicted, source), None),
+        }
+    }
+
+    fn advice(
+        &self,
+        step: usize,
+        state: &State,
+        allocation: f64,
+        floor_gain: f64,
+        predicted: &Prediction,
+        source: AdviceSource,
+    ) -> Advice {
+        let floor = self.context.floor(step, state);
+        Advice {
+            allocation,
+            certainty_equivalent: floor * floor_gain.exp(),
+            floor,
+            radius: self.context.radius(state),
+            sample_size: state.law.sample_size(),
+            surrogate_sd: predicted.deviation,
+            in_design: predicted.in_design,
+            source,
+        }
+    }
+
+    fn predict(&self, step: usize, state: &State) -> Prediction {
+        match &self.steps[step] {
+            PreparedStep::Single(single) => {
+                let in_design = self.is_single_state(step, state);
+                Prediction { action: single.action, floor_gain: single.floor_gain, deviation: 0.0, in_design }
+            }
+            PreparedStep::Surrogates { value, policy, deviation } => {
+                let input = value.scaling.apply(&self.context.features(state));
+                let Solution::Surrogates(stored) = &self.policy.steps()[step].solution else {
+                    return Prediction { action: 0.0, floor_gain: 0.0, deviation: f64::INFINITY, in_design: false };
+                };
+                let process = deviation.get_or_init(|| {
+                    let zeros = vec![0.0; stored.value.weights.len()];
+                    GaussianProcess::condition(&stored.matrix(), &zeros, &stored.value.hyperparameters).ok()
+                });
+                let deviation = process.as_ref().map_or(f64::INFINITY, |found| found.latent_variance(&input).sqrt());
+                let highest = self.specification().problem.action_interval[1];
+                let action = stored.policy.offset + stored.policy.scale * policy.mean(&input);
+                let prediction = value.offset + value.scale * value.mean.mean(&input);
+                Prediction {
+                    action: action.clamp(0.0, highest),
+                    floor_gain: value.clamped_gain(prediction, state.wealth),
+                    deviation: deviation * value.scale,
+                    in_design: deviation <= stored.deviation_limit && action.is_finite(),
+                }
+            }
+        }
+    }
+
+    /// Whether `state` is the one state that a single-state step was solved at.
+    fn is_single_state(&self, step: usize, state: &State) -> bool {
+        let problem = &self.specification().problem;
+        let start = EmpiricalDistribution::new(&problem.history);
+        let same_law = !problem.framework.learns() || (step == 0 && state.law == start);
+        let trained = self.specification().design.wealth.map_or(problem.initial_wealth, |wealth| wealth.min);
+        let same_wealth = !depends_on_wealth(problem.utility) || state.wealth == trained;
+        same_law && same_wealth
+    }
+
+    /// Relative utility to utility: the derivative of U at the floor times the floor.
+    fn utility_per_radius(&self, step: usize, state: &State) -> f64 {
+        let floor = self.context.floor(step, state);
+        match self.specification().problem.utility {
+            UtilitySpecification::Exponential { risk_aversion } => floor * (-risk_aversion * floor).exp(),
+            UtilitySpecification::Power { risk_aversion } => floor.powf(1.0 - risk_aversion),
+            UtilitySpecification::Log {} => 1.0,
+        }
     }
 
     /// Sample size, moments, quantile and radius of a state.
     pub fn uncertainty(&self, state: &State) -> Uncertainty {
-        let moments = state.law.raw_moments(self.specification().surrogate.moment_count);
+        let frozen = EmpiricalDistribution::new(&self.specification().problem.history);
+        let law = if self.specification().problem.framework == Framework::Static { &frozen } else { &state.law };
+        let quantile = self.context.sets.quantile(law);
         Uncertainty {
             sample_size: state.law.sample_size(),
-            moments,
-            quantile: Some(0.1),
-            quantile_standard_error: Some(0.001),
-            radius: 0.01,
+            moments: state.law.raw_moments(self.specification().surrogate.moment_count),
+            quantile: quantile.map(|found| found.value),
+            quantile_standard_error: quantile.map(|found| found.standard_error),
+            radius: self.context.radius(state),
         }
     }
 
     /// The state after holding `allocation` through `log_return`.
     pub fn advance(&self, state: &State, allocation: f64, log_return: f64) -> State {
-        let mut law = state.law.clone();
-        law.push(log_return);
-        let gross = 1.0 + self.specification().problem.rate_per_step;
-        State { wealth: state.wealth * ((1.0 - allocation) * gross + allocation * log_return.exp()), law }
+        next_state(state, allocation, log_return, self.specification().problem.rate_per_step)
+    }
+
+    /// Follows the policy through `returns` from `start`: the advice before each return, and the state after the last.
+    /// At most `horizon` returns are used.
+    pub fn simulate(&self, start: State, returns: &[f64]) -> (Vec<Advice>, State) {
+        let mut state = start;
+        let mut advices = Vec::with_capacity(returns.len());
+        for (step, &log_return) in returns.iter().take(self.specification().problem.horizon).enumerate() {
+            let advice = self.advise(step, &state, AdviceMode::Surrogate);
+            state = self.advance(&state, advice.allocation, log_return);
+            advices.push(advice);
+        }
+        (advices, state)
+    }
+}
+
+impl WorstCase {
+    fn unknown() -> Self {
+        let sentence =
+            "The robust step has no finite solution at this state, so all wealth stays in the bank.".to_owned();
+        WorstCase { multiplier: 0.0, transport: Vec::new(), duality_gap: 0.0, sentence }
+    }
+}
+
+fn worst_case(solution: &RobustSolution, advice: &Advice, utility_scale: f64) -> WorstCase {
+    let transport: Vec<TransportedMass> = solution
+        .worst
+        .moves
+        .iter()
+        .map(|m| TransportedMass { atom: solution.support[m.from], moved_to: solution.support[m.to], mass: m.mass })
+        .collect();
+    let moved = transport.iter().filter(|mass| mass.atom != mass.moved_to);
+    let share: f64 = moved.clone().map(|mass| mass.mass).sum();
+    let lowest = moved.clone().map(|mass| mass.moved_to).fold(f64::INFINITY, f64::min);
+    let sentence = if share > 0.0 {
+        format!(
+            "Against an allocation of {:.1} %, the worst law within distance {:.4} of the {} returns seen moves {:.1} % of \
+             the probability, down to a return of {:.1} % in one period; against that law the allocation is still worth \
+             {:.2} for certain at the horizon, and all-bank {:.2}.",
+            100.0 * advice.allocation,
+            advice.radius,
+            advice.sample_size,
+            100.0 * share,
+            100.0 * lowest.exp_m1(),
+            advice.certainty_equivalent,
+            advice.floor
+        )
+    } else {
+        format!(
+            "At an allocation of {:.1} % no law within distance {:.4} of the {} returns seen does worse than the empirical one.",
+            100.0 * advice.allocation,
+            advice.radius,
+            advice.sample_size
+        )
+    };
+    WorstCase {
+        multiplier: solution.multiplier * utility_scale,
+        transport,
+        duality_gap: solution.duality_gap,
+        sentence,
     }
 }

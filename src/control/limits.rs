@@ -11,7 +11,8 @@ pub const DEFAULT_COUNT: usize = 1000;
 /// Design points per step where the state is wealth alone: the paper's count.
 pub const DEFAULT_COUNT_WEALTH_ALONE: usize = 200;
 /// The covariance matrix of 10,000 points takes 800 MB.
-const COUNT: std::ops::RangeInclusive<usize> = 10..=10_000;
+pub const LARGEST_COUNT: usize = 10_000;
+const COUNT: std::ops::RangeInclusive<usize> = 10..=LARGEST_COUNT;
 /// Ten years of weeks.
 const HORIZON: std::ops::RangeInclusive<usize> = 1..=520;
 const HISTORY_LENGTH: std::ops::RangeInclusive<usize> = 2..=20_000;

@@ -1,12 +1,14 @@
-//! A trained policy: immutable, portable, named by the hash of its bytes.  (STUB BODIES)
+//! A trained policy: immutable, portable, named by the hash of its bytes.
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
-use super::backward::StepSolution;
-use super::error::PolicyError;
+use super::backward::{ProblemContext, StepSolution};
+use super::error::{FieldError, PolicyError};
+use super::limits;
 use super::specification::Specification;
+use super::surrogate::{SingleSolution, Solution, StepSurrogates};
 
 /// The completed specification and the solution of every step, in ascending order of step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -25,6 +27,8 @@ pub struct StepDiagnostics {
     pub design_count: usize,
     /// Share of the design points at which the robust allocation is zero.
     pub all_bank_share: f64,
+    /// Share of the design points whose window could not be certified: mass might want to leave it.
+    pub uncertified_share: f64,
     /// Largest difference between the primal and the dual value of a robust step, in log certainty equivalent.
     pub duality_gap: f64,
     /// Diagnostics of the value surrogate; absent where the step stores a single state's solution.
@@ -54,14 +58,23 @@ pub struct SurrogateDiagnostics {
     pub search: String,
 }
 
+/// Name and version of the portable form.
+const FORMAT: &str = "ballast-policy-1";
+
 impl Policy {
+    /// The policy of a completed specification from the solutions of all its steps, ascending.
     pub fn new(specification: Specification, steps: Vec<StepSolution>) -> Self {
-        Policy { format: "ballast-policy-1".into(), specification, steps }
+        Policy { format: FORMAT.to_owned(), specification, steps }
     }
 
     /// The completed specification it was trained from.
     pub fn specification(&self) -> &Specification {
         &self.specification
+    }
+
+    /// The solutions of all steps, ascending.
+    pub fn steps(&self) -> &[StepSolution] {
+        &self.steps
     }
 
     /// Diagnostics of every step, ascending.
@@ -71,13 +84,97 @@ impl Policy {
 
     /// The portable form: JSON whose numbers parse back to the same bits.
     pub fn to_json(&self) -> Vec<u8> {
+        // Serialising plain structs of numbers and strings into memory cannot fail.
         serde_json::to_vec(self).unwrap_or_default()
     }
 
     /// Reads and checks the portable form as hostile input: format, shapes, finite numbers, the specification's rules.
+    ///
+    /// # Errors
+    /// What is wrong, naming the field.
     pub fn from_json(bytes: &[u8]) -> Result<Self, PolicyError> {
-        serde_json::from_slice(bytes).map_err(|error| PolicyError::Format(error.to_string()))
+        let policy: Policy = serde_json::from_slice(bytes).map_err(|error| PolicyError::Format(error.to_string()))?;
+        policy.check()?;
+        Ok(policy)
     }
+
+    fn check(&self) -> Result<(), FieldError> {
+        if self.format != FORMAT {
+            return Err(FieldError::new("format", &self.format, format!("must be {FORMAT}")));
+        }
+        if self.specification.clone().completed()? != self.specification {
+            return Err(FieldError::new("specification", "an object with holes", "must be completed"));
+        }
+        let horizon = self.specification.problem.horizon;
+        if self.steps.len() != horizon {
+            return Err(FieldError::new("steps", self.steps.len(), format!("must hold horizon = {horizon} steps")));
+        }
+        let context = ProblemContext::new(&self.specification);
+        let feature_count = context.selection.names().len();
+        for (index, step) in self.steps.iter().enumerate() {
+            if step.step != index {
+                return Err(FieldError::new(format!("steps[{index}].step"), step.step, format!("must be {index}")));
+            }
+            let field = format!("steps[{index}].solution");
+            match &step.solution {
+                Solution::Single(single) => check_single(&field, single, &self.specification)?,
+                Solution::Surrogates(stored) => check_surrogates(&field, stored, feature_count)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_single(field: &str, single: &SingleSolution, specification: &Specification) -> Result<(), FieldError> {
+    let highest = specification.problem.action_interval[1];
+    limits::within(&format!("{field}.action"), single.action, 0.0, highest)?;
+    limits::within(&format!("{field}.floor_gain"), single.floor_gain, 0.0, LARGEST_GAIN)
+}
+
+/// Largest floor gain believed: a factor e^100.
+const LARGEST_GAIN: f64 = 100.0;
+/// Bound on every other stored number.
+const LARGEST_NUMBER: f64 = 1e30;
+
+fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) -> Result<(), FieldError> {
+    let scaling = &stored.scaling;
+    let inputs = scaling.active.len();
+    let ascending = scaling.active.windows(2).all(|pair| pair[0] < pair[1]);
+    if inputs == 0 || !ascending || scaling.active.iter().any(|&feature| feature >= feature_count) {
+        let rule = format!("must name distinct features below {feature_count}, ascending");
+        return Err(FieldError::new(format!("{field}.scaling.active"), format!("{:?}", scaling.active), rule));
+    }
+    let points = stored.value.weights.len();
+    let shapes = [
+        ("scaling.centre", scaling.centre.len(), inputs),
+        ("scaling.spread", scaling.spread.len(), inputs),
+        ("inputs", stored.inputs.len(), inputs),
+        ("value.hyperparameters.lengthscales", stored.value.hyperparameters.lengthscales.len(), inputs),
+        ("policy.hyperparameters.lengthscales", stored.policy.hyperparameters.lengthscales.len(), inputs),
+        ("policy.weights", stored.policy.weights.len(), points),
+        ("value.weights", points, points.clamp(2, limits::LARGEST_COUNT)),
+    ];
+    let columns = stored.inputs.iter().map(|column| ("inputs", column.len(), points));
+    for (name, found, expected) in shapes.into_iter().chain(columns) {
+        if found != expected {
+            return Err(FieldError::new(format!("{field}.{name}"), found, format!("must have {expected} entries")));
+        }
+    }
+    let plain = scaling.centre.iter().chain(stored.inputs.iter().flatten());
+    for &number in plain.chain(&stored.value.weights).chain(&stored.policy.weights) {
+        limits::within(field, number, -LARGEST_NUMBER, LARGEST_NUMBER)?;
+    }
+    for surrogate in [&stored.value, &stored.policy] {
+        let hyper = &surrogate.hyperparameters;
+        limits::within(&format!("{field}.offset"), surrogate.offset, -LARGEST_NUMBER, LARGEST_NUMBER)?;
+        let positive =
+            hyper.lengthscales.iter().chain([&hyper.signal_variance, &hyper.noise_variance, &surrogate.scale]);
+        for &number in positive.chain(&scaling.spread) {
+            limits::within(field, number, 1.0 / LARGEST_NUMBER, LARGEST_NUMBER)?;
+        }
+    }
+    limits::within(&format!("{field}.deviation_limit"), stored.deviation_limit, 0.0, LARGEST_NUMBER)?;
+    limits::within(&format!("{field}.largest_gain"), stored.largest_gain, 0.0, LARGEST_GAIN)
 }
 
 /// SHA-256 of a policy's portable form, in lower-case hexadecimal: the policy's name.
