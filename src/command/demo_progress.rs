@@ -16,10 +16,14 @@ pub struct Job {
     pub error: Option<Value>,
 }
 
+/// Steps finished, and where the running one is: absent between two steps.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Progress {
-    pub step: usize,
+    pub steps_done: usize,
+    pub step: Option<usize>,
+    #[serde(default)]
     pub done: usize,
+    #[serde(default)]
     pub total: usize,
     pub seconds_left: Option<f64>,
 }
@@ -34,7 +38,7 @@ impl Job {
 const TICKS_PER_STEP: usize = 1000;
 
 pub enum ProgressView {
-    Bar { bar: ProgressBar, horizon: usize },
+    Bar(ProgressBar),
     Lines { last_step: Option<usize> },
 }
 
@@ -47,40 +51,40 @@ impl ProgressView {
         if let Ok(style) = ProgressStyle::with_template("  [{bar:32}] {percent:>3} %  {msg}") {
             bar.set_style(style.progress_chars("=> "));
         }
-        ProgressView::Bar { bar, horizon }
+        ProgressView::Bar(bar)
     }
 
-    /// Shows one event. Steps run backwards, from `horizon - 1` to 0.
+    /// Shows one event.
     pub fn show(&mut self, progress: &Progress) {
         match self {
-            ProgressView::Bar { bar, horizon } => {
-                bar.set_position(position(*horizon, progress) as u64);
-                bar.set_message(sentence(progress));
+            ProgressView::Bar(bar) => {
+                bar.set_position(position(progress) as u64);
+                bar.set_message(sentence(progress).unwrap_or_default());
             }
-            ProgressView::Lines { last_step } if *last_step != Some(progress.step) => {
-                *last_step = Some(progress.step);
-                eprintln!("  {}", sentence(progress));
+            ProgressView::Lines { last_step } if *last_step != progress.step => {
+                *last_step = progress.step;
+                sentence(progress).into_iter().for_each(|sentence| eprintln!("  {sentence}"));
             }
             ProgressView::Lines { .. } => {}
         }
     }
 
     pub fn finish(self) {
-        if let ProgressView::Bar { bar, .. } = self {
+        if let ProgressView::Bar(bar) = self {
             bar.finish_and_clear();
         }
     }
 }
 
-fn position(horizon: usize, progress: &Progress) -> usize {
-    let steps_done = horizon.saturating_sub(progress.step + 1);
-    steps_done * TICKS_PER_STEP + progress.done * TICKS_PER_STEP / progress.total.max(1)
+fn position(progress: &Progress) -> usize {
+    progress.steps_done * TICKS_PER_STEP + progress.done * TICKS_PER_STEP / progress.total.max(1)
 }
 
-fn sentence(progress: &Progress) -> String {
-    let Progress { step, done, total, seconds_left } = progress;
+/// Where the running step is; `None` between two steps.
+fn sentence(progress: &Progress) -> Option<String> {
+    let Progress { step, done, total, seconds_left, .. } = progress;
     let left = seconds_left.map_or(String::new(), |seconds| format!(", about {seconds:.0} s left"));
-    format!("step {step}, design point {done} of {total}{left}")
+    step.map(|step| format!("step {step}, design point {done} of {total}{left}"))
 }
 
 #[cfg(test)]
@@ -88,8 +92,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_bar_starts_at_the_horizon_and_ends_at_step_zero() {
-        let at = |step, done| position(12, &Progress { step, done, total: 60, seconds_left: None });
-        assert_eq!((at(11, 0), at(11, 60), at(10, 0), at(0, 60)), (0, 1000, 1000, 12_000));
+    fn the_bar_moves_by_steps_and_by_design_points_within() {
+        let at =
+            |steps_done, step, done, total| position(&Progress { steps_done, step, done, total, seconds_left: None });
+        assert_eq!((at(0, None, 0, 0), at(0, Some(11), 30, 60)), (0, 500));
+        assert_eq!((at(1, None, 0, 0), at(11, Some(0), 60, 60)), (1000, 12_000));
     }
 }
