@@ -19,7 +19,7 @@ use super::us_market::{MarketError, Month, UsMarket};
 const YEAR: &str = "2008";
 const FIRST_MONTH: &str = "2008-01";
 /// Januaries in which the same rule, looking one month ahead, is asked for comparison.
-const EARLIER: [&str; 3] = ["1947-01", "1975-01", "1987-01"];
+const JANUARIES: [&str; 4] = ["1947-01", "1975-01", "1987-01", FIRST_MONTH];
 /// Months of history: twenty years.
 const HISTORY: usize = 240;
 const HORIZON: usize = 12;
@@ -96,18 +96,18 @@ pub async fn run(args: DemoArgs) -> Result<(), DemoError> {
 async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
     let market = UsMarket::bundled()?;
     let past = Past::before(&market, FIRST_MONTH)?;
-    println!("\nTraining on the US stock market of the {HISTORY} months before {FIRST_MONTH}, for a year ahead:");
     println!(
-        "horizon {HORIZON} months, bank {:.2} % a month, power utility with risk aversion {RISK_AVERSION},",
-        100.0 * past.rate
+        "\nTraining on the US stock market of the {HISTORY} months before {FIRST_MONTH} for the {HORIZON} months after:"
     );
-    println!("adaptive framework, bridge radius at alpha {ALPHA}, {count} design points a step.");
+    println!(
+        "power utility, risk aversion {RISK_AVERSION}, bridge radius at alpha {ALPHA}, {count} design points a step."
+    );
     let policy = train(api, &past, HORIZON, count).await?;
     let session = open_session(api, &policy).await?;
-    println!("Policy {:.12} trained, session {session} opened with wealth {INITIAL_WEALTH}.\n", policy);
+    println!("Policy {policy:.12} is trained; session {session} starts with wealth {INITIAL_WEALTH}.");
     let first = advice(api, &session, false).await?;
     tell_why(&past, &first);
-    compare_earlier(api, &market, count).await?;
+    compare_januaries(api, &market, count).await?;
     let last = live_through(api, &session, &past, market.year(YEAR)).await?;
     tell_worst_case(&last);
     Ok(())
@@ -234,41 +234,48 @@ async fn observe(api: &ApiClient, session: &str, period: usize, simple_return: f
 }
 
 fn tell_why(past: &Past, advice: &Advice) {
-    let percent = 100.0 * advice.allocation;
     println!(
-        "What the investor is told for {}: hold {percent:.0} % in stocks (allocation {:.2}, radius {:.4}).",
-        past.month, advice.allocation, advice.radius
+        "\nTold for {}: hold {:.0} % in stocks (allocation {:.2}, radius {:.4}).",
+        past.month,
+        100.0 * advice.allocation,
+        advice.allocation,
+        advice.radius
     );
     println!(
-        "Why: over {} months stocks paid {:.2} % a month more than the bank. So short a record cannot tell the",
+        "Why: over {} months stocks paid {:.2} % a month beyond the bank. So short a record does not rule out laws",
         advice.sample_size,
         100.0 * past.edge()
     );
     println!(
-        "true law from any other within {:.4} of it: a law that moves the average log-return by {:.2} %. The",
-        advice.radius,
+        "that move the average log-return by {:.2} %, the radius. The advice is the best one against the worst of them,",
         100.0 * advice.radius
     );
     println!(
-        "advice is best against the worst of these, and is worth {:.2} for certain at the horizon, where the",
-        advice.certainty_equivalent
-    );
-    println!(
-        "bank alone pays {:.2}. Where the radius swallows what stocks paid beyond the bank, it says 0.",
-        advice.floor
+        "and counts as {:.2} for certain at the horizon, where the bank alone pays {:.2}.",
+        advice.certainty_equivalent, advice.floor
     );
 }
 
-/// The same rule, one month ahead, in Januaries when it says to stay away. Cheap: each is a single robust solve.
-async fn compare_earlier(api: &ApiClient, market: &UsMarket, count: usize) -> Result<(), DemoError> {
-    println!("\nThe same rule, looking one month ahead, in other Januaries:");
-    println!("{:<8} {:>18} {:>8} {:>11}", "month", "paid beyond bank", "radius", "allocation");
-    for month in EARLIER {
+/// Why a month's allocation is what it is, in the figures of its line.
+fn reason(edge: f64, radius: f64) -> &'static str {
+    match () {
+        () if edge <= 0.0 => "stocks paid less than the bank",
+        () if edge <= radius => "the radius swallows it",
+        () => "more than the radius",
+    }
+}
+
+/// The same rule, one month ahead, in several Januaries. Cheap: each is a single robust solve.
+async fn compare_januaries(api: &ApiClient, market: &UsMarket, count: usize) -> Result<(), DemoError> {
+    println!("\nThe same rule, looking one month ahead, in four Januaries:");
+    println!("{:<8} {:>8} {:>11}  stocks beyond the bank", "month", "radius", "allocation");
+    for month in JANUARIES {
         let past = Past::before(market, month)?;
         let policy = train(api, &past, 1, count).await?;
         let session = open_session(api, &policy).await?;
-        let told = advice(api, &session, false).await?;
-        println!("{month:<8} {:>16.2} % {:>8.4} {:>11.3}", 100.0 * past.edge(), told.radius, told.allocation);
+        let Advice { radius, allocation, .. } = advice(api, &session, false).await?;
+        let (edge, reason) = (past.edge(), reason(past.edge(), radius));
+        println!("{month:<8} {radius:>8.4} {allocation:>11.3}  {:.2} % a month: {reason}", 100.0 * edge);
     }
     Ok(())
 }
@@ -305,7 +312,7 @@ async fn live_through(
 
 fn tell_worst_case(last: &Option<Advice>) {
     let Some(worst_case) = last.as_ref().and_then(|advice| advice.worst_case.as_ref()) else { return };
-    println!("\nThe worst law within the last radius: {}", worst_case.sentence);
+    println!("\nThe worst law for December's advice: {}", worst_case.sentence);
     let moves = largest_moves(&worst_case.transport);
     if moves.is_empty() {
         println!("No return is moved: with nothing in stocks no law can hurt.");

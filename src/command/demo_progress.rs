@@ -39,11 +39,18 @@ const TICKS_PER_STEP: usize = 1000;
 
 pub enum ProgressView {
     Bar(ProgressBar),
-    Lines { last_step: Option<usize> },
+    Lines {
+        last_step: Option<usize>,
+    },
+    /// For a training too short to watch.
+    Nothing,
 }
 
 impl ProgressView {
     pub fn new(horizon: usize) -> Self {
+        if horizon == 1 {
+            return ProgressView::Nothing;
+        }
         if !stderr().is_terminal() {
             return ProgressView::Lines { last_step: None };
         }
@@ -65,7 +72,7 @@ impl ProgressView {
                 *last_step = progress.step;
                 sentence(progress).into_iter().for_each(|sentence| eprintln!("  {sentence}"));
             }
-            ProgressView::Lines { .. } => {}
+            ProgressView::Lines { .. } | ProgressView::Nothing => {}
         }
     }
 
