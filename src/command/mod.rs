@@ -2,5 +2,4 @@
 
 mod api_client;
 pub mod demo;
-mod demo_progress;
 mod us_market;
