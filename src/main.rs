@@ -17,7 +17,7 @@ enum Command {
 async fn main() -> std::process::ExitCode {
     let Command::Demo(args) = Cli::parse().command;
     if let Err(error) = command::demo::run(args).await {
-        eprintln!("ballast: {error}");
+        eprintln!("ballast: {}", command::with_causes(&error));
         return std::process::ExitCode::FAILURE;
     }
     std::process::ExitCode::SUCCESS

@@ -3,7 +3,6 @@
 //! Starts the service in this process on a free loopback port with a data folder of its own, trains on the 240 months
 //! before 2008, and lives through 2008 as an investor's program would: ask, hold, report.
 
-use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -14,6 +13,7 @@ use super::api_client::{ApiClient, ApiError};
 use super::us_market::MarketError;
 
 mod calls;
+mod host;
 mod progress;
 mod story;
 
@@ -65,7 +65,7 @@ impl Drop for DataFolder {
 pub async fn run(args: DemoArgs) -> Result<(), DemoError> {
     let started = Instant::now();
     let folder = DataFolder::new()?;
-    let service = start_service(&folder).await?;
+    let service = host::start(&folder.0).await?;
     println!("Ballast is up on http://{} with its data in {}.", service.address, folder.0.display());
     let api = ApiClient::new(service.address);
     tokio::select! {
@@ -79,22 +79,4 @@ pub async fn run(args: DemoArgs) -> Result<(), DemoError> {
         let _ = tokio::signal::ctrl_c().await;
     }
     service.stop().await
-}
-
-/// The service itself, as `serve` runs it, on a free loopback port.
-struct RunningService {
-    address: SocketAddr,
-}
-
-impl RunningService {
-    async fn stop(self) -> Result<(), DemoError> {
-        Ok(())
-    }
-}
-
-async fn start_service(folder: &DataFolder) -> Result<RunningService, DemoError> {
-    let _ = &folder.0;
-    let address = std::env::var("BALLAST_DEMO_ADDRESS").unwrap_or_default().parse();
-    let address = address.map_err(|source: std::net::AddrParseError| DemoError::Service { source: source.into() })?;
-    Ok(RunningService { address })
 }
