@@ -3,6 +3,7 @@
 //! Starts the service in this process on a free loopback port with a data folder of its own, trains on the 240 months
 //! before 2008, and lives through 2008 as an investor's program would: ask, hold, report.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -67,16 +68,24 @@ pub async fn run(args: DemoArgs) -> Result<(), DemoError> {
     let folder = DataFolder::new()?;
     let service = host::start(&folder.0).await?;
     println!("Ballast is up on http://{} with its data in {}.", service.address, folder.0.display());
-    let api = ApiClient::new(service.address);
-    tokio::select! {
-        outcome = story::narrate(&api, args.count) => outcome?,
-        _ = tokio::signal::ctrl_c() => println!("\nStopped."),
-    }
+    let outcome = tokio::select! {
+        outcome = whole(service.address, &args, started) => outcome,
+        _ = tokio::signal::ctrl_c() => {
+            println!("\nStopped.");
+            Ok(())
+        }
+    };
+    // The service lets go of the folder before the folder goes.
+    service.stop().await?;
+    outcome
+}
+
+async fn whole(address: SocketAddr, args: &DemoArgs, started: Instant) -> Result<(), DemoError> {
+    story::narrate(&ApiClient::new(address), args.count).await?;
     println!("\nDone in {:.0} s.", started.elapsed().as_secs_f64());
     if args.stay {
-        println!("The service stays up on http://{} until Ctrl-C.", service.address);
-        // No handler means no way to be told to stop: end at once.
-        let _ = tokio::signal::ctrl_c().await;
+        println!("The service stays up on http://{address} until Ctrl-C.");
+        std::future::pending::<()>().await;
     }
-    service.stop().await
+    Ok(())
 }
