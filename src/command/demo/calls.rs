@@ -1,5 +1,7 @@
 //! What the demo asks of the service, and what it reads in the answers.
 
+use std::time::Duration;
+
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -7,6 +9,9 @@ use super::DemoError;
 use super::progress::{Job, ProgressView};
 use super::story::{ALPHA, INITIAL_WEALTH, Past, RISK_AVERSION};
 use crate::command::api_client::ApiClient;
+
+/// Pause before an event stream that ended early is opened again.
+const BEFORE_REOPENING: Duration = Duration::from_millis(250);
 
 /// What the demo reads of `GET /action`.
 #[derive(Debug, Clone, Deserialize)]
@@ -71,6 +76,9 @@ pub async fn train(api: &ApiClient, past: &Past, horizon: usize, count: usize) -
             }
         }
         job = read("GET /jobs/{id}", api.get(&path).await?)?;
+        if !job.is_over() {
+            tokio::time::sleep(BEFORE_REOPENING).await;
+        }
     }
     view.finish();
     let reason = job.error.map_or(String::from("no reason given"), |error| error.to_string());
