@@ -1,0 +1,91 @@
+//! `ballast demo`: the whole way once, on real returns, over HTTP.
+//!
+//! Starts the service in this process on a free loopback port with a data folder of its own, trains on the 240 months
+//! before 2008, and lives through 2008 as an investor's program would: ask, hold, report.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+use thiserror::Error;
+
+use super::api_client::{ApiClient, ApiError};
+use super::us_market::MarketError;
+
+mod calls;
+mod host;
+mod progress;
+mod story;
+
+#[derive(Debug, Clone, Args)]
+pub struct DemoArgs {
+    /// Leave the service up afterwards, until Ctrl-C
+    #[arg(long)]
+    stay: bool,
+    /// Design points per step: more is more accurate and slower
+    #[arg(long, default_value_t = 500)]
+    count: usize,
+}
+
+#[derive(Debug, Error)]
+pub enum DemoError {
+    #[error("making the data folder {}", path.display())]
+    Folder { path: PathBuf, source: std::io::Error },
+    #[error("starting the service")]
+    Service { source: Box<dyn std::error::Error + Send + Sync> },
+    #[error("reading the bundled returns")]
+    Market(#[from] MarketError),
+    #[error("calling the service")]
+    Api(#[from] ApiError),
+    #[error("{call} answered JSON of another shape")]
+    Shape { call: &'static str, source: serde_json::Error },
+    #[error("the training ended as {state}: {reason}")]
+    Training { state: String, reason: String },
+}
+
+/// A data folder that is removed with everything in it.
+struct DataFolder(PathBuf);
+
+impl DataFolder {
+    fn new() -> Result<Self, DemoError> {
+        let path = std::env::temp_dir().join(format!("ballast-demo-{}", std::process::id()));
+        std::fs::create_dir(&path).map_err(|source| DemoError::Folder { path: path.clone(), source })?;
+        Ok(DataFolder(path))
+    }
+}
+
+impl Drop for DataFolder {
+    fn drop(&mut self) {
+        // Left behind where it cannot be removed: it is in the system's temporary folder.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Runs the demo to its end, or to Ctrl-C.
+pub async fn run(args: DemoArgs) -> Result<(), DemoError> {
+    let started = Instant::now();
+    let folder = DataFolder::new()?;
+    let service = host::start(&folder.0).await?;
+    println!("Ballast is up on http://{} with its data in {}.", service.address, folder.0.display());
+    let outcome = tokio::select! {
+        outcome = whole(service.address, &args, started) => outcome,
+        _ = tokio::signal::ctrl_c() => {
+            println!("\nStopped.");
+            Ok(())
+        }
+    };
+    // The service lets go of the folder before the folder goes.
+    service.stop().await?;
+    outcome
+}
+
+async fn whole(address: SocketAddr, args: &DemoArgs, started: Instant) -> Result<(), DemoError> {
+    story::narrate(&ApiClient::new(address), args.count).await?;
+    println!("\nDone in {:.0} s.", started.elapsed().as_secs_f64());
+    if args.stay {
+        println!("The service stays up on http://{address} until Ctrl-C.");
+        std::future::pending::<()>().await;
+    }
+    Ok(())
+}

@@ -1,0 +1,108 @@
+//! A training's progress on the screen: a bar on a terminal, a line a step elsewhere.
+
+use std::io::{IsTerminal, stderr};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Deserialize;
+use serde_json::Value;
+
+/// What the demo reads of a job, from `GET /jobs/{id}` and from each of its events.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Job {
+    pub job: String,
+    pub state: String,
+    pub progress: Option<Progress>,
+    pub policy: Option<String>,
+    pub error: Option<Value>,
+}
+
+/// Steps finished, and where the running one is: absent between two steps.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Progress {
+    pub steps_done: usize,
+    pub step: Option<usize>,
+    #[serde(default)]
+    pub done: usize,
+    #[serde(default)]
+    pub total: usize,
+    pub seconds_left: Option<f64>,
+}
+
+impl Job {
+    pub fn is_over(&self) -> bool {
+        matches!(self.state.as_str(), "succeeded" | "failed" | "cancelled")
+    }
+}
+
+/// Positions of the bar per backward step.
+const TICKS_PER_STEP: usize = 1000;
+
+pub enum ProgressView {
+    Bar(ProgressBar),
+    Lines {
+        last_step: Option<usize>,
+    },
+    /// For a training too short to watch.
+    Nothing,
+}
+
+impl ProgressView {
+    pub fn new(horizon: usize) -> Self {
+        if horizon == 1 {
+            return ProgressView::Nothing;
+        }
+        if !stderr().is_terminal() {
+            return ProgressView::Lines { last_step: None };
+        }
+        let bar = ProgressBar::new((horizon * TICKS_PER_STEP) as u64);
+        if let Ok(style) = ProgressStyle::with_template("  [{bar:32}] {percent:>3} %  {msg}") {
+            bar.set_style(style.progress_chars("=> "));
+        }
+        ProgressView::Bar(bar)
+    }
+
+    /// Shows one event.
+    pub fn show(&mut self, progress: &Progress) {
+        match self {
+            ProgressView::Bar(bar) => {
+                bar.set_position(position(progress) as u64);
+                bar.set_message(sentence(progress).unwrap_or_default());
+            }
+            ProgressView::Lines { last_step } if *last_step != progress.step => {
+                *last_step = progress.step;
+                sentence(progress).into_iter().for_each(|sentence| eprintln!("  {sentence}"));
+            }
+            ProgressView::Lines { .. } | ProgressView::Nothing => {}
+        }
+    }
+
+    pub fn finish(self) {
+        if let ProgressView::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn position(progress: &Progress) -> usize {
+    progress.steps_done * TICKS_PER_STEP + progress.done * TICKS_PER_STEP / progress.total.max(1)
+}
+
+/// Where the running step is; `None` between two steps.
+fn sentence(progress: &Progress) -> Option<String> {
+    let Progress { step, done, total, seconds_left, .. } = progress;
+    let left = seconds_left.map_or(String::new(), |seconds| format!(", about {seconds:.0} s left"));
+    step.map(|step| format!("step {step}, design point {done} of {total}{left}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bar_moves_by_steps_and_by_design_points_within() {
+        let at =
+            |steps_done, step, done, total| position(&Progress { steps_done, step, done, total, seconds_left: None });
+        assert_eq!((at(0, None, 0, 0), at(0, Some(11), 30, 60)), (0, 500));
+        assert_eq!((at(1, None, 0, 0), at(11, Some(0), 60, 60)), (1000, 12_000));
+    }
+}

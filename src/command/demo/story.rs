@@ -1,0 +1,189 @@
+//! The story the demo tells: what was known before 2008, what the investor was told, what became of him.
+
+use super::DemoError;
+use super::calls::{Advice, Move, advice, observe, open_session, train};
+use crate::command::api_client::ApiClient;
+use crate::command::us_market::{Month, UsMarket};
+
+const YEAR: &str = "2008";
+const FIRST_MONTH: &str = "2008-01";
+/// Januaries in which the same rule, looking one month ahead, is asked for comparison.
+const JANUARIES: [&str; 4] = ["1947-01", "1975-01", "1987-01", FIRST_MONTH];
+/// Months of history: twenty years.
+const HISTORY: usize = 240;
+const HORIZON: usize = 12;
+pub const INITIAL_WEALTH: f64 = 100.0;
+pub const RISK_AVERSION: f64 = 3.0;
+pub const ALPHA: f64 = 0.1;
+/// Moves of the worst-case law that are told one by one.
+const MOVES_TOLD: usize = 3;
+
+/// Trains, tells why, and lives through the year.
+pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
+    let market = UsMarket::bundled()?;
+    let past = Past::before(&market, FIRST_MONTH)?;
+    println!(
+        "\nTraining on the US stock market of the {HISTORY} months before {FIRST_MONTH} for the {HORIZON} months after:"
+    );
+    println!(
+        "power utility, risk aversion {RISK_AVERSION}, bridge radius at alpha {ALPHA}, {count} design points a step."
+    );
+    let policy = train(api, &past, HORIZON, count).await?;
+    let session = open_session(api, &policy).await?;
+    println!("Policy {policy:.12} is trained; session {session} starts with wealth {INITIAL_WEALTH}.");
+    let first = advice(api, &session, false).await?;
+    tell_why(&past, &first);
+    compare_januaries(api, &market, count).await?;
+    let last = live_through(api, &session, &past, market.year(YEAR)).await?;
+    tell_worst_case(&last);
+    Ok(())
+}
+
+/// What was known before a month.
+pub struct Past {
+    month: String,
+    pub log_returns: Vec<f64>,
+    /// Bank return per month: that of the last month known.
+    pub rate: f64,
+    mean_return: f64,
+}
+
+impl Past {
+    fn before(market: &UsMarket, month: &str) -> Result<Self, DemoError> {
+        let months = market.before(month, HISTORY)?;
+        Ok(Past {
+            month: month.into(),
+            log_returns: months.iter().map(|row| row.market_return.ln_1p()).collect(),
+            rate: months.last().map_or(0.0, |row| row.risk_free_return),
+            mean_return: months.iter().map(|row| row.market_return).sum::<f64>() / months.len() as f64,
+        })
+    }
+
+    /// How much more than the bank the average month paid.
+    fn edge(&self) -> f64 {
+        self.mean_return - self.rate
+    }
+}
+
+fn tell_why(past: &Past, advice: &Advice) {
+    println!(
+        "\nTold for {}: hold {:.0} % in stocks (allocation {:.2}, radius {:.4}).",
+        past.month,
+        100.0 * advice.allocation,
+        advice.allocation,
+        advice.radius
+    );
+    println!(
+        "Why: over {} months stocks paid {:.2} % a month beyond the bank. So short a record does not rule out laws",
+        advice.sample_size,
+        100.0 * past.edge()
+    );
+    println!(
+        "that move the average log-return by {:.2} %, the radius. The advice is the best one against the worst of them,",
+        100.0 * advice.radius
+    );
+    println!(
+        "and counts as {:.2} for certain at the horizon, where the bank alone pays {:.2}.",
+        advice.certainty_equivalent, advice.floor
+    );
+}
+
+/// Why a month's allocation is what it is, in the figures of its line.
+fn reason(edge: f64, radius: f64) -> &'static str {
+    match () {
+        () if edge <= 0.0 => "stocks paid less than the bank",
+        () if edge <= radius => "the radius swallows it",
+        () => "more than the radius",
+    }
+}
+
+/// The same rule, one month ahead, in several Januaries. Cheap: each is a single robust solve.
+async fn compare_januaries(api: &ApiClient, market: &UsMarket, count: usize) -> Result<(), DemoError> {
+    println!("\nThe same rule, looking one month ahead, in four Januaries:");
+    println!("{:<8} {:>8} {:>11}  stocks beyond the bank", "month", "radius", "allocation");
+    for month in JANUARIES {
+        let past = Past::before(market, month)?;
+        let policy = train(api, &past, 1, count).await?;
+        let session = open_session(api, &policy).await?;
+        let Advice { radius, allocation, .. } = advice(api, &session, false).await?;
+        let (edge, reason) = (past.edge(), reason(past.edge(), radius));
+        println!("{month:<8} {radius:>8.4} {allocation:>11.3}  {:.2} % a month: {reason}", 100.0 * edge);
+    }
+    Ok(())
+}
+
+/// One line a month; the advice of the last month, explained.
+async fn live_through(
+    api: &ApiClient,
+    session: &str,
+    past: &Past,
+    year: &[Month],
+) -> Result<Option<Advice>, DemoError> {
+    println!("\nThe year {YEAR}, month by month (the bank pays {:.2} % throughout):", 100.0 * past.rate);
+    println!(
+        "{:<8} {:>8} {:>11} {:>10} {:>9} {:>9} {:>10}",
+        "month", "radius", "allocation", "return", "wealth", "all-bank", "all-stock"
+    );
+    let (mut all_bank, mut all_stock, mut last) = (INITIAL_WEALTH, INITIAL_WEALTH, None);
+    for (index, month) in year.iter().enumerate() {
+        let told = advice(api, session, index + 1 == year.len()).await?;
+        let wealth = observe(api, session, told.period, month.market_return).await?;
+        all_bank *= 1.0 + past.rate;
+        all_stock *= 1.0 + month.market_return;
+        println!(
+            "{:<8} {:>8.4} {:>11.3} {:>8.2} % {wealth:>9.2} {all_bank:>9.2} {all_stock:>10.2}",
+            month.month,
+            told.radius,
+            told.allocation,
+            100.0 * month.market_return
+        );
+        last = Some(told);
+    }
+    Ok(last)
+}
+
+fn tell_worst_case(last: &Option<Advice>) {
+    let Some(worst_case) = last.as_ref().and_then(|advice| advice.worst_case.as_ref()) else { return };
+    println!("\nThe worst law for December's advice: {}", worst_case.sentence);
+    let moves = largest_moves(&worst_case.transport);
+    if moves.is_empty() {
+        println!("No return is moved: with nothing in stocks no law can hurt.");
+    }
+    for Move { atom, moved_to, mass } in moves {
+        println!(
+            "  a month of {:+.2} % turns into one of {:+.2} %, with probability {:.2} %",
+            100.0 * atom.exp_m1(),
+            100.0 * moved_to.exp_m1(),
+            100.0 * mass
+        );
+    }
+}
+
+/// The moves that use most of the radius, largest first.
+fn largest_moves(transport: &[Move]) -> Vec<Move> {
+    let mut moves: Vec<Move> = transport.iter().filter(|one| one.cost() > 0.0).cloned().collect();
+    moves.sort_by(|one, other| other.cost().total_cmp(&one.cost()));
+    moves.truncate(MOVES_TOLD);
+    moves
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_moves_are_told_first_and_still_mass_not_at_all() {
+        let one = |atom, moved_to, mass| Move { atom, moved_to, mass };
+        let transport =
+            [one(0.1, 0.1, 0.5), one(0.1, 0.0, 0.1), one(0.2, -0.6, 0.1), one(0.0, -0.1, 0.2), one(0.1, 0.05, 0.1)];
+        let told: Vec<f64> = largest_moves(&transport).iter().map(|one| one.moved_to).collect();
+        assert_eq!(told, [-0.6, -0.1, 0.0]);
+    }
+
+    #[test]
+    fn january_2008_pays_beyond_the_bank_more_than_the_radius_and_1987_less() {
+        let market = UsMarket::bundled().unwrap();
+        assert!(Past::before(&market, FIRST_MONTH).unwrap().edge() > 0.0049);
+        assert!(Past::before(&market, "1987-01").unwrap().edge() < 0.0056);
+    }
+}

@@ -1,0 +1,383 @@
+//! The rules of the house that a program can check, read off the source itself.
+//!
+//! Five floors, arrows only point down; rayon in `control` and in the service's pool only; no clock, log or sleep
+//! below `service`; files and functions of a size that fits a head; nothing that panics on purpose outside tests.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Lowest first. The binary (`main.rs` and `command/`) stands on top and names the library as `ballast`.
+const FLOORS: [&str; 5] = ["numerics", "control", "store", "service", "http"];
+const FILE_LINES: usize = 350;
+const FUNCTION_LINES: usize = 70;
+
+/// Where rayon may be named besides `control/`, and why.
+const RAYON: [(&str, &str); 1] = [("service/trainer.rs", "builds the training pool: its own, one core short of all")];
+/// Files above `FILE_LINES`, and why.
+const LONG_FILES: [(&str, &str); 0] = [];
+/// Functions above `FUNCTION_LINES` as `file: function`, and why.
+const LONG_FUNCTIONS: [(&str, &str); 0] = [];
+
+/// Calls that read the clock, log or print; they enter the lower floors as arguments or not at all.
+const EFFECTS: [&str; 7] = ["Instant::now", "SystemTime::now", "println!", "eprintln!", "print!", "dbg!", "tracing::"];
+const PANICS: [&str; 4] = [".unwrap()", "panic!", "todo!", "unimplemented!"];
+
+/// A file of `src`, with comments, literals and tests blanked out, line for line.
+struct Source {
+    /// Relative to `src`, with `/` between folders.
+    path: String,
+    code: String,
+    /// Modules it declares for tests only.
+    test_modules: Vec<String>,
+}
+
+impl Source {
+    fn new(path: &str, text: &str) -> Self {
+        let mut code = blank_comments_and_literals(text);
+        let test_modules = blank_tests(&mut code);
+        Source { path: path.into(), code, test_modules }
+    }
+
+    fn floor(&self) -> Option<usize> {
+        let first = self.path.split(['/', '.']).next();
+        FLOORS.iter().position(|floor| Some(*floor) == first)
+    }
+
+    fn line_of(&self, offset: usize) -> usize {
+        1 + self.code[..offset].matches('\n').count()
+    }
+
+    fn lines(&self) -> usize {
+        self.code.trim_end().lines().count()
+    }
+
+    /// Paths of the files that hold its test modules.
+    fn test_files(&self) -> Vec<String> {
+        let (folder, file) = self.path.rsplit_once('/').unwrap_or(("", &self.path));
+        let stem = file.trim_end_matches(".rs");
+        let below = if matches!(stem, "mod" | "lib" | "main") { folder.into() } else { join(folder, stem) };
+        let paths = |name: &String| [join(&below, &format!("{name}.rs")), join(&below, &format!("{name}/mod.rs"))];
+        self.test_modules.iter().flat_map(paths).collect()
+    }
+
+    /// Every function as name and line span.
+    fn functions(&self) -> Vec<(String, Range<usize>)> {
+        words(&self.code, "fn").filter_map(|at| self.function(at)).collect()
+    }
+
+    fn function(&self, at: usize) -> Option<(String, Range<usize>)> {
+        let rest = &self.code[at + 2..];
+        let name: String = rest.trim_start().chars().take_while(|&letter| is_word(letter)).collect();
+        if name.is_empty() {
+            return None; // a function pointer type
+        }
+        let end = at + 2 + item_end(rest);
+        self.code[..end].ends_with('}').then(|| (name, self.line_of(at)..self.line_of(end) + 1))
+    }
+}
+
+fn join(folder: &str, name: &str) -> String {
+    if folder.is_empty() { name.into() } else { format!("{folder}/{name}") }
+}
+
+fn is_word(letter: char) -> bool {
+    letter.is_alphanumeric() || letter == '_'
+}
+
+/// Offsets at which `word` stands as a whole word.
+fn words<'a>(code: &'a str, word: &'a str) -> impl Iterator<Item = usize> + 'a {
+    code.match_indices(word).map(|(at, _)| at).filter(move |&at| {
+        let before = code[..at].chars().next_back().is_some_and(is_word);
+        let after = code[at + word.len()..].chars().next().is_some_and(is_word);
+        !before && !after
+    })
+}
+
+/// Length of the item that starts `code`: to its `;`, or to the brace that closes its body.
+fn item_end(code: &str) -> usize {
+    let mut open: Vec<char> = Vec::new();
+    for (at, letter) in code.char_indices() {
+        match letter {
+            '(' | '[' | '{' => open.push(letter),
+            ')' | ']' | '}' => drop(open.pop()),
+            _ => {}
+        }
+        if open.is_empty() && matches!(letter, ';' | '}') {
+            return at + 1;
+        }
+    }
+    code.len()
+}
+
+/// Blanks comments and the insides of string and character literals; line breaks stay.
+fn blank_comments_and_literals(text: &str) -> String {
+    let letters: Vec<char> = text.chars().collect();
+    let mut out = String::with_capacity(text.len());
+    let mut at = 0;
+    while at < letters.len() {
+        let end = literal_end(&letters, at);
+        if end == at {
+            out.push(letters[at]);
+            at += 1;
+            continue;
+        }
+        out.extend(letters[at..end].iter().map(|&letter| if letter == '\n' { '\n' } else { ' ' }));
+        at = end;
+    }
+    out
+}
+
+/// Where the comment or literal that starts at `at` ends; `at` itself where none starts.
+fn literal_end(letters: &[char], at: usize) -> usize {
+    let rest = &letters[at..];
+    let inside_word = at > 0 && is_word(letters[at - 1]);
+    let length = match rest {
+        ['/', '/', ..] => rest.iter().position(|&letter| letter == '\n').unwrap_or(rest.len()),
+        ['/', '*', ..] => block_comment_length(rest),
+        ['"', ..] => quoted_length(rest),
+        ['r', '"' | '#', ..] if !inside_word => raw_length(&rest[1..]).map_or(0, |length| length + 1),
+        ['b', 'r', '"' | '#', ..] if !inside_word => raw_length(&rest[2..]).map_or(0, |length| length + 2),
+        ['\'', '\\', ..] => 3 + rest[3..].iter().position(|&letter| letter == '\'').map_or(0, |end| end + 1),
+        ['\'', _, '\'', ..] => 3,
+        _ => 0,
+    };
+    at + length
+}
+
+fn block_comment_length(rest: &[char]) -> usize {
+    let mut depth = 0;
+    let mut at = 0;
+    while at + 1 < rest.len() {
+        match (rest[at], rest[at + 1]) {
+            ('/', '*') => depth += 1,
+            ('*', '/') => depth -= 1,
+            _ => {
+                at += 1;
+                continue;
+            }
+        }
+        at += 2;
+        if depth == 0 {
+            return at;
+        }
+    }
+    rest.len()
+}
+
+fn quoted_length(rest: &[char]) -> usize {
+    let mut at = 1;
+    while at < rest.len() {
+        match rest[at] {
+            '\\' => at += 2,
+            '"' => return at + 1,
+            _ => at += 1,
+        }
+    }
+    rest.len()
+}
+
+/// Length of a raw string after its `r`; `None` for a raw identifier.
+fn raw_length(rest: &[char]) -> Option<usize> {
+    let hashes = rest.iter().take_while(|&&letter| letter == '#').count();
+    if rest.get(hashes) != Some(&'"') {
+        return None;
+    }
+    let closing: Vec<char> = std::iter::once('"').chain(std::iter::repeat_n('#', hashes)).collect();
+    let body = &rest[hashes + 1..];
+    let end = body.windows(closing.len()).position(|window| window == closing);
+    Some(end.map_or(rest.len(), |end| hashes + 1 + end + closing.len()))
+}
+
+/// Blanks every item under `#[cfg(test)]`; the names of the modules among them that live in files of their own.
+fn blank_tests(code: &mut String) -> Vec<String> {
+    const ATTRIBUTE: &str = "#[cfg(test)]";
+    let mut modules = Vec::new();
+    while let Some(start) = code.find(ATTRIBUTE) {
+        let after = start + ATTRIBUTE.len();
+        let end = after + item_end(&code[after..]);
+        let item = code[after..end].trim();
+        if let Some(name) = item.strip_suffix(';').and_then(|item| item.split("mod ").nth(1)) {
+            modules.push(name.trim().into());
+        }
+        let blank: String = code[start..end].chars().map(|letter| if letter == '\n' { '\n' } else { ' ' }).collect();
+        code.replace_range(start..end, &blank);
+    }
+    modules
+}
+
+/// First segments of every path that starts at the crate's root, with their offsets; groups are opened.
+fn crate_paths(code: &str) -> Vec<(usize, String)> {
+    let mut found = Vec::new();
+    for at in words(code, "crate") {
+        let Some(rest) = code[at + 5..].trim_start().strip_prefix("::") else { continue };
+        let rest = rest.trim_start();
+        let names = if rest.starts_with('{') { top_of_group(rest) } else { vec![first_word(rest)] };
+        found.extend(names.into_iter().map(|name| (at, name)));
+    }
+    found
+}
+
+fn first_word(text: &str) -> String {
+    text.trim_start().chars().take_while(|&letter| is_word(letter)).collect()
+}
+
+/// `{a::b, c::{d, e}}` gives a, c.
+fn top_of_group(group: &str) -> Vec<String> {
+    let mut names = Vec::new();
+    let mut depth = 0;
+    for (at, letter) in group.char_indices() {
+        match letter {
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            ',' => {}
+            _ => continue,
+        }
+        if depth == 0 {
+            break;
+        }
+        if depth == 1 && letter != '}' {
+            names.push(first_word(&group[at + 1..]));
+        }
+    }
+    names.retain(|name| !name.is_empty());
+    names
+}
+
+/// Every broken rule of one file, as `file:line: what`.
+fn faults(source: &Source) -> Vec<String> {
+    let mut faults = Vec::new();
+    let mut fault = |at: usize, what: String| faults.push(format!("{}:{}: {what}", source.path, source.line_of(at)));
+    if let Some(own) = source.floor() {
+        for (at, name) in crate_paths(&source.code) {
+            if FLOORS.iter().position(|floor| *floor == name).is_some_and(|named| named > own) {
+                fault(at, format!("{} names the higher floor {name}", FLOORS[own]));
+            }
+        }
+        for at in words(&source.code, "ballast") {
+            fault(at, "a floor names the crate as `crate`".into());
+        }
+        let below_service = own < 3;
+        for call in EFFECTS.iter().filter(|_| below_service) {
+            source.code.match_indices(call).for_each(|(at, _)| fault(at, format!("{call} below service")));
+        }
+    }
+    if !source.path.starts_with("control/") && !is_listed(&RAYON, &source.path) {
+        words(&source.code, "rayon").for_each(|at| fault(at, "rayon outside control and the training pool".into()));
+    }
+    for call in PANICS {
+        source.code.match_indices(call).for_each(|(at, _)| fault(at, format!("{call} outside tests")));
+    }
+    if source.lines() > FILE_LINES && !is_listed(&LONG_FILES, &source.path) {
+        fault(0, format!("{} lines without tests, above {FILE_LINES}", source.lines()));
+    }
+    for (name, lines) in source.functions() {
+        let listed = is_listed(&LONG_FUNCTIONS, &format!("{}: {name}", source.path));
+        if lines.len() > FUNCTION_LINES && !listed {
+            faults.push(format!("{}:{}: {name} has {} lines", source.path, lines.start, lines.len()));
+        }
+    }
+    faults
+}
+
+fn is_listed(exceptions: &[(&str, &str)], name: &str) -> bool {
+    exceptions.iter().any(|(listed, _)| *listed == name)
+}
+
+fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            rust_files(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+fn sources() -> Vec<Source> {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut paths = Vec::new();
+    rust_files(&src, &mut paths);
+    let read = |path: &PathBuf| {
+        let name = path.strip_prefix(&src).unwrap().to_string_lossy().replace('\\', "/");
+        Source::new(&name, &fs::read_to_string(path).unwrap())
+    };
+    paths.iter().map(read).collect()
+}
+
+/// Files reached from the crate roots by their `mod` declarations, as the compiler reaches them.
+fn declared_files(sources: &[Source]) -> BTreeSet<String> {
+    let exists = |path: &String| sources.iter().any(|source| source.path == *path);
+    let mut files: BTreeSet<String> = ["lib.rs".into(), "main.rs".into()].into();
+    for source in sources {
+        let names =
+            words(&source.code, "mod").filter(|&at| source.code[at..at + item_end(&source.code[at..])].ends_with(';'));
+        let test_modules =
+            names.map(|at| first_word(&source.code[at + 3..])).chain(source.test_modules.clone()).collect();
+        let declares = Source { path: source.path.clone(), code: String::new(), test_modules };
+        files.extend(declares.test_files().into_iter().filter(exists));
+    }
+    files
+}
+
+#[test]
+fn the_source_keeps_the_rules_of_the_house() {
+    let sources = sources();
+    let visited: BTreeSet<String> = sources.iter().map(|source| source.path.clone()).collect();
+    assert_eq!(visited, declared_files(&sources), "files visited, and files the crate is made of");
+    for floor in FLOORS {
+        assert!(visited.contains(&format!("{floor}/mod.rs")), "floor {floor} was not visited");
+    }
+    let tests: BTreeSet<String> = sources.iter().flat_map(Source::test_files).collect();
+    let faults: Vec<String> = sources.iter().filter(|source| !tests.contains(&source.path)).flat_map(faults).collect();
+    assert!(faults.is_empty(), "{} broken rules:\n{}", faults.len(), faults.join("\n"));
+}
+
+fn faults_of(path: &str, text: &str) -> Vec<String> {
+    faults(&Source::new(path, text))
+}
+
+#[test]
+fn a_broken_rule_is_found() {
+    let upward = "use crate::{numerics::gp, service::{clock, metrics}};\nfn f() -> crate::http::Problem { g() }";
+    assert_eq!(
+        faults_of("control/policy.rs", upward),
+        [
+            "control/policy.rs:1: control names the higher floor service",
+            "control/policy.rs:2: control names the higher floor http",
+        ]
+    );
+    assert_eq!(faults_of("http/router.rs", upward), [""; 0]);
+    assert_eq!(faults_of("numerics/gp.rs", "use rayon::prelude::*;").len(), 1);
+    assert_eq!(faults_of("control/policy.rs", "use rayon::prelude::*;").len(), 0);
+    assert_eq!(faults_of("store/jobs.rs", "fn f() { let now = Instant::now(); }").len(), 1);
+    assert_eq!(faults_of("service/clock.rs", "fn f() { let now = Instant::now(); }").len(), 0);
+    assert_eq!(faults_of("http/a.rs", "fn f() { g().unwrap(); panic!(\"no\"); todo!() }").len(), 3);
+    assert_eq!(faults_of("http/a.rs", &format!("fn f(a: [u8; 3]) {{{}}}", "\n".repeat(70))).len(), 1);
+    assert_eq!(faults_of("http/a.rs", &format!("fn f(a: [u8; 3]) {{{}}}", "\n".repeat(69))).len(), 0);
+    assert_eq!(faults_of("http/a.rs", &"const A: u8 = 1;\n".repeat(351)).len(), 1);
+}
+
+#[test]
+fn comments_literals_and_tests_break_no_rule() {
+    let innocent = r##"
+        // crate::http, panic!
+        /* .unwrap() /* nested todo!() */ rayon */
+        const A: &str = "crate::http \" panic!";
+        const B: &str = r#"todo!() " rayon"#;
+        const C: [char; 3] = ['"', '\'', '\u{22}'];
+        fn f<'a>(r: &'a str) -> &'a str { r }
+        #[cfg(test)]
+        mod tests { fn g() { crate::http::f().unwrap(); } }
+        #[cfg(test)]
+        mod story;
+    "##;
+    let source = Source::new("control/bellman.rs", innocent);
+    assert_eq!(faults(&source), [""; 0]);
+    assert_eq!(source.test_files(), ["control/bellman/story.rs", "control/bellman/story/mod.rs"]);
+    let functions: Vec<String> = source.functions().into_iter().map(|(name, _)| name).collect();
+    assert_eq!(functions, ["f"]);
+    assert_eq!(faults_of("control/bellman.rs", &format!("{innocent}\nuse crate::http;")).len(), 1);
+}
