@@ -28,7 +28,8 @@ const REACH: (f64, f64) = (1.5, 0.75);
 const WINDOW_GROWTHS: usize = 4;
 /// Parts into which each interval between exact returns is cut for the support, and again around destinations.
 const SUPPORT_PARTS: usize = 4;
-const REFINED_PARTS: usize = 16;
+const REFINED_PARTS: usize = 8;
+const REFINEMENTS: usize = 2;
 
 /// The problem of one state, complete.
 pub struct RobustStep<'a> {
@@ -91,7 +92,8 @@ impl RobustStep<'_> {
         let highest = self.field.highest_action;
         let mut rows = field.at(&grid.support);
         let (action, _) = self.best_action(&grid, &rows, 0.0, highest);
-        if self.radius > 0.0 && action > 0.0 {
+        let rounds = if self.radius > 0.0 && action > 0.0 { REFINEMENTS } else { 0 };
+        for _ in 0..rounds {
             let near: Vec<bool> = self.destinations(&grid, &rows, action);
             let refined = subdivided(&grid.support, REFINED_PARTS, |interval| near[interval] || near[interval + 1]);
             grid = self.grid(refined);

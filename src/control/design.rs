@@ -63,11 +63,15 @@ impl Design {
             history: problem.history.clone(),
             learns,
             initial: Vec::new(),
-            returns: Vec::with_capacity(count),
-            wealth: Vec::with_capacity(count),
+            returns: Vec::new(),
+            wealth: Vec::new(),
             constant: !learns && !wealth_matters,
             start_is_single: !resampled && (start.min == start.max || !wealth_matters),
         };
+        if !learns {
+            made.wealth = wealth_ladders(problem, start, count);
+            return made;
+        }
         for point in 0..count {
             let mut generator = stream(specification.seed, "initial", 0, point);
             let mut wealth = start.min * (start.max / start.min).powf(generator.random::<f64>());
@@ -104,6 +108,30 @@ impl Design {
         State { wealth: self.wealth[point][step], law: EmpiricalDistribution::new(&sample) }
     }
 }
+
+/// Wealths of a design whose state is wealth alone: evenly in log wealth, over what holding any allocation can reach
+/// within [`REACHED_DEVIATIONS`] of the centre. A simulated design would leave its edges, which the robust step visits,
+/// to extrapolation.
+fn wealth_ladders(problem: &ProblemSpecification, start: Interval, count: usize) -> Vec<Vec<f64>> {
+    let law = match (&problem.law, problem.framework) {
+        (Some(law), Framework::KnownLaw) => continuous_law(law, &problem.history).quadrature(),
+        _ => merged(EmpiricalDistribution::new(&problem.history).atoms()),
+    };
+    let mean: f64 = law.0.iter().zip(&law.1).map(|(atom, mass)| atom * mass).sum();
+    let variance: f64 = law.0.iter().zip(&law.1).map(|(atom, mass)| mass * (atom - mean).powi(2)).sum();
+    let ladder = |point: usize, step: usize| {
+        let elapsed = step as f64;
+        let spread = REACHED_DEVIATIONS * problem.action_interval[1] * (elapsed * variance).sqrt();
+        let bank = elapsed * problem.rate_per_step.ln_1p();
+        let low = start.min.ln() + bank.min(elapsed * mean) - spread;
+        let high = start.max.ln() + bank.max(elapsed * mean) + spread;
+        (low + (high - low) * point as f64 / (count - 1) as f64).exp()
+    };
+    (0..count).map(|point| (0..problem.horizon).map(|step| ladder(point, step)).collect()).collect()
+}
+
+/// Standard deviations of log wealth that the design covers where the state is wealth alone.
+const REACHED_DEVIATIONS: f64 = 5.0;
 
 /// The discrete law a framework centres on at a state: ascending distinct atoms and their masses.
 pub fn centre(problem: &ProblemSpecification, state: &State) -> Result<(Vec<f64>, Vec<f64>), FieldError> {
