@@ -1,10 +1,18 @@
 //! Jobs as workers see them: claimed under a lease, checkpointed, finished.
 //!
 //! A worker holds a job until its lease runs out. Every claim raises `attempt`, and every write names the attempt it was
-//! claimed under: a worker that slept past its lease finds itself fenced, by `false`, and must drop the job.
+//! claimed under: a worker that slept past its lease, and whose job another took, finds itself fenced, by `false`, and must
+//! drop the job.
 
-use super::job::{ClaimedJob, JobOutcome};
-use super::{Store, StoreError};
+use futures_util::FutureExt;
+use sqlx::SqliteConnection;
+
+use super::codec::{Seal, from_sql, to_sql};
+use super::error::Failure;
+use super::job::{ClaimedJob, JobOutcome, JobRow};
+use super::job_state::{JobEvent, JobState};
+use super::jobs::{end, find};
+use super::{Store, StoreError, policies};
 
 impl Store {
     /// Takes the oldest job that is queued, or whose worker's lease ran out, until `now_ms + 1000 lease_seconds`.
@@ -15,14 +23,29 @@ impl Store {
         lease_seconds: u32,
         now_ms: i64,
     ) -> Result<Option<ClaimedJob>, StoreError> {
-        let _ = (worker, lease_seconds, now_ms);
-        todo!()
+        let worker = worker.to_owned();
+        let until_ms = now_ms.saturating_add(1000 * i64::from(lease_seconds));
+        self.write("claiming a job", move |connection| claim(connection, worker, until_ms, now_ms).boxed()).await
     }
 
     /// Holds the job until `until_ms`. False when fenced.
     pub async fn renew_lease(&self, job: &str, attempt: i64, until_ms: i64) -> Result<bool, StoreError> {
-        let _ = (job, attempt, until_ms);
-        todo!()
+        let job = job.to_owned();
+        self.write("renewing a lease", move |connection| {
+            async move {
+                let renewed =
+                    sqlx::query("UPDATE jobs SET lease_until_ms = ? WHERE job = ? AND attempt = ? AND state = ?")
+                        .bind(until_ms)
+                        .bind(job)
+                        .bind(attempt)
+                        .bind(JobState::Running.as_str())
+                        .execute(connection)
+                        .await?;
+                Ok(renewed.rows_affected() > 0)
+            }
+            .boxed()
+        })
+        .await
     }
 
     /// Stores the solution of one step, replacing an earlier one. False when fenced.
@@ -33,17 +56,32 @@ impl Store {
         step: usize,
         bytes: &[u8],
     ) -> Result<bool, StoreError> {
-        let _ = (job, attempt, step, bytes);
-        todo!()
+        let (job, bytes, step) = (job.to_owned(), bytes.to_vec(), to_sql(step));
+        self.write("saving a checkpoint", move |connection| checkpoint(connection, job, attempt, step, bytes).boxed())
+            .await
     }
 
-    /// Every checkpoint of the job, ascending by step, each verified against its digest.
+    /// Every checkpoint of the job, ascending by step, each verified against its seal.
     pub async fn checkpoints(&self, job: &str) -> Result<Vec<(usize, Vec<u8>)>, StoreError> {
-        let _ = job;
-        todo!()
+        let rows = sqlx::query_as("SELECT step, bytes, seal FROM checkpoints WHERE job = ? ORDER BY step")
+            .bind(job)
+            .fetch_all(&self.readers);
+        self.read("reading checkpoints", async {
+            let rows: Vec<(i64, Vec<u8>, Vec<u8>)> = rows.await?;
+            let verified = |(step, bytes, seal): (i64, Vec<u8>, Vec<u8>)| {
+                let what = || format!("the checkpoint of step {step} of job {job}");
+                checkpoint_seal(job, step, &bytes).verify(&seal, what)?;
+                Ok((from_sql(step)?, bytes))
+            };
+            rows.into_iter().map(verified).collect()
+        })
+        .await
     }
 
     /// Stores the result, sets the terminal state and deletes the checkpoints, all or nothing. False when fenced.
+    ///
+    /// # Errors
+    /// [`StoreError::Corrupt`] where a policy's name is not the hash of its bytes.
     pub async fn finish_job(
         &self,
         job: &str,
@@ -51,13 +89,142 @@ impl Store {
         outcome: JobOutcome,
         now_ms: i64,
     ) -> Result<bool, StoreError> {
-        let _ = (job, attempt, outcome, now_ms);
-        todo!()
+        if let JobOutcome::Succeeded { policy_id, policy_json } = &outcome {
+            policies::verify(policy_id, policy_json).map_err(|failure| failure.during("finishing a job"))?;
+        }
+        let job = job.to_owned();
+        self.write("finishing a job", move |connection| finish(connection, job, attempt, outcome, now_ms).boxed()).await
     }
 
     /// Puts the job back in the queue with its checkpoints; one that was asked to stop is cancelled. False when fenced.
     pub async fn release_job(&self, job: &str, attempt: i64, now_ms: i64) -> Result<bool, StoreError> {
-        let _ = (job, attempt, now_ms);
-        todo!()
+        let job = job.to_owned();
+        self.write("releasing a job", move |connection| release(connection, job, attempt, now_ms).boxed()).await
     }
+}
+
+async fn claim(
+    connection: &mut SqliteConnection,
+    worker: String,
+    until_ms: i64,
+    now_ms: i64,
+) -> Result<Option<ClaimedJob>, Failure> {
+    while let Some(row) = claimable(connection, now_ms).await? {
+        if row.cancel_requested
+            && let Ok(next) = row.state.next(JobEvent::Cancel)
+        {
+            end(connection, &row, next, now_ms).await?;
+            continue;
+        }
+        let next = row.state.next(JobEvent::Claim).map_err(|error| Failure::Corrupt(error.to_string()))?;
+        let claimed = sqlx::query(
+            "UPDATE jobs SET state = ?, worker = ?, lease_until_ms = ?, attempt = attempt + 1,
+                             started_ms = coalesce(started_ms, ?)
+             WHERE job = ? RETURNING *",
+        )
+        .bind(next.as_str())
+        .bind(&worker)
+        .bind(until_ms)
+        .bind(now_ms)
+        .bind(&row.job)
+        .fetch_one(connection)
+        .await?;
+        let row = JobRow::from_row(&claimed)?;
+        return Ok(Some(ClaimedJob { attempt: row.attempt, row }));
+    }
+    Ok(None)
+}
+
+/// The oldest job that is queued or whose lease ran out.
+async fn claimable(connection: &mut SqliteConnection, now_ms: i64) -> Result<Option<JobRow>, Failure> {
+    let row = sqlx::query(
+        "SELECT * FROM jobs WHERE state = ? OR (state = ? AND lease_until_ms <= ?) ORDER BY sequence LIMIT 1",
+    )
+    .bind(JobState::Queued.as_str())
+    .bind(JobState::Running.as_str())
+    .bind(now_ms)
+    .fetch_optional(connection)
+    .await?;
+    row.as_ref().map(JobRow::from_row).transpose()
+}
+
+/// The job where this attempt still holds it.
+async fn held(connection: &mut SqliteConnection, job: &str, attempt: i64) -> Result<Option<JobRow>, Failure> {
+    let row = find(connection, job).await?;
+    Ok(row.filter(|row| row.state == JobState::Running && row.attempt == attempt))
+}
+
+async fn checkpoint(
+    connection: &mut SqliteConnection,
+    job: String,
+    attempt: i64,
+    step: i64,
+    bytes: Vec<u8>,
+) -> Result<bool, Failure> {
+    if held(connection, &job, attempt).await?.is_none() {
+        return Ok(false);
+    }
+    let seal = checkpoint_seal(&job, step, &bytes).finish();
+    sqlx::query("INSERT OR REPLACE INTO checkpoints (job, step, bytes, seal) VALUES (?, ?, ?, ?)")
+        .bind(&job)
+        .bind(step)
+        .bind(bytes)
+        .bind(seal)
+        .execute(&mut *connection)
+        .await?;
+    sqlx::query("UPDATE jobs SET steps_done = (SELECT count(*) FROM checkpoints WHERE job = ?1) WHERE job = ?1")
+        .bind(&job)
+        .execute(connection)
+        .await?;
+    Ok(true)
+}
+
+fn checkpoint_seal(job: &str, step: i64, bytes: &[u8]) -> Seal {
+    Seal::of("checkpoint").text(job).integer(step).bytes(bytes)
+}
+
+async fn finish(
+    connection: &mut SqliteConnection,
+    job: String,
+    attempt: i64,
+    outcome: JobOutcome,
+    now_ms: i64,
+) -> Result<bool, Failure> {
+    let Some(row) = held(connection, &job, attempt).await? else { return Ok(false) };
+    let event = match &outcome {
+        JobOutcome::Succeeded { .. } | JobOutcome::Reported { .. } => JobEvent::Succeed,
+        JobOutcome::Failed { .. } => JobEvent::Fail,
+        JobOutcome::Cancelled => JobEvent::Cancel,
+    };
+    let Ok(next) = row.state.next(event) else { return Ok(false) };
+    end(connection, &row, next, now_ms).await?;
+    let update = match outcome {
+        JobOutcome::Succeeded { policy_id, policy_json } => {
+            policies::insert(connection, &policy_id, policy_json, now_ms).await?;
+            sqlx::query("UPDATE jobs SET policy = ?, steps_done = steps_total WHERE job = ?").bind(policy_id)
+        }
+        JobOutcome::Reported { report_json } => {
+            sqlx::query("UPDATE jobs SET report_json = ?, steps_done = steps_total WHERE job = ?").bind(report_json)
+        }
+        JobOutcome::Failed { reason } => sqlx::query("UPDATE jobs SET error = ? WHERE job = ?").bind(reason),
+        JobOutcome::Cancelled => return Ok(true),
+    };
+    update.bind(job).execute(connection).await?;
+    Ok(true)
+}
+
+async fn release(connection: &mut SqliteConnection, job: String, attempt: i64, now_ms: i64) -> Result<bool, Failure> {
+    let Some(row) = held(connection, &job, attempt).await? else { return Ok(false) };
+    let event = if row.cancel_requested { JobEvent::Cancel } else { JobEvent::Release };
+    let Ok(next) = row.state.next(event) else { return Ok(false) };
+    if next.is_terminal() {
+        end(connection, &row, next, now_ms).await?;
+        return Ok(true);
+    }
+    sqlx::query("UPDATE jobs SET state = ?, worker = NULL, lease_until_ms = NULL WHERE job = ?")
+        .bind(next.as_str())
+        .bind(job)
+        .execute(connection)
+        .await?;
+    Ok(true)
 }

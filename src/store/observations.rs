@@ -1,5 +1,11 @@
 //! Observations: append-only, numbered by period from 1, each stored exactly once.
 
+use futures_util::FutureExt;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row, SqliteConnection};
+
+use super::codec::{Seal, from_sql, to_sql};
+use super::error::Failure;
 use super::{Store, StoreError};
 
 /// One period's return and what was answered to it.
@@ -50,15 +56,18 @@ pub enum Append {
 impl Store {
     /// Appends the period after the last, or says why not; decided and written in one transaction.
     pub async fn append_observation(&self, new: NewObservation) -> Result<Append, StoreError> {
-        let _ = new;
-        todo!()
+        self.write("appending an observation", move |connection| append(connection, new).boxed()).await
     }
 
     /// # Errors
     /// [`StoreError::Corrupt`] where the row is not what was written.
     pub async fn observation(&self, session: &str, period: usize) -> Result<Option<ObservationRow>, StoreError> {
-        let _ = (session, period);
-        todo!()
+        let row = sqlx::query("SELECT * FROM observations WHERE session = ? AND period = ?")
+            .bind(session)
+            .bind(to_sql(period))
+            .fetch_optional(&self.readers);
+        self.read("reading an observation", async { row.await?.as_ref().map(ObservationRow::from_row).transpose() })
+            .await
     }
 
     /// Every observation of the session, ascending by period; empty where there is no such session.
@@ -66,7 +75,114 @@ impl Store {
     /// # Errors
     /// [`StoreError::Corrupt`] where a row is not what was written or a period is missing.
     pub async fn observations(&self, session: &str) -> Result<Vec<ObservationRow>, StoreError> {
-        let _ = session;
-        todo!()
+        let rows = sqlx::query("SELECT * FROM observations WHERE session = ? ORDER BY period")
+            .bind(session)
+            .fetch_all(&self.readers);
+        self.read("reading observations", async {
+            let rows: Vec<_> = rows.await?.iter().map(ObservationRow::from_row).collect::<Result<_, Failure>>()?;
+            match rows.iter().zip(1..).find(|(row, period)| row.period != *period) {
+                None => Ok(rows),
+                Some((_, period)) => Err(Failure::Corrupt(format!("period {period} of session {session}"))),
+            }
+        })
+        .await
+    }
+}
+
+async fn append(connection: &mut SqliteConnection, new: NewObservation) -> Result<Append, Failure> {
+    let last: Option<Option<i64>> = sqlx::query_scalar(
+        "SELECT (SELECT max(period) FROM observations WHERE session = ?1) FROM sessions WHERE session = ?1",
+    )
+    .bind(&new.session)
+    .fetch_optional(&mut *connection)
+    .await?;
+    let Some(last) = last else { return Ok(Append::NoSession) };
+    let expected = from_sql(last.unwrap_or(0))? + 1;
+    if (1..expected).contains(&new.period) {
+        return repeated(connection, &new).await;
+    }
+    if new.period != expected {
+        return Ok(Append::OutOfOrder { expected });
+    }
+    insert(connection, new).await?;
+    Ok(Append::Appended)
+}
+
+/// What a period reported before answers.
+async fn repeated(connection: &mut SqliteConnection, new: &NewObservation) -> Result<Append, Failure> {
+    let earlier = sqlx::query("SELECT * FROM observations WHERE session = ? AND period = ?")
+        .bind(&new.session)
+        .bind(to_sql(new.period))
+        .fetch_optional(connection)
+        .await?;
+    let missing = || Failure::Corrupt(format!("period {} of session {}", new.period, new.session));
+    let earlier = ObservationRow::from_row(&earlier.ok_or_else(missing)?)?;
+    Ok(if earlier.content_hash == new.content_hash {
+        Append::Repeated { answer_json: earlier.answer_json }
+    } else {
+        Append::Conflict
+    })
+}
+
+async fn insert(connection: &mut SqliteConnection, new: NewObservation) -> Result<(), Failure> {
+    let row = ObservationRow {
+        period: new.period,
+        content_hash: new.content_hash,
+        log_return: new.log_return,
+        executed_allocation: new.executed_allocation,
+        advised_allocation: new.advised_allocation,
+        wealth_after: new.wealth_after,
+        answer_json: new.answer_json,
+        created_ms: new.created_ms,
+    };
+    let seal = row.seal(&new.session).finish();
+    sqlx::query(
+        "INSERT INTO observations (session, period, content_hash, log_return, executed_allocation, advised_allocation,
+                                   wealth_after, answer_json, created_ms, seal)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(new.session)
+    .bind(to_sql(row.period))
+    .bind(row.content_hash)
+    .bind(row.log_return)
+    .bind(row.executed_allocation)
+    .bind(row.advised_allocation)
+    .bind(row.wealth_after)
+    .bind(row.answer_json)
+    .bind(row.created_ms)
+    .bind(seal)
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+impl ObservationRow {
+    fn seal(&self, session: &str) -> Seal {
+        Seal::of("observation")
+            .text(session)
+            .integer(to_sql(self.period))
+            .text(&self.content_hash)
+            .real(self.log_return)
+            .real(self.executed_allocation)
+            .real(self.advised_allocation)
+            .real(self.wealth_after)
+            .text(&self.answer_json)
+            .integer(self.created_ms)
+    }
+
+    fn from_row(row: &SqliteRow) -> Result<Self, Failure> {
+        let session: &str = row.try_get("session")?;
+        let read = ObservationRow {
+            period: from_sql(row.try_get("period")?)?,
+            content_hash: row.try_get("content_hash")?,
+            log_return: row.try_get("log_return")?,
+            executed_allocation: row.try_get("executed_allocation")?,
+            advised_allocation: row.try_get("advised_allocation")?,
+            wealth_after: row.try_get("wealth_after")?,
+            answer_json: row.try_get("answer_json")?,
+            created_ms: row.try_get("created_ms")?,
+        };
+        read.seal(session).verify(row.try_get("seal")?, || format!("period {} of session {session}", read.period))?;
+        Ok(read)
     }
 }

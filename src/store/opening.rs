@@ -1,0 +1,106 @@
+//! Opening a folder: the lock, the engine's age, the schema, the connections.
+
+use std::fs::{File, TryLockError};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use sqlx::migrate::Migrator;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
+use sqlx::{ConnectOptions, SqliteConnection};
+
+use super::error::{Failure, StoreError};
+
+static MIGRATOR: Migrator = sqlx::migrate!("src/store/migrations/sqlite");
+
+const DATABASE: &str = "ballast.sqlite";
+const LOCK: &str = "ballast.lock";
+/// The first release without the reset bug of the write-ahead log.
+const OLDEST_ENGINE: [u32; 3] = [3, 51, 3];
+/// A reader waits this long for recovery after a crash; writers never meet.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
+/// Each read connection is a thread; reads are short.
+const READERS: u32 = 4;
+
+/// A folder that is ours, its schema up to date.
+pub(super) struct Opened {
+    pub lock: File,
+    pub writer: SqliteConnection,
+    pub readers: SqlitePool,
+}
+
+pub(super) async fn open(dir: &Path) -> Result<Opened, StoreError> {
+    let lock = lock(dir)?;
+    let file = dir.join(DATABASE);
+    let mut writer = connect(&file).await?;
+    refuse_old_engine(&mut writer).await?;
+    refuse_newer_schema(&mut writer).await?;
+    migrate(&mut writer).await?;
+    let options = SqliteConnectOptions::new().filename(&file).read_only(true).busy_timeout(BUSY_TIMEOUT);
+    let readers = SqlitePoolOptions::new()
+        .max_connections(READERS)
+        .acquire_timeout(BUSY_TIMEOUT)
+        .test_before_acquire(false)
+        .connect_lazy_with(options.disable_statement_logging());
+    Ok(Opened { lock, writer, readers })
+}
+
+fn lock(dir: &Path) -> Result<File, StoreError> {
+    let folder = |path: &Path, error| StoreError::Folder { path: PathBuf::from(path), source: Arc::new(error) };
+    std::fs::create_dir_all(dir).map_err(|error| folder(dir, error))?;
+    let path = dir.join(LOCK);
+    let file = File::options().create(true).truncate(false).write(true).open(&path);
+    let file = file.map_err(|error| folder(&path, error))?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(StoreError::Locked { path }),
+        Err(TryLockError::Error(error)) => Err(folder(&path, error)),
+    }
+}
+
+async fn connect(file: &Path) -> Result<SqliteConnection, StoreError> {
+    SqliteConnectOptions::new()
+        .filename(file)
+        .create_if_missing(true)
+        .journal_mode(SqliteJournalMode::Wal)
+        .synchronous(SqliteSynchronous::Full)
+        .foreign_keys(true)
+        .busy_timeout(BUSY_TIMEOUT)
+        .disable_statement_logging()
+        .connect()
+        .await
+        .map_err(opening)
+}
+
+async fn refuse_old_engine(connection: &mut SqliteConnection) -> Result<(), StoreError> {
+    let found: String = sqlx::query_scalar("SELECT sqlite_version()").fetch_one(connection).await.map_err(opening)?;
+    let numbers: Vec<u32> = found.split('.').map_while(|number| number.parse().ok()).collect();
+    if numbers.as_slice() < OLDEST_ENGINE.as_slice() {
+        return Err(StoreError::OldEngine { found });
+    }
+    Ok(())
+}
+
+async fn refuse_newer_schema(connection: &mut SqliteConnection) -> Result<(), StoreError> {
+    let known = MIGRATOR.iter().map(|migration| migration.version).max().unwrap_or_default();
+    let table = "SELECT count(*) FROM sqlite_schema WHERE name = '_sqlx_migrations'";
+    let tables: i64 = sqlx::query_scalar(table).fetch_one(&mut *connection).await.map_err(opening)?;
+    if tables == 0 {
+        return Ok(());
+    }
+    let newest = "SELECT coalesce(max(version), 0) FROM _sqlx_migrations";
+    let found: i64 = sqlx::query_scalar(newest).fetch_one(connection).await.map_err(opening)?;
+    if found > known { Err(StoreError::NewerSchema { found, known }) } else { Ok(()) }
+}
+
+async fn migrate(connection: &mut SqliteConnection) -> Result<(), StoreError> {
+    use sqlx::migrate::MigrateError;
+    MIGRATOR.run(connection).await.map_err(|error| match error {
+        MigrateError::Execute(error) | MigrateError::ExecuteMigration(error, _) => opening(error),
+        error => StoreError::Migration { source: Arc::new(error) },
+    })
+}
+
+fn opening(error: sqlx::Error) -> StoreError {
+    Failure::from(error).during("opening the store")
+}

@@ -1,0 +1,155 @@
+//! The one writer: operations that wait together are committed together.
+//!
+//! A commit costs one fsync however much it holds, so each transaction takes every operation that waits, up to [`GROUP`].
+//! Each runs in a savepoint of its own: one that fails is undone alone. Answers leave after the commit. Errors after which
+//! SQLite may have rolled back by itself (disk full, I/O) fail every operation that ran in the group; those that had not
+//! run yet go to the next one. After a fatal error the writer stops for good.
+
+use std::collections::VecDeque;
+use std::fs::File;
+
+use futures_util::FutureExt;
+use futures_util::future::BoxFuture;
+use sqlx::{Connection, SqliteConnection};
+use tokio::sync::{mpsc, oneshot, watch};
+
+use super::error::{Failure, StoreError};
+
+/// Operations in one transaction. At 64 a row costs a hundredth of what it costs alone; more only adds waiting.
+const GROUP: usize = 64;
+/// Requests that may wait before callers do.
+pub(super) const QUEUE: usize = 1024;
+
+pub(super) enum Request {
+    Write(Operation),
+    /// Commit what waits, then close and answer.
+    Close(oneshot::Sender<()>),
+}
+
+/// One caller's reads and writes. Given an error instead of a connection, it passes that on as its own.
+pub(super) struct Operation(Run);
+
+type Run = Box<dyn for<'c> FnOnce(Result<&'c mut SqliteConnection, StoreError>) -> BoxFuture<'c, Ran> + Send>;
+
+/// An operation that ran: whether its savepoint may be kept, and how to answer its caller once the group's end is known.
+struct Ran {
+    end: Result<(), StoreError>,
+    answer: Answer,
+}
+
+type Answer = Box<dyn FnOnce(Result<(), StoreError>) + Send>;
+
+impl Operation {
+    /// `work` as an operation, and where its answer arrives.
+    pub(super) fn new<T, W>(doing: &'static str, work: W) -> (Self, oneshot::Receiver<Result<T, StoreError>>)
+    where
+        T: Send + 'static,
+        W: for<'c> FnOnce(&'c mut SqliteConnection) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
+    {
+        let (sender, receiver) = oneshot::channel();
+        let run: Run = Box::new(move |connection| {
+            async move {
+                let result = match connection {
+                    Ok(connection) => work(connection).await.map_err(|failure| failure.during(doing)),
+                    Err(error) => Err(error),
+                };
+                let end = result.as_ref().map(|_| ()).map_err(StoreError::clone);
+                // A caller that stopped waiting needs no answer.
+                let answer = Box::new(move |group: Result<(), StoreError>| drop(sender.send(group.and(result))));
+                Ran { end, answer }
+            }
+            .boxed()
+        });
+        (Operation(run), receiver)
+    }
+}
+
+/// Serves requests until the last [`Store`](super::Store) is dropped, one closes it, or a write fails fatally.
+/// Holds the folder's lock as long as it can write.
+pub(super) async fn serve(
+    mut connection: SqliteConnection,
+    mut requests: mpsc::Receiver<Request>,
+    fatal: watch::Sender<Option<StoreError>>,
+    lock: File,
+) {
+    let mut waiting = VecDeque::new();
+    let mut closed = Vec::new();
+    while !waiting.is_empty() || receive(&mut requests, &mut waiting, &mut closed).await {
+        if let Err(error) = commit_group(&mut connection, &mut waiting).await
+            && error.is_fatal()
+        {
+            fatal.send_replace(Some(error));
+            return;
+        }
+    }
+    // The commits are durable already; what closing adds is a shorter log to read at the next start.
+    let _ = connection.close().await;
+    drop(lock);
+    for closed in closed {
+        let _ = closed.send(());
+    }
+}
+
+/// Waits for a request and takes those behind it, a group at most. False once there will be no more.
+async fn receive(
+    requests: &mut mpsc::Receiver<Request>,
+    waiting: &mut VecDeque<Operation>,
+    closed: &mut Vec<oneshot::Sender<()>>,
+) -> bool {
+    let mut received = Vec::new();
+    let count = requests.recv_many(&mut received, GROUP).await;
+    for request in received {
+        match request {
+            Request::Write(operation) => waiting.push_back(operation),
+            Request::Close(answer) => {
+                requests.close();
+                closed.push(answer);
+            }
+        }
+    }
+    count > 0
+}
+
+/// Runs what waits as one transaction and answers every operation that ran.
+///
+/// # Errors
+/// What ended the group before its commit.
+async fn commit_group(connection: &mut SqliteConnection, waiting: &mut VecDeque<Operation>) -> Result<(), StoreError> {
+    let mut answers = Vec::new();
+    let end = run_group(connection, waiting, &mut answers).await;
+    if end.is_err() {
+        // Refused where SQLite rolled back by itself, which is as good.
+        let _ = execute(connection, "ROLLBACK").await;
+    }
+    for answer in answers {
+        answer(end.clone());
+    }
+    end
+}
+
+async fn run_group(
+    connection: &mut SqliteConnection,
+    waiting: &mut VecDeque<Operation>,
+    answers: &mut Vec<Answer>,
+) -> Result<(), StoreError> {
+    let mut begun = execute(connection, "BEGIN IMMEDIATE").await;
+    while let Some(operation) = waiting.pop_front() {
+        if begun.is_ok() {
+            begun = execute(connection, "SAVEPOINT operation").await;
+        }
+        let ran = (operation.0)(begun.clone().map(|()| &mut *connection)).await;
+        answers.push(ran.answer);
+        match ran.end {
+            Ok(()) => {}
+            Err(error) if begun.is_err() || error.ends_group() => return Err(error),
+            Err(_) => execute(connection, "ROLLBACK TO operation").await?,
+        }
+        execute(connection, "RELEASE operation").await?;
+    }
+    execute(connection, "COMMIT").await
+}
+
+async fn execute(connection: &mut SqliteConnection, statement: &'static str) -> Result<(), StoreError> {
+    let result = sqlx::query(statement).execute(connection).await;
+    result.map(|_| ()).map_err(|error| Failure::from(error).during("committing a group"))
+}
