@@ -149,7 +149,10 @@ mod tests {
         let (field, value, _) = refused(r#"{"problem": {"history": [0.1], "colour": 3}}"#);
         assert_eq!((field.as_str(), value), ("problem.colour", Value::from(3)));
         assert_eq!(refused(r#"{"problem": {}}"#).0, "problem.history");
-        assert_eq!(refused(r#"{"problem": {"history": [], "utility": {"kind": "log", "x": 1}}}"#).0, "problem.utility.x");
+        assert_eq!(
+            refused(r#"{"problem": {"history": [], "utility": {"kind": "log", "x": 1}}}"#).0,
+            "problem.utility.x"
+        );
     }
 
     #[test]

@@ -1,0 +1,4 @@
+//! What the binary can be asked to do.
+
+pub mod healthcheck;
+pub mod serve;
