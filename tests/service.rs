@@ -103,7 +103,7 @@ async fn events_end_with_the_job() {
     let events = format!("{}/jobs/{job}/events", app.url);
     let text = app.client.get(&events).send().await.unwrap().text().await.unwrap();
     assert!(text.contains("event: progress") && text.contains("succeeded"), "{text}");
-    let last = text.lines().filter_map(|line| line.strip_prefix("id: ")).last().unwrap();
+    let last = text.lines().filter_map(|line| line.strip_prefix("id: ")).next_back().unwrap();
     let again = app.client.get(&events).header("Last-Event-ID", last).send().await.unwrap();
     assert_eq!(again.status(), 204);
 }

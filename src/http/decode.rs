@@ -134,7 +134,7 @@ mod tests {
 
     fn refused(body: &str) -> (String, Value, String) {
         let problem = json::<Specification>(body.as_bytes()).unwrap_err();
-        (problem.field.unwrap(), problem.value.unwrap(), problem.rule.unwrap())
+        (problem.field.unwrap(), *problem.value.unwrap(), problem.rule.unwrap().into())
     }
 
     #[test]

@@ -15,8 +15,8 @@ impl From<ServiceError> for Problem {
                 let rule = format!("must be {expected}");
                 return Problem {
                     field: Some("period".into()),
-                    value: Some(given.into()),
-                    rule: Some(rule),
+                    value: Some(Box::new(given.into())),
+                    rule: Some(rule.into()),
                     ..Problem::new(ProblemKind::PeriodGap, detail)
                 };
             }

@@ -6,7 +6,7 @@
 use axum::Json;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
@@ -86,14 +86,14 @@ impl ProblemKind {
 }
 
 /// A problem document (RFC 9457).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Problem {
     /// Stable reference of the kind of problem: `/problems/<slug>`.
     #[serde(rename = "type")]
     #[schema(example = "/problems/invalid-field")]
     pub kind: String,
     #[schema(example = "A field breaks a rule")]
-    pub title: String,
+    pub title: &'static str,
     #[schema(example = 422)]
     pub status: u16,
     /// This occurrence, in one sentence.
@@ -106,11 +106,11 @@ pub struct Problem {
     /// What the field held.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<Value>)]
-    pub value: Option<Value>,
+    pub value: Option<Box<Value>>,
     /// What the field must be.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(example = "must lie in [1, 520]")]
-    pub rule: Option<String>,
+    #[schema(value_type = Option<String>, example = "must lie in [1, 520]")]
+    pub rule: Option<Box<str>>,
 }
 
 impl Problem {
@@ -118,7 +118,7 @@ impl Problem {
         let (slug, status, title) = kind.entry();
         Problem {
             kind: format!("/problems/{slug}"),
-            title: title.into(),
+            title,
             status: status.as_u16(),
             detail: detail.into(),
             field: None,
@@ -131,7 +131,12 @@ impl Problem {
     pub fn of_field(kind: ProblemKind, error: FieldError) -> Self {
         let detail = error.to_string();
         let value = serde_json::from_str(&error.value).unwrap_or(Value::String(error.value));
-        Problem { field: Some(error.field), value: Some(value), rule: Some(error.rule), ..Problem::new(kind, detail) }
+        Problem {
+            field: Some(error.field),
+            value: Some(Box::new(value)),
+            rule: Some(error.rule.into()),
+            ..Problem::new(kind, detail)
+        }
     }
 }
 
