@@ -81,13 +81,13 @@ async fn run(listener: TcpListener, application: Router, service: Arc<Service>, 
             let permit = permits.clone().acquire_owned().await;
             (permit, listener.accept().await)
         };
-        let (permit, stream) = tokio::select! {
-            (permit, Ok((stream, _))) = accepted => (permit, stream),
+        let (permit, accepted) = tokio::select! {
+            accepted = accepted => accepted,
             () = service.shutdown.begun() => break,
-            else => {
-                tokio::time::sleep(ACCEPT_PAUSE).await;
-                continue;
-            }
+        };
+        let Ok((stream, _)) = accepted else {
+            tokio::time::sleep(ACCEPT_PAUSE).await;
+            continue;
         };
         let handler = TowerToHyperService::new(application.clone());
         let connection = http1::Builder::new()
