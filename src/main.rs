@@ -1,24 +1,48 @@
-use clap::{Parser, Subcommand};
+//! Parses the command line and runs what it names.
 
 mod command;
 
-#[derive(Parser)]
-struct Cli {
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use command::{demo, healthcheck, serve};
+
+/// Nonparametric adaptive robust control of an investor, as a service.
+#[derive(Debug, Parser)]
+#[command(version)]
+struct CommandLine {
     #[command(subcommand)]
     command: Command,
 }
 
-#[derive(Subcommand)]
+#[derive(Debug, Subcommand)]
 enum Command {
-    Demo(command::demo::DemoArgs),
+    /// Train on real returns and advise a live session through 2008.
+    Demo(demo::DemoArgs),
+    /// Run the service.
+    Serve(serve::Serve),
+    /// Exit 0 if a running service is ready, else 1.
+    Healthcheck(healthcheck::Healthcheck),
+    /// Print the OpenAPI description.
+    Openapi,
 }
 
 #[tokio::main]
-async fn main() -> std::process::ExitCode {
-    let Command::Demo(args) = Cli::parse().command;
-    if let Err(error) = command::demo::run(args).await {
-        eprintln!("ballast: {}", command::with_causes(&error));
-        return std::process::ExitCode::FAILURE;
+async fn main() -> ExitCode {
+    let outcome = match CommandLine::parse().command {
+        Command::Demo(arguments) => demo::run(arguments).await.map_err(Into::into),
+        Command::Serve(arguments) => serve::run(arguments).await,
+        Command::Healthcheck(arguments) => healthcheck::run(&arguments),
+        Command::Openapi => {
+            print!("{}", ballast::http::description_json());
+            Ok(())
+        }
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("ballast: {}", command::with_causes(error.as_ref()));
+            ExitCode::FAILURE
+        }
     }
-    std::process::ExitCode::SUCCESS
 }

@@ -1,7 +1,9 @@
-//! Commands of the binary that are clients of the service, and what they need.
+//! What the binary can be asked to do.
 
 mod api_client;
 pub mod demo;
+pub mod healthcheck;
+pub mod serve;
 mod us_market;
 
 /// An error and its causes on one line.

@@ -1,1 +1,20 @@
-//! TODO
+//! Floor 4: translation between the wire and the use cases, and nothing else.
+
+mod decode;
+mod documentation;
+mod events;
+mod extract;
+mod fault;
+mod jobs;
+mod operations;
+mod page;
+mod policies;
+pub mod problem;
+mod router;
+mod server;
+mod sessions;
+mod telemetry;
+mod wire;
+
+pub use router::description_json;
+pub use server::{Running, ServeError, serve};

@@ -1,1 +1,91 @@
-//! TODO
+//! Floor 3: use cases: train, open a session, observe, act. No HTTP types.
+//!
+//! [`Service`] is what a transport needs: the store, the jobs and their trainer, the policies made ready to answer,
+//! and the live sessions. Everything acknowledged is in the store first; memory only saves recomputing.
+
+pub mod clock;
+pub mod config;
+pub mod error;
+mod identity;
+pub mod jobs;
+pub mod metrics;
+pub mod observation;
+pub mod policies;
+pub mod progress;
+pub mod sessions;
+pub mod shutdown;
+mod trainer;
+
+use std::sync::Arc;
+
+use clock::Clock;
+use config::Config;
+use error::ServiceError;
+use jobs::Jobs;
+use policies::Policies;
+use sessions::Sessions;
+use shutdown::Shutdown;
+use trainer::Trainer;
+
+use crate::store::{JobCounts, Store};
+
+/// The use cases over one store.
+pub struct Service {
+    pub jobs: Jobs,
+    pub policies: Arc<Policies>,
+    pub sessions: Sessions,
+    pub shutdown: Shutdown,
+    store: Store,
+    trainer: Trainer,
+}
+
+impl Service {
+    /// Opens the store, starts the trainer, and ends the process should the store ever fail past recovery.
+    ///
+    /// # Errors
+    /// The store cannot be opened, or the training thread cannot be started.
+    pub async fn start(config: &Config, clock: Clock, shutdown: Shutdown) -> Result<Arc<Self>, ServiceError> {
+        let store = Store::open(&config.data).await?;
+        exit_on_fatal(store.clone());
+        let jobs = Jobs::new(store.clone(), clock.clone());
+        let policies = Arc::new(Policies::new(store.clone(), clock.clone()));
+        let sessions = Sessions::new(store.clone(), clock.clone(), policies.clone());
+        let trainer = Trainer::start(config, store.clone(), clock, jobs.board(), shutdown.clone())?;
+        Ok(Arc::new(Service { jobs, policies, sessions, shutdown, store, trainer }))
+    }
+
+    /// Whether the store answers and the service is not draining.
+    ///
+    /// # Errors
+    /// Which of the two is not so.
+    pub async fn ready(&self) -> Result<(), ServiceError> {
+        if self.shutdown.has_begun() {
+            return Err(ServiceError::Draining);
+        }
+        Ok(self.store.ping().await?)
+    }
+
+    /// Jobs in each state, and the number of sessions.
+    ///
+    /// # Errors
+    /// The store does not answer.
+    pub async fn counts(&self) -> Result<(JobCounts, u64), ServiceError> {
+        Ok((self.store.count_jobs_by_state().await?, self.store.count_sessions().await?))
+    }
+
+    /// Waits for the running job to be requeued and closes the store. Call after the shutdown has begun.
+    pub async fn close(&self) {
+        self.trainer.join().await;
+        self.store.close().await;
+    }
+}
+
+/// After a failed fsync or an I/O error memory and disk may disagree: only a restart finds the truth.
+fn exit_on_fatal(store: Store) {
+    const EXIT_STORE_FAILED: i32 = 74;
+    tokio::spawn(async move {
+        let error = store.until_fatal().await;
+        tracing::error!(error = &error as &dyn std::error::Error, "the store failed; exiting");
+        std::process::exit(EXIT_STORE_FAILED);
+    });
+}

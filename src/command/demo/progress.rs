@@ -21,10 +21,8 @@ pub struct Job {
 pub struct Progress {
     pub steps_done: usize,
     pub step: Option<usize>,
-    #[serde(default)]
-    pub done: usize,
-    #[serde(default)]
-    pub total: usize,
+    pub points_done: Option<usize>,
+    pub points_total: Option<usize>,
     pub seconds_left: Option<f64>,
 }
 
@@ -84,12 +82,14 @@ impl ProgressView {
 }
 
 fn position(progress: &Progress) -> usize {
-    progress.steps_done * TICKS_PER_STEP + progress.done * TICKS_PER_STEP / progress.total.max(1)
+    let (done, total) = (progress.points_done.unwrap_or(0), progress.points_total.unwrap_or(1));
+    progress.steps_done * TICKS_PER_STEP + done * TICKS_PER_STEP / total.max(1)
 }
 
 /// Where the running step is; `None` between two steps.
 fn sentence(progress: &Progress) -> Option<String> {
-    let Progress { step, done, total, seconds_left, .. } = progress;
+    let Progress { step, seconds_left, .. } = progress;
+    let (done, total) = (progress.points_done.unwrap_or(0), progress.points_total.unwrap_or(0));
     let left = seconds_left.map_or(String::new(), |seconds| format!(", about {seconds:.0} s left"));
     step.map(|step| format!("step {step}, design point {done} of {total}{left}"))
 }

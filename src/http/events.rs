@@ -1,0 +1,85 @@
+//! The event stream of a job: levels, not edges.
+//!
+//! Each event carries the whole job, and its id is made of the state and the progress shown. A client that comes back
+//! with `Last-Event-ID` therefore misses nothing and sees nothing twice, even across a restart of the service. A client
+//! that has seen the terminal state gets 204, which tells an `EventSource` to stay away.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::sse::{Event, KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use futures_util::stream;
+use tokio::sync::watch;
+
+use super::extract::Id;
+use super::problem::Problem;
+use super::wire;
+use crate::service::Service;
+use crate::store::JobState;
+
+/// A change made by another process is noticed within this time.
+const POLL: Duration = Duration::from_secs(2);
+const KEEP_ALIVE: Duration = Duration::from_secs(15);
+
+struct Follower {
+    service: Arc<Service>,
+    job: String,
+    changes: watch::Receiver<u64>,
+    last_id: String,
+    last_state: Option<JobState>,
+}
+
+/// Follow a job: events `state` and `progress` carry the job; the stream ends at a terminal state.
+#[utoipa::path(get, path = "/jobs/{id}/events", tag = "jobs",
+    params(("id" = String, Path, description = "The job."),
+           ("Last-Event-ID" = Option<String>, Header, description = "The id of the last event seen.")),
+    responses(
+        (status = 200, description = "Server-sent events, each with the job as JSON.", body = String, content_type = "text/event-stream"),
+        (status = 204, description = "The terminal state was seen already."),
+        (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json")))]
+pub async fn follow(State(service): State<Arc<Service>>, Id(job): Id, headers: HeaderMap) -> Result<Response, Problem> {
+    let changes = service.jobs.changes();
+    let now = wire::Job::from(service.jobs.get(&job).await?);
+    let last_id = headers.get("last-event-id").and_then(|id| id.to_str().ok()).unwrap_or("").to_owned();
+    if now.state.is_terminal() && last_id == event_id(&now) {
+        return Ok(StatusCode::NO_CONTENT.into_response());
+    }
+    let follower = Follower { service, job, changes, last_id, last_state: None };
+    let events = stream::unfold(Some(follower), |follower| async { follower?.next().await });
+    Ok(Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE)).into_response())
+}
+
+impl Follower {
+    /// The next event that differs from the last; none once the job or the service ends.
+    async fn next(mut self) -> Option<(Result<Event, Infallible>, Option<Self>)> {
+        loop {
+            self.changes.mark_unchanged();
+            let job = wire::Job::from(self.service.jobs.get(&self.job).await.ok()?);
+            let id = event_id(&job);
+            if id != self.last_id {
+                let name = if self.last_state == Some(job.state) { "progress" } else { "state" };
+                let event = Event::default().id(&id).event(name).json_data(&job).ok()?;
+                (self.last_id, self.last_state) = (id, Some(job.state));
+                return Some((Ok(event), (!job.state.is_terminal()).then_some(self)));
+            }
+            tokio::select! {
+                _ = self.changes.changed() => {}
+                () = tokio::time::sleep(POLL) => {}
+                () = self.service.shutdown.begun() => return None,
+            }
+        }
+    }
+}
+
+fn event_id(job: &wire::Job) -> String {
+    let points = job.progress.points_done.unwrap_or(0);
+    let phase = job.progress.phase.map_or("", |phase| match phase {
+        crate::control::backward::Phase::Solving => "s",
+        crate::control::backward::Phase::Fitting => "f",
+    });
+    format!("{}-{}-{points}{phase}", job.state.as_str(), job.progress.steps_done)
+}

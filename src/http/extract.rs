@@ -1,0 +1,78 @@
+//! Extractors that refuse with problem documents where axum's own refuse with plain text.
+
+use axum::body::Bytes;
+use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, StatusCode, header};
+use serde::de::DeserializeOwned;
+
+use super::decode;
+use super::problem::{Problem, ProblemKind};
+
+/// A JSON body.
+pub struct JsonBody<T>(pub T);
+
+impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T> {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        let JsonBytes(bytes) = JsonBytes::from_request(request, state).await?;
+        decode::json(&bytes).map(JsonBody)
+    }
+}
+
+/// The bytes of a body declared to be JSON, not yet parsed.
+pub struct JsonBytes(pub Bytes);
+
+impl<S: Send + Sync> FromRequest<S> for JsonBytes {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        refuse_other_media(request.headers())?;
+        Bytes::from_request(request, state).await.map(JsonBytes).map_err(|rejection| {
+            let kind = match rejection.status() {
+                StatusCode::PAYLOAD_TOO_LARGE => ProblemKind::BodyTooLarge,
+                _ => ProblemKind::MalformedJson,
+            };
+            Problem::new(kind, rejection.body_text())
+        })
+    }
+}
+
+fn refuse_other_media(headers: &HeaderMap) -> Result<(), Problem> {
+    let declared = headers.get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok()).unwrap_or("");
+    let media = declared.split(';').next().unwrap_or("").trim().to_ascii_lowercase();
+    if media == "application/json" || (media.starts_with("application/") && media.ends_with("+json")) {
+        return Ok(());
+    }
+    let detail = format!("the Content-Type is '{declared}'; it must be application/json");
+    Err(Problem::new(ProblemKind::UnsupportedMediaType, detail))
+}
+
+/// The parameters of the query string.
+pub struct Parameters<T>(pub T);
+
+impl<S: Send + Sync, T: DeserializeOwned> FromRequestParts<S> for Parameters<T> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let Query(pairs) = Query::<Vec<(String, String)>>::from_request_parts(parts, state)
+            .await
+            .map_err(|rejection| Problem::new(ProblemKind::InvalidQuery, rejection.body_text()))?;
+        decode::parameters(pairs).map(Parameters)
+    }
+}
+
+/// The identifier in the path.
+pub struct Id(pub String);
+
+impl<S: Send + Sync> FromRequestParts<S> for Id {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let Path(id) = Path::<String>::from_request_parts(parts, state)
+            .await
+            .map_err(|rejection| Problem::new(ProblemKind::NotFound, rejection.body_text()))?;
+        Ok(Id(id))
+    }
+}

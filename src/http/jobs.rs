@@ -1,0 +1,80 @@
+//! Training jobs.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+
+use super::extract::{Id, JsonBody, Parameters};
+use super::page::{self, Page};
+use super::problem::{Problem, ProblemKind};
+use super::wire;
+use crate::control::error::FieldError;
+use crate::control::specification::Specification;
+use crate::service::Service;
+
+/// Queue a training.
+#[utoipa::path(post, path = "/train", tag = "jobs", request_body = Specification,
+    params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
+    responses(
+        (status = 202, description = "Queued; poll the Location or follow its events.", body = wire::Job, headers(
+            ("Location" = String, description = "The job."),
+            ("Retry-After" = u32, description = "Seconds to wait before asking for the job."))),
+        (status = 400, description = "The body is not JSON.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "The key was used with another body.", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn train(
+    State(service): State<Arc<Service>>,
+    headers: HeaderMap,
+    JsonBody(specification): JsonBody<Specification>,
+) -> Result<Response, Problem> {
+    let job = wire::Job::from(service.jobs.train(specification, idempotency_key(&headers)?).await?);
+    let location = [(header::LOCATION, format!("/jobs/{}", job.job)), (header::RETRY_AFTER, "1".to_owned())];
+    Ok((StatusCode::ACCEPTED, location, Json(job)).into_response())
+}
+
+fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
+    let Some(value) = headers.get("idempotency-key") else { return Ok(None) };
+    value.to_str().map(|key| Some(key.to_owned())).map_err(|_| {
+        let error = FieldError::new("Idempotency-Key", "not ASCII", "must be visible ASCII");
+        Problem::of_field(ProblemKind::InvalidField, error)
+    })
+}
+
+/// List jobs, newest first.
+#[utoipa::path(get, path = "/jobs", tag = "jobs",
+    params(("limit" = Option<usize>, Query, description = "1 to 1000; default 50."),
+           ("after" = Option<i64>, Query, description = "The `next` of the page before.")),
+    responses(
+        (status = 200, description = "A page of jobs.", body = wire::JobPage),
+        (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn list(
+    State(service): State<Arc<Service>>,
+    Parameters(page): Parameters<Page>,
+) -> Result<Json<wire::JobPage>, Problem> {
+    let (limit, after) = page.bounds()?;
+    let jobs = service.jobs.list(limit, after).await?;
+    let next = page::next(jobs.len(), limit, jobs.last().map(|job| job.row.sequence));
+    Ok(Json(wire::JobPage { jobs: jobs.into_iter().map(Into::into).collect(), next }))
+}
+
+/// A job: state, progress, result.
+#[utoipa::path(get, path = "/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "The job.")),
+    responses(
+        (status = 200, description = "The job.", body = wire::Job),
+        (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json")))]
+pub async fn get(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Json<wire::Job>, Problem> {
+    Ok(Json(service.jobs.get(&id).await?.into()))
+}
+
+/// Cancel a job: always accepted; it stops within a second. A finished job stays as it is.
+#[utoipa::path(delete, path = "/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "The job.")),
+    responses(
+        (status = 202, description = "The job as it is now.", body = wire::Job),
+        (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json")))]
+pub async fn cancel(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Response, Problem> {
+    let job = wire::Job::from(service.jobs.cancel(&id).await?);
+    Ok((StatusCode::ACCEPTED, Json(job)).into_response())
+}

@@ -1,0 +1,88 @@
+//! For the operator: is it alive, is it ready, how is it doing.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::header;
+use axum::response::{Html, IntoResponse, Response};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::problem::Problem;
+use super::{documentation, router, telemetry};
+use crate::service::Service;
+
+/// The service in a few words.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Health {
+    pub status: &'static str,
+    pub version: &'static str,
+    pub jobs_queued: u64,
+    pub jobs_running: u64,
+    pub sessions: u64,
+}
+
+/// Whether the process answers.
+#[utoipa::path(get, path = "/livez", tag = "operations",
+    responses((status = 200, description = "It does.", body = String, content_type = "text/plain")))]
+pub async fn livez() -> &'static str {
+    "ok"
+}
+
+/// Whether the store answers and the service takes work.
+#[utoipa::path(get, path = "/readyz", tag = "operations",
+    responses(
+        (status = 200, description = "It does.", body = String, content_type = "text/plain"),
+        (status = 503, description = "Draining, or the store does not answer.", body = Problem, content_type = "application/problem+json")))]
+pub async fn readyz(State(service): State<Arc<Service>>) -> Result<&'static str, Problem> {
+    service.ready().await?;
+    Ok("ok")
+}
+
+/// Both, with detail.
+#[utoipa::path(get, path = "/health", tag = "operations",
+    responses(
+        (status = 200, description = "Alive and ready.", body = Health),
+        (status = 503, description = "Draining, or the store does not answer.", body = Problem, content_type = "application/problem+json")))]
+pub async fn health(State(service): State<Arc<Service>>) -> Result<Json<Health>, Problem> {
+    service.ready().await?;
+    let (jobs, sessions) = service.counts().await?;
+    Ok(Json(Health {
+        status: "ok",
+        version: env!("CARGO_PKG_VERSION"),
+        jobs_queued: jobs.queued,
+        jobs_running: jobs.running,
+        sessions,
+    }))
+}
+
+/// Metrics for Prometheus.
+#[utoipa::path(get, path = "/metrics", tag = "operations",
+    responses((status = 200, description = "Text exposition format.", body = String, content_type = "text/plain")))]
+pub async fn metrics(State(service): State<Arc<Service>>) -> Result<Response, Problem> {
+    let (jobs, sessions) = service.counts().await?;
+    let text = telemetry::exposition(jobs, sessions);
+    Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response())
+}
+
+/// The description of this interface.
+#[utoipa::path(get, path = "/openapi.json", tag = "operations",
+    responses((status = 200, description = "OpenAPI 3.1.", body = serde_json::Value)))]
+pub async fn openapi() -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], router::description_json()).into_response()
+}
+
+/// The description as a page to read.
+#[utoipa::path(get, path = "/docs", tag = "operations",
+    responses((status = 200, description = "A page.", body = String, content_type = "text/html")))]
+pub async fn docs() -> Html<String> {
+    Html(documentation::page(&router::description()))
+}
+
+/// Where to start.
+#[utoipa::path(get, path = "/", tag = "operations",
+    responses((status = 200, description = "A page.", body = String, content_type = "text/html")))]
+pub async fn root() -> Html<&'static str> {
+    Html("<!doctype html><title>Ballast</title><p>Ballast is running. Read <a href=\"/docs\">the documentation</a>.")
+}

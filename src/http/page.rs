@@ -1,0 +1,43 @@
+//! Pages of a list.
+
+use serde::Deserialize;
+
+use super::problem::{Problem, ProblemKind};
+use crate::control::error::FieldError;
+
+const DEFAULT_LIMIT: usize = 50;
+const LARGEST_LIMIT: usize = 1000;
+
+/// Query parameters of a list, as text.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Page {
+    limit: Option<String>,
+    after: Option<String>,
+}
+
+impl Page {
+    /// The limit and the cursor.
+    pub fn bounds(&self) -> Result<(usize, Option<i64>), Problem> {
+        let refused = |field, value: &str, rule| {
+            Problem::of_field(ProblemKind::InvalidQuery, FieldError::new(field, value, rule))
+        };
+        let limit = match &self.limit {
+            None => DEFAULT_LIMIT,
+            Some(text) => match text.parse() {
+                Ok(limit) if (1..=LARGEST_LIMIT).contains(&limit) => limit,
+                _ => return Err(refused("limit", text, "must be a whole number in [1, 1000]")),
+            },
+        };
+        let after = self
+            .after
+            .as_deref()
+            .map(|text| text.parse().map_err(|_| refused("after", text, "must be the `next` of the page before")));
+        Ok((limit, after.transpose()?))
+    }
+}
+
+/// The cursor of the page after one that ends at `last`, where the page is full.
+pub fn next(length: usize, limit: usize, last: Option<i64>) -> Option<i64> {
+    last.filter(|_| length == limit)
+}

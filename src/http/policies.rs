@@ -1,0 +1,83 @@
+//! Policies: immutable, named by the hash of their bytes.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+
+use super::extract::{Id, JsonBytes, Parameters};
+use super::page::{self, Page};
+use super::problem::Problem;
+use super::wire;
+use crate::service::Service;
+
+/// List policies, newest first.
+#[utoipa::path(get, path = "/policies", tag = "policies",
+    params(("limit" = Option<usize>, Query, description = "1 to 1000; default 50."),
+           ("after" = Option<i64>, Query, description = "The `next` of the page before.")),
+    responses(
+        (status = 200, description = "A page of policies.", body = wire::PolicyPage),
+        (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn list(
+    State(service): State<Arc<Service>>,
+    Parameters(page): Parameters<Page>,
+) -> Result<Json<wire::PolicyPage>, Problem> {
+    let (limit, after) = page.bounds()?;
+    let rows = service.policies.list(limit, after).await?;
+    let next = page::next(rows.len(), limit, rows.last().map(|row| row.sequence));
+    Ok(Json(wire::PolicyPage { policies: rows.into_iter().map(Into::into).collect(), next }))
+}
+
+/// A policy with its specification and the diagnostics of every step.
+#[utoipa::path(get, path = "/policies/{id}", tag = "policies", params(("id" = String, Path, description = "The policy.")),
+    responses(
+        (status = 200, description = "The policy.", body = wire::PolicyDetail),
+        (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json")))]
+pub async fn get(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Json<wire::PolicyDetail>, Problem> {
+    let row = service.policies.get(&id).await?;
+    let advisor = service.policies.advisor(&id).await?;
+    let specification = advisor.specification().clone();
+    Ok(Json(wire::PolicyDetail {
+        policy: row.policy,
+        created_ms: row.created_ms,
+        framework: specification.problem.framework,
+        horizon: specification.problem.horizon,
+        diagnostics: advisor.policy().diagnostics().cloned().collect(),
+        specification,
+    }))
+}
+
+/// The portable document of a policy; its SHA-256 is the policy's name.
+#[utoipa::path(get, path = "/policies/{id}/export", tag = "policies", params(("id" = String, Path, description = "The policy.")),
+    responses(
+        (status = 200, description = "The document.", body = serde_json::Value),
+        (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json")))]
+pub async fn export(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Response, Problem> {
+    let row = service.policies.get(&id).await?;
+    Ok(([(header::CONTENT_TYPE, "application/json")], row.json).into_response())
+}
+
+/// Store an exported policy.
+#[utoipa::path(post, path = "/policies/import", tag = "policies", request_body = serde_json::Value,
+    responses(
+        (status = 201, description = "Stored, or known already.", body = wire::Imported,
+            headers(("Location" = String, description = "The policy."))),
+        (status = 422, description = "The document is not a usable policy.", body = Problem, content_type = "application/problem+json")))]
+pub async fn import(State(service): State<Arc<Service>>, JsonBytes(document): JsonBytes) -> Result<Response, Problem> {
+    let policy = service.policies.import(document.into()).await?;
+    let location = [(header::LOCATION, format!("/policies/{policy}"))];
+    Ok((StatusCode::CREATED, location, Json(wire::Imported { policy })).into_response())
+}
+
+/// Delete a policy that no session lives by.
+#[utoipa::path(delete, path = "/policies/{id}", tag = "policies", params(("id" = String, Path, description = "The policy.")),
+    responses(
+        (status = 204, description = "Deleted."),
+        (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "Sessions live by it.", body = Problem, content_type = "application/problem+json")))]
+pub async fn delete(State(service): State<Arc<Service>>, Id(id): Id) -> Result<StatusCode, Problem> {
+    service.policies.delete(&id).await?;
+    Ok(StatusCode::NO_CONTENT)
+}

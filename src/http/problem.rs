@@ -1,0 +1,155 @@
+//! Every way a request can fail, once: RFC 9457 problem documents.
+//!
+//! [`ProblemKind::entry`] is the only place that pairs a kind with its slug, status and title; responses, the
+//! OpenAPI description and the documentation page are derived from it.
+
+use axum::Json;
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+
+use crate::control::error::FieldError;
+
+/// What went wrong, chosen by what the client should do next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ProblemKind {
+    MalformedJson,
+    InvalidQuery,
+    UnknownRoute,
+    NotFound,
+    WrongMethod,
+    IdempotencyConflict,
+    InUse,
+    PeriodConflict,
+    PeriodGap,
+    SessionCompleted,
+    BodyTooLarge,
+    UnsupportedMediaType,
+    InvalidField,
+    InvalidPolicy,
+    Internal,
+    Overloaded,
+    StorageFull,
+}
+
+impl ProblemKind {
+    /// In ascending order of status.
+    pub const ALL: [ProblemKind; 17] = [
+        ProblemKind::MalformedJson,
+        ProblemKind::InvalidQuery,
+        ProblemKind::UnknownRoute,
+        ProblemKind::NotFound,
+        ProblemKind::WrongMethod,
+        ProblemKind::IdempotencyConflict,
+        ProblemKind::InUse,
+        ProblemKind::PeriodConflict,
+        ProblemKind::PeriodGap,
+        ProblemKind::SessionCompleted,
+        ProblemKind::BodyTooLarge,
+        ProblemKind::UnsupportedMediaType,
+        ProblemKind::InvalidField,
+        ProblemKind::InvalidPolicy,
+        ProblemKind::Internal,
+        ProblemKind::Overloaded,
+        ProblemKind::StorageFull,
+    ];
+
+    /// Slug, status and title.
+    pub fn entry(self) -> (&'static str, StatusCode, &'static str) {
+        use StatusCode as S;
+        match self {
+            Self::MalformedJson => ("malformed-json", S::BAD_REQUEST, "The body is not JSON"),
+            Self::InvalidQuery => ("invalid-query", S::BAD_REQUEST, "A query parameter breaks a rule"),
+            Self::UnknownRoute => ("unknown-route", S::NOT_FOUND, "There is nothing at this address"),
+            Self::NotFound => ("not-found", S::NOT_FOUND, "There is no such thing"),
+            Self::WrongMethod => ("wrong-method", S::METHOD_NOT_ALLOWED, "The address does not take this method"),
+            Self::IdempotencyConflict => {
+                ("idempotency-conflict", S::CONFLICT, "The idempotency key was used with another body")
+            }
+            Self::InUse => ("in-use", S::CONFLICT, "Something else depends on it"),
+            Self::PeriodConflict => ("period-conflict", S::CONFLICT, "The period was observed with other content"),
+            Self::PeriodGap => ("period-gap", S::CONFLICT, "The period is not the one expected"),
+            Self::SessionCompleted => ("session-completed", S::CONFLICT, "The session has reached its horizon"),
+            Self::BodyTooLarge => ("body-too-large", S::PAYLOAD_TOO_LARGE, "The body is too large"),
+            Self::UnsupportedMediaType => {
+                ("unsupported-media-type", S::UNSUPPORTED_MEDIA_TYPE, "The body must be application/json")
+            }
+            Self::InvalidField => ("invalid-field", S::UNPROCESSABLE_ENTITY, "A field breaks a rule"),
+            Self::InvalidPolicy => ("invalid-policy", S::UNPROCESSABLE_ENTITY, "The document is not a usable policy"),
+            Self::Internal => ("internal", S::INTERNAL_SERVER_ERROR, "The service failed"),
+            Self::Overloaded => ("overloaded", S::SERVICE_UNAVAILABLE, "The service cannot answer now"),
+            Self::StorageFull => ("storage-full", S::INSUFFICIENT_STORAGE, "The data folder is full"),
+        }
+    }
+}
+
+/// A problem document (RFC 9457).
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Problem {
+    /// Stable reference of the kind of problem: `/problems/<slug>`.
+    #[serde(rename = "type")]
+    #[schema(example = "/problems/invalid-field")]
+    pub kind: String,
+    #[schema(example = "A field breaks a rule")]
+    pub title: &'static str,
+    #[schema(example = 422)]
+    pub status: u16,
+    /// This occurrence, in one sentence.
+    #[schema(example = "problem.horizon is 0: must lie in [1, 520]")]
+    pub detail: String,
+    /// Dotted path of the offending field.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(example = "problem.horizon")]
+    pub field: Option<String>,
+    /// What the field held.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<Value>)]
+    pub value: Option<Box<Value>>,
+    /// What the field must be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<String>, example = "must lie in [1, 520]")]
+    pub rule: Option<Box<str>>,
+}
+
+impl Problem {
+    pub fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
+        let (slug, status, title) = kind.entry();
+        Problem {
+            kind: format!("/problems/{slug}"),
+            title,
+            status: status.as_u16(),
+            detail: detail.into(),
+            field: None,
+            value: None,
+            rule: None,
+        }
+    }
+
+    /// A field that breaks a rule. A value that is not JSON is shown as text.
+    pub fn of_field(kind: ProblemKind, error: FieldError) -> Self {
+        let detail = error.to_string();
+        let value = serde_json::from_str(&error.value).unwrap_or(Value::String(error.value));
+        Problem {
+            field: Some(error.field),
+            value: Some(Box::new(value)),
+            rule: Some(error.rule.into()),
+            ..Problem::new(kind, detail)
+        }
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        const RETRY_AFTER_SECONDS: HeaderValue = HeaderValue::from_static("1");
+        let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+        let mut response = (status, Json(self)).into_response();
+        let headers = response.headers_mut();
+        headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
+        if status == StatusCode::SERVICE_UNAVAILABLE || status == StatusCode::INSUFFICIENT_STORAGE {
+            headers.insert(header::RETRY_AFTER, RETRY_AFTER_SECONDS);
+        }
+        response
+    }
+}

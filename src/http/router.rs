@@ -1,0 +1,98 @@
+//! Every route, once: the router and its OpenAPI description come from the same list.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use axum::extract::{DefaultBodyLimit, Request, State};
+use axum::http::{Method, Uri};
+use axum::middleware::{self, Next};
+use axum::response::{IntoResponse, Response};
+use tower_http::catch_panic::CatchPanicLayer;
+use utoipa::OpenApi;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use super::problem::{Problem, ProblemKind};
+use super::{events, jobs, operations, policies, sessions, telemetry};
+use crate::service::Service;
+use crate::service::config::Config;
+
+#[derive(OpenApi)]
+#[openapi(
+    info(title = "Ballast", description = "Nonparametric adaptive robust control of an investor. Every error is a problem document (RFC 9457)."),
+    tags(
+        (name = "jobs", description = "Train, offline."),
+        (name = "policies", description = "What trainings give."),
+        (name = "sessions", description = "Act, live."),
+        (name = "operations", description = "For the operator."))
+)]
+struct Description;
+
+fn routes() -> OpenApiRouter<Arc<Service>> {
+    OpenApiRouter::with_openapi(Description::openapi())
+        .routes(routes!(jobs::train))
+        .routes(routes!(jobs::list))
+        .routes(routes!(jobs::get, jobs::cancel))
+        .routes(routes!(events::follow))
+        .routes(routes!(policies::list))
+        .routes(routes!(policies::get, policies::delete))
+        .routes(routes!(policies::export))
+        .routes(routes!(policies::import))
+        .routes(routes!(sessions::open, sessions::list))
+        .routes(routes!(sessions::get, sessions::delete))
+        .routes(routes!(sessions::history))
+        .routes(routes!(sessions::observe))
+        .routes(routes!(sessions::action))
+        .routes(routes!(operations::livez))
+        .routes(routes!(operations::readyz))
+        .routes(routes!(operations::health))
+        .routes(routes!(operations::metrics))
+        .routes(routes!(operations::openapi))
+        .routes(routes!(operations::docs))
+        .routes(routes!(operations::root))
+}
+
+/// The OpenAPI description.
+pub fn description() -> utoipa::openapi::OpenApi {
+    routes().into_openapi()
+}
+
+/// The description as checked in under `api/openapi.json`.
+pub fn description_json() -> String {
+    description().to_pretty_json().unwrap_or_default() + "\n"
+}
+
+/// The whole application.
+pub fn application(service: Arc<Service>, config: &Config) -> Router {
+    let (router, _) = routes().split_for_parts();
+    router
+        .fallback(unknown_route)
+        .method_not_allowed_fallback(wrong_method)
+        .layer(DefaultBodyLimit::max(config.body_limit_bytes))
+        .layer(middleware::from_fn_with_state(config.request_timeout, within_time))
+        .layer(CatchPanicLayer::custom(|_| {
+            Problem::new(ProblemKind::Internal, "the cause is in the log").into_response()
+        }))
+        .layer(middleware::from_fn(telemetry::record))
+        .with_state(service)
+}
+
+async fn unknown_route(uri: Uri) -> Problem {
+    Problem::new(ProblemKind::UnknownRoute, format!("there is nothing at {}", uri.path()))
+}
+
+async fn wrong_method(method: Method, uri: Uri) -> Problem {
+    Problem::new(ProblemKind::WrongMethod, format!("{} does not take {method}", uri.path()))
+}
+
+/// Bounds the time to the head of the response, and so the time a slow body may take; event streams run on.
+async fn within_time(State(limit): State<Duration>, request: Request, next: Next) -> Response {
+    match tokio::time::timeout(limit, next.run(request)).await {
+        Ok(response) => response,
+        Err(_) => {
+            let detail = format!("no answer within {} s", limit.as_secs());
+            Problem::new(ProblemKind::Overloaded, detail).into_response()
+        }
+    }
+}

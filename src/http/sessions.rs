@@ -1,0 +1,152 @@
+//! Live investors: open, observe, act.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::Deserialize;
+
+use super::extract::{Id, JsonBody, Parameters};
+use super::page::{self, Page};
+use super::problem::Problem;
+use super::wire;
+use crate::control::advisor::AdviceMode;
+use crate::service::Service;
+use crate::service::metrics::{ACTION_SECONDS, OBSERVE_SECONDS};
+use crate::service::observation::{Observe, Observed};
+use crate::service::sessions::Question;
+
+/// Open a session.
+#[utoipa::path(post, path = "/sessions", tag = "sessions", request_body = wire::OpenSession,
+    responses(
+        (status = 201, description = "Opened.", body = wire::Session, headers(("Location" = String, description = "The session."))),
+        (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn open(
+    State(service): State<Arc<Service>>,
+    JsonBody(request): JsonBody<wire::OpenSession>,
+) -> Result<Response, Problem> {
+    let live = service.sessions.open(&request.policy, request.history, request.wealth).await?;
+    let session = wire::Session::from(live);
+    let location = [(header::LOCATION, format!("/sessions/{}", session.session))];
+    Ok((StatusCode::CREATED, location, Json(session)).into_response())
+}
+
+/// List sessions, newest first.
+#[utoipa::path(get, path = "/sessions", tag = "sessions",
+    params(("limit" = Option<usize>, Query, description = "1 to 1000; default 50."),
+           ("after" = Option<i64>, Query, description = "The `next` of the page before.")),
+    responses(
+        (status = 200, description = "A page of sessions.", body = wire::SessionPage),
+        (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn list(
+    State(service): State<Arc<Service>>,
+    Parameters(page): Parameters<Page>,
+) -> Result<Json<wire::SessionPage>, Problem> {
+    let (limit, after) = page.bounds()?;
+    let rows = service.sessions.list(limit, after).await?;
+    let next = page::next(rows.len(), limit, rows.last().map(|row| row.sequence));
+    Ok(Json(wire::SessionPage { sessions: rows.into_iter().map(Into::into).collect(), next }))
+}
+
+/// A session: coming period, wealth, state.
+#[utoipa::path(get, path = "/sessions/{id}", tag = "sessions", params(("id" = String, Path, description = "The session.")),
+    responses(
+        (status = 200, description = "The session.", body = wire::Session),
+        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json")))]
+pub async fn get(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Json<wire::Session>, Problem> {
+    Ok(Json(service.sessions.get(&id).await?.into()))
+}
+
+/// Where a session started and everything it observed.
+#[utoipa::path(get, path = "/sessions/{id}/history", tag = "sessions", params(("id" = String, Path, description = "The session.")),
+    responses(
+        (status = 200, description = "The history.", body = wire::SessionHistory),
+        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json")))]
+pub async fn history(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Json<wire::SessionHistory>, Problem> {
+    let (row, observations) = service.sessions.history(&id).await?;
+    Ok(Json(wire::SessionHistory {
+        session: row.session,
+        policy: row.policy,
+        initial_wealth: row.initial_wealth,
+        history: row.initial_history,
+        observations: observations.into_iter().map(Into::into).collect(),
+    }))
+}
+
+/// Delete a session and its observations.
+#[utoipa::path(delete, path = "/sessions/{id}", tag = "sessions", params(("id" = String, Path, description = "The session.")),
+    responses(
+        (status = 204, description = "Deleted."),
+        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json")))]
+pub async fn delete(State(service): State<Arc<Service>>, Id(id): Id) -> Result<StatusCode, Problem> {
+    service.sessions.delete(&id).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Report the return of a period: exactly once, durable before it is answered.
+#[utoipa::path(post, path = "/observe", tag = "sessions", request_body = Observe,
+    responses(
+        (status = 200, description = "Recorded; the same period and content again give the same answer.", body = Observed),
+        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "Other content, a gap, or past the horizon.", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn observe(
+    State(service): State<Arc<Service>>,
+    JsonBody(report): JsonBody<Observe>,
+) -> Result<Json<Observed>, Problem> {
+    let started = Instant::now();
+    let observed = service.sessions.observe(report).await?;
+    metrics::histogram!(OBSERVE_SECONDS).record(started.elapsed().as_secs_f64());
+    Ok(Json(observed))
+}
+
+/// Query of `/action`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ask {
+    session: String,
+    mode: Option<Mode>,
+    explain: Option<Explain>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Mode {
+    Surrogate,
+    Resolve,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Explain {
+    WorstCase,
+}
+
+/// The robust allocation for the coming period.
+#[utoipa::path(get, path = "/action", tag = "sessions",
+    params(("session" = String, Query, description = "The session."),
+           ("mode" = Option<String>, Query, description = "`surrogate` (default) or `resolve`."),
+           ("explain" = Option<String>, Query, description = "`worst_case`: re-solve, and show the worst-case law.")),
+    responses(
+        (status = 200, description = "The allocation.", body = wire::Action),
+        (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json"),
+        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "The session has reached its horizon.", body = Problem, content_type = "application/problem+json")))]
+pub async fn action(
+    State(service): State<Arc<Service>>,
+    Parameters(ask): Parameters<Ask>,
+) -> Result<Json<wire::Action>, Problem> {
+    let (question, label) = match (ask.explain, ask.mode) {
+        (Some(Explain::WorstCase), _) => (Question::Explain, "explain"),
+        (None, Some(Mode::Resolve)) => (Question::Advise(AdviceMode::Resolve), "resolve"),
+        (None, _) => (Question::Advise(AdviceMode::Surrogate), "surrogate"),
+    };
+    let started = Instant::now();
+    let action = service.sessions.action(&ask.session, question).await?;
+    metrics::histogram!(ACTION_SECONDS, "mode" => label).record(started.elapsed().as_secs_f64());
+    Ok(Json(wire::Action::new(ask.session, action)))
+}

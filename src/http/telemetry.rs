@@ -1,0 +1,64 @@
+//! One log line and two metrics a request; the metrics page.
+
+use std::sync::OnceLock;
+use std::time::Instant;
+
+use axum::extract::{MatchedPath, Request};
+use axum::middleware::Next;
+use axum::response::Response;
+use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
+
+use crate::service::metrics as names;
+use crate::store::JobCounts;
+
+/// The recorder is one per process, as the `metrics` crate has it.
+static RECORDER: OnceLock<Option<PrometheusHandle>> = OnceLock::new();
+
+/// Installs the recorder; later calls change nothing.
+pub fn install_recorder() {
+    RECORDER.get_or_init(|| {
+        let step = Matcher::Full(names::TRAINING_STEP_SECONDS.into());
+        let builder = PrometheusBuilder::new()
+            .set_buckets(&names::REQUEST_BUCKETS)
+            .and_then(|builder| builder.set_buckets_for_metric(step, &names::STEP_BUCKETS));
+        let handle = builder.and_then(PrometheusBuilder::install_recorder);
+        names::describe();
+        handle.inspect_err(|error| tracing::error!(%error, "no metrics")).ok()
+    });
+}
+
+/// The metrics page, with the counts of the store as they are now.
+pub fn exposition(jobs: JobCounts, sessions: u64) -> String {
+    let by_state = [
+        ("queued", jobs.queued),
+        ("running", jobs.running),
+        ("succeeded", jobs.succeeded),
+        ("failed", jobs.failed),
+        ("cancelled", jobs.cancelled),
+    ];
+    for (state, count) in by_state {
+        metrics::gauge!(names::JOBS, "state" => state).set(count as f64);
+    }
+    metrics::gauge!(names::SESSIONS).set(sessions as f64);
+    RECORDER.get().and_then(Option::as_ref).map(PrometheusHandle::render).unwrap_or_default()
+}
+
+/// Records one request.
+pub async fn record(request: Request, next: Next) -> Response {
+    let started = Instant::now();
+    let method = request.method().clone();
+    let path = request.uri().path().to_owned();
+    let route =
+        request.extensions().get::<MatchedPath>().map_or("unmatched".to_owned(), |path| path.as_str().to_owned());
+    let response = next.run(request).await;
+    let (seconds, status) = (started.elapsed().as_secs_f64(), response.status().as_u16());
+    // An unknown method would be a label of its own for every word a client can think of.
+    let verb =
+        if matches!(method.as_str(), "GET" | "POST" | "DELETE" | "HEAD") { method.to_string() } else { "other".into() };
+    metrics::histogram!(names::HTTP_REQUEST_SECONDS, "method" => verb.clone(), "route" => route.clone())
+        .record(seconds);
+    metrics::counter!(names::HTTP_REQUESTS, "method" => verb, "route" => route, "status" => status.to_string())
+        .increment(1);
+    tracing::info!(%method, path, status, seconds, "request");
+    response
+}

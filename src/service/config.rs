@@ -1,0 +1,42 @@
+//! What an operator may choose.
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// The configuration of one process.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// Port 0 picks a free one.
+    pub listen: SocketAddr,
+    /// Folder of the database; created if absent.
+    pub data: PathBuf,
+    /// Threads of the training pool.
+    pub training_threads: usize,
+    /// Connections served at a time; more wait in the kernel's queue.
+    pub connection_limit: usize,
+    /// Largest request body, in bytes: an exported policy of a few thousand design points fits.
+    pub body_limit_bytes: usize,
+    pub request_timeout: Duration,
+    /// Time given to open requests once the service is asked to stop.
+    pub drain: Duration,
+    /// A job whose worker has been silent this long may be claimed by another.
+    pub lease: Duration,
+}
+
+impl Config {
+    /// The defaults: loopback, every core but one for training.
+    pub fn new(data: impl Into<PathBuf>) -> Self {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        Config {
+            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
+            data: data.into(),
+            training_threads: cores.saturating_sub(1).max(1),
+            connection_limit: 1024,
+            body_limit_bytes: 64 << 20,
+            request_timeout: Duration::from_secs(30),
+            drain: Duration::from_secs(25),
+            lease: Duration::from_secs(30),
+        }
+    }
+}

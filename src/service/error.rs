@@ -1,0 +1,51 @@
+//! Why a use case could not be done.
+
+use thiserror::Error;
+
+use crate::control::error::{FieldError, PolicyError};
+use crate::store::StoreError;
+
+#[derive(Debug, Error)]
+pub enum ServiceError {
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    #[error("there is no {what} '{id}'")]
+    Unknown { what: &'static str, id: String },
+    #[error("the idempotency key '{key}' was used with another body")]
+    KeyConflict { key: String },
+    #[error("{sessions} sessions live by the policy '{policy}'; delete them first")]
+    PolicyInUse { policy: String, sessions: u64 },
+    #[error("period {period} was observed with other content")]
+    PeriodConflict { period: usize },
+    #[error("period {given} is not the one expected: report period {expected}")]
+    PeriodGap { given: usize, expected: usize },
+    #[error("the session has observed all {horizon} periods of its horizon")]
+    Completed { horizon: usize },
+    #[error(transparent)]
+    Policy(PolicyError),
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    #[error("the service is shutting down")]
+    Draining,
+    #[error("{0}")]
+    Internal(String),
+}
+
+impl From<PolicyError> for ServiceError {
+    fn from(error: PolicyError) -> Self {
+        match error {
+            PolicyError::Field(field) => ServiceError::Field(field),
+            other => ServiceError::Policy(other),
+        }
+    }
+}
+
+impl ServiceError {
+    pub(super) fn unknown(what: &'static str, id: &str) -> Self {
+        ServiceError::Unknown { what, id: id.to_owned() }
+    }
+
+    pub(super) fn internal(error: impl std::fmt::Display) -> Self {
+        ServiceError::Internal(error.to_string())
+    }
+}

@@ -1,0 +1,109 @@
+//! Training jobs as their users see them.
+
+use std::sync::Arc;
+
+use tokio::sync::watch;
+
+use super::clock::Clock;
+use super::error::ServiceError;
+use super::identity;
+use super::progress::{Progress, ProgressBoard};
+use crate::control::error::FieldError;
+use crate::control::policy::content_hash;
+use crate::control::specification::Specification;
+use crate::store::{CreateJob, JobKind, JobRow, NewJob, Store};
+
+/// Longest idempotency key taken, in bytes.
+const KEY_LENGTH: usize = 255;
+
+/// A job as stored, and how far it is where it runs in this process.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Job {
+    pub row: JobRow,
+    pub progress: Option<Progress>,
+}
+
+/// The jobs of the store.
+pub struct Jobs {
+    store: Store,
+    clock: Clock,
+    board: Arc<ProgressBoard>,
+}
+
+impl Jobs {
+    pub(super) fn new(store: Store, clock: Clock) -> Self {
+        Jobs { store, clock, board: Arc::new(ProgressBoard::new()) }
+    }
+
+    pub(super) fn board(&self) -> Arc<ProgressBoard> {
+        self.board.clone()
+    }
+
+    /// Queues a training. The same key and specification again give the same job.
+    ///
+    /// # Errors
+    /// A field that breaks its rule; a key used with another specification.
+    pub async fn train(&self, specification: Specification, key: Option<String>) -> Result<Job, ServiceError> {
+        if let Some(key) = key.as_deref().filter(|key| key.is_empty() || key.len() > KEY_LENGTH) {
+            let value = format!("{} bytes", key.len());
+            return Err(FieldError::new("Idempotency-Key", value, "must hold 1 to 255 characters").into());
+        }
+        let sent = serde_json::to_vec(&specification).map_err(ServiceError::internal)?;
+        let completed = specification.completed()?;
+        let new = NewJob {
+            job: identity::new_id("job")?,
+            kind: JobKind::Train,
+            request_json: serde_json::to_string(&completed).map_err(ServiceError::internal)?,
+            request_hash: content_hash(&sent),
+            idempotency_key: key.clone(),
+            steps_total: completed.problem.horizon,
+            created_ms: self.clock.now_milliseconds(),
+        };
+        match self.store.create_job(new).await? {
+            CreateJob::Created(row) => {
+                self.board.ring();
+                Ok(self.with_progress(row))
+            }
+            CreateJob::Repeated(row) => Ok(self.with_progress(row)),
+            CreateJob::KeyConflict => Err(ServiceError::KeyConflict { key: key.unwrap_or_default() }),
+        }
+    }
+
+    /// # Errors
+    /// There is no such job.
+    pub async fn get(&self, job: &str) -> Result<Job, ServiceError> {
+        let row = self.store.job(job).await?.ok_or_else(|| ServiceError::unknown("job", job))?;
+        Ok(self.with_progress(row))
+    }
+
+    /// At most `limit` jobs, newest first, after the job with sequence `after`.
+    ///
+    /// # Errors
+    /// The store does not answer.
+    pub async fn list(&self, limit: usize, after: Option<i64>) -> Result<Vec<Job>, ServiceError> {
+        let rows = self.store.jobs(limit, after).await?;
+        Ok(rows.into_iter().map(|row| self.with_progress(row)).collect())
+    }
+
+    /// Asks a job to stop: durably first, then the worker. Always accepted; a terminal job stays as it is.
+    ///
+    /// # Errors
+    /// There is no such job.
+    pub async fn cancel(&self, job: &str) -> Result<Job, ServiceError> {
+        let row = self.store.request_cancel(job, self.clock.now_milliseconds()).await?;
+        let row = row.ok_or_else(|| ServiceError::unknown("job", job))?;
+        self.board.stop(job);
+        self.board.ring();
+        Ok(self.with_progress(row))
+    }
+
+    /// Changes whenever a job's state or progress may have changed.
+    pub fn changes(&self) -> watch::Receiver<u64> {
+        self.board.subscribe()
+    }
+
+    fn with_progress(&self, row: JobRow) -> Job {
+        let progress = self.board.of(&row.job);
+        Job { row, progress }
+    }
+}

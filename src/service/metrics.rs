@@ -1,0 +1,27 @@
+//! Names and meanings of the metrics; base units, `_total` for counters.
+
+use metrics::{Unit, describe_counter, describe_gauge, describe_histogram};
+
+pub const TRAINING_STEP_SECONDS: &str = "ballast_training_step_duration_seconds";
+pub const OBSERVE_SECONDS: &str = "ballast_observe_duration_seconds";
+pub const ACTION_SECONDS: &str = "ballast_action_duration_seconds";
+pub const HTTP_REQUEST_SECONDS: &str = "ballast_http_request_duration_seconds";
+pub const HTTP_REQUESTS: &str = "ballast_http_requests_total";
+pub const JOBS: &str = "ballast_jobs";
+pub const SESSIONS: &str = "ballast_sessions";
+
+/// Upper bounds of the buckets of training steps, in seconds: milliseconds to an hour.
+pub const STEP_BUCKETS: [f64; 10] = [0.01, 0.1, 0.5, 1.0, 5.0, 15.0, 60.0, 300.0, 900.0, 3600.0];
+/// Upper bounds of the buckets of requests, in seconds: the target of `/action` is a millisecond.
+pub const REQUEST_BUCKETS: [f64; 11] = [1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 1e-2, 5e-2, 0.25, 1.0, 10.0];
+
+/// Tells the recorder what each metric means.
+pub fn describe() {
+    describe_histogram!(TRAINING_STEP_SECONDS, Unit::Seconds, "Duration of one backward step of a training.");
+    describe_histogram!(OBSERVE_SECONDS, Unit::Seconds, "Duration of recording one observation, durably.");
+    describe_histogram!(ACTION_SECONDS, Unit::Seconds, "Duration of finding one allocation, by mode.");
+    describe_histogram!(HTTP_REQUEST_SECONDS, Unit::Seconds, "Duration of one request, by method and route.");
+    describe_counter!(HTTP_REQUESTS, "Requests answered, by method, route and status.");
+    describe_gauge!(JOBS, "Jobs in the store, by state.");
+    describe_gauge!(SESSIONS, "Sessions in the store.");
+}

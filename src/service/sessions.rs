@@ -1,0 +1,330 @@
+//! Live sessions: an investor's wealth and the law learned so far.
+//!
+//! A session is its rows: the state in memory is a replay of them and is dropped whenever a write fails, so memory
+//! never runs ahead of the disk. One lock per session orders its observations.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard};
+
+use super::clock::Clock;
+use super::error::ServiceError;
+use super::identity;
+use super::observation::{Observe, Observed};
+use super::policies::Policies;
+use crate::control::advisor::{Advice, AdviceMode, Advisor, WorstCase};
+use crate::control::error::FieldError;
+use crate::control::state::State;
+use crate::store::{
+    Append, CreateSession, NewObservation, NewSession, ObservationRow, SessionRow, SessionSummary, Store,
+};
+
+/// Sessions kept in memory; past it, those nobody is using are dropped and replayed when next asked for.
+const KEPT_LIVE: usize = 20_000;
+
+type Slot = Arc<AsyncMutex<Option<Live>>>;
+
+/// A session replayed from its rows.
+#[derive(Clone)]
+pub struct Live {
+    pub row: SessionRow,
+    pub state: State,
+    /// Periods observed.
+    pub observed: usize,
+    advisor: Arc<Advisor>,
+    /// Price reported for the last period.
+    price: Option<f64>,
+    /// The surrogate's advice for the coming period, once computed.
+    advice: Option<Advice>,
+}
+
+/// What [`Sessions::action`] found.
+pub struct Action {
+    pub period: usize,
+    pub advice: Advice,
+    pub worst_case: Option<WorstCase>,
+}
+
+/// How an action is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Question {
+    Advise(AdviceMode),
+    /// Re-solve, and show the worst-case law.
+    Explain,
+}
+
+/// The sessions of the store.
+#[derive(Clone)]
+pub struct Sessions {
+    store: Store,
+    clock: Clock,
+    policies: Arc<Policies>,
+    slots: Arc<Mutex<HashMap<String, Slot>>>,
+}
+
+impl Sessions {
+    pub(super) fn new(store: Store, clock: Clock, policies: Arc<Policies>) -> Self {
+        Sessions { store, clock, policies, slots: Arc::default() }
+    }
+
+    /// Opens a session; history and wealth default to the policy's.
+    ///
+    /// # Errors
+    /// There is no such policy, or history or wealth breaks a rule.
+    pub async fn open(
+        &self,
+        policy: &str,
+        history: Option<Vec<f64>>,
+        wealth: Option<f64>,
+    ) -> Result<Live, ServiceError> {
+        let advisor = self.policies.advisor(policy).await?;
+        let state = advisor.initial_state(history.as_deref(), wealth)?;
+        let problem = &advisor.specification().problem;
+        let row = SessionRow {
+            session: identity::new_id("session")?,
+            policy: policy.to_owned(),
+            initial_wealth: state.wealth,
+            initial_history: history.unwrap_or_else(|| problem.history.clone()),
+            horizon: problem.horizon,
+            created_ms: self.clock.now_milliseconds(),
+        };
+        let new = NewSession {
+            session: row.session.clone(),
+            policy: row.policy.clone(),
+            wealth: row.initial_wealth,
+            history: row.initial_history.clone(),
+            horizon: row.horizon,
+            created_ms: row.created_ms,
+        };
+        match self.store.create_session(new).await? {
+            CreateSession::Created => Ok(Live { row, state, observed: 0, advisor, price: None, advice: None }),
+            CreateSession::NoPolicy => Err(ServiceError::unknown("policy", policy)),
+            CreateSession::Exists => Err(ServiceError::internal("a session of this random name exists")),
+        }
+    }
+
+    /// # Errors
+    /// There is no such session.
+    pub async fn get(&self, session: &str) -> Result<Live, ServiceError> {
+        let mut slot = self.slot(session).lock_owned().await;
+        self.replayed(session, &mut slot).await.cloned()
+    }
+
+    /// At most `limit` sessions, newest first, after the session with sequence `after`.
+    ///
+    /// # Errors
+    /// The store does not answer.
+    pub async fn list(&self, limit: usize, after: Option<i64>) -> Result<Vec<SessionSummary>, ServiceError> {
+        Ok(self.store.sessions(limit, after).await?)
+    }
+
+    /// The session's start and every observation.
+    ///
+    /// # Errors
+    /// There is no such session.
+    pub async fn history(&self, session: &str) -> Result<(SessionRow, Vec<ObservationRow>), ServiceError> {
+        let row = self.store.session(session).await?.ok_or_else(|| ServiceError::unknown("session", session))?;
+        Ok((row, self.store.observations(session).await?))
+    }
+
+    /// # Errors
+    /// There is no such session.
+    pub async fn delete(&self, session: &str) -> Result<(), ServiceError> {
+        let mut slot = self.slot(session).lock_owned().await;
+        *slot = None;
+        let deleted = self.store.delete_session(session).await?;
+        self.forget(session);
+        if deleted { Ok(()) } else { Err(ServiceError::unknown("session", session)) }
+    }
+
+    /// Records the return of a period, durably before it is answered, exactly once.
+    /// Runs to its end even where the caller goes away.
+    ///
+    /// # Errors
+    /// A field breaks a rule; the period was observed with other content, is not the next, or lies past the horizon.
+    pub async fn observe(&self, report: Observe) -> Result<Observed, ServiceError> {
+        let sessions = self.clone();
+        let recording = tokio::spawn(async move {
+            let mut slot = sessions.slot(&report.session).lock_owned().await;
+            let outcome = sessions.record(&report, &mut slot).await;
+            if let Err(ServiceError::Store(_) | ServiceError::Internal(_)) = outcome {
+                *slot = None;
+            }
+            outcome
+        });
+        recording.await.map_err(ServiceError::internal)?
+    }
+
+    async fn record(
+        &self,
+        report: &Observe,
+        slot: &mut OwnedMutexGuard<Option<Live>>,
+    ) -> Result<Observed, ServiceError> {
+        let live = self.replayed(&report.session, slot).await?;
+        let content_hash = report.content_hash().map_err(ServiceError::internal)?;
+        if report.period == 0 {
+            return Err(FieldError::new("period", 0, "must be at least 1").into());
+        }
+        if report.period <= live.observed {
+            return self.repeat(report, &content_hash).await;
+        }
+        live.expects(report.period)?;
+        let log_return = report.checked_log_return(live.price)?;
+        let (next, answer) = live.after(report, log_return).await?;
+        let new = NewObservation {
+            session: report.session.clone(),
+            period: report.period,
+            content_hash,
+            log_return,
+            executed_allocation: answer.executed_allocation,
+            advised_allocation: live.advice.as_ref().map_or(answer.executed_allocation, |advice| advice.allocation),
+            wealth_after: answer.wealth,
+            answer_json: serde_json::to_string(&answer).map_err(ServiceError::internal)?,
+            created_ms: self.clock.now_milliseconds(),
+        };
+        match self.store.append_observation(new).await? {
+            Append::Appended => {
+                **slot = Some(next);
+                Ok(answer)
+            }
+            Append::Repeated { answer_json } => serde_json::from_str(&answer_json).map_err(ServiceError::internal),
+            Append::Conflict => Err(ServiceError::PeriodConflict { period: report.period }),
+            Append::OutOfOrder { expected } => Err(ServiceError::PeriodGap { given: report.period, expected }),
+            Append::NoSession => Err(ServiceError::unknown("session", &report.session)),
+        }
+    }
+
+    /// The first answer to a period already observed.
+    async fn repeat(&self, report: &Observe, content_hash: &str) -> Result<Observed, ServiceError> {
+        match self.store.observation(&report.session, report.period).await? {
+            Some(row) if row.content_hash == content_hash => {
+                serde_json::from_str(&row.answer_json).map_err(ServiceError::internal)
+            }
+            _ => Err(ServiceError::PeriodConflict { period: report.period }),
+        }
+    }
+
+    /// The robust allocation for the coming period.
+    ///
+    /// # Errors
+    /// There is no such session, or it has reached its horizon.
+    pub async fn action(&self, session: &str, question: Question) -> Result<Action, ServiceError> {
+        let mut slot = self.slot(session).lock_owned().await;
+        let live = self.replayed(session, &mut slot).await?;
+        if live.observed >= live.row.horizon {
+            return Err(ServiceError::Completed { horizon: live.row.horizon });
+        }
+        let period = live.observed + 1;
+        if question == Question::Advise(AdviceMode::Surrogate) {
+            let advice = live.surrogate_advice().await?;
+            return Ok(Action { period, advice, worst_case: None });
+        }
+        let (advisor, state, step) = (live.advisor.clone(), live.state.clone(), live.observed);
+        drop(slot);
+        let solving = tokio::task::spawn_blocking(move || match question {
+            Question::Explain => {
+                let (advice, worst_case) = advisor.explain(step, &state);
+                (advice, Some(worst_case))
+            }
+            Question::Advise(mode) => (advisor.advise(step, &state, mode), None),
+        });
+        let (advice, worst_case) = solving.await.map_err(ServiceError::internal)?;
+        Ok(Action { period, advice, worst_case })
+    }
+
+    async fn replayed<'a>(
+        &self,
+        session: &str,
+        slot: &'a mut OwnedMutexGuard<Option<Live>>,
+    ) -> Result<&'a mut Live, ServiceError> {
+        if slot.is_none() {
+            match self.replay(session).await {
+                Ok(live) => **slot = Some(live),
+                Err(error) => {
+                    self.forget(session);
+                    return Err(error);
+                }
+            }
+        }
+        slot.as_mut().ok_or_else(|| ServiceError::internal("a session vanished while it was locked"))
+    }
+
+    async fn replay(&self, session: &str) -> Result<Live, ServiceError> {
+        let (row, observations) = self.history(session).await?;
+        let advisor = self.policies.advisor(&row.policy).await?;
+        let mut state = advisor.initial_state(Some(&row.initial_history), Some(row.initial_wealth))?;
+        for observation in &observations {
+            state = advisor.advance(&state, observation.executed_allocation, observation.log_return);
+            state.wealth = observation.wealth_after;
+        }
+        let last = observations.last().and_then(|row| serde_json::from_str::<Observed>(&row.answer_json).ok());
+        let price = last.and_then(|answer| answer.price);
+        Ok(Live { row, state, observed: observations.len(), advisor, price, advice: None })
+    }
+
+    fn slot(&self, session: &str) -> Slot {
+        let mut slots = self.lock();
+        if slots.len() >= KEPT_LIVE && !slots.contains_key(session) {
+            slots.retain(|_, slot| Arc::strong_count(slot) > 1);
+        }
+        slots.entry(session.to_owned()).or_default().clone()
+    }
+
+    fn forget(&self, session: &str) {
+        self.lock().remove(session);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, HashMap<String, Slot>> {
+        // No code panics while holding the lock.
+        self.slots.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Live {
+    fn expects(&self, period: usize) -> Result<(), ServiceError> {
+        if self.observed >= self.row.horizon {
+            return Err(ServiceError::Completed { horizon: self.row.horizon });
+        }
+        let expected = self.observed + 1;
+        if period == expected { Ok(()) } else { Err(ServiceError::PeriodGap { given: period, expected }) }
+    }
+
+    /// The surrogate's advice for the coming period, computed once.
+    async fn surrogate_advice(&mut self) -> Result<Advice, ServiceError> {
+        if let Some(advice) = &self.advice {
+            return Ok(advice.clone());
+        }
+        let (advisor, state, step) = (self.advisor.clone(), self.state.clone(), self.observed);
+        let advising = tokio::task::spawn_blocking(move || advisor.advise(step, &state, AdviceMode::Surrogate));
+        let advice = advising.await.map_err(ServiceError::internal)?;
+        self.advice = Some(advice.clone());
+        Ok(advice)
+    }
+
+    /// The session after `log_return`, and the answer to it; nothing is changed yet but the memoised advice.
+    async fn after(&mut self, report: &Observe, log_return: f64) -> Result<(Live, Observed), ServiceError> {
+        let advised = self.surrogate_advice().await?.allocation;
+        let executed_allocation = report.executed_allocation.unwrap_or(advised);
+        let (advisor, before, stated) = (self.advisor.clone(), self.state.clone(), report.wealth);
+        let advancing = tokio::task::spawn_blocking(move || {
+            let mut state = advisor.advance(&before, executed_allocation, log_return);
+            state.wealth = stated.unwrap_or(state.wealth);
+            let uncertainty = advisor.uncertainty(&state);
+            (state, uncertainty)
+        });
+        let (state, uncertainty) = advancing.await.map_err(ServiceError::internal)?;
+        let answer = Observed {
+            session: report.session.clone(),
+            period: report.period,
+            log_return,
+            executed_allocation,
+            price: report.price,
+            wealth: state.wealth,
+            completed: report.period == self.row.horizon,
+            uncertainty,
+        };
+        let next = Live { state, observed: report.period, price: report.price, advice: None, ..self.clone() };
+        Ok((next, answer))
+    }
+}

@@ -1,0 +1,257 @@
+//! The training worker: claims jobs one at a time and solves them step by step, a checkpoint after each.
+//!
+//! It runs on a thread of its own with a rayon pool of its own, so that the threads that answer requests stay free.
+//! Stopping (a cancel, a shutdown, a lost lease) always ends in `release_job`: the store knows whether a cancel was
+//! asked for, and requeues the job or cancels it; a worker that lost its lease changes nothing.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use tokio::runtime::Handle;
+
+use super::clock::Clock;
+use super::config::Config;
+use super::error::ServiceError;
+use super::progress::ProgressBoard;
+use super::shutdown::Shutdown;
+use super::{identity, metrics as names};
+use crate::control::backward::{StepSolution, Training, Watch};
+use crate::control::error::TrainError;
+use crate::control::policy::{Policy, content_hash};
+use crate::control::specification::Specification;
+use crate::store::{ClaimedJob, JobKind, JobOutcome, Store, StoreError};
+
+/// The queue is looked at this often even if nobody rang: a lease may have run out.
+const QUEUE_POLL: Duration = Duration::from_secs(2);
+/// The store is asked this often whether the running job should stop: half the second a cancel may take.
+const CANCEL_POLL: Duration = Duration::from_millis(500);
+
+/// The worker thread, to be joined once.
+pub(super) struct Trainer(Mutex<Option<JoinHandle<()>>>);
+
+struct Worker {
+    name: String,
+    store: Store,
+    clock: Clock,
+    board: Arc<ProgressBoard>,
+    shutdown: Shutdown,
+    pool: rayon::ThreadPool,
+    lease: Duration,
+    runtime: Handle,
+}
+
+/// How the work on a job ended.
+enum Ended {
+    Finished(JobOutcome),
+    /// Stopped before the end.
+    Stopped,
+    /// Another worker holds the job.
+    Fenced,
+}
+
+impl Trainer {
+    pub(super) fn start(
+        config: &Config,
+        store: Store,
+        clock: Clock,
+        board: Arc<ProgressBoard>,
+        shutdown: Shutdown,
+    ) -> Result<Self, ServiceError> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(config.training_threads)
+            .thread_name(|index| format!("training-{index}"))
+            .build()
+            .map_err(ServiceError::internal)?;
+        let worker = Worker {
+            name: identity::new_id("worker")?,
+            store,
+            clock,
+            board,
+            shutdown,
+            pool,
+            lease: config.lease,
+            runtime: Handle::current(),
+        };
+        let thread = std::thread::Builder::new().name("trainer".into()).spawn(move || worker.run());
+        Ok(Trainer(Mutex::new(Some(thread.map_err(ServiceError::internal)?))))
+    }
+
+    /// Waits for the worker to put its job back. Call after the shutdown has begun.
+    pub(super) async fn join(&self) {
+        let thread = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let Some(thread) = thread else { return };
+        if !matches!(tokio::task::spawn_blocking(move || thread.join()).await, Ok(Ok(()))) {
+            tracing::error!("the training thread ended by a panic");
+        }
+    }
+}
+
+impl Worker {
+    fn run(&self) {
+        let mut changes = self.board.subscribe();
+        while !self.shutdown.has_begun() {
+            changes.mark_unchanged();
+            let lease_seconds = u32::try_from(self.lease.as_secs()).unwrap_or(u32::MAX).max(1);
+            let claim = self.store.claim_job(&self.name, lease_seconds, self.clock.now_milliseconds());
+            match self.runtime.block_on(claim) {
+                Ok(Some(claimed)) => self.work(&claimed),
+                Ok(None) => self.runtime.block_on(async {
+                    tokio::select! {
+                        _ = changes.changed() => {}
+                        () = self.shutdown.begun() => {}
+                        () = tokio::time::sleep(QUEUE_POLL) => {}
+                    }
+                }),
+                Err(error) => self.pause("claiming a job", &error),
+            }
+        }
+    }
+
+    fn work(&self, claimed: &ClaimedJob) {
+        let (job, attempt) = (claimed.row.job.as_str(), claimed.attempt);
+        tracing::info!(job, attempt, steps_done = claimed.row.steps_done, "job started");
+        let stop = self.board.enter(job, claimed.row.steps_done, claimed.row.steps_total);
+        let keeper = self.runtime.spawn(keep_lease(
+            self.store.clone(),
+            self.clock.clone(),
+            self.shutdown.clone(),
+            (job.to_owned(), attempt),
+            self.lease,
+            stop.clone(),
+        ));
+        let ended = catch_unwind(AssertUnwindSafe(|| self.solve(claimed, &stop)))
+            .unwrap_or_else(|panic| Ok(Ended::Finished(JobOutcome::Failed { reason: panic_reason(panic.as_ref()) })));
+        keeper.abort();
+        let closed = ended.and_then(|ended| self.close(job, attempt, ended));
+        self.board.leave(job);
+        if let Err(error) = closed {
+            self.pause("keeping a job; its lease will run out", &error);
+        }
+    }
+
+    fn solve(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<Ended, StoreError> {
+        let job = claimed.row.job.as_str();
+        let failed = |reason: String| Ok(Ended::Finished(JobOutcome::Failed { reason }));
+        if claimed.row.kind != JobKind::Train {
+            return failed(format!("this release cannot do {} jobs", claimed.row.kind.as_str()));
+        }
+        let specification: Specification = match serde_json::from_str(&claimed.row.request_json) {
+            Ok(specification) => specification,
+            Err(error) => return failed(format!("the stored specification cannot be read: {error}")),
+        };
+        let training = match self.pool.install(|| Training::new(&specification)) {
+            Ok(training) => training,
+            Err(error) => return failed(error.to_string()),
+        };
+        let checkpoints = self.runtime.block_on(self.store.checkpoints(job))?;
+        let mut steps = resumed(training.horizon(), &checkpoints);
+        for step in (0..training.horizon() - steps.len()).rev() {
+            let watch = Watch { stop, progress: &|progress| self.board.advance(job, progress) };
+            let started = Instant::now();
+            let solved = self.pool.install(|| training.solve_step(step, steps.last(), &watch));
+            let solution = match solved {
+                Ok(solution) => solution,
+                Err(TrainError::Stopped) => return Ok(Ended::Stopped),
+                Err(error) => return failed(error.to_string()),
+            };
+            metrics::histogram!(names::TRAINING_STEP_SECONDS).record(started.elapsed().as_secs_f64());
+            let Ok(bytes) = serde_json::to_vec(&solution) else {
+                return failed(format!("step {step}: the solution cannot be written as JSON"));
+            };
+            let saving = self.store.save_checkpoint(job, claimed.attempt, step, &bytes);
+            if !self.runtime.block_on(saving)? {
+                return Ok(Ended::Fenced);
+            }
+            steps.push(solution);
+            self.board.finish_step(job);
+        }
+        steps.reverse();
+        Ok(Ended::Finished(succeeded(&training.into_policy(steps))))
+    }
+
+    fn close(&self, job: &str, attempt: i64, ended: Ended) -> Result<(), StoreError> {
+        let now = self.clock.now_milliseconds();
+        let held = match ended {
+            Ended::Finished(outcome) => {
+                log_outcome(job, &outcome);
+                self.runtime.block_on(self.store.finish_job(job, attempt, outcome, now))?
+            }
+            Ended::Stopped => {
+                tracing::info!(job, "job stopped");
+                self.runtime.block_on(self.store.release_job(job, attempt, now))?
+            }
+            Ended::Fenced => false,
+        };
+        if !held {
+            tracing::warn!(job, attempt, "the lease was lost; another worker has the job");
+        }
+        Ok(())
+    }
+
+    fn pause(&self, doing: &str, error: &StoreError) {
+        tracing::error!(error = error as &dyn std::error::Error, "the store failed while {doing}");
+        self.runtime.block_on(async {
+            tokio::select! {
+                () = self.shutdown.begun() => {}
+                () = tokio::time::sleep(QUEUE_POLL) => {}
+            }
+        });
+    }
+}
+
+/// Renews the lease and raises `stop` once the job should end: a cancel, a shutdown, or a lost lease.
+async fn keep_lease(
+    store: Store,
+    clock: Clock,
+    shutdown: Shutdown,
+    (job, attempt): (String, i64),
+    lease: Duration,
+    stop: Arc<AtomicBool>,
+) {
+    let lease_milliseconds = i64::try_from(lease.as_millis()).unwrap_or(i64::MAX / 2);
+    let mut renewed = Instant::now();
+    while !stop.load(Ordering::Relaxed) {
+        tokio::select! {
+            () = shutdown.begun() => stop.store(true, Ordering::Relaxed),
+            () = tokio::time::sleep(CANCEL_POLL.min(lease / 3)) => {}
+        }
+        if matches!(store.job(&job).await, Ok(Some(row)) if row.cancel_requested) {
+            stop.store(true, Ordering::Relaxed);
+        }
+        if renewed.elapsed() >= lease / 3 {
+            match store.renew_lease(&job, attempt, clock.now_milliseconds() + lease_milliseconds).await {
+                Ok(true) => renewed = Instant::now(),
+                Ok(false) => stop.store(true, Ordering::Relaxed),
+                Err(error) => tracing::warn!(job, error = &error as &dyn std::error::Error, "lease not renewed"),
+            }
+        }
+    }
+}
+
+/// The solutions that need not be computed again: steps `horizon - 1` downwards, without a gap.
+fn resumed(horizon: usize, checkpoints: &[(usize, Vec<u8>)]) -> Vec<StepSolution> {
+    let newest_first = checkpoints.iter().rev();
+    let in_order = newest_first.zip((0..horizon).rev()).take_while(|((step, _), expected)| step == expected);
+    in_order.map_while(|((_, bytes), _)| serde_json::from_slice(bytes).ok()).collect()
+}
+
+fn succeeded(policy: &Policy) -> JobOutcome {
+    let policy_json = policy.to_json();
+    JobOutcome::Succeeded { policy_id: content_hash(&policy_json), policy_json }
+}
+
+fn log_outcome(job: &str, outcome: &JobOutcome) {
+    match outcome {
+        JobOutcome::Succeeded { policy_id, .. } => tracing::info!(job, policy = policy_id, "job succeeded"),
+        JobOutcome::Failed { reason } => tracing::warn!(job, reason, "job failed"),
+        JobOutcome::Reported { .. } | JobOutcome::Cancelled => tracing::info!(job, "job ended"),
+    }
+}
+
+fn panic_reason(panic: &(dyn std::any::Any + Send)) -> String {
+    let message = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    format!("the training panicked: {}", message.unwrap_or("no message"))
+}

@@ -1,0 +1,109 @@
+//! The life of a training, a policy and a session, over HTTP.
+
+mod support;
+
+use std::time::{Duration, Instant};
+
+use reqwest::Method;
+use serde_json::json;
+use support::{App, specification};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_investor_lives_to_the_horizon() {
+    let mut app = App::start().await;
+    app.train(&specification(2)).await;
+    let (status, policy) = app.get(&format!("/policies/{}", app.policy)).await;
+    assert_eq!((status.as_u16(), policy["diagnostics"].as_array().unwrap().len()), (200, 2));
+    app.open().await;
+    let (_, action) = app.action().await;
+    assert_eq!(action["period"], 1);
+    let (status, explained) = app.get(&format!("/action?session={}&explain=worst_case", app.session)).await;
+    assert!(status == 200 && explained["worst_case"]["sentence"].is_string(), "{explained}");
+    let (status, resolved) = app.get(&format!("/action?session={}&mode=resolve", app.session)).await;
+    assert!(status == 200 && resolved["source"] == "resolved", "{resolved}");
+
+    let (status, gap) = app.observe(2, 0.01).await;
+    assert!(status == 409 && gap["type"] == "/problems/period-gap" && gap["rule"] == "must be 1", "{gap}");
+    let (status, first) = app.observe(1, 0.012).await;
+    assert_eq!(status, 200, "{first}");
+    assert_eq!(first["executed_allocation"], action["allocation"]);
+    assert_eq!(app.observe(1, 0.012).await.1, first);
+    assert_eq!(app.observe(1, 0.013).await.0, 409);
+
+    app.restart().await;
+    assert_eq!(app.observe(1, 0.012).await.1, first);
+    let (_, session) = app.get(&format!("/sessions/{}", app.session)).await;
+    assert_eq!((&session["wealth"], &session["period"]), (&first["wealth"], &json!(2)));
+    assert_eq!(app.observe(2, -0.02).await.1["completed"], true);
+    assert_eq!(app.observe(3, 0.01).await.0, 409);
+    assert_eq!(app.action().await.0, 409);
+    let (_, history) = app.get(&format!("/sessions/{}/history", app.session)).await;
+    assert_eq!(history["observations"].as_array().unwrap().len(), 2);
+
+    assert_eq!(app.delete(&format!("/policies/{}", app.policy)).await, 409);
+    assert_eq!(app.delete(&format!("/sessions/{}", app.session)).await, 204);
+    let (_, document) = app.get(&format!("/policies/{}/export", app.policy)).await;
+    assert_eq!(app.delete(&format!("/policies/{}", app.policy)).await, 204);
+    assert_eq!(app.get(&format!("/policies/{}", app.policy)).await.0, 404);
+    let (status, imported) = app.post("/policies/import", &document).await;
+    assert_eq!((status.as_u16(), imported["policy"].as_str()), (201, Some(app.policy.as_str())));
+    let (_, metrics) = app.get("/metrics").await;
+    for name in [
+        "ballast_training_step_duration_seconds",
+        "ballast_observe_duration_seconds",
+        "ballast_action_duration_seconds",
+        "ballast_http_requests_total",
+        "ballast_jobs",
+        "ballast_sessions",
+    ] {
+        assert!(metrics.as_str().unwrap().contains(&format!("# HELP {name}")), "{name}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_key_makes_one_job() {
+    let app = App::start().await;
+    let train = |horizon| {
+        let request = app.client.post(format!("{}/train", app.url)).header("Idempotency-Key", "k");
+        async move { support::read(request.json(&specification(horizon)).send().await.unwrap()).await }
+    };
+    let (first, again, other) = (train(2).await, train(2).await, train(3).await);
+    assert_eq!((first.0.as_u16(), &first.1["job"]), (202, &again.1["job"]));
+    assert_eq!((other.0.as_u16(), &other.1["type"]), (409, &json!("/problems/idempotency-conflict")));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_cancel_takes_less_than_a_second() {
+    let app = App::start().await;
+    let job = app.queue(&specification(100)).await;
+    app.until(&job, |job| job["state"] == "running").await;
+    let asked = Instant::now();
+    let (status, _) = app.send(Method::DELETE, &format!("/jobs/{job}"), None).await;
+    assert_eq!(status, 202);
+    app.until(&job, |job| job["state"] == "cancelled").await;
+    assert!(asked.elapsed() < Duration::from_secs(1), "{:?}", asked.elapsed());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_training_survives_a_restart() {
+    let mut app = App::start().await;
+    let job = app.queue(&specification(6)).await;
+    let before = app.until(&job, |job| job["progress"]["steps_done"].as_u64() >= Some(1)).await;
+    app.restart().await;
+    let (_, after) = app.get(&format!("/jobs/{job}")).await;
+    assert!(after["progress"]["steps_done"].as_u64() >= before["progress"]["steps_done"].as_u64(), "{after}");
+    let done = app.until(&job, |job| job["finished_ms"].is_i64()).await;
+    assert_eq!(done["state"], "succeeded", "{done}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn events_end_with_the_job() {
+    let app = App::start().await;
+    let job = app.queue(&specification(2)).await;
+    let events = format!("{}/jobs/{job}/events", app.url);
+    let text = app.client.get(&events).send().await.unwrap().text().await.unwrap();
+    assert!(text.contains("event: progress") && text.contains("succeeded"), "{text}");
+    let last = text.lines().filter_map(|line| line.strip_prefix("id: ")).next_back().unwrap();
+    let again = app.client.get(&events).header("Last-Event-ID", last).send().await.unwrap();
+    assert_eq!(again.status(), 204);
+}
