@@ -6,8 +6,9 @@ use utoipa::ToSchema;
 
 use std::sync::OnceLock;
 
-use super::backward::{ProblemContext, StepSolution};
+use super::backward::StepSolution;
 use super::bellman::RobustSolution;
+use super::context::ProblemContext;
 use super::error::{FieldError, PolicyError};
 use super::policy::Policy;
 use super::specification::{Framework, Specification, UtilitySpecification};

@@ -9,20 +9,16 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::bellman::{RobustSolution, RobustStep};
-use super::design::{Design, centre};
+use super::bellman::RobustSolution;
+use super::context::ProblemContext;
+use super::design::Design;
 use super::error::TrainError;
-use super::features::{FeatureSelection, Scaling};
-use super::gain_field::FieldContext;
+use super::features::Scaling;
 use super::policy::{Policy, StepDiagnostics, SurrogateDiagnostics};
-use super::specification::{Framework, Specification};
-use super::state::{State, floor};
+use super::specification::Specification;
 use super::surrogate::{NextValue, SingleSolution, Solution, StepSurrogates, StoredSurrogate, TargetMap};
-use super::uncertainty::UncertaintySets;
-use super::utility::RelativeUtility;
 use crate::numerics::gp::{GaussianProcess, Hyperparameters, LeaveOneOut};
 use crate::numerics::gp_fit::{self, Bounds};
-use crate::numerics::moments::CentralMoments;
 
 /// Share of the design whose leave-one-out deviation lies below the guard.
 const GUARDED_SHARE: f64 = 0.99;
@@ -61,71 +57,6 @@ pub struct StepSolution {
     pub step: usize,
     pub solution: Solution,
     pub diagnostics: StepDiagnostics,
-}
-
-/// The problem with everything that does not change from step to step.
-pub struct ProblemContext {
-    pub specification: Specification,
-    pub sets: UncertaintySets,
-    pub selection: FeatureSelection,
-}
-
-impl ProblemContext {
-    pub fn new(specification: &Specification) -> Self {
-        let sets = UncertaintySets::new(specification);
-        let selection = FeatureSelection::new(specification, sets.varies());
-        ProblemContext { specification: specification.clone(), sets, selection }
-    }
-
-    /// Radius of the ball at a state: of the history's law where the framework does not learn.
-    pub fn radius(&self, state: &State) -> f64 {
-        match self.specification.problem.framework {
-            Framework::Static => self
-                .sets
-                .radius(&crate::numerics::empirical::EmpiricalDistribution::new(&self.specification.problem.history)),
-            _ => self.sets.radius(&state.law),
-        }
-    }
-
-    /// Terminal all-bank wealth from a state at `step`.
-    pub fn floor(&self, step: usize, state: &State) -> f64 {
-        let problem = &self.specification.problem;
-        floor(state.wealth, problem.rate_per_step, problem.horizon - step)
-    }
-
-    /// The features of a state, unscaled.
-    pub fn features(&self, state: &State) -> Vec<f64> {
-        let radius = if self.selection.has_radius() { self.radius(state) } else { 0.0 };
-        self.selection.of(state.wealth, &CentralMoments::of(&state.law), radius)
-    }
-
-    /// Solves the robust step at one state exactly, given the value of the step after.
-    ///
-    /// # Errors
-    /// A centre that the specification does not define.
-    pub fn solve(&self, step: usize, state: &State, next: &NextValue) -> Result<RobustSolution, TrainError> {
-        let problem = &self.specification.problem;
-        let (atoms, masses) = centre(problem, state)?;
-        let mean: f64 = atoms.iter().zip(&masses).map(|(atom, mass)| atom * mass).sum();
-        let variance = atoms.iter().zip(&masses).map(|(atom, mass)| mass * (atom - mean).powi(2)).sum();
-        let robust = RobustStep {
-            field: FieldContext {
-                selection: &self.selection,
-                sets: &self.sets,
-                next,
-                learns: problem.framework.learns(),
-                rate_per_step: problem.rate_per_step,
-                highest_action: problem.action_interval[1],
-            },
-            utility: RelativeUtility::new(problem.utility, self.floor(step, state)),
-            support: problem.support,
-            atoms: &atoms,
-            masses: &masses,
-            radius: self.radius(state),
-            variance,
-        };
-        Ok(robust.solve(state))
-    }
 }
 
 /// A prepared training job: the completed specification and its simulated design.

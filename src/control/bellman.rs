@@ -91,17 +91,18 @@ impl RobustStep<'_> {
         let mut grid = self.grid(subdivided(&returns, SUPPORT_PARTS, |_| true));
         let highest = self.field.highest_action;
         let mut rows = field.at(&grid.support);
-        let (action, _) = self.best_action(&grid, &rows, 0.0, highest);
+        let (coarse, _) = self.best_action(&grid, &rows, 0.0, highest);
+        let part = highest / COARSE_ACTIONS as f64;
+        let (low, high) = ((coarse - part).max(0.0), (coarse + part).min(highest));
+        let mut action = maximise_concave_scalar(|a| self.robust_value(&grid, &rows, a), low, high, ACTION_TOLERANCE).0;
         let rounds = if self.radius > 0.0 && action > 0.0 { REFINEMENTS } else { 0 };
         for _ in 0..rounds {
             let near: Vec<bool> = self.destinations(&grid, &rows, action);
             let refined = subdivided(&grid.support, REFINED_PARTS, |interval| near[interval] || near[interval + 1]);
             grid = self.grid(refined);
             rows = field.at(&grid.support);
+            action = maximise_concave_scalar(|a| self.robust_value(&grid, &rows, a), low, high, ACTION_TOLERANCE).0;
         }
-        let part = highest / COARSE_ACTIONS as f64;
-        let (low, high) = ((action - part).max(0.0), (action + part).min(highest));
-        let (action, _) = maximise_concave_scalar(|a| self.robust_value(&grid, &rows, a), low, high, ACTION_TOLERANCE);
         self.solution(grid, &rows, action)
     }
 

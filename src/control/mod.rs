@@ -3,6 +3,7 @@
 pub mod advisor;
 pub mod backward;
 pub mod bellman;
+pub mod context;
 pub mod design;
 pub mod error;
 pub mod features;

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
-use super::backward::{ProblemContext, StepSolution};
+use super::backward::StepSolution;
+use super::context::ProblemContext;
 use super::error::{FieldError, PolicyError};
 use super::limits;
 use super::specification::Specification;

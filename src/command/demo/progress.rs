@@ -100,8 +100,15 @@ mod tests {
 
     #[test]
     fn the_bar_moves_by_steps_and_by_design_points_within() {
-        let at =
-            |steps_done, step, done, total| position(&Progress { steps_done, step, done, total, seconds_left: None });
+        let at = |steps_done, step, done, total| {
+            position(&Progress {
+                steps_done,
+                step,
+                points_done: Some(done),
+                points_total: Some(total),
+                seconds_left: None,
+            })
+        };
         assert_eq!((at(0, None, 0, 0), at(0, Some(11), 30, 60)), (0, 500));
         assert_eq!((at(1, None, 0, 0), at(11, Some(0), 60, 60)), (1000, 12_000));
     }
