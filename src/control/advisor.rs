@@ -15,6 +15,7 @@ use super::specification::{Framework, Specification, UtilitySpecification};
 use super::state::{State, next_state};
 use super::surrogate::{NextValue, SingleSolution, Solution, TargetMap, ValueSurrogate};
 use super::utility::depends_on_wealth;
+use super::worst_case::WorstCase;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::gp::{GaussianProcess, GpMean};
 
@@ -56,28 +57,6 @@ pub struct Advice {
     /// Whether the state lies where the surrogates were trained.
     pub in_design: bool,
     pub source: AdviceSource,
-}
-
-/// The law that is worst for the advised allocation, as a transport of the empirical law.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct WorstCase {
-    /// Lagrange multiplier of the ball: utility lost per unit of extra radius.
-    pub multiplier: f64,
-    pub transport: Vec<TransportedMass>,
-    /// Difference between primal and dual value, in log certainty equivalent.
-    pub duality_gap: f64,
-    /// The worst case in one plain sentence.
-    pub sentence: String,
-}
-
-/// Mass of one atom and where the adversary puts it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct TransportedMass {
-    /// Observed log-return.
-    pub atom: f64,
-    /// Log-return in the worst case; equal to `atom` where the mass stays.
-    pub moved_to: f64,
-    pub mass: f64,
 }
 
 /// The uncertainty set of a state, in figures.
@@ -172,7 +151,7 @@ impl Advisor {
         let predicted = self.predict(step, state);
         let (advice, solution) = self.resolved(step, state, AdviceMode::Resolve, &predicted);
         let worst = match solution {
-            Some(solution) => worst_case(&solution, &advice, self.utility_per_radius(step, state)),
+            Some(solution) => WorstCase::of(&solution, &advice, self.utility_per_radius(step, state)),
             None => WorstCase::unknown(),
         };
         (advice, worst)
@@ -300,52 +279,5 @@ impl Advisor {
             advices.push(advice);
         }
         (advices, state)
-    }
-}
-
-impl WorstCase {
-    fn unknown() -> Self {
-        let sentence =
-            "The robust step has no finite solution at this state, so all wealth stays in the bank.".to_owned();
-        WorstCase { multiplier: 0.0, transport: Vec::new(), duality_gap: 0.0, sentence }
-    }
-}
-
-fn worst_case(solution: &RobustSolution, advice: &Advice, utility_scale: f64) -> WorstCase {
-    let transport: Vec<TransportedMass> = solution
-        .worst
-        .moves
-        .iter()
-        .map(|m| TransportedMass { atom: solution.support[m.from], moved_to: solution.support[m.to], mass: m.mass })
-        .collect();
-    let moved = transport.iter().filter(|mass| mass.atom != mass.moved_to);
-    let share: f64 = moved.clone().map(|mass| mass.mass).sum();
-    let lowest = moved.clone().map(|mass| mass.moved_to).fold(f64::INFINITY, f64::min);
-    let sentence = if share > 0.0 {
-        format!(
-            "Against an allocation of {:.1} %, the worst law within distance {:.4} of the {} returns seen moves {:.1} % of \
-             the probability, down to a return of {:.1} % in one period; against that law the allocation is still worth \
-             {:.2} for certain at the horizon, and all-bank {:.2}.",
-            100.0 * advice.allocation,
-            advice.radius,
-            advice.sample_size,
-            100.0 * share,
-            100.0 * lowest.exp_m1(),
-            advice.certainty_equivalent,
-            advice.floor
-        )
-    } else {
-        format!(
-            "At an allocation of {:.1} % no law within distance {:.4} of the {} returns seen does worse than the empirical one.",
-            100.0 * advice.allocation,
-            advice.radius,
-            advice.sample_size
-        )
-    };
-    WorstCase {
-        multiplier: solution.multiplier * utility_scale,
-        transport,
-        duality_gap: solution.duality_gap,
-        sentence,
     }
 }

@@ -15,3 +15,4 @@ pub mod state;
 pub mod surrogate;
 pub mod uncertainty;
 pub mod utility;
+pub mod worst_case;

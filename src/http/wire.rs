@@ -3,10 +3,11 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::control::advisor::{Advice, WorstCase};
+use crate::control::advisor::Advice;
 use crate::control::backward::Phase;
 use crate::control::policy::StepDiagnostics;
 use crate::control::specification::{Framework, Specification};
+use crate::control::worst_case::WorstCase;
 use crate::service::jobs::Job as ServiceJob;
 use crate::service::sessions::{Action as ServiceAction, Live};
 use crate::store::{JobKind, JobState, ObservationRow, PolicySummary, SessionSummary};

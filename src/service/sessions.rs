@@ -13,9 +13,10 @@ use super::error::ServiceError;
 use super::identity;
 use super::observation::{Observe, Observed};
 use super::policies::Policies;
-use crate::control::advisor::{Advice, AdviceMode, Advisor, WorstCase};
+use crate::control::advisor::{Advice, AdviceMode, Advisor};
 use crate::control::error::FieldError;
 use crate::control::state::State;
+use crate::control::worst_case::WorstCase;
 use crate::store::{
     Append, CreateSession, NewObservation, NewSession, ObservationRow, SessionRow, SessionSummary, Store,
 };
