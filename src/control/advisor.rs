@@ -82,7 +82,7 @@ pub struct Advisor {
 /// One step ready for evaluation. The factor behind the predicted deviation is built on first use.
 enum PreparedStep {
     Single(SingleSolution),
-    Surrogates { value: Box<ValueSurrogate>, policy: GpMean, deviation: OnceLock<Option<GaussianProcess>> },
+    Surrogates { value: Box<ValueSurrogate>, policy: Box<GpMean>, deviation: Box<OnceLock<Option<GaussianProcess>>> },
 }
 
 /// What the surrogates say of a state.
@@ -101,10 +101,11 @@ impl Advisor {
         let prepare = |step: &StepSolution| match &step.solution {
             Solution::Single(single) => PreparedStep::Single(*single),
             Solution::Surrogates(stored) => {
-                let policy = GpMean::new(&stored.matrix(), &stored.policy.weights, &stored.policy.hyperparameters);
+                let policy =
+                    Box::new(GpMean::new(&stored.matrix(), &stored.policy.weights, &stored.policy.hyperparameters));
                 let target = TargetMap::new(&context.specification, step.step);
                 let value = Box::new(ValueSurrogate::new(stored, target));
-                PreparedStep::Surrogates { value, policy, deviation: OnceLock::new() }
+                PreparedStep::Surrogates { value, policy, deviation: Box::default() }
             }
         };
         let steps = policy.steps().iter().map(prepare).collect();

@@ -41,7 +41,7 @@ impl CentralMoments {
         let shift = (value - self.mean) / size;
         let mut sums = self.sums;
         sums[0] = size;
-        for order in 2..=ORDERS {
+        for (order, sum) in sums.iter_mut().enumerate().skip(2) {
             let mut total = self.sums[order];
             let (mut binomial, mut power) = (1.0, 1.0);
             for k in 1..=order.saturating_sub(2) {
@@ -50,7 +50,7 @@ impl CentralMoments {
                 total += binomial * self.sums[order - k] * power;
             }
             let sign = (-1.0 / self.size).powi(order as i32 - 1);
-            sums[order] = total + (self.size * shift).powi(order as i32) * (1.0 - sign);
+            *sum = total + (self.size * shift).powi(order as i32) * (1.0 - sign);
         }
         CentralMoments { size, mean: self.mean + shift, sums }
     }
