@@ -1,14 +1,14 @@
 //! The Matern-5/2 kernel with a length scale for each dimension, over contiguous slices.
 //!
 //! Every loop is plain multiplications and additions, compiled once for each instruction set and chosen at run
-//! time. Nothing is fused and every sum has [`LANES`] fixed accumulators, so the bits of a result do not depend
+//! time. Nothing is fused and every sum has `LANES` fixed accumulators, so the bits of a result do not depend
 //! on the vector width of the processor.
 
 use pulp::Arch;
 
 /// Accumulators of a sum: two 256-bit vectors of four, or one of eight.
 pub(super) const LANES: usize = 8;
-/// Values staged on the stack between the two passes of a kernel sum; a multiple of [`LANES`].
+/// Values staged on the stack between the two passes of a kernel sum; a multiple of `LANES`.
 const BLOCK: usize = 256;
 /// Below this the exponential has no normal value; it is held at about 3e-308.
 const EXPONENT_FLOOR: f64 = -708.0;
@@ -60,7 +60,7 @@ fn steepness(squared: f64) -> f64 {
     (5.0 / 3.0) * (1.0 + r) * exp_nonpositive(-r)
 }
 
-/// Adds left_j right_j to accumulator j mod [`LANES`]; every call but the last takes whole blocks.
+/// Adds left_j right_j to accumulator j mod `LANES`; every call but the last takes whole blocks.
 #[inline(always)]
 fn accumulate(lanes: &mut [f64; LANES], left: &[f64], right: &[f64]) {
     let (left_blocks, right_blocks) = (left.chunks_exact(LANES), right.chunks_exact(LANES));
