@@ -20,8 +20,18 @@ const LONG_FILES: [(&str, &str); 0] = [];
 /// Functions above `FUNCTION_LINES` as `file: function`, and why.
 const LONG_FUNCTIONS: [(&str, &str); 0] = [];
 
-/// Calls that read the clock, log or print; they enter the lower floors as arguments or not at all.
-const EFFECTS: [&str; 7] = ["Instant::now", "SystemTime::now", "println!", "eprintln!", "print!", "dbg!", "tracing::"];
+/// Calls that read the clock, log, print or sleep; they enter the lower floors as arguments or not at all.
+const EFFECTS: [&str; 9] = [
+    "Instant::now",
+    "SystemTime::now",
+    "println!",
+    "eprintln!",
+    "print!",
+    "dbg!",
+    "tracing::",
+    "thread::sleep",
+    "time::sleep",
+];
 const PANICS: [&str; 4] = [".unwrap()", "panic!", "todo!", "unimplemented!"];
 
 /// A file of `src`, with comments, literals and tests blanked out, line for line.
@@ -353,6 +363,7 @@ fn a_broken_rule_is_found() {
     assert_eq!(faults_of("numerics/gp.rs", "use rayon::prelude::*;").len(), 1);
     assert_eq!(faults_of("control/policy.rs", "use rayon::prelude::*;").len(), 0);
     assert_eq!(faults_of("store/jobs.rs", "fn f() { let now = Instant::now(); }").len(), 1);
+    assert_eq!(faults_of("control/backward.rs", "fn f() { std::thread::sleep(PAUSE); }").len(), 1);
     assert_eq!(faults_of("service/clock.rs", "fn f() { let now = Instant::now(); }").len(), 0);
     assert_eq!(faults_of("http/a.rs", "fn f() { g().unwrap(); panic!(\"no\"); todo!() }").len(), 3);
     assert_eq!(faults_of("http/a.rs", &format!("fn f(a: [u8; 3]) {{{}}}", "\n".repeat(70))).len(), 1);

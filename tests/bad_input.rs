@@ -4,6 +4,7 @@ mod support;
 
 use std::collections::BTreeSet;
 
+use reqwest::Method;
 use serde_json::{Value, json};
 use support::{App, specification};
 
@@ -151,26 +152,183 @@ async fn bodies_that_are_not_json_are_refused() {
     for bomb in ["[".repeat(10_000), format!("{{\"seed\": {}", "[".repeat(10_000))] {
         assert!(send(bomb, "application/json").await.0.is_client_error());
     }
-    assert_eq!(send(specification(2).to_string(), "text/plain").await.0, 415);
-    assert_eq!(send(" ".repeat(2 << 20), "application/json").await.0, 413);
+    assert_refused(&send(specification(2).to_string(), "text/plain").await, 415, "content-type", "text/plain");
+    let large = send(" ".repeat(2 << 20), "application/json").await;
+    assert_refused(&large, 413, "body", "2097152 bytes");
+    assert_eq!(large.1["rule"], "must hold at most 1048576 bytes");
+}
+
+/// What an observation can get wrong: the body without session and period, the status and the field.
+fn faulty_reports() -> Vec<(&'static str, u16, &'static str)> {
+    vec![
+        (r#""period": 1, "log_return": NaN"#, 400, "log_return"),
+        (r#""period": 1, "log_return": 1e999"#, 400, "log_return"),
+        (r#""period": 1, "log_return": "0.1""#, 422, "log_return"),
+        (r#""period": 1, "log_return": 5.1"#, 422, "log_return"),
+        (r#""period": 1"#, 422, "log_return"),
+        (r#""period": 1, "log_return": 0.1, "simple_return": 0.1"#, 422, "log_return"),
+        (r#""period": 1, "simple_return": 0.1, "price": 10.0"#, 422, "simple_return"),
+        (r#""period": 1, "simple_return": -1.0"#, 422, "simple_return"),
+        (r#""period": 1, "simple_return": -2.5"#, 422, "simple_return"),
+        (r#""period": 1, "price": 0.0, "previous_price": 1.0"#, 422, "price"),
+        (r#""period": 1, "price": 1.0, "previous_price": -1.0"#, 422, "previous_price"),
+        (r#""period": 1, "price": 1e9, "previous_price": 1.0"#, 422, "price"),
+        (r#""period": 1, "price": 1.0"#, 422, "previous_price"),
+        (r#""period": 1, "log_return": 0.1, "previous_price": 1.0"#, 422, "previous_price"),
+        (r#""period": 0, "log_return": 0.1"#, 422, "period"),
+        (r#""period": -1, "log_return": 0.1"#, 422, "period"),
+        (r#""period": 1.5, "log_return": 0.1"#, 422, "period"),
+        (r#""log_return": 0.1"#, 422, "period"),
+        (r#""period": 2, "log_return": 0.1"#, 409, "period"),
+        (r#""period": 1, "log_return": 0.1, "executed_allocation": 1.01"#, 422, "executed_allocation"),
+        (r#""period": 1, "log_return": 0.1, "executed_allocation": -0.01"#, 422, "executed_allocation"),
+        (r#""period": 1, "log_return": 0.1, "wealth": -1.0"#, 422, "wealth"),
+        (r#""period": 1, "log_return": 0.1, "wealth": 0"#, 422, "wealth"),
+        (r#""period": 1, "log_return": 0.1, "colour": 1"#, 422, "colour"),
+    ]
+}
+
+/// What opening a session can get wrong, besides its policy.
+fn faulty_sessions() -> Vec<(&'static str, &'static str)> {
+    vec![
+        (r#""wealth": 0"#, "wealth"),
+        (r#""wealth": -1.0"#, "wealth"),
+        (r#""wealth": 1e16"#, "wealth"),
+        (r#""wealth": "much""#, "wealth"),
+        (r#""history": []"#, "history"),
+        (r#""history": [0.1]"#, "history"),
+        (r#""history": [0.1, 0.1]"#, "history"),
+        (r#""history": [0.1, 9.0]"#, "history[1]"),
+        (r#""history": [0.1, null]"#, "history[1]"),
+        (r#""history": 3"#, "history"),
+        (r#""colour": 1"#, "colour"),
+    ]
+}
+
+/// Names of the properties of a schema of the description.
+fn properties(schema: &str) -> BTreeSet<String> {
+    let description: Value = serde_json::from_str(include_str!("../api/openapi.json")).unwrap();
+    description["components"]["schemas"][schema]["properties"].as_object().unwrap().keys().cloned().collect()
+}
+
+#[test]
+fn the_walks_cover_every_field() {
+    let mut walked: BTreeSet<String> = faulty_reports().iter().map(|(_, _, field)| (*field).to_owned()).collect();
+    // A session that is missing or unknown is walked beside the list.
+    walked.insert("session".into());
+    assert!(properties("Observe").is_subset(&walked), "{walked:?}");
+    let mut walked: BTreeSet<String> =
+        faulty_sessions().iter().map(|(_, field)| field.split('[').next().unwrap().to_owned()).collect();
+    walked.insert("policy".into());
+    assert!(properties("OpenSession").is_subset(&walked), "{walked:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_field_of_a_session_and_a_report_is_named() {
+    let mut app = App::start().await;
+    app.train(&specification(2)).await;
+    app.open().await;
+    let post = |path: &'static str, body: String| {
+        let request = app.client.post(format!("{}{path}", app.url)).header("content-type", "application/json");
+        async move { support::read(request.body(body).send().await.unwrap()).await }
+    };
+    for (report, expected, field) in faulty_reports() {
+        let (status, problem) = post("/observe", format!(r#"{{"session": "{}", {report}}}"#, app.session)).await;
+        assert_eq!(status, expected, "{report} {problem}");
+        assert_named(&problem, field);
+    }
+    assert_named(&post("/observe", r#"{"period": 1, "log_return": 0.1}"#.into()).await.1, "session");
+    for (session, field) in faulty_sessions() {
+        let (status, problem) = post("/sessions", format!(r#"{{"policy": "{}", {session}}}"#, app.policy)).await;
+        assert_eq!(status, 422, "{session} {problem}");
+        assert_named(&problem, field);
+    }
+    assert_named(&post("/sessions", "{}".into()).await.1, "policy");
+    assert_named(&post("/sessions", r#"{"policy": 1}"#.into()).await.1, "policy");
+    let (_, session) = app.get(&format!("/sessions/{}", app.session)).await;
+    assert_eq!(session["period"], 1, "a refused report changed the session");
+}
+
+fn assert_refused((status, problem): &(reqwest::StatusCode, Value), expected: u16, field: &str, value: &str) {
+    assert_eq!(status.as_u16(), expected, "{problem}");
+    assert_named(problem, field);
+    assert_eq!(problem["value"], value, "{problem}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn unknown_things_are_refused() {
     let app = App::start().await;
-    for path in ["/jobs/x", "/jobs/x/events", "/policies/x", "/policies/x/export", "/sessions/x", "/sessions/x/history"]
-    {
-        assert_eq!(app.get(path).await.0, 404, "{path}");
+    for (path, what) in [
+        ("/jobs/42", "job"),
+        ("/jobs/42/events", "job"),
+        ("/policies/42", "policy"),
+        ("/policies/42/export", "policy"),
+        ("/sessions/42", "session"),
+        ("/sessions/42/history", "session"),
+        ("/action?session=42", "session"),
+        ("/action?session=42&mode=resolve", "session"),
+    ] {
+        let answer = app.get(path).await;
+        assert_refused(&answer, 404, what, "42");
+        assert_eq!(answer.1["rule"], format!("must name a {what}"), "{path}");
     }
-    assert_eq!(app.get("/nowhere").await.1["type"], "/problems/unknown-route");
-    assert_eq!(app.delete("/train").await, 405);
-    assert_eq!(app.get("/action?session=x").await.0, 404);
-    assert_eq!(app.post("/sessions", &json!({"policy": "x"})).await.0, 404);
-    assert_named(&app.get("/action").await.1, "session");
-    assert_named(&app.get("/action?session=x&mode=guess").await.1, "mode");
-    assert_named(&app.get("/jobs?limit=0").await.1, "limit");
-    let (status, problem) = app.post("/observe", &json!({"session": "x", "period": 1, "log_return": 0.1})).await;
-    assert_eq!(status, 404, "{problem}");
-    let (status, problem) = app.post("/policies/import", &json!({"format": "ballast-policy-1"})).await;
-    assert_eq!(status, 422, "{problem}");
+    for (path, what) in [("/jobs/42", "job"), ("/policies/42", "policy"), ("/sessions/42", "session")] {
+        assert_refused(&app.send(Method::DELETE, path, None).await, 404, what, "42");
+    }
+    assert_refused(&app.post("/sessions", &json!({"policy": "42"})).await, 404, "policy", "42");
+    let report = json!({"session": "42", "period": 1, "log_return": 0.1});
+    assert_refused(&app.post("/observe", &report).await, 404, "session", "42");
+    assert_refused(&app.get("/nowhere").await, 404, "path", "/nowhere");
+    assert_refused(&app.get("/jobs/%ff").await, 404, "id", "/jobs/%ff");
+    assert_refused(&app.send(Method::DELETE, "/train", None).await, 405, "method", "DELETE");
+    let allowed = app.client.delete(format!("{}/train", app.url)).send().await.unwrap();
+    assert_eq!(allowed.headers()["allow"], "POST");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn parameters_are_named() {
+    let app = App::start().await;
+    for (path, field) in [
+        ("/action", "session"),
+        ("/action?session=x&session=y", "session"),
+        ("/action?session=x&mode=guess", "mode"),
+        ("/action?session=x&explain=everything", "explain"),
+        ("/action?session=x&colour=1", "colour"),
+        ("/jobs?limit=0", "limit"),
+        ("/jobs?limit=1001", "limit"),
+        ("/policies?limit=many", "limit"),
+        ("/sessions?after=last", "after"),
+        ("/sessions?colour=1", "colour"),
+    ] {
+        let (status, problem) = app.get(path).await;
+        assert_eq!(status, 400, "{path} {problem}");
+        assert_named(&problem, field);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn documents_that_are_no_policies_are_refused() {
+    let mut app = App::start().await;
+    app.train(&specification(2)).await;
+    let sound: Value = serde_json::from_slice(&app.export().await).unwrap();
+    let with = |pointer: &str, value: Value| {
+        let mut document = sound.clone();
+        *document.pointer_mut(pointer).unwrap() = value;
+        document
+    };
+    for (document, field) in [
+        (json!({"format": "ballast-policy-1"}), "specification"),
+        (with("/format", json!("ballast-policy-9")), "format"),
+        (with("/specification/problem/horizon", json!(3)), "steps"),
+        (with("/specification/problem/horizon", json!(0)), "problem.horizon"),
+        (with("/steps/1/step", json!(0)), "steps[1].step"),
+        (with("/steps/1/diagnostics", json!({"colour": 1})), "steps[1].diagnostics.colour"),
+    ] {
+        let (status, problem) = app.post("/policies/import", &document).await;
+        assert_eq!(status, 422, "{problem}");
+        assert_named(&problem, field);
+    }
+    let request = app.client.post(format!("{}/policies/import", app.url)).header("content-type", "application/json");
+    let (status, problem) = support::read(request.body("{\"format\": ").send().await.unwrap()).await;
+    assert_eq!(status, 400, "{problem}");
 }

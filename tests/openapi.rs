@@ -24,3 +24,32 @@ fn every_response_is_described() {
         }
     }
 }
+
+#[test]
+fn every_operation_lists_what_its_shape_can_answer() {
+    let description: Value = serde_json::from_str(CHECKED_IN).unwrap();
+    let mut with_body = 0;
+    for (path, operations) in description["paths"].as_object().unwrap() {
+        for (method, operation) in operations.as_object().unwrap() {
+            let mut expected = Vec::new();
+            if operation["tags"][0] != "operations" {
+                expected.extend(["500", "503"]);
+            }
+            if operation["requestBody"].is_object() {
+                with_body += 1;
+                expected.extend(["400", "413", "415", "422", "507"]);
+            }
+            if method == "delete" {
+                expected.push("507");
+            }
+            if path.contains('{') {
+                expected.push("404");
+            }
+            for status in expected {
+                let content = &operation["responses"][status]["content"];
+                assert!(content["application/problem+json"].is_object(), "{method} {path} {status}");
+            }
+        }
+    }
+    assert_eq!(with_body, 4);
+}

@@ -73,13 +73,21 @@ struct Solved {
 }
 
 impl Training {
-    /// `specification` must be completed. Cost: simulating the design.
+    /// As [`Self::prepare`], without a way to stop.
     ///
     /// # Errors
     /// A specification that breaks a rule.
     pub fn new(specification: &Specification) -> Result<Self, TrainError> {
+        Self::prepare(specification, &AtomicBool::new(false))
+    }
+
+    /// Completes and checks the specification. Cost: simulating the design, seconds at the largest counts.
+    ///
+    /// # Errors
+    /// A specification that breaks a rule; [`TrainError::Stopped`] soon after the stop signal.
+    pub fn prepare(specification: &Specification, stop: &AtomicBool) -> Result<Self, TrainError> {
         let specification = specification.clone().completed()?;
-        let design = Design::simulate(&specification);
+        let design = Design::simulate(&specification, stop)?;
         Ok(Training { context: ProblemContext::new(&specification), design })
     }
 

@@ -1,8 +1,10 @@
 //! The design: simulated states, step by step, under randomised actions and the sampling law.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use rand::RngExt;
 
-use super::error::FieldError;
+use super::error::{FieldError, TrainError};
 use super::specification::{Framework, InitialLaws, Interval, ProblemSpecification, SamplingLaw, Specification};
 use super::state::{State, next_wealth};
 use super::utility::depends_on_wealth;
@@ -49,7 +51,10 @@ fn admissible(log_return: f64, problem: &ProblemSpecification) -> f64 {
 impl Design {
     /// Simulates the design of a completed specification. Streams: ("design", t, i) for the steps of point i,
     /// ("initial", 0, i) for its start.
-    pub fn simulate(specification: &Specification) -> Self {
+    ///
+    /// # Errors
+    /// [`TrainError::Stopped`] soon after the stop signal.
+    pub fn simulate(specification: &Specification, stop: &AtomicBool) -> Result<Self, TrainError> {
         let problem = &specification.problem;
         let design = &specification.design;
         let count = design.count.unwrap_or(super::limits::DEFAULT_COUNT);
@@ -70,9 +75,12 @@ impl Design {
         };
         if !learns {
             made.wealth = wealth_ladders(problem, start, count);
-            return made;
+            return Ok(made);
         }
         for point in 0..count {
+            if stop.load(Ordering::Relaxed) {
+                return Err(TrainError::Stopped);
+            }
             let mut generator = stream(specification.seed, "initial", 0, point);
             let mut wealth = start.min * (start.max / start.min).powf(generator.random::<f64>());
             if resampled {
@@ -91,7 +99,7 @@ impl Design {
             made.returns.push(returns);
             made.wealth.push(path);
         }
-        made
+        Ok(made)
     }
 
     /// Number of distinct design points of a step: 1 where they are all the same state.

@@ -95,8 +95,16 @@ impl Policy {
     /// What is wrong, naming the field.
     pub fn from_json(bytes: &[u8]) -> Result<Self, PolicyError> {
         let policy: Policy = serde_json::from_slice(bytes).map_err(|error| PolicyError::Format(error.to_string()))?;
-        policy.check()?;
-        Ok(policy)
+        Ok(policy.checked()?)
+    }
+
+    /// This policy, where its parts fit together and its specification keeps the rules.
+    ///
+    /// # Errors
+    /// The first field that breaks a rule.
+    pub fn checked(self) -> Result<Self, FieldError> {
+        self.check()?;
+        Ok(self)
     }
 
     fn check(&self) -> Result<(), FieldError> {

@@ -24,17 +24,31 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T> {
 /// The bytes of a body declared to be JSON, not yet parsed.
 pub struct JsonBytes(pub Bytes);
 
+/// Largest body taken, in bytes, as the router tells its extractors.
+#[derive(Debug, Clone, Copy)]
+pub struct BodyLimit(pub usize);
+
 impl<S: Send + Sync> FromRequest<S> for JsonBytes {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
         refuse_other_media(request.headers())?;
+        let declared = request.headers().get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok());
+        let size = declared.and_then(|length| length.parse::<u64>().ok()).map(|length| format!("{length} bytes"));
+        let limit = request.extensions().get::<BodyLimit>().map_or(0, |limit| limit.0);
         Bytes::from_request(request, state).await.map(JsonBytes).map_err(|rejection| {
-            let kind = match rejection.status() {
-                StatusCode::PAYLOAD_TOO_LARGE => ProblemKind::BodyTooLarge,
-                _ => ProblemKind::MalformedJson,
-            };
-            Problem::new(kind, rejection.body_text())
+            let size = size.unwrap_or_else(|| "a stream".to_owned());
+            match rejection.status() {
+                StatusCode::PAYLOAD_TOO_LARGE => {
+                    let rule = format!("must hold at most {limit} bytes");
+                    Problem::new(ProblemKind::BodyTooLarge, rejection.body_text()).naming("body", size, rule)
+                }
+                _ => Problem::new(ProblemKind::MalformedJson, rejection.body_text()).naming(
+                    "body",
+                    size,
+                    "must arrive complete",
+                ),
+            }
         })
     }
 }
@@ -45,8 +59,9 @@ fn refuse_other_media(headers: &HeaderMap) -> Result<(), Problem> {
     if media == "application/json" || (media.starts_with("application/") && media.ends_with("+json")) {
         return Ok(());
     }
-    let detail = format!("the Content-Type is '{declared}'; it must be application/json");
-    Err(Problem::new(ProblemKind::UnsupportedMediaType, detail))
+    let detail = format!("the content-type is '{declared}'; it must be application/json");
+    let problem = Problem::new(ProblemKind::UnsupportedMediaType, detail);
+    Err(problem.naming("content-type", declared, "must be application/json"))
 }
 
 /// The parameters of the query string.
@@ -56,9 +71,12 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequestParts<S> for Parameters<T> 
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
-        let Query(pairs) = Query::<Vec<(String, String)>>::from_request_parts(parts, state)
-            .await
-            .map_err(|rejection| Problem::new(ProblemKind::InvalidQuery, rejection.body_text()))?;
+        let query = parts.uri.query().unwrap_or_default().to_owned();
+        let Query(pairs) =
+            Query::<Vec<(String, String)>>::from_request_parts(parts, state).await.map_err(|rejection| {
+                let problem = Problem::new(ProblemKind::InvalidQuery, rejection.body_text());
+                problem.naming("query", query, "must be a query string")
+            })?;
         decode::parameters(pairs).map(Parameters)
     }
 }
@@ -70,9 +88,14 @@ impl<S: Send + Sync> FromRequestParts<S> for Id {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
-        let Path(id) = Path::<String>::from_request_parts(parts, state)
-            .await
-            .map_err(|rejection| Problem::new(ProblemKind::NotFound, rejection.body_text()))?;
+        let path = parts.uri.path().to_owned();
+        let Path(id) = Path::<String>::from_request_parts(parts, state).await.map_err(|rejection| {
+            Problem::new(ProblemKind::NotFound, rejection.body_text()).naming(
+                "id",
+                path,
+                "must be percent-encoded UTF-8",
+            )
+        })?;
         Ok(Id(id))
     }
 }

@@ -2,38 +2,54 @@
 
 use std::error::Error;
 
+use serde_json::Value;
+
 use super::problem::{Problem, ProblemKind};
 use crate::service::error::ServiceError;
 use crate::store::StoreError;
 
 impl From<ServiceError> for Problem {
     fn from(error: ServiceError) -> Self {
+        use ProblemKind as Kind;
         let detail = error.to_string();
-        let kind = match error {
-            ServiceError::Field(field) => return Problem::of_field(ProblemKind::InvalidField, field),
-            ServiceError::PeriodGap { given, expected } => {
-                let rule = format!("must be {expected}");
-                return Problem {
-                    field: Some("period".into()),
-                    value: Some(Box::new(given.into())),
-                    rule: Some(rule.into()),
-                    ..Problem::new(ProblemKind::PeriodGap, detail)
-                };
+        let problem = |kind| Problem::new(kind, detail);
+        match error {
+            ServiceError::Field(field) => Problem::of_field(Kind::InvalidField, field),
+            ServiceError::Unknown { what, id } => {
+                problem(Kind::NotFound).naming(what, id, format!("must name a {what}"))
             }
-            ServiceError::Unknown { .. } => ProblemKind::NotFound,
-            ServiceError::KeyConflict { .. } => ProblemKind::IdempotencyConflict,
-            ServiceError::PolicyInUse { .. } => ProblemKind::InUse,
-            ServiceError::PeriodConflict { .. } => ProblemKind::PeriodConflict,
-            ServiceError::Completed { .. } => ProblemKind::SessionCompleted,
-            ServiceError::Policy(_) => ProblemKind::InvalidPolicy,
-            ServiceError::Draining => ProblemKind::Overloaded,
-            ServiceError::Store(error) => return of_store(&error),
+            ServiceError::KeyConflict { key } => {
+                let rule = "must come with the body it first came with";
+                problem(Kind::IdempotencyConflict).naming("Idempotency-Key", key, rule)
+            }
+            ServiceError::PolicyInUse { policy, .. } => {
+                problem(Kind::InUse).naming("policy", policy, "must have no session that lives by it")
+            }
+            ServiceError::PeriodConflict { period } => problem(Kind::PeriodConflict).naming(
+                "period",
+                period,
+                "must come with the content first reported for it",
+            ),
+            ServiceError::PeriodGap { given, expected } => {
+                problem(Kind::PeriodGap).naming("period", given, format!("must be {expected}"))
+            }
+            ServiceError::PastHorizon { given, horizon } => {
+                problem(Kind::SessionCompleted).naming("period", given, format!("must be at most {horizon}"))
+            }
+            ServiceError::Completed { session, horizon } => {
+                let rule = format!("must name a session with fewer than {horizon} periods observed");
+                problem(Kind::SessionCompleted).naming("session", session, rule)
+            }
+            ServiceError::Policy(cause) => {
+                problem(Kind::InvalidPolicy).naming("steps", Value::Null, format!("must make a policy: {cause}"))
+            }
+            ServiceError::Draining | ServiceError::Busy => problem(Kind::Overloaded),
+            ServiceError::Store(error) => of_store(&error),
             ServiceError::Internal(reason) => {
                 tracing::error!(reason, "a request failed");
-                return Problem::new(ProblemKind::Internal, "the cause is in the log");
+                Problem::new(Kind::Internal, "the cause is in the log")
             }
-        };
-        Problem::new(kind, detail)
+        }
     }
 }
 

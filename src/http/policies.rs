@@ -7,11 +7,14 @@ use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
+use super::decode;
 use super::extract::{Id, JsonBytes, Parameters};
 use super::page::{self, Page};
 use super::problem::Problem;
 use super::wire;
+use crate::control::policy::Policy;
 use crate::service::Service;
+use crate::service::error::ServiceError;
 
 /// List policies, newest first.
 #[utoipa::path(get, path = "/policies", tag = "policies",
@@ -66,7 +69,9 @@ pub async fn export(State(service): State<Arc<Service>>, Id(id): Id) -> Result<R
             headers(("Location" = String, description = "The policy."))),
         (status = 422, description = "The document is not a usable policy.", body = Problem, content_type = "application/problem+json")))]
 pub async fn import(State(service): State<Arc<Service>>, JsonBytes(document): JsonBytes) -> Result<Response, Problem> {
-    let policy = service.policies.import(document.into()).await?;
+    // A document may hold 64 MB: too much to parse between two requests.
+    let decoded = tokio::task::spawn_blocking(move || decode::json::<Policy>(&document));
+    let policy = service.policies.import(decoded.await.map_err(ServiceError::internal)??).await?;
     let location = [(header::LOCATION, format!("/policies/{policy}"))];
     Ok((StatusCode::CREATED, location, Json(wire::Imported { policy })).into_response())
 }

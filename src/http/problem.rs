@@ -99,7 +99,7 @@ pub struct Problem {
     /// This occurrence, in one sentence.
     #[schema(example = "problem.horizon is 0: must lie in [1, 520]")]
     pub detail: String,
-    /// Dotted path of the offending field.
+    /// Dotted path of the offending field, header or parameter; every problem that the client can mend names it.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(example = "problem.horizon")]
     pub field: Option<String>,
@@ -131,12 +131,12 @@ impl Problem {
     pub fn of_field(kind: ProblemKind, error: FieldError) -> Self {
         let detail = error.to_string();
         let value = serde_json::from_str(&error.value).unwrap_or(Value::String(error.value));
-        Problem {
-            field: Some(error.field),
-            value: Some(Box::new(value)),
-            rule: Some(error.rule.into()),
-            ..Problem::new(kind, detail)
-        }
+        Problem::new(kind, detail).naming(error.field, value, error.rule)
+    }
+
+    /// The same problem with what it is about: the field, what it held, what it must be.
+    pub fn naming(self, field: impl Into<String>, value: impl Into<Value>, rule: impl Into<Box<str>>) -> Self {
+        Problem { field: Some(field.into()), value: Some(Box::new(value.into())), rule: Some(rule.into()), ..self }
     }
 }
 

@@ -3,18 +3,19 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use axum::Router;
 use axum::extract::{DefaultBodyLimit, Request, State};
 use axum::http::{Method, Uri};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
+use axum::{Extension, Router};
 use tower_http::catch_panic::CatchPanicLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+use super::extract::BodyLimit;
 use super::problem::{Problem, ProblemKind};
-use super::{events, jobs, operations, policies, sessions, telemetry};
+use super::{described, events, jobs, operations, policies, sessions, telemetry};
 use crate::service::Service;
 use crate::service::config::Config;
 
@@ -55,7 +56,9 @@ fn routes() -> OpenApiRouter<Arc<Service>> {
 
 /// The OpenAPI description.
 pub fn description() -> utoipa::openapi::OpenApi {
-    routes().into_openapi()
+    let mut description = routes().into_openapi();
+    described::with_every_problem(&mut description);
+    description
 }
 
 /// The description as checked in under `api/openapi.json`.
@@ -70,6 +73,7 @@ pub fn application(service: Arc<Service>, config: &Config) -> Router {
         .fallback(unknown_route)
         .method_not_allowed_fallback(wrong_method)
         .layer(DefaultBodyLimit::max(config.body_limit_bytes))
+        .layer(Extension(BodyLimit(config.body_limit_bytes)))
         .layer(middleware::from_fn_with_state(config.request_timeout, within_time))
         .layer(CatchPanicLayer::custom(|_| {
             Problem::new(ProblemKind::Internal, "the cause is in the log").into_response()
@@ -79,11 +83,13 @@ pub fn application(service: Arc<Service>, config: &Config) -> Router {
 }
 
 async fn unknown_route(uri: Uri) -> Problem {
-    Problem::new(ProblemKind::UnknownRoute, format!("there is nothing at {}", uri.path()))
+    let problem = Problem::new(ProblemKind::UnknownRoute, format!("there is nothing at {}", uri.path()));
+    problem.naming("path", uri.path(), "must be a path of /openapi.json")
 }
 
 async fn wrong_method(method: Method, uri: Uri) -> Problem {
-    Problem::new(ProblemKind::WrongMethod, format!("{} does not take {method}", uri.path()))
+    let problem = Problem::new(ProblemKind::WrongMethod, format!("{} does not take {method}", uri.path()));
+    problem.naming("method", method.as_str(), "must be one that the Allow header names")
 }
 
 /// Bounds the time to the head of the response, and so the time a slow body may take; event streams run on.

@@ -18,6 +18,12 @@ pub struct Config {
     /// Largest request body, in bytes: an exported policy of a few thousand design points fits.
     pub body_limit_bytes: usize,
     pub request_timeout: Duration,
+    /// Robust steps solved at a time for `mode=resolve` and `explain`; more wait.
+    pub resolve_limit: usize,
+    /// Allocations and observations computed at a time; more wait.
+    pub advice_limit: usize,
+    /// A request that has waited this long for its turn is told to come back.
+    pub turn_wait: Duration,
     /// Time given to open requests once the service is asked to stop.
     pub drain: Duration,
     /// A job whose worker has been silent this long may be claimed by another.
@@ -35,6 +41,9 @@ impl Config {
             connection_limit: 1024,
             body_limit_bytes: 64 << 20,
             request_timeout: Duration::from_secs(30),
+            resolve_limit: cores.div_ceil(2),
+            advice_limit: 2 * cores,
+            turn_wait: Duration::from_secs(2),
             drain: Duration::from_secs(25),
             lease: Duration::from_secs(30),
         }

@@ -19,14 +19,18 @@ pub enum ServiceError {
     PeriodConflict { period: usize },
     #[error("period {given} is not the one expected: report period {expected}")]
     PeriodGap { given: usize, expected: usize },
-    #[error("the session has observed all {horizon} periods of its horizon")]
-    Completed { horizon: usize },
+    #[error("period {given} lies past the horizon of {horizon} periods")]
+    PastHorizon { given: usize, horizon: usize },
+    #[error("the session '{session}' has observed all {horizon} periods of its horizon")]
+    Completed { session: String, horizon: usize },
     #[error(transparent)]
     Policy(PolicyError),
     #[error(transparent)]
     Store(#[from] StoreError),
     #[error("the service is shutting down")]
     Draining,
+    #[error("too many requests of this kind wait already")]
+    Busy,
     #[error("{0}")]
     Internal(String),
 }
@@ -45,7 +49,7 @@ impl ServiceError {
         ServiceError::Unknown { what, id: id.to_owned() }
     }
 
-    pub(super) fn internal(error: impl std::fmt::Display) -> Self {
+    pub fn internal(error: impl std::fmt::Display) -> Self {
         ServiceError::Internal(error.to_string())
     }
 }

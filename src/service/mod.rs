@@ -3,6 +3,7 @@
 //! [`Service`] is what a transport needs: the store, the jobs and their trainer, the policies made ready to answer,
 //! and the live sessions. Everything acknowledged is in the store first; memory only saves recomputing.
 
+mod bounded;
 pub mod clock;
 pub mod config;
 pub mod error;
@@ -49,7 +50,7 @@ impl Service {
         exit_on_fatal(store.clone());
         let jobs = Jobs::new(store.clone(), clock.clone());
         let policies = Arc::new(Policies::new(store.clone(), clock.clone()));
-        let sessions = Sessions::new(store.clone(), clock.clone(), policies.clone());
+        let sessions = Sessions::new(config, store.clone(), clock.clone(), policies.clone());
         let trainer = Trainer::start(config, store.clone(), clock, jobs.board(), shutdown.clone())?;
         Ok(Arc::new(Service { jobs, policies, sessions, shutdown, store, trainer }))
     }

@@ -10,6 +10,7 @@ use crate::control::policy::content_hash;
 
 /// Prices taken: any currency, any quantity.
 const PRICE: (f64, f64) = (1e-12, 1e15);
+const ONE_RETURN: &str = "must be the only one of log_return, simple_return and price";
 
 /// The return of one period, given in exactly one of three ways, and what was done in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -65,10 +66,10 @@ impl Observe {
             limits::within("executed_allocation", allocation, 0.0, 1.0)?;
         }
         if let Some(wealth) = self.wealth {
-            limits::within("wealth", wealth, 1e-6, 1e15)?;
+            limits::within("wealth", wealth, limits::WEALTH.0, limits::WEALTH.1)?;
         }
-        if self.previous_price.is_some() && self.price.is_none() {
-            return Err(FieldError::new("previous_price", "given", "must be absent unless price is given"));
+        if let (Some(value), None) = (self.previous_price, self.price) {
+            return Err(FieldError::new("previous_price", value, "must be absent unless price is given"));
         }
         match (self.log_return, self.simple_return, self.price) {
             (Some(value), None, None) => limits::log_return("log_return", value).map(|()| value),
@@ -80,10 +81,8 @@ impl Observe {
             (None, None, None) => {
                 Err(FieldError::new("log_return", "null", "must be given, or simple_return or price instead of it"))
             }
-            (log_return, ..) => {
-                let field = if log_return.is_some() { "log_return" } else { "simple_return" };
-                Err(FieldError::new(field, "given", "must be the only one of log_return, simple_return and price"))
-            }
+            (Some(value), ..) => Err(FieldError::new("log_return", value, ONE_RETURN)),
+            (None, Some(value), _) => Err(FieldError::new("simple_return", value, ONE_RETURN)),
         }
     }
 

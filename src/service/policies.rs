@@ -40,7 +40,9 @@ impl Policies {
         }
         let row = self.get(policy).await?;
         let prepared = tokio::task::spawn_blocking(move || Advisor::new(Policy::from_json(&row.json)?));
-        let advisor = Arc::new(prepared.await.map_err(ServiceError::internal)??);
+        // What was stored was checked: a fault in it is not the caller's.
+        let advisor = prepared.await.map_err(ServiceError::internal)?.map_err(ServiceError::internal)?;
+        let advisor = Arc::new(advisor);
         let mut ready = self.lock();
         if ready.len() >= KEPT_READY {
             // Live sessions hold their own reference, so dropping any entry costs at most one more preparation.
@@ -63,9 +65,9 @@ impl Policies {
     ///
     /// # Errors
     /// The document is not a usable policy.
-    pub async fn import(&self, document: Vec<u8>) -> Result<String, ServiceError> {
+    pub async fn import(&self, document: Policy) -> Result<String, ServiceError> {
         let checked = tokio::task::spawn_blocking(move || {
-            let advisor = Advisor::new(Policy::from_json(&document)?)?;
+            let advisor = Advisor::new(document.checked()?)?;
             Ok::<_, ServiceError>(advisor.policy().to_json())
         });
         let json = checked.await.map_err(ServiceError::internal)??;

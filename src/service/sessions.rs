@@ -8,13 +8,16 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard};
 
+use super::bounded::Bounded;
 use super::clock::Clock;
+use super::config::Config;
 use super::error::ServiceError;
 use super::identity;
 use super::observation::{Observe, Observed};
 use super::policies::Policies;
 use crate::control::advisor::{Advice, AdviceMode, Advisor};
 use crate::control::error::FieldError;
+use crate::control::limits;
 use crate::control::state::State;
 use crate::control::worst_case::WorstCase;
 use crate::store::{
@@ -62,11 +65,15 @@ pub struct Sessions {
     clock: Clock,
     policies: Arc<Policies>,
     slots: Arc<Mutex<HashMap<String, Slot>>>,
+    advising: Bounded,
+    resolving: Bounded,
 }
 
 impl Sessions {
-    pub(super) fn new(store: Store, clock: Clock, policies: Arc<Policies>) -> Self {
-        Sessions { store, clock, policies, slots: Arc::default() }
+    pub(super) fn new(config: &Config, store: Store, clock: Clock, policies: Arc<Policies>) -> Self {
+        let advising = Bounded::new(config.advice_limit, config.turn_wait);
+        let resolving = Bounded::new(config.resolve_limit, config.turn_wait);
+        Sessions { store, clock, policies, slots: Arc::default(), advising, resolving }
     }
 
     /// Opens a session; history and wealth default to the policy's.
@@ -172,7 +179,7 @@ impl Sessions {
         }
         live.expects(report.period)?;
         let log_return = report.checked_log_return(live.price)?;
-        let (next, answer) = live.after(report, log_return).await?;
+        let (next, answer) = live.after(report, log_return, &self.advising).await?;
         let new = NewObservation {
             session: report.session.clone(),
             period: report.period,
@@ -214,23 +221,23 @@ impl Sessions {
         let mut slot = self.slot(session).lock_owned().await;
         let live = self.replayed(session, &mut slot).await?;
         if live.observed >= live.row.horizon {
-            return Err(ServiceError::Completed { horizon: live.row.horizon });
+            return Err(ServiceError::Completed { session: session.to_owned(), horizon: live.row.horizon });
         }
         let period = live.observed + 1;
         if question == Question::Advise(AdviceMode::Surrogate) {
-            let advice = live.surrogate_advice().await?;
+            let advice = live.surrogate_advice(&self.advising).await?;
             return Ok(Action { period, advice, worst_case: None });
         }
         let (advisor, state, step) = (live.advisor.clone(), live.state.clone(), live.observed);
         drop(slot);
-        let solving = tokio::task::spawn_blocking(move || match question {
+        let solving = self.resolving.run(move || match question {
             Question::Explain => {
                 let (advice, worst_case) = advisor.explain(step, &state);
                 (advice, Some(worst_case))
             }
             Question::Advise(mode) => (advisor.advise(step, &state, mode), None),
         });
-        let (advice, worst_case) = solving.await.map_err(ServiceError::internal)?;
+        let (advice, worst_case) = solving.await?;
         Ok(Action { period, advice, worst_case })
     }
 
@@ -285,36 +292,41 @@ impl Sessions {
 impl Live {
     fn expects(&self, period: usize) -> Result<(), ServiceError> {
         if self.observed >= self.row.horizon {
-            return Err(ServiceError::Completed { horizon: self.row.horizon });
+            return Err(ServiceError::PastHorizon { given: period, horizon: self.row.horizon });
         }
         let expected = self.observed + 1;
         if period == expected { Ok(()) } else { Err(ServiceError::PeriodGap { given: period, expected }) }
     }
 
     /// The surrogate's advice for the coming period, computed once.
-    async fn surrogate_advice(&mut self) -> Result<Advice, ServiceError> {
+    async fn surrogate_advice(&mut self, advising: &Bounded) -> Result<Advice, ServiceError> {
         if let Some(advice) = &self.advice {
             return Ok(advice.clone());
         }
         let (advisor, state, step) = (self.advisor.clone(), self.state.clone(), self.observed);
-        let advising = tokio::task::spawn_blocking(move || advisor.advise(step, &state, AdviceMode::Surrogate));
-        let advice = advising.await.map_err(ServiceError::internal)?;
+        let advice = advising.run(move || advisor.advise(step, &state, AdviceMode::Surrogate)).await?;
         self.advice = Some(advice.clone());
         Ok(advice)
     }
 
     /// The session after `log_return`, and the answer to it; nothing is changed yet but the memoised advice.
-    async fn after(&mut self, report: &Observe, log_return: f64) -> Result<(Live, Observed), ServiceError> {
-        let advised = self.surrogate_advice().await?.allocation;
+    async fn after(
+        &mut self,
+        report: &Observe,
+        log_return: f64,
+        advising: &Bounded,
+    ) -> Result<(Live, Observed), ServiceError> {
+        let advised = self.surrogate_advice(advising).await?.allocation;
         let executed_allocation = report.executed_allocation.unwrap_or(advised);
         let (advisor, before, stated) = (self.advisor.clone(), self.state.clone(), report.wealth);
-        let advancing = tokio::task::spawn_blocking(move || {
+        let advancing = advising.run(move || {
             let mut state = advisor.advance(&before, executed_allocation, log_return);
             state.wealth = stated.unwrap_or(state.wealth);
+            limits::within("wealth", state.wealth, limits::WEALTH.0, limits::WEALTH.1)?;
             let uncertainty = advisor.uncertainty(&state);
-            (state, uncertainty)
+            Ok::<_, FieldError>((state, uncertainty))
         });
-        let (state, uncertainty) = advancing.await.map_err(ServiceError::internal)?;
+        let (state, uncertainty) = advancing.await??;
         let answer = Observed {
             session: report.session.clone(),
             period: report.period,

@@ -2,11 +2,13 @@
 //!
 //! It runs on a thread of its own with a rayon pool of its own, so that the threads that answer requests stay free.
 //! Stopping (a cancel, a shutdown, a lost lease) always ends in `release_job`: the store knows whether a cancel was
-//! asked for, and requeues the job or cancels it; a worker that lost its lease changes nothing.
+//! asked for, and requeues the job or cancels it; a worker that lost its lease changes nothing. The work itself looks
+//! for the stop signal often, but not inside a factorisation, which takes a minute at ten thousand points: past
+//! [`PATIENCE`] the job is given back without waiting for it, and what it still computes is dropped.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -29,6 +31,11 @@ const QUEUE_POLL: Duration = Duration::from_secs(2);
 /// The store is asked this often whether the running job should stop: half the second a cancel may take.
 const CANCEL_POLL: Duration = Duration::from_millis(500);
 
+/// The stop signal is looked at this often, and stopped work has this long to end by itself: with [`CANCEL_POLL`] below
+/// the second a cancel may take.
+const STOP_POLL: Duration = Duration::from_millis(50);
+const PATIENCE: Duration = Duration::from_millis(250);
+
 /// The worker thread, to be joined once.
 pub(super) struct Trainer(Mutex<Option<JoinHandle<()>>>);
 
@@ -48,6 +55,8 @@ enum Ended {
     Finished(JobOutcome),
     /// Stopped before the end.
     Stopped,
+    /// The store failed in a way that may pass.
+    Interrupted(StoreError),
     /// Another worker holds the job.
     Fenced,
 }
@@ -75,6 +84,7 @@ impl Trainer {
             lease: config.lease,
             runtime: Handle::current(),
         };
+        let worker = Arc::new(worker);
         let thread = std::thread::Builder::new().name("trainer".into()).spawn(move || worker.run());
         Ok(Trainer(Mutex::new(Some(thread.map_err(ServiceError::internal)?))))
     }
@@ -90,14 +100,14 @@ impl Trainer {
 }
 
 impl Worker {
-    fn run(&self) {
+    fn run(self: Arc<Self>) {
         let mut changes = self.board.subscribe();
         while !self.shutdown.has_begun() {
             changes.mark_unchanged();
             let lease_seconds = u32::try_from(self.lease.as_secs()).unwrap_or(u32::MAX).max(1);
             let claim = self.store.claim_job(&self.name, lease_seconds, self.clock.now_milliseconds());
             match self.runtime.block_on(claim) {
-                Ok(Some(claimed)) => self.work(&claimed),
+                Ok(Some(claimed)) => self.work(claimed),
                 Ok(None) => self.runtime.block_on(async {
                     tokio::select! {
                         _ = changes.changed() => {}
@@ -110,25 +120,47 @@ impl Worker {
         }
     }
 
-    fn work(&self, claimed: &ClaimedJob) {
-        let (job, attempt) = (claimed.row.job.as_str(), claimed.attempt);
+    fn work(self: &Arc<Self>, claimed: ClaimedJob) {
+        let (job, attempt) = (claimed.row.job.clone(), claimed.attempt);
         tracing::info!(job, attempt, steps_done = claimed.row.steps_done, "job started");
-        let stop = self.board.enter(job, claimed.row.steps_done, claimed.row.steps_total);
+        let stop = self.board.enter(&job, claimed.row.steps_done, claimed.row.steps_total);
         let keeper = self.runtime.spawn(keep_lease(
             self.store.clone(),
             self.clock.clone(),
             self.shutdown.clone(),
-            (job.to_owned(), attempt),
+            (job.clone(), attempt),
             self.lease,
             stop.clone(),
         ));
-        let ended = catch_unwind(AssertUnwindSafe(|| self.solve(claimed, &stop)))
-            .unwrap_or_else(|panic| Ok(Ended::Finished(JobOutcome::Failed { reason: panic_reason(panic.as_ref()) })));
+        let (worker, signal) = (self.clone(), stop.clone());
+        let (answer, solved) = mpsc::channel();
+        let solving = std::thread::Builder::new().name("job".into()).spawn(move || {
+            let ended = catch_unwind(AssertUnwindSafe(|| worker.solve(&claimed, &signal))).unwrap_or_else(|panic| {
+                Ok(Ended::Finished(JobOutcome::Failed { reason: panic_reason(panic.as_ref()) }))
+            });
+            // Nobody listens where the work was given up.
+            let _ = answer.send(ended);
+        });
+        let ended = match &solving {
+            Ok(_) => until_solved(&solved, &stop).unwrap_or_else(|error| ended_by(&job, &error)),
+            Err(error) => Ended::Finished(JobOutcome::Failed { reason: format!("no thread: {error}") }),
+        };
+        self.close_at_last(&job, attempt, &ended);
         keeper.abort();
-        let closed = ended.and_then(|ended| self.close(job, attempt, ended));
-        self.board.leave(job);
-        if let Err(error) = closed {
-            self.pause("keeping a job; its lease will run out", &error);
+        self.board.leave(&job);
+        // The next job would compete with what this one still computes.
+        while solving.as_ref().is_ok_and(|thread| !thread.is_finished()) && !self.shutdown.has_begun() {
+            self.wait(STOP_POLL);
+        }
+    }
+
+    /// Ends the job in the store, again until it is done: a full disk must not cost a policy that took hours.
+    fn close_at_last(&self, job: &str, attempt: i64, ended: &Ended) {
+        while let Err(error) = self.close(job, attempt, ended) {
+            self.pause("ending a job; trying again", &error);
+            if self.shutdown.has_begun() || error.is_fatal() {
+                return;
+            }
         }
     }
 
@@ -142,8 +174,9 @@ impl Worker {
             Ok(specification) => specification,
             Err(error) => return failed(format!("the stored specification cannot be read: {error}")),
         };
-        let training = match self.pool.install(|| Training::new(&specification)) {
+        let training = match self.pool.install(|| Training::prepare(&specification, stop)) {
             Ok(training) => training,
+            Err(TrainError::Stopped) => return Ok(Ended::Stopped),
             Err(error) => return failed(error.to_string()),
         };
         let checkpoints = self.runtime.block_on(self.store.checkpoints(job))?;
@@ -172,16 +205,22 @@ impl Worker {
         Ok(Ended::Finished(succeeded(&training.into_policy(steps))))
     }
 
-    fn close(&self, job: &str, attempt: i64, ended: Ended) -> Result<(), StoreError> {
+    fn close(&self, job: &str, attempt: i64, ended: &Ended) -> Result<(), StoreError> {
         let now = self.clock.now_milliseconds();
         let held = match ended {
             Ended::Finished(outcome) => {
-                log_outcome(job, &outcome);
-                self.runtime.block_on(self.store.finish_job(job, attempt, outcome, now))?
+                let held = self.runtime.block_on(self.store.finish_job(job, attempt, outcome.clone(), now))?;
+                log_outcome(job, outcome);
+                held
             }
             Ended::Stopped => {
                 tracing::info!(job, "job stopped");
                 self.runtime.block_on(self.store.release_job(job, attempt, now))?
+            }
+            Ended::Interrupted(error) => {
+                let held = self.runtime.block_on(self.store.release_job(job, attempt, now))?;
+                self.pause("keeping a job, which is queued again", error);
+                held
             }
             Ended::Fenced => false,
         };
@@ -193,12 +232,43 @@ impl Worker {
 
     fn pause(&self, doing: &str, error: &StoreError) {
         tracing::error!(error = error as &dyn std::error::Error, "the store failed while {doing}");
+        self.wait(QUEUE_POLL);
+    }
+
+    /// Waits, but not past the shutdown signal.
+    fn wait(&self, time: Duration) {
         self.runtime.block_on(async {
             tokio::select! {
                 () = self.shutdown.begun() => {}
-                () = tokio::time::sleep(QUEUE_POLL) => {}
+                () = tokio::time::sleep(time) => {}
             }
         });
+    }
+}
+
+/// The end of the work; `Stopped` where it goes on past [`PATIENCE`] after the stop signal.
+fn until_solved(solved: &mpsc::Receiver<Result<Ended, StoreError>>, stop: &AtomicBool) -> Result<Ended, StoreError> {
+    let mut stopped_at = None;
+    loop {
+        match solved.recv_timeout(STOP_POLL) {
+            Ok(ended) => return ended,
+            Err(mpsc::RecvTimeoutError::Disconnected) => return Ok(Ended::Stopped),
+            Err(mpsc::RecvTimeoutError::Timeout) if stop.load(Ordering::Relaxed) => {
+                if stopped_at.get_or_insert_with(Instant::now).elapsed() >= PATIENCE {
+                    return Ok(Ended::Stopped);
+                }
+            }
+            Err(mpsc::RecvTimeoutError::Timeout) => {}
+        }
+    }
+}
+
+/// How a job ends whose checkpoints could not be read or written: trying again helps where the store was full or busy.
+fn ended_by(job: &str, error: &StoreError) -> Ended {
+    tracing::error!(job, error = error as &dyn std::error::Error, "the store failed during a job");
+    match error {
+        StoreError::Full { .. } | StoreError::Unavailable { .. } => Ended::Interrupted(error.clone()),
+        _ => Ended::Finished(JobOutcome::Failed { reason: error.to_string() }),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Opening a folder: the lock, the engine's age, the schema, the connections.
+//! Opening a folder: the lock, the engine's age, the schema, the leases of the dead, the connections.
 
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -10,6 +10,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePo
 use sqlx::{ConnectOptions, SqliteConnection};
 
 use super::error::{Failure, StoreError};
+use super::job_state::JobState;
 
 static MIGRATOR: Migrator = sqlx::migrate!("src/store/migrations/sqlite");
 
@@ -36,6 +37,7 @@ pub(super) async fn open(dir: &Path) -> Result<Opened, StoreError> {
     refuse_old_engine(&mut writer).await?;
     refuse_newer_schema(&mut writer).await?;
     migrate(&mut writer).await?;
+    end_leases(&mut writer).await?;
     let options = SqliteConnectOptions::new().filename(&file).read_only(true).busy_timeout(BUSY_TIMEOUT);
     let readers = SqlitePoolOptions::new()
         .max_connections(READERS)
@@ -99,6 +101,17 @@ async fn migrate(connection: &mut SqliteConnection) -> Result<(), StoreError> {
         MigrateError::Execute(error) | MigrateError::ExecuteMigration(error, _) => opening(error),
         error => StoreError::Migration { source: Arc::new(error) },
     })
+}
+
+/// The lock shows that whoever held a lease has ended or was fenced off with its store: its jobs may be claimed at once.
+async fn end_leases(connection: &mut SqliteConnection) -> Result<(), StoreError> {
+    sqlx::query("UPDATE jobs SET lease_until_ms = ? WHERE state = ?")
+        .bind(i64::MIN)
+        .bind(JobState::Running.as_str())
+        .execute(connection)
+        .await
+        .map(|_| ())
+        .map_err(opening)
 }
 
 fn opening(error: sqlx::Error) -> StoreError {

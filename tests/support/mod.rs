@@ -2,13 +2,17 @@
 #![allow(dead_code)]
 
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use ballast::control::backward::{Training, Watch};
 use ballast::http::{self, Running};
 use ballast::service::config::Config;
 use ballast::service::shutdown::Shutdown;
 use reqwest::{Client, Method, Response, StatusCode};
 use serde_json::{Value, json};
+use sqlx::Connection;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use tempfile::TempDir;
 
 /// Nothing that is waited for takes longer.
@@ -35,6 +39,35 @@ pub fn specification(horizon: usize) -> Value {
     })
 }
 
+/// The policy of a specification, trained here and now, as its portable document.
+pub fn trained(specification: &Value) -> Vec<u8> {
+    let specification = serde_json::from_value(specification.clone()).expect("a specification");
+    let stop = AtomicBool::new(false);
+    let training = Training::new(&specification).expect("a training");
+    training.run(&Watch { stop: &stop, progress: &|_| {} }).expect("a policy").to_json()
+}
+
+async fn connection(folder: &Path) -> SqliteConnection {
+    let options = SqliteConnectOptions::new().filename(folder.join("ballast.sqlite"));
+    SqliteConnection::connect_with(&options).await.expect("the database")
+}
+
+/// Runs a statement behind the service's back.
+pub async fn execute(folder: &Path, statement: &'static str) {
+    let mut connection = connection(folder).await;
+    sqlx::query(statement).execute(&mut connection).await.expect(statement);
+    connection.close().await.expect("closed");
+}
+
+/// Keeps the service from writing for so long.
+pub async fn lock_out(folder: &Path, time: Duration) {
+    let mut connection = connection(folder).await;
+    sqlx::query("BEGIN IMMEDIATE").execute(&mut connection).await.expect("a lock");
+    tokio::time::sleep(time).await;
+    sqlx::query("ROLLBACK").execute(&mut connection).await.expect("the lock given up");
+    connection.close().await.expect("closed");
+}
+
 async fn start(folder: &Path) -> Running {
     let config = Config { listen: ([127, 0, 0, 1], 0).into(), body_limit_bytes: 1 << 20, ..Config::new(folder) };
     http::serve(config, Shutdown::new()).await.expect("the service starts")
@@ -45,14 +78,17 @@ impl App {
         let folder = tempfile::tempdir().expect("a folder");
         let running = start(folder.path()).await;
         let url = format!("http://{}", running.address);
-        App {
-            client: Client::new(),
-            url,
-            session: String::new(),
-            policy: String::new(),
-            folder,
-            running: Some(running),
-        }
+        App { running: Some(running), ..App::at(url, folder) }
+    }
+
+    /// A client of a service that somebody else runs over `folder`.
+    pub fn at(url: String, folder: TempDir) -> App {
+        let (session, policy) = (String::new(), String::new());
+        App { client: Client::new(), url, session, policy, folder, running: None }
+    }
+
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
     }
 
     /// Stops the service as SIGTERM does and starts another on the same folder.
@@ -65,12 +101,14 @@ impl App {
     }
 
     pub async fn send(&self, method: Method, path: &str, body: Option<&Value>) -> (StatusCode, Value) {
-        let request = self.client.request(method, format!("{}{path}", self.url));
+        let request = self.client.request(method.clone(), format!("{}{path}", self.url));
         let request = match body {
             Some(body) => request.json(body),
             None => request,
         };
-        read(request.send().await.expect("an answer")).await
+        let (status, answer) = read(request.send().await.expect("an answer")).await;
+        assert_described(&method, path, status);
+        (status, answer)
     }
 
     pub async fn get(&self, path: &str) -> (StatusCode, Value) {
@@ -95,8 +133,12 @@ impl App {
     /// Waits until the job satisfies `reached`.
     pub async fn until(&self, job: &str, reached: impl Fn(&Value) -> bool) -> Value {
         let deadline = Instant::now() + PATIENCE;
+        let mut steps_done = 0;
         loop {
             let (_, now) = self.get(&format!("/jobs/{job}")).await;
+            let steps = now["progress"]["steps_done"].as_u64().expect("a count");
+            assert!(steps >= steps_done, "from {steps_done} steps done back to {now}");
+            steps_done = steps;
             if reached(&now) {
                 return now;
             }
@@ -115,13 +157,31 @@ impl App {
 
     /// Opens a session of the policy and remembers it.
     pub async fn open(&mut self) {
-        let (status, session) = self.post("/sessions", &json!({ "policy": self.policy })).await;
+        self.open_with(json!({})).await;
+    }
+
+    /// Opens a session of the policy with `history` or `wealth` of its own.
+    pub async fn open_with(&mut self, mut request: Value) {
+        request["policy"] = json!(self.policy);
+        let (status, session) = self.post("/sessions", &request).await;
         assert_eq!(status, 201, "{session}");
         self.session = session["session"].as_str().expect("a session").to_owned();
     }
 
     pub async fn observe(&self, period: usize, log_return: f64) -> (StatusCode, Value) {
-        self.post("/observe", &json!({ "session": self.session, "period": period, "log_return": log_return })).await
+        self.report(period, json!({ "log_return": log_return })).await
+    }
+
+    /// Observes what `report` says of the period.
+    pub async fn report(&self, period: usize, mut report: Value) -> (StatusCode, Value) {
+        (report["session"], report["period"]) = (json!(self.session), json!(period));
+        self.post("/observe", &report).await
+    }
+
+    /// The exported policy, as bytes.
+    pub async fn export(&self) -> Vec<u8> {
+        let answer = self.client.get(format!("{}/policies/{}/export", self.url, self.policy)).send().await;
+        answer.expect("an answer").bytes().await.expect("a document").to_vec()
     }
 
     pub async fn action(&self) -> (StatusCode, Value) {
@@ -129,12 +189,35 @@ impl App {
     }
 }
 
+/// Every answer carries what the house promises: a client's error names field, value and rule.
 pub async fn read(response: Response) -> (StatusCode, Value) {
     let status = response.status();
     let media = response.headers().get("content-type").map(|media| media.to_str().expect("text").to_owned());
+    let text = response.text().await.expect("a body");
+    let answer = serde_json::from_str(&text).unwrap_or(Value::String(text));
     if status.is_client_error() || status.is_server_error() {
         assert_eq!(media.as_deref(), Some("application/problem+json"), "{status}");
     }
-    let text = response.text().await.expect("a body");
-    (status, serde_json::from_str(&text).unwrap_or(Value::String(text)))
+    if status.is_client_error() {
+        assert!(answer["field"].is_string() && answer["rule"].is_string(), "{answer}");
+        assert!(answer.get("value").is_some(), "{answer}");
+    }
+    (status, answer)
+}
+
+/// The status is one that `api/openapi.json` lists for the operation.
+fn assert_described(method: &Method, path: &str, status: StatusCode) {
+    let description: Value = serde_json::from_str(include_str!("../../api/openapi.json")).expect("JSON");
+    let parts = |path: &str| path.split('?').next().unwrap_or("").split('/').map(str::to_owned).collect::<Vec<_>>();
+    let asked = parts(path);
+    let fits = |template: &str| {
+        let template = parts(template);
+        template.len() == asked.len() && template.iter().zip(&asked).all(|(t, a)| t == a || t.starts_with('{'))
+    };
+    let paths = description["paths"].as_object().expect("paths");
+    let mut operations = paths.iter().filter(|(template, _)| fits(template)).map(|(_, operations)| operations);
+    let operation = operations.find_map(|operations| operations.get(method.as_str().to_lowercase()));
+    if let Some(operation) = operation {
+        assert!(operation["responses"].get(status.as_str()).is_some(), "{method} {path} does not describe {status}");
+    }
 }
