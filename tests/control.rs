@@ -4,6 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use ballast::control::advisor::{AdviceMode, Advisor};
 use ballast::control::backward::{Training, Watch};
+use ballast::control::error::TrainError;
 use ballast::control::policy::Policy;
 use ballast::control::specification::Specification;
 use ballast::control::state::State;
@@ -214,4 +215,11 @@ fn values_stay_above_the_floor_and_actions_in_the_interval_everywhere() {
             }
         }
     }
+}
+
+#[test]
+fn a_training_asked_to_stop_simulates_no_design() {
+    let specification = specification(json!({"problem": {"history": [0.01, -0.02, 0.03]}}));
+    let stopped = Training::prepare(&specification, &AtomicBool::new(true));
+    assert!(matches!(stopped, Err(TrainError::Stopped)));
 }

@@ -94,6 +94,55 @@ async fn a_training_survives_a_restart() {
     assert!(after["progress"]["steps_done"].as_u64() >= before["progress"]["steps_done"].as_u64(), "{after}");
     let done = app.until(&job, |job| job["finished_ms"].is_i64()).await;
     assert_eq!(done["state"], "succeeded", "{done}");
+    app.policy = done["policy"].as_str().unwrap().to_owned();
+    assert!(app.export().await == support::trained(&specification(6)), "resumed and uninterrupted policies differ");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_checkpoint_that_cannot_be_saved_fails_the_job_at_once() {
+    let app = App::start().await;
+    support::execute(
+        app.folder(),
+        "CREATE TRIGGER refuse BEFORE INSERT ON checkpoints BEGIN SELECT RAISE(ABORT, 'no'); END",
+    )
+    .await;
+    let job = app.queue(&specification(3)).await;
+    let failed = app.until(&job, |job| job["finished_ms"].is_i64()).await;
+    assert_eq!(failed["state"], "failed", "{failed}");
+    assert!(failed["error"].as_str().unwrap().contains("saving a checkpoint"), "{failed}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_job_whose_store_is_busy_is_tried_again() {
+    let app = App::start().await;
+    let job = app.queue(&specification(60)).await;
+    app.until(&job, |job| job["progress"]["steps_done"].as_u64() >= Some(1)).await;
+    // The service's writer gives up after five seconds.
+    support::lock_out(app.folder(), Duration::from_secs(7)).await;
+    let done = app.until(&job, |job| job["finished_ms"].is_i64()).await;
+    assert_eq!(done["state"], "succeeded", "{done}");
+    assert!(support::attempts(app.folder()).await > 1, "it was never given back");
+}
+
+/// Large enough that the fit, and the simulation of the design, take longer than a cancel may.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_cancel_does_not_wait_for_a_long_fit_or_a_large_design() {
+    let app = App::start().await;
+    let mut fitting = specification(1);
+    fitting["design"] = json!({ "count": 1500, "initial_laws": "resampled" });
+    let history: Vec<f64> = (0..2000).map(|k| 0.05 * f64::from(k).sin()).collect();
+    let mut simulating = specification(30);
+    simulating["problem"]["history"] = json!(history);
+    simulating["design"] = json!({ "count": 10_000, "initial_laws": "resampled" });
+    for (specification, phase) in [(simulating, ""), (fitting, "fitting")] {
+        let job = app.queue(&specification).await;
+        app.until(&job, |job| job["state"] == "running" && (phase.is_empty() || job["progress"]["phase"] == phase))
+            .await;
+        let asked = Instant::now();
+        assert_eq!(app.delete(&format!("/jobs/{job}")).await, 202);
+        app.until(&job, |job| job["state"] == "cancelled").await;
+        assert!(asked.elapsed() < Duration::from_secs(1), "{phase} {:?}", asked.elapsed());
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

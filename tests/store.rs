@@ -263,6 +263,17 @@ async fn a_job_asked_to_stop_is_not_claimed_again() {
 }
 
 #[tokio::test]
+async fn opening_the_folder_ends_the_leases_of_the_dead() {
+    let (dir, store) = fresh().await;
+    queued(&store, "j").await;
+    let (_, dead) = claimed(&store, 0).await;
+    assert_eq!(store.claim_job("worker", 30, 1).await.unwrap(), None);
+    let store = reopened(&dir, store).await;
+    assert_eq!(claimed(&store, 1).await, ("j".into(), dead + 1));
+    assert!(!store.save_checkpoint("j", dead, 9, b"late").await.unwrap());
+}
+
+#[tokio::test]
 async fn a_released_job_resumes_from_its_checkpoints() {
     let (dir, store) = fresh().await;
     queued(&store, "j").await;

@@ -6,7 +6,7 @@
 //! 2. What is read is what was written, bit for bit: policies, sessions and observations carry a SHA-256 that every read
 //!    checks, so a damaged row is [`StoreError::Corrupt`], never an action.
 //! 3. A worker whose lease ran out changes nothing: every write of a job names the `attempt` it was claimed under.
-//! 4. One process per folder, one writer per process.
+//! 4. One process per folder, one writer per process; so opening the folder ends the leases that a dead process left.
 //!
 //! Conflicts, repeats and gaps are outcomes, not errors. The store reads no clock: time enters as milliseconds since the
 //! epoch. Identifiers are opaque and made by the caller.
@@ -53,7 +53,8 @@ pub struct Store {
 }
 
 impl Store {
-    /// Opens `dir/ballast.sqlite`, creating folder and file, and brings its schema up to date.
+    /// Opens `dir/ballast.sqlite`, creating folder and file, brings its schema up to date and lets every running job be
+    /// claimed at once: who ran it no longer can.
     ///
     /// # Errors
     /// [`StoreError::Locked`] where another process holds the folder, [`StoreError::NewerSchema`] where a later release

@@ -103,7 +103,7 @@ async fn migrate(connection: &mut SqliteConnection) -> Result<(), StoreError> {
     })
 }
 
-/// The lock shows that whoever held a lease has ended or was fenced off with its store: its jobs may be claimed at once.
+/// The lock shows that whoever held a lease can no longer write: its jobs may be claimed at once.
 async fn end_leases(connection: &mut SqliteConnection) -> Result<(), StoreError> {
     sqlx::query("UPDATE jobs SET lease_until_ms = ? WHERE state = ?")
         .bind(i64::MIN)

@@ -59,6 +59,12 @@ pub async fn execute(folder: &Path, statement: &'static str) {
     connection.close().await.expect("closed");
 }
 
+/// How often the one job of the folder was claimed.
+pub async fn attempts(folder: &Path) -> i64 {
+    let mut connection = connection(folder).await;
+    sqlx::query_scalar("SELECT attempt FROM jobs").fetch_one(&mut connection).await.expect("one job")
+}
+
 /// Keeps the service from writing for so long.
 pub async fn lock_out(folder: &Path, time: Duration) {
     let mut connection = connection(folder).await;
@@ -68,15 +74,25 @@ pub async fn lock_out(folder: &Path, time: Duration) {
     connection.close().await.expect("closed");
 }
 
-async fn start(folder: &Path) -> Running {
-    let config = Config { listen: ([127, 0, 0, 1], 0).into(), body_limit_bytes: 1 << 20, ..Config::new(folder) };
+fn config(folder: &Path) -> Config {
+    Config { listen: ([127, 0, 0, 1], 0).into(), body_limit_bytes: 1 << 20, ..Config::new(folder) }
+}
+
+async fn start(config: Config) -> Running {
     http::serve(config, Shutdown::new()).await.expect("the service starts")
 }
 
 impl App {
     pub async fn start() -> App {
+        App::configured(|_| {}).await
+    }
+
+    /// Starts with a configuration changed by `change`; a restart does not keep the change.
+    pub async fn configured(change: impl FnOnce(&mut Config)) -> App {
         let folder = tempfile::tempdir().expect("a folder");
-        let running = start(folder.path()).await;
+        let mut config = config(folder.path());
+        change(&mut config);
+        let running = start(config).await;
         let url = format!("http://{}", running.address);
         App { running: Some(running), ..App::at(url, folder) }
     }
@@ -95,7 +111,7 @@ impl App {
     pub async fn restart(&mut self) {
         self.client = Client::new();
         self.running.take().expect("running").stop().await;
-        let running = start(self.folder.path()).await;
+        let running = start(config(self.folder.path())).await;
         self.url = format!("http://{}", running.address);
         self.running = Some(running);
     }

@@ -1,0 +1,201 @@
+//! Live sessions: equal to the simulator bit for bit, and what they refuse.
+
+mod support;
+
+use std::time::Duration;
+
+use ballast::control::advisor::Advisor;
+use ballast::control::policy::Policy;
+use serde_json::{Value, json};
+use support::{App, specification};
+
+const HORIZON: usize = 4;
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
+}
+
+async fn advisor(app: &App) -> Advisor {
+    Advisor::new(Policy::from_json(&app.export().await).unwrap()).unwrap()
+}
+
+async fn trained(specification: &Value) -> App {
+    let mut app = App::start().await;
+    app.train(specification).await;
+    app
+}
+
+#[track_caller]
+fn assert_refused(answer: &(reqwest::StatusCode, Value), status: u16, field: &str, value: impl Into<Value>) {
+    let (found, problem) = answer;
+    assert_eq!(found.as_u16(), status, "{problem}");
+    assert_eq!((&problem["field"], &problem["value"]), (&json!(field), &value.into()), "{problem}");
+}
+
+/// Every allocation, wealth and radius of a session as the simulator has them on the returns the service understood.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_live_session_equals_the_simulator_bit_for_bit() {
+    let mut request = specification(HORIZON);
+    // A radius small enough that the robust allocation is not always zero.
+    request["problem"]["radius"]["scale"] = json!(0.1);
+    let mut app = trained(&request).await;
+    let advisor = advisor(&app).await;
+    let own: Vec<f64> = (0..12).map(|k| 0.03 * f64::from(k).sin() + 0.01).collect();
+    let mut held = 0;
+    for (start, history, wealth) in
+        [(json!({}), None, None), (json!({ "history": own, "wealth": 250.0 }), Some(own.as_slice()), Some(250.0))]
+    {
+        app.open_with(start).await;
+        let start = advisor.initial_state(history, wealth).unwrap();
+        let reports = [
+            json!({ "log_return": 0.0123456789 }),
+            json!({ "simple_return": -0.0317 }),
+            json!({ "price": 101.3, "previous_price": 99.7 }),
+            json!({ "price": 100.1 }),
+        ];
+        assert_eq!(reports.len(), HORIZON);
+        let mut returns = Vec::new();
+        for (index, report) in reports.into_iter().enumerate() {
+            let (_, action) = app.action().await;
+            let (status, observed) = app.report(index + 1, report).await;
+            assert_eq!(status, 200, "{observed}");
+            returns.push(number(&observed["log_return"]));
+            let (advices, state) = advisor.simulate(start.clone(), &returns);
+            let (advice, uncertainty) = (&advices[index], advisor.uncertainty(&state));
+            assert_eq!(number(&action["allocation"]), advice.allocation);
+            assert_eq!(number(&action["certainty_equivalent"]), advice.certainty_equivalent);
+            assert_eq!(number(&action["floor"]), advice.floor);
+            assert_eq!(number(&action["radius"]), advice.radius);
+            assert_eq!(action["source"], json!(advice.source));
+            assert_eq!(number(&observed["executed_allocation"]), advice.allocation);
+            assert_eq!(number(&observed["wealth"]), state.wealth);
+            assert_eq!(number(&observed["radius"]), uncertainty.radius);
+            assert_eq!(number(&observed["quantile"]), uncertainty.quantile.unwrap());
+            assert_eq!(observed["moments"], json!(uncertainty.moments));
+            held += usize::from(advice.allocation > 0.0);
+        }
+        assert_eq!(returns[1], (-0.0317_f64).ln_1p());
+        assert_eq!(returns[2..], [(101.3_f64 / 99.7).ln(), (100.1_f64 / 101.3).ln()]);
+    }
+    assert!(held > 0, "no period held the risky asset: the test shows nothing");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_was_executed_and_what_was_reached_are_taken_as_stated() {
+    let mut app = trained(&specification(3)).await;
+    app.open().await;
+    let (rate, wealth, allocation, log_return) = (0.002, 100.0, 0.37, 0.0213_f64);
+    let (_, first) = app.report(1, json!({ "log_return": log_return, "executed_allocation": allocation })).await;
+    let expected = wealth * ((1.0 - allocation) * (1.0 + rate) + allocation * log_return.exp());
+    assert_eq!((number(&first["wealth"]), number(&first["executed_allocation"])), (expected, allocation));
+    let (_, second) = app.report(2, json!({ "log_return": 0.01, "wealth": 77.5 })).await;
+    assert_eq!(number(&second["wealth"]), 77.5);
+    app.restart().await;
+    let (_, action) = app.action().await;
+    let advisor = advisor(&app).await;
+    let mut state = advisor.initial_state(None, None).unwrap();
+    state = advisor.advance(&state, allocation, log_return);
+    state = advisor.advance(&state, number(&second["executed_allocation"]), 0.01);
+    state.wealth = 77.5;
+    let advice = advisor.advise(2, &state, ballast::control::advisor::AdviceMode::Surrogate);
+    assert_eq!(number(&action["allocation"]), advice.allocation);
+    assert_eq!(number(&action["certainty_equivalent"]), advice.certainty_equivalent);
+    let (_, third) = app.report(3, json!({ "log_return": 0.01, "executed_allocation": 1.0 })).await;
+    assert_eq!(number(&third["wealth"]), 77.5 * (0.0 * (1.0 + rate) + 1.0 * 0.01_f64.exp()));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_period_has_one_content_and_the_horizon_is_the_end() {
+    let mut app = trained(&specification(2)).await;
+    assert_refused(&app.get("/action?session=nobody").await, 404, "session", "nobody");
+    app.open().await;
+    let report = json!({ "log_return": 0.01, "executed_allocation": 0.5 });
+    let first = app.report(1, report.clone()).await;
+    assert_eq!(first.0, 200);
+    for other in [
+        json!({ "log_return": 0.01 }),
+        json!({ "log_return": 0.01, "executed_allocation": 0.4 }),
+        json!({ "log_return": 0.01, "executed_allocation": 0.5, "wealth": 100.0 }),
+        json!({ "simple_return": 0.01, "executed_allocation": 0.5 }),
+    ] {
+        let answer = app.report(1, other).await;
+        assert_refused(&answer, 409, "period", 1);
+        assert_eq!(answer.1["type"], "/problems/period-conflict");
+    }
+    assert_eq!(app.report(1, report).await, first);
+    assert_refused(&app.observe(3, 0.01).await, 409, "period", 3);
+    assert_eq!(app.observe(2, 0.01).await.1["completed"], true);
+    let past = app.observe(3, 0.01).await;
+    assert_refused(&past, 409, "period", 3);
+    assert_eq!(
+        (&past.1["type"], &past.1["rule"]),
+        (&json!("/problems/session-completed"), &json!("must be at most 2"))
+    );
+    assert_refused(&app.action().await, 409, "session", app.session.as_str());
+    assert_refused(
+        &app.send(reqwest::Method::DELETE, &format!("/policies/{}", app.policy), None).await,
+        409,
+        "policy",
+        app.policy.as_str(),
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_price_needs_the_price_before() {
+    let mut app = trained(&specification(4)).await;
+    app.open().await;
+    assert_refused(&app.report(1, json!({ "price": 101.0 })).await, 422, "previous_price", Value::Null);
+    let (_, first) = app.report(1, json!({ "price": 101.0, "previous_price": 100.0 })).await;
+    assert_eq!(number(&first["log_return"]), (101.0_f64 / 100.0).ln());
+    app.restart().await;
+    let (_, second) = app.report(2, json!({ "price": 99.0 })).await;
+    assert_eq!(number(&second["log_return"]), (99.0_f64 / 101.0).ln());
+    assert_eq!(app.observe(3, 0.01).await.0, 200);
+    assert_refused(&app.report(4, json!({ "price": 101.0 })).await, 422, "previous_price", Value::Null);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_static_policy_is_bound_to_its_history() {
+    let mut request = specification(2);
+    request["problem"]["framework"] = json!("static");
+    let mut app = trained(&request).await;
+    let foreign = json!({ "policy": app.policy, "history": [0.01, -0.02, 0.03] });
+    assert_refused(&app.post("/sessions", &foreign).await, 422, "history", "3 values");
+    app.open_with(json!({ "history": request["problem"]["history"], "wealth": 120.0 })).await;
+    let (_, session) = app.get(&format!("/sessions/{}", app.session)).await;
+    assert_eq!((&session["wealth"], &session["sample_size"]), (&json!(120.0), &json!(10)));
+    let radius = app.action().await.1["radius"].clone();
+    let (_, observed) = app.observe(1, 0.2).await;
+    assert_eq!((&observed["radius"], &observed["sample_size"]), (&radius, &json!(11)));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_keeps_its_own_history_and_wealth() {
+    let mut app = trained(&specification(2)).await;
+    app.open_with(json!({ "history": [0.01, -0.02, 0.03], "wealth": 7.0 })).await;
+    app.restart().await;
+    let (_, session) = app.get(&format!("/sessions/{}", app.session)).await;
+    assert_eq!((&session["wealth"], &session["sample_size"], &session["period"]), (&json!(7.0), &json!(3), &json!(1)));
+    let (_, history) = app.get(&format!("/sessions/{}/history", app.session)).await;
+    assert_eq!(history["history"], json!([0.01, -0.02, 0.03]));
+    let (_, action) = app.action().await;
+    assert_eq!((&action["source"], &action["sample_size"]), (&json!("resolved_outside_design"), &json!(3)));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_burst_of_resolves_is_told_to_come_back_and_starves_nobody() {
+    let mut app = App::configured(|config| {
+        (config.resolve_limit, config.turn_wait) = (0, Duration::from_millis(50));
+    })
+    .await;
+    app.train(&specification(2)).await;
+    app.open().await;
+    for question in ["mode=resolve", "explain=worst_case"] {
+        let request = app.client.get(format!("{}/action?session={}&{question}", app.url, app.session));
+        let answer = request.send().await.unwrap();
+        assert_eq!((answer.status().as_u16(), answer.headers()["retry-after"].to_str().unwrap()), (503, "1"));
+        assert_eq!(support::read(answer).await.1["type"], "/problems/overloaded");
+    }
+    assert_eq!(app.action().await.0, 200);
+    assert_eq!(app.observe(1, 0.01).await.0, 200);
+}
