@@ -99,6 +99,18 @@ async fn a_training_survives_a_restart() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn checkpoints_that_do_not_reach_back_from_the_horizon_are_solved_again() {
+    let mut app = App::start().await;
+    let job = app.queue(&specification(40)).await;
+    app.until(&job, |job| job["progress"]["steps_done"].as_u64() >= Some(2)).await;
+    app.restart_after("DELETE FROM checkpoints WHERE step = 39").await;
+    let done = app.until(&job, |job| job["finished_ms"].is_i64()).await;
+    assert_eq!((&done["state"], &done["progress"]["steps_done"]), (&json!("succeeded"), &json!(40)), "{done}");
+    app.policy = done["policy"].as_str().unwrap().to_owned();
+    assert!(app.export().await == support::trained(&specification(40)), "the policies differ");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_checkpoint_that_cannot_be_saved_fails_the_job_at_once() {
     let app = App::start().await;
     support::execute(

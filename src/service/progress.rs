@@ -62,6 +62,14 @@ impl ProgressBoard {
         stop
     }
 
+    /// Records how many steps need not be solved again, where that differs from what was stored.
+    pub fn resume(&self, job: &str, steps_done: usize) {
+        if let Some(running) = self.lock().get_mut(job) {
+            running.steps_at_start = steps_done;
+            running.progress.steps_done = steps_done;
+        }
+    }
+
     /// Records progress inside a step.
     pub fn advance(&self, job: &str, current: StepProgress) {
         let mut wake = false;

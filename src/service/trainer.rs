@@ -181,6 +181,7 @@ impl Worker {
         };
         let checkpoints = self.runtime.block_on(self.store.checkpoints(job))?;
         let mut steps = resumed(training.horizon(), &checkpoints);
+        self.board.resume(job, steps.len());
         for step in (0..training.horizon() - steps.len()).rev() {
             let watch = Watch { stop, progress: &|progress| self.board.advance(job, progress) };
             let started = Instant::now();

@@ -109,8 +109,14 @@ impl App {
 
     /// Stops the service as SIGTERM does and starts another on the same folder.
     pub async fn restart(&mut self) {
+        self.restart_after("SELECT 1").await;
+    }
+
+    /// As [`Self::restart`], with a statement run on the database in between.
+    pub async fn restart_after(&mut self, statement: &'static str) {
         self.client = Client::new();
         self.running.take().expect("running").stop().await;
+        execute(self.folder.path(), statement).await;
         let running = start(config(self.folder.path())).await;
         self.url = format!("http://{}", running.address);
         self.running = Some(running);
