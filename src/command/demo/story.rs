@@ -31,11 +31,15 @@ pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
     let policy = train(api, &past, HORIZON, count).await?;
     let session = open_session(api, &policy).await?;
     println!("Policy {policy:.12} is trained; session {session} starts with wealth {INITIAL_WEALTH}.");
-    let first = advice(api, &session, false).await?;
+    let first = advice(api, &session, true).await?;
     tell_why(&past, &first);
+    tell_worst_case("this", &first);
     compare_januaries(api, &market, count).await?;
     let last = live_through(api, &session, &past, market.year(YEAR)).await?;
-    tell_worst_case(&last);
+    if let Some(last) = last {
+        println!();
+        tell_worst_case("December's", &last);
+    }
     Ok(())
 }
 
@@ -142,14 +146,11 @@ async fn live_through(
     Ok(last)
 }
 
-fn tell_worst_case(last: &Option<Advice>) {
-    let Some(worst_case) = last.as_ref().and_then(|advice| advice.worst_case.as_ref()) else { return };
-    println!("\nThe worst law for December's advice: {}", worst_case.sentence);
-    let moves = largest_moves(&worst_case.transport);
-    if moves.is_empty() {
-        println!("No return is moved: with nothing in stocks no law can hurt.");
-    }
-    for Move { atom, moved_to, mass } in moves {
+/// The worst law behind an advice, in words, and its largest moves.
+fn tell_worst_case(whose: &str, advice: &Advice) {
+    let Some(worst_case) = &advice.worst_case else { return };
+    println!("The worst law for {whose} advice: {}", worst_case.sentence);
+    for Move { atom, moved_to, mass } in largest_moves(&worst_case.transport) {
         println!(
             "  a month of {:+.2} % turns into one of {:+.2} %, with probability {:.2} %",
             100.0 * atom.exp_m1(),
