@@ -26,6 +26,10 @@ const TAIL_RATIO: f64 = 1.3;
 /// First reach of the window below and above the atoms; doubled until certified, at most this often.
 const REACH: (f64, f64) = (1.5, 0.75);
 const WINDOW_GROWTHS: usize = 4;
+/// Log-returns closer than this are one.
+const COINCIDENT: f64 = 1e-12;
+/// Relative utility that sums of a few hundred roundings may lose.
+const LOSS_OF_ROUNDING: f64 = 1e-14;
 /// Parts into which each interval between exact returns is cut for the support, and again around destinations.
 const SUPPORT_PARTS: usize = 4;
 const REFINED_PARTS: usize = 8;
@@ -108,7 +112,7 @@ impl RobustStep<'_> {
 
     fn solution(&self, grid: Grid, rows: &FieldRows, action: f64) -> RobustSolution {
         let payoff = self.payoff(&grid.support, rows, action);
-        let worst = self.ball(&grid).worst_law(&payoff);
+        let worst = self.worst_law(&grid, &payoff);
         let gain = self.utility.inverse(worst.expectation);
         RobustSolution {
             action,
@@ -120,6 +124,14 @@ impl RobustStep<'_> {
             worst,
             support: grid.support,
         }
+    }
+
+    /// The worst law; the centre itself where no law takes more than rounding, so that nobody is told of moves that
+    /// rounding made.
+    fn worst_law(&self, grid: &Grid, payoff: &[f64]) -> WorstLaw {
+        let worst = self.ball(grid).worst_law(payoff);
+        let centre = WassersteinBall { radius: 0.0, ..self.ball(grid) }.worst_law(payoff);
+        if centre.expectation - worst.expectation > LOSS_OF_ROUNDING { worst } else { centre }
     }
 
     fn ball<'g>(&self, grid: &'g Grid) -> WassersteinBall<'g> {
@@ -236,18 +248,19 @@ impl RobustStep<'_> {
         returns
     }
 
-    /// Merges the atoms into `points`. Without a radius the atoms alone are the support.
+    /// Merges the atoms into `points`, which give way where they all but coincide with an atom: mass that moves by a
+    /// rounding would count as moved. Without a radius the atoms alone are the support.
     fn grid(&self, points: Vec<f64>) -> Grid {
         if self.radius <= 0.0 {
             return Grid { support: self.atoms.to_vec(), masses: self.masses.to_vec() };
         }
         let mut all: Vec<(f64, f64)> = self.atoms.iter().copied().zip(self.masses.iter().copied()).collect();
-        all.extend(
-            points
-                .into_iter()
-                .filter(|point| self.atoms.binary_search_by(|a| a.total_cmp(point)).is_err())
-                .map(|p| (p, 0.0)),
-        );
+        let apart = |point: &f64| {
+            let above = self.atoms.partition_point(|atom| atom < point);
+            let mut near = self.atoms.iter().take(above + 1).skip(above.saturating_sub(1));
+            near.all(|atom| (atom - point).abs() > COINCIDENT)
+        };
+        all.extend(points.into_iter().filter(apart).map(|point| (point, 0.0)));
         all.sort_by(|left, right| left.0.total_cmp(&right.0));
         all.dedup_by(|next, kept| next.0 == kept.0);
         let (support, masses) = all.into_iter().unzip();
