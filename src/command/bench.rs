@@ -4,6 +4,7 @@ use std::error::Error;
 
 use clap::Subcommand;
 
+mod accuracy;
 mod action;
 mod paper;
 mod summary;
@@ -13,6 +14,8 @@ mod training;
 pub enum Bench {
     /// Time a whole training of the paper's configuration, phase by phase.
     Training(training::TrainingBench),
+    /// Compare the surrogates with direct solves at fresh states, in basis points of log certainty equivalent.
+    Accuracy(accuracy::AccuracyBench),
     /// Time GET /action on loopback beside GET /livez.
     Action(action::ActionBench),
 }
@@ -20,6 +23,7 @@ pub enum Bench {
 pub async fn run(bench: Bench) -> Result<(), Box<dyn Error>> {
     match bench {
         Bench::Training(arguments) => tokio::task::block_in_place(|| training::run(&arguments)),
+        Bench::Accuracy(arguments) => tokio::task::block_in_place(|| accuracy::run(&arguments)),
         Bench::Action(arguments) => action::run(&arguments).await,
     }
 }

@@ -54,7 +54,7 @@ pub struct RobustSolution {
     pub action: f64,
     /// The action, moved past a bound by the one-sided derivative there over a reference curvature.
     pub extended_action: f64,
-    /// Log certainty equivalent over the all-bank floor, at least 0.
+    /// Log certainty equivalent over the all-bank floor.
     pub floor_gain: f64,
     /// Primal minus dual value, in log certainty equivalent.
     pub duality_gap: f64,
@@ -73,12 +73,13 @@ struct Grid {
 }
 
 impl RobustStep<'_> {
-    /// Solves the step at `state`. Windows grow until certified; then the support is refined around the
-    /// destinations of the worst law and the action polished.
-    pub fn solve(&self, state: &State) -> RobustSolution {
+    /// Solves the step at `state` over the actions in `[lowest, highest]`: a single action is priced where they are
+    /// equal. Windows grow until certified; then the support is refined around the destinations of the worst law and
+    /// the action polished.
+    pub fn solve(&self, state: &State, actions: (f64, f64)) -> RobustSolution {
         let (mut reach, mut solved) = (REACH, None);
         for growth in 0..=WINDOW_GROWTHS {
-            let found = self.solve_in_window(state, reach);
+            let found = self.solve_in_window(state, reach, actions);
             let done = found.certified || self.support.is_some() || self.radius <= 0.0 || growth == WINDOW_GROWTHS;
             solved = Some(found);
             if done {
@@ -86,18 +87,17 @@ impl RobustStep<'_> {
             }
             reach = (2.0 * reach.0, 2.0 * reach.1);
         }
-        solved.unwrap_or_else(|| self.solve_in_window(state, reach))
+        solved.unwrap_or_else(|| self.solve_in_window(state, reach, actions))
     }
 
-    fn solve_in_window(&self, state: &State, reach: (f64, f64)) -> RobustSolution {
+    fn solve_in_window(&self, state: &State, reach: (f64, f64), (lowest, highest): (f64, f64)) -> RobustSolution {
         let returns = self.exact_returns(reach);
         let field = GainField::tabulate(self.field, state, returns.clone());
         let mut grid = self.grid(subdivided(&returns, SUPPORT_PARTS, |_| true));
-        let highest = self.field.highest_action;
         let mut rows = field.at(&grid.support);
-        let (coarse, _) = self.best_action(&grid, &rows, 0.0, highest);
-        let part = highest / COARSE_ACTIONS as f64;
-        let (low, high) = ((coarse - part).max(0.0), (coarse + part).min(highest));
+        let (coarse, _) = self.best_action(&grid, &rows, lowest, highest);
+        let part = (highest - lowest) / COARSE_ACTIONS as f64;
+        let (low, high) = ((coarse - part).max(lowest), (coarse + part).min(highest));
         let mut action = maximise_concave_scalar(|a| self.robust_value(&grid, &rows, a), low, high, ACTION_TOLERANCE).0;
         let rounds = if self.radius > 0.0 && action > 0.0 { REFINEMENTS } else { 0 };
         for _ in 0..rounds {
@@ -117,7 +117,7 @@ impl RobustStep<'_> {
         RobustSolution {
             action,
             extended_action: self.extended(&grid, rows, action, gain),
-            floor_gain: gain.max(0.0),
+            floor_gain: gain,
             duality_gap: gain - self.utility.inverse(worst.dual),
             multiplier: worst.multiplier,
             certified: self.certified(&grid, &payoff, &worst, action),

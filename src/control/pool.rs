@@ -1,5 +1,6 @@
 //! The threads that trainings run on.
 
+use rayon::prelude::*;
 use thiserror::Error;
 
 /// A pool of threads; work installed on it is spread over them.
@@ -27,5 +28,10 @@ impl TrainingPool {
     /// Runs `work` on the pool and waits for it.
     pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
         self.0.install(work)
+    }
+
+    /// `work` done on every item, in their order, on the pool this is called from.
+    pub fn map<T: Send, R: Send>(items: Vec<T>, work: impl Fn(T) -> R + Sync + Send) -> Vec<R> {
+        items.into_par_iter().map(work).collect()
     }
 }

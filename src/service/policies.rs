@@ -39,7 +39,7 @@ impl Policies {
             return Ok(advisor.clone());
         }
         let row = self.get(policy).await?;
-        let prepared = tokio::task::spawn_blocking(move || Advisor::new(Policy::from_json(&row.json)?));
+        let prepared = tokio::task::spawn_blocking(move || Policy::from_json(&row.json).map(Advisor::new));
         let advisor = Arc::new(prepared.await.map_err(ServiceError::internal)??);
         let mut ready = self.lock();
         if ready.len() >= KEPT_READY {
@@ -65,8 +65,7 @@ impl Policies {
     /// The document is not a usable policy.
     pub async fn import(&self, document: Vec<u8>) -> Result<String, ServiceError> {
         let checked = tokio::task::spawn_blocking(move || {
-            let advisor = Advisor::new(Policy::from_json(&document)?)?;
-            Ok::<_, ServiceError>(advisor.policy().to_json())
+            Ok::<_, ServiceError>(Policy::from_json(&document)?.to_json())
         });
         let json = checked.await.map_err(ServiceError::internal)??;
         let policy = content_hash(&json);
