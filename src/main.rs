@@ -5,7 +5,7 @@ mod command;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use command::{demo, healthcheck, serve};
+use command::{bench, demo, healthcheck, serve};
 
 /// Nonparametric adaptive robust control of an investor, as a service.
 #[derive(Debug, Parser)]
@@ -23,6 +23,9 @@ enum Command {
     Serve(serve::Serve),
     /// Exit 0 if a running service is ready, else 1.
     Healthcheck(healthcheck::Healthcheck),
+    /// Measure this machine's speed and accuracy.
+    #[command(subcommand)]
+    Bench(bench::Bench),
     /// Print the OpenAPI description.
     Openapi,
 }
@@ -32,6 +35,7 @@ async fn main() -> ExitCode {
     let outcome = match CommandLine::parse().command {
         Command::Demo(arguments) => demo::run(arguments).await.map_err(Into::into),
         Command::Serve(arguments) => serve::run(arguments).await,
+        Command::Bench(bench) => bench::run(bench).await,
         Command::Healthcheck(arguments) => healthcheck::run(&arguments),
         Command::Openapi => {
             print!("{}", ballast::http::description_json());

@@ -21,7 +21,7 @@ fn train(value: Value) -> Policy {
 }
 
 fn advisor(value: Value) -> Advisor {
-    Advisor::new(train(value)).unwrap()
+    Advisor::new(train(value))
 }
 
 fn utility_of(case: &Value) -> Value {

@@ -16,7 +16,7 @@ fn number(value: &Value) -> f64 {
 }
 
 async fn advisor(app: &App) -> Advisor {
-    Advisor::new(Policy::from_json(&app.export().await).unwrap()).unwrap()
+    Advisor::new(Policy::from_json(&app.export().await).unwrap())
 }
 
 async fn trained(specification: &Value) -> App {

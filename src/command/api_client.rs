@@ -50,6 +50,12 @@ impl ApiClient {
         self.json(Method::POST, path, body.to_string().into()).await
     }
 
+    /// Reads the answer at `path` to its end, whatever it is.
+    pub async fn touch(&self, path: &str) -> Result<(), ApiError> {
+        let (call, response) = self.send(Method::GET, path, Bytes::new()).await?;
+        whole_body(&call, response).await.map(drop)
+    }
+
     /// Opens the event stream at `path`.
     pub async fn events(&self, path: &str) -> Result<Events, ApiError> {
         let (call, response) = self.send(Method::GET, path, Bytes::new()).await?;

@@ -4,17 +4,16 @@
 //! before 2008, and lives through 2008 as an investor's program would: ask, hold, report.
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
 use thiserror::Error;
 
 use super::api_client::{ApiClient, ApiError};
+use super::host::{Host, HostError};
 use super::us_market::MarketError;
 
 mod calls;
-mod host;
 mod progress;
 mod story;
 
@@ -30,10 +29,8 @@ pub struct DemoArgs {
 
 #[derive(Debug, Error)]
 pub enum DemoError {
-    #[error("making the data folder {}", path.display())]
-    Folder { path: PathBuf, source: std::io::Error },
-    #[error("starting the service")]
-    Service { source: Box<dyn std::error::Error + Send + Sync> },
+    #[error(transparent)]
+    Host(#[from] HostError),
     #[error("reading the bundled returns")]
     Market(#[from] MarketError),
     #[error("calling the service")]
@@ -44,30 +41,11 @@ pub enum DemoError {
     Training { state: String, reason: String },
 }
 
-/// A data folder that is removed with everything in it.
-struct DataFolder(PathBuf);
-
-impl DataFolder {
-    fn new() -> Result<Self, DemoError> {
-        let path = std::env::temp_dir().join(format!("ballast-demo-{}", std::process::id()));
-        std::fs::create_dir(&path).map_err(|source| DemoError::Folder { path: path.clone(), source })?;
-        Ok(DataFolder(path))
-    }
-}
-
-impl Drop for DataFolder {
-    fn drop(&mut self) {
-        // Left behind where it cannot be removed: it is in the system's temporary folder.
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
 /// Runs the demo to its end, or to Ctrl-C.
 pub async fn run(args: DemoArgs) -> Result<(), DemoError> {
     let started = Instant::now();
-    let folder = DataFolder::new()?;
-    let service = host::start(&folder.0).await?;
-    println!("Ballast is up on http://{} with its data in {}.", service.address, folder.0.display());
+    let service = Host::start("demo").await?;
+    println!("Ballast is up on http://{} with its data in {}.", service.address, service.folder().display());
     let outcome = tokio::select! {
         outcome = whole(service.address, &args, started) => outcome,
         _ = tokio::signal::ctrl_c() => {
@@ -75,8 +53,7 @@ pub async fn run(args: DemoArgs) -> Result<(), DemoError> {
             Ok(())
         }
     };
-    // The service lets go of the folder before the folder goes.
-    service.stop().await?;
+    service.stop().await;
     outcome
 }
 

@@ -1,8 +1,10 @@
 //! What the binary can be asked to do.
 
 mod api_client;
+pub mod bench;
 pub mod demo;
 pub mod healthcheck;
+mod host;
 pub mod serve;
 mod us_market;
 

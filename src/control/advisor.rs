@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use super::backward::StepSolution;
 use super::bellman::RobustSolution;
 use super::context::ProblemContext;
-use super::error::{FieldError, PolicyError};
+use super::error::FieldError;
 use super::policy::Policy;
 use super::specification::{Framework, Specification, UtilitySpecification};
 use super::state::{State, next_state};
@@ -94,9 +94,7 @@ struct Prediction {
 }
 
 impl Advisor {
-    /// # Errors
-    /// None today; kept fallible because a stored policy is outside input.
-    pub fn new(policy: Policy) -> Result<Self, PolicyError> {
+    pub fn new(policy: Policy) -> Self {
         let context = ProblemContext::new(policy.specification());
         let prepare = |step: &StepSolution| match &step.solution {
             Solution::Single(single) => PreparedStep::Single(*single),
@@ -109,7 +107,7 @@ impl Advisor {
             }
         };
         let steps = policy.steps().iter().map(prepare).collect();
-        Ok(Advisor { policy, context, steps })
+        Advisor { policy, context, steps }
     }
 
     pub fn policy(&self) -> &Policy {
@@ -156,6 +154,11 @@ impl Advisor {
             None => WorstCase::unknown(),
         };
         (advice, worst)
+    }
+
+    /// The floor gain that the value surrogate predicts, wherever the state lies.
+    pub fn surrogate_gain(&self, step: usize, state: &State) -> f64 {
+        self.predict(step, state).floor_gain
     }
 
     fn resolved(

@@ -26,6 +26,10 @@ const TAIL_RATIO: f64 = 1.3;
 /// First reach of the window below and above the atoms; doubled until certified, at most this often.
 const REACH: (f64, f64) = (1.5, 0.75);
 const WINDOW_GROWTHS: usize = 4;
+/// Log-returns closer than this are one.
+const COINCIDENT: f64 = 1e-12;
+/// Relative utility that sums of a few hundred roundings may lose.
+const LOSS_OF_ROUNDING: f64 = 1e-14;
 /// Parts into which each interval between exact returns is cut for the support, and again around destinations.
 const SUPPORT_PARTS: usize = 4;
 const REFINED_PARTS: usize = 8;
@@ -50,7 +54,7 @@ pub struct RobustSolution {
     pub action: f64,
     /// The action, moved past a bound by the one-sided derivative there over a reference curvature.
     pub extended_action: f64,
-    /// Log certainty equivalent over the all-bank floor, at least 0.
+    /// Log certainty equivalent over the all-bank floor.
     pub floor_gain: f64,
     /// Primal minus dual value, in log certainty equivalent.
     pub duality_gap: f64,
@@ -69,12 +73,13 @@ struct Grid {
 }
 
 impl RobustStep<'_> {
-    /// Solves the step at `state`. Windows grow until certified; then the support is refined around the
-    /// destinations of the worst law and the action polished.
-    pub fn solve(&self, state: &State) -> RobustSolution {
+    /// Solves the step at `state` over the actions in `[lowest, highest]`: a single action is priced where they are
+    /// equal. Windows grow until certified; then the support is refined around the destinations of the worst law and
+    /// the action polished.
+    pub fn solve(&self, state: &State, actions: (f64, f64)) -> RobustSolution {
         let (mut reach, mut solved) = (REACH, None);
         for growth in 0..=WINDOW_GROWTHS {
-            let found = self.solve_in_window(state, reach);
+            let found = self.solve_in_window(state, reach, actions);
             let done = found.certified || self.support.is_some() || self.radius <= 0.0 || growth == WINDOW_GROWTHS;
             solved = Some(found);
             if done {
@@ -82,18 +87,17 @@ impl RobustStep<'_> {
             }
             reach = (2.0 * reach.0, 2.0 * reach.1);
         }
-        solved.unwrap_or_else(|| self.solve_in_window(state, reach))
+        solved.unwrap_or_else(|| self.solve_in_window(state, reach, actions))
     }
 
-    fn solve_in_window(&self, state: &State, reach: (f64, f64)) -> RobustSolution {
+    fn solve_in_window(&self, state: &State, reach: (f64, f64), (lowest, highest): (f64, f64)) -> RobustSolution {
         let returns = self.exact_returns(reach);
         let field = GainField::tabulate(self.field, state, returns.clone());
         let mut grid = self.grid(subdivided(&returns, SUPPORT_PARTS, |_| true));
-        let highest = self.field.highest_action;
         let mut rows = field.at(&grid.support);
-        let (coarse, _) = self.best_action(&grid, &rows, 0.0, highest);
-        let part = highest / COARSE_ACTIONS as f64;
-        let (low, high) = ((coarse - part).max(0.0), (coarse + part).min(highest));
+        let (coarse, _) = self.best_action(&grid, &rows, lowest, highest);
+        let part = (highest - lowest) / COARSE_ACTIONS as f64;
+        let (low, high) = ((coarse - part).max(lowest), (coarse + part).min(highest));
         let mut action = maximise_concave_scalar(|a| self.robust_value(&grid, &rows, a), low, high, ACTION_TOLERANCE).0;
         let rounds = if self.radius > 0.0 && action > 0.0 { REFINEMENTS } else { 0 };
         for _ in 0..rounds {
@@ -108,18 +112,26 @@ impl RobustStep<'_> {
 
     fn solution(&self, grid: Grid, rows: &FieldRows, action: f64) -> RobustSolution {
         let payoff = self.payoff(&grid.support, rows, action);
-        let worst = self.ball(&grid).worst_law(&payoff);
+        let worst = self.worst_law(&grid, &payoff);
         let gain = self.utility.inverse(worst.expectation);
         RobustSolution {
             action,
             extended_action: self.extended(&grid, rows, action, gain),
-            floor_gain: gain.max(0.0),
+            floor_gain: gain,
             duality_gap: gain - self.utility.inverse(worst.dual),
             multiplier: worst.multiplier,
             certified: self.certified(&grid, &payoff, &worst, action),
             worst,
             support: grid.support,
         }
+    }
+
+    /// The worst law; the centre itself where no law takes more than rounding, so that nobody is told of moves that
+    /// rounding made.
+    fn worst_law(&self, grid: &Grid, payoff: &[f64]) -> WorstLaw {
+        let worst = self.ball(grid).worst_law(payoff);
+        let centre = WassersteinBall { radius: 0.0, ..self.ball(grid) }.worst_law(payoff);
+        if centre.expectation - worst.expectation > LOSS_OF_ROUNDING { worst } else { centre }
     }
 
     fn ball<'g>(&self, grid: &'g Grid) -> WassersteinBall<'g> {
@@ -236,18 +248,19 @@ impl RobustStep<'_> {
         returns
     }
 
-    /// Merges the atoms into `points`. Without a radius the atoms alone are the support.
+    /// Merges the atoms into `points`, which give way where they all but coincide with an atom: mass that moves by a
+    /// rounding would count as moved. Without a radius the atoms alone are the support.
     fn grid(&self, points: Vec<f64>) -> Grid {
         if self.radius <= 0.0 {
             return Grid { support: self.atoms.to_vec(), masses: self.masses.to_vec() };
         }
         let mut all: Vec<(f64, f64)> = self.atoms.iter().copied().zip(self.masses.iter().copied()).collect();
-        all.extend(
-            points
-                .into_iter()
-                .filter(|point| self.atoms.binary_search_by(|a| a.total_cmp(point)).is_err())
-                .map(|p| (p, 0.0)),
-        );
+        let apart = |point: &f64| {
+            let above = self.atoms.partition_point(|atom| atom < point);
+            let mut near = self.atoms.iter().take(above + 1).skip(above.saturating_sub(1));
+            near.all(|atom| (atom - point).abs() > COINCIDENT)
+        };
+        all.extend(points.into_iter().filter(apart).map(|point| (point, 0.0)));
         all.sort_by(|left, right| left.0.total_cmp(&right.0));
         all.dedup_by(|next, kept| next.0 == kept.0);
         let (support, masses) = all.into_iter().unzip();

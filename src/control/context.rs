@@ -52,6 +52,23 @@ impl ProblemContext {
     /// # Errors
     /// A centre that the specification does not define.
     pub fn solve(&self, step: usize, state: &State, next: &NextValue) -> Result<RobustSolution, TrainError> {
+        let [lowest, highest] = self.specification.problem.action_interval;
+        let solution = self.solve_between(step, state, next, (lowest, highest))?;
+        // All-bank is feasible and no law can hurt it.
+        Ok(RobustSolution { floor_gain: solution.floor_gain.max(0.0), ..solution })
+    }
+
+    /// The same with actions in `[lowest, highest]` alone: a single action is priced where they are equal.
+    ///
+    /// # Errors
+    /// As [`Self::solve`].
+    pub fn solve_between(
+        &self,
+        step: usize,
+        state: &State,
+        next: &NextValue,
+        actions: (f64, f64),
+    ) -> Result<RobustSolution, TrainError> {
         let problem = &self.specification.problem;
         let (atoms, masses) = centre(problem, state)?;
         let mean: f64 = atoms.iter().zip(&masses).map(|(atom, mass)| atom * mass).sum();
@@ -72,6 +89,6 @@ impl ProblemContext {
             radius: self.radius(state),
             variance,
         };
-        Ok(robust.solve(state))
+        Ok(robust.solve(state, actions))
     }
 }

@@ -41,12 +41,32 @@ impl<'a> GainField<'a> {
     pub fn tabulate(context: FieldContext<'a>, state: &State, returns: Vec<f64>) -> Self {
         let mut field =
             GainField { context, wealth: state.wealth, returns, wealth_nodes: Chebyshev::new(1), table: Vec::new() };
-        if let NextValue::Surrogate(surrogate) = context.next {
-            let wealth_matters = wealth_is_active(context.selection, &surrogate.scaling);
-            field.wealth_nodes = Chebyshev::new(if wealth_matters { WEALTH_NODES } else { 1 });
-            field.fill(state, surrogate, wealth_matters);
+        let wealth_matters = match context.next {
+            NextValue::Terminal | NextValue::Constant(_) => return field,
+            NextValue::Surrogate(surrogate) => wealth_is_active(context.selection, &surrogate.scaling),
+            NextValue::Exact(_) => context.selection.has_wealth(),
+        };
+        field.wealth_nodes = Chebyshev::new(if wealth_matters { WEALTH_NODES } else { 1 });
+        match context.next {
+            NextValue::Surrogate(surrogate) => field.fill(state, surrogate, wealth_matters),
+            NextValue::Exact(gain) => field.fill_exactly(state, gain),
+            NextValue::Terminal | NextValue::Constant(_) => {}
         }
         field
+    }
+
+    fn fill_exactly(&mut self, state: &State, gain: &(dyn Fn(&State) -> f64 + Send + Sync)) {
+        for &log_return in &self.returns {
+            let mut law = state.law.clone();
+            if self.context.learns {
+                law.push(log_return);
+            }
+            let (bank, full) = self.wealth_range(log_return);
+            for node in self.wealth_nodes.nodes() {
+                let next = State { wealth: self.wealth * (bank + node * (full - bank)).exp(), law: law.clone() };
+                self.table.push(gain(&next));
+            }
+        }
     }
 
     fn fill(&mut self, state: &State, surrogate: &ValueSurrogate, wealth_matters: bool) {
@@ -121,17 +141,21 @@ impl FieldRows<'_, '_> {
             NextValue::Terminal => 0.0,
             NextValue::Constant(gain) => *gain,
             NextValue::Surrogate(surrogate) => {
-                let nodes = self.field.wealth_nodes.nodes().len();
-                let row = &self.rows[index * nodes..(index + 1) * nodes];
-                let prediction = if nodes == 1 {
-                    row[0]
-                } else {
-                    let (bank, full) = self.ranges[index];
-                    let position = if full == bank { 0.0 } else { (log_growth - bank) / (full - bank) };
-                    self.field.wealth_nodes.evaluate(row, position)
-                };
-                surrogate.clamped_gain(prediction, self.field.wealth * log_growth.exp())
+                surrogate.clamped_gain(self.interpolated(index, log_growth), self.field.wealth * log_growth.exp())
             }
+            NextValue::Exact(_) => self.interpolated(index, log_growth).max(0.0),
         }
+    }
+
+    /// The tabulated prediction, along wealth.
+    fn interpolated(&self, index: usize, log_growth: f64) -> f64 {
+        let nodes = self.field.wealth_nodes.nodes().len();
+        let row = &self.rows[index * nodes..(index + 1) * nodes];
+        if nodes == 1 {
+            return row[0];
+        }
+        let (bank, full) = self.ranges[index];
+        let position = if full == bank { 0.0 } else { (log_growth - bank) / (full - bank) };
+        self.field.wealth_nodes.evaluate(row, position)
     }
 }

@@ -10,6 +10,7 @@ pub mod features;
 pub mod gain_field;
 pub mod limits;
 pub mod policy;
+pub mod pool;
 pub mod specification;
 pub mod state;
 pub mod surrogate;

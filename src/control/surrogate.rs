@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::features::{FeatureSelection, Scaling};
 use super::specification::{Specification, SurrogateTarget, UtilitySpecification};
-use super::state::floor;
+use super::state::{State, floor};
 use super::utility::{certainty_equivalent, depends_on_wealth, utility};
 use crate::numerics::gp::{GpMean, Hyperparameters};
 
@@ -117,6 +117,8 @@ pub enum NextValue {
     /// The same floor gain everywhere.
     Constant(f64),
     Surrogate(Box<ValueSurrogate>),
+    /// The floor gain itself, however it is known: what a surrogate is measured against.
+    Exact(Box<dyn Fn(&State) -> f64 + Send + Sync>),
 }
 
 /// The value surrogate of one step.

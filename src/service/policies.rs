@@ -39,7 +39,7 @@ impl Policies {
             return Ok(advisor.clone());
         }
         let row = self.get(policy).await?;
-        let prepared = tokio::task::spawn_blocking(move || Advisor::new(Policy::from_json(&row.json)?));
+        let prepared = tokio::task::spawn_blocking(move || Policy::from_json(&row.json).map(Advisor::new));
         // What was stored was checked: a fault in it is not the caller's.
         let advisor = prepared.await.map_err(ServiceError::internal)?.map_err(ServiceError::internal)?;
         let advisor = Arc::new(advisor);
@@ -66,10 +66,7 @@ impl Policies {
     /// # Errors
     /// The document is not a usable policy.
     pub async fn import(&self, document: Policy) -> Result<String, ServiceError> {
-        let checked = tokio::task::spawn_blocking(move || {
-            let advisor = Advisor::new(document.checked()?)?;
-            Ok::<_, ServiceError>(advisor.policy().to_json())
-        });
+        let checked = tokio::task::spawn_blocking(move || document.checked().map(|policy| policy.to_json()));
         let json = checked.await.map_err(ServiceError::internal)??;
         let policy = content_hash(&json);
         self.store.insert_policy(&policy, &json, self.clock.now_milliseconds()).await?;

@@ -15,6 +15,7 @@ const HORIZON: usize = 12;
 pub const INITIAL_WEALTH: f64 = 100.0;
 pub const RISK_AVERSION: f64 = 3.0;
 pub const ALPHA: f64 = 0.1;
+const LINE_WIDTH: usize = 108;
 /// Moves of the worst-case law that are told one by one.
 const MOVES_TOLD: usize = 3;
 
@@ -31,11 +32,15 @@ pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
     let policy = train(api, &past, HORIZON, count).await?;
     let session = open_session(api, &policy).await?;
     println!("Policy {policy:.12} is trained; session {session} starts with wealth {INITIAL_WEALTH}.");
-    let first = advice(api, &session, false).await?;
+    let first = advice(api, &session, true).await?;
     tell_why(&past, &first);
+    tell_worst_case("this", &first);
     compare_januaries(api, &market, count).await?;
     let last = live_through(api, &session, &past, market.year(YEAR)).await?;
-    tell_worst_case(&last);
+    if let Some(last) = last {
+        println!();
+        tell_worst_case("December's", &last);
+    }
     Ok(())
 }
 
@@ -142,14 +147,12 @@ async fn live_through(
     Ok(last)
 }
 
-fn tell_worst_case(last: &Option<Advice>) {
-    let Some(worst_case) = last.as_ref().and_then(|advice| advice.worst_case.as_ref()) else { return };
-    println!("\nThe worst law for December's advice: {}", worst_case.sentence);
-    let moves = largest_moves(&worst_case.transport);
-    if moves.is_empty() {
-        println!("No return is moved: with nothing in stocks no law can hurt.");
-    }
-    for Move { atom, moved_to, mass } in moves {
+/// The worst law behind an advice, in words, and its largest moves.
+fn tell_worst_case(whose: &str, advice: &Advice) {
+    let Some(worst_case) = &advice.worst_case else { return };
+    println!("The worst law for {whose} advice:");
+    wrapped(&worst_case.sentence, LINE_WIDTH).iter().for_each(|line| println!("{line}"));
+    for Move { atom, moved_to, mass } in largest_moves(&worst_case.transport) {
         println!(
             "  a month of {:+.2} % turns into one of {:+.2} %, with probability {:.2} %",
             100.0 * atom.exp_m1(),
@@ -157,6 +160,21 @@ fn tell_worst_case(last: &Option<Advice>) {
             100.0 * mass
         );
     }
+}
+
+/// A sentence in lines of at most `width` characters, where its words allow.
+fn wrapped(sentence: &str, width: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in sentence.split_whitespace() {
+        match lines.last_mut().filter(|line| line.chars().count() + 1 + word.chars().count() <= width) {
+            Some(line) => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            None => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 /// The moves that use most of the radius, largest first.
@@ -178,6 +196,11 @@ mod tests {
             [one(0.1, 0.1, 0.5), one(0.1, 0.0, 0.1), one(0.2, -0.6, 0.1), one(0.0, -0.1, 0.2), one(0.1, 0.05, 0.1)];
         let told: Vec<f64> = largest_moves(&transport).iter().map(|one| one.moved_to).collect();
         assert_eq!(told, [-0.6, -0.1, 0.0]);
+    }
+
+    #[test]
+    fn a_sentence_is_cut_between_words() {
+        assert_eq!(wrapped("one two  three overlong", 7), ["one two", "three", "overlong"]);
     }
 
     #[test]

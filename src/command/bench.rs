@@ -1,0 +1,29 @@
+//! `ballast bench`: the figures the README quotes, measured on this machine.
+
+use std::error::Error;
+
+use clap::Subcommand;
+
+mod accuracy;
+mod action;
+mod paper;
+mod summary;
+mod training;
+
+#[derive(Debug, Subcommand)]
+pub enum Bench {
+    /// Time a whole training of the paper's configuration, phase by phase.
+    Training(training::TrainingBench),
+    /// Compare the surrogates with direct solves at fresh states, in basis points of log certainty equivalent.
+    Accuracy(accuracy::AccuracyBench),
+    /// Time GET /action on loopback beside GET /livez.
+    Action(action::ActionBench),
+}
+
+pub async fn run(bench: Bench) -> Result<(), Box<dyn Error>> {
+    match bench {
+        Bench::Training(arguments) => tokio::task::block_in_place(|| training::run(&arguments)),
+        Bench::Accuracy(arguments) => tokio::task::block_in_place(|| accuracy::run(&arguments)),
+        Bench::Action(arguments) => action::run(&arguments).await,
+    }
+}

@@ -1,0 +1,234 @@
+//! How far the surrogates are from direct solves at states they were not trained on.
+//!
+//! Errors are in basis points, 1e-4 of log certainty equivalent. The truth at the last step is the robust step itself;
+//! at the step before it is the robust step over the exact value of the last. Regret is what an allocation loses
+//! against the best one under the same worst-case criterion.
+
+use std::error::Error;
+use std::sync::atomic::AtomicBool;
+
+use ballast::control::advisor::{Advice, AdviceMode, Advisor};
+use ballast::control::backward::{StepSolution, Training, Watch};
+use ballast::control::context::ProblemContext;
+use ballast::control::design::Design;
+use ballast::control::error::TrainError;
+use ballast::control::policy::{Policy, StepDiagnostics};
+use ballast::control::pool::TrainingPool;
+use ballast::control::specification::{FeatureMap, InitialLaws, RadiusRule, Specification, SurrogateTarget};
+use ballast::control::state::State;
+use ballast::control::surrogate::{NextValue, SingleSolution, Solution};
+use clap::Args;
+
+use super::paper;
+use super::summary::quantile;
+
+#[derive(Debug, Args)]
+pub struct AccuracyBench {
+    /// Design points per step, one row each
+    #[arg(long, value_delimiter = ',', default_values_t = [1000])]
+    counts: Vec<usize>,
+    #[arg(long, default_value_t = 0.1)]
+    alpha: f64,
+    /// Returns of the history
+    #[arg(long, default_value_t = 20)]
+    sample_size: usize,
+    #[arg(long, default_value_t = 10)]
+    horizon: usize,
+    /// Fresh states at the last step
+    #[arg(long, default_value_t = 2000)]
+    states: usize,
+    /// Fresh states at the step before
+    #[arg(long, default_value_t = 0)]
+    nested_states: usize,
+    /// Compare the surrogate targets and feature maps as well
+    #[arg(long)]
+    variants: bool,
+}
+
+/// Seed of the fresh states: another than the design's.
+const FRESH_SEED: u64 = 1_000_003;
+const BASIS_POINTS: f64 = 1e4;
+
+/// A state with its direct solution.
+struct Truth {
+    state: State,
+    floor_gain: f64,
+}
+
+pub fn run(bench: &AccuracyBench) -> Result<(), Box<dyn Error>> {
+    let pool = TrainingPool::new(std::thread::available_parallelism().map_or(1, usize::from))?;
+    pool.install(|| compare(bench)).map_err(Into::into)
+}
+
+fn compare(bench: &AccuracyBench) -> Result<(), TrainError> {
+    let mut base = paper::specification(bench.sample_size, bench.horizon, 1000, InitialLaws::Resampled).completed()?;
+    base.problem.radius = RadiusRule::Bridge { alpha: bench.alpha, paths: 2000, scale: 1.0 };
+    println!("paper's mixture, t0 = {}, T = {}, alpha = {}", bench.sample_size, bench.horizon, bench.alpha);
+    let context = ProblemContext::new(&base);
+    let last = bench.horizon - 1;
+    let mut truths = vec![(last, last_truth(&context, bench.states)?)];
+    if bench.nested_states > 0 {
+        truths.push((last - 1, nested_truth(&context, bench.nested_states)?));
+    }
+    heading();
+    for &count in &bench.counts {
+        let mut variants = vec![(SurrogateTarget::FloorGain, FeatureMap::Standardized)];
+        if bench.variants {
+            variants.push((SurrogateTarget::Value, FeatureMap::Standardized));
+            variants.push((SurrogateTarget::FloorGain, FeatureMap::RawMoments));
+        }
+        for (target, features) in variants {
+            let mut specification = base.clone();
+            specification.design.count = Some(count);
+            specification.surrogate.target = target;
+            specification.surrogate.features = features;
+            let advisor = trained(&specification, truths.len())?;
+            for (step, truths) in &truths {
+                report(&context, &advisor, *step, truths)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// States of the design's own law, under another seed.
+fn fresh_states(specification: &Specification, step: usize, count: usize) -> Result<Vec<State>, TrainError> {
+    let mut fresh = specification.clone();
+    fresh.seed = FRESH_SEED;
+    fresh.design.count = Some(count);
+    let design = Design::simulate(&fresh, &AtomicBool::new(false))?;
+    Ok((0..count).map(|point| design.state(step, point)).collect())
+}
+
+fn solved(context: &ProblemContext, step: usize, next: &NextValue, count: usize) -> Result<Vec<Truth>, TrainError> {
+    let states = fresh_states(&context.specification, step, count)?;
+    let solve = |state: State| Ok(Truth { floor_gain: context.solve(step, &state, next)?.floor_gain, state });
+    TrainingPool::map(states, solve).into_iter().collect()
+}
+
+fn last_truth(context: &ProblemContext, count: usize) -> Result<Vec<Truth>, TrainError> {
+    solved(context, context.specification.problem.horizon - 1, &NextValue::Terminal, count)
+}
+
+/// The value of the last step, solved anew at every state asked.
+fn exact_last_value(specification: &Specification) -> NextValue {
+    let context = ProblemContext::new(specification);
+    let last = specification.problem.horizon - 1;
+    let gain = move |state: &State| {
+        context.solve(last, state, &NextValue::Terminal).map_or(f64::NAN, |solution| solution.floor_gain)
+    };
+    NextValue::Exact(Box::new(gain))
+}
+
+fn nested_truth(context: &ProblemContext, count: usize) -> Result<Vec<Truth>, TrainError> {
+    let next = exact_last_value(&context.specification);
+    solved(context, context.specification.problem.horizon - 2, &next, count)
+}
+
+/// A policy whose last `steps` steps are solved; the ones before are not asked and hold nothing.
+fn trained(specification: &Specification, steps: usize) -> Result<Advisor, TrainError> {
+    let training = Training::new(specification)?;
+    let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+    let mut solutions: Vec<StepSolution> = Vec::new();
+    for step in (0..training.horizon()).rev() {
+        let solution =
+            if solutions.len() < steps { training.solve_step(step, solutions.last(), &watch)? } else { unsolved(step) };
+        solutions.push(solution);
+    }
+    solutions.reverse();
+    Ok(Advisor::new(Policy::new(specification.clone(), solutions)))
+}
+
+fn unsolved(step: usize) -> StepSolution {
+    let diagnostics = StepDiagnostics {
+        step,
+        design_count: 1,
+        all_bank_share: 1.0,
+        uncertified_share: 0.0,
+        duality_gap: 0.0,
+        value: None,
+        policy: None,
+    };
+    StepSolution { step, solution: Solution::Single(SingleSolution { floor_gain: 0.0, action: 0.0 }), diagnostics }
+}
+
+fn heading() {
+    println!(
+        "{:>5} {:<12} {:<13} {:>4}  {:^23}  {:^23}  {:>6}  {:>6}",
+        "", "", "", "", "value error", "regret as served", "in", "within"
+    );
+    println!(
+        "{:>5} {:<12} {:<13} {:>4}  {:>7} {:>7} {:>7}  {:>7} {:>7} {:>7}  {:>6}  {:>6}",
+        "N", "target", "features", "step", "RMS", "99 %", "worst", "mean", "99 %", "worst", "design", "2 sd"
+    );
+}
+
+fn report(context: &ProblemContext, advisor: &Advisor, step: usize, truths: &[Truth]) -> Result<(), TrainError> {
+    let specification = advisor.specification();
+    let next = match step + 1 < specification.problem.horizon {
+        true => exact_last_value(&context.specification),
+        false => NextValue::Terminal,
+    };
+    let judged: Vec<Judged> =
+        TrainingPool::map(truths.iter().collect(), |truth: &Truth| judge(context, advisor, step, &next, truth))
+            .into_iter()
+            .collect::<Result<_, _>>()?;
+    let inside: Vec<&Judged> = judged.iter().filter(|one| one.in_design).collect();
+    let errors: Vec<f64> = inside.iter().map(|one| one.error.abs()).collect();
+    let regrets: Vec<f64> = judged.iter().map(|one| one.regret).collect();
+    let share = |part: usize| part as f64 / judged.len() as f64;
+    let within = judged.iter().filter(|one| one.error.abs() <= BASIS_POINTS * 2.0 * one.deviation).count();
+    let target = match specification.surrogate.target {
+        SurrogateTarget::FloorGain => "floor_gain",
+        SurrogateTarget::Value => "value",
+    };
+    let features = match specification.surrogate.features {
+        FeatureMap::Standardized => "standardized",
+        FeatureMap::RawMoments => "raw_moments",
+    };
+    println!(
+        "{:>5} {target:<12} {features:<13} {step:>4}  {:>7.3} {:>7.3} {:>7.3}  {:>7.4} {:>7.3} {:>7.3}  {:>6.4}  {:>6.4}",
+        specification.design.count.unwrap_or(0),
+        root_mean_square(&errors),
+        quantile(&errors, 0.99),
+        quantile(&errors, 1.0),
+        regrets.iter().sum::<f64>() / regrets.len() as f64,
+        quantile(&regrets, 0.99),
+        quantile(&regrets, 1.0),
+        share(inside.len()),
+        share(within),
+    );
+    Ok(())
+}
+
+/// What an advice is off by at one state.
+struct Judged {
+    /// Predicted minus true log certainty equivalent, in basis points.
+    error: f64,
+    /// In basis points, at least 0.
+    regret: f64,
+    /// Predicted standard deviation, in log certainty equivalent.
+    deviation: f64,
+    in_design: bool,
+}
+
+fn judge(
+    context: &ProblemContext,
+    advisor: &Advisor,
+    step: usize,
+    next: &NextValue,
+    truth: &Truth,
+) -> Result<Judged, TrainError> {
+    let Advice { allocation, surrogate_sd, in_design, .. } = advisor.advise(step, &truth.state, AdviceMode::Surrogate);
+    let served = context.solve_between(step, &truth.state, next, (allocation, allocation))?.floor_gain;
+    Ok(Judged {
+        error: BASIS_POINTS * (advisor.surrogate_gain(step, &truth.state) - truth.floor_gain),
+        regret: BASIS_POINTS * (truth.floor_gain - served).max(0.0),
+        deviation: surrogate_sd,
+        in_design,
+    })
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
+}

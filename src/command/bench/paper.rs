@@ -1,0 +1,41 @@
+//! The paper's configuration: its mixture, 20 returns drawn from it, ten steps.
+
+use ballast::control::design::continuous_law;
+use ballast::control::specification::{
+    InitialLaws, MixtureComponent, ProblemSpecification, SamplingLaw, Specification,
+};
+use ballast::numerics::law::ContinuousLaw;
+use ballast::numerics::streams::stream;
+use serde_json::json;
+
+/// The law of the paper's section 3.
+pub fn mixture() -> SamplingLaw {
+    SamplingLaw::GaussianMixture {
+        components: vec![
+            MixtureComponent { weight: 0.4, mean: 0.006, variance: 0.016 },
+            MixtureComponent { weight: 0.6, mean: 0.016, variance: 0.00625 },
+        ],
+    }
+}
+
+/// `count` log-returns drawn from the mixture.
+pub fn history(count: usize, seed: u64) -> Vec<f64> {
+    let law: ContinuousLaw = continuous_law(&mixture(), &[]);
+    let mut generator = stream(seed, "bench-history", 0, 0);
+    (0..count).map(|_| law.draw(&mut generator)).collect()
+}
+
+/// The request of the paper with a history of `sample_size` draws.
+pub fn specification(sample_size: usize, horizon: usize, count: usize, initial_laws: InitialLaws) -> Specification {
+    let problem = json!({ "horizon": horizon, "history": history(sample_size, 1) });
+    let mut specification = Specification {
+        problem: serde_json::from_value::<ProblemSpecification>(problem).unwrap_or_else(|_| unreachable!()),
+        design: Default::default(),
+        surrogate: Default::default(),
+        seed: 1,
+    };
+    specification.design.count = Some(count);
+    specification.design.initial_laws = initial_laws;
+    specification.design.sampling_law = Some(mixture());
+    specification
+}

@@ -1,0 +1,79 @@
+//! How long a whole training takes, and where the time goes.
+
+use std::error::Error;
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use ballast::control::backward::{Phase, StepProgress, Training, Watch};
+use ballast::control::pool::TrainingPool;
+use ballast::control::specification::InitialLaws;
+use clap::Args;
+
+use super::paper;
+use super::summary::{median, peak_memory_mb};
+
+#[derive(Debug, Args)]
+pub struct TrainingBench {
+    /// Design points per step
+    #[arg(long, default_value_t = 1000)]
+    count: usize,
+    #[arg(long, default_value_t = 10)]
+    horizon: usize,
+    /// Returns of the history
+    #[arg(long, default_value_t = 20)]
+    sample_size: usize,
+    /// Give every design point a history of its own
+    #[arg(long)]
+    resampled: bool,
+    /// Threads to train with, one figure each
+    #[arg(long, value_delimiter = ',', default_values_t = [std::thread::available_parallelism().map_or(1, usize::from)])]
+    threads: Vec<usize>,
+    #[arg(long, default_value_t = 1)]
+    runs: usize,
+}
+
+/// Seconds spent in each phase.
+#[derive(Debug, Clone, Copy, Default)]
+struct Spent {
+    solving: f64,
+    fitting: f64,
+}
+
+pub fn run(bench: &TrainingBench) -> Result<(), Box<dyn Error>> {
+    let initial_laws = if bench.resampled { InitialLaws::Resampled } else { InitialLaws::Given };
+    let specification = paper::specification(bench.sample_size, bench.horizon, bench.count, initial_laws);
+    println!("threads  run  total s  solving s  fitting s  peak MB");
+    for &threads in &bench.threads {
+        let pool = TrainingPool::new(threads)?;
+        let mut totals = Vec::new();
+        for run in 1..=bench.runs {
+            let started = Instant::now();
+            let phases = Mutex::new((Spent::default(), Phase::Solving, started));
+            let progress = |progress: StepProgress| note_phase(&phases, progress.phase);
+            let watch = Watch { stop: &AtomicBool::new(false), progress: &progress };
+            let training = Training::new(&specification)?;
+            pool.install(|| training.run(&watch))?;
+            note_phase(&phases, Phase::Solving);
+            let total = started.elapsed().as_secs_f64();
+            let spent = phases.lock().map_or(Spent::default(), |phases| phases.0);
+            let memory = peak_memory_mb().map_or(String::from("unknown"), |mb| format!("{mb:.0}"));
+            println!("{threads:>7} {run:>4} {total:>8.2} {:>10.2} {:>10.2} {memory:>8}", spent.solving, spent.fitting);
+            totals.push(total);
+        }
+        println!("{threads:>7}  median {:.2} s", median(&totals));
+    }
+    Ok(())
+}
+
+/// Books the time since the last report to the phase that was running.
+fn note_phase(phases: &Mutex<(Spent, Phase, Instant)>, phase: Phase) {
+    let Ok(mut noted) = phases.lock() else { return };
+    let now = Instant::now();
+    let elapsed = (now - noted.2).as_secs_f64();
+    match noted.1 {
+        Phase::Solving => noted.0.solving += elapsed,
+        Phase::Fitting => noted.0.fitting += elapsed,
+    }
+    (noted.1, noted.2) = (phase, now);
+}

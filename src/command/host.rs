@@ -1,0 +1,59 @@
+//! The service in this process, as `serve` runs it, on a free loopback port with a data folder of its own.
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+
+use ballast::http::{Running, serve};
+use ballast::service::config::Config;
+use ballast::service::shutdown::Shutdown;
+use thiserror::Error;
+
+#[derive(Debug, Error)]
+pub enum HostError {
+    #[error("making the data folder {}", path.display())]
+    Folder { path: PathBuf, source: std::io::Error },
+    #[error("starting the service")]
+    Start { source: Box<dyn std::error::Error + Send + Sync> },
+}
+
+/// A data folder that is removed with everything in it.
+struct DataFolder(PathBuf);
+
+impl Drop for DataFolder {
+    fn drop(&mut self) {
+        // Left behind where it cannot be removed: it is in the system's temporary folder.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// A running service.
+pub struct Host {
+    pub address: SocketAddr,
+    running: Running,
+    // The service lets go of the folder before the folder goes.
+    folder: DataFolder,
+}
+
+impl Host {
+    /// Starts it over a new folder named after `purpose`, training on every core: nobody else is being served.
+    pub async fn start(purpose: &str) -> Result<Self, HostError> {
+        let path = std::env::temp_dir().join(format!("ballast-{purpose}-{}", std::process::id()));
+        std::fs::create_dir(&path).map_err(|source| HostError::Folder { path: path.clone(), source })?;
+        let folder = DataFolder(path);
+        let mut config = Config::new(&folder.0);
+        config.listen = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        config.training_threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let started = serve(config, Shutdown::new()).await;
+        let running = started.map_err(|source| HostError::Start { source: source.into() })?;
+        Ok(Host { address: running.address, running, folder })
+    }
+
+    pub fn folder(&self) -> &std::path::Path {
+        &self.folder.0
+    }
+
+    /// Drains it and waits for its end.
+    pub async fn stop(self) {
+        self.running.stop().await;
+    }
+}
