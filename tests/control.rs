@@ -218,8 +218,8 @@ fn values_stay_above_the_floor_and_actions_in_the_interval_everywhere() {
 }
 
 #[test]
-fn a_training_asked_to_stop_simulates_no_design() {
-    let specification = specification(json!({"problem": {"history": [0.01, -0.02, 0.03]}}));
-    let stopped = Training::prepare(&specification, &AtomicBool::new(true));
-    assert!(matches!(stopped, Err(TrainError::Stopped)));
+fn a_training_asked_to_stop_solves_nothing() {
+    let training = Training::new(&specification(json!({"problem": {"history": [0.01, -0.02, 0.03]}}))).unwrap();
+    let watch = Watch { stop: &AtomicBool::new(true), progress: &|_| {} };
+    assert!(matches!(training.solve_step(9, None, &watch), Err(TrainError::Stopped)));
 }

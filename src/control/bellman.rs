@@ -16,8 +16,10 @@ use crate::numerics::wasserstein::{WassersteinBall, WorstLaw};
 /// Equal parts of the action interval that are tried before the search between the best one's neighbours.
 const COARSE_ACTIONS: usize = 12;
 const ACTION_TOLERANCE: f64 = 1e-7;
-/// Step of the one-sided derivative at a bound.
-const DERIVATIVE_STEP: f64 = 1e-4;
+/// Step of the one-sided derivatives at a bound.
+const DERIVATIVE_STEP: f64 = 1e-2;
+/// The curvature there is taken to lie within this factor of relative risk aversion times variance.
+const CURVATURE_RANGE: f64 = 4.0;
 /// How far past a bound the policy target may be extended.
 const LARGEST_EXTENSION: f64 = 2.0;
 /// Exact returns of the field across the atoms, and the ratio by which spacing grows outside them.
@@ -52,7 +54,7 @@ pub struct RobustStep<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobustSolution {
     pub action: f64,
-    /// The action, moved past a bound by the one-sided derivative there over a reference curvature.
+    /// The action, moved past a bound by the Newton step of the one-sided derivatives there.
     pub extended_action: f64,
     /// Log certainty equivalent over the all-bank floor.
     pub floor_gain: f64,
@@ -177,6 +179,8 @@ impl RobustStep<'_> {
         near
     }
 
+    /// An action at a bound, moved past it by the Newton step that the one-sided derivatives there suggest: the optimum
+    /// of the parabola that touches the robust gain at the bound, so that the target crosses the bound without a kink.
     fn extended(&self, grid: &Grid, rows: &FieldRows, action: f64, gain: f64) -> f64 {
         let highest = self.field.highest_action;
         let inward = if action <= 0.0 {
@@ -186,11 +190,16 @@ impl RobustStep<'_> {
         } else {
             return action;
         };
-        let near = self.utility.inverse(self.robust_value(grid, rows, action + inward * DERIVATIVE_STEP));
-        let derivative = inward * (near - gain) / DERIVATIVE_STEP;
-        let curvature = self.utility.relative_risk_aversion() * self.variance;
-        let extension = (derivative / curvature).clamp(-LARGEST_EXTENSION, LARGEST_EXTENSION);
-        if inward > 0.0 { action + extension.min(0.0) } else { action + extension.max(0.0) }
+        let gain_at =
+            |steps: f64| self.utility.inverse(self.robust_value(grid, rows, action + inward * steps * DERIVATIVE_STEP));
+        let (near, far) = (gain_at(1.0), gain_at(2.0));
+        let slope = (4.0 * near - far - 3.0 * gain) / (2.0 * DERIVATIVE_STEP);
+        let curvature = (2.0 * near - far - gain) / (DERIVATIVE_STEP * DERIVATIVE_STEP);
+        let reference = self.utility.relative_risk_aversion() * self.variance;
+        let curvature = curvature.clamp(reference / CURVATURE_RANGE, reference * CURVATURE_RANGE);
+        // At a bound the robust gain does not rise inwards: what rounding says otherwise is dropped. Far beyond the bound
+        // the target levels off, smoothly, for what is never wanted needs no resolution.
+        action + inward * LARGEST_EXTENSION * (slope / curvature / LARGEST_EXTENSION).min(0.0).tanh()
     }
 
     /// Proves from the multiplier that no law with mass outside the window does worse.

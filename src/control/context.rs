@@ -3,7 +3,7 @@
 use super::bellman::{RobustSolution, RobustStep};
 use super::design::centre;
 use super::error::TrainError;
-use super::features::FeatureSelection;
+use super::features::{FeatureSelection, LawSummary};
 use super::gain_field::FieldContext;
 use super::specification::{Framework, Specification};
 use super::state::{State, floor};
@@ -11,6 +11,7 @@ use super::surrogate::NextValue;
 use super::uncertainty::UncertaintySets;
 use super::utility::RelativeUtility;
 use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::exponential_mean::ExponentialMean;
 use crate::numerics::moments::CentralMoments;
 
 /// The problem with everything that does not change from step to step.
@@ -43,8 +44,35 @@ impl ProblemContext {
 
     /// The features of a state, unscaled.
     pub fn features(&self, state: &State) -> Vec<f64> {
-        let radius = if self.selection.has_radius() { self.radius(state) } else { 0.0 };
-        self.selection.of(state.wealth, &CentralMoments::of(&state.law), radius)
+        let (mut radius, mut robust_excess) = (0.0, 0.0);
+        if self.selection.has_ball() {
+            radius = self.radius(state);
+            let worst = ExponentialMean::of(&state.law, self.lowest_return()).worst(radius);
+            robust_excess = excess(worst, self.specification.problem.rate_per_step);
+        }
+        self.selection.of(state.wealth, &LawSummary { moments: CentralMoments::of(&state.law), radius, robust_excess })
+    }
+
+    /// Features of the laws that follow from `law` when each of `returns` (ascending) is learned, for one wealth.
+    pub fn features_with(&self, law: &EmpiricalDistribution, wealth: f64, returns: &[f64]) -> Vec<Vec<f64>> {
+        let before = CentralMoments::of(law);
+        if !self.specification.problem.framework.learns() {
+            let summary = LawSummary { moments: before, radius: 0.0, robust_excess: 0.0 };
+            return vec![self.selection.of(wealth, &summary); returns.len()];
+        }
+        let rate = self.specification.problem.rate_per_step;
+        let has_ball = self.selection.has_ball();
+        let radii = if has_ball { self.sets.radii_with(law, returns) } else { vec![0.0; returns.len()] };
+        let mean = ExponentialMean::of(law, self.lowest_return());
+        let features = |(&log_return, radius): (&f64, f64)| {
+            let robust_excess = if has_ball { excess(mean.worst_with(log_return, radius), rate) } else { 0.0 };
+            self.selection.of(wealth, &LawSummary { moments: before.with(log_return), radius, robust_excess })
+        };
+        returns.iter().zip(radii).map(features).collect()
+    }
+
+    fn lowest_return(&self) -> f64 {
+        self.specification.problem.support.map_or(f64::NEG_INFINITY, |support| support.min)
     }
 
     /// Solves the robust step at one state exactly, given the value of the step after.
@@ -75,10 +103,8 @@ impl ProblemContext {
         let variance = atoms.iter().zip(&masses).map(|(atom, mass)| mass * (atom - mean).powi(2)).sum();
         let robust = RobustStep {
             field: FieldContext {
-                selection: &self.selection,
-                sets: &self.sets,
+                problem: self,
                 next,
-                learns: problem.framework.learns(),
                 rate_per_step: problem.rate_per_step,
                 highest_action: problem.action_interval[1],
             },
@@ -91,4 +117,9 @@ impl ProblemContext {
         };
         Ok(robust.solve(state, actions))
     }
+}
+
+/// What e^Z with mean `mean` earns beyond the bank, per unit held.
+fn excess(mean: f64, rate_per_step: f64) -> f64 {
+    mean / (1.0 + rate_per_step) - 1.0
 }

@@ -1,10 +1,14 @@
 //! The design: simulated states, step by step, under randomised actions and the sampling law.
+//!
+//! Every state is drawn anew from its streams when asked for, so a design of any size costs no memory. Where the law
+//! is part of the state, twice as many candidates as design points are simulated; a quarter of the design is taken as
+//! drawn and the rest from where the candidates lie farthest apart, so that its edges are inside.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::ops::Range;
 
 use rand::RngExt;
 
-use super::error::{FieldError, TrainError};
+use super::error::FieldError;
 use super::specification::{Framework, InitialLaws, Interval, ProblemSpecification, SamplingLaw, Specification};
 use super::state::{State, next_wealth};
 use super::utility::depends_on_wealth;
@@ -12,15 +16,24 @@ use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::streams::stream;
 
-/// Simulated paths of wealth and returns; the design of step t is where the paths are after t steps.
+/// Candidates simulated for each design point.
+const CANDIDATES_PER_POINT: usize = 2;
+/// States that set the guard: 10 of them lie beyond a guard that 99 % pass.
+const GUARDS: usize = 1000;
+/// One design point in this many is taken as drawn.
+const AS_DRAWN: usize = 4;
+
+/// The states that a training may be asked to solve.
 pub struct Design {
-    history: Vec<f64>,
-    learns: bool,
-    /// `initial[i]`: returns drawn as design point i's own history; empty where every point starts at the history.
-    initial: Vec<Vec<f64>>,
-    /// `returns[i][t]` and `wealth[i][t]`, t from 0.
-    returns: Vec<Vec<f64>>,
-    wealth: Vec<Vec<f64>>,
+    problem: ProblemSpecification,
+    law: ContinuousLaw,
+    seed: u64,
+    count: usize,
+    /// Initial wealths.
+    start: Interval,
+    resampled: bool,
+    /// `ladder[i][t]`: wealths where the state is wealth alone; empty where the law is part of it.
+    ladder: Vec<Vec<f64>>,
     /// True where all states of a step are one: no learning and no wealth in the state.
     constant: bool,
     start_is_single: bool,
@@ -49,71 +62,73 @@ fn admissible(log_return: f64, problem: &ProblemSpecification) -> f64 {
 }
 
 impl Design {
-    /// Simulates the design of a completed specification. Streams: ("design", t, i) for the steps of point i,
-    /// ("initial", 0, i) for its start.
-    ///
-    /// # Errors
-    /// [`TrainError::Stopped`] soon after the stop signal.
-    pub fn simulate(specification: &Specification, stop: &AtomicBool) -> Result<Self, TrainError> {
+    /// The design of a completed specification.
+    pub fn new(specification: &Specification) -> Self {
         let problem = &specification.problem;
         let design = &specification.design;
         let count = design.count.unwrap_or(super::limits::DEFAULT_COUNT);
         let bootstrap = SamplingLaw::Bootstrap {};
-        let law = continuous_law(design.sampling_law.as_ref().unwrap_or(&bootstrap), &problem.history);
         let start = design.wealth.unwrap_or(Interval { min: problem.initial_wealth, max: problem.initial_wealth });
         let learns = problem.framework.learns();
         let resampled = learns && design.initial_laws == InitialLaws::Resampled;
         let wealth_matters = depends_on_wealth(problem.utility);
-        let mut made = Design {
-            history: problem.history.clone(),
-            learns,
-            initial: Vec::new(),
-            returns: Vec::new(),
-            wealth: Vec::new(),
+        Design {
+            law: continuous_law(design.sampling_law.as_ref().unwrap_or(&bootstrap), &problem.history),
+            seed: specification.seed,
+            count,
+            start,
+            resampled,
+            ladder: if learns { Vec::new() } else { wealth_ladders(problem, start, count) },
             constant: !learns && !wealth_matters,
             start_is_single: !resampled && (start.min == start.max || !wealth_matters),
-        };
-        if !learns {
-            made.wealth = wealth_ladders(problem, start, count);
-            return Ok(made);
+            problem: problem.clone(),
         }
-        for point in 0..count {
-            if stop.load(Ordering::Relaxed) {
-                return Err(TrainError::Stopped);
-            }
-            let mut generator = stream(specification.seed, "initial", 0, point);
-            let mut wealth = start.min * (start.max / start.min).powf(generator.random::<f64>());
-            if resampled {
-                let draw = |_| admissible(law.draw(&mut generator), problem);
-                made.initial.push((0..problem.history.len()).map(draw).collect());
-            }
-            let (mut returns, mut path) = (Vec::with_capacity(problem.horizon), vec![wealth]);
-            for step in 0..problem.horizon.saturating_sub(1) {
-                let mut generator = stream(specification.seed, "design", step, point);
-                let action = problem.action_interval[1] * generator.random::<f64>();
-                let log_return = admissible(law.draw(&mut generator), problem);
-                wealth = next_wealth(wealth, action, log_return, problem.rate_per_step);
-                returns.push(log_return);
-                path.push(wealth);
-            }
-            made.returns.push(returns);
-            made.wealth.push(path);
-        }
-        Ok(made)
     }
 
     /// Number of distinct design points of a step: 1 where they are all the same state.
     pub fn count(&self, step: usize) -> usize {
-        if self.constant || (step == 0 && self.start_is_single) { 1 } else { self.wealth.len() }
+        if self.constant || (step == 0 && self.start_is_single) { 1 } else { self.count }
     }
 
-    /// Design point `point` of `step`.
-    pub fn state(&self, step: usize, point: usize) -> State {
-        let mut sample = self.initial.get(point).unwrap_or(&self.history).clone();
-        if self.learns {
-            sample.extend_from_slice(&self.returns[point][..step]);
+    /// Candidates from which the design points of a step are chosen: as many as those where there is no choice.
+    pub fn candidate_count(&self, step: usize) -> usize {
+        let count = self.count(step);
+        if count == 1 || !self.ladder.is_empty() { count } else { CANDIDATES_PER_POINT * count }
+    }
+
+    /// The first so many candidates are design points as they are.
+    pub fn as_drawn_count(&self, step: usize) -> usize {
+        let count = self.count(step);
+        if self.candidate_count(step) == count { count } else { count.div_ceil(AS_DRAWN) }
+    }
+
+    /// Independent draws of the design's law, to judge the surrogates by; none where the state is wealth alone.
+    pub fn guards(&self, step: usize) -> Range<usize> {
+        let candidates = self.candidate_count(step);
+        if self.ladder.is_empty() { candidates..candidates + GUARDS } else { 0..0 }
+    }
+
+    /// State `index` of `step`; those beyond the candidates are independent draws of the same law. Streams:
+    /// ("initial", 0, index) for the start, ("design", t, index) for each step. Cost O((history + step) ln(..)).
+    pub fn state(&self, step: usize, index: usize) -> State {
+        let problem = &self.problem;
+        if let Some(wealths) = self.ladder.get(index) {
+            return State { wealth: wealths[step], law: EmpiricalDistribution::new(&problem.history) };
         }
-        State { wealth: self.wealth[point][step], law: EmpiricalDistribution::new(&sample) }
+        let mut generator = stream(self.seed, "initial", 0, index);
+        let mut wealth = self.start.min * (self.start.max / self.start.min).powf(generator.random::<f64>());
+        let mut sample = problem.history.clone();
+        if self.resampled {
+            sample.fill_with(|| admissible(self.law.draw(&mut generator), problem));
+        }
+        for earlier in 0..step {
+            let mut generator = stream(self.seed, "design", earlier, index);
+            let action = problem.action_interval[1] * generator.random::<f64>();
+            let log_return = admissible(self.law.draw(&mut generator), problem);
+            wealth = next_wealth(wealth, action, log_return, problem.rate_per_step);
+            sample.push(log_return);
+        }
+        State { wealth, law: EmpiricalDistribution::new(&sample) }
     }
 }
 

@@ -14,13 +14,24 @@ const SMALLEST_RADIUS: f64 = 1e-12;
 /// A feature whose spread over the design is below this share of its size carries no information.
 const SMALLEST_SPREAD: f64 = 1e-9;
 
-/// Which features a specification has, in order: wealth first, then the law, then the radius.
+/// Which features a specification has, in order: wealth first, then the law, then its uncertainty set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FeatureSelection {
     map: FeatureMap,
     wealth: bool,
     moments: usize,
     radius: bool,
+    robust_excess: bool,
+}
+
+/// What of an empirical law and its ball the features are made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LawSummary {
+    pub moments: CentralMoments,
+    pub radius: f64,
+    /// `min_F E_F[e^Z] / (1 + r) - 1` over the ball: the first unit of allocation earns this against the worst law,
+    /// and its sign decides whether anything is held at the last step.
+    pub robust_excess: f64,
 }
 
 impl FeatureSelection {
@@ -33,6 +44,7 @@ impl FeatureSelection {
             wealth: depends_on_wealth(specification.problem.utility),
             moments: if learns { specification.surrogate.moment_count } else { 0 },
             radius: learns && radius_varies && map == FeatureMap::Standardized,
+            robust_excess: learns && map == FeatureMap::Standardized,
         }
     }
 
@@ -41,9 +53,9 @@ impl FeatureSelection {
         self.wealth
     }
 
-    /// True where the radius is the last feature.
-    pub fn has_radius(&self) -> bool {
-        self.radius
+    /// True where the features depend on the ball and not on its centre alone.
+    pub fn has_ball(&self) -> bool {
+        self.robust_excess
     }
 
     /// Names, in order.
@@ -66,6 +78,9 @@ impl FeatureSelection {
         if self.radius {
             names.push("log_radius".to_owned());
         }
+        if self.robust_excess {
+            names.push("robust_excess".to_owned());
+        }
         names
     }
 
@@ -75,8 +90,9 @@ impl FeatureSelection {
     }
 
     /// All features of a state, unscaled.
-    pub fn of(&self, wealth: f64, moments: &CentralMoments, radius: f64) -> Vec<f64> {
-        let mut features = Vec::with_capacity(self.moments + 2);
+    pub fn of(&self, wealth: f64, law: &LawSummary) -> Vec<f64> {
+        let LawSummary { moments, radius, robust_excess } = law;
+        let mut features = Vec::with_capacity(self.moments + 3);
         if self.wealth {
             features.push(self.wealth(wealth));
         }
@@ -88,6 +104,9 @@ impl FeatureSelection {
         }
         if self.radius {
             features.push(radius.max(SMALLEST_RADIUS).ln());
+        }
+        if self.robust_excess {
+            features.push(*robust_excess);
         }
         features
     }

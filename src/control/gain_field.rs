@@ -5,12 +5,10 @@
 //! function on that strip, so it is tabulated once, exactly, at a few returns (local cubics between them) times a
 //! few Chebyshev nodes in log wealth, and every action is then priced without touching the surrogate again.
 
-use super::features::FeatureSelection;
+use super::context::ProblemContext;
 use super::state::{State, growth};
 use super::surrogate::{NextValue, ValueSurrogate, wealth_is_active};
-use super::uncertainty::UncertaintySets;
 use crate::numerics::chebyshev::{Chebyshev, local_cubic};
-use crate::numerics::moments::CentralMoments;
 
 /// Chebyshev nodes in log wealth.
 const WEALTH_NODES: usize = 9;
@@ -18,10 +16,8 @@ const WEALTH_NODES: usize = 9;
 /// What of the problem the field needs.
 #[derive(Clone, Copy)]
 pub struct FieldContext<'a> {
-    pub selection: &'a FeatureSelection,
-    pub sets: &'a UncertaintySets,
+    pub problem: &'a ProblemContext,
     pub next: &'a NextValue,
-    pub learns: bool,
     pub rate_per_step: f64,
     pub highest_action: f64,
 }
@@ -43,8 +39,8 @@ impl<'a> GainField<'a> {
             GainField { context, wealth: state.wealth, returns, wealth_nodes: Chebyshev::new(1), table: Vec::new() };
         let wealth_matters = match context.next {
             NextValue::Terminal | NextValue::Constant(_) => return field,
-            NextValue::Surrogate(surrogate) => wealth_is_active(context.selection, &surrogate.scaling),
-            NextValue::Exact(_) => context.selection.has_wealth(),
+            NextValue::Surrogate(surrogate) => wealth_is_active(&context.problem.selection, &surrogate.scaling),
+            NextValue::Exact(_) => context.problem.selection.has_wealth(),
         };
         field.wealth_nodes = Chebyshev::new(if wealth_matters { WEALTH_NODES } else { 1 });
         match context.next {
@@ -58,7 +54,7 @@ impl<'a> GainField<'a> {
     fn fill_exactly(&mut self, state: &State, gain: &(dyn Fn(&State) -> f64 + Send + Sync)) {
         for &log_return in &self.returns {
             let mut law = state.law.clone();
-            if self.context.learns {
+            if self.context.problem.specification.problem.framework.learns() {
                 law.push(log_return);
             }
             let (bank, full) = self.wealth_range(log_return);
@@ -70,28 +66,22 @@ impl<'a> GainField<'a> {
     }
 
     fn fill(&mut self, state: &State, surrogate: &ValueSurrogate, wealth_matters: bool) {
-        let before = CentralMoments::of(&state.law);
-        let radii = if self.context.selection.has_radius() {
-            self.context.sets.radii_with(&state.law, &self.returns)
-        } else {
-            vec![0.0; self.returns.len()]
-        };
+        let features = self.context.problem.features_with(&state.law, self.wealth, &self.returns);
         let count = surrogate.scaling.active.len();
         let mut law_part = vec![0.0; surrogate.mean.input_count()];
         let mut squared = law_part.clone();
-        for (&log_return, &radius) in self.returns.iter().zip(&radii) {
-            let moments = if self.context.learns { before.with(log_return) } else { before };
-            let mut input = surrogate.scaling.apply(&self.context.selection.of(self.wealth, &moments, radius));
+        for (index, features) in features.iter().enumerate() {
+            let mut input = surrogate.scaling.apply(features);
             if !wealth_matters {
                 surrogate.mean.squared_distances(&input, 0..count, &mut squared);
                 self.table.push(surrogate.offset + surrogate.scale * surrogate.mean.mean_from_squared(&squared));
                 continue;
             }
             surrogate.mean.squared_distances(&input, 1..count, &mut law_part);
-            let (bank, full) = self.wealth_range(log_return);
+            let (bank, full) = self.wealth_range(self.returns[index]);
             for node in self.wealth_nodes.nodes() {
                 let wealth = self.wealth * (bank + node * (full - bank)).exp();
-                let feature = self.context.selection.wealth(wealth);
+                let feature = self.context.problem.selection.wealth(wealth);
                 input[0] = (feature - surrogate.scaling.centre[0]) / surrogate.scaling.spread[0];
                 surrogate.mean.squared_distances(&input, 0..1, &mut squared);
                 for (total, law) in squared.iter_mut().zip(&law_part) {

@@ -7,6 +7,7 @@ pub mod context;
 pub mod design;
 pub mod error;
 pub mod features;
+pub mod fitting;
 pub mod gain_field;
 pub mod limits;
 pub mod policy;

@@ -60,27 +60,35 @@ impl UncertaintySets {
 
     /// Radius of the ball around `law`, in log-return.
     pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
-        let size = law.sample_size() as f64;
         match self.rule {
-            _ if !self.uncertain => 0.0,
-            RadiusRule::Bridge { scale, .. } => {
-                scale * self.quantile(law).map_or(0.0, |found| found.value) / size.sqrt()
+            RadiusRule::Bridge { scale, .. } if self.uncertain => {
+                scale * self.quantile(law).map_or(0.0, |found| found.value) / (law.sample_size() as f64).sqrt()
             }
-            RadiusRule::Concentration { alpha, numerator, rate } => ((numerator / alpha).ln() / (rate * size)).sqrt(),
-            RadiusRule::RootN { kappa } => kappa / size.sqrt(),
-            RadiusRule::Fixed { radius } => radius,
+            _ => self.radius_of_size(law.sample_size()),
         }
     }
 
-    /// Radii of `law` with one more value, for every value in ascending `values`; used where the radius varies.
+    /// Radii of `law` with one more value, for every value in ascending `values`.
     pub fn radii_with(&self, law: &EmpiricalDistribution, values: &[f64]) -> Vec<f64> {
+        let size = law.sample_size() + 1;
         match self.rule {
             RadiusRule::Bridge { alpha, paths, scale } if self.uncertain => {
-                let size = law.sample_size() + 1;
                 let quantiles = self.bridges(size, paths).quantiles_with(law.atoms(), values, alpha);
                 quantiles.into_iter().map(|quantile| scale * quantile / (size as f64).sqrt()).collect()
             }
-            _ => vec![0.0; values.len()],
+            _ => vec![self.radius_of_size(size); values.len()],
+        }
+    }
+
+    /// The radius under the rules that look at the sample size alone.
+    fn radius_of_size(&self, sample_size: usize) -> f64 {
+        let size = sample_size as f64;
+        match self.rule {
+            RadiusRule::Bridge { .. } => 0.0,
+            _ if !self.uncertain => 0.0,
+            RadiusRule::Concentration { alpha, numerator, rate } => ((numerator / alpha).ln() / (rate * size)).sqrt(),
+            RadiusRule::RootN { kappa } => kappa / size.sqrt(),
+            RadiusRule::Fixed { radius } => radius,
         }
     }
 }

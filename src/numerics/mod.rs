@@ -4,6 +4,8 @@ pub mod bridge;
 pub mod chebyshev;
 pub mod cholesky;
 pub mod empirical;
+pub mod exponential_mean;
+pub mod farthest;
 pub mod gp;
 pub mod gp_fit;
 pub mod law;

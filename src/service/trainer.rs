@@ -174,7 +174,7 @@ impl Worker {
             Ok(specification) => specification,
             Err(error) => return failed(format!("the stored specification cannot be read: {error}")),
         };
-        let training = match self.pool.install(|| Training::prepare(&specification, stop)) {
+        let training = match self.pool.install(|| Training::new(&specification)) {
             Ok(training) => training,
             Err(TrainError::Stopped) => return Ok(Ended::Stopped),
             Err(error) => return failed(error.to_string()),

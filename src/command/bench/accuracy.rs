@@ -96,7 +96,7 @@ fn fresh_states(specification: &Specification, step: usize, count: usize) -> Res
     let mut fresh = specification.clone();
     fresh.seed = FRESH_SEED;
     fresh.design.count = Some(count);
-    let design = Design::simulate(&fresh, &AtomicBool::new(false))?;
+    let design = Design::new(&fresh);
     Ok((0..count).map(|point| design.state(step, point)).collect())
 }
 

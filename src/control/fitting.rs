@@ -1,0 +1,225 @@
+//! Fitting the surrogates of one step to its solved design points.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::backward::{Phase, StepProgress, Watch};
+use super::bellman::RobustSolution;
+use super::context::ProblemContext;
+use super::error::TrainError;
+use super::features::Scaling;
+use super::policy::{StepDiagnostics, SurrogateDiagnostics};
+use super::surrogate::{Solution, StepSurrogates, StoredSurrogate, TargetMap};
+use crate::numerics::gp::{GaussianProcess, Hyperparameters, LeaveOneOut};
+use crate::numerics::gp_fit::{self, Bounds};
+
+/// Share of the states of the design's own law that lie within the guard.
+const GUARDED_SHARE: f64 = 0.99;
+
+/// One solved design point.
+pub struct Solved {
+    pub wealth: f64,
+    pub features: Vec<f64>,
+    pub solution: RobustSolution,
+}
+
+/// Hyperparameters from which the search for both surrogates starts.
+pub struct Start {
+    pub value: Hyperparameters,
+    pub policy: Hyperparameters,
+}
+
+/// What a fit needs to know of its step.
+pub struct Fitting<'a> {
+    pub context: &'a ProblemContext,
+    pub step: usize,
+    pub scaling: &'a Scaling,
+    pub watch: &'a Watch<'a>,
+}
+
+/// A regression problem: targets of zero prior mean and unit size.
+struct Targets {
+    scaled: Vec<f64>,
+    offset: f64,
+    scale: f64,
+}
+
+impl Targets {
+    /// Divides by the root mean square about the offset, which is the mean where `centre` is, else 0.
+    fn new(values: &[f64], centre: Centre) -> Self {
+        let count = values.len() as f64;
+        let offset = match centre {
+            Centre::Zero => 0.0,
+            Centre::Mean => values.iter().sum::<f64>() / count,
+        };
+        let size = (values.iter().map(|value| (value - offset).powi(2)).sum::<f64>() / count).sqrt();
+        let scale = if size > 1e-12 { size } else { 1.0 };
+        Targets { scaled: values.iter().map(|value| (value - offset) / scale).collect(), offset, scale }
+    }
+}
+
+/// The prior mean of a surrogate.
+#[derive(Clone, Copy)]
+enum Centre {
+    Zero,
+    Mean,
+}
+
+impl Fitting<'_> {
+    /// The hyperparameters of the step after, if it has surrogates of the same inputs.
+    pub fn start_from(&self, after: &Solution) -> Option<Start> {
+        match after {
+            Solution::Surrogates(stored) if stored.scaling.active == self.scaling.active => Some(Start {
+                value: stored.value.hyperparameters.clone(),
+                policy: stored.policy.hyperparameters.clone(),
+            }),
+            _ => None,
+        }
+    }
+
+    /// A first fit to few design points.
+    ///
+    /// # Errors
+    /// A covariance matrix that stays singular.
+    pub fn coarse(&self, solved: &[Solved]) -> Result<Start, TrainError> {
+        let inputs = self.inputs(solved);
+        let [value, policy] = self.targets(solved);
+        Ok(Start {
+            value: self.search("value", &inputs, &value.scaled, None)?.hyperparameters,
+            policy: self.search("policy", &inputs, &policy.scaled, None)?.hyperparameters,
+        })
+    }
+
+    /// Both surrogates, by maximum likelihood. `guards` are features of independent states of the design's own law: the
+    /// guard is set so that the share [`GUARDED_SHARE`] of them passes. Where there are none, the design points take
+    /// their place, each predicted from the others.
+    ///
+    /// # Errors
+    /// A covariance matrix that stays singular; the stop signal.
+    pub fn surrogates(
+        &self,
+        solved: &[Solved],
+        start: &Start,
+        guards: &[Vec<f64>],
+        diagnostics: &mut StepDiagnostics,
+    ) -> Result<Solution, TrainError> {
+        let total = solved.len();
+        (self.watch.progress)(StepProgress { step: self.step, phase: Phase::Fitting, done: total, total });
+        self.watch.go_on()?;
+        let inputs = self.inputs(solved);
+        let [value, policy] = self.targets(solved);
+        let (value, policy) = rayon::join(
+            || self.fitted("value", &inputs, &value, &start.value),
+            || self.fitted("policy", &inputs, &policy, &start.policy),
+        );
+        let (value, policy) = (value?, policy?);
+        let deviations: Vec<f64> = if guards.is_empty() {
+            value.left_out.latent_sd.clone()
+        } else {
+            guards.par_iter().map(|guard| value.process.latent_variance(&self.scaling.apply(guard)).sqrt()).collect()
+        };
+        let names = self.context.selection.names();
+        let names: Vec<String> = self.scaling.active.iter().map(|&feature| names[feature].clone()).collect();
+        diagnostics.value = Some(value.diagnostics(&names));
+        diagnostics.policy = Some(policy.diagnostics(&names));
+        Ok(Solution::Surrogates(Box::new(StepSurrogates {
+            inputs: inputs.column_iter().map(|column| column.iter().copied().collect()).collect(),
+            scaling: self.scaling.clone(),
+            deviation_limit: quantile(&deviations, GUARDED_SHARE),
+            largest_gain: solved.iter().map(|point| point.solution.floor_gain).fold(0.0, f64::max),
+            value: value.stored,
+            policy: policy.stored,
+        })))
+    }
+
+    fn inputs(&self, solved: &[Solved]) -> DMatrix<f64> {
+        let rows: Vec<Vec<f64>> = solved.iter().map(|point| point.features.clone()).collect();
+        self.scaling.matrix(&rows)
+    }
+
+    /// The value's targets, then the policy's.
+    fn targets(&self, solved: &[Solved]) -> [Targets; 2] {
+        let map = TargetMap::new(&self.context.specification, self.step);
+        let gains: Vec<f64> = solved.iter().map(|point| map.target(point.solution.floor_gain, point.wealth)).collect();
+        let actions: Vec<f64> = solved.iter().map(|point| point.solution.extended_action).collect();
+        let centre = if map.is_value() { Centre::Mean } else { Centre::Zero };
+        [Targets::new(&gains, centre), Targets::new(&actions, Centre::Mean)]
+    }
+
+    fn search(
+        &self,
+        surrogate: &'static str,
+        inputs: &DMatrix<f64>,
+        targets: &[f64],
+        start: Option<&Hyperparameters>,
+    ) -> Result<gp_fit::Fit, TrainError> {
+        let bounds = self.context.specification.surrogate.bounds;
+        let bounds = Bounds {
+            lengthscale: bounds.lengthscale,
+            signal_variance: bounds.signal_variance,
+            noise_variance: bounds.noise_variance,
+        };
+        gp_fit::fit(inputs, targets, &bounds, start).map_err(|error| self.singular(surrogate, error.jitter))
+    }
+
+    fn singular(&self, surrogate: &'static str, jitter: f64) -> TrainError {
+        TrainError::Singular { step: self.step, surrogate, jitter }
+    }
+
+    fn fitted(
+        &self,
+        surrogate: &'static str,
+        inputs: &DMatrix<f64>,
+        targets: &Targets,
+        start: &Hyperparameters,
+    ) -> Result<Fitted, TrainError> {
+        let found = self.search(surrogate, inputs, &targets.scaled, Some(start))?;
+        let process = GaussianProcess::condition(inputs, &targets.scaled, &found.hyperparameters)
+            .map_err(|error| self.singular(surrogate, error.jitter))?;
+        Ok(Fitted {
+            left_out: process.leave_one_out(&targets.scaled),
+            log_likelihood_per_point: found.log_likelihood / targets.scaled.len() as f64,
+            search: format!("{:?}", found.outcome),
+            stored: StoredSurrogate {
+                hyperparameters: found.hyperparameters,
+                weights: process.weights().to_vec(),
+                offset: targets.offset,
+                scale: targets.scale,
+            },
+            process,
+        })
+    }
+}
+
+/// A fitted surrogate with the figures that describe the fit.
+struct Fitted {
+    stored: StoredSurrogate,
+    left_out: LeaveOneOut,
+    log_likelihood_per_point: f64,
+    process: GaussianProcess,
+    search: String,
+}
+
+impl Fitted {
+    fn diagnostics(&self, features: &[String]) -> SurrogateDiagnostics {
+        let squares: f64 = self.left_out.errors.iter().map(|error| error * error).sum();
+        SurrogateDiagnostics {
+            features: features.to_vec(),
+            lengthscales: self.stored.hyperparameters.lengthscales.clone(),
+            signal_variance: self.stored.hyperparameters.signal_variance,
+            noise_variance: self.stored.hyperparameters.noise_variance,
+            log_likelihood_per_point: self.log_likelihood_per_point,
+            leave_one_out_error: self.stored.scale * (squares / self.left_out.errors.len() as f64).sqrt(),
+            jitter: self.process.jitter(),
+            search: self.search.clone(),
+        }
+    }
+}
+
+/// The order statistic below which a share of `values` lies.
+fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let index = (share * sorted.len() as f64) as usize;
+    sorted.get(index.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0.0)
+}
