@@ -17,7 +17,7 @@ use crate::numerics::wasserstein::{WassersteinBall, WorstLaw};
 const COARSE_ACTIONS: usize = 12;
 const ACTION_TOLERANCE: f64 = 1e-7;
 /// Step of the one-sided derivatives at a bound.
-const DERIVATIVE_STEP: f64 = 1e-2;
+const DERIVATIVE_STEP: f64 = 5e-2;
 /// The curvature there is taken to lie within this factor of relative risk aversion times variance.
 const CURVATURE_RANGE: f64 = 4.0;
 /// How far past a bound the policy target may be extended.

@@ -12,7 +12,7 @@ const SUBSET_ABOVE_ROWS: usize = 400;
 const SUBSET_ROWS: usize = 300;
 const ITERATION_LIMIT: usize = 100;
 /// From the optimum of the subset the optimum of all rows is close.
-const POLISH_ITERATION_LIMIT: usize = 12;
+const POLISH_ITERATION_LIMIT: usize = 40;
 /// Default start: the share of the targets' variance taken for noise.
 const START_NOISE_SHARE: f64 = 1e-2;
 
