@@ -14,8 +14,9 @@ use crate::numerics::minimise::maximise_concave_scalar;
 use crate::numerics::wasserstein::{WassersteinBall, WorstLaw};
 
 /// Equal parts of the action interval that are tried before the search between the best one's neighbours.
-const COARSE_ACTIONS: usize = 12;
+const COARSE_ACTIONS: usize = 8;
 const ACTION_TOLERANCE: f64 = 1e-7;
+const PLACING_TOLERANCE: f64 = 1e-4;
 /// Step of the one-sided derivatives at a bound.
 const DERIVATIVE_STEP: f64 = 5e-2;
 /// The curvature there is taken to lie within this factor of relative risk aversion times variance.
@@ -100,20 +101,24 @@ impl RobustStep<'_> {
         let (coarse, _) = self.best_action(&grid, &rows, lowest, highest);
         let part = (highest - lowest) / COARSE_ACTIONS as f64;
         let (low, high) = ((coarse - part).max(lowest), (coarse + part).min(highest));
-        let mut action = maximise_concave_scalar(|a| self.robust_value(&grid, &rows, a), low, high, ACTION_TOLERANCE).0;
+        let polished = |grid: &Grid, rows: &FieldRows, tolerance: f64| {
+            maximise_concave_scalar(|action| self.robust_value(grid, rows, action), low, high, tolerance).0
+        };
+        // Until the last refinement the action only has to say where the worst law puts its mass.
+        let mut action = polished(&grid, &rows, if self.radius > 0.0 { PLACING_TOLERANCE } else { ACTION_TOLERANCE });
         let rounds = if self.radius > 0.0 && action > 0.0 { REFINEMENTS } else { 0 };
-        for _ in 0..rounds {
+        for round in 1..=rounds {
             let near: Vec<bool> = self.destinations(&grid, &rows, action);
             let refined = subdivided(&grid.support, REFINED_PARTS, |interval| near[interval] || near[interval + 1]);
             grid = self.grid(refined);
             rows = field.at(&grid.support);
-            action = maximise_concave_scalar(|a| self.robust_value(&grid, &rows, a), low, high, ACTION_TOLERANCE).0;
+            action = polished(&grid, &rows, if round == rounds { ACTION_TOLERANCE } else { PLACING_TOLERANCE });
         }
         self.solution(grid, &rows, action)
     }
 
     fn solution(&self, grid: Grid, rows: &FieldRows, action: f64) -> RobustSolution {
-        let payoff = self.payoff(&grid.support, rows, action);
+        let payoff = self.payoff(rows, action);
         let worst = self.worst_law(&grid, &payoff);
         let gain = self.utility.inverse(worst.expectation);
         RobustSolution {
@@ -141,19 +146,14 @@ impl RobustStep<'_> {
     }
 
     /// Relative utility of the next state's certainty equivalent at every support point.
-    fn payoff(&self, support: &[f64], rows: &FieldRows, action: f64) -> Vec<f64> {
-        let rate = self.field.rate_per_step;
-        let bank = rate.ln_1p();
-        let payoff = |(index, &log_return): (usize, &f64)| {
-            let log_growth = growth(action, log_return, rate).ln();
-            self.utility.value(log_growth - bank + rows.gain(index, log_growth))
-        };
-        support.iter().enumerate().map(payoff).collect()
+    fn payoff(&self, rows: &FieldRows, action: f64) -> Vec<f64> {
+        let (relative, gains) = rows.at_action(action);
+        self.utility.values(relative, &gains)
     }
 
     /// Worst expected relative utility of an action.
     fn robust_value(&self, grid: &Grid, rows: &FieldRows, action: f64) -> f64 {
-        self.ball(grid).worst_expectation(&self.payoff(&grid.support, rows, action)).0
+        self.ball(grid).worst_expectation(&self.payoff(rows, action)).0
     }
 
     fn best_action(&self, grid: &Grid, rows: &FieldRows, low: f64, high: f64) -> (f64, f64) {
@@ -173,7 +173,7 @@ impl RobustStep<'_> {
     /// Support points that receive mass from elsewhere.
     fn destinations(&self, grid: &Grid, rows: &FieldRows, action: f64) -> Vec<bool> {
         let mut near = vec![false; grid.support.len()];
-        for moved in self.ball(grid).worst_law(&self.payoff(&grid.support, rows, action)).moves {
+        for moved in self.ball(grid).worst_law(&self.payoff(rows, action)).moves {
             near[moved.to] |= moved.to != moved.from;
         }
         near

@@ -91,7 +91,7 @@ impl Fitting<'_> {
     }
 
     /// Both surrogates, by maximum likelihood. `guards` are features of independent states of the design's own law: the
-    /// guard is set so that the share [`GUARDED_SHARE`] of them passes. Where there are none, the design points take
+    /// guard is set so that the share `GUARDED_SHARE` of them passes. Where there are none, the design points take
     /// their place, each predicted from the others.
     ///
     /// # Errors

@@ -4,7 +4,10 @@
 //! wealth L of all-bank: with `w = ln(x_T / L)`, `u(0) = 0` and `u'(0) = 1`. Rounding is then relative to the gain
 //! the investor cares about, at any wealth and risk aversion.
 
+use pulp::Arch;
+
 use super::specification::UtilitySpecification;
+use crate::numerics::elementary::{exp_m1, ln};
 
 /// Largest exponent taken: exp(600) is finite, and a loss that deep is never chosen.
 const LARGEST_EXPONENT: f64 = 600.0;
@@ -39,6 +42,35 @@ impl RelativeUtility {
             RelativeUtility::Power { eta } => ((1.0 - eta) * log_gain).min(LARGEST_EXPONENT).exp_m1() / (1.0 - eta),
             RelativeUtility::Log => log_gain.max(-LARGEST_EXPONENT),
         }
+    }
+
+    /// u(ln(relative_j) + gains_j) for all j, in place of `relative`: wealth over all-bank wealth, positive.
+    pub fn values(self, mut relative: Vec<f64>, gains: &[f64]) -> Vec<f64> {
+        Arch::new().dispatch(
+            #[inline(always)]
+            || match self {
+                RelativeUtility::Exponential { k } => {
+                    for (value, gain) in relative.iter_mut().zip(gains) {
+                        let excess = (*value - 1.0) + *value * exp_m1(*gain);
+                        let loss = -k * excess;
+                        *value = -exp_m1(if loss < LARGEST_EXPONENT { loss } else { LARGEST_EXPONENT }) / k;
+                    }
+                }
+                RelativeUtility::Power { eta } => {
+                    for (value, gain) in relative.iter_mut().zip(gains) {
+                        let power = (1.0 - eta) * (ln(*value) + gain);
+                        let power = if power < LARGEST_EXPONENT { power } else { LARGEST_EXPONENT };
+                        *value = exp_m1(power) / (1.0 - eta);
+                    }
+                }
+                RelativeUtility::Log => {
+                    for (value, gain) in relative.iter_mut().zip(gains) {
+                        *value = ln(*value) + gain;
+                    }
+                }
+            },
+        );
+        relative
     }
 
     /// The log gain whose utility is `value`: the log certainty equivalent over the floor.
@@ -90,6 +122,23 @@ pub fn depends_on_wealth(utility: UtilitySpecification) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn many_values_equal_one_by_one() {
+        let (relative, gains): (Vec<f64>, [f64; 5]) = (vec![0.01, 0.7, 1.0, 1.2, 3.0], [0.0, 0.01, 0.0, 0.2, 0.5]);
+        for utility in
+            [RelativeUtility::Exponential { k: 1.2 }, RelativeUtility::Power { eta: 3.0 }, RelativeUtility::Log]
+        {
+            let expected = relative.iter().zip(gains).map(|(relative, gain)| utility.value(relative.ln() + gain));
+            for (found, expected) in utility.values(relative.clone(), &gains).iter().zip(expected) {
+                // Relative error of two exponentials, and the rounding of 1.
+                assert!(
+                    (found - expected).abs() < 4e-14 * expected.abs() + 2e-16,
+                    "{utility:?}: {found} against {expected}"
+                );
+            }
+        }
+    }
 
     #[test]
     fn relative_utility_is_an_affine_map_of_the_utility() {

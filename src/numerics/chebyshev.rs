@@ -25,19 +25,16 @@ impl Chebyshev {
         &self.nodes
     }
 
-    /// The polynomial through `values` at the nodes, evaluated at `position`. Cost O(count).
-    pub fn evaluate(&self, values: &[f64], position: f64) -> f64 {
-        let (mut numerator, mut denominator) = (0.0, 0.0);
-        for ((&node, &weight), &value) in self.nodes.iter().zip(&self.weights).zip(values) {
-            let distance = position - node;
-            if distance == 0.0 {
-                return value;
-            }
-            let ratio = weight / distance;
-            numerator += ratio * value;
-            denominator += ratio;
+    /// The weight of each node's value in the polynomial through them, evaluated at `position`. Cost O(count).
+    pub fn basis(&self, position: f64) -> Vec<f64> {
+        if let Some(hit) = self.nodes.iter().position(|&node| node == position) {
+            return (0..self.nodes.len()).map(|node| if node == hit { 1.0 } else { 0.0 }).collect();
         }
-        numerator / denominator
+        let ratios = self.nodes.iter().zip(&self.weights).map(|(node, weight)| weight / (position - node));
+        let mut basis: Vec<f64> = ratios.collect();
+        let total: f64 = basis.iter().sum();
+        basis.iter_mut().for_each(|ratio| *ratio /= total);
+        basis
     }
 }
 
@@ -73,7 +70,8 @@ mod tests {
         let grid = [-1.0, -0.4, -0.3, 0.0, 0.5, 0.6, 1.2];
         for step in 0..=20 {
             let x = step as f64 / 20.0;
-            assert!((chebyshev.evaluate(&values, x) - cubic(x)).abs() < 1e-13);
+            let found: f64 = chebyshev.basis(x).iter().zip(&values).map(|(weight, value)| weight * value).sum();
+            assert!((found - cubic(x)).abs() < 1e-13);
             let (first, weights) = local_cubic(&grid, x);
             let sum: f64 = weights.iter().zip(&grid[first..]).map(|(w, &node)| w * cubic(node)).sum();
             assert!((sum - cubic(x)).abs() < 1e-12);

@@ -6,58 +6,24 @@
 
 use pulp::Arch;
 
+use super::elementary::exp;
+
 /// Accumulators of a sum: two 256-bit vectors of four, or one of eight.
 pub(super) const LANES: usize = 8;
 /// Values staged on the stack between the two passes of a kernel sum; a multiple of `LANES`.
 const BLOCK: usize = 256;
-/// Below this the exponential has no normal value; it is held at about 3e-308.
-const EXPONENT_FLOOR: f64 = -708.0;
-/// Adding 1.5 * 2^52 rounds to an integer and leaves it in the low bits.
-const ROUNDER: f64 = 6_755_399_441_055_744.0;
-/// ln 2 in two parts; the first has 21 trailing zero bits, so its product with an exponent is exact.
-const LN2_HIGH: f64 = f64::from_bits(0x3fe6_2e42_fee0_0000);
-const LN2_LOW: f64 = f64::from_bits(0x3dea_39ef_3579_3c76);
-
-/// exp(x) for x <= 0, with relative error below 1e-14 on [-708, 0] and 3e-308 under it. A NaN stays a NaN.
-///
-///   exp(x) = 2^k exp(x - k ln 2),  k = round(x / ln 2)
-///
-/// The second factor is the Taylor polynomial of degree 12 on [-0.347, 0.347], whose remainder is below 3e-16.
-/// Branchless: LLVM turns a loop over it into vector code.
-#[inline(always)]
-pub fn exp_nonpositive(x: f64) -> f64 {
-    let x = if x < EXPONENT_FLOOR { EXPONENT_FLOOR } else { x };
-    let rounded = x * std::f64::consts::LOG2_E + ROUNDER;
-    let k = rounded - ROUNDER;
-    let t = (x - k * LN2_HIGH) - k * LN2_LOW;
-    let mut sum = 1.0 / 479_001_600.0;
-    sum = sum * t + 1.0 / 39_916_800.0;
-    sum = sum * t + 1.0 / 3_628_800.0;
-    sum = sum * t + 1.0 / 362_880.0;
-    sum = sum * t + 1.0 / 40_320.0;
-    sum = sum * t + 1.0 / 5_040.0;
-    sum = sum * t + 1.0 / 720.0;
-    sum = sum * t + 1.0 / 120.0;
-    sum = sum * t + 1.0 / 24.0;
-    sum = sum * t + 1.0 / 6.0;
-    sum = sum * t + 0.5;
-    sum = sum * t + 1.0;
-    sum = sum * t + 1.0;
-    sum * f64::from_bits(rounded.to_bits().wrapping_add(1023) << 52)
-}
-
 /// (1 + r + r^2/3) exp(-r) with r = sqrt(5 d2): the correlation at squared scaled distance d2.
 #[inline(always)]
 fn correlation(squared: f64) -> f64 {
     let r = (5.0 * squared).sqrt();
-    (1.0 + r + r * r * (1.0 / 3.0)) * exp_nonpositive(-r)
+    (1.0 + r + r * r * (1.0 / 3.0)) * exp(-r)
 }
 
 /// (5/3)(1 + r) exp(-r): minus twice the derivative of [`correlation`] with respect to d2.
 #[inline(always)]
 fn steepness(squared: f64) -> f64 {
     let r = (5.0 * squared).sqrt();
-    (5.0 / 3.0) * (1.0 + r) * exp_nonpositive(-r)
+    (5.0 / 3.0) * (1.0 + r) * exp(-r)
 }
 
 /// Adds left_j right_j to accumulator j mod `LANES`; every call but the last takes whole blocks.
@@ -193,19 +159,6 @@ pub fn weighted_squares(column: &[f64], centre: f64, weights: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_exponential_is_accurate_on_its_whole_domain() {
-        for index in 0..=700_000 {
-            let x = -f64::from(index) * 0.001 - f64::from(index % 7) * 1e-5;
-            let relative = (exp_nonpositive(x) / x.exp() - 1.0).abs();
-            assert!(relative < 1e-14, "exp({x}): relative error {relative:e}");
-        }
-        assert_eq!(exp_nonpositive(0.0), 1.0);
-        assert_eq!(exp_nonpositive(-0.0), 1.0);
-        assert!(exp_nonpositive(f64::NEG_INFINITY) < 1e-300);
-        assert!(exp_nonpositive(f64::NAN).is_nan());
-    }
 
     #[test]
     fn the_fast_sum_equals_the_plain_formula() {

@@ -3,6 +3,7 @@
 pub mod bridge;
 pub mod chebyshev;
 pub mod cholesky;
+pub mod elementary;
 pub mod empirical;
 pub mod exponential_mean;
 pub mod farthest;
