@@ -1,5 +1,7 @@
 //! Maximum likelihood for the scales of a Gaussian process, with exact gradients.
 
+use std::f64::consts::TAU;
+
 use nalgebra::DMatrix;
 
 use super::cholesky::{Cholesky, Singular};
@@ -12,7 +14,7 @@ const SUBSET_ABOVE_ROWS: usize = 400;
 const SUBSET_ROWS: usize = 300;
 const ITERATION_LIMIT: usize = 100;
 /// From the optimum of the subset the optimum of all rows is close.
-const POLISH_ITERATION_LIMIT: usize = 40;
+const POLISH_ITERATION_LIMIT: usize = 15;
 /// Default start: the share of the targets' variance taken for noise.
 const START_NOISE_SHARE: f64 = 1e-2;
 
@@ -38,7 +40,7 @@ pub struct Fit {
 
 /// The scales in `bounds` under which `targets` (n) at `inputs` (n rows, d columns) are most likely.
 ///
-/// Bounded L-BFGS-B over natural logarithms, from `start` (moved into the bounds) or from the spread of the data.
+/// Bounded L-BFGS-B over natural logarithms, the signal variance profiled out, from `start` (moved into the bounds) or from the spread of the data.
 /// Above 400 rows it searches about 300 rows, evenly strided, and polishes the result on all rows. A start whose
 /// kernel matrix is singular is retried with the greatest noise allowed; `Singular` when that fails too.
 /// Cost O(n^3) for each evaluation. Source: Rasmussen and Williams 2006, section 5.4.1.
@@ -49,7 +51,7 @@ pub fn fit(
     start: Option<&Hyperparameters>,
 ) -> Result<Fit, Singular> {
     let n = inputs.nrows();
-    let mut point = logs(&start.cloned().unwrap_or_else(|| start_from_spread(inputs, targets)));
+    let mut point = point_of(&start.cloned().unwrap_or_else(|| start_from_spread(inputs, targets)));
     let mut evaluations = 0;
     let mut iteration_limit = ITERATION_LIMIT;
     if n > SUBSET_ABOVE_ROWS {
@@ -61,8 +63,9 @@ pub fn fit(
         iteration_limit = POLISH_ITERATION_LIMIT;
     }
     let fine = search(inputs, targets, bounds, &point, iteration_limit)?;
+    let best = profiled(inputs, targets, bounds, &fine.point).ok_or(Singular { jitter: 0.0 })?;
     Ok(Fit {
-        hyperparameters: from_logs(&fine.point),
+        hyperparameters: hyperparameters(&fine.point, best.signal_variance),
         log_likelihood: -fine.value,
         evaluations: evaluations + fine.evaluations,
         outcome: fine.outcome,
@@ -114,6 +117,44 @@ fn contract(scaled: &DMatrix<f64>, mut inverse: DMatrix<f64>, alpha: &[f64], hyp
     gradient
 }
 
+/// The most likely signal variance at given length scales and noise ratio, with what the search needs there.
+struct Profiled {
+    log_likelihood: f64,
+    /// In the order log length scales, log noise ratio.
+    gradient: Vec<f64>,
+    signal_variance: f64,
+}
+
+/// The likelihood with the signal variance profiled out, at `point`: log length scales, then the log of the ratio
+/// nu = noise / signal variance.
+///
+///   s2(l, nu) = y^T A^-1 y / n, moved into its bounds,   A = R(l) + nu I,   K = s2 A
+///
+/// Where s2 is inside its bounds its own slope vanishes, so the gradient is the partial one; where a bound of the noise
+/// holds it, s2 moves against nu. The ridge along which s2 and the length scales trade places is gone, and with it most
+/// iterations of a search. `None` where A is singular. Cost as [`log_likelihood_and_gradient`].
+fn profiled(inputs: &DMatrix<f64>, targets: &[f64], bounds: &Bounds, point: &[f64]) -> Option<Profiled> {
+    let n = targets.len() as f64;
+    let unit = hyperparameters(point, 1.0);
+    let ratio = unit.noise_variance;
+    let scaled = unit.scale(inputs);
+    let factor = Cholesky::factor(&kernel_lower(&scaled, &unit))?;
+    let mut weights = factor.solve(targets);
+    let squares = matern::dot(targets, &weights);
+    let (signal, noise) = (bounds.signal_variance, bounds.noise_variance);
+    let (least, greatest) = (signal[0].max(noise[0] / ratio), signal[1].min(noise[1] / ratio));
+    let signal_variance = (squares / n).max(least).min(greatest);
+    let log_likelihood =
+        -0.5 * squares / signal_variance - 0.5 * factor.log_determinant() - 0.5 * n * (TAU * signal_variance).ln();
+    let root = signal_variance.sqrt();
+    weights.iter_mut().for_each(|weight| *weight /= root);
+    let mut gradient = contract(&scaled, factor.inverse(), &weights, &unit);
+    let (noise_slope, signal_slope) = (gradient.pop()?, gradient.pop()?);
+    let held_by_noise = signal_variance == noise[0] / ratio || signal_variance == noise[1] / ratio;
+    gradient.push(if held_by_noise { -signal_slope } else { noise_slope });
+    Some(Profiled { log_likelihood, gradient, signal_variance })
+}
+
 fn search(
     inputs: &DMatrix<f64>,
     targets: &[f64],
@@ -121,15 +162,22 @@ fn search(
     start: &[f64],
     iteration_limit: usize,
 ) -> Result<Minimum, Singular> {
-    let (lower, upper) = (log_bounds(bounds, inputs.ncols(), 0), log_bounds(bounds, inputs.ncols(), 1));
-    let objective = |point: &[f64]| match log_likelihood_and_gradient(inputs, targets, &from_logs(point)) {
-        Some((value, gradient)) => (-value, gradient.into_iter().map(|slope| -slope).collect()),
+    let d = inputs.ncols();
+    let (signal, noise) = (bounds.signal_variance, bounds.noise_variance);
+    let box_of = |side: usize| {
+        let mut logs = vec![bounds.lengthscale[side].ln(); d];
+        logs.push((noise[side] / signal[1 - side]).ln());
+        logs
+    };
+    let (lower, upper) = (box_of(0), box_of(1));
+    let objective = |point: &[f64]| match profiled(inputs, targets, bounds, point) {
+        Some(found) => (-found.log_likelihood, found.gradient.into_iter().map(|slope| -slope).collect()),
         None => (f64::INFINITY, vec![0.0; point.len()]),
     };
     let mut minimum = minimise_bounded(objective, start, &lower, &upper, iteration_limit);
     if minimum.value == f64::INFINITY {
         let mut noisy = start.to_vec();
-        noisy[inputs.ncols() + 1] = upper[inputs.ncols() + 1];
+        noisy[d] = upper[d];
         let spent = minimum.evaluations;
         minimum = minimise_bounded(objective, &noisy, &lower, &upper, iteration_limit);
         minimum.evaluations += spent;
@@ -152,22 +200,15 @@ fn start_from_spread(inputs: &DMatrix<f64>, targets: &[f64]) -> Hyperparameters 
     }
 }
 
-fn logs(hyper: &Hyperparameters) -> Vec<f64> {
-    let variances = [hyper.signal_variance, hyper.noise_variance];
-    hyper.lengthscales.iter().chain(&variances).map(|scale| scale.ln()).collect()
+/// The point of the search that stands for these scales.
+fn point_of(hyper: &Hyperparameters) -> Vec<f64> {
+    let ratio = hyper.noise_variance / hyper.signal_variance;
+    hyper.lengthscales.iter().chain([&ratio]).map(|scale| scale.ln()).collect()
 }
 
-fn from_logs(point: &[f64]) -> Hyperparameters {
-    let (lengthscales, variances) = point.split_at(point.len() - 2);
-    Hyperparameters {
-        lengthscales: lengthscales.iter().map(|log| log.exp()).collect(),
-        signal_variance: variances[0].exp(),
-        noise_variance: variances[1].exp(),
-    }
-}
-
-fn log_bounds(bounds: &Bounds, d: usize, side: usize) -> Vec<f64> {
-    let mut logs = vec![bounds.lengthscale[side].ln(); d];
-    logs.extend([bounds.signal_variance[side].ln(), bounds.noise_variance[side].ln()]);
-    logs
+/// The scales at a point of the search and a signal variance.
+fn hyperparameters(point: &[f64], signal_variance: f64) -> Hyperparameters {
+    let mut lengthscales: Vec<f64> = point.iter().map(|log| log.exp()).collect();
+    let ratio = lengthscales.pop().unwrap_or(0.0);
+    Hyperparameters { lengthscales, signal_variance, noise_variance: ratio * signal_variance }
 }
