@@ -226,7 +226,7 @@ impl Advisor {
                 Prediction {
                     action: action.clamp(0.0, highest),
                     floor_gain: value.clamped_gain(prediction, state.wealth),
-                    deviation: deviation * value.scale,
+                    deviation: value.gain_spread(prediction, deviation * value.scale, state.wealth),
                     in_design: deviation <= stored.deviation_limit && action.is_finite(),
                 }
             }

@@ -145,6 +145,14 @@ impl ValueSurrogate {
         }
     }
 
+    /// The deviation of the floor gain that a deviation of the target makes, around `prediction` at `wealth`; the
+    /// largest gain where it leads out of the target's range.
+    pub fn gain_spread(&self, prediction: f64, deviation: f64, wealth: f64) -> f64 {
+        let gain = |target| self.target.gain(target, wealth);
+        let spread = 0.5 * (gain(prediction + deviation) - gain(prediction - deviation)).abs();
+        if spread.is_finite() { spread } else { self.largest_gain }
+    }
+
     /// The floor gain of a predicted target at `wealth`, clamped to what is true (0) and seen (the largest).
     pub fn clamped_gain(&self, prediction: f64, wealth: f64) -> f64 {
         self.target.gain(prediction, wealth).clamp(0.0, self.largest_gain)
