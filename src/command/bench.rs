@@ -6,6 +6,7 @@ use clap::Subcommand;
 
 mod accuracy;
 mod action;
+mod kernels;
 mod paper;
 mod summary;
 mod training;
@@ -14,6 +15,8 @@ mod training;
 pub enum Bench {
     /// Time a whole training of the paper's configuration, phase by phase.
     Training(training::TrainingBench),
+    /// Time the fit, the kernel sums, the exponential and the inner solve, on one thread.
+    Kernels(kernels::KernelsBench),
     /// Compare the surrogates with direct solves at fresh states, in basis points of log certainty equivalent.
     Accuracy(accuracy::AccuracyBench),
     /// Time GET /action on loopback beside GET /livez.
@@ -24,6 +27,7 @@ pub async fn run(bench: Bench) -> Result<(), Box<dyn Error>> {
     match bench {
         Bench::Training(arguments) => tokio::task::block_in_place(|| training::run(&arguments)),
         Bench::Accuracy(arguments) => tokio::task::block_in_place(|| accuracy::run(&arguments)),
+        Bench::Kernels(arguments) => tokio::task::block_in_place(|| kernels::run(&arguments)),
         Bench::Action(arguments) => action::run(&arguments).await,
     }
 }

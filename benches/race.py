@@ -1,0 +1,66 @@
+#!/usr/bin/env python3
+"""Races Ballast against Python programs that do the same work, in one run, and prints medians and ratios.
+
+    cargo build --release
+    benches/race.py --opponents FOLDER [--runs 3] [--horizon 3]
+
+FOLDER holds `python_reference.py` (a training: numba for the robust step, scikit-learn for the surrogates) and
+`gp_fit.py` (scikit-learn's fit and prediction on a CSV); this Python needs numpy, scipy, scikit-learn and numba. Both
+sides train 1000 design points with a history each (20 draws of the paper's mixture) over the same number of steps.
+"""
+import argparse
+import json
+import os
+import re
+import statistics
+import subprocess
+import sys
+import tempfile
+
+
+def output(*command):
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+
+def last_json(text):
+    return json.loads(text.strip().splitlines()[-1])
+
+
+def main():
+    root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--opponents", required=True)
+    parser.add_argument("--binary", default=os.path.join(root, "target", "release", "ballast"))
+    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--horizon", type=int, default=3)
+    options = parser.parse_args()
+    opponent = lambda name: os.path.join(options.opponents, name)
+    rows = {}
+
+    def note(name, ours, theirs, unit="s"):
+        rows.setdefault(name, (unit, [], []))
+        rows[name][1].append(ours)
+        rows[name][2].append(theirs)
+
+    with tempfile.TemporaryDirectory() as folder:
+        csv = os.path.join(folder, "rows.csv")
+        for run in range(options.runs):
+            print(f"run {run + 1} of {options.runs}", file=sys.stderr)
+            ours = output(options.binary, "bench", "training", "--resampled", "--horizon", str(options.horizon))
+            theirs = last_json(output(sys.executable, opponent("python_reference.py"), "--horizon", str(options.horizon), "--json"))
+            note("training", float(re.search(r"median ([\d.]+) s", ours)[1]), theirs["total"])
+            ours = output(options.binary, "bench", "kernels", "--csv", csv)
+            theirs = last_json(output(sys.executable, opponent("gp_fit.py"), csv))
+            fit = re.search(r"fit: ([\d.]+) s, log-likelihood per point ([-\d.]+)", ours)
+            note("fit, 1000 rows, 6 inputs", float(fit[1]), theirs["fit_seconds"])
+            note("mean, 1000 queries", float(re.search(r"queries: ([\d.]+) s", ours)[1]), theirs["predict_seconds"])
+            note("log-likelihood per point", float(fit[2]), theirs["log_likelihood_per_point"], unit="")
+    print(f"{'':<28} {'Ballast':>10} {'Python':>10} {'ratio':>8}   medians of {options.runs}")
+    for name, (unit, ours, theirs) in rows.items():
+        ours, theirs = statistics.median(ours), statistics.median(theirs)
+        ratio = f"{theirs / ours:.1f}" if unit else ""
+        print(f"{name:<28} {ours:>10.4f} {theirs:>10.4f} {ratio:>8}")
+
+
+if __name__ == "__main__":
+    main()

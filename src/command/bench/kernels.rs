@@ -1,0 +1,154 @@
+//! The parts a training spends its time on, each by itself, on one thread.
+
+use std::error::Error;
+use std::hint::black_box;
+use std::io::Write;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use ballast::numerics::elementary::exp;
+use ballast::numerics::gp::GaussianProcess;
+use ballast::numerics::gp_fit::{Bounds, fit};
+use ballast::numerics::streams::stream;
+use ballast::numerics::wasserstein::WassersteinBall;
+use clap::Args;
+use nalgebra::DMatrix;
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+
+use super::summary::median;
+
+#[derive(Debug, Args)]
+pub struct KernelsBench {
+    /// Rows of the Gaussian process
+    #[arg(long, default_value_t = 1000)]
+    rows: usize,
+    /// Inputs of the Gaussian process
+    #[arg(long, default_value_t = 6)]
+    inputs: usize,
+    #[arg(long, default_value_t = 3)]
+    runs: usize,
+    /// Write the rows there (inputs, target last, header line), for another program to fit
+    #[arg(long)]
+    csv: Option<PathBuf>,
+}
+
+const QUERIES: usize = 1000;
+/// Atoms, support points and solves of the inner problem.
+const ATOMS: usize = 30;
+const SUPPORT: usize = 120;
+const SOLVES: usize = 2000;
+/// Exponentials timed: an array that stays in the first-level cache, this often.
+const EXPONENTIALS: (usize, usize) = (1000, 2000);
+
+pub fn run(bench: &KernelsBench) -> Result<(), Box<dyn Error>> {
+    let (inputs, targets) = smooth_function(bench.rows, bench.inputs);
+    if let Some(path) = &bench.csv {
+        write_csv(path, &inputs, &targets)?;
+    }
+    let (inputs, targets) = standardized(&inputs, &targets);
+    // Those of the scikit-learn program it is raced against.
+    let bounds = Bounds { lengthscale: [0.1, 1e3], signal_variance: [1e-3, 1e3], noise_variance: [1e-8, 1.0] };
+    let found = fit(&inputs, &targets, &bounds, None)?;
+    let fit_seconds = timed(bench.runs, || drop(black_box(fit(&inputs, &targets, &bounds, None))));
+    println!(
+        "fit: {fit_seconds:.4} s, log-likelihood per point {:.6}, {} evaluations ({:?})",
+        found.log_likelihood / targets.len() as f64,
+        found.evaluations,
+        found.outcome
+    );
+    let process = GaussianProcess::condition(&inputs, &targets, &found.hyperparameters)?;
+    let mut generator = stream(2, "bench-queries", 0, 0);
+    let queries: Vec<Vec<f64>> = (0..QUERIES).map(|_| normals(&mut generator, bench.inputs)).collect();
+    let mut scratch = Vec::new();
+    let predict_seconds = timed(bench.runs, || {
+        let means = queries.iter().map(|query| process.posterior_mean().mean_with(query, &mut scratch));
+        black_box(means.sum::<f64>());
+    });
+    let evaluations = (QUERIES * bench.rows) as f64 / predict_seconds;
+    println!("mean at {QUERIES} queries: {predict_seconds:.5} s, {:.0} million kernels a second", evaluations / 1e6);
+    println!("exponential alone: {:.0} million a second", exponentials_per_second(bench.runs) / 1e6);
+    println!("inner solve, {ATOMS} atoms, {SUPPORT} support points: {:.2} us", 1e6 * inner_solve_seconds(bench.runs));
+    Ok(())
+}
+
+fn timed(runs: usize, mut work: impl FnMut()) -> f64 {
+    let seconds = |_| {
+        let started = Instant::now();
+        work();
+        started.elapsed().as_secs_f64()
+    };
+    median(&(0..runs.max(1)).map(seconds).collect::<Vec<f64>>())
+}
+
+fn normals(generator: &mut impl Rng, count: usize) -> Vec<f64> {
+    (0..count).map(|_| generator.sample(StandardNormal)).collect()
+}
+
+/// A smooth function of normal inputs with a kink, and noise of a hundredth of its size.
+fn smooth_function(rows: usize, inputs: usize) -> (DMatrix<f64>, Vec<f64>) {
+    let mut generator = stream(1, "bench-rows", 0, 0);
+    let points: Vec<Vec<f64>> = (0..rows).map(|_| normals(&mut generator, inputs)).collect();
+    let value = |x: &Vec<f64>| {
+        let smooth: f64 = x.iter().zip(1..).map(|(x, order)| (x / f64::from(order)).sin()).sum();
+        let kink = (x.iter().sum::<f64>() / x.len() as f64).max(0.0);
+        smooth + kink * kink
+    };
+    let targets = points.iter().map(|x| value(x) + 0.01 * generator.sample::<f64, _>(StandardNormal)).collect();
+    (DMatrix::from_row_iterator(rows, inputs, points.into_iter().flatten()), targets)
+}
+
+/// Columns and targets of mean 0 and variance 1.
+fn standardized(inputs: &DMatrix<f64>, targets: &[f64]) -> (DMatrix<f64>, Vec<f64>) {
+    let standard = |values: &[f64]| -> Vec<f64> {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64;
+        values.iter().map(|value| (value - mean) / variance.sqrt()).collect()
+    };
+    let columns = inputs.column_iter().flat_map(|column| standard(&column.iter().copied().collect::<Vec<f64>>()));
+    (DMatrix::from_iterator(inputs.nrows(), inputs.ncols(), columns), standard(targets))
+}
+
+fn write_csv(path: &PathBuf, inputs: &DMatrix<f64>, targets: &[f64]) -> Result<(), std::io::Error> {
+    let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
+    let names: Vec<String> = (1..=inputs.ncols()).map(|index| format!("x{index}")).collect();
+    writeln!(file, "{},y", names.join(","))?;
+    for (row, target) in inputs.row_iter().zip(targets) {
+        let cells: Vec<String> = row.iter().map(|x| format!("{x:e}")).collect();
+        writeln!(file, "{},{target:e}", cells.join(","))?;
+    }
+    file.flush()
+}
+
+fn exponentials_per_second(runs: usize) -> f64 {
+    let (size, passes) = EXPONENTIALS;
+    let arguments: Vec<f64> = (0..size).map(|index| -10.0 * index as f64 / size as f64).collect();
+    let mut values = arguments.clone();
+    let seconds = timed(runs, || {
+        for _ in 0..passes {
+            pulp::Arch::new().dispatch(
+                #[inline(always)]
+                || values.iter_mut().zip(&arguments).for_each(|(value, x)| *value = exp(*x)),
+            );
+            black_box(&mut values);
+        }
+    });
+    (size * passes) as f64 / seconds
+}
+
+/// Seconds of one exact inner solve, over radii from 0 to half the spread of the atoms.
+fn inner_solve_seconds(runs: usize) -> f64 {
+    let support: Vec<f64> = (0..SUPPORT).map(|k| -1.0 + 1.6 * k as f64 / (SUPPORT - 1) as f64).collect();
+    let first = (SUPPORT - ATOMS) / 2;
+    let masses: Vec<f64> =
+        (0..SUPPORT).map(|k| if (first..first + ATOMS).contains(&k) { 1.0 / ATOMS as f64 } else { 0.0 }).collect();
+    let payoff: Vec<f64> = support.iter().map(|z| -(-2.0 * z).exp()).collect();
+    let seconds = timed(runs, || {
+        for solve in 0..SOLVES {
+            let radius = 0.2 * solve as f64 / SOLVES as f64;
+            let ball = WassersteinBall { support: &support, masses: &masses, radius };
+            black_box(ball.worst_expectation(&payoff));
+        }
+    });
+    seconds / SOLVES as f64
+}
