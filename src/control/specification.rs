@@ -227,7 +227,8 @@ pub enum SurrogateTarget {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FeatureMap {
-    /// Log wealth; mean, log standard deviation, skewness, log kurtosis; log radius where it varies.
+    /// Log wealth; mean, log standard deviation, skewness, log kurtosis; log radius where it varies; the worst-case
+    /// excess return over the ball.
     #[default]
     Standardized,
     /// Wealth and the raw moments (the paper).

@@ -125,7 +125,6 @@ pub enum NextValue {
 pub struct ValueSurrogate {
     pub scaling: Scaling,
     pub mean: GpMean,
-    pub lengthscales: Vec<f64>,
     pub offset: f64,
     pub scale: f64,
     pub largest_gain: f64,
@@ -137,7 +136,6 @@ impl ValueSurrogate {
         ValueSurrogate {
             scaling: stored.scaling.clone(),
             mean: GpMean::new(&stored.matrix(), &stored.value.weights, &stored.value.hyperparameters),
-            lengthscales: stored.value.hyperparameters.lengthscales.clone(),
             offset: stored.value.offset,
             scale: stored.value.scale,
             largest_gain: stored.largest_gain,
