@@ -1,6 +1,6 @@
 //! The rules of the house that a program can check, read off the source itself.
 //!
-//! Five floors, arrows only point down; rayon in `control` and in the service's pool only; no clock, log or sleep
+//! Five floors, arrows only point down; rayon in `control` only; no clock, log or sleep
 //! below `service`; files and functions of a size that fits a head; nothing that panics on purpose outside tests.
 
 use std::collections::BTreeSet;
@@ -13,8 +13,6 @@ const FLOORS: [&str; 5] = ["numerics", "control", "store", "service", "http"];
 const FILE_LINES: usize = 350;
 const FUNCTION_LINES: usize = 70;
 
-/// Where rayon may be named besides `control/`, and why.
-const RAYON: [(&str, &str); 1] = [("service/trainer.rs", "builds the training pool: its own, one core short of all")];
 /// Files above `FILE_LINES`, and why.
 const LONG_FILES: [(&str, &str); 0] = [];
 /// Functions above `FUNCTION_LINES` as `file: function`, and why.
@@ -273,8 +271,8 @@ fn faults(source: &Source) -> Vec<String> {
             source.code.match_indices(call).for_each(|(at, _)| fault(at, format!("{call} below service")));
         }
     }
-    if !source.path.starts_with("control/") && !is_listed(&RAYON, &source.path) {
-        words(&source.code, "rayon").for_each(|at| fault(at, "rayon outside control and the training pool".into()));
+    if !source.path.starts_with("control/") {
+        words(&source.code, "rayon").for_each(|at| fault(at, "rayon outside control".into()));
     }
     for call in PANICS {
         source.code.match_indices(call).for_each(|(at, _)| fault(at, format!("{call} outside tests")));

@@ -101,7 +101,7 @@ impl Training {
         let crew = Crew { training: self, step, next: &next, watch };
         let count = self.design.count(step);
         if count == 1 {
-            let only = crew.solve(&[0], Vec::new())?;
+            let only = crew.solve(&[0], &[], Vec::new())?;
             let found = only.first().map(|point| &point.solution).ok_or(TrainError::Stopped)?;
             let solution = Solution::Single(SingleSolution { floor_gain: found.floor_gain, action: found.action });
             return Ok(StepSolution { step, solution, diagnostics: diagnostics(step, &only) });
@@ -110,7 +110,7 @@ impl Training {
         let scaling = Scaling::of(&candidates);
         let fitting = Fitting { context: &self.context, step, scaling: &scaling, watch };
         let as_drawn: Vec<usize> = (0..self.design.as_drawn_count(step)).collect();
-        let mut solved = crew.solve(&as_drawn, Vec::new())?;
+        let mut solved = crew.solve(&as_drawn, &candidates, Vec::new())?;
         let start = match after.and_then(|after| fitting.start_from(&after.solution)) {
             Some(start) => start,
             None => fitting.coarse(&solved)?,
@@ -118,7 +118,7 @@ impl Training {
         if count > as_drawn.len() {
             let inputs: Vec<Vec<f64>> = candidates.iter().map(|features| scaling.apply(features)).collect();
             let chosen = farthest_points(&inputs, &start.value.lengthscales, as_drawn.len(), count);
-            solved = crew.solve(&chosen[as_drawn.len()..], solved)?;
+            solved = crew.solve(&chosen[as_drawn.len()..], &candidates, solved)?;
         }
         let guards = crew.features(self.design.guards(step))?;
         let mut diagnostics = diagnostics(step, &solved);
@@ -164,8 +164,9 @@ impl Crew<'_> {
         states.into_par_iter().map(features).collect()
     }
 
-    /// Solves the robust step at the design points named, after those solved before.
-    fn solve(&self, points: &[usize], before: Vec<Solved>) -> Result<Vec<Solved>, TrainError> {
+    /// Solves the robust step at the design points named, after those solved before. `features` are those of all
+    /// candidates, empty where nothing will be fitted.
+    fn solve(&self, points: &[usize], features: &[Vec<f64>], before: Vec<Solved>) -> Result<Vec<Solved>, TrainError> {
         let Crew { training, step, next, watch } = *self;
         let (total, first) = (training.design.count(step), before.len());
         let every = (total / REPORTS_PER_STEP).max(1);
@@ -182,7 +183,7 @@ impl Crew<'_> {
             if finished.is_multiple_of(every) || finished == total {
                 (watch.progress)(StepProgress { step, phase: Phase::Solving, done: finished, total });
             }
-            Ok(Solved { wealth: state.wealth, features: training.context.features(&state), solution })
+            Ok(Solved { wealth: state.wealth, features: features.get(point).cloned().unwrap_or_default(), solution })
         };
         let found: Result<Vec<Solved>, TrainError> = points.par_iter().map(solve).collect();
         let mut solved = before;

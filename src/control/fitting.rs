@@ -12,6 +12,7 @@ use super::policy::{StepDiagnostics, SurrogateDiagnostics};
 use super::surrogate::{Solution, StepSurrogates, StoredSurrogate, TargetMap};
 use crate::numerics::gp::{GaussianProcess, Hyperparameters, LeaveOneOut};
 use crate::numerics::gp_fit::{self, Bounds};
+use crate::numerics::summary::quantile;
 
 /// Share of the states of the design's own law that lie within the guard.
 const GUARDED_SHARE: f64 = 0.99;
@@ -214,12 +215,4 @@ impl Fitted {
             search: self.search.clone(),
         }
     }
-}
-
-/// The order statistic below which a share of `values` lies.
-fn quantile(values: &[f64], share: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let index = (share * sorted.len() as f64) as usize;
-    sorted.get(index.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0.0)
 }

@@ -3,7 +3,7 @@
 //! From one state, the next state depends on the action and the adversary's return z only. The law's features
 //! depend on z alone, and wealth on both, linearly in the action. The prediction is a smooth function of the two, so
 //! it is tabulated once, exactly, at a few returns (local cubics between them) times a few Chebyshev nodes in the
-//! action, and every action is then priced without touching the surrogate again: nine products a return.
+//! action, and every action is then priced without touching the surrogate again: a product a node and return.
 
 use super::context::ProblemContext;
 use super::state::{State, next_wealth};

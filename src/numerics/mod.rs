@@ -14,4 +14,5 @@ pub mod matern;
 pub mod minimise;
 pub mod moments;
 pub mod streams;
+pub mod summary;
 pub mod wasserstein;

@@ -1,6 +1,6 @@
 //! The training worker: claims jobs one at a time and solves them step by step, a checkpoint after each.
 //!
-//! It runs on a thread of its own with a rayon pool of its own, so that the threads that answer requests stay free.
+//! It runs on a thread of its own with a pool of its own, so that the threads that answer requests stay free.
 //! Stopping (a cancel, a shutdown, a lost lease) always ends in `release_job`: the store knows whether a cancel was
 //! asked for, and requeues the job or cancels it; a worker that lost its lease changes nothing. The work itself looks
 //! for the stop signal often, but not inside a factorisation, which takes a minute at ten thousand points: past
@@ -23,6 +23,7 @@ use super::{identity, metrics as names};
 use crate::control::backward::{StepSolution, Training, Watch};
 use crate::control::error::TrainError;
 use crate::control::policy::{Policy, content_hash};
+use crate::control::pool::TrainingPool;
 use crate::control::specification::Specification;
 use crate::store::{ClaimedJob, JobKind, JobOutcome, Store, StoreError};
 
@@ -45,7 +46,7 @@ struct Worker {
     clock: Clock,
     board: Arc<ProgressBoard>,
     shutdown: Shutdown,
-    pool: rayon::ThreadPool,
+    pool: TrainingPool,
     lease: Duration,
     runtime: Handle,
 }
@@ -69,11 +70,7 @@ impl Trainer {
         board: Arc<ProgressBoard>,
         shutdown: Shutdown,
     ) -> Result<Self, ServiceError> {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(config.training_threads)
-            .thread_name(|index| format!("training-{index}"))
-            .build()
-            .map_err(ServiceError::internal)?;
+        let pool = TrainingPool::new(config.training_threads).map_err(ServiceError::internal)?;
         let worker = Worker {
             name: identity::new_id("worker")?,
             store,

@@ -17,10 +17,10 @@ use ballast::control::pool::TrainingPool;
 use ballast::control::specification::{FeatureMap, InitialLaws, RadiusRule, Specification, SurrogateTarget};
 use ballast::control::state::State;
 use ballast::control::surrogate::{NextValue, SingleSolution, Solution};
+use ballast::numerics::summary::quantile;
 use clap::Args;
 
 use super::paper;
-use super::summary::quantile;
 
 #[derive(Debug, Args)]
 pub struct AccuracyBench {

@@ -4,11 +4,11 @@ use std::error::Error;
 use std::time::Instant;
 
 use ballast::control::specification::InitialLaws;
+use ballast::numerics::summary::quantile;
 use clap::Args;
 use serde_json::{Value, json};
 
 use super::paper;
-use super::summary::quantile;
 use crate::command::api_client::{ApiClient, ApiError};
 use crate::command::host::Host;
 
