@@ -7,9 +7,12 @@
 //! - [`store`]: durable facts: jobs, policies, sessions, observations.
 //! - [`service`]: use cases: train, open a session, observe, act. No HTTP types.
 //! - [`http`]: translation between the wire and the use cases, and nothing else.
+//!
+//! Beside them stands [`report`], a leaf that names no floor: charts, pages and tables from data, for people to read.
 
 pub mod control;
 pub mod http;
 pub mod numerics;
+pub mod report;
 pub mod service;
 pub mod store;

@@ -1,6 +1,6 @@
 //! The rules of the house that a program can check, read off the source itself.
 //!
-//! Five floors, arrows only point down; rayon in `control` only; no clock, log or sleep
+//! Five floors, arrows only point down, and a leaf beside them; rayon in `control` only; no clock, log or sleep
 //! below `service`; files and functions of a size that fits a head; nothing that panics on purpose outside tests.
 
 use std::collections::BTreeSet;
@@ -10,6 +10,10 @@ use std::path::{Path, PathBuf};
 
 /// Lowest first. The binary (`main.rs` and `command/`) stands on top and names the library as `ballast`.
 const FLOORS: [&str; 5] = ["numerics", "control", "store", "service", "http"];
+/// The place of `service` among them.
+const SERVICE: usize = 3;
+/// Names no floor and is named by none below `service`: what mathematics and facts look like is not their matter.
+const LEAF: &str = "report";
 const FILE_LINES: usize = 350;
 const FUNCTION_LINES: usize = 70;
 
@@ -48,9 +52,13 @@ impl Source {
         Source { path: path.into(), code, test_modules }
     }
 
+    /// The first part of its path: a floor, the leaf, or part of the binary.
+    fn top(&self) -> &str {
+        self.path.split(['/', '.']).next().unwrap_or_default()
+    }
+
     fn floor(&self) -> Option<usize> {
-        let first = self.path.split(['/', '.']).next();
-        FLOORS.iter().position(|floor| Some(*floor) == first)
+        FLOORS.iter().position(|floor| *floor == self.top())
     }
 
     fn line_of(&self, offset: usize) -> usize {
@@ -257,17 +265,22 @@ fn top_of_group(group: &str) -> Vec<String> {
 fn faults(source: &Source) -> Vec<String> {
     let mut faults = Vec::new();
     let mut fault = |at: usize, what: String| faults.push(format!("{}:{}: {what}", source.path, source.line_of(at)));
-    if let Some(own) = source.floor() {
+    let (own, is_leaf) = (source.floor(), source.top() == LEAF);
+    if own.is_some() || is_leaf {
         for (at, name) in crate_paths(&source.code) {
-            if FLOORS.iter().position(|floor| *floor == name).is_some_and(|named| named > own) {
-                fault(at, format!("{} names the higher floor {name}", FLOORS[own]));
+            let named = FLOORS.iter().position(|floor| *floor == name);
+            if named > own {
+                fault(at, format!("{} names the higher floor {name}", source.top()));
+            }
+            if name == LEAF && own.is_some_and(|own| own < SERVICE) {
+                fault(at, format!("{} names the leaf {name}", source.top()));
             }
         }
         for at in words(&source.code, "ballast") {
             fault(at, "a floor names the crate as `crate`".into());
         }
-        let below_service = own < 3;
-        for call in EFFECTS.iter().filter(|_| below_service) {
+        let pure = is_leaf || own < Some(SERVICE);
+        for call in EFFECTS.iter().filter(|_| pure) {
             source.code.match_indices(call).for_each(|(at, _)| fault(at, format!("{call} below service")));
         }
     }
@@ -335,7 +348,7 @@ fn the_source_keeps_the_rules_of_the_house() {
     let sources = sources();
     let visited: BTreeSet<String> = sources.iter().map(|source| source.path.clone()).collect();
     assert_eq!(visited, declared_files(&sources), "files visited, and files the crate is made of");
-    for floor in FLOORS {
+    for floor in FLOORS.into_iter().chain([LEAF]) {
         assert!(visited.contains(&format!("{floor}/mod.rs")), "floor {floor} was not visited");
     }
     let tests: BTreeSet<String> = sources.iter().flat_map(Source::test_files).collect();
@@ -358,6 +371,11 @@ fn a_broken_rule_is_found() {
         ]
     );
     assert_eq!(faults_of("http/router.rs", upward), [""; 0]);
+    let leaf = "use crate::{report::Page, numerics::gp};";
+    assert_eq!(faults_of("report/page.rs", leaf), ["report/page.rs:1: report names the higher floor numerics"]);
+    assert_eq!(faults_of("store/jobs.rs", leaf), ["store/jobs.rs:1: store names the leaf report"]);
+    assert_eq!(faults_of("service/jobs.rs", leaf), [""; 0]);
+    assert_eq!(faults_of("report/page.rs", "fn f() { println!() }").len(), 1);
     assert_eq!(faults_of("numerics/gp.rs", "use rayon::prelude::*;").len(), 1);
     assert_eq!(faults_of("control/policy.rs", "use rayon::prelude::*;").len(), 0);
     assert_eq!(faults_of("store/jobs.rs", "fn f() { let now = Instant::now(); }").len(), 1);
