@@ -1,0 +1,66 @@
+"""Client of Ballast, a service that advises investors robustly.
+
+    from ballast import Ballast
+
+    with Ballast("http://127.0.0.1:8080") as ballast:
+        session = ballast.train(returns, kind="simple", horizon=12).session()
+        while not session.completed:
+            allocation = session.action()["allocation"]
+            session.observe(simple_return=...)
+
+Requests and answers are the JSON of the service, typed in :mod:`ballast.wire`; what goes wrong is in
+:mod:`ballast.errors`.
+"""
+
+from . import wire
+from .client import Ballast
+from .errors import (
+    BallastError,
+    BodyTooLarge,
+    DamagedPolicy,
+    IdempotencyConflict,
+    InUse,
+    Internal,
+    InvalidField,
+    InvalidPolicy,
+    InvalidQuery,
+    JobEnded,
+    NotFound,
+    Overloaded,
+    PeriodConflict,
+    PeriodGap,
+    ProblemError,
+    SessionCompleted,
+    StorageFull,
+    Unreachable,
+)
+from .policy import Policy
+from .session import Session
+from .training import ProgressPrinter, Training
+
+__all__ = [
+    "Ballast",
+    "BallastError",
+    "BodyTooLarge",
+    "DamagedPolicy",
+    "IdempotencyConflict",
+    "InUse",
+    "Internal",
+    "InvalidField",
+    "InvalidPolicy",
+    "InvalidQuery",
+    "JobEnded",
+    "NotFound",
+    "Overloaded",
+    "PeriodConflict",
+    "PeriodGap",
+    "Policy",
+    "ProblemError",
+    "ProgressPrinter",
+    "Session",
+    "SessionCompleted",
+    "StorageFull",
+    "Training",
+    "Unreachable",
+    "wire",
+]

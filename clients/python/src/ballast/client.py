@@ -1,0 +1,152 @@
+"""The service, as seen from a program."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from types import TracebackType
+from typing import Any, cast
+from urllib.parse import quote
+
+import httpx
+
+from . import wire
+from .policy import Policy
+from .returns import Kind, Returns, log_returns
+from .session import Session
+from .training import Training
+from .transport import Transport
+
+
+class Ballast:
+    """A service at ``url``.
+
+    ``timeout`` bounds each wait for the network, in seconds. A request that is lost or put off is sent again up to
+    ``retries`` times, after 0.2 s, 0.4 s and so on (``ballast.transport`` says which, and why that is safe).
+    ``headers`` go with every request, and ``transport`` replaces the connections themselves (proxies, certificates).
+    Safe to share between threads; as a context manager it closes its connections at the end.
+    """
+
+    def __init__(
+        self,
+        url: str = "http://127.0.0.1:8080",
+        *,
+        timeout: float = 30.0,
+        retries: int = 6,
+        headers: Mapping[str, str] | None = None,
+        transport: httpx.BaseTransport | None = None,
+    ) -> None:
+        http = httpx.Client(base_url=url, timeout=timeout, headers=headers, transport=transport)
+        self._transport = Transport(http, retries)
+
+    def train(
+        self,
+        returns: Returns,
+        *,
+        kind: Kind,
+        framework: wire.Framework | None = None,
+        horizon: int | None = None,
+        rate_per_step: float | None = None,
+        initial_wealth: float | None = None,
+        action_interval: Sequence[float] | None = None,
+        utility: wire.UtilitySpecification | None = None,
+        radius: wire.RadiusRule | None = None,
+        support: wire.Interval | None = None,
+        law: wire.SamplingLaw | None = None,
+        design: wire.DesignSpecification | None = None,
+        surrogate: wire.SurrogateSpecification | None = None,
+        seed: int | None = None,
+        idempotency_key: str | None = None,
+    ) -> Training:
+        """Queues a training on the returns seen so far, and does not wait for it.
+
+        ``returns`` is a list, an array, a Series or a DataFrame of one column, and ``kind`` says of what: ``"simple"``
+        or ``"log"`` returns or ``"price"``. What is left out the service chooses, and ``Policy.detail`` tells. The
+        same ``idempotency_key`` and arguments again, even from another process, give the same job.
+        """
+        problem = {
+            "history": log_returns(returns, kind),
+            "framework": framework,
+            "horizon": horizon,
+            "rate_per_step": rate_per_step,
+            "initial_wealth": initial_wealth,
+            "action_interval": None if action_interval is None else list(action_interval),
+            "utility": utility,
+            "radius": radius,
+            "support": support,
+            "law": law,
+        }
+        whole = {"problem": _given(problem), "design": design, "surrogate": surrogate, "seed": seed}
+        return self.submit(cast(wire.Specification, _given(whole)), idempotency_key=idempotency_key)
+
+    def submit(self, specification: wire.Specification, *, idempotency_key: str | None = None) -> Training:
+        """Queues the training of a whole specification, such as ``Policy.detail`` shows."""
+        # Without a key of the caller's, one of this call's own: a repetition after a lost answer finds the same job.
+        headers = {"Idempotency-Key": idempotency_key or str(uuid.uuid4())}
+        job: wire.Job = self._transport.call("POST", "/train", body=specification, headers=headers).json()
+        return Training(self._transport, job)
+
+    def training(self, job: str) -> Training:
+        """A training that was queued before."""
+        return Training(self._transport, self._transport.call("GET", f"/jobs/{quote(job, safe='')}").json())
+
+    def policy(self, policy: str) -> Policy:
+        """A policy by its name. Asks nothing of the service yet."""
+        return Policy(self._transport, policy)
+
+    def import_policy(self, document: bytes) -> Policy:
+        """Stores an exported policy; one that the service knows already stays as it is."""
+        imported: wire.Imported = self._transport.call("POST", "/policies/import", body=document).json()
+        return Policy(self._transport, imported["policy"])
+
+    def session(self, session: str) -> Session:
+        """A session that was opened before, at the period it has come to."""
+        return Session(self._transport, self._transport.call("GET", f"/sessions/{quote(session, safe='')}").json())
+
+    def jobs(self) -> Iterator[wire.Job]:
+        """All jobs, newest first."""
+        return self._listed("/jobs", "jobs")
+
+    def policies(self) -> Iterator[wire.PolicyEntry]:
+        """All policies, newest first."""
+        return self._listed("/policies", "policies")
+
+    def sessions(self) -> Iterator[wire.SessionEntry]:
+        """All sessions, newest first."""
+        return self._listed("/sessions", "sessions")
+
+    def health(self) -> wire.Health:
+        """The service in a few words. Raises :class:`Overloaded` where it is draining."""
+        return cast(wire.Health, self._transport.call("GET", "/health").json())
+
+    def close(self) -> None:
+        """Closes the connections."""
+        self._transport.http.close()
+
+    def _listed(self, path: str, name: str) -> Iterator[Any]:
+        after: int | None = None
+        while True:
+            page = self._transport.call("GET", path, params={"after": after, "limit": _PAGE}).json()
+            yield from page[name]
+            after = page.get("next")
+            if after is None:
+                return
+
+    def __enter__(self) -> Ballast:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<Ballast at {self._transport.http.base_url}>"
+
+
+#: Entries asked for at a time.
+_PAGE = 200
+
+
+def _given(fields: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in fields.items() if value is not None}

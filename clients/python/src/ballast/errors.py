@@ -1,0 +1,128 @@
+"""What can go wrong, as exceptions.
+
+A refusal of the service is a :class:`ProblemError` with the parts of its problem document (RFC 9457); the kinds that a
+program may want to tell apart have a class of their own, found by the last part of the document's ``type``. A kind that
+this client does not know yet is a plain :class:`ProblemError`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import httpx
+
+from . import wire
+
+
+class BallastError(Exception):
+    """Everything this package raises, but for arguments that cannot be sent at all (``ValueError``, ``TypeError``)."""
+
+
+class Unreachable(BallastError):
+    """No answer came. The request may have been carried out; to send the same one again is safe where its method says so."""
+
+
+class DamagedPolicy(BallastError):
+    """The bytes of an exported policy do not hash to its name."""
+
+
+class JobEnded(BallastError):
+    """A job that was waited for failed or was cancelled. ``job`` is its last state."""
+
+    def __init__(self, job: wire.Job) -> None:
+        super().__init__(job)
+        self.job = job
+
+    def __str__(self) -> str:
+        return f"the job {self.job['job']} ended as {self.job['state']}: {self.job.get('error') or 'no reason given'}"
+
+
+class ProblemError(BallastError):
+    """The service refused: ``type``, ``title``, ``status``, ``detail`` and, where a field is at fault, ``field``,
+    ``value`` and ``rule``. ``retry_after`` is the pause the service asked for, in seconds."""
+
+    kinds: ClassVar[dict[str, type[ProblemError]]] = {}
+
+    def __init_subclass__(cls, slug: str, **rest: Any) -> None:
+        super().__init_subclass__(**rest)
+        cls.kinds[slug] = cls
+
+    def __init__(self, problem: wire.Problem, retry_after: float | None = None) -> None:
+        super().__init__(problem, retry_after)
+        self.type = problem["type"]
+        self.title = problem["title"]
+        self.status = problem["status"]
+        self.detail = problem["detail"]
+        self.field = problem.get("field")
+        self.value = problem.get("value")
+        self.rule = problem.get("rule")
+        self.retry_after = retry_after
+
+    def __str__(self) -> str:
+        return f"{self.title} ({self.status}): {self.detail}"
+
+
+class InvalidField(ProblemError, slug="invalid-field"):
+    """A field breaks a rule."""
+
+
+class InvalidQuery(ProblemError, slug="invalid-query"):
+    """A query parameter breaks a rule."""
+
+
+class InvalidPolicy(ProblemError, slug="invalid-policy"):
+    """The imported document is not a usable policy."""
+
+
+class NotFound(ProblemError, slug="not-found"):
+    """There is no such job, policy or session."""
+
+
+class InUse(ProblemError, slug="in-use"):
+    """Sessions live by the policy."""
+
+
+class IdempotencyConflict(ProblemError, slug="idempotency-conflict"):
+    """The idempotency key was used with another body."""
+
+
+class PeriodConflict(ProblemError, slug="period-conflict"):
+    """The period was observed with other content."""
+
+
+class PeriodGap(ProblemError, slug="period-gap"):
+    """The period is not the one expected; ``rule`` names that one."""
+
+
+class SessionCompleted(ProblemError, slug="session-completed"):
+    """The session has reached its horizon."""
+
+
+class BodyTooLarge(ProblemError, slug="body-too-large"):
+    """The body is larger than the service takes."""
+
+
+class Overloaded(ProblemError, slug="overloaded"):
+    """The service cannot answer now, and could not at the last of the repetitions."""
+
+
+class StorageFull(ProblemError, slug="storage-full"):
+    """The data folder of the service is full: its operator must act."""
+
+
+class Internal(ProblemError, slug="internal"):
+    """The service failed; its log says why."""
+
+
+def of_response(response: httpx.Response, retry_after: float | None) -> ProblemError:
+    """The exception of an answer that is not a success, be it of the service or of something in between."""
+    problem: wire.Problem = {
+        "type": "about:blank",
+        "title": response.reason_phrase or "Error",
+        "status": response.status_code,
+        "detail": response.text[:200],
+    }
+    if response.headers.get("content-type", "").startswith("application/problem+json"):
+        problem.update(response.json())
+    kind = ProblemError.kinds.get(problem["type"].rpartition("/")[2], ProblemError)
+    return kind(problem, retry_after)

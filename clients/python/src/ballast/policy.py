@@ -1,0 +1,52 @@
+"""A trained policy: immutable, named by the SHA-256 of its exported bytes."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import cast
+from urllib.parse import quote
+
+from . import wire
+from .errors import DamagedPolicy
+from .returns import Kind, Returns, log_returns
+from .session import Session
+from .transport import Transport
+
+
+class Policy:
+    """A policy of the service, by its name."""
+
+    def __init__(self, transport: Transport, policy: str) -> None:
+        self._transport = transport
+        self._path = f"/policies/{quote(policy, safe='')}"
+        self.id = policy
+
+    def detail(self) -> wire.PolicyDetail:
+        """The completed specification and the diagnostics of every step."""
+        return cast(wire.PolicyDetail, self._transport.call("GET", self._path).json())
+
+    def export(self) -> bytes:
+        """The portable document, as ``Ballast.import_policy`` takes it. Raises :class:`DamagedPolicy` where the bytes
+        that arrive do not hash to the policy's name."""
+        document = self._transport.call("GET", f"{self._path}/export").content
+        if (found := hashlib.sha256(document).hexdigest()) != self.id:
+            raise DamagedPolicy(f"the exported bytes hash to {found}: must be {self.id}")
+        return document
+
+    def session(self, *, history: Returns | None = None, kind: Kind = "log", wealth: float | None = None) -> Session:
+        """Opens a session of an investor.
+
+        ``history`` is what the investor has seen, ``wealth`` what he has; by default both are the policy's own. An
+        answer that is lost raises :class:`Unreachable` and may leave a session behind that nobody uses.
+        """
+        request: wire.OpenSession = {"policy": self.id, "wealth": wealth}
+        if history is not None:
+            request["history"] = log_returns(history, kind)
+        return Session(self._transport, self._transport.call("POST", "/sessions", body=request, repeatable=False).json())
+
+    def delete(self) -> None:
+        """Deletes it. Raises :class:`InUse` while sessions live by it, and :class:`NotFound` where there is none."""
+        self._transport.call("DELETE", self._path)
+
+    def __repr__(self) -> str:
+        return f"<Policy {self.id:.12}>"

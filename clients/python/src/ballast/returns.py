@@ -1,0 +1,49 @@
+"""Returns in whatever holds numbers, as the log-returns the service takes. Nothing here imports pandas or NumPy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any, Literal, TypeAlias
+
+#: What the numbers are, with the names ``observe`` has for them.
+Kind: TypeAlias = Literal["log", "simple", "price"]
+
+#: A list, a tuple, a NumPy array, a pandas or polars Series, a DataFrame of one column.
+Returns: TypeAlias = Any
+
+
+def log_returns(returns: Returns, kind: Kind) -> list[float]:
+    """``log``: as they are. ``simple``: ln(1 + R). ``price``: ln(P_i / P_(i-1)), oldest first, one fewer than prices.
+
+    Raises ``ValueError`` that names the entry, its value and the rule.
+    """
+    numbers = [float(number) for number in _column(returns)]
+    above = {"log": -math.inf, "simple": -1.0, "price": 0.0}.get(kind)
+    if above is None:
+        raise ValueError(f"kind is {kind!r}: must be 'log', 'simple' or 'price'")
+    for index, number in enumerate(numbers):
+        if not math.isfinite(number):
+            raise ValueError(f"returns[{index}] is {number}: must be finite (drop missing values first)")
+        if number <= above:
+            raise ValueError(f"returns[{index}] is {number}: must be above {above:g}, since kind is {kind!r}")
+    if kind == "log":
+        return numbers
+    if kind == "simple":
+        return [math.log1p(number) for number in numbers]
+    if not getattr(getattr(returns, "index", None), "is_monotonic_increasing", True):
+        raise ValueError("the index of the prices is not increasing: prices must come oldest first")
+    return [math.log(later / earlier) for earlier, later in zip(numbers, numbers[1:])]
+
+
+def _column(returns: Returns) -> Iterable[Any]:
+    """The one column of a table; anything else as it is."""
+    shape: tuple[int, ...] = getattr(returns, "shape", (0,))
+    if len(shape) == 1:
+        values: Iterable[Any] = returns
+        return values
+    if len(shape) != 2 or shape[1] != 1:
+        names = f", {list(returns.columns)}" if hasattr(returns, "columns") else ""
+        raise ValueError(f"returns has the shape {shape}{names}: must be one column; choose it first")
+    rows = returns.to_numpy() if hasattr(returns, "to_numpy") else returns
+    return [row[0] for row in rows]

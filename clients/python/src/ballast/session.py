@@ -1,0 +1,100 @@
+"""A live investor."""
+
+from __future__ import annotations
+
+from typing import Literal, cast
+from urllib.parse import quote
+
+from . import wire
+from .transport import Transport
+
+
+class Session:
+    """A session of the service, and the period it has come to.
+
+    ``observe`` numbers its reports, which makes them exactly-once: a report whose answer was lost is sent again under
+    the same number, and the service answers as it did the first time. Where ``observe`` raises :class:`Unreachable`,
+    the period is still the old one here; call it again with the same arguments. One object is one investor's and is not
+    meant for several threads; after somebody else has observed for him, ``refresh`` catches up.
+    """
+
+    def __init__(self, transport: Transport, session: wire.Session) -> None:
+        self._transport = transport
+        self._path = f"/sessions/{quote(session['session'], safe='')}"
+        self.id = session["session"]
+        self.policy = session["policy"]
+        self.horizon = session["horizon"]
+        #: The coming period, from 1; ``horizon + 1`` once completed.
+        self.period = session["period"]
+        self.wealth = session["wealth"]
+        #: The answer to the last ``observe``: wealth, sample size, moments, quantile, radius.
+        self.observed: wire.Observed | None = None
+
+    @property
+    def completed(self) -> bool:
+        return self.period > self.horizon
+
+    def action(
+        self,
+        *,
+        mode: Literal["surrogate", "resolve"] | None = None,
+        explain: Literal["worst_case"] | None = None,
+    ) -> wire.Action:
+        """The robust allocation for the coming period.
+
+        ``mode="resolve"`` solves the robust step anew at the exact state; ``explain="worst_case"`` does too, and shows
+        the law it is robust against. Raises :class:`SessionCompleted` after the horizon.
+        """
+        params = {"session": self.id, "mode": mode, "explain": explain}
+        return cast(wire.Action, self._transport.call("GET", "/action", params=params).json())
+
+    def observe(
+        self,
+        *,
+        log_return: float | None = None,
+        simple_return: float | None = None,
+        price: float | None = None,
+        previous_price: float | None = None,
+        executed_allocation: float | None = None,
+        wealth: float | None = None,
+        period: int | None = None,
+    ) -> Session:
+        """Reports the return of the coming period, in exactly one of three ways; the answer is in ``observed``.
+
+        ``executed_allocation`` is what was really held, by default what was advised; ``wealth`` is what was really
+        reached, where fees or flows made a difference. ``period`` is the coming one unless given: an earlier one with
+        the content first reported for it gets its first answer again. Raises :class:`PeriodConflict`,
+        :class:`PeriodGap` and :class:`SessionCompleted`.
+        """
+        report: wire.Observe = {
+            "session": self.id,
+            "period": self.period if period is None else period,
+            "log_return": log_return,
+            "simple_return": simple_return,
+            "price": price,
+            "previous_price": previous_price,
+            "executed_allocation": executed_allocation,
+            "wealth": wealth,
+        }
+        observed: wire.Observed = self._transport.call("POST", "/observe", body=report).json()
+        self.observed = observed
+        if observed["period"] >= self.period:
+            self.period, self.wealth = observed["period"] + 1, observed["wealth"]
+        return self
+
+    def history(self) -> wire.SessionHistory:
+        """Where the session started and everything it observed."""
+        return cast(wire.SessionHistory, self._transport.call("GET", f"{self._path}/history").json())
+
+    def refresh(self) -> Session:
+        """Reads the period and the wealth from the service."""
+        session: wire.Session = self._transport.call("GET", self._path).json()
+        self.period, self.wealth = session["period"], session["wealth"]
+        return self
+
+    def delete(self) -> None:
+        """Deletes the session and its observations. Raises :class:`NotFound` where there is none."""
+        self._transport.call("DELETE", self._path)
+
+    def __repr__(self) -> str:
+        return f"<Session {self.id} at period {self.period} of {self.horizon}>"

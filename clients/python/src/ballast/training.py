@@ -1,0 +1,127 @@
+"""A training: a job that ends in a policy."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from typing import TextIO
+from urllib.parse import quote
+
+import httpx
+
+from . import wire
+from .errors import JobEnded, Overloaded, Unreachable
+from .events import parsed
+from .policy import Policy
+from .returns import Kind, Returns
+from .session import Session
+from .transport import Transport, growing_pause
+
+#: Called with the job at every change of it.
+Watch = Callable[[wire.Job], object]
+
+_TERMINAL = ("succeeded", "failed", "cancelled")
+
+
+class Training:
+    """A job of the service. It goes on whether or not anybody waits for it; ``Ballast.training(id)`` finds it again."""
+
+    def __init__(self, transport: Transport, job: wire.Job) -> None:
+        self._transport = transport
+        self._path = f"/jobs/{quote(job['job'], safe='')}"
+        #: The job as last seen.
+        self.job = job
+
+    @property
+    def id(self) -> str:
+        return self.job["job"]
+
+    def refresh(self) -> wire.Job:
+        """The job as it is now."""
+        self.job = self._transport.call("GET", self._path).json()
+        return self.job
+
+    def cancel(self) -> wire.Job:
+        """Asks the job to stop, which it does within a second; a job that has ended stays as it is."""
+        self.job = self._transport.call("DELETE", self._path).json()
+        return self.job
+
+    def events(self) -> Iterator[wire.Job]:
+        """The job now, then at every change of it, up to its end. A stream that breaks is taken up where it was left."""
+        last_id, failures = "", 0
+        while True:
+            reason = "the service ended them"
+            try:
+                with self._transport.stream(f"{self._path}/events", last_id) as response:
+                    for event in parsed(response.iter_bytes()):
+                        last_id, failures = event.id, 0
+                        self.job = json.loads(event.data)
+                        yield self.job
+                        if self.job["state"] in _TERMINAL:
+                            return
+            except (httpx.TransportError, Overloaded) as error:
+                reason = repr(error)
+            # A service that stops ends its streams in good order, and comes back.
+            if failures >= self._transport.retries:
+                raise Unreachable(f"no more events of the job {self.id}: {reason}")
+            time.sleep(growing_pause(failures))
+            failures += 1
+
+    def policy(self, watch: Watch | None = None) -> Policy:
+        """Waits for the end of the training, showing each change to ``watch``.
+
+        Raises :class:`JobEnded` where the job fails or is cancelled.
+        """
+        for job in self.events():
+            if watch is not None:
+                watch(job)
+        policy = self.job.get("policy")
+        if policy is None:
+            raise JobEnded(self.job)
+        return Policy(self._transport, policy)
+
+    def session(
+        self,
+        *,
+        history: Returns | None = None,
+        kind: Kind = "log",
+        wealth: float | None = None,
+        watch: Watch | None = None,
+    ) -> Session:
+        """Waits for the policy and opens a session of it, as :meth:`Policy.session` does."""
+        return self.policy(watch).session(history=history, kind=kind, wealth=wealth)
+
+    def __repr__(self) -> str:
+        return f"<Training {self.id} {self.job['state']}>"
+
+
+class ProgressPrinter:
+    """A ``watch`` that prints: one line that is rewritten on a terminal, a line for each new step elsewhere."""
+
+    def __init__(self, file: TextIO | None = None) -> None:
+        self._file = sys.stderr if file is None else file
+        self._shown: tuple[str, int | None] | None = None
+
+    def __call__(self, job: wire.Job) -> None:
+        line = progress_line(job)
+        with suppress(BrokenPipeError):
+            if self._file.isatty():
+                end = "\n" if job["state"] in _TERMINAL else ""
+                print(f"\r\x1b[K{line}", end=end, file=self._file, flush=True)
+            elif self._shown != (now := (job["state"], job["progress"].get("step"))):
+                self._shown = now
+                print(line, file=self._file, flush=True)
+
+
+def progress_line(job: wire.Job) -> str:
+    """A job in a line."""
+    progress = job["progress"]
+    line = f"{job['state']}: {progress['steps_done']} of {progress['steps_total']} steps"
+    if (step := progress.get("step")) is not None:
+        line += f", step {step}: {progress.get('points_done')} of {progress.get('points_total')} design points"
+    if (left := progress.get("seconds_left")) is not None:
+        line += f", about {left:.0f} s left"
+    return line

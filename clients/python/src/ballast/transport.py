@@ -1,0 +1,120 @@
+"""Requests over one pool of connections, repeated where that is safe.
+
+Every call of this client can be repeated without harm, for one of four reasons: it reads; it deletes; its content names
+it (an imported policy); or the service knows the request again (the idempotency key of a training, the period of an
+observation). Opening a session is the exception: a repetition after a lost answer would open a second one. It is
+repeated only where the service cannot have acted, which is when no connection was made or the service said so.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from email.utils import parsedate_to_datetime
+from typing import Any, TypeVar
+
+import httpx
+
+from .errors import Unreachable, of_response
+
+#: First pause before a repetition, in seconds; it doubles with each, up to the longest.
+FIRST_PAUSE = 0.2
+#: Also the longest ``Retry-After`` that is waited out; beyond it the problem is raised at once.
+LONGEST_PAUSE = 30.0
+#: The service sends a sign of life every 15 s on a stream of events.
+STREAM_SILENCE = 60.0
+
+_RETRIED_STATUS = (429, 503)
+_NO_CONNECTION = (httpx.ConnectError, httpx.ConnectTimeout, httpx.PoolTimeout)
+_LOST = (httpx.TimeoutException, httpx.NetworkError, httpx.RemoteProtocolError)
+
+T = TypeVar("T")
+
+
+class Transport:
+    """Sends requests to one service. Safe to share between threads."""
+
+    def __init__(self, http: httpx.Client, retries: int) -> None:
+        self.http = http
+        self.retries = retries
+
+    def call(
+        self,
+        method: str,
+        path: str,
+        *,
+        body: Mapping[str, Any] | bytes | None = None,
+        params: Mapping[str, str | int | None] | None = None,
+        headers: Mapping[str, str] | None = None,
+        repeatable: bool = True,
+    ) -> httpx.Response:
+        """A successful answer.
+
+        Raises :class:`ProblemError` where the service refuses and :class:`Unreachable` where no answer comes.
+        """
+        content = encoded(body) if isinstance(body, Mapping) else body
+        media = {} if body is None else {"content-type": "application/json"}
+        given = {name: value for name, value in (params or {}).items() if value is not None}
+        request = self.http.build_request(
+            method, path, content=content, params=given or None, headers={**media, **(headers or {})}
+        )
+        lost = False
+        for attempt in range(self.retries + 1):
+            last = attempt == self.retries
+            try:
+                response = self.http.send(request)
+            except httpx.TransportError as error:
+                if last or not isinstance(error, _LOST if repeatable else _NO_CONNECTION):
+                    raise Unreachable(f"no answer to {method} {request.url}: {error!r}") from error
+                lost, pause = True, growing_pause(attempt)
+            else:
+                # What is not there any more was deleted by the request whose answer was lost.
+                if response.is_success or (method == "DELETE" and lost and response.status_code == httpx.codes.NOT_FOUND):
+                    return response
+                asked = retry_after(response)
+                if last or response.status_code not in _RETRIED_STATUS or asked is None or asked > LONGEST_PAUSE:
+                    raise of_response(response, asked)
+                pause = max(asked, growing_pause(attempt))
+            time.sleep(pause)
+        raise AssertionError("the last attempt returns or raises")
+
+    @contextmanager
+    def stream(self, path: str, last_event_id: str) -> Iterator[httpx.Response]:
+        """An open stream of events, from the one after ``last_event_id``."""
+        headers = {"accept": "text/event-stream"} | ({"last-event-id": last_event_id} if last_event_id else {})
+        timeout = httpx.Timeout(self.http.timeout.connect, read=STREAM_SILENCE)
+        with self.http.stream("GET", path, headers=headers, timeout=timeout) as response:
+            if not response.is_success:
+                response.read()
+                raise of_response(response, retry_after(response))
+            yield response
+
+
+def encoded(body: Mapping[str, Any]) -> bytes:
+    """JSON. NumPy's scalars are numbers; NaN and infinities are not JSON (``ValueError``)."""
+
+    def plain(value: Any) -> Any:
+        if hasattr(value, "item"):
+            return value.item()
+        raise TypeError(f"{value!r} of type {type(value).__name__} is not JSON")
+
+    return json.dumps(body, allow_nan=False, default=plain).encode()
+
+
+def retry_after(response: httpx.Response) -> float | None:
+    """The pause an answer asks for, in seconds: RFC 9110 allows a number or a date."""
+    text = response.headers.get("retry-after")
+    if text is None:
+        return None
+    try:
+        return max(0.0, float(text) if text.isdigit() else parsedate_to_datetime(text).timestamp() - time.time())
+    except ValueError:
+        return None
+
+
+def growing_pause(attempt: int) -> float:
+    """Seconds before repetition ``attempt`` (from 0), drawn apart so that clients do not come back together."""
+    return random.uniform(0.5, 1.0) * min(FIRST_PAUSE * 2.0**attempt, LONGEST_PAUSE)

@@ -1,0 +1,491 @@
+"""The types of requests and answers, generated from api/openapi.json by ./generate."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, TypeAlias, TypedDict
+
+from typing_extensions import NotRequired
+
+AdviceSource: TypeAlias = Literal["policy_surrogate", "resolved", "resolved_outside_design"]
+"""Where an advice came from."""
+
+
+FeatureMap: TypeAlias = Literal["standardized", "raw_moments"]
+"""How a state becomes the inputs of a surrogate."""
+
+
+Framework: TypeAlias = Literal["adaptive", "static", "known_law", "plug_in"]
+"""What the investor is robust against, and whether observing returns changes it."""
+
+
+class Health(TypedDict):
+    """The service in a few words."""
+
+    status: str
+    version: str
+    jobs_queued: int
+    jobs_running: int
+    sessions: int
+
+
+class HyperparameterBounds(TypedDict):
+    """Box of the maximum-likelihood search, for inputs and targets scaled to unit variance."""
+
+    lengthscale: NotRequired[list[float]]
+    signal_variance: NotRequired[list[float]]
+    noise_variance: NotRequired[list[float]]
+
+
+class Imported(TypedDict):
+    """An imported policy."""
+
+    policy: str
+
+
+InitialLaws: TypeAlias = Literal["given", "resampled"]
+"""Where the design's empirical laws start."""
+
+
+class Interval(TypedDict):
+    """A closed interval."""
+
+    min: float
+    max: float
+
+
+JobKind: TypeAlias = Literal["train", "evaluate"]
+"""What a job computes."""
+
+
+JobState: TypeAlias = Literal["queued", "running", "succeeded", "failed", "cancelled"]
+
+
+class MixtureComponent(TypedDict):
+    weight: float
+    mean: float
+    variance: float
+
+
+class Observation(TypedDict):
+    """One observed period."""
+
+    period: int
+    log_return: float
+    advised_allocation: float
+    executed_allocation: float
+    wealth: float
+    """Wealth at the end of the period."""
+    observed_ms: int
+
+
+class Observe(TypedDict):
+    """The return of one period, given in exactly one of three ways, and what was done in it."""
+
+    session: str
+    period: int
+    """Number of the period, from 1."""
+    log_return: NotRequired[float | None]
+    simple_return: NotRequired[float | None]
+    """`price / previous price - 1`."""
+    price: NotRequired[float | None]
+    """Price at the end of the period."""
+    previous_price: NotRequired[float | None]
+    """Price at the start of the period. Default: the price reported for the period before."""
+    executed_allocation: NotRequired[float | None]
+    """Share of wealth held in the risky asset through the period. Default: the allocation advised for it."""
+    wealth: NotRequired[float | None]
+    """Wealth reached, where fees or flows made it differ from what the return and the allocation give."""
+
+
+class OpenSession(TypedDict):
+    """A session to open."""
+
+    policy: str
+    """The policy to live by."""
+    history: NotRequired[list[float] | None]
+    """Log-returns known at the start. Default: the policy's."""
+    wealth: NotRequired[float | None]
+    """Default: the policy's initial wealth."""
+
+
+Phase: TypeAlias = Literal["solving", "fitting"]
+
+
+class PolicyEntry(TypedDict):
+    """A policy in a list."""
+
+    policy: str
+    created_ms: int
+    bytes: int
+    """Length of the exported document."""
+
+
+class PolicyPage(TypedDict):
+    """A page of policies, newest first."""
+
+    policies: list[PolicyEntry]
+    next: NotRequired[int | None]
+    """Give it as `after` for the next page; null on the last."""
+
+
+class Problem(TypedDict):
+    """A problem document (RFC 9457)."""
+
+    type: str
+    """Stable reference of the kind of problem: `/problems/<slug>`."""
+    title: str
+    status: int
+    detail: str
+    """This occurrence, in one sentence."""
+    field: NotRequired[str | None]
+    """Dotted path of the offending field, header or parameter; every problem that the client can mend names it."""
+    value: NotRequired[Any]
+    """What the field held."""
+    rule: NotRequired[str | None]
+    """What the field must be."""
+
+
+class RadiusRule1(TypedDict):
+    """`scale Q / sqrt(n)`, Q the (1 - alpha)-quantile of the bridge statistic over simulated paths."""
+
+    alpha: NotRequired[float]
+    paths: NotRequired[int]
+    scale: NotRequired[float]
+    rule: Literal["bridge"]
+
+
+class RadiusRule2(TypedDict):
+    """`sqrt(ln(C / alpha) / (c n))`, the concentration inequality of Fournier and Guillin."""
+
+    alpha: NotRequired[float]
+    C: float
+    c: float
+    rule: Literal["concentration"]
+
+
+class RadiusRule3(TypedDict):
+    """`kappa / sqrt(n)`."""
+
+    kappa: float
+    rule: Literal["root_n"]
+
+
+class RadiusRule4(TypedDict):
+    """The same radius at every sample size."""
+
+    radius: float
+    rule: Literal["fixed"]
+
+
+RadiusRule: TypeAlias = RadiusRule1 | RadiusRule2 | RadiusRule3 | RadiusRule4
+"""How the radius of the Wasserstein ball follows from the sample of size n."""
+
+
+class SamplingLaw1(TypedDict):
+    """A law of log-returns that can be drawn from."""
+
+    components: list[MixtureComponent]
+    kind: Literal["gaussian_mixture"]
+
+
+class SamplingLaw2(TypedDict):
+    """Smoothed bootstrap of the history, with the history's own mean and variance."""
+
+    kind: Literal["bootstrap"]
+
+
+class SamplingLaw3(TypedDict):
+    """A law of log-returns that can be drawn from."""
+
+    location: float
+    scale: float
+    degrees_of_freedom: float
+    kind: Literal["student_t"]
+
+
+SamplingLaw: TypeAlias = SamplingLaw1 | SamplingLaw2 | SamplingLaw3
+"""A law of log-returns that can be drawn from."""
+
+
+class SessionHistory(TypedDict):
+    """Where a session started and everything it observed."""
+
+    session: str
+    policy: str
+    initial_wealth: float
+    history: list[float]
+    """Log-returns known at the start."""
+    observations: list[Observation]
+
+
+SessionState: TypeAlias = Literal["active", "completed"]
+
+
+class SurrogateDiagnostics(TypedDict):
+    """A fitted surrogate in figures."""
+
+    features: list[str]
+    """Names of the inputs, in the order of the lengthscales."""
+    lengthscales: list[float]
+    """Lengthscales in units of each input's standard deviation over the design."""
+    signal_variance: float
+    """In units of the target's variance over the design."""
+    noise_variance: float
+    """In units of the target's variance over the design."""
+    log_likelihood_per_point: float
+    leave_one_out_error: float
+    """Root mean square of the leave-one-out errors, in the target's own unit."""
+    jitter: float
+    """Diagonal added to the covariance matrix to factorise it, relative to its diagonal."""
+    search: str
+    """How the maximum-likelihood search ended."""
+
+
+SurrogateTarget: TypeAlias = Literal["floor_gain", "value"]
+"""What the value surrogate regresses."""
+
+
+class TransportedMass(TypedDict):
+    """Mass of one atom and where the adversary puts it."""
+
+    atom: float
+    """Observed log-return."""
+    moved_to: float
+    """Log-return in the worst case; equal to `atom` where the mass stays."""
+    mass: float
+
+
+class Uncertainty(TypedDict):
+    """The uncertainty set of a state, in figures."""
+
+    sample_size: int
+    moments: list[float]
+    """Raw moments of the empirical law, first to the specification's count."""
+    quantile: NotRequired[float | None]
+    """(1 - alpha)-quantile of the bridge statistic; absent under other radius rules."""
+    quantile_standard_error: NotRequired[float | None]
+    """Simulation standard error of the quantile."""
+    radius: float
+
+
+class UtilitySpecification1(TypedDict):
+    """`(1 - exp(-risk_aversion x)) / risk_aversion`, risk aversion per unit of wealth."""
+
+    risk_aversion: float
+    kind: Literal["exponential"]
+
+
+class UtilitySpecification2(TypedDict):
+    """`(x^(1 - risk_aversion) - 1) / (1 - risk_aversion)`, risk aversion above 1."""
+
+    risk_aversion: float
+    kind: Literal["power"]
+
+
+class UtilitySpecification3(TypedDict):
+    """`ln x`."""
+
+    kind: Literal["log"]
+
+
+UtilitySpecification: TypeAlias = UtilitySpecification1 | UtilitySpecification2 | UtilitySpecification3
+"""Utility of terminal wealth, always maximised."""
+
+
+class WorstCase(TypedDict):
+    """The law that is worst for the advised allocation, as a transport of the empirical law."""
+
+    multiplier: float
+    """Lagrange multiplier of the ball: utility lost per unit of extra radius."""
+    transport: list[TransportedMass]
+    duality_gap: float
+    """Difference between primal and dual value, in log certainty equivalent."""
+    sentence: str
+    """The worst case in one plain sentence."""
+
+
+class Advice(TypedDict):
+    """The robust allocation for the coming period and what it is worth."""
+
+    allocation: float
+    """Share of wealth to hold in the risky asset."""
+    certainty_equivalent: float
+    """Certainty equivalent of the robust value, in terminal wealth."""
+    floor: float
+    """Terminal wealth of all-bank: no law can take it away."""
+    radius: float
+    """Radius of the Wasserstein ball, in log-return."""
+    sample_size: int
+    surrogate_sd: float
+    """Predicted standard deviation of the log certainty equivalent."""
+    in_design: bool
+    """Whether the state lies where the surrogates were trained."""
+    source: AdviceSource
+
+
+class DesignSpecification(TypedDict):
+    """Which states the surrogates are trained on."""
+
+    count: NotRequired[int | None]
+    """Design points per step, N. Default 1000; 200 where the state is wealth alone."""
+    initial_laws: NotRequired[InitialLaws]
+    sampling_law: NotRequired[SamplingLaw | None]
+    wealth: NotRequired[Interval | None]
+
+
+class JobProgress(TypedDict):
+    """How far a job is."""
+
+    steps_done: int
+    steps_total: int
+    step: NotRequired[int | None]
+    """The step being solved; steps are solved from the last to the first."""
+    phase: NotRequired[Phase | None]
+    points_done: NotRequired[int | None]
+    """Design points solved in this step."""
+    points_total: NotRequired[int | None]
+    seconds_left: NotRequired[float | None]
+
+
+class Observed(Uncertainty):
+    """The session after an observation."""
+
+    session: str
+    period: int
+    log_return: float
+    executed_allocation: float
+    price: NotRequired[float | None]
+    """The price reported, if one was."""
+    wealth: float
+    """Wealth at the end of the period."""
+    completed: bool
+    """Whether the horizon is reached."""
+
+
+class ProblemSpecification(TypedDict):
+    framework: NotRequired[Framework]
+    horizon: NotRequired[int]
+    """Number of allocation decisions, T."""
+    rate_per_step: NotRequired[float]
+    """Bank return per step, r: wealth in the bank grows by the factor 1 + r."""
+    initial_wealth: NotRequired[float]
+    action_interval: NotRequired[list[float]]
+    """Share of wealth that may be held in the risky asset: `[0, highest]`."""
+    utility: NotRequired[UtilitySpecification]
+    radius: NotRequired[RadiusRule]
+    support: NotRequired[Interval | None]
+    law: NotRequired[SamplingLaw | None]
+    history: list[float]
+    """The log-returns observed before the start, at least two of them distinct."""
+
+
+class Session(TypedDict):
+    """A live investor."""
+
+    session: str
+    policy: str
+    period: int
+    """The coming period, from 1; `horizon + 1` once completed."""
+    horizon: int
+    state: SessionState
+    wealth: float
+    sample_size: int
+    created_ms: int
+
+
+class SessionEntry(TypedDict):
+    """A session in a list."""
+
+    session: str
+    policy: str
+    period: int
+    horizon: int
+    state: SessionState
+    initial_wealth: float
+    created_ms: int
+
+
+class SessionPage(TypedDict):
+    """A page of sessions, newest first."""
+
+    sessions: list[SessionEntry]
+    next: NotRequired[int | None]
+    """Give it as `after` for the next page; null on the last."""
+
+
+class StepDiagnostics(TypedDict):
+    """How well a step was solved."""
+
+    step: int
+    design_count: int
+    all_bank_share: float
+    """Share of the design points at which the robust allocation is zero."""
+    uncertified_share: float
+    """Share of the design points whose window could not be certified: mass might want to leave it."""
+    duality_gap: float
+    """Largest difference between the primal and the dual value of a robust step, in log certainty equivalent."""
+    value: NotRequired[SurrogateDiagnostics | None]
+    policy: NotRequired[SurrogateDiagnostics | None]
+
+
+class SurrogateSpecification(TypedDict):
+    target: NotRequired[SurrogateTarget]
+    features: NotRequired[FeatureMap]
+    moment_count: NotRequired[int]
+    """Number of moments of the law that enter the features."""
+    bounds: NotRequired[HyperparameterBounds]
+
+
+class Action(Advice):
+    """The robust allocation for the coming period."""
+
+    session: str
+    period: int
+    worst_case: NotRequired[WorstCase | None]
+
+
+class Job(TypedDict):
+    """A job."""
+
+    job: str
+    kind: JobKind
+    state: JobState
+    cancel_requested: bool
+    """A cancel was asked for; the worker stops within a second."""
+    progress: JobProgress
+    policy: NotRequired[str | None]
+    """The policy of a succeeded training."""
+    error: NotRequired[str | None]
+    """Why it failed."""
+    created_ms: int
+    started_ms: NotRequired[int | None]
+    finished_ms: NotRequired[int | None]
+
+
+class JobPage(TypedDict):
+    """A page of jobs, newest first."""
+
+    jobs: list[Job]
+    next: NotRequired[int | None]
+    """Give it as `after` for the next page; null on the last."""
+
+
+class Specification(TypedDict):
+    """A whole training job: the problem, the design that samples its states, the surrogates, one seed."""
+
+    problem: ProblemSpecification
+    design: NotRequired[DesignSpecification]
+    surrogate: NotRequired[SurrogateSpecification]
+    seed: NotRequired[int]
+    """The same specification and seed give the same policy, bit for bit."""
+
+
+class PolicyDetail(TypedDict):
+    """A policy, and how well each of its steps was solved."""
+
+    policy: str
+    created_ms: int
+    framework: Framework
+    horizon: int
+    specification: Specification
+    diagnostics: list[StepDiagnostics]

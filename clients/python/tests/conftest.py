@@ -1,0 +1,121 @@
+"""A real service over a temporary folder, and a network that fails on demand."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from ballast import Ballast, Session, Training
+from ballast import transport
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+BINARY = Path(os.environ.get("BALLAST_BINARY", REPOSITORY / "target/debug/ballast")).resolve()
+#: Monthly log-returns: enough for a policy that holds something.
+RETURNS = [0.041, -0.014, 0.032, 0.053, 0.012, 0.037, -0.021, 0.028, 0.019, 0.044]
+
+
+class Service:
+    """The binary under test, on one port from its first start on."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._port = folder, 0
+        self.start()
+
+    def start(self) -> None:
+        arguments = [BINARY, "serve", "--listen", f"127.0.0.1:{self._port}", "--data", self._folder]
+        environment = {**os.environ, "RUST_LOG": "error"}
+        self._process = subprocess.Popen(arguments, stdout=subprocess.PIPE, env=environment, text=True)
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        assert line.startswith("listening on "), f"{BINARY} printed {line!r}"
+        self.url = line.removeprefix("listening on ").strip()
+        self._port = httpx.URL(self.url).port or 0
+
+    def stop(self) -> None:
+        self._process.send_signal(signal.SIGTERM)
+        assert self._process.wait(timeout=60) == 0
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+
+
+class Network(httpx.BaseTransport):
+    """Connections that fail as told, and remember what went over them."""
+
+    def __init__(self) -> None:
+        self._inner = httpx.HTTPTransport()
+        self.sent: list[tuple[str, str]] = []
+        self._faults: list[Callable[[httpx.Request], httpx.Response]] = []
+
+    def handle_request(self, request: httpx.Request) -> httpx.Response:
+        self.sent.append((request.method, request.url.path))
+        return self._faults.pop(0)(request) if self._faults else self._inner.handle_request(request)
+
+    def lose_answers(self, count: int) -> None:
+        """The next requests arrive; their answers do not."""
+
+        def lose(request: httpx.Request) -> httpx.Response:
+            self._inner.handle_request(request).read()
+            raise httpx.ReadError("the connection was reset", request=request)
+
+        self._faults += [lose] * count
+
+    def refuse(self, count: int) -> None:
+        """The next connections cannot be made."""
+
+        def fail(request: httpx.Request) -> httpx.Response:
+            raise httpx.ConnectError("connection refused", request=request)
+
+        self._faults += [fail] * count
+
+    def answer(self, status: int, headers: dict[str, str] | None = None, text: str = "") -> None:
+        """Something in between answers the next request."""
+        self._faults.append(lambda request: httpx.Response(status, headers=headers, text=text, request=request))
+
+    def close(self) -> None:
+        self._inner.close()
+
+
+@pytest.fixture(scope="session")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    assert BINARY.is_file(), f"{BINARY} is missing: build it, or name another in BALLAST_BINARY"
+    running = Service(tmp_path_factory.mktemp("data"))
+    yield running
+    running.stop()
+
+
+@pytest.fixture
+def network() -> Network:
+    return Network()
+
+
+@pytest.fixture
+def ballast(service: Service, network: Network) -> Iterator[Ballast]:
+    with Ballast(service.url, transport=network) as client:
+        yield client
+
+
+def train(ballast: Ballast, **changes: object) -> Training:
+    """A small training: three periods, 20 design points."""
+    settings = {"horizon": 3, "rate_per_step": 0.001, "design": {"count": 20}, **changes}
+    return ballast.train(RETURNS, kind="log", **settings)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def session(ballast: Ballast) -> Session:
+    # The same key and body: every test but the first finds the job done.
+    return train(ballast, idempotency_key="the policy of the tests").session()
+
+
+@pytest.fixture
+def pauses(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The pauses between repetitions, which then take no time."""
+    taken: list[float] = []
+    monkeypatch.setattr(transport.time, "sleep", taken.append)
+    return taken

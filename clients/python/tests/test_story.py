@@ -1,0 +1,127 @@
+"""The whole way: train, open a session, ask, report, look back."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import math
+
+import pytest
+from conftest import REPOSITORY, RETURNS, Network, train
+
+import ballast as package
+from ballast import Ballast, Session, wire
+
+
+def test_an_investor_lives_to_the_horizon(session: Session) -> None:
+    rate, wealth, realised = 0.001, session.wealth, [0.02, -0.05, 0.01]
+    assert (session.period, session.horizon, wealth) == (1, 3, 100.0)
+    for number, simple_return in enumerate(realised, start=1):
+        action = session.action()
+        allocation = action["allocation"]
+        assert action["period"] == session.period == number
+        assert action["certainty_equivalent"] >= action["floor"]
+        wealth *= (1 - allocation) * (1 + rate) + allocation * (1 + simple_return)
+        assert session.observe(simple_return=simple_return) is session
+        assert session.wealth == pytest.approx(wealth, rel=1e-12)
+        assert session.observed is not None
+        assert session.observed["sample_size"] == len(RETURNS) + number
+        assert session.observed["completed"] == session.completed == (number == 3)
+    with pytest.raises(package.SessionCompleted):
+        session.action()
+    with pytest.raises(package.SessionCompleted) as refusal:
+        session.observe(simple_return=0.0)
+    assert (refusal.value.field, refusal.value.value, refusal.value.rule) == ("period", 4, "must be at most 3")
+    history = session.history()
+    assert history["history"] == RETURNS
+    assert [row["log_return"] for row in history["observations"]] == pytest.approx([math.log1p(r) for r in realised])
+    assert history["observations"][-1]["wealth"] == session.wealth
+
+
+def test_the_chain_of_the_readme(ballast: Ballast) -> None:
+    action = train(ballast).session(wealth=100.0).observe(log_return=0.01).action(explain="worst_case")
+    assert action["period"] == 2 and 0.0 <= action["allocation"] <= 1.0
+    worst = action.get("worst_case")
+    assert worst is not None and sum(move["mass"] for move in worst["transport"]) == pytest.approx(1.0)
+
+
+def test_prices_and_what_was_really_done(session: Session) -> None:
+    session.observe(price=103.0, previous_price=100.0, executed_allocation=0.5)
+    assert session.wealth == pytest.approx(100.0 * (0.5 * 1.001 + 0.5 * 1.03), rel=1e-12)
+    session.observe(price=103.0 * 1.01, wealth=90.0)
+    assert session.observed is not None
+    assert session.observed["log_return"] == pytest.approx(math.log(1.01))
+    assert session.wealth == 90.0
+
+
+def test_a_session_is_found_again_where_it_was(ballast: Ballast, session: Session) -> None:
+    session.observe(log_return=0.01)
+    other = ballast.session(session.id)
+    assert (other.period, other.wealth, other.policy) == (2, session.wealth, session.policy)
+    other.observe(log_return=0.02)
+    assert session.period == 2 and session.refresh().period == 3 and session.wealth == other.wealth
+
+
+def test_a_policy_travels_and_its_specification_trains_it_again(ballast: Ballast) -> None:
+    policy = train(ballast, seed=7).policy()
+    detail, document = policy.detail(), policy.export()
+    assert detail["policy"] == policy.id and detail["specification"].get("seed") == 7
+    policy.delete()
+    with pytest.raises(package.NotFound):
+        policy.detail()
+    assert ballast.import_policy(document).id == policy.id
+    assert ballast.submit(detail["specification"]).policy().id == policy.id
+
+
+def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, session: Session) -> None:
+    """Compares what goes over the network with api/openapi.json: an operation the service gains is missed here."""
+    training = train(ballast, seed=8)
+    policy = training.policy()
+    own = policy.session(history=RETURNS[:5])
+    own.action(mode="resolve")
+    own.observe(log_return=0.01)
+    own.refresh().history()
+    assert own.id in [entry["session"] for entry in ballast.sessions()]
+    own.delete()
+    assert policy.id in [entry["policy"] for entry in ballast.policies()]
+    policy.detail()
+    ballast.import_policy(policy.export())
+    policy.delete()
+    assert training.id in [job["job"] for job in ballast.jobs()]
+    assert ballast.training(training.id).cancel()["state"] == "succeeded"
+    assert ballast.health()["status"] == "ok"
+
+    ids = {training.id: "{id}", policy.id: "{id}", own.id: "{id}", session.id: "{id}"}
+    reached = {(method, "/".join(ids.get(part, part) for part in path.split("/"))) for method, path in network.sent}
+    paths = json.loads((REPOSITORY / "api/openapi.json").read_text())["paths"]
+    described = {(method.upper(), path) for path, item in paths.items() for method in item if described_for_clients(item)}
+    assert len(described) >= 17
+    assert described - reached == set()
+
+
+def described_for_clients(item: dict[str, dict[str, list[str]]]) -> bool:
+    return all(operation["tags"] != ["operations"] for operation in item.values())
+
+
+def test_every_field_of_a_specification_is_an_argument() -> None:
+    arguments = set(inspect.signature(Ballast.train).parameters) - {"self", "returns", "kind", "idempotency_key"}
+    problem, whole = wire.ProblemSpecification.__annotations__, wire.Specification.__annotations__
+    assert arguments == (set(problem) - {"history"}) | (set(whole) - {"problem"})
+
+
+def test_every_field_of_a_report_is_an_argument() -> None:
+    arguments = set(inspect.signature(Session.observe).parameters) - {"self"}
+    assert arguments == set(wire.Observe.__annotations__) - {"session"}
+
+
+def test_pages_are_joined(ballast: Ballast, session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = [session.id] + [ballast.policy(session.policy).session().id for _ in range(4)]
+    monkeypatch.setattr("ballast.client._PAGE", 2)
+    listed = [entry["session"] for entry in ballast.sessions()]
+    assert listed[:5] == opened[::-1] and len(listed) == len(set(listed))
+
+
+def test_the_client_closes_its_connections(ballast: Ballast) -> None:
+    ballast.close()
+    with pytest.raises(RuntimeError, match="closed"):
+        ballast.health()
