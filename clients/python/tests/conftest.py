@@ -13,7 +13,6 @@ import httpx
 import pytest
 
 from ballast import Ballast, Session, Training
-from ballast import transport
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 BINARY = Path(os.environ.get("BALLAST_BINARY", REPOSITORY / "target/debug/ballast")).resolve()
@@ -29,7 +28,8 @@ class Service:
         self.start()
 
     def start(self) -> None:
-        arguments = [BINARY, "serve", "--listen", f"127.0.0.1:{self._port}", "--data", self._folder]
+        arguments: list[str | Path] = [BINARY, "serve", "--listen", f"127.0.0.1:{self._port}", "--data"]
+        arguments.append(self._folder)
         environment = {**os.environ, "RUST_LOG": "error"}
         self._process = subprocess.Popen(arguments, stdout=subprocess.PIPE, env=environment, text=True)
         assert self._process.stdout is not None
@@ -39,10 +39,13 @@ class Service:
         self._port = httpx.URL(self.url).port or 0
 
     def stop(self) -> None:
+        """As an operator does: it drains and exits."""
         self._process.send_signal(signal.SIGTERM)
-        assert self._process.wait(timeout=60) == 0
-        assert self._process.stdout is not None
-        self._process.stdout.close()
+        try:
+            assert self._process.wait(timeout=60) == 0
+        finally:
+            self._process.kill()
+            self._process.communicate()
 
 
 class Network(httpx.BaseTransport):
@@ -117,5 +120,5 @@ def session(ballast: Ballast) -> Session:
 def pauses(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The pauses between repetitions, which then take no time."""
     taken: list[float] = []
-    monkeypatch.setattr(transport.time, "sleep", taken.append)
+    monkeypatch.setattr("time.sleep", taken.append)
     return taken

@@ -1,0 +1,64 @@
+"""Lives through 2008 as `ballast demo` does, from Python: the table it prints is the demo's.
+
+    ballast serve --data ballast-data &
+    python examples/us_market.py              # --count 60 for a quicker, coarser policy
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import pandas as pd
+
+from ballast import Ballast, ProgressPrinter
+
+DATA = Path(__file__).resolve().parents[3] / "data" / "us_market_monthly.csv"
+HISTORY = 240
+YEAR = "2008"
+INITIAL_WEALTH = 100.0
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Lives through 2008 on the bundled returns.")
+    parser.add_argument("--url", default="http://127.0.0.1:8080", help="where the service listens")
+    parser.add_argument("--count", type=int, default=500, help="design points per step")
+    arguments = parser.parse_args()
+
+    market = pd.read_csv(DATA, index_col="month")
+    past, year = market[market.index < f"{YEAR}-01"].tail(HISTORY), market[market.index.str.startswith(YEAR)]
+    rate = float(past["risk_free_return"].iloc[-1])
+    with Ballast(arguments.url) as ballast:
+        session = ballast.train(
+            past["market_return"],
+            kind="simple",
+            horizon=len(year),
+            rate_per_step=rate,
+            initial_wealth=INITIAL_WEALTH,
+            utility={"kind": "power", "risk_aversion": 3.0},
+            radius={"rule": "bridge", "alpha": 0.1},
+            design={"count": arguments.count},
+        ).session(watch=ProgressPrinter())
+        rows = []
+        for month, realised in year["market_return"].items():
+            action = session.action()
+            session.observe(simple_return=realised)
+            rows.append((month, action["radius"], action["allocation"], realised, session.wealth))
+
+    table = pd.DataFrame(rows, columns=["month", "radius", "allocation", "return", "wealth"]).set_index("month")
+    table["all-bank"] = [INITIAL_WEALTH * (1 + rate) ** period for period in range(1, len(table) + 1)]
+    table["all-stock"] = INITIAL_WEALTH * (1 + table["return"]).cumprod()
+    print(f"The year {YEAR}, month by month (the bank pays {100 * rate:.2f} % throughout):")
+    print(shown(table))
+
+
+def shown(table: pd.DataFrame) -> str:
+    """The table in the columns of the demo."""
+    head = "{:<8} {:>8} {:>11} {:>10} {:>9} {:>9} {:>10}".format(table.index.name, *table.columns)
+    line = "{:<8} {:>8.4f} {:>11.3f} {:>8.2f} % {:>9.2f} {:>9.2f} {:>10.2f}"
+    in_percent = table.assign(**{"return": 100 * table["return"]})
+    return "\n".join([head, *(line.format(*row) for row in in_percent.itertuples())])
+
+
+if __name__ == "__main__":
+    main()

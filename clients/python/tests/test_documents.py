@@ -1,0 +1,81 @@
+"""What the READMEs and the example say is run, and what it prints is true."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from conftest import BINARY, REPOSITORY, Service
+
+HERE = REPOSITORY / "clients/python"
+URL = "http://127.0.0.1:8080"
+
+
+def blocks(text: str) -> list[str]:
+    return re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
+def run(code: str, service: Service) -> subprocess.CompletedProcess[str]:
+    assert URL in code
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-c", code.replace(URL, service.url)], text=True, capture_output=True, check=True
+    )
+
+
+def test_the_readme_of_the_client_runs(service: Service) -> None:
+    quick_start, error = blocks((HERE / "README.md").read_text())
+    lines = run(quick_start, service).stdout.splitlines()
+    assert [line.split()[0] for line in lines[:3]] == ["1", "2", "3"]
+    assert lines[0].endswith(" 100.0") and lines[3].count("'log_return'") == 3
+    said = error.split("#")[1].strip()
+    assert run(quick_start + error, service).stdout.splitlines()[-1] == said
+
+
+def test_the_readme_of_the_repository_runs(service: Service) -> None:
+    (code,) = blocks((REPOSITORY / "README.md").read_text())
+    assert len(code.splitlines()) == 5
+    allocations = [float(line) for line in run(code, service).stdout.splitlines()]
+    assert len(allocations) == 2 and all(0.0 <= allocation <= 1.0 for allocation in allocations)
+
+
+def test_the_example_prints_the_table_of_the_demo(service: Service) -> None:
+    count = ["--count", "20"]
+    script = HERE / "examples/us_market.py"
+    example = [sys.executable, "-W", "error", str(script), "--url", service.url, *count]
+    told = subprocess.run(example, text=True, capture_output=True, check=True).stdout
+    demo = subprocess.run([str(BINARY), "demo", *count], text=True, capture_output=True, check=True).stdout
+    assert table(told) == table(demo)
+
+
+def table(text: str) -> list[str]:
+    lines = text.splitlines()
+    start = next(at for at, line in enumerate(lines) if line.startswith("The year 2008"))
+    found = lines[start : start + 14]
+    assert [line[:7] for line in found[2:]] == [f"2008-{month:02}" for month in range(1, 13)]
+    return found
+
+
+#: What a user may write, and what the types keep him from.
+CALLS = [
+    ('session.action()["allocation"] + 1.0', None),
+    ('session.action()["alocation"]', "typeddict-item"),
+    ('ballast.train([0.1, 0.2], kind="price")', None),
+    ('ballast.train([0.1, 0.2], kind="prices")', "arg-type"),
+    ('ballast.train([0.1, 0.2], kind="log", radius={"rule": "fixed", "radius": 0.01})', None),
+    ('ballast.train([0.1, 0.2], kind="log", radius={"rule": "fixed", "kappa": 0.01})', "arg-type"),
+    ("session.observe(simple_return=0.01).action()", None),
+    ("session.observe(0.01)", "call-arg"),
+]
+
+
+def test_types_reach_those_who_install_it(tmp_path: Path) -> None:
+    """In another folder, where mypy finds the package as installed, by its py.typed."""
+    lines = ["from ballast import Ballast, Session", "def use(ballast: Ballast, session: Session) -> None:"]
+    first = len(lines) + 1
+    (tmp_path / "use.py").write_text("\n".join(lines + [f"    {call}" for call, _ in CALLS]) + "\n")
+    command = [sys.executable, "-m", "mypy", "--strict", "--hide-error-context", "use.py"]
+    said = subprocess.run(command, cwd=tmp_path, text=True, capture_output=True).stdout
+    found = {int(line): code for line, code in re.findall(r"^use\.py:(\d+): error: .*\[([a-z-]+)\]$", said, re.MULTILINE)}
+    assert found == {number: code for number, (_, code) in enumerate(CALLS, start=first) if code}, said
