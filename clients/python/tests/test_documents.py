@@ -66,7 +66,7 @@ CALLS = [
     ('ballast.train([0.1, 0.2], kind="log", radius={"rule": "fixed", "radius": 0.01})', None),
     ('ballast.train([0.1, 0.2], kind="log", radius={"rule": "fixed", "kappa": 0.01})', "arg-type"),
     ("session.observe(simple_return=0.01).action()", None),
-    ("session.observe(0.01)", "call-arg"),
+    ("session.observe(0.01)", "misc"),
 ]
 
 

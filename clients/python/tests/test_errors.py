@@ -79,6 +79,21 @@ def test_an_answer_of_something_in_between_is_a_problem_too(ballast: Ballast, ne
     assert "<h1>Bad gateway</h1>" in str(error)
 
 
+def test_an_answer_that_is_not_json_is_a_problem_too(ballast: Ballast, network: Network) -> None:
+    network.answer(200, {"content-type": "text/html"}, "<h1>Sign in</h1>")
+    with pytest.raises(ProblemError, match="Sign in"):
+        ballast.health()
+    network.answer(422, {"content-type": "application/problem+json"}, "cut of")
+    with pytest.raises(ProblemError, match="cut of"):
+        ballast.health()
+
+
+def test_an_address_without_a_protocol_is_said_at_once(pauses: list[float]) -> None:
+    with Ballast("localhost") as nowhere, pytest.raises(package.Unreachable, match="http://"):
+        nowhere.health()
+    assert pauses == []
+
+
 def test_every_kind_of_the_service_has_its_class() -> None:
     source = (REPOSITORY / "src/http/problem.rs").read_text()
     kinds = set(re.findall(r'\("([a-z-]+)", S::', source))

@@ -82,13 +82,13 @@ class Ballast:
     def submit(self, specification: wire.Specification, *, idempotency_key: str | None = None) -> Training:
         """Queues the training of a whole specification, such as ``Policy.detail`` shows."""
         # Without a key of the caller's, one of this call's own: a repetition after a lost answer finds the same job.
-        headers = {"Idempotency-Key": idempotency_key or str(uuid.uuid4())}
-        job: wire.Job = self._transport.call("POST", "/train", body=specification, headers=headers).json()
+        headers = {"Idempotency-Key": str(uuid.uuid4()) if idempotency_key is None else idempotency_key}
+        job: wire.Job = self._transport.json("POST", "/train", body=specification, headers=headers)
         return Training(self._transport, job)
 
     def training(self, job: str) -> Training:
         """A training that was queued before."""
-        return Training(self._transport, self._transport.call("GET", f"/jobs/{quote(job, safe='')}").json())
+        return Training(self._transport, self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
 
     def policy(self, policy: str) -> Policy:
         """A policy by its name. Asks nothing of the service yet."""
@@ -96,12 +96,12 @@ class Ballast:
 
     def import_policy(self, document: bytes) -> Policy:
         """Stores an exported policy; one that the service knows already stays as it is."""
-        imported: wire.Imported = self._transport.call("POST", "/policies/import", body=document).json()
+        imported: wire.Imported = self._transport.json("POST", "/policies/import", body=document)
         return Policy(self._transport, imported["policy"])
 
     def session(self, session: str) -> Session:
         """A session that was opened before, at the period it has come to."""
-        return Session(self._transport, self._transport.call("GET", f"/sessions/{quote(session, safe='')}").json())
+        return Session(self._transport, self._transport.json("GET", f"/sessions/{quote(session, safe='')}"))
 
     def jobs(self) -> Iterator[wire.Job]:
         """All jobs, newest first."""
@@ -117,7 +117,7 @@ class Ballast:
 
     def health(self) -> wire.Health:
         """The service in a few words. Raises :class:`Overloaded` where it is draining."""
-        return cast(wire.Health, self._transport.call("GET", "/health").json())
+        return cast(wire.Health, self._transport.json("GET", "/health"))
 
     def close(self) -> None:
         """Closes the connections."""
@@ -126,7 +126,7 @@ class Ballast:
     def _listed(self, path: str, name: str) -> Iterator[Any]:
         after: int | None = None
         while True:
-            page = self._transport.call("GET", path, params={"after": after, "limit": _PAGE}).json()
+            page = self._transport.json("GET", path, params={"after": after, "limit": _PAGE})
             yield from page[name]
             after = page.get("next")
             if after is None:

@@ -7,6 +7,7 @@ this client does not know yet is a plain :class:`ProblemError`.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any, ClassVar
 
 import httpx
@@ -123,6 +124,7 @@ def of_response(response: httpx.Response, retry_after: float | None) -> ProblemE
         "detail": response.text[:200],
     }
     if response.headers.get("content-type", "").startswith("application/problem+json"):
-        problem.update(response.json())
+        with suppress(ValueError):
+            problem.update(response.json())
     kind = ProblemError.kinds.get(problem["type"].rpartition("/")[2], ProblemError)
     return kind(problem, retry_after)

@@ -23,7 +23,7 @@ class Policy:
 
     def detail(self) -> wire.PolicyDetail:
         """The completed specification and the diagnostics of every step."""
-        return cast(wire.PolicyDetail, self._transport.call("GET", self._path).json())
+        return cast(wire.PolicyDetail, self._transport.json("GET", self._path))
 
     def export(self) -> bytes:
         """The portable document, as ``Ballast.import_policy`` takes it. Raises :class:`DamagedPolicy` where the bytes
@@ -42,7 +42,7 @@ class Policy:
         request: wire.OpenSession = {"policy": self.id, "wealth": wealth}
         if history is not None:
             request["history"] = log_returns(history, kind)
-        return Session(self._transport, self._transport.call("POST", "/sessions", body=request, repeatable=False).json())
+        return Session(self._transport, self._transport.json("POST", "/sessions", body=request, repeatable=False))
 
     def delete(self) -> None:
         """Deletes it. Raises :class:`InUse` while sessions live by it, and :class:`NotFound` where there is none."""

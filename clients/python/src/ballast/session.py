@@ -46,7 +46,7 @@ class Session:
         the law it is robust against. Raises :class:`SessionCompleted` after the horizon.
         """
         params = {"session": self.id, "mode": mode, "explain": explain}
-        return cast(wire.Action, self._transport.call("GET", "/action", params=params).json())
+        return cast(wire.Action, self._transport.json("GET", "/action", params=params))
 
     def observe(
         self,
@@ -76,7 +76,7 @@ class Session:
             "executed_allocation": executed_allocation,
             "wealth": wealth,
         }
-        observed: wire.Observed = self._transport.call("POST", "/observe", body=report).json()
+        observed: wire.Observed = self._transport.json("POST", "/observe", body=report)
         self.observed = observed
         if observed["period"] >= self.period:
             self.period, self.wealth = observed["period"] + 1, observed["wealth"]
@@ -84,11 +84,11 @@ class Session:
 
     def history(self) -> wire.SessionHistory:
         """Where the session started and everything it observed."""
-        return cast(wire.SessionHistory, self._transport.call("GET", f"{self._path}/history").json())
+        return cast(wire.SessionHistory, self._transport.json("GET", f"{self._path}/history"))
 
     def refresh(self) -> Session:
         """Reads the period and the wealth from the service."""
-        session: wire.Session = self._transport.call("GET", self._path).json()
+        session: wire.Session = self._transport.json("GET", self._path)
         self.period, self.wealth = session["period"], session["wealth"]
         return self
 

@@ -13,12 +13,12 @@ from urllib.parse import quote
 import httpx
 
 from . import wire
-from .errors import JobEnded, Overloaded, Unreachable
+from .errors import JobEnded, ProblemError, Unreachable
 from .events import parsed
 from .policy import Policy
 from .returns import Kind, Returns
 from .session import Session
-from .transport import Transport, growing_pause
+from .transport import RETRIED_STATUS, Transport, growing_pause
 
 #: Called with the job at every change of it.
 Watch = Callable[[wire.Job], object]
@@ -41,12 +41,12 @@ class Training:
 
     def refresh(self) -> wire.Job:
         """The job as it is now."""
-        self.job = self._transport.call("GET", self._path).json()
+        self.job = self._transport.json("GET", self._path)
         return self.job
 
     def cancel(self) -> wire.Job:
         """Asks the job to stop, which it does within a second; a job that has ended stays as it is."""
-        self.job = self._transport.call("DELETE", self._path).json()
+        self.job = self._transport.json("DELETE", self._path)
         return self.job
 
     def events(self) -> Iterator[wire.Job]:
@@ -62,7 +62,11 @@ class Training:
                         yield self.job
                         if self.job["state"] in _TERMINAL:
                             return
-            except (httpx.TransportError, Overloaded) as error:
+            except httpx.RequestError as error:
+                reason = repr(error)
+            except ProblemError as error:
+                if error.status not in RETRIED_STATUS:
+                    raise
                 reason = repr(error)
             # A service that stops ends its streams in good order, and comes back.
             if failures >= self._transport.retries:

@@ -14,7 +14,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from email.utils import parsedate_to_datetime
-from typing import Any, TypeVar
+from typing import Any
 
 import httpx
 
@@ -27,11 +27,10 @@ LONGEST_PAUSE = 30.0
 #: The service sends a sign of life every 15 s on a stream of events.
 STREAM_SILENCE = 60.0
 
-_RETRIED_STATUS = (429, 503)
+#: Refusals for the moment.
+RETRIED_STATUS = (429, 503)
 _NO_CONNECTION = (httpx.ConnectError, httpx.ConnectTimeout, httpx.PoolTimeout)
 _LOST = (httpx.TimeoutException, httpx.NetworkError, httpx.RemoteProtocolError)
-
-T = TypeVar("T")
 
 
 class Transport:
@@ -66,7 +65,7 @@ class Transport:
             last = attempt == self.retries
             try:
                 response = self.http.send(request)
-            except httpx.TransportError as error:
+            except httpx.RequestError as error:
                 if last or not isinstance(error, _LOST if repeatable else _NO_CONNECTION):
                     raise Unreachable(f"no answer to {method} {request.url}: {error!r}") from error
                 lost, pause = True, growing_pause(attempt)
@@ -75,11 +74,29 @@ class Transport:
                 if response.is_success or (method == "DELETE" and lost and response.status_code == httpx.codes.NOT_FOUND):
                     return response
                 asked = retry_after(response)
-                if last or response.status_code not in _RETRIED_STATUS or asked is None or asked > LONGEST_PAUSE:
+                if last or response.status_code not in RETRIED_STATUS or asked is None or asked > LONGEST_PAUSE:
                     raise of_response(response, asked)
                 pause = max(asked, growing_pause(attempt))
             time.sleep(pause)
         raise AssertionError("the last attempt returns or raises")
+
+    def json(
+        self,
+        method: str,
+        path: str,
+        *,
+        body: Mapping[str, Any] | bytes | None = None,
+        params: Mapping[str, str | int | None] | None = None,
+        headers: Mapping[str, str] | None = None,
+        repeatable: bool = True,
+    ) -> Any:
+        """What a successful answer holds; as :meth:`call` otherwise."""
+        response = self.call(method, path, body=body, params=params, headers=headers, repeatable=repeatable)
+        try:
+            return response.json()
+        except ValueError as error:
+            # Something in between, such as a page to sign in at.
+            raise of_response(response, None) from error
 
     @contextmanager
     def stream(self, path: str, last_event_id: str) -> Iterator[httpx.Response]:
