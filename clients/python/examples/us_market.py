@@ -1,7 +1,6 @@
 """Lives through 2008 as `ballast demo` does, from Python: the table it prints is the demo's.
 
-    ballast serve --data ballast-data &
-    python examples/us_market.py              # --count 60 for a quicker, coarser policy
+It wants a service, `ballast serve --data ballast-data`; `--count 60` gives a quicker, coarser policy.
 """
 
 from __future__ import annotations

@@ -19,9 +19,8 @@ def blocks(text: str) -> list[str]:
 
 def run(code: str, service: Service) -> subprocess.CompletedProcess[str]:
     assert URL in code
-    return subprocess.run(
-        [sys.executable, "-W", "error", "-c", code.replace(URL, service.url)], text=True, capture_output=True, check=True
-    )
+    command = [sys.executable, "-W", "error", "-c", code.replace(URL, service.url)]
+    return subprocess.run(command, text=True, capture_output=True, check=True)
 
 
 def test_the_readme_of_the_client_runs(service: Service) -> None:
@@ -77,5 +76,6 @@ def test_types_reach_those_who_install_it(tmp_path: Path) -> None:
     (tmp_path / "use.py").write_text("\n".join(lines + [f"    {call}" for call, _ in CALLS]) + "\n")
     command = [sys.executable, "-m", "mypy", "--strict", "--hide-error-context", "use.py"]
     said = subprocess.run(command, cwd=tmp_path, text=True, capture_output=True).stdout
-    found = {int(line): code for line, code in re.findall(r"^use\.py:(\d+): error: .*\[([a-z-]+)\]$", said, re.MULTILINE)}
+    errors = re.findall(r"^use\.py:(\d+): error: .*\[([a-z-]+)\]$", said, re.MULTILINE)
+    found = {int(line): code for line, code in errors}
     assert found == {number: code for number, (_, code) in enumerate(CALLS, start=first) if code}, said

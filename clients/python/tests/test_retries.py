@@ -24,6 +24,13 @@ def test_a_lost_answer_to_observe_is_given_again_and_counts_once(
     assert len(session.history()["observations"]) == 1
 
 
+def test_the_repetition_of_an_earlier_period_does_not_turn_back_time(session: Session) -> None:
+    wealth = session.observe(log_return=0.02).observe(log_return=0.03).wealth
+    session.observe(log_return=0.02, period=1)
+    assert (session.period, session.wealth) == (3, wealth)
+    assert session.observed is not None and session.observed["period"] == 1
+
+
 def test_observe_goes_on_after_it_gave_up(session: Session, network: Network, pauses: list[float]) -> None:
     network.lose_answers(7)
     with pytest.raises(Unreachable, match="reset"):

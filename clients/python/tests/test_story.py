@@ -94,12 +94,12 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     ids = {training.id: "{id}", policy.id: "{id}", own.id: "{id}", session.id: "{id}"}
     reached = {(method, "/".join(ids.get(part, part) for part in path.split("/"))) for method, path in network.sent}
     paths = json.loads((REPOSITORY / "api/openapi.json").read_text())["paths"]
-    described = {(method.upper(), path) for path, item in paths.items() for method in item if described_for_clients(item)}
+    described = {(method.upper(), path) for path, item in paths.items() for method in item if for_clients(item)}
     assert len(described) >= 17
     assert described - reached == set()
 
 
-def described_for_clients(item: dict[str, dict[str, list[str]]]) -> bool:
+def for_clients(item: dict[str, dict[str, list[str]]]) -> bool:
     return all(operation["tags"] != ["operations"] for operation in item.values())
 
 

@@ -20,7 +20,8 @@ class BallastError(Exception):
 
 
 class Unreachable(BallastError):
-    """No answer came. The request may have been carried out; to send the same one again is safe where its method says so."""
+    """No answer came, and the request may have been carried out all the same. Where it can be sent again without harm,
+    the method that sent it says so."""
 
 
 class DamagedPolicy(BallastError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import Any, Literal, TypeAlias
 
 #: What the numbers are, with the names ``observe`` has for them.
@@ -33,7 +34,7 @@ def log_returns(returns: Returns, kind: Kind) -> list[float]:
         return [math.log1p(number) for number in numbers]
     if not getattr(getattr(returns, "index", None), "is_monotonic_increasing", True):
         raise ValueError("the index of the prices is not increasing: prices must come oldest first")
-    return [math.log(later / earlier) for earlier, later in zip(numbers, numbers[1:])]
+    return [math.log(later / earlier) for earlier, later in pairwise(numbers)]
 
 
 def _column(returns: Returns) -> Iterable[Any]:

@@ -50,7 +50,7 @@ class Training:
         return self.job
 
     def events(self) -> Iterator[wire.Job]:
-        """The job now, then at every change of it, up to its end. A stream that breaks is taken up where it was left."""
+        """The job now, then at every change of it, up to its end. A stream that breaks is taken up where it was."""
         last_id, failures = "", 0
         while True:
             reason = "the service ended them"
@@ -103,11 +103,11 @@ class Training:
 
 
 class ProgressPrinter:
-    """A ``watch`` that prints: one line that is rewritten on a terminal, a line for each new step elsewhere."""
+    """A ``watch`` that prints: one line that is rewritten on a terminal, a line for each finished step elsewhere."""
 
     def __init__(self, file: TextIO | None = None) -> None:
         self._file = sys.stderr if file is None else file
-        self._shown: tuple[str, int | None] | None = None
+        self._shown: tuple[str, int] | None = None
 
     def __call__(self, job: wire.Job) -> None:
         line = progress_line(job)
@@ -115,7 +115,7 @@ class ProgressPrinter:
             if self._file.isatty():
                 end = "\n" if job["state"] in _TERMINAL else ""
                 print(f"\r\x1b[K{line}", end=end, file=self._file, flush=True)
-            elif self._shown != (now := (job["state"], job["progress"].get("step"))):
+            elif self._shown != (now := (job["state"], job["progress"]["steps_done"])):
                 self._shown = now
                 print(line, file=self._file, flush=True)
 

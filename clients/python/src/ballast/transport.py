@@ -71,7 +71,8 @@ class Transport:
                 lost, pause = True, growing_pause(attempt)
             else:
                 # What is not there any more was deleted by the request whose answer was lost.
-                if response.is_success or (method == "DELETE" and lost and response.status_code == httpx.codes.NOT_FOUND):
+                deleted = lost and method == "DELETE" and response.status_code == httpx.codes.NOT_FOUND
+                if response.is_success or deleted:
                     return response
                 asked = retry_after(response)
                 if last or response.status_code not in RETRIED_STATUS or asked is None or asked > LONGEST_PAUSE:
