@@ -74,7 +74,10 @@ fn the_last_step_on_real_returns_agrees_with_a_direct_solve() {
 
 #[test]
 fn the_bridge_quantile_agrees_with_a_million_paths() {
-    use ballast::numerics::{bridge::AbsoluteBridges, empirical::EmpiricalDistribution};
+    use ballast::numerics::{
+        bridge::{AbsoluteBridges, UpperQuantile},
+        empirical::EmpiricalDistribution,
+    };
     let oracle: Value = serde_json::from_str(include_str!("data/bridge.json")).unwrap();
     let cases = oracle["cases"].as_array().unwrap();
     assert_eq!(cases.len(), 3);
@@ -83,7 +86,7 @@ fn the_bridge_quantile_agrees_with_a_million_paths() {
         let law = EmpiricalDistribution::new(&sample);
         let bridges = AbsoluteBridges::simulate(sample.len(), 50_000, 11);
         for row in case["quantiles"].as_array().unwrap() {
-            let found = bridges.quantile(&law, row["alpha"].as_f64().unwrap());
+            let found = bridges.quantile_with_error(&law, &UpperQuantile::new(50_000, row["alpha"].as_f64().unwrap()));
             let allowed = 4.0 * (found.standard_error + row["standard_error"].as_f64().unwrap());
             assert!((found.value - row["quantile"].as_f64().unwrap()).abs() < allowed, "{row} {found:?}");
         }

@@ -8,11 +8,14 @@ use super::gain_field::FieldContext;
 use super::specification::{Framework, Specification};
 use super::state::{State, floor};
 use super::surrogate::NextValue;
-use super::uncertainty::UncertaintySets;
+use super::uncertainty::{Radii, UncertaintySets};
 use super::utility::RelativeUtility;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::exponential_mean::ExponentialMean;
 use crate::numerics::moments::CentralMoments;
+
+/// Where the features do not depend on the ball.
+const NO_BALL: Radii = Radii { radius: 0.0, radius_ahead: 0.0 };
 
 /// The problem with everything that does not change from step to step.
 pub struct ProblemContext {
@@ -44,29 +47,30 @@ impl ProblemContext {
 
     /// The features of a state, unscaled.
     pub fn features(&self, state: &State) -> Vec<f64> {
-        let (mut radius, mut robust_excess) = (0.0, 0.0);
+        let (mut radii, mut robust_excess) = (NO_BALL, 0.0);
         if self.selection.has_ball() {
-            radius = self.radius(state);
-            let worst = ExponentialMean::of(&state.law, self.lowest_return()).worst(radius);
+            radii = self.sets.radii(&state.law);
+            let worst = ExponentialMean::of(&state.law, self.lowest_return()).worst(radii.radius);
             robust_excess = excess(worst, self.specification.problem.rate_per_step);
         }
-        self.selection.of(state.wealth, &LawSummary { moments: CentralMoments::of(&state.law), radius, robust_excess })
+        self.selection.of(state.wealth, &LawSummary { moments: CentralMoments::of(&state.law), radii, robust_excess })
     }
 
     /// Features of the laws that follow from `law` when each of `returns` (ascending) is learned, for one wealth.
     pub fn features_with(&self, law: &EmpiricalDistribution, wealth: f64, returns: &[f64]) -> Vec<Vec<f64>> {
         let before = CentralMoments::of(law);
         if !self.specification.problem.framework.learns() {
-            let summary = LawSummary { moments: before, radius: 0.0, robust_excess: 0.0 };
+            let summary = LawSummary { moments: before, radii: NO_BALL, robust_excess: 0.0 };
             return vec![self.selection.of(wealth, &summary); returns.len()];
         }
         let rate = self.specification.problem.rate_per_step;
         let has_ball = self.selection.has_ball();
-        let radii = if has_ball { self.sets.radii_with(law, returns) } else { vec![0.0; returns.len()] };
+        let radii = if has_ball { self.sets.radii_with(law, returns) } else { vec![NO_BALL; returns.len()] };
         let mean = ExponentialMean::of(law, self.lowest_return());
-        let features = |(&log_return, radius): (&f64, f64)| {
-            let robust_excess = if has_ball { excess(mean.worst_with(log_return, radius), rate) } else { 0.0 };
-            self.selection.of(wealth, &LawSummary { moments: before.with(log_return), radius, robust_excess })
+        let features = |(&log_return, radii): (&f64, Radii)| {
+            let worst = || excess(mean.worst_with(log_return, radii.radius), rate);
+            let robust_excess = if has_ball { worst() } else { 0.0 };
+            self.selection.of(wealth, &LawSummary { moments: before.with(log_return), radii, robust_excess })
         };
         returns.iter().zip(radii).map(features).collect()
     }

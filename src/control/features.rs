@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::specification::{FeatureMap, Specification};
+use super::uncertainty::Radii;
 use super::utility::depends_on_wealth;
 use crate::numerics::moments::CentralMoments;
 
@@ -28,7 +29,7 @@ pub struct FeatureSelection {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LawSummary {
     pub moments: CentralMoments,
-    pub radius: f64,
+    pub radii: Radii,
     /// `min_F E_F[e^Z] / (1 + r) - 1` over the ball: the first unit of allocation earns this against the worst law,
     /// and its sign decides whether anything is held at the last step.
     pub robust_excess: f64,
@@ -77,6 +78,7 @@ impl FeatureSelection {
         }
         if self.radius {
             names.push("log_radius".to_owned());
+            names.push("radius_trend".to_owned());
         }
         if self.robust_excess {
             names.push("robust_excess".to_owned());
@@ -91,8 +93,8 @@ impl FeatureSelection {
 
     /// All features of a state, unscaled.
     pub fn of(&self, wealth: f64, law: &LawSummary) -> Vec<f64> {
-        let LawSummary { moments, radius, robust_excess } = law;
-        let mut features = Vec::with_capacity(self.moments + 3);
+        let LawSummary { moments, radii, robust_excess } = law;
+        let mut features = Vec::with_capacity(self.moments + 4);
         if self.wealth {
             features.push(self.wealth(wealth));
         }
@@ -103,7 +105,9 @@ impl FeatureSelection {
             });
         }
         if self.radius {
-            features.push(radius.max(SMALLEST_RADIUS).ln());
+            let log = |radius: f64| radius.max(SMALLEST_RADIUS).ln();
+            features.push(log(radii.radius));
+            features.push(log(radii.radius_ahead) - log(radii.radius));
         }
         if self.robust_excess {
             features.push(*robust_excess);

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::specification::{Framework, RadiusRule, Specification};
-use crate::numerics::bridge::{AbsoluteBridges, Quantile};
+use crate::numerics::bridge::{AbsoluteBridges, Quantile, UpperQuantile};
 use crate::numerics::empirical::EmpiricalDistribution;
 
 /// Bridge matrices kept at once; live sessions of one policy pass through a horizon's worth of sample sizes.
@@ -16,14 +16,35 @@ pub struct UncertaintySets {
     seed: u64,
     /// False where the framework has no uncertainty (known law, plug-in).
     uncertain: bool,
-    bridges: Mutex<HashMap<usize, Arc<AbsoluteBridges>>>,
+    /// The quantile under the bridge rule.
+    estimator: UpperQuantile,
+    bridges: Mutex<HashMap<usize, Arc<Bridges>>>,
+}
+
+/// The common random numbers of one sample size.
+struct Bridges {
+    now: AbsoluteBridges,
+    /// Of the mean statistic one return later.
+    ahead: AbsoluteBridges,
+}
+
+/// The radius of a law and what it tends to be one return later.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Radii {
+    pub radius: f64,
+    /// Of the mean statistic over the laws with one value of this law twice.
+    pub radius_ahead: f64,
 }
 
 impl UncertaintySets {
     pub fn new(specification: &Specification) -> Self {
         let uncertain = matches!(specification.problem.framework, Framework::Adaptive | Framework::Static);
         let rule = specification.problem.radius;
-        UncertaintySets { rule, seed: specification.seed, uncertain, bridges: Mutex::new(HashMap::new()) }
+        let estimator = match rule {
+            RadiusRule::Bridge { alpha, paths, .. } => UpperQuantile::new(paths, alpha),
+            _ => UpperQuantile::new(1, 0.5),
+        };
+        UncertaintySets { rule, seed: specification.seed, uncertain, estimator, bridges: Mutex::new(HashMap::new()) }
     }
 
     /// True where laws of one sample size have different radii.
@@ -32,7 +53,7 @@ impl UncertaintySets {
     }
 
     /// The bridges of sample size n, simulated on first use.
-    fn bridges(&self, sample_size: usize, paths: usize) -> Arc<AbsoluteBridges> {
+    fn bridges(&self, sample_size: usize, paths: usize) -> Arc<Bridges> {
         let mut kept = self.bridges.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(found) = kept.get(&sample_size) {
             return Arc::clone(found);
@@ -43,7 +64,8 @@ impl UncertaintySets {
                 kept.remove(&smallest);
             }
         }
-        let made = Arc::new(AbsoluteBridges::simulate(sample_size, paths, self.seed));
+        let simulate = |size| AbsoluteBridges::simulate(size, paths, self.seed);
+        let made = Arc::new(Bridges { now: simulate(sample_size), ahead: simulate(sample_size + 1).one_ahead() });
         kept.insert(sample_size, Arc::clone(&made));
         made
     }
@@ -51,8 +73,8 @@ impl UncertaintySets {
     /// The bridge quantile of a law; `None` under other rules and frameworks.
     pub fn quantile(&self, law: &EmpiricalDistribution) -> Option<Quantile> {
         match self.rule {
-            RadiusRule::Bridge { alpha, paths, .. } if self.uncertain => {
-                Some(self.bridges(law.sample_size(), paths).quantile(law, alpha))
+            RadiusRule::Bridge { paths, .. } if self.uncertain => {
+                Some(self.bridges(law.sample_size(), paths).now.quantile_with_error(law, &self.estimator))
             }
             _ => None,
         }
@@ -61,22 +83,47 @@ impl UncertaintySets {
     /// Radius of the ball around `law`, in log-return.
     pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
         match self.rule {
-            RadiusRule::Bridge { scale, .. } if self.uncertain => {
-                scale * self.quantile(law).map_or(0.0, |found| found.value) / (law.sample_size() as f64).sqrt()
+            RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
+                let bridges = self.bridges(law.sample_size(), paths);
+                radius(scale, bridges.now.quantile(law, &self.estimator), law.sample_size())
             }
             _ => self.radius_of_size(law.sample_size()),
         }
     }
 
-    /// Radii of `law` with one more value, for every value in ascending `values`.
-    pub fn radii_with(&self, law: &EmpiricalDistribution, values: &[f64]) -> Vec<f64> {
+    /// The radius of `law`, and what it tends to be one return later.
+    pub fn radii(&self, law: &EmpiricalDistribution) -> Radii {
+        let size = law.sample_size();
+        match self.rule {
+            RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
+                let bridges = self.bridges(size, paths);
+                Radii {
+                    radius: radius(scale, bridges.now.quantile(law, &self.estimator), size),
+                    radius_ahead: radius(scale, bridges.ahead.quantile(law, &self.estimator), size + 1),
+                }
+            }
+            _ => Radii { radius: self.radius_of_size(size), radius_ahead: self.radius_of_size(size + 1) },
+        }
+    }
+
+    /// The same for `law` with one more value, for every value in ascending `values`.
+    pub fn radii_with(&self, law: &EmpiricalDistribution, values: &[f64]) -> Vec<Radii> {
         let size = law.sample_size() + 1;
         match self.rule {
-            RadiusRule::Bridge { alpha, paths, scale } if self.uncertain => {
-                let quantiles = self.bridges(size, paths).quantiles_with(law.atoms(), values, alpha);
-                quantiles.into_iter().map(|quantile| scale * quantile / (size as f64).sqrt()).collect()
+            RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
+                let bridges = self.bridges(size, paths);
+                let now = bridges.now.quantiles_with(law.atoms(), values, &self.estimator);
+                let ahead = bridges.ahead.quantiles_with(law.atoms(), values, &self.estimator);
+                let radii = |(now, ahead)| Radii {
+                    radius: radius(scale, now, size),
+                    radius_ahead: radius(scale, ahead, size + 1),
+                };
+                now.into_iter().zip(ahead).map(radii).collect()
             }
-            _ => vec![self.radius_of_size(size); values.len()],
+            _ => {
+                let (radius, radius_ahead) = (self.radius_of_size(size), self.radius_of_size(size + 1));
+                vec![Radii { radius, radius_ahead }; values.len()]
+            }
         }
     }
 
@@ -91,4 +138,8 @@ impl UncertaintySets {
             RadiusRule::Fixed { radius } => radius,
         }
     }
+}
+
+fn radius(scale: f64, quantile: f64, sample_size: usize) -> f64 {
+    scale * quantile / (sample_size as f64).sqrt()
 }

@@ -4,6 +4,7 @@ use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
 use super::empirical::EmpiricalDistribution;
+use super::harrell_davis::HarrellDavis;
 use super::streams::stream;
 
 /// Simulated `|B(i/n)|`, i = 1 to n - 1, for one sample size n: common random numbers for every law of that size.
@@ -21,6 +22,25 @@ pub struct AbsoluteBridges {
 pub struct Quantile {
     pub value: f64,
     pub standard_error: f64,
+}
+
+/// The (1 - alpha)-quantile of a statistic over simulated paths.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UpperQuantile {
+    at: HarrellDavis,
+    /// One standard deviation of the share of paths below and above.
+    beside: [HarrellDavis; 2],
+}
+
+impl UpperQuantile {
+    /// `alpha` in (0, 1), `paths` at least 1. Cost O(paths).
+    pub fn new(paths: usize, alpha: f64) -> Self {
+        let deviation = (alpha * (1.0 - alpha) / paths as f64).sqrt();
+        let shares =
+            [(1.0 - alpha - deviation).max(0.5 * (1.0 - alpha)), (1.0 - alpha + deviation).min(1.0 - 0.5 * alpha)];
+        let at = HarrellDavis::new(paths, 1.0 - alpha);
+        UpperQuantile { at, beside: shares.map(|share| HarrellDavis::new(paths, share)) }
+    }
 }
 
 /// Cells of the dyadic grid that carries the paths, at least.
@@ -113,19 +133,37 @@ impl AbsoluteBridges {
         statistic
     }
 
-    /// The (1 - alpha)-quantile of the statistic of `law`, whose sample size must be n.
-    pub fn quantile(&self, law: &EmpiricalDistribution, alpha: f64) -> Quantile {
+    /// The quantile of the statistic of `law`, whose sample size must be n.
+    pub fn quantile(&self, law: &EmpiricalDistribution, estimator: &UpperQuantile) -> f64 {
+        estimator.at.estimate(&mut self.statistic(law.atoms()))
+    }
+
+    /// The same with the standard error of its simulation: half the distance of the quantiles one standard deviation of
+    /// the share of paths to either side.
+    pub fn quantile_with_error(&self, law: &EmpiricalDistribution, estimator: &UpperQuantile) -> Quantile {
         let mut statistic = self.statistic(law.atoms());
-        let value = upper_quantile(&mut statistic, alpha);
-        let half_width = (statistic.len() as f64 * alpha * (1.0 - alpha)).sqrt() / statistic.len() as f64;
-        let above = upper_quantile(&mut statistic, (alpha - half_width).max(0.0));
-        let below = upper_quantile(&mut statistic, (alpha + half_width).min(1.0));
-        Quantile { value, standard_error: 0.5 * (above - below) }
+        let [below, above] = estimator.beside.each_ref().map(|beside| beside.estimate(&mut statistic));
+        Quantile { value: estimator.at.estimate(&mut statistic), standard_error: 0.5 * (above - below) }
+    }
+
+    /// Columns whose statistic, for a law of n - 1 values, is the mean of this one's over the n - 1 laws that have one of
+    /// its values twice: what the statistic becomes, on average, when the next value comes from the law itself. A value
+    /// doubled at rank j moves the gaps above it one node up, so that gap i lies at node i in n - 1 - i of them and at
+    /// node i + 1 in the other i. Cost O(n paths).
+    pub fn one_ahead(&self) -> AbsoluteBridges {
+        let sample_size = self.sample_size.saturating_sub(1);
+        let mut values = Vec::with_capacity(sample_size.saturating_sub(1) * self.paths);
+        for node in 1..sample_size {
+            let share = node as f64 / sample_size as f64;
+            let at = |node: usize| &self.values[(node - 1) * self.paths..node * self.paths];
+            values.extend(at(node).iter().zip(at(node + 1)).map(|(low, high)| (1.0 - share) * low + share * high));
+        }
+        AbsoluteBridges { sample_size, paths: self.paths, values }
     }
 
     /// Quantiles of the laws of `atoms` (n - 1 of them, ascending) with one more value, for every value in
     /// ascending `values`. Cost O((n + values) paths): sums left and right of the value are carried along.
-    pub fn quantiles_with(&self, atoms: &[f64], values: &[f64], alpha: f64) -> Vec<f64> {
+    pub fn quantiles_with(&self, atoms: &[f64], values: &[f64], estimator: &UpperQuantile) -> Vec<f64> {
         let size = atoms.len();
         let mut left = vec![0.0; self.paths];
         let mut right = vec![0.0; self.paths];
@@ -155,19 +193,10 @@ impl AbsoluteBridges {
             if below < size {
                 self.add(below + 1, atoms[below] - value, &mut statistic);
             }
-            quantiles.push(upper_quantile(&mut statistic, alpha));
+            quantiles.push(estimator.at.estimate(&mut statistic));
         }
         quantiles
     }
-}
-
-/// The (1 - alpha)-quantile by linear interpolation of order statistics (Hyndman and Fan, type 7). Reorders `sample`.
-fn upper_quantile(sample: &mut [f64], alpha: f64) -> f64 {
-    let position = (sample.len() - 1) as f64 * (1.0 - alpha);
-    let index = (position.floor() as usize).min(sample.len() - 1);
-    let (_, &mut low, above) = sample.select_nth_unstable_by(index, f64::total_cmp);
-    let high = above.iter().copied().fold(f64::INFINITY, f64::min);
-    if high.is_finite() { low + (position - index as f64) * (high - low) } else { low }
 }
 
 #[cfg(test)]
@@ -212,22 +241,42 @@ mod tests {
         let law = EmpiricalDistribution::new(&[0.02, -0.05, 0.11, 0.04, 0.04]);
         let bridges = AbsoluteBridges::simulate(6, 300, 9);
         let values = [-0.4, -0.05, 0.0, 0.04, 0.05, 0.3];
-        let carried = bridges.quantiles_with(law.atoms(), &values, 0.1);
+        let estimator = UpperQuantile::new(300, 0.1);
+        let carried = bridges.quantiles_with(law.atoms(), &values, &estimator);
         for (value, quantile) in values.iter().zip(carried) {
             let mut larger = law.clone();
             larger.push(*value);
             // Six additions and subtractions of numbers below 1.
-            assert!((bridges.quantile(&larger, 0.1).value - quantile).abs() < 1e-14);
+            assert!((bridges.quantile(&larger, &estimator) - quantile).abs() < 1e-14);
         }
     }
 
     #[test]
     fn the_quantile_is_continuous_in_the_law() {
         let bridges = AbsoluteBridges::simulate(5, 2000, 1);
-        let before = bridges.quantile(&EmpiricalDistribution::new(&[0.02, -0.05, 0.11, 0.04, 0.07]), 0.1);
-        let after = bridges.quantile(&EmpiricalDistribution::new(&[0.02, -0.05, 0.11 + 1e-9, 0.04, 0.07]), 0.1);
+        let estimator = UpperQuantile::new(2000, 0.1);
+        let quantile = |sample: &[f64]| bridges.quantile_with_error(&EmpiricalDistribution::new(sample), &estimator);
+        let before = quantile(&[0.02, -0.05, 0.11, 0.04, 0.07]);
+        let after = quantile(&[0.02, -0.05, 0.11 + 1e-9, 0.04, 0.07]);
         // One gap grows by 1e-9 and |B| stays below 3 on 2000 paths.
         assert!((before.value - after.value).abs() < 3e-9);
         assert!(before.standard_error > 0.0);
+    }
+
+    #[test]
+    fn one_ahead_is_the_mean_over_the_values_of_the_law() {
+        let law = EmpiricalDistribution::new(&[0.02, -0.05, 0.11, 0.04, 0.07]);
+        let bridges = AbsoluteBridges::simulate(6, 20, 1);
+        let mut mean = vec![0.0; 20];
+        for &atom in law.atoms() {
+            let mut doubled = law.clone();
+            doubled.push(atom);
+            let statistic = bridges.statistic(doubled.atoms());
+            mean.iter_mut().zip(statistic).for_each(|(sum, value)| *sum += value / 5.0);
+        }
+        for (found, expected) in bridges.one_ahead().statistic(law.atoms()).iter().zip(mean) {
+            // A dozen roundings of numbers below 1.
+            assert!((found - expected).abs() < 1e-14);
+        }
     }
 }

@@ -12,9 +12,12 @@ use super::minimise::{Minimum, SearchOutcome, minimise_bounded};
 const ITERATION_LIMIT: usize = 100;
 /// Subsets searched first: their rows, the number of rows above which they are, and the iterations allowed after them,
 /// for the optimum of a subset is close to that of all rows. An evaluation on 300 rows costs 1/40 of one on 1000.
-const SUBSETS: [(usize, usize, usize); 2] = [(300, 400, 15), (1000, 2500, 8)];
+const SUBSETS: [(usize, usize, usize); 2] = [(300, 400, 20), (1000, 2500, 8)];
 /// Default start: the share of the targets' variance taken for noise.
 const START_NOISE_SHARE: f64 = 1e-2;
+/// A search starts from length scales no longer than this, in units of the inputs: beyond, the likelihood is flat to the
+/// optimiser, which would leave an input that matters where an earlier search on other rows had lost it.
+const LONGEST_START: f64 = 30.0;
 
 /// Least and greatest value of each scale; both positive.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +58,7 @@ pub fn fit(
     let mut iteration_limit = ITERATION_LIMIT;
     for (rows, above, limit_after) in SUBSETS {
         if n > above {
+            shorten(&mut point, inputs.ncols());
             let chosen: Vec<usize> = (0..rows).map(|k| k * n / rows).collect();
             let some_targets: Vec<f64> = chosen.iter().map(|&row| targets[row]).collect();
             let found = search(&inputs.select_rows(&chosen), &some_targets, bounds, &point, iteration_limit)?;
@@ -63,6 +67,7 @@ pub fn fit(
             iteration_limit = limit_after;
         }
     }
+    shorten(&mut point, inputs.ncols());
     let fine = search(inputs, targets, bounds, &point, iteration_limit)?;
     let best = profiled(inputs, targets, bounds, &fine.point).ok_or(Singular { jitter: 0.0 })?;
     Ok(Fit {
@@ -71,6 +76,11 @@ pub fn fit(
         evaluations: evaluations + fine.evaluations,
         outcome: fine.outcome,
     })
+}
+
+/// Brings the first `inputs` entries, logarithms of length scales, within [`LONGEST_START`].
+fn shorten(point: &mut [f64], inputs: usize) {
+    point[..inputs].iter_mut().for_each(|log_scale| *log_scale = log_scale.min(LONGEST_START.ln()));
 }
 
 /// Log marginal likelihood and its gradient, in the order log length scales, log signal, log noise variance.

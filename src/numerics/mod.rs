@@ -9,6 +9,7 @@ pub mod exponential_mean;
 pub mod farthest;
 pub mod gp;
 pub mod gp_fit;
+pub mod harrell_davis;
 pub mod law;
 pub mod matern;
 pub mod minimise;
