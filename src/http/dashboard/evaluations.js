@@ -1,0 +1,2 @@
+export const view = async () => ({ title: "Evaluations", body: "" });
+export const report = view;
