@@ -7,7 +7,7 @@ import { count, duration, moment, short } from "./format.js";
 /** Browsers keep six connections to one address: following two jobs leaves room for everything else. */
 const FOLLOWED = 2;
 /** Jobs that are not followed are asked for this often, in milliseconds. */
-const POLL = 3000;
+const POLL = 1000;
 
 const WORDS = { train: "Training", evaluate: "Evaluation", walk_forward: "Walk-forward" };
 const named = (kind) => WORDS[kind] ?? kind.replace(/_/g, " ");
@@ -16,10 +16,15 @@ export async function view(_, leaving) {
   const { entries, more } = await list("/jobs", "jobs", leaving);
   const actions = h("a", { class: "button", href: "#/train" }, "Train a policy");
   if (entries.length === 0) return { title: "Jobs", body: welcome() };
-  const cards = entries.map((job) => card(job));
-  watch(cards, leaving);
   const note = more ? h("p", { class: "note" }, `The newest ${count(entries.length)} jobs.`) : null;
-  return { title: "Jobs", actions, body: [h("ol", { class: "cards" }, cards.map(({ element }) => element)), note].filter(Boolean) };
+  return { title: "Jobs", actions, body: [jobList(entries, leaving), note].filter(Boolean) };
+}
+
+/** Jobs that stay up to date until `leaving`; `changed(job)` hears of every change. */
+export function jobList(entries, leaving, changed = () => {}) {
+  const cards = entries.map((job) => card(job, changed));
+  watch(cards, leaving);
+  return h("ol", { class: "cards" }, cards.map(({ element }) => element));
 }
 
 function welcome() {
@@ -34,7 +39,7 @@ function welcome() {
 }
 
 /** A job on the page, and how to bring it up to date. */
-function card(job) {
+function card(job, changed) {
   const element = h("li", { class: "card job" });
   const card = { element, job };
   card.update = (now) => {
@@ -43,6 +48,7 @@ function card(job) {
     const kept = element.contains(document.activeElement);
     element.replaceChildren(...contents(card));
     if (kept) element.querySelector("a, button")?.focus();
+    changed(now);
     if (ended) announce(`${named(now.kind)} ${short(now.job)} ${now.state}.`);
   };
   card.update(job);
@@ -110,7 +116,7 @@ function watch(cards, leaving) {
     }
     const others = pending.filter((card) => !followed.has(card));
     await Promise.all(others.map((card) => get(`/jobs/${card.job.job}`, leaving).then(card.update, () => {})));
-    if (pending.length > 0 && !leaving.aborted) setTimeout(turn, others.some(({ job }) => job.state === "running") ? 0 : POLL / 3);
+    if (pending.length > 0 && !leaving.aborted) setTimeout(turn, POLL);
   };
   turn();
 }

@@ -2,6 +2,7 @@
 
 import { offers, Problem } from "./api.js";
 import { announce, h } from "./dom.js";
+import * as evaluation from "./evaluation.js";
 import * as evaluations from "./evaluations.js";
 import * as jobs from "./jobs.js";
 import * as policies from "./policies.js";
@@ -19,7 +20,7 @@ const ROUTES = [
   [/^#\/sessions(?:\?(.*))?$/, sessions.view, "sessions"],
   [/^#\/sessions\/([^/]+)$/, session.view, "sessions"],
   [/^#\/evaluations(?:\?(.*))?$/, evaluations.view, "evaluations"],
-  [/^#\/evaluations\/([^/]+)$/, evaluations.report, "evaluations"],
+  [/^#\/evaluations\/([^/]+)$/, evaluation.view, "evaluations"],
 ];
 
 const main = document.querySelector("main");

@@ -23,7 +23,7 @@ export async function view(id, leaving) {
     surface(policy),
     steps(diagnostics),
   ];
-  const evaluate = (await offers("/evaluate")) ? h("a", { class: "button quiet", href: "#/evaluations" }, "Evaluate") : null;
+  const evaluate = (await offers("/evaluate")) ? h("a", { class: "button quiet", href: `#/evaluations?policy=${id}` }, "Evaluate") : null;
   const actions = h("div", { class: "actions" },
     h("a", { class: "button", href: `#/sessions?policy=${id}` }, "Open a session"), evaluate,
     h("a", { class: "button quiet", href: `/policies/${id}/export`, download: `policy-${short(id)}.json` }, "Export"),
