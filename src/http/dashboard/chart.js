@@ -99,9 +99,9 @@ export function figure({ title, legend, holder, rows, note }) {
  * Lines over common positions.
  * x: `{values, domain, label, format, tick, whole, between}`, `between` where x names the unit before it; y: `{format, tick, also}`;
  * series: `[{name, values, kind: "line" | "bars" | "levels", bare}]`, null where there is nothing. Bars and levels span
- * the unit before their x; a bare line has no dots. What is read at first is the last value of the first series.
+ * the unit before their x; a bare line has no dots. What is read at first is `start`, or the last value of the first series.
  */
-export function lineChart({ title, x, y, series, height = 190, note }) {
+export function lineChart({ title, x, y, series, height = 190, note, start: first }) {
   const shown = x.values.map((_, index) => index).filter((index) => series.some(({ values }) => Number.isFinite(values[index])));
   const here = h("span", { class: "here" });
   const outputs = series.map(() => h("b", {}));
@@ -109,7 +109,7 @@ export function lineChart({ title, x, y, series, height = 190, note }) {
   const yDomain = extent(series.flatMap(({ values }) => values), y.also);
   const xDomain = x.domain ?? [x.values[0], x.values.at(-1)];
   let cursor, xScale = scale(xDomain, [0, 1]);
-  const start = Math.max(0, shown.findLastIndex((index) => Number.isFinite(series[0].values[index])));
+  const start = first >= 0 ? shown.indexOf(first) : Math.max(0, shown.findLastIndex((index) => Number.isFinite(series[0].values[index])));
   let position = start;
   const shift = x.between ? 0.5 : 0;
   const holder = plot(height, (width) => {

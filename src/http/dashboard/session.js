@@ -12,6 +12,7 @@ import { conservatism } from "./what_if.js";
 const SOURCES = {
   policy_surrogate: "read off the policy",
   resolved: "solved anew on request",
+  resolved_other_radius: "solved anew for another radius",
   resolved_outside_design: "solved anew, because this state lies outside the policy\u2019s design",
 };
 
@@ -40,10 +41,9 @@ async function fill(holder, shown) {
   holder.replaceChildren(
     figures(shown, action),
     h("div", { class: "columns" },
-      h("div", {}, active ? advice(action, shown) : completed(shown)),
+      h("div", {}, active ? advice(action, shown) : completed(shown), active && shown.canAsk ? conservatism(shown, action) : null),
       h("div", {}, course(shown, action))),
     active ? worstCase(shown, action) : "",
-    active && shown.canAsk ? conservatism(shown, action) : "",
     observed(shown),
   );
 }
