@@ -113,7 +113,7 @@ export function lineChart({ title, x, y, series, height = 190, note, start: firs
   let position = start;
   const shift = x.between ? 0.5 : 0;
   const holder = plot(height, (width) => {
-    const yTicks = ticks(...yDomain, height / 50);
+    const yTicks = ticks(...yDomain, height / 38);
     const left = 16 + 6.6 * Math.max(...yTicks.map((tick) => y.tick(tick, yTicks[1] - yTicks[0]).length));
     xScale = scale(xDomain, [left, width - 14]);
     const frame = { x: xScale, y: scale(yDomain, [height - 30, 10]), left, right: width - 4, bottom: height - 30 };

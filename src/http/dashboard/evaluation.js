@@ -53,7 +53,7 @@ function outcomes({ strategies, reference }, names) {
     table("Outcomes of every strategy", [
       { name: "Strategy", cell: ({ name }) => name },
       estimate("Certainty equivalent", ({ certainty_equivalent }) => certainty_equivalent, wealth),
-      estimate(`Less ${referred}`, ({ difference }) => difference?.certainty_equivalent, (value) => significant(value, 3)),
+      estimate(`Less ${referred.toLowerCase()}`, ({ difference }) => difference?.certainty_equivalent, (value) => significant(value, 3)),
       estimate("Mean wealth", (row) => row.wealth.mean, wealth),
       plain("Utility: mean", ({ utility }) => utility.mean),
       plain("variance", ({ utility }) => utility.variance),
@@ -72,7 +72,7 @@ function spreads({ strategies, histogram_edges }, names) {
   const x = { values: Array.from({ length: bins }, (_, k) => k + 1), domain: [0, bins], label: "Utility", whole: true, format: (place) => `${edge(place - 1)} to ${edge(place)}`, tick: edge };
   const charts = strategies.map(({ histogram }, index) => {
     const total = histogram.reduce((sum, value) => sum + value, 0);
-    return lineChart({ title: names[index], height: 120, x, y: { format: percent, tick: percentTick, also: [0] }, series: [{ name: "", kind: "bars", values: histogram.map((value) => value / total) }] });
+    return lineChart({ title: names[index], height: 120, start: histogram.indexOf(Math.max(...histogram)), x, y: { format: percent, tick: percentTick, also: [0] }, series: [{ name: "", kind: "bars", values: histogram.map((value) => value / total) }] });
   });
   return section("How terminal utility spreads", h("div", { class: "trio" }, charts));
 }

@@ -49,7 +49,7 @@ export function lawChart({ transport }) {
     const round = ticks(...domain.map(Math.expm1), width / 90);
     const frame = axes({ x, y: both, left, right, bottom: HEIGHT - 30, xTicks: round.map(Math.log1p), yTicks: [...levels.map((level) => -level), 0, ...levels], xFormat: (tick) => percentTick(Math.expm1(tick), round[1] - round[0]), yFormat: (tick, step) => percentTick(Math.abs(tick), step) });
     const bar = (bin, name, top, height) => s("rect", { class: `mass ${name}`, x: x(bin.from) + 0.5, width: Math.max(1, x(bin.to) - x(bin.from) - 1), y: top, height });
-    cursor = s("rect", { class: "cursor", y: 6, height: HEIGHT - 36 });
+    cursor = s("rect", { class: "cursor bin", y: 6, height: HEIGHT - 36 });
     mark();
     const zero = both(0);
     return [cursor, frame, bins.map((bin) => [

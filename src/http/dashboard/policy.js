@@ -12,7 +12,7 @@ import { stepSurface } from "./surface.js";
 const READY_BYTES = 15e6;
 /** Digits of one number in the document. */
 const NUMBER_BYTES = 20;
-const [COLUMNS, ROWS] = [31, 25];
+const [COLUMNS, ROWS] = [41, 29];
 
 export async function view(id, leaving) {
   const policy = await get(`/policies/${id}`, leaving);
@@ -125,12 +125,12 @@ function single({ solution }) {
   return h("p", { class: "single" }, "At this step every session of this policy is in one and the same state: hold ", h("strong", {}, percent(solution.action)), ", worth ", h("strong", {}, basisPoints(solution.floor_gain)), " more than the bank.");
 }
 
-/** The range of the allocations shown, out to the next twentieth; a tenth at least, so that noise stays pale. */
+/** The range of the allocations shown, out to the next tenth, so that noise stays pale. */
 function rounded(cells, highest) {
   const values = cells.flat();
-  const low = Math.max(0, Math.floor(20 * Math.min(...values)) / 20);
-  const high = Math.ceil(20 * Math.max(...values)) / 20;
-  return high - low >= 0.1 ? [low, high] : [Math.max(0, Math.min(low, highest - 0.1)), Math.min(highest, Math.max(high, low + 0.1))];
+  const low = Math.floor(10 * Math.min(...values)) / 10;
+  const high = Math.ceil(10 * Math.max(...values)) / 10;
+  return high > low ? [low, high] : [Math.max(0, low - 0.1), Math.min(highest, low + 0.1)];
 }
 
 const spread = ([low, high], count) => Array.from({ length: count }, (_, k) => low + ((high - low) * k) / (count - 1));
