@@ -14,7 +14,9 @@ const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 /** Starts the service; `url` is where it listens, `stop()` ends it and takes its data away. */
 export async function service() {
   const folder = await mkdtemp(join(tmpdir(), "ballast-browser-"));
-  const process_ = spawn(BINARY, ["serve", "--listen", "127.0.0.1:0", "--data", folder], { stdio: ["ignore", "pipe", "ignore"] });
+  const process_ = spawn(BINARY, ["serve", "--listen", "127.0.0.1:0", "--data", folder], {
+    stdio: ["ignore", "pipe", "ignore"],
+  });
   const ended = new Promise((resolve) => process_.once("exit", resolve));
   const failed = new Promise((_, reject) => process_.once("error", reject));
   const listening = (async () => {
@@ -34,12 +36,19 @@ export async function service() {
 }
 
 export function browser() {
-  return chromium.launch({ executablePath: CHROMIUM, args: ["--no-sandbox", "--disable-gpu", "--disable-background-networking"] });
+  return chromium.launch({
+    executablePath: CHROMIUM,
+    args: ["--no-sandbox", "--disable-gpu", "--disable-background-networking"],
+  });
 }
 
 /** The service's answer to a request with a JSON body. */
 export async function call(url, path, body) {
-  const request = body && { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) };
+  const request = body && {
+    method: "POST",
+    headers: { "content-type": "application/json" },
+    body: JSON.stringify(body),
+  };
   const response = await fetch(url + path, request);
   const answer = await response.json();
   if (!response.ok) throw new Error(`${path}: ${answer.detail}`);

@@ -23,7 +23,13 @@ before(async () => {
   page.on("pageerror", (error) => faults.push(error.message));
   page.on("console", (message) => message.type() === "error" && faults.push(message.text()));
   page.on("dialog", (dialog) => dialog.accept());
-  page.on("request", (request) => request.url().startsWith(ballast.url) || request.url() === "about:blank" || faults.push(`asked for ${request.url()}`));
+  page.on(
+    "request",
+    (request) =>
+      request.url().startsWith(ballast.url) ||
+      request.url() === "about:blank" ||
+      faults.push(`asked for ${request.url()}`),
+  );
 });
 
 after(async () => {
@@ -43,7 +49,11 @@ test("an empty service says what to do first", async () => {
   await page.getByText("Nothing has been trained here yet").waitFor();
   await page.getByRole("link", { name: "Train the first policy" }).click();
   await heading("Train a policy").waitFor();
-  assert.equal(await page.evaluate(() => document.activeElement.textContent), "Train a policy", "focus goes to the new view");
+  assert.equal(
+    await page.evaluate(() => document.activeElement.textContent),
+    "Train a policy",
+    "focus goes to the new view",
+  );
 });
 
 test("a refusal is told at the field it names", async () => {
@@ -61,7 +71,9 @@ test("a refusal is told at the field it names", async () => {
 });
 
 test("a training from a file, watched to its end", async () => {
-  await page.getByLabel("Choose a CSV file").setInputFiles({ name: "returns.csv", mimeType: "text/csv", buffer: Buffer.from(FILE) });
+  await page
+    .getByLabel("Choose a CSV file")
+    .setInputFiles({ name: "returns.csv", mimeType: "text/csv", buffer: Buffer.from(FILE) });
   await page.getByText("12 log-returns: mean").waitFor();
   assert.equal(await page.getByLabel("It holds").inputValue(), "simple");
   assert.equal(await page.getByLabel("In", { exact: true }).inputValue(), "percent");
@@ -75,7 +87,10 @@ test("a training from a file, watched to its end", async () => {
   await page.getByLabel("Training request as JSON").fill(JSON.stringify(request));
   await page.getByRole("button", { name: "Train", exact: true }).click();
   await page.getByRole("progressbar").waitFor();
-  await page.getByText(/\d of 4 steps/).first().waitFor();
+  await page
+    .getByText(/\d of 4 steps/)
+    .first()
+    .waitFor();
   await page.getByRole("link", { name: "See the policy" }).click();
   await heading(/^Policy [0-9a-f]/).waitFor();
   policy = decodeURIComponent(page.url().split("/").pop());
@@ -119,10 +134,14 @@ test("a session is opened, observed, and the same after a reload", async () => {
 });
 
 test("a report whose answer is lost is sent again and counts once", async () => {
-  await page.route("**/observe", async (route) => {
-    await route.fetch();
-    await route.abort();
-  }, { times: 1 });
+  await page.route(
+    "**/observe",
+    async (route) => {
+      await route.fetch();
+      await route.abort();
+    },
+    { times: 1 },
+  );
   await page.getByLabel(/Return in period 2/).fill("\u22122.5");
   await page.getByText("It went differently").click();
   await page.getByLabel("Share held, %").fill("50");
@@ -143,17 +162,28 @@ test("the surface is what the service advises", async () => {
   const atoms = [...history.history, ...history.observations.map(({ log_return }) => log_return)];
   const rate = document_.specification.problem.rate_per_step;
   const step = document_.steps[history.observations.length];
-  const drawn = await page.evaluate(async ({ state, step }) => {
-    const { allocation, feature } = await import("/dashboard/surface.js");
-    return allocation(step.solution, step.diagnostics.policy.features.map((name) => feature(name, state)), 1);
-  }, { state: { wealth, atoms, rate, radius: action.radius }, step });
+  const drawn = await page.evaluate(
+    async ({ state, step }) => {
+      const { allocation, feature } = await import("/dashboard/surface.js");
+      return allocation(
+        step.solution,
+        step.diagnostics.policy.features.map((name) => feature(name, state)),
+        1,
+      );
+    },
+    { state: { wealth, atoms, rate, radius: action.radius }, step },
+  );
   assert.equal(action.source, "policy_surrogate", "the state must lie in the design for this comparison");
   assert.ok(Math.abs(drawn - action.allocation) < 1e-6, `${drawn} against ${action.allocation}`);
 });
 
 test("a long training is cancelled", async () => {
-  await call(ballast.url, "/train", { problem: { horizon: 60, history: RETURNS.map((value) => value / 100) }, design: { count: 3000 } });
+  await call(ballast.url, "/train", {
+    problem: { horizon: 60, history: RETURNS.map((value) => value / 100) },
+    design: { count: 3000 },
+  });
   await go("#/jobs");
+  await page.getByText(/^Step 59, solving/).waitFor();
   await page.getByRole("button", { name: /^Cancel/ }).click();
   await page.locator(".state.cancelled").waitFor();
 });
@@ -188,7 +218,9 @@ test("every view fits, at 390 and 1600 pixels", async () => {
     for (const hash of views()) {
       await go(hash);
       await settled();
-      const beyond = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+      const beyond = await page.evaluate(
+        () => document.documentElement.scrollWidth - document.documentElement.clientWidth,
+      );
       assert.equal(beyond, 0, `${hash} at ${width} pixels`);
     }
   }
@@ -205,7 +237,9 @@ test("axe finds nothing serious, in light and dark", async () => {
       await page.evaluate(axe);
       const { violations, passes } = await page.evaluate(() => axe.run(document));
       const serious = violations.filter(({ impact }) => impact === "serious" || impact === "critical");
-      const told = serious.map(({ id, nodes }) => `${id}: ${nodes.map(({ html, any }) => `${html} ${any[0]?.message ?? ""}`).join("\n")}`);
+      const told = serious.map(
+        ({ id, nodes }) => `${id}: ${nodes.map(({ html, any }) => `${html} ${any[0]?.message ?? ""}`).join("\n")}`,
+      );
       assert.deepEqual(told, [], `${hash} in ${colorScheme}`);
       assert.ok(passes.length > 10);
     }
@@ -223,11 +257,22 @@ test("a policy in use is not deleted, a session is", async () => {
 
 test("the console held no error but the refusals that were asked for", () => {
   const refused = /^Failed to load resource: (the server responded with a status of (422|409)|net::ERR_FAILED)/;
-  assert.deepEqual(faults.filter((fault) => !refused.test(fault)), []);
+  assert.deepEqual(
+    faults.filter((fault) => !refused.test(fault)),
+    [],
+  );
 });
 
 function views() {
-  return ["#/jobs", "#/train", "#/policies", `#/policies/${policy}`, "#/sessions", `#/sessions/${session}`, "#/nowhere"];
+  return [
+    "#/jobs",
+    "#/train",
+    "#/policies",
+    `#/policies/${policy}`,
+    "#/sessions",
+    `#/sessions/${session}`,
+    "#/nowhere",
+  ];
 }
 
 /** What is fetched after the view stands has arrived. */

@@ -7,7 +7,10 @@ import { fileURLToPath } from "node:url";
 import { browser, call, service } from "./ballast.js";
 
 const root = (path) => fileURLToPath(new URL(`../../${path}`, import.meta.url));
-const rows = (await readFile(root("data/us_market_monthly.csv"), "utf8")).trim().split("\n").map((line) => line.split(","));
+const rows = (await readFile(root("data/us_market_monthly.csv"), "utf8"))
+  .trim()
+  .split("\n")
+  .map((line) => line.split(","));
 const start = rows.findIndex(([month]) => month === "2008-01");
 const returns = rows.map(([, market]) => Number(market));
 const bank = rows.slice(start - 12, start).reduce((sum, [, , bill]) => sum + Number(bill), 0) / 12;
@@ -32,7 +35,8 @@ try {
   while (policy === null) {
     await new Promise((resolve) => setTimeout(resolve, 200));
     const now = await call(url, `/jobs/${job}`);
-    if (now.finished_ms !== null && now.state !== "succeeded") throw new Error(`the training ${now.state}: ${now.error}`);
+    if (now.finished_ms !== null && now.state !== "succeeded")
+      throw new Error(`the training ${now.state}: ${now.error}`);
     policy = now.policy;
   }
   const { session } = await call(url, "/sessions", { policy });

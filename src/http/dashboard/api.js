@@ -24,7 +24,11 @@ async function send(method, path, body, signal) {
     throw new Problem({ title: "No answer", status: 0, detail: "The service did not answer. Is it running?" });
   });
   if (response.ok) return response;
-  const fallback = { title: response.statusText, status: response.status, detail: `The service answered ${response.status}.` };
+  const fallback = {
+    title: response.statusText,
+    status: response.status,
+    detail: `The service answered ${response.status}.`,
+  };
   throw new Problem(await response.json().catch(() => fallback));
 }
 

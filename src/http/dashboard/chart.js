@@ -34,7 +34,11 @@ export function extent(values, also = []) {
 export function plot(height, draw) {
   const holder = h("div", { class: "plot" });
   const drawn = (width) => {
-    const picture = s("svg", { width, height, viewBox: `0 0 ${width} ${height}`, "aria-hidden": "true", focusable: "false" }, draw(width));
+    const picture = s(
+      "svg",
+      { width, height, viewBox: `0 0 ${width} ${height}`, "aria-hidden": "true", focusable: "false" },
+      draw(width),
+    );
     holder.replaceChildren(picture);
   };
   holder.redraw = () => holder.clientWidth > 0 && drawn(holder.clientWidth);
@@ -52,12 +56,24 @@ export function walkable(holder, { label, count, start, at, read }) {
     holder.setAttribute("aria-valuenow", now);
     holder.setAttribute("aria-valuetext", read(now));
   };
-  const attributes = { tabindex: 0, role: "slider", "aria-label": label, "aria-valuemin": 0, "aria-valuemax": count - 1 };
+  const attributes = {
+    tabindex: 0,
+    role: "slider",
+    "aria-label": label,
+    "aria-valuemin": 0,
+    "aria-valuemax": count - 1,
+  };
   for (const [name, value] of Object.entries(attributes)) holder.setAttribute(name, value);
   const now = () => Number(holder.getAttribute("aria-valuenow"));
   const moves = {
-    ArrowLeft: () => now() - 1, ArrowDown: () => now() - 1, ArrowRight: () => now() + 1, ArrowUp: () => now() + 1,
-    Home: () => 0, End: () => count - 1, PageUp: () => now() + 10, PageDown: () => now() - 10,
+    ArrowLeft: () => now() - 1,
+    ArrowDown: () => now() - 1,
+    ArrowRight: () => now() + 1,
+    ArrowUp: () => now() + 1,
+    Home: () => 0,
+    End: () => count - 1,
+    PageUp: () => now() + 10,
+    PageDown: () => now() - 10,
   };
   holder.addEventListener("keydown", (event) => {
     if (!(event.key in moves)) return;
@@ -74,14 +90,34 @@ export function axes({ x, y, xTicks, yTicks, xFormat, yFormat, left, right, bott
   return [
     yTicks.map((tick) => [
       s("line", { class: "rule", x1: left, x2: right, y1: y(tick), y2: y(tick) }),
-      s("text", { class: "tick", x: left - 8, y: y(tick), dy: "0.32em", "text-anchor": "end" }, yFormat(tick, yTicks[1] - yTicks[0])),
+      s(
+        "text",
+        { class: "tick", x: left - 8, y: y(tick), dy: "0.32em", "text-anchor": "end" },
+        yFormat(tick, yTicks[1] - yTicks[0]),
+      ),
     ]),
-    xTicks.map((tick) => s("text", { class: "tick", x: x(tick), y: bottom + 18, "text-anchor": "middle" }, xFormat(tick, xTicks[1] - xTicks[0]))),
+    xTicks.map((tick) =>
+      s(
+        "text",
+        { class: "tick", x: x(tick), y: bottom + 18, "text-anchor": "middle" },
+        xFormat(tick, xTicks[1] - xTicks[0]),
+      ),
+    ),
   ];
 }
 
-const swatch = (index) => s("svg", { class: "swatch", width: 22, height: 8, "aria-hidden": "true" }, s("line", { class: `line s${index}`, x1: 1, x2: 21, y1: 4, y2: 4 }));
-const block = (index) => s("svg", { class: "swatch", width: 12, height: 12, "aria-hidden": "true" }, s("rect", { class: `bar s${index}`, width: 12, height: 12 }));
+const swatch = (index) =>
+  s(
+    "svg",
+    { class: "swatch", width: 22, height: 8, "aria-hidden": "true" },
+    s("line", { class: `line s${index}`, x1: 1, x2: 21, y1: 4, y2: 4 }),
+  );
+const block = (index) =>
+  s(
+    "svg",
+    { class: "swatch", width: 12, height: 12, "aria-hidden": "true" },
+    s("rect", { class: `bar s${index}`, width: 12, height: 12 }),
+  );
 
 /** Title, what is read off, the plot, and the same as a table. */
 export function figure({ title, legend, holder, rows, note }) {
@@ -99,28 +135,63 @@ export function figure({ title, legend, holder, rows, note }) {
  * Lines over common positions.
  * x: `{values, domain, label, format, tick, whole, between}`, `between` where x names the unit before it; y: `{format, tick, also}`;
  * series: `[{name, values, kind: "line" | "bars" | "levels", bare}]`, null where there is nothing. Bars and levels span
- * the unit before their x; a bare line has no dots. What is read at first is `start`, or the last value of the first series.
+ * the unit before their x; a bare line has no dots. What is read at first is `start`, or the last value of the first series; `gutter` lines up charts that stand above each other.
  */
-export function lineChart({ title, x, y, series, height = 190, note, start: first }) {
-  const shown = x.values.map((_, index) => index).filter((index) => series.some(({ values }) => Number.isFinite(values[index])));
+export function lineChart({ title, x, y, series, height = 190, note, start: first, gutter = 0 }) {
+  const shown = x.values
+    .map((_, index) => index)
+    .filter((index) => series.some(({ values }) => Number.isFinite(values[index])));
   const here = h("span", { class: "here" });
   const outputs = series.map(() => h("b", {}));
-  const legend = h("span", { class: "legend" }, here, series.map(({ name, kind }, index) => h("span", {}, name ? [kind === "bars" ? block(index) : swatch(index), `${name} `] : null, outputs[index])));
-  const yDomain = extent(series.flatMap(({ values }) => values), y.also);
+  const legend = h(
+    "span",
+    { class: "legend" },
+    here,
+    series.map(({ name, kind }, index) =>
+      h("span", {}, name ? [kind === "bars" ? block(index) : swatch(index), `${name} `] : null, outputs[index]),
+    ),
+  );
+  const yDomain = extent(
+    series.flatMap(({ values }) => values),
+    y.also,
+  );
   const xDomain = x.domain ?? [x.values[0], x.values.at(-1)];
-  let cursor, xScale = scale(xDomain, [0, 1]);
-  const start = first >= 0 ? shown.indexOf(first) : Math.max(0, shown.findLastIndex((index) => Number.isFinite(series[0].values[index])));
+  let cursor,
+    xScale = scale(xDomain, [0, 1]);
+  const start =
+    first >= 0
+      ? shown.indexOf(first)
+      : Math.max(
+          0,
+          shown.findLastIndex((index) => Number.isFinite(series[0].values[index])),
+        );
   let position = start;
   const shift = x.between ? 0.5 : 0;
   const holder = plot(height, (width) => {
     const yTicks = ticks(...yDomain, height / 38);
-    const left = 16 + 6.6 * Math.max(...yTicks.map((tick) => y.tick(tick, yTicks[1] - yTicks[0]).length));
+    const left = Math.max(
+      gutter,
+      16 + 6.6 * Math.max(...yTicks.map((tick) => y.tick(tick, yTicks[1] - yTicks[0]).length)),
+    );
     xScale = scale(xDomain, [left, width - 14]);
     const frame = { x: xScale, y: scale(yDomain, [height - 30, 10]), left, right: width - 4, bottom: height - 30 };
-    const xTicks = ticks(...xDomain, Math.min(12, width / 70)).filter((tick) => (!x.whole || Number.isInteger(tick)) && !(x.between && tick === 0));
+    const xTicks = ticks(...xDomain, Math.min(12, width / 70)).filter(
+      (tick) => (!x.whole || Number.isInteger(tick)) && !(x.between && tick === 0),
+    );
     cursor = s("line", { class: "cursor", y1: 6, y2: frame.bottom });
     mark();
-    return [axes({ ...frame, x: (value) => xScale(value - shift), xTicks, yTicks, xFormat: x.tick ?? x.format, yFormat: y.tick }), cursor, series.map((one, index) => drawn(one, index, x.values, frame))];
+    return [
+      axes({
+        ...frame,
+        x: (value) => xScale(value - shift),
+        xTicks,
+        yTicks,
+        xFormat: x.tick ?? x.format,
+        yFormat: y.tick,
+      }),
+      cursor,
+      series.map((one, index) => drawn(one, index, x.values, frame)),
+    ];
   });
   const mark = () => {
     const pixel = xScale((x.values[shown[position]] ?? 0) - shift);
@@ -137,11 +208,16 @@ export function lineChart({ title, x, y, series, height = 190, note, start: firs
   };
   const nearest = (pixel) => {
     const value = xScale.inverse(pixel) + shift;
-    return shown.reduce((best, index, at) => (Math.abs(x.values[index] - value) < Math.abs(x.values[shown[best]] - value) ? at : best), 0);
+    return shown.reduce(
+      (best, index, at) => (Math.abs(x.values[index] - value) < Math.abs(x.values[shown[best]] - value) ? at : best),
+      0,
+    );
   };
   if (shown.length > 0) walkable(holder, { label: title, count: shown.length, start, at: nearest, read });
   const columns = [{ name: x.label, cell: (index) => x.format(x.values[index]) }];
-  columns.push(...series.map(({ name, values }) => ({ name, numeric: true, cell: (index) => y.format(values[index]) })));
+  columns.push(
+    ...series.map(({ name, values }) => ({ name, numeric: true, cell: (index) => y.format(values[index]) })),
+  );
   return figure({ title, legend, holder, note, rows: () => table(title, columns, shown) });
 }
 
@@ -149,15 +225,28 @@ function drawn({ values, kind, bare }, index, positions, { x, y, bottom }) {
   const points = values.map((value, k) => [x(positions[k]), y(value), value]);
   if (kind === "bars") {
     const wide = x(1) - x(0);
-    return points.filter(([, , value]) => Number.isFinite(value)).map(([right, top]) =>
-      s("rect", { class: `bar s${index}`, x: right - wide + 1, width: Math.max(1, wide - 2), y: Math.min(top, bottom - 1), height: Math.max(1, bottom - top) }));
+    return points
+      .filter(([, , value]) => Number.isFinite(value))
+      .map(([right, top]) =>
+        s("rect", {
+          class: `bar s${index}`,
+          x: right - wide + 1,
+          width: Math.max(1, wide - 2),
+          y: Math.min(top, bottom - 1),
+          height: Math.max(1, bottom - top),
+        }),
+      );
   }
   const dots = points.filter(([, , value]) => Number.isFinite(value));
-  if (kind === "levels") return dots.map(([right, py]) => s("line", { class: `level s${index}`, x1: right - x(1) + x(0) + 1, x2: right - 1, y1: py, y2: py }));
+  if (kind === "levels")
+    return dots.map(([right, py]) =>
+      s("line", { class: `level s${index}`, x1: right - x(1) + x(0) + 1, x2: right - 1, y1: py, y2: py }),
+    );
   const path = points.map(([px, py, value], k) => {
     if (!Number.isFinite(value)) return "";
     return `${k > 0 && Number.isFinite(points[k - 1][2]) ? "L" : "M"}${px.toFixed(1)} ${py.toFixed(1)}`;
   });
-  const ends = !bare && dots.length <= 40 ? dots.map(([cx, cy]) => s("circle", { class: `dot s${index}`, cx, cy, r: 2.5 })) : null;
+  const ends =
+    !bare && dots.length <= 40 ? dots.map(([cx, cy]) => s("circle", { class: `dot s${index}`, cx, cy, r: 2.5 })) : null;
   return [s("path", { class: `line s${index}`, d: path.join("") }), ends];
 }

@@ -6,7 +6,9 @@ export function read(text) {
   if (lines.length < 2) throw new Error("The file holds fewer than two lines.");
   const delimiter = [";", "\t", ","].find((mark) => lines[1].includes(mark)) ?? ",";
   const cells = lines.map((line) => line.split(delimiter).map((cell) => cell.trim().replace(/^"(.*)"$/, "$1")));
-  const headed = cells[0].some((cell) => cell !== "" && !isNumber(cell, delimiter)) && cells[1].some((cell) => isNumber(cell, delimiter));
+  const headed =
+    cells[0].some((cell) => cell !== "" && !isNumber(cell, delimiter)) &&
+    cells[1].some((cell) => isNumber(cell, delimiter));
   const names = headed ? cells.shift() : cells[0].map((_, index) => `Column ${index + 1}`);
   const columns = names.flatMap((name, index) => {
     const given = cells.map((row) => row[index] ?? "").filter((cell) => cell !== "");
@@ -24,7 +26,11 @@ const number = (cell, delimiter) => Number(plain(cell, delimiter));
 
 /** What a column holds, by its name and its numbers; the reader can say otherwise. */
 function guess(name, values) {
-  const kind = /log/i.test(name) ? "log" : /price|close|index|level/i.test(name) || values.every((value) => value > 2) ? "price" : "simple";
+  const kind = /log/i.test(name)
+    ? "log"
+    : /price|close|index|level/i.test(name) || values.every((value) => value > 2)
+      ? "price"
+      : "simple";
   return { kind, inPercent: kind !== "price" && Math.max(...values.map(Math.abs)) > 1 };
 }
 
@@ -36,7 +42,8 @@ export function logReturns(values, kind, inPercent) {
   }
   const fractions = values.map((value) => (inPercent ? value / 100 : value));
   if (kind === "log") return fractions;
-  if (fractions.some((value) => value <= -1)) throw new Error("A simple return is not above \u2212100 %. Are they percentages?");
+  if (fractions.some((value) => value <= -1))
+    throw new Error("A simple return is not above \u2212100 %. Are they percentages?");
   return fractions.map((value) => rounded(Math.log1p(value)));
 }
 

@@ -18,14 +18,20 @@ function filled(element, attributes, children) {
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
     else element.setAttribute(name, value === true ? "" : value);
   }
-  element.append(...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false));
+  element.append(
+    ...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false),
+  );
   return element;
 }
 
 /** A table: `columns` are `{name, cell(row), numeric}`. The first column heads its row. */
 export function table(caption, columns, rows) {
   const cell = (row, column, index) =>
-    h(index === 0 ? "th" : "td", { scope: index === 0 ? "row" : null, class: column.numeric ? "number" : null }, column.cell(row));
+    h(
+      index === 0 ? "th" : "td",
+      { scope: index === 0 ? "row" : null, class: column.numeric ? "number" : null },
+      column.cell(row),
+    );
   return h(
     "div",
     { class: "table", tabindex: 0, role: "region", "aria-label": caption },
@@ -33,8 +39,26 @@ export function table(caption, columns, rows) {
       "table",
       {},
       h("caption", { class: "unseen" }, caption),
-      h("thead", {}, h("tr", {}, columns.map((column) => h("th", { scope: "col", class: column.numeric ? "number" : null }, column.name)))),
-      h("tbody", {}, rows.map((row) => h("tr", {}, columns.map((column, index) => cell(row, column, index))))),
+      h(
+        "thead",
+        {},
+        h(
+          "tr",
+          {},
+          columns.map((column) => h("th", { scope: "col", class: column.numeric ? "number" : null }, column.name)),
+        ),
+      ),
+      h(
+        "tbody",
+        {},
+        rows.map((row) =>
+          h(
+            "tr",
+            {},
+            columns.map((column, index) => cell(row, column, index)),
+          ),
+        ),
+      ),
     ),
   );
 }

@@ -15,8 +15,17 @@ export async function view(id, leaving) {
   if (job.state !== "succeeded") return { title, trail, body: waiting(job, leaving) };
   const report = await get(job.report, leaving);
   const names = report.strategies.map(named);
-  const export_ = h("a", { class: "button quiet", href: job.report, download: `evaluation-${short(id)}.json` }, "Export");
-  return { title, trail, actions: export_, body: [summary(report), outcomes(report, names), spreads(report, names), courses(report), coverage(report)] };
+  const export_ = h(
+    "a",
+    { class: "button quiet", href: job.report, download: `evaluation-${short(id)}.json` },
+    "Export",
+  );
+  return {
+    title,
+    trail,
+    actions: export_,
+    body: [summary(report), outcomes(report, names), spreads(report, names), courses(report), coverage(report)],
+  };
 }
 
 function waiting(job, leaving) {
@@ -24,7 +33,8 @@ function waiting(job, leaving) {
   return jobList([job], leaving, again);
 }
 
-const named = ({ framework, constant_mix }) => (framework ? FRAMEWORKS[framework] : constant_mix === 0 ? "All in the bank" : `${percent(constant_mix, 0)} at risk`);
+const named = ({ framework, constant_mix }) =>
+  framework ? FRAMEWORKS[framework] : constant_mix === 0 ? "All in the bank" : `${percent(constant_mix, 0)} at risk`;
 
 /** An estimate with its interval. */
 const interval = ({ value, low, high }, format) => `${format(value)} (${format(low)} to ${format(high)})`;
@@ -32,36 +42,70 @@ const interval = ({ value, low, high }, format) => `${format(value)} (${format(l
 function summary({ request, histories, level = request.level, costs }) {
   const drawn = request.histories.kind === "drawn";
   const radii = histories.map(({ radius }) => radius).filter(Number.isFinite);
-  return h("div", {},
-    h("div", { class: "words" }, h("p", {}, `Every strategy went through the same ${counted(request.paths * histories.length, "path")} of ${counted(request.problem.horizon, "period")}${drawn ? `, from ${counted(histories.length, "history").replace("historys", "histories")} drawn from the law` : ", all from the given history"}. Ranges bound each figure at ${percent(level, 0)}.`)),
+  return h(
+    "div",
+    {},
+    h(
+      "div",
+      { class: "words" },
+      h(
+        "p",
+        {},
+        `Every strategy went through the same ${counted(request.paths * histories.length, "path")} of ${counted(request.problem.horizon, "period")}${drawn ? `, from ${counted(histories.length, "history").replace("historys", "histories")} drawn from the law` : ", all from the given history"}. Ranges bound each figure at ${percent(level, 0)}.`,
+      ),
+    ),
     facts([
       ["Paths", count(request.paths), drawn ? "per history" : "from one history"],
       ["Histories", count(histories.length), drawn ? "drawn" : "given"],
-      radii.length > 0 && ["First radius", significant(radii.reduce((sum, radius) => sum + radius, 0) / radii.length, 3), "mean over histories"],
+      radii.length > 0 && [
+        "First radius",
+        significant(radii.reduce((sum, radius) => sum + radius, 0) / radii.length, 3),
+        "mean over histories",
+      ],
       ["Training", duration(costs.training_seconds)],
       ["Simulation", duration(costs.simulation_seconds)],
-    ]));
+    ]),
+  );
 }
 
 function outcomes({ strategies, reference }, names) {
   const rows = strategies.map((strategy, index) => ({ ...strategy, name: names[index] }));
-  const estimate = (name, read, format) => ({ name, numeric: true, cell: (row) => (read(row) ? interval(read(row), format) : "\u2013") });
+  const estimate = (name, read, format) => ({
+    name,
+    numeric: true,
+    cell: (row) => (read(row) ? interval(read(row), format) : "\u2013"),
+  });
   const plain = (name, read) => ({ name, numeric: true, cell: (row) => significant(read(row).value, 5) });
   const referred = names[strategies.findIndex(({ strategy }) => strategy === reference)];
-  return section("What each was worth",
-    intervalChart({ title: "Certainty equivalent of terminal wealth", rows: rows.map(({ name, certainty_equivalent }) => ({ name, ...certainty_equivalent })), format: wealth, tick }),
-    table("Outcomes of every strategy", [
-      { name: "Strategy", cell: ({ name }) => name },
-      estimate("Certainty equivalent", ({ certainty_equivalent }) => certainty_equivalent, wealth),
-      estimate(`Less ${referred.toLowerCase()}`, ({ difference }) => difference?.certainty_equivalent, (value) => significant(value, 3)),
-      estimate("Mean wealth", (row) => row.wealth.mean, wealth),
-      plain("Utility: mean", ({ utility }) => utility.mean),
-      plain("variance", ({ utility }) => utility.variance),
-      plain("20 %", ({ utility }) => utility.quantile_20),
-      plain("90 %", ({ utility }) => utility.quantile_90),
-      plain("least", ({ utility }) => utility.min),
-      plain("most", ({ utility }) => utility.max),
-    ], rows));
+  return section(
+    "What each was worth",
+    intervalChart({
+      title: "Certainty equivalent of terminal wealth",
+      rows: rows.map(({ name, certainty_equivalent }) => ({ name, ...certainty_equivalent })),
+      format: wealth,
+      tick,
+    }),
+    table(
+      "Outcomes of every strategy",
+      [
+        { name: "Strategy", cell: ({ name }) => name },
+        estimate("Certainty equivalent", ({ certainty_equivalent }) => certainty_equivalent, wealth),
+        estimate(
+          `Less ${referred.toLowerCase()}`,
+          ({ difference }) => difference?.certainty_equivalent,
+          (value) => significant(value, 3),
+        ),
+        estimate("Mean wealth", (row) => row.wealth.mean, wealth),
+        plain("Utility: mean", ({ utility }) => utility.mean),
+        plain("variance", ({ utility }) => utility.variance),
+        plain("20 %", ({ utility }) => utility.quantile_20),
+        plain("90 %", ({ utility }) => utility.quantile_90),
+        plain("least", ({ utility }) => utility.min),
+        plain("most", ({ utility }) => utility.max),
+      ],
+      rows,
+    ),
+  );
 }
 
 /** Terminal utility, one histogram a strategy on common bins and a common height. */
@@ -69,10 +113,24 @@ function spreads({ strategies, histogram_edges }, names) {
   const bins = histogram_edges.length - 1;
   if (histogram_edges[0] === histogram_edges[bins]) return "";
   const edge = (place) => significant(histogram_edges[Math.round(place)], 3);
-  const x = { values: Array.from({ length: bins }, (_, k) => k + 1), domain: [0, bins], label: "Utility", whole: true, format: (place) => `${edge(place - 1)} to ${edge(place)}`, tick: edge };
+  const x = {
+    values: Array.from({ length: bins }, (_, k) => k + 1),
+    domain: [0, bins],
+    label: "Utility",
+    whole: true,
+    format: (place) => `${edge(place - 1)} to ${edge(place)}`,
+    tick: edge,
+  };
   const charts = strategies.map(({ histogram }, index) => {
     const total = histogram.reduce((sum, value) => sum + value, 0);
-    return lineChart({ title: names[index], height: 120, start: histogram.indexOf(Math.max(...histogram)), x, y: { format: percent, tick: percentTick, also: [0] }, series: [{ name: "", kind: "bars", values: histogram.map((value) => value / total) }] });
+    return lineChart({
+      title: names[index],
+      height: 120,
+      start: histogram.indexOf(Math.max(...histogram)),
+      x,
+      y: { format: percent, tick: percentTick, also: [0] },
+      series: [{ name: "", kind: "bars", values: histogram.map((value) => value / total) }],
+    });
   });
   return section("How terminal utility spreads", h("div", { class: "trio" }, charts));
 }
@@ -85,23 +143,48 @@ function courses({ strategies }) {
   const x = { values, label: "Period", format: String, whole: true };
   const line = (strategy, read) => ({ name: named(strategy), kind: "line", values: strategy.periods.map(read) });
   const guarding = deciding.filter(({ periods }) => periods[0].radius);
-  const radius = guarding.length > 0 && lineChart({ title: "Mean radius", x, y: { format: (value) => significant(value, 3), tick }, series: guarding.map((strategy) => line(strategy, ({ radius }) => radius.mean)) });
-  return section("What each held",
-    lineChart({ title: "Mean allocation", x, y: { format: percent, tick: percentTick, also: [0] }, series: deciding.map((strategy) => line(strategy, ({ allocation }) => allocation.mean)) }),
-    radius || null);
+  const radius =
+    guarding.length > 0 &&
+    lineChart({
+      title: "Mean radius",
+      x,
+      y: { format: (value) => significant(value, 3), tick },
+      series: guarding.map((strategy) => line(strategy, ({ radius }) => radius.mean)),
+    });
+  return section(
+    "What each held",
+    lineChart({
+      title: "Mean allocation",
+      x,
+      y: { format: percent, tick: percentTick, also: [0] },
+      series: deciding.map((strategy) => line(strategy, ({ allocation }) => allocation.mean)),
+    }),
+    radius || null,
+  );
 }
 
 function coverage({ strategies }) {
   const covered = strategies.filter(({ coverage }) => coverage);
   if (covered.length === 0) return "";
-  const rows = covered.flatMap((strategy) => strategy.coverage.by_sample_size.map((row) => ({ ...row, strategy, target: strategy.coverage.target })));
-  const left = covered.map((strategy) => `${named(strategy)}: the law left the ball at some period on ${interval(strategy.coverage.ever_left, percent)} of the paths.`);
-  return section("How often the ball held the true law",
+  const rows = covered.flatMap((strategy) =>
+    strategy.coverage.by_sample_size.map((row) => ({ ...row, strategy, target: strategy.coverage.target })),
+  );
+  const left = covered.map(
+    (strategy) =>
+      `${named(strategy)}: the law left the ball at some period on ${interval(strategy.coverage.ever_left, percent)} of the paths.`,
+  );
+  return section(
+    "How often the ball held the true law",
     left.map((sentence) => h("p", {}, sentence)),
-    table("Coverage by sample size", [
-      { name: "Strategy", cell: ({ strategy }) => named(strategy) },
-      { name: "Returns seen", numeric: true, cell: ({ sample_size }) => count(sample_size) },
-      { name: "Ball held the law", numeric: true, cell: (row) => interval(row.covered, percent) },
-      { name: "Aimed at", numeric: true, cell: ({ target }) => (target === null ? "\u2013" : percent(target, 0)) },
-    ], rows));
+    table(
+      "Coverage by sample size",
+      [
+        { name: "Strategy", cell: ({ strategy }) => named(strategy) },
+        { name: "Returns seen", numeric: true, cell: ({ sample_size }) => count(sample_size) },
+        { name: "Ball held the law", numeric: true, cell: (row) => interval(row.covered, percent) },
+        { name: "Aimed at", numeric: true, cell: ({ target }) => (target === null ? "\u2013" : percent(target, 0)) },
+      ],
+      rows,
+    ),
+  );
 }

@@ -10,7 +10,13 @@ function field(name, label, note, control) {
   control.id = id;
   control.name = name;
   if (noteId) control.setAttribute("aria-describedby", noteId);
-  const element = h("div", { class: "field" }, h("label", { for: id }, label), control, note ? h("p", { class: "note", id: noteId }, note) : null);
+  const element = h(
+    "div",
+    { class: "field" },
+    h("label", { for: id }, label),
+    control,
+    note ? h("p", { class: "note", id: noteId }, note) : null,
+  );
   return { name, element, control };
 }
 
@@ -24,13 +30,26 @@ export function input({ name, label, note, changed, value = "", ...attributes })
 
 /** A choice; `choices` maps values to words. */
 export function select({ name, label, note, choices, changed }) {
-  const control = h("select", {}, Object.entries(choices).map(([value, words]) => h("option", { value }, words)));
+  const control = h(
+    "select",
+    {},
+    Object.entries(choices).map(([value, words]) => h("option", { value }, words)),
+  );
   if (changed) control.addEventListener("change", () => changed(control.value));
   return field(name, label, note, control);
 }
 
 export function fieldset(legend, parts) {
-  return h("fieldset", {}, h("legend", {}, legend), h("div", { class: "fields" }, parts.map((part) => part.element ?? part)));
+  return h(
+    "fieldset",
+    {},
+    h("legend", {}, legend),
+    h(
+      "div",
+      { class: "fields" },
+      parts.map((part) => part.element ?? part),
+    ),
+  );
 }
 
 /**

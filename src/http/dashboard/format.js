@@ -4,7 +4,9 @@ const NARROW = "\u202f";
 const MINUS = "\u2212";
 
 function grouped(value, digits) {
-  return value.toLocaleString("en-GB", { minimumFractionDigits: digits, maximumFractionDigits: digits, useGrouping: "min2" }).replace("-", MINUS);
+  return value
+    .toLocaleString("en-GB", { minimumFractionDigits: digits, maximumFractionDigits: digits, useGrouping: "min2" })
+    .replace("-", MINUS);
 }
 
 /** A share or a return, given as a fraction. */
@@ -31,7 +33,10 @@ export function significant(value, digits = 3) {
   if (value === 0) return "0";
   const exponent = Math.floor(Math.log10(Math.abs(value)));
   if (exponent >= -4 && exponent < 6) return Number(value.toPrecision(digits)).toString().replace("-", MINUS);
-  return value.toExponential(digits - 1).replace("e+", "e").replaceAll("-", MINUS);
+  return value
+    .toExponential(digits - 1)
+    .replace("e+", "e")
+    .replaceAll("-", MINUS);
 }
 
 /** A number on an axis, with the digits that its `step` asks for. */

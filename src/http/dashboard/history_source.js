@@ -12,13 +12,40 @@ const USUAL_LENGTH = 240;
 
 /** The part of a form that gives a history; `changed(logReturns)` whenever it does. */
 export function historySource(changed) {
-  const values = h("textarea", { id: "f-problem-history", name: "problem.history", rows: 4, spellcheck: "false", "aria-describedby": "history-note" });
-  const note = h("p", { class: "note", id: "history-note", role: "status" }, "At least two log-returns, oldest first, separated by spaces, commas or lines.");
+  const values = h("textarea", {
+    id: "f-problem-history",
+    name: "problem.history",
+    rows: 4,
+    spellcheck: "false",
+    "aria-describedby": "history-note",
+  });
+  const note = h(
+    "p",
+    { class: "note", id: "history-note", role: "status" },
+    "At least two log-returns, oldest first, separated by spaces, commas or lines.",
+  );
   const columns = h("div", { class: "fields", hidden: true });
   const file = h("input", { type: "file", id: "csv", accept: ".csv,.tsv,.txt,text/csv,text/plain", class: "unseen" });
-  const drop = h("div", { class: "drop" },
-    h("p", {}, file, h("label", { class: "button quiet", for: "csv" }, "Choose a CSV file"), " or drop one here. Columns of returns or prices are found by themselves."),
-    h("p", {}, h("button", { type: "button", class: "link", onclick: () => example() }, "Use the example: US stock market, monthly")));
+  const drop = h(
+    "div",
+    { class: "drop" },
+    h(
+      "p",
+      {},
+      file,
+      h("label", { class: "button quiet", for: "csv" }, "Choose a CSV file"),
+      " or drop one here. Columns of returns or prices are found by themselves.",
+    ),
+    h(
+      "p",
+      {},
+      h(
+        "button",
+        { type: "button", class: "link", onclick: () => example() },
+        "Use the example: US stock market, monthly",
+      ),
+    ),
+  );
   const told = (returns) => {
     if (returns.length < 2) return;
     const { mean, deviation } = moments(returns);
@@ -63,17 +90,36 @@ export function historySource(changed) {
     const dropped = event.dataTransfer.files[0];
     if (dropped) open(dropped.name, await dropped.text());
   });
-  const element = h("fieldset", {}, h("legend", {}, "The returns seen so far"), drop, columns,
-    h("div", { class: "field wide" }, h("label", { for: values.id }, "Log-returns, as fractions"), values, note));
+  const element = h(
+    "fieldset",
+    {},
+    h("legend", {}, "The returns seen so far"),
+    drop,
+    columns,
+    h("div", { class: "field wide" }, h("label", { for: values.id }, "Log-returns, as fractions"), values, note),
+  );
   return { element, show };
 }
 
 /** Column, kind, unit and length of a file that was read; the first numeric column unless told otherwise. */
 function columnFields(name, { columns, rows }, taken, fail) {
   const option = (value, words, selected) => h("option", { value, selected }, words);
-  const column = h("select", { id: "csv-column" }, columns.map(({ name }, index) => option(index, name, index === 0)));
-  const kind = h("select", { id: "csv-kind" }, Object.entries(KINDS).map(([value, words]) => option(value, words)));
-  const unit = h("select", { id: "csv-unit" }, option("fraction", "Fractions (0.012)"), option("percent", "Percent (1.2)"));
+  const column = h(
+    "select",
+    { id: "csv-column" },
+    columns.map(({ name }, index) => option(index, name, index === 0)),
+  );
+  const kind = h(
+    "select",
+    { id: "csv-kind" },
+    Object.entries(KINDS).map(([value, words]) => option(value, words)),
+  );
+  const unit = h(
+    "select",
+    { id: "csv-unit" },
+    option("fraction", "Fractions (0.012)"),
+    option("percent", "Percent (1.2)"),
+  );
   const length = h("input", { id: "csv-length", type: "number", min: 2, max: rows });
   const use = () => {
     try {
@@ -94,5 +140,10 @@ function columnFields(name, { columns, rows }, taken, fail) {
   for (const control of [kind, unit, length]) control.addEventListener("input", use);
   guessed();
   const field = (label, control) => h("div", { class: "field" }, h("label", { for: control.id }, label), control);
-  return [field(`Column of ${name}`, column), field("It holds", kind), field("In", unit), field(`Latest rows, of ${rows}`, length)];
+  return [
+    field(`Column of ${name}`, column),
+    field("It holds", kind),
+    field("In", unit),
+    field(`Latest rows, of ${rows}`, length),
+  ];
 }

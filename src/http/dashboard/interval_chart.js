@@ -17,7 +17,11 @@ export function intervalChart({ title, rows, format, tick }) {
     return [
       places.map((place) => [
         s("line", { class: "rule", x1: x(place), x2: x(place), y1: 0, y2: bottom }),
-        s("text", { class: "tick", x: x(place), y: bottom + 18, "text-anchor": "middle" }, tick(place, places[1] - places[0])),
+        s(
+          "text",
+          { class: "tick", x: x(place), y: bottom + 18, "text-anchor": "middle" },
+          tick(place, places[1] - places[0]),
+        ),
       ]),
       rows.map(({ name, value, low, high }, index) => {
         const y = LINE * (index + 0.5) + 2;
@@ -29,10 +33,19 @@ export function intervalChart({ title, rows, format, tick }) {
       }),
     ];
   });
-  return figure({ title, holder, rows: () => table(title, [
-    { name: "Strategy", cell: ({ name }) => name },
-    { name: "Estimate", numeric: true, cell: ({ value }) => format(value) },
-    { name: "From", numeric: true, cell: ({ low }) => format(low) },
-    { name: "To", numeric: true, cell: ({ high }) => format(high) },
-  ], rows) });
+  return figure({
+    title,
+    holder,
+    rows: () =>
+      table(
+        title,
+        [
+          { name: "Strategy", cell: ({ name }) => name },
+          { name: "Estimate", numeric: true, cell: ({ value }) => format(value) },
+          { name: "From", numeric: true, cell: ({ low }) => format(low) },
+          { name: "To", numeric: true, cell: ({ high }) => format(high) },
+        ],
+        rows,
+      ),
+  });
 }

@@ -24,18 +24,38 @@ export async function view(_, leaving) {
 export function jobList(entries, leaving, changed = () => {}) {
   const cards = entries.map((job) => card(job, changed));
   watch(cards, leaving);
-  return h("ol", { class: "cards" }, cards.map(({ element }) => element));
+  return h(
+    "ol",
+    { class: "cards" },
+    cards.map(({ element }) => element),
+  );
 }
 
 function welcome() {
   const step = (title, ...text) => h("li", {}, h("h2", {}, title), h("p", {}, text));
-  return h("div", { class: "welcome" },
-    h("p", { class: "lead" }, "Ballast tells an investor how much to hold in a risky asset when nobody knows the law of its returns. Nothing has been trained here yet."),
-    h("ol", { class: "steps" },
-      step("Train a policy", "Give it the returns seen so far. It prepares for the worst law those returns cannot rule out, in seconds to minutes."),
+  return h(
+    "div",
+    { class: "welcome" },
+    h(
+      "p",
+      { class: "lead" },
+      "Ballast tells an investor how much to hold in a risky asset when nobody knows the law of its returns. Nothing has been trained here yet.",
+    ),
+    h(
+      "ol",
+      { class: "steps" },
+      step(
+        "Train a policy",
+        "Give it the returns seen so far. It prepares for the worst law those returns cannot rule out, in seconds to minutes.",
+      ),
       step("Open a session", "A session is one investor: his wealth, and the returns he has lived through."),
-      step("Observe and act", "Report each period\u2019s return as it comes. The advice for the next one follows from all of them.")),
-    h("p", {}, h("a", { class: "button", href: "#/train" }, "Train the first policy")));
+      step(
+        "Observe and act",
+        "Report each period\u2019s return as it comes. The advice for the next one follows from all of them.",
+      ),
+    ),
+    h("p", {}, h("a", { class: "button", href: "#/train" }, "Train the first policy")),
+  );
 }
 
 /** A job on the page, and how to bring it up to date. */
@@ -44,10 +64,15 @@ function card(job, changed) {
   const card = { element, job };
   card.update = (now) => {
     const ended = isOver(now) && !isOver(card.job);
+    const moved = now.state === card.job.state && now.cancel_requested === card.job.cancel_requested;
     card.job = now;
-    const kept = element.contains(document.activeElement);
-    element.replaceChildren(...contents(card));
-    if (kept) element.querySelector("a, button")?.focus();
+    // Progress comes many times a second: a button replaced between press and release would not be clicked.
+    if (moved && element.firstChild) advanced(element, now);
+    else {
+      const kept = element.contains(document.activeElement);
+      element.replaceChildren(...contents(card));
+      if (kept) element.querySelector("a, button")?.focus();
+    }
     changed(now);
     if (ended) announce(`${named(now.kind)} ${short(now.job)} ${now.state}.`);
   };
@@ -55,31 +80,64 @@ function card(job, changed) {
   return card;
 }
 
+/** Brings the moving parts of a running job up to date. */
+function advanced(element, job) {
+  element.querySelector(".summary").textContent = summary(job);
+  const progress = element.querySelector("progress");
+  if (!progress) return;
+  progress.value = done(job.progress);
+  progress.nextSibling.textContent = stepsDone(job.progress);
+}
+
 function contents(card) {
   const { job } = card;
   const title = h("h2", {}, named(job.kind), " ", h("code", {}, short(job.job)));
-  const state = h("span", { class: `state ${job.state}` }, job.cancel_requested && !isOver(job) ? "stopping" : job.state);
-  return [h("div", { class: "row" }, title, state), h("p", {}, summary(job)), bar(job), h("div", { class: "row" }, times(job), links(card))].filter(Boolean);
+  const state = h(
+    "span",
+    { class: `state ${job.state}` },
+    job.cancel_requested && !isOver(job) ? "stopping" : job.state,
+  );
+  return [
+    h("div", { class: "row" }, title, state),
+    h("p", { class: "summary" }, summary(job)),
+    bar(job),
+    h("div", { class: "row" }, times(job), links(card)),
+  ].filter(Boolean);
 }
 
 function summary({ state, progress, error, kind }) {
   if (state === "failed") return error ?? "No reason was recorded.";
   if (state === "queued") return "Waits for the jobs before it.";
   if (state === "cancelled") return `Stopped after ${progress.steps_done} of ${progress.steps_total} steps.`;
-  if (state === "succeeded") return kind === "train" ? `${progress.steps_total} steps solved, last to first.` : `${progress.steps_total} steps done.`;
-  const at = progress.step === null || progress.phase === null ? "Starting" : `Step ${progress.step}, ${progress.phase}`;
-  const points = progress.points_total ? `: ${count(progress.points_done)} of ${count(progress.points_total)} points` : "";
+  if (state === "succeeded")
+    return kind === "train"
+      ? `${progress.steps_total} steps solved, last to first.`
+      : `${progress.steps_total} steps done.`;
+  const at =
+    progress.step === null || progress.phase === null ? "Starting" : `Step ${progress.step}, ${progress.phase}`;
+  const points = progress.points_total
+    ? `: ${count(progress.points_done)} of ${count(progress.points_total)} points`
+    : "";
   const left = progress.seconds_left === null ? "" : `, ${duration(progress.seconds_left)} left`;
   return `${at}${points}${left}`;
 }
 
 function bar({ job, state, progress }) {
   if (state !== "running") return null;
-  const within = progress.points_total ? progress.points_done / progress.points_total : 0;
-  const done = Math.min(progress.steps_total, progress.steps_done + 0.9 * within);
-  return h("div", { class: "progress" },
-    h("progress", { max: progress.steps_total, value: done, "aria-label": `Progress of ${short(job)}` }),
-    h("span", {}, `${progress.steps_done} of ${progress.steps_total} steps`));
+  return h(
+    "div",
+    { class: "progress" },
+    h("progress", { max: progress.steps_total, value: done(progress), "aria-label": `Progress of ${short(job)}` }),
+    h("span", {}, stepsDone(progress)),
+  );
+}
+
+const stepsDone = ({ steps_done, steps_total }) => `${steps_done} of ${steps_total} steps`;
+
+/** Steps done, and nine tenths of the one being solved by its points: the rest is fitting. */
+function done({ steps_done, steps_total, points_done, points_total, phase }) {
+  const share = phase === "fitting" ? 1 : points_total ? points_done / points_total : 0;
+  return Math.min(steps_total, steps_done + 0.9 * share);
 }
 
 function times({ created_ms, started_ms, finished_ms }) {
@@ -90,9 +148,14 @@ function times({ created_ms, started_ms, finished_ms }) {
 function links(card) {
   const { job } = card;
   if (job.policy) return h("a", { class: "button quiet", href: `#/policies/${job.policy}` }, "See the policy");
-  if (job.state === "succeeded") return h("a", { class: "button quiet", href: `#/evaluations/${job.job}` }, "See the report");
+  if (job.state === "succeeded")
+    return h("a", { class: "button quiet", href: `#/evaluations/${job.job}` }, "See the report");
   if (isOver(job)) return null;
-  const stop = h("button", { class: "quiet", disabled: job.cancel_requested, "aria-label": `Cancel ${short(job.job)}` }, "Cancel");
+  const stop = h(
+    "button",
+    { class: "quiet", disabled: job.cancel_requested, "aria-label": `Cancel ${short(job.job)}` },
+    "Cancel",
+  );
   stop.addEventListener("click", async () => {
     stop.disabled = true;
     announce("Asked it to stop.");

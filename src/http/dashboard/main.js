@@ -48,7 +48,10 @@ async function show() {
     else link.removeAttribute("aria-current");
   }
   const heading = h("h1", { tabindex: -1 }, page.title);
-  main.replaceChildren(h("header", { class: "page" }, h("div", {}, page.trail ?? null, heading), page.actions ?? null), ...[page.body].flat());
+  main.replaceChildren(
+    h("header", { class: "page" }, h("div", {}, page.trail ?? null, heading), page.actions ?? null),
+    ...[page.body].flat(),
+  );
   main.removeAttribute("aria-busy");
   document.title = `${page.title} \u00b7 Ballast`;
   if (!first) {
@@ -59,7 +62,10 @@ async function show() {
 }
 
 function missing(hash) {
-  return { title: "There is nothing here", body: h("p", {}, `No view stands at ${hash}. `, h("a", { href: "#/jobs" }, "See the jobs"), ".") };
+  return {
+    title: "There is nothing here",
+    body: h("p", {}, `No view stands at ${hash}. `, h("a", { href: "#/jobs" }, "See the jobs"), "."),
+  };
 }
 
 function failed(error) {

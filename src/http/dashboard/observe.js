@@ -26,14 +26,37 @@ export function observeForm(action, { id, session, policy, refresh }) {
     const next = session.wealth * ((1 - executed) * (1 + rate_per_step) + executed * growth);
     preview.textContent = `Log-return ${significant(Math.log(growth), 4)}; wealth ${wealth(session.wealth)} \u2192 ${wealth(next)} at ${allocation(executed)} held.`;
   };
-  const given = input({ name: "return", label: `Return in period ${action.period}, %`, note: "Of the risky asset: \u22122.5 is a loss of 2.5 %", changed: () => read() });
+  const given = input({
+    name: "return",
+    label: `Return in period ${action.period}, %`,
+    note: "Of the risky asset: \u22122.5 is a loss of 2.5 %",
+    changed: () => read(),
+  });
   const kind = select({ name: "kind", label: "Given as", choices: KINDS, changed: () => read() });
-  const held = input({ name: "executed_allocation", label: "Share held, %", note: `Blank: the ${allocation(action.allocation)} advised.`, changed: () => read() });
+  const held = input({
+    name: "executed_allocation",
+    label: "Share held, %",
+    note: `Blank: the ${allocation(action.allocation)} advised.`,
+    changed: () => read(),
+  });
   const reached = input({ name: "wealth", label: "Wealth reached", note: "Blank: what return and share give." });
   const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
   const button = h("button", { type: "submit" }, `Report period ${action.period}`);
-  const more = h("details", {}, h("summary", {}, "It went differently"), h("div", { class: "fields" }, held.element, reached.element));
-  const form = h("form", { class: "observe", novalidate: true }, h("div", { class: "fields" }, given.element, kind.element), more, preview, message, h("p", { class: "send" }, button));
+  const more = h(
+    "details",
+    {},
+    h("summary", {}, "It went differently"),
+    h("div", { class: "fields" }, held.element, reached.element),
+  );
+  const form = h(
+    "form",
+    { class: "observe", novalidate: true },
+    h("div", { class: "fields" }, given.element, kind.element),
+    more,
+    preview,
+    message,
+    h("p", { class: "send" }, button),
+  );
   let request = null;
   const freed = () => {
     request = null;
@@ -43,8 +66,12 @@ export function observeForm(action, { id, session, policy, refresh }) {
   kind.control.addEventListener("change", freed);
   const compose = () => {
     const report = { session: id, period: action.period, [kind.control.value]: fraction(given.control.value) };
-    if (held.control.value.trim() !== "") report.executed_allocation = fraction(held.control.value) ?? held.control.value;
-    if (reached.control.value.trim() !== "") report.wealth = Number.isNaN(Number(reached.control.value)) ? reached.control.value : Number(reached.control.value);
+    if (held.control.value.trim() !== "")
+      report.executed_allocation = fraction(held.control.value) ?? held.control.value;
+    if (reached.control.value.trim() !== "")
+      report.wealth = Number.isNaN(Number(reached.control.value))
+        ? reached.control.value
+        : Number(reached.control.value);
     return report;
   };
   form.addEventListener("submit", async (event) => {

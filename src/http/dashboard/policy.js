@@ -18,17 +18,32 @@ export async function view(id, leaving) {
   const policy = await get(`/policies/${id}`, leaving);
   const { specification, diagnostics } = policy;
   const body = [
-    h("div", { class: "words" }, inWords(specification).map((sentence) => h("p", {}, sentence))),
+    h(
+      "div",
+      { class: "words" },
+      inWords(specification).map((sentence) => h("p", {}, sentence)),
+    ),
     disclosure("The whole specification", () => h("pre", { tabindex: 0 }, JSON.stringify(specification, null, 1))),
     surface(policy),
     steps(diagnostics),
   ];
-  const evaluate = (await offers("/evaluate")) ? h("a", { class: "button quiet", href: `#/evaluations?policy=${id}` }, "Evaluate") : null;
-  const actions = h("div", { class: "actions" },
-    h("a", { class: "button", href: `#/sessions?policy=${id}` }, "Open a session"), evaluate,
+  const evaluate = (await offers("/evaluate"))
+    ? h("a", { class: "button quiet", href: `#/evaluations?policy=${id}` }, "Evaluate")
+    : null;
+  const actions = h(
+    "div",
+    { class: "actions" },
+    h("a", { class: "button", href: `#/sessions?policy=${id}` }, "Open a session"),
+    evaluate,
     h("a", { class: "button quiet", href: `/policies/${id}/export`, download: `policy-${short(id)}.json` }, "Export"),
-    deletion(id));
-  const trail = h("p", { class: "trail" }, h("a", { href: "#/policies" }, "Policies"), ` \u203a ${FRAMEWORKS[policy.framework]}, stored ${moment(policy.created_ms)}`);
+    deletion(id),
+  );
+  const trail = h(
+    "p",
+    { class: "trail" },
+    h("a", { href: "#/policies" }, "Policies"),
+    ` \u203a ${FRAMEWORKS[policy.framework]}, stored ${moment(policy.created_ms)}`,
+  );
   return { title: `Policy ${short(id)}`, trail, actions, body };
 }
 
@@ -48,7 +63,10 @@ function deletion(id) {
 }
 
 function surface({ policy: id, specification, diagnostics }) {
-  const size = diagnostics.reduce((sum, step) => sum + NUMBER_BYTES * step.design_count * (2 + (step.policy?.features.length ?? 0)), 0);
+  const size = diagnostics.reduce(
+    (sum, step) => sum + NUMBER_BYTES * step.design_count * (2 + (step.policy?.features.length ?? 0)),
+    0,
+  );
   const holder = h("div", {});
   const load = async () => {
     holder.replaceChildren(h("p", { role: "status" }, "Reading the policy\u2026"));
@@ -79,8 +97,13 @@ function explorer(policy) {
   const across = h("select", { id: "surface-across" });
   const radius = h("input", { type: "range", id: "surface-radius", min: 0, max: 20, value: 10, step: 1 });
   const outputs = { step: h("output", { for: "surface-step" }), radius: h("output", { for: "surface-radius" }) };
-  const field = (label, control, output) => h("p", { class: "field" }, h("label", { for: control.id }, label), control, output);
-  const fields = { step: field("Period", step, outputs.step), across: field("Across", across, null), radius: field("Radius", radius, outputs.radius) };
+  const field = (label, control, output) =>
+    h("p", { class: "field" }, h("label", { for: control.id }, label), control, output);
+  const fields = {
+    step: field("Period", step, outputs.step),
+    across: field("Across", across, null),
+    radius: field("Radius", radius, outputs.radius),
+  };
   const drawing = h("div", {});
   const draw = () => {
     const found = at(Number(step.value));
@@ -89,10 +112,18 @@ function explorer(policy) {
     const axes = found ? Object.keys(AXES).filter((axis) => axis in found.ranges) : [];
     const choices = axes.filter((axis) => axis !== "mean");
     const chosen = choices.includes(across.value) ? across.value : choices[0];
-    across.replaceChildren(...choices.map((axis) => h("option", { value: axis, selected: axis === chosen }, AXES[axis].label)));
+    across.replaceChildren(
+      ...choices.map((axis) => h("option", { value: axis, selected: axis === chosen }, AXES[axis].label)),
+    );
     fields.across.hidden = choices.length < 2 || !axes.includes("mean");
     fields.radius.hidden = !axes.includes("radius") || chosen === "radius";
-    drawing.replaceChildren(!found ? single(policy.steps[Number(step.value)]) : axes.length === 1 ? alongOne(found, axes[0]) : over(found, chosen));
+    drawing.replaceChildren(
+      !found
+        ? single(policy.steps[Number(step.value)])
+        : axes.length === 1
+          ? alongOne(found, axes[0])
+          : over(found, chosen),
+    );
   };
   const chosenRadius = (found) => {
     if (fields.radius.hidden) return found.middle.radius;
@@ -107,14 +138,36 @@ function explorer(policy) {
     const [xs, ys] = [spread(found.ranges[across], COLUMNS), spread(found.ranges.mean, ROWS)];
     const cells = ys.map((mean) => xs.map((value) => found.at({ ...place, mean, [across]: value })));
     const dots = thinned(found.dots(across), found.dots("mean"));
-    const axis = (name, values) => ({ name: AXES[name].label, values, format: AXES[name].format, tick: AXES[name].tick });
-    const rest = ["wealth", "deviation", "radius"].filter((axis) => axis !== across && (axis in found.ranges)).map((axis) => `${AXES[axis].label.toLowerCase()} ${AXES[axis].format(place[axis] ?? found.middle[axis])}`);
+    const axis = (name, values) => ({
+      name: AXES[name].label,
+      values,
+      format: AXES[name].format,
+      tick: AXES[name].tick,
+    });
+    const rest = ["wealth", "deviation", "radius"]
+      .filter((axis) => axis !== across && axis in found.ranges)
+      .map((axis) => `${AXES[axis].label.toLowerCase()} ${AXES[axis].format(place[axis] ?? found.middle[axis])}`);
     const note = `Each cell is the history, moved to that mean${across === "deviation" ? " and standard deviation" : ""}${rest.length > 0 ? `; ${rest.join(", ")}` : ""}. Where no design point lies, Ballast solves the step anew instead of reading this surface.`;
-    return heatmap({ title: "Allocation", name: "allocation", x: axis(across, xs), y: axis("mean", ys), field: cells, range: rounded(cells, action_interval[1]), format: (value) => percent(value, 0), dots, note });
+    return heatmap({
+      title: "Allocation",
+      name: "allocation",
+      x: axis(across, xs),
+      y: axis("mean", ys),
+      field: cells,
+      range: rounded(cells, action_interval[1]),
+      format: (value) => percent(value, 0),
+      dots,
+      note,
+    });
   };
   const alongOne = (found, name) => {
     const values = spread(found.ranges[name], 61);
-    return lineChart({ title: "Allocation", x: { values, label: AXES[name].label, format: AXES[name].format, tick: AXES[name].tick }, y: { format: percent, tick: percentTick, also: [0] }, series: [{ name: "Allocation", kind: "line", values: values.map((value) => found.at({ [name]: value })) }] });
+    return lineChart({
+      title: "Allocation",
+      x: { values, label: AXES[name].label, format: AXES[name].format, tick: AXES[name].tick },
+      y: { format: percent, tick: percentTick, also: [0] },
+      series: [{ name: "Allocation", kind: "line", values: values.map((value) => found.at({ [name]: value })) }],
+    });
   };
   for (const control of [step, across, radius]) control.addEventListener("input", draw);
   draw();
@@ -122,7 +175,15 @@ function explorer(policy) {
 }
 
 function single({ solution }) {
-  return h("p", { class: "single" }, "At this step every session of this policy is in one and the same state: hold ", h("strong", {}, percent(solution.action)), ", worth ", h("strong", {}, basisPoints(solution.floor_gain)), " more than the bank.");
+  return h(
+    "p",
+    { class: "single" },
+    "At this step every session of this policy is in one and the same state: hold ",
+    h("strong", {}, percent(solution.action)),
+    ", worth ",
+    h("strong", {}, basisPoints(solution.floor_gain)),
+    " more than the bank.",
+  );
 }
 
 /** The range of the allocations shown, out to the next tenth, so that noise stays pale. */
@@ -144,7 +205,13 @@ function thinned(xs, ys) {
 function steps(diagnostics) {
   const periods = diagnostics.map(({ step }) => step + 1);
   const chart = (title, read, format, tick) =>
-    lineChart({ title, height: 130, x: { values: periods, label: "Period", format: String, whole: true }, y: { format, tick, also: [0] }, series: [{ name: "", kind: "line", values: diagnostics.map(read) }] });
+    lineChart({
+      title,
+      height: 130,
+      x: { values: periods, label: "Period", format: String, whole: true },
+      y: { format, tick, also: [0] },
+      series: [{ name: "", kind: "line", values: diagnostics.map(read) }],
+    });
   const names = [...new Set(diagnostics.flatMap(({ policy }) => policy?.features ?? []))];
   const length = (side, name) => (step) => {
     const index = step[side]?.features.indexOf(name) ?? -1;
@@ -163,13 +230,34 @@ function steps(diagnostics) {
     figure("Value noise", ({ value }) => significant(value?.noise_variance, 2)),
     figure("Policy noise", ({ policy }) => significant(policy?.noise_variance, 2)),
   ];
-  const lengthscales = (side) => disclosure(`Lengthscales of the ${side} surrogate`, () => [table(`Lengthscales of the ${side} surrogate, in standard deviations of each feature over the design`, [period, ...names.map((name) => figure(name.replace(/_/g, " "), length(side, name)))], diagnostics)][0]);
-  return section("How well it was solved",
-    h("div", { class: "trio" },
+  const lengthscales = (side) =>
+    disclosure(
+      `Lengthscales of the ${side} surrogate`,
+      () =>
+        [
+          table(
+            `Lengthscales of the ${side} surrogate, in standard deviations of each feature over the design`,
+            [period, ...names.map((name) => figure(name.replace(/_/g, " "), length(side, name)))],
+            diagnostics,
+          ),
+        ][0],
+    );
+  return section(
+    "How well it was solved",
+    h(
+      "div",
+      { class: "trio" },
       chart("Design states all in the bank", ({ all_bank_share }) => all_bank_share, percent, percentTick),
       chart("Value surrogate, error left out", ({ value }) => value?.leave_one_out_error, basisPoints, basisPoints),
-      chart("Largest duality gap", ({ duality_gap }) => duality_gap, basisPoints, basisPoints)),
-    h("p", { class: "note" }, "Errors are root mean squares of leave-one-out predictions; those of the value and the gap are in basis points (1/100 %) of the certainty equivalent, that of the policy is in allocation. Noise is a share of the target\u2019s variance."),
+      chart("Largest duality gap", ({ duality_gap }) => duality_gap, basisPoints, basisPoints),
+    ),
+    h(
+      "p",
+      { class: "note" },
+      "Errors are root mean squares of leave-one-out predictions; those of the value and the gap are in basis points (1/100 %) of the certainty equivalent, that of the policy is in allocation. Noise is a share of the target\u2019s variance.",
+    ),
     table("Diagnostics of every step", quality, diagnostics),
-    lengthscales("value"), lengthscales("policy"));
+    lengthscales("value"),
+    lengthscales("policy"),
+  );
 }

@@ -51,7 +51,9 @@ export function moments(values) {
 export function inWords({ problem, design, surrogate, seed }) {
   const { mean, deviation } = moments(problem.history);
   const limit = problem.action_interval[1];
-  const ball = ["adaptive", "static"].includes(problem.framework) ? ` The radius of the ball is ${radiusRule(problem.radius)}.` : "";
+  const ball = ["adaptive", "static"].includes(problem.framework)
+    ? ` The radius of the ball is ${radiusRule(problem.radius)}.`
+    : "";
   const laws = design.initial_laws === "resampled" ? "starting from resampled histories" : "starting from this history";
   return [
     `${MEANINGS[problem.framework]}${ball}`,
@@ -63,6 +65,7 @@ export function inWords({ problem, design, surrogate, seed }) {
 
 function law(sampling) {
   if (sampling.kind === "gaussian_mixture") return `a mixture of ${counted(sampling.components.length, "normal law")}`;
-  if (sampling.kind === "student_t") return `a Student law with ${significant(sampling.degrees_of_freedom)} degrees of freedom`;
+  if (sampling.kind === "student_t")
+    return `a Student law with ${significant(sampling.degrees_of_freedom)} degrees of freedom`;
   return "a smoothed bootstrap of the history";
 }

@@ -31,14 +31,22 @@ function raw(atoms, order) {
 export function feature(name, { wealth, atoms, radius, rate }) {
   const standardised = (order) => central(atoms, order) / central(atoms, 2) ** (order / 2);
   switch (name) {
-    case "wealth": return wealth;
-    case "log_wealth": return Math.log(wealth);
-    case "mean": return raw(atoms, 1);
-    case "log_standard_deviation": return Math.log(central(atoms, 2)) / 2;
-    case "skewness": return standardised(3);
-    case "log_kurtosis": return Math.log(standardised(4));
-    case "log_radius": return Math.log(Math.max(radius, 1e-12));
-    case "robust_excess": return robustExcess(atoms, radius, rate);
+    case "wealth":
+      return wealth;
+    case "log_wealth":
+      return Math.log(wealth);
+    case "mean":
+      return raw(atoms, 1);
+    case "log_standard_deviation":
+      return Math.log(central(atoms, 2)) / 2;
+    case "skewness":
+      return standardised(3);
+    case "log_kurtosis":
+      return Math.log(standardised(4));
+    case "log_radius":
+      return Math.log(Math.max(radius, 1e-12));
+    case "robust_excess":
+      return robustExcess(atoms, radius, rate);
   }
   const order = Number(name.split("_")[1]);
   if (name.startsWith("moment_")) return raw(atoms, order);
@@ -72,16 +80,26 @@ export function stepSurface(policy, step) {
   const { problem } = policy.specification;
   const names = diagnostics.policy.features;
   const { centre, spread } = solution.scaling;
-  const level = Object.fromEntries(names.map((name, index) => [name, { centre: centre[index], spread: spread[index] }]));
+  const level = Object.fromEntries(
+    names.map((name, index) => [name, { centre: centre[index], spread: spread[index] }]),
+  );
   const own = { mean: raw(problem.history, 1), deviation: Math.sqrt(central(problem.history, 2)) };
   const middle = centres(level, problem, step, own);
   const shape = problem.history.map((atom) => (atom - own.mean) / own.deviation);
-  const state = ({ wealth, mean, deviation, radius }) =>
-    ({ wealth, radius, rate: problem.rate_per_step, atoms: shape.map((z) => mean + deviation * z) });
+  const state = ({ wealth, mean, deviation, radius }) => ({
+    wealth,
+    radius,
+    rate: problem.rate_per_step,
+    atoms: shape.map((z) => mean + deviation * z),
+  });
   const base = features(names, state(middle));
   const at = (place) => {
     const moved = features(names, state({ ...middle, ...place }));
-    return allocation(solution, moved.map((value, index) => centre[index] + value - base[index]), problem.action_interval[1]);
+    return allocation(
+      solution,
+      moved.map((value, index) => centre[index] + value - base[index]),
+      problem.action_interval[1],
+    );
   };
   return { at, middle, ranges: ranges(level, middle), dots: (axis) => designValues(axis, solution, names) };
 }
@@ -94,9 +112,15 @@ function centres(level, problem, step, own) {
   const mean = of("mean") ?? of("moment_1") ?? own.mean;
   const logDeviation = of("log_standard_deviation");
   const variance = of("moment_2") === undefined ? undefined : of("moment_2") - mean ** 2;
-  const deviation = logDeviation !== undefined ? Math.exp(logDeviation) : variance > 0 ? Math.sqrt(variance) : own.deviation;
-  const wealth = of("log_wealth") !== undefined ? Math.exp(of("log_wealth")) : of("wealth") ?? problem.initial_wealth;
-  return { wealth, mean, deviation, radius: of("log_radius") !== undefined ? Math.exp(of("log_radius")) : ruledRadius(problem, step) };
+  const deviation =
+    logDeviation !== undefined ? Math.exp(logDeviation) : variance > 0 ? Math.sqrt(variance) : own.deviation;
+  const wealth = of("log_wealth") !== undefined ? Math.exp(of("log_wealth")) : (of("wealth") ?? problem.initial_wealth);
+  return {
+    wealth,
+    mean,
+    deviation,
+    radius: of("log_radius") !== undefined ? Math.exp(of("log_radius")) : ruledRadius(problem, step),
+  };
 }
 
 /** Radius where it follows from the sample size alone. */
@@ -104,26 +128,44 @@ function ruledRadius({ framework, radius, history }, step) {
   const n = history.length + step;
   if (framework === "plug_in" || framework === "known_law") return 0;
   switch (radius.rule) {
-    case "fixed": return radius.radius;
-    case "root_n": return radius.kappa / Math.sqrt(n);
-    case "concentration": return Math.sqrt(Math.log(radius.C / radius.alpha) / (radius.c * n));
-    default: return 0;
+    case "fixed":
+      return radius.radius;
+    case "root_n":
+      return radius.kappa / Math.sqrt(n);
+    case "concentration":
+      return Math.sqrt(Math.log(radius.C / radius.alpha) / (radius.c * n));
+    default:
+      return 0;
   }
 }
 
 /** Two and a half standard deviations of the design around its centre, for each axis the step depends on. */
 function ranges(level, middle) {
   const WIDE = 2.5;
-  const plain = (name, lowest = -Infinity) => level[name] && [Math.max(lowest, level[name].centre - WIDE * level[name].spread), level[name].centre + WIDE * level[name].spread];
+  const plain = (name, lowest = -Infinity) =>
+    level[name] && [
+      Math.max(lowest, level[name].centre - WIDE * level[name].spread),
+      level[name].centre + WIDE * level[name].spread,
+    ];
   const logarithmic = (name) => plain(name)?.map(Math.exp);
   const wealth = logarithmic("log_wealth") ?? plain("wealth", 0.01 * middle.wealth);
-  const found = { wealth, mean: plain("mean") ?? plain("moment_1"), radius: logarithmic("log_radius"), deviation: logarithmic("log_standard_deviation") };
+  const found = {
+    wealth,
+    mean: plain("mean") ?? plain("moment_1"),
+    radius: logarithmic("log_radius"),
+    deviation: logarithmic("log_standard_deviation"),
+  };
   return Object.fromEntries(Object.entries(found).filter(([, range]) => range));
 }
 
 /** Values of one axis over the design points. */
 function designValues(axis, { scaling, inputs }, names) {
-  const choices = { wealth: ["log_wealth", "wealth"], mean: ["mean", "moment_1"], radius: ["log_radius"], deviation: ["log_standard_deviation"] }[axis];
+  const choices = {
+    wealth: ["log_wealth", "wealth"],
+    mean: ["mean", "moment_1"],
+    radius: ["log_radius"],
+    deviation: ["log_standard_deviation"],
+  }[axis];
   const index = names.findIndex((name) => choices.includes(name));
   const straight = (value) => (names[index].startsWith("log_") ? Math.exp(value) : value);
   return inputs[index].map((value) => straight(scaling.centre[index] + scaling.spread[index] * value));

@@ -48,7 +48,12 @@ export async function view(_, leaving) {
     written();
   });
   const fields = mainFields((path, value) => {
-    if (path === "problem.utility.kind") put(request, "problem.utility", value === "log" ? { kind: value } : { kind: value, risk_aversion: AVERSION[value] });
+    if (path === "problem.utility.kind")
+      put(
+        request,
+        "problem.utility",
+        value === "log" ? { kind: value } : { kind: value, risk_aversion: AVERSION[value] },
+      );
     else put(request, path, value);
     if (path === "problem.utility.kind") fields.show(request);
     written();
@@ -68,11 +73,36 @@ export async function view(_, leaving) {
       jsonError.hidden = false;
     }
   });
-  const advanced = h("details", { class: "advanced" }, h("summary", {}, "Every field, as JSON"),
-    h("p", { class: "note", id: "json-note" }, "The request as it will be sent. What is edited here changes the form and the other way round; ", h("a", { href: "/docs" }, "the interface"), " names every field."),
-    h("label", { for: "json", class: "unseen" }, "Training request as JSON"), json, jsonError);
+  const advanced = h(
+    "details",
+    { class: "advanced" },
+    h("summary", {}, "Every field, as JSON"),
+    h(
+      "p",
+      { class: "note", id: "json-note" },
+      "The request as it will be sent. What is edited here changes the form and the other way round; ",
+      h("a", { href: "/docs" }, "the interface"),
+      " names every field.",
+    ),
+    h("label", { for: "json", class: "unseen" }, "Training request as JSON"),
+    json,
+    jsonError,
+  );
   const send = h("button", { type: "submit" }, "Train");
-  const form = h("form", { novalidate: true }, source.element, fields.elements, advanced, message, h("p", { class: "send" }, send, h("span", { class: "note" }, "Trains in the background; the job list shows how far it is.")));
+  const form = h(
+    "form",
+    { novalidate: true },
+    source.element,
+    fields.elements,
+    advanced,
+    message,
+    h(
+      "p",
+      { class: "send" },
+      send,
+      h("span", { class: "note" }, "Trains in the background; the job list shows how far it is."),
+    ),
+  );
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
     send.disabled = true;
@@ -94,17 +124,38 @@ export async function view(_, leaving) {
 
 /** JSON with a line a field, numbers of the history side by side. */
 function compact(request) {
-  return JSON.stringify(request, null, 2).replace(/\[\s*([-\d.e+,\s]*?)\s*\]/g, (_, inside) => `[${inside.replace(/\s+/g, " ")}]`);
+  return JSON.stringify(request, null, 2).replace(
+    /\[\s*([-\d.e+,\s]*?)\s*\]/g,
+    (_, inside) => `[${inside.replace(/\s+/g, " ")}]`,
+  );
 }
 
 function mainFields(changed) {
-  const number = (path, label, note, options = {}) => input({ name: path, label, note, changed: (text) => changed(path, text.trim() === "" ? null : Number.isNaN(Number(text)) ? text : Number(text)), ...options });
+  const number = (path, label, note, options = {}) =>
+    input({
+      name: path,
+      label,
+      note,
+      changed: (text) => changed(path, text.trim() === "" ? null : Number.isNaN(Number(text)) ? text : Number(text)),
+      ...options,
+    });
   const parts = [
-    select({ name: "problem.framework", label: "Framework", note: "Adaptive guards and learns, static only guards, plug-in only learns.", choices: FRAMEWORKS, changed: (value) => changed("problem.framework", value) }),
+    select({
+      name: "problem.framework",
+      label: "Framework",
+      note: "Adaptive guards and learns, static only guards, plug-in only learns.",
+      choices: FRAMEWORKS,
+      changed: (value) => changed("problem.framework", value),
+    }),
     number("problem.horizon", "Decisions", "Periods to live through, 1 to 520."),
     number("problem.rate_per_step", "Bank return per period", "As a fraction: 0.002 is 0.2 % a period."),
     number("problem.initial_wealth", "Initial wealth", "In any unit."),
-    select({ name: "problem.utility.kind", label: "Utility", choices: UTILITIES, changed: (value) => changed("problem.utility.kind", value) }),
+    select({
+      name: "problem.utility.kind",
+      label: "Utility",
+      choices: UTILITIES,
+      changed: (value) => changed("problem.utility.kind", value),
+    }),
     number("problem.utility.risk_aversion", "Risk aversion", "Exponential: per unit of wealth. Power: above 1."),
     number("problem.radius.alpha", "Miscoverage alpha", "Smaller guards against more: 0.1 takes the 90 % quantile."),
     number("problem.radius.scale", "Radius scale", "Multiplies the radius; 0 trusts the returns seen."),

@@ -24,8 +24,26 @@ function charts(points, { radius }) {
   const own = points.findIndex(({ radius_scale }) => Math.abs(radius_scale - 1) < 1e-9);
   const line = (name, read, bare) => ({ name, kind: "line", bare, values: points.map(read) });
   return [
-    h("p", { class: "note" }, `The coming period solved again with its radius of ${significant(radius, 3)} multiplied. At 0 the returns seen are the whole truth; later periods keep their own radius.`),
-    lineChart({ title: "Allocation by radius", height: 130, start: own, x, y: { format: allocation, tick: percentTick, also: [0] }, series: [line("", (point) => point.allocation)] }),
-    lineChart({ title: "Worth for certain by radius", height: 150, start: own, x, y: { format: wealth, tick }, series: [line("", (point) => point.certainty_equivalent), line("Bank", ({ floor }) => floor, true)] }),
+    h(
+      "p",
+      { class: "note" },
+      `The coming period solved again with its radius of ${significant(radius, 3)} multiplied. At 0 the returns seen are the whole truth; later periods keep their own radius.`,
+    ),
+    lineChart({
+      title: "Allocation by radius",
+      height: 130,
+      start: own,
+      x,
+      y: { format: allocation, tick: percentTick, also: [0] },
+      series: [line("", (point) => point.allocation)],
+    }),
+    lineChart({
+      title: "Worth for certain by radius",
+      height: 150,
+      start: own,
+      x,
+      y: { format: wealth, tick },
+      series: [line("", (point) => point.certainty_equivalent), line("Bank", ({ floor }) => floor, true)],
+    }),
   ];
 }
