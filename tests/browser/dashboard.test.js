@@ -13,7 +13,7 @@ const PATIENCE = 60_000;
 const RETURNS = [1.31, -4.42, 2.1, 3.3, -1.2, 0.8, 4.5, -2.7, 1.6, 0.2, 2.4, -0.9];
 const FILE = `month;market return\n${RETURNS.map((value, index) => `2020-${index + 1};${String(value).replace(".", ",")}`).join("\n")}\n`;
 
-let ballast, chromium, page, policy, session;
+let ballast, chromium, page, policy, session, twin, evaluation;
 const faults = [];
 
 before(async () => {
@@ -197,6 +197,32 @@ test("what if is asked of a session", async (t) => {
     return t.skip("this service has no /what-if");
   }
   await curve.first().waitFor();
+  const sweep = { radius_scale: { from: 0, to: 2, points: 3 } };
+  const { points } = await call(ballast.url, "/what-if", { session, sweep });
+  for (const [key, { allocation }] of [
+    ["Home", points[0]],
+    ["End", points[2]],
+  ]) {
+    await curve.first().press(key);
+    const told = await curve.first().getAttribute("aria-valuetext");
+    assert.ok(
+      Math.abs(Number.parseFloat(/: +([\d.]+)/.exec(told)[1]) - 100 * allocation) <= 0.05,
+      `${told} for ${allocation}`,
+    );
+  }
+});
+
+test("a session lives to its end", async () => {
+  twin = (await call(ballast.url, "/sessions", { policy })).session;
+  await call(ballast.url, "/observe", { session: twin, period: 1, simple_return: 0.01 });
+  await go(`#/sessions/${session}`);
+  for (const period of [3, 4]) {
+    await page.getByLabel(`Return in period ${period}`).fill("0.5");
+    await page.getByRole("button", { name: `Report period ${period}` }).click();
+    await page.getByText(`${period} periods observed of 4`).waitFor();
+  }
+  await page.getByRole("heading", { name: "Completed" }).waitFor();
+  assert.equal((await call(ballast.url, `/sessions/${session}`)).state, "completed");
 });
 
 test("an evaluation is asked for and reported", async (t) => {
@@ -210,6 +236,7 @@ test("an evaluation is asked for and reported", async (t) => {
   await page.getByLabel("Paths per history").fill("200");
   await page.getByRole("button", { name: "Evaluate" }).click();
   await page.getByRole("table", { name: "Outcomes of every strategy" }).waitFor();
+  evaluation = page.url().split("/").pop();
 });
 
 test("every view fits, at 390 and 1600 pixels", async () => {
@@ -264,15 +291,9 @@ test("the console held no error but the refusals that were asked for", () => {
 });
 
 function views() {
-  return [
-    "#/jobs",
-    "#/train",
-    "#/policies",
-    `#/policies/${policy}`,
-    "#/sessions",
-    `#/sessions/${session}`,
-    "#/nowhere",
-  ];
+  const reports = evaluation ? ["#/evaluations", `#/evaluations/${evaluation}`] : [];
+  const things = [`#/policies/${policy}`, `#/sessions/${session}`, `#/sessions/${twin}`];
+  return ["#/jobs", "#/train", "#/policies", "#/sessions", ...things, ...reports, "#/nowhere"];
 }
 
 /** What is fetched after the view stands has arrived. */

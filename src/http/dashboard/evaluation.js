@@ -6,7 +6,7 @@ import { facts, h, section, table } from "./dom.js";
 import { count, counted, duration, percent, percentTick, short, significant, tick, wealth } from "./format.js";
 import { intervalChart } from "./interval_chart.js";
 import { jobList } from "./jobs.js";
-import { FRAMEWORKS } from "./specification.js";
+import { FRAMEWORKS, worth } from "./specification.js";
 
 export async function view(id, leaving) {
   const job = await get(`/jobs/${id}`, leaving);
@@ -68,14 +68,20 @@ function summary({ request, histories, level = request.level, costs }) {
   );
 }
 
-function outcomes({ strategies, reference }, names) {
+/** Quantiles and extremes of utility are those of wealth, utility being increasing; its mean and variance are not. */
+function outcomes({ strategies, reference, request }, names) {
   const rows = strategies.map((strategy, index) => ({ ...strategy, name: names[index] }));
   const estimate = (name, read, format) => ({
     name,
     numeric: true,
     cell: (row) => (read(row) ? interval(read(row), format) : "\u2013"),
   });
-  const plain = (name, read) => ({ name, numeric: true, cell: (row) => significant(read(row).value, 5) });
+  const plain = (name, read, digits) => ({ name, numeric: true, cell: (row) => significant(read(row).value, digits) });
+  const inWealth = (name, read) => ({
+    name,
+    numeric: true,
+    cell: ({ utility }) => wealth(worth(request.problem.utility, read(utility).value)),
+  });
   const referred = names[strategies.findIndex(({ strategy }) => strategy === reference)];
   return section(
     "What each was worth",
@@ -93,30 +99,30 @@ function outcomes({ strategies, reference }, names) {
         estimate(
           `Less ${referred.toLowerCase()}`,
           ({ difference }) => difference?.certainty_equivalent,
-          (value) => significant(value, 3),
+          (value) => tick(value, 0.01),
         ),
         estimate("Mean wealth", (row) => row.wealth.mean, wealth),
-        plain("Utility: mean", ({ utility }) => utility.mean),
-        plain("variance", ({ utility }) => utility.variance),
-        plain("20 %", ({ utility }) => utility.quantile_20),
-        plain("90 %", ({ utility }) => utility.quantile_90),
-        plain("least", ({ utility }) => utility.min),
-        plain("most", ({ utility }) => utility.max),
+        inWealth("20 % below", ({ quantile_20 }) => quantile_20),
+        inWealth("90 % below", ({ quantile_90 }) => quantile_90),
+        inWealth("Least", ({ min }) => min),
+        inWealth("Most", ({ max }) => max),
+        plain("Mean utility", ({ utility }) => utility.mean, 7),
+        plain("Variance", ({ utility }) => utility.variance, 3),
       ],
       rows,
     ),
   );
 }
 
-/** Terminal utility, one histogram a strategy on common bins and a common height. */
-function spreads({ strategies, histogram_edges }, names) {
+/** One histogram a strategy, on common bins: even in utility, labelled by the wealth that has it. */
+function spreads({ strategies, histogram_edges, request }, names) {
   const bins = histogram_edges.length - 1;
   if (histogram_edges[0] === histogram_edges[bins]) return "";
-  const edge = (place) => significant(histogram_edges[Math.round(place)], 3);
+  const edge = (place) => wealth(worth(request.problem.utility, histogram_edges[Math.round(place)]));
   const x = {
     values: Array.from({ length: bins }, (_, k) => k + 1),
     domain: [0, bins],
-    label: "Utility",
+    label: "Wealth",
     whole: true,
     format: (place) => `${edge(place - 1)} to ${edge(place)}`,
     tick: edge,
@@ -132,7 +138,7 @@ function spreads({ strategies, histogram_edges }, names) {
       series: [{ name: "", kind: "bars", values: histogram.map((value) => value / total) }],
     });
   });
-  return section("How terminal utility spreads", h("div", { class: "trio" }, charts));
+  return section("How terminal wealth spreads", h("div", { class: "trio" }, charts));
 }
 
 /** Allocation and radius through time, where a framework decides. */

@@ -67,15 +67,11 @@ async function fill(holder, shown) {
     h(
       "div",
       { class: "columns" },
-      h(
-        "div",
-        {},
-        active ? advice(action, shown) : completed(shown),
-        active && shown.canAsk ? conservatism(shown, action) : null,
-      ),
+      h("div", {}, active ? advice(action, shown) : completed(shown)),
       h("div", {}, course(shown, action)),
     ),
     active ? worstCase(shown, action) : "",
+    active && shown.canAsk ? conservatism(shown, action) : "",
     observed(shown),
   );
 }
@@ -218,7 +214,7 @@ function worstCase({ id, leaving }, action) {
       h(
         "p",
         { class: "note" },
-        `Multiplier of the ball ${significant(worst_case.multiplier, 3)} (utility lost per unit of radius); duality gap ${significant(1e4 * worst_case.duality_gap, 2)} bp.${apart}`,
+        `Multiplier of the ball ${significant(worst_case.multiplier, 3)} (utility lost per unit of radius); duality gap ${significant(1e4 * Math.abs(worst_case.duality_gap), 2)} bp.${apart}`,
       ),
     ];
   };

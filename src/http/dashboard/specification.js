@@ -22,6 +22,13 @@ export function utility({ kind, risk_aversion }) {
   return `${kind} utility, risk aversion ${significant(risk_aversion)}${kind === "exponential" ? " per unit of wealth" : ""}`;
 }
 
+/** The wealth whose utility is `value`. */
+export function worth({ kind, risk_aversion: aversion }, value) {
+  if (kind === "log") return Math.exp(value);
+  if (kind === "power") return (1 + (1 - aversion) * value) ** (1 / (1 - aversion));
+  return -Math.log1p(-aversion * value) / aversion;
+}
+
 /** The rule of the radius in a few words. */
 export function radiusRule(radius) {
   switch (radius.rule) {

@@ -29,21 +29,25 @@ function charts(points, { radius }) {
       { class: "note" },
       `The coming period solved again with its radius of ${significant(radius, 3)} multiplied. At 0 the returns seen are the whole truth; later periods keep their own radius.`,
     ),
-    lineChart({
-      title: "Allocation by radius",
-      height: 130,
-      start: own,
-      x,
-      y: { format: allocation, tick: percentTick, also: [0] },
-      series: [line("", (point) => point.allocation)],
-    }),
-    lineChart({
-      title: "Worth for certain by radius",
-      height: 150,
-      start: own,
-      x,
-      y: { format: wealth, tick },
-      series: [line("", (point) => point.certainty_equivalent), line("Bank", ({ floor }) => floor, true)],
-    }),
+    h(
+      "div",
+      { class: "duo" },
+      lineChart({
+        title: "Allocation by radius",
+        height: 170,
+        start: own,
+        x,
+        y: { format: allocation, tick: percentTick, also: [0] },
+        series: [line("", (point) => point.allocation)],
+      }),
+      lineChart({
+        title: "Worth for certain by radius",
+        height: 170,
+        start: own,
+        x,
+        y: { format: wealth, tick },
+        series: [line("", (point) => point.certainty_equivalent), line("Bank", ({ floor }) => floor, true)],
+      }),
+    ),
   ];
 }
