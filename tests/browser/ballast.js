@@ -8,7 +8,7 @@ import { createInterface } from "node:readline";
 import { fileURLToPath } from "node:url";
 import { chromium } from "playwright-core";
 
-const BINARY = process.env.BALLAST ?? fileURLToPath(new URL("../../target/release/ballast", import.meta.url));
+const BINARY = process.env.BALLAST_BINARY ?? fileURLToPath(new URL("../../target/release/ballast", import.meta.url));
 const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 
 /** Starts the service; `url` is where it listens, `stop()` ends it and takes its data away. */

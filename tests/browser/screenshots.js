@@ -43,8 +43,8 @@ try {
   for (let period = 1; period <= LIVED; period++) {
     await call(url, "/observe", { session, period, simple_return: returns[start + period - 1] });
   }
-  await shot(`#/sessions/${session}`, "light", "slider", "docs/images/session.png", 1120);
-  await shot(`#/policies/${policy}`, "dark", "application", "docs/images/policy.png", 1120);
+  await shot(`#/sessions/${session}`, "light", "slider", "docs/images/session.png", 1080);
+  await shot(`#/policies/${policy}`, "dark", "application", "docs/images/policy.png", 1035);
 } finally {
   await chromium.close();
   await ballast.stop();
