@@ -39,6 +39,7 @@ async fn an_investor_lives_to_the_horizon() {
     assert_eq!(app.action().await.0, 409);
     let (_, history) = app.get(&format!("/sessions/{}/history", app.session)).await;
     assert_eq!(history["observations"].as_array().unwrap().len(), 2);
+    assert_eq!(history["observations"][0]["radius"], first["radius"]);
 
     assert_eq!(app.delete(&format!("/policies/{}", app.policy)).await, 409);
     assert_eq!(app.delete(&format!("/sessions/{}", app.session)).await, 204);

@@ -10,7 +10,8 @@ use super::problem::ProblemKind;
 const HEAD: &str = "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Ballast: interface</title>\
 <style>body{font:16px/1.5 system-ui;max-width:60rem;margin:2rem auto;padding:0 1rem}\
 code{background:#8882;padding:0 .2em}h2{border-top:1px solid #8885;padding-top:1rem}</style>\
-<h1>Ballast</h1><p>The machine-readable form is <a href=\"/openapi.json\">openapi.json</a>.</p>";
+<h1>Ballast</h1><p>The machine-readable form is <a href=\"/openapi.json\">openapi.json</a>; \
+<a href=\"/\">the dashboard</a> is made of these calls.</p>";
 
 /// The page.
 pub fn page(description: &OpenApi) -> String {

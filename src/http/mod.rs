@@ -1,5 +1,6 @@
 //! Floor 4: translation between the wire and the use cases, and nothing else.
 
+mod dashboard;
 mod decode;
 mod described;
 mod documentation;

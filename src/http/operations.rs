@@ -79,10 +79,3 @@ pub async fn openapi() -> Response {
 pub async fn docs() -> Html<String> {
     Html(documentation::page(&router::description()))
 }
-
-/// Where to start.
-#[utoipa::path(get, path = "/", tag = "operations",
-    responses((status = 200, description = "A page.", body = String, content_type = "text/html")))]
-pub async fn root() -> Html<&'static str> {
-    Html("<!doctype html><title>Ballast</title><p>Ballast is running. Read <a href=\"/docs\">the documentation</a>.")
-}

@@ -15,7 +15,7 @@ use utoipa_axum::routes;
 
 use super::extract::BodyLimit;
 use super::problem::{Problem, ProblemKind};
-use super::{described, events, jobs, operations, policies, sessions, telemetry};
+use super::{dashboard, described, events, jobs, operations, policies, sessions, telemetry};
 use crate::service::Service;
 use crate::service::config::Config;
 
@@ -51,7 +51,8 @@ fn routes() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(operations::metrics))
         .routes(routes!(operations::openapi))
         .routes(routes!(operations::docs))
-        .routes(routes!(operations::root))
+        .routes(routes!(dashboard::root))
+        .routes(routes!(dashboard::file))
 }
 
 /// The OpenAPI description.

@@ -73,7 +73,7 @@ pub async fn history(State(service): State<Arc<Service>>, Id(id): Id) -> Result<
         policy: row.policy,
         initial_wealth: row.initial_wealth,
         history: row.initial_history,
-        observations: observations.into_iter().map(Into::into).collect(),
+        observations: observations.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
     }))
 }
 

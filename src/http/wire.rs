@@ -8,7 +8,9 @@ use crate::control::backward::Phase;
 use crate::control::policy::StepDiagnostics;
 use crate::control::specification::{Framework, Specification};
 use crate::control::worst_case::WorstCase;
+use crate::service::error::ServiceError;
 use crate::service::jobs::Job as ServiceJob;
+use crate::service::observation::Observed;
 use crate::service::sessions::{Action as ServiceAction, Live};
 use crate::store::{JobKind, JobState, ObservationRow, PolicySummary, SessionSummary};
 
@@ -225,19 +227,25 @@ pub struct Observation {
     pub executed_allocation: f64,
     /// Wealth at the end of the period.
     pub wealth: f64,
+    /// Radius of the Wasserstein ball after the period, in log-return.
+    pub radius: f64,
     pub observed_ms: i64,
 }
 
-impl From<ObservationRow> for Observation {
-    fn from(row: ObservationRow) -> Self {
-        Observation {
+impl TryFrom<ObservationRow> for Observation {
+    type Error = ServiceError;
+
+    fn try_from(row: ObservationRow) -> Result<Self, ServiceError> {
+        let answer: Observed = serde_json::from_str(&row.answer_json).map_err(ServiceError::internal)?;
+        Ok(Observation {
             period: row.period,
             log_return: row.log_return,
             advised_allocation: row.advised_allocation,
             executed_allocation: row.executed_allocation,
             wealth: row.wealth_after,
+            radius: answer.uncertainty.radius,
             observed_ms: row.created_ms,
-        }
+        })
     }
 }
 

@@ -75,6 +75,8 @@ class Observation(TypedDict):
     executed_allocation: float
     wealth: float
     """Wealth at the end of the period."""
+    radius: float
+    """Radius of the Wasserstein ball after the period, in log-return."""
     observed_ms: int
 
 

@@ -1,0 +1,252 @@
+// Charts of a few hundred points, as SVG: drawn at the width they have, read by pointer, by keyboard and as a table.
+
+import { disclosure, h, s, table } from "./dom.js";
+
+/** Round numbers that span `[low, high]` with about `wanted` steps. */
+export function ticks(low, high, wanted) {
+  const rough = (high - low) / Math.max(1, wanted);
+  if (!(rough > 0)) return [low];
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = power * [1, 2, 5, 10].find((factor) => factor * power >= rough * 0.999);
+  const values = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) values.push(k * step + 0); // never \u22120
+  return values;
+}
+
+/** The map from `[low, high]` onto `[from, to]`. */
+export function scale([low, high], [from, to]) {
+  const slope = high > low ? (to - from) / (high - low) : 0;
+  const map = (value) => from + slope * (value - low);
+  map.inverse = (pixel) => (slope === 0 ? low : low + (pixel - from) / slope);
+  return map;
+}
+
+/** The range of finite `values`, widened by a twentieth and to hold `also`. */
+export function extent(values, also = []) {
+  const finite = [...values, ...also].filter(Number.isFinite);
+  if (finite.length === 0) return [0, 1];
+  const [low, high] = [Math.min(...finite), Math.max(...finite)];
+  const room = high > low ? 0.05 * (high - low) : 0.05 * Math.abs(high) || 0.5;
+  return [also.includes(low) ? low : low - room, also.includes(high) ? high : high + room];
+}
+
+/** An element whose drawing follows its width: `draw(width)` gives the SVG's children. */
+export function plot(height, draw) {
+  const holder = h("div", { class: "plot" });
+  const drawn = (width) => {
+    const picture = s(
+      "svg",
+      { width, height, viewBox: `0 0 ${width} ${height}`, "aria-hidden": "true", focusable: "false" },
+      draw(width),
+    );
+    holder.replaceChildren(picture);
+  };
+  holder.redraw = () => holder.clientWidth > 0 && drawn(holder.clientWidth);
+  new ResizeObserver(holder.redraw).observe(holder);
+  return holder;
+}
+
+/**
+ * Lets a reader walk along `count` positions of a plot by pointer or arrow keys.
+ * `at(x)` is the position under a pixel; `read(position)` marks it and says what stands there.
+ */
+export function walkable(holder, { label, count, start, at, read }) {
+  const go = (position) => {
+    const now = Math.max(0, Math.min(count - 1, position));
+    holder.setAttribute("aria-valuenow", now);
+    holder.setAttribute("aria-valuetext", read(now));
+  };
+  const attributes = {
+    tabindex: 0,
+    role: "slider",
+    "aria-label": label,
+    "aria-valuemin": 0,
+    "aria-valuemax": count - 1,
+  };
+  for (const [name, value] of Object.entries(attributes)) holder.setAttribute(name, value);
+  const now = () => Number(holder.getAttribute("aria-valuenow"));
+  const moves = {
+    ArrowLeft: () => now() - 1,
+    ArrowDown: () => now() - 1,
+    ArrowRight: () => now() + 1,
+    ArrowUp: () => now() + 1,
+    Home: () => 0,
+    End: () => count - 1,
+    PageUp: () => now() + 10,
+    PageDown: () => now() - 10,
+  };
+  holder.addEventListener("keydown", (event) => {
+    if (!(event.key in moves)) return;
+    event.preventDefault();
+    go(moves[event.key]());
+  });
+  holder.addEventListener("pointermove", (event) => go(at(event.clientX - holder.getBoundingClientRect().left)));
+  holder.addEventListener("pointerleave", () => go(start));
+  go(start);
+}
+
+/** Horizontal rules with their values, and the labels below. */
+export function axes({ x, y, xTicks, yTicks, xFormat, yFormat, left, right, bottom }) {
+  return [
+    yTicks.map((tick) => [
+      s("line", { class: "rule", x1: left, x2: right, y1: y(tick), y2: y(tick) }),
+      s(
+        "text",
+        { class: "tick", x: left - 8, y: y(tick), dy: "0.32em", "text-anchor": "end" },
+        yFormat(tick, yTicks[1] - yTicks[0]),
+      ),
+    ]),
+    xTicks.map((tick) =>
+      s(
+        "text",
+        { class: "tick", x: x(tick), y: bottom + 18, "text-anchor": "middle" },
+        xFormat(tick, xTicks[1] - xTicks[0]),
+      ),
+    ),
+  ];
+}
+
+const swatch = (index) =>
+  s(
+    "svg",
+    { class: "swatch", width: 22, height: 8, "aria-hidden": "true" },
+    s("line", { class: `line s${index}`, x1: 1, x2: 21, y1: 4, y2: 4 }),
+  );
+const block = (index) =>
+  s(
+    "svg",
+    { class: "swatch", width: 12, height: 12, "aria-hidden": "true" },
+    s("rect", { class: `bar s${index}`, width: 12, height: 12 }),
+  );
+
+/** Title, what is read off, the plot, and the same as a table. */
+export function figure({ title, legend, holder, rows, note }) {
+  return h(
+    "figure",
+    { class: "chart" },
+    h("figcaption", {}, h("span", { class: "title" }, title), legend),
+    holder,
+    note ? h("p", { class: "note" }, note) : null,
+    rows ? disclosure("As a table", rows) : null,
+  );
+}
+
+/**
+ * Lines over common positions.
+ * x: `{values, domain, label, format, tick, whole, between}`, `between` where x names the unit before it; y: `{format, tick, also}`;
+ * series: `[{name, values, kind: "line" | "bars" | "levels", bare}]`, null where there is nothing. Bars and levels span
+ * the unit before their x; a bare line has no dots. What is read at first is `start`, or the last value of the first series; `gutter` lines up charts that stand above each other.
+ */
+export function lineChart({ title, x, y, series, height = 190, note, start: first, gutter = 0 }) {
+  const shown = x.values
+    .map((_, index) => index)
+    .filter((index) => series.some(({ values }) => Number.isFinite(values[index])));
+  const here = h("span", { class: "here" });
+  const outputs = series.map(() => h("b", {}));
+  const legend = h(
+    "span",
+    { class: "legend" },
+    here,
+    series.map(({ name, kind }, index) =>
+      h("span", {}, name ? [kind === "bars" ? block(index) : swatch(index), `${name} `] : null, outputs[index]),
+    ),
+  );
+  const yDomain = extent(
+    series.flatMap(({ values }) => values),
+    y.also,
+  );
+  const xDomain = x.domain ?? [x.values[0], x.values.at(-1)];
+  let cursor,
+    xScale = scale(xDomain, [0, 1]);
+  const start =
+    first >= 0
+      ? shown.indexOf(first)
+      : Math.max(
+          0,
+          shown.findLastIndex((index) => Number.isFinite(series[0].values[index])),
+        );
+  let position = start;
+  const shift = x.between ? 0.5 : 0;
+  const holder = plot(height, (width) => {
+    const yTicks = ticks(...yDomain, height / 38);
+    const left = Math.max(
+      gutter,
+      16 + 6.6 * Math.max(...yTicks.map((tick) => y.tick(tick, yTicks[1] - yTicks[0]).length)),
+    );
+    xScale = scale(xDomain, [left, width - 14]);
+    const frame = { x: xScale, y: scale(yDomain, [height - 30, 10]), left, right: width - 4, bottom: height - 30 };
+    const xTicks = ticks(...xDomain, Math.min(12, width / 70)).filter(
+      (tick) => (!x.whole || Number.isInteger(tick)) && !(x.between && tick === 0),
+    );
+    cursor = s("line", { class: "cursor", y1: 6, y2: frame.bottom });
+    mark();
+    return [
+      axes({
+        ...frame,
+        x: (value) => xScale(value - shift),
+        xTicks,
+        yTicks,
+        xFormat: x.tick ?? x.format,
+        yFormat: y.tick,
+      }),
+      cursor,
+      series.map((one, index) => drawn(one, index, x.values, frame)),
+    ];
+  });
+  const mark = () => {
+    const pixel = xScale((x.values[shown[position]] ?? 0) - shift);
+    cursor?.setAttribute("x1", pixel);
+    cursor?.setAttribute("x2", pixel);
+  };
+  const read = (at) => {
+    position = at;
+    const index = shown[at];
+    here.textContent = `${x.label} ${x.format(x.values[index])}`;
+    const words = series.map(({ values }, k) => (outputs[k].textContent = y.format(values[index])));
+    mark();
+    return `${here.textContent}: ${series.map(({ name }, k) => `${name} ${words[k]}`).join(", ")}`;
+  };
+  const nearest = (pixel) => {
+    const value = xScale.inverse(pixel) + shift;
+    return shown.reduce(
+      (best, index, at) => (Math.abs(x.values[index] - value) < Math.abs(x.values[shown[best]] - value) ? at : best),
+      0,
+    );
+  };
+  if (shown.length > 0) walkable(holder, { label: title, count: shown.length, start, at: nearest, read });
+  const columns = [{ name: x.label, cell: (index) => x.format(x.values[index]) }];
+  columns.push(
+    ...series.map(({ name, values }) => ({ name, numeric: true, cell: (index) => y.format(values[index]) })),
+  );
+  return figure({ title, legend, holder, note, rows: () => table(title, columns, shown) });
+}
+
+function drawn({ values, kind, bare }, index, positions, { x, y, bottom }) {
+  const points = values.map((value, k) => [x(positions[k]), y(value), value]);
+  if (kind === "bars") {
+    const wide = x(1) - x(0);
+    return points
+      .filter(([, , value]) => Number.isFinite(value))
+      .map(([right, top]) =>
+        s("rect", {
+          class: `bar s${index}`,
+          x: right - wide + 1,
+          width: Math.max(1, wide - 2),
+          y: Math.min(top, bottom - 1),
+          height: Math.max(1, bottom - top),
+        }),
+      );
+  }
+  const dots = points.filter(([, , value]) => Number.isFinite(value));
+  if (kind === "levels")
+    return dots.map(([right, py]) =>
+      s("line", { class: `level s${index}`, x1: right - x(1) + x(0) + 1, x2: right - 1, y1: py, y2: py }),
+    );
+  const path = points.map(([px, py, value], k) => {
+    if (!Number.isFinite(value)) return "";
+    return `${k > 0 && Number.isFinite(points[k - 1][2]) ? "L" : "M"}${px.toFixed(1)} ${py.toFixed(1)}`;
+  });
+  const ends =
+    !bare && dots.length <= 40 ? dots.map(([cx, cy]) => s("circle", { class: `dot s${index}`, cx, cy, r: 2.5 })) : null;
+  return [s("path", { class: `line s${index}`, d: path.join("") }), ends];
+}

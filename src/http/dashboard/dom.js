@@ -1,0 +1,89 @@
+// Elements without markup strings: text is always text, so nothing a server or a file says can become an element.
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/** An HTML element. `on...` attributes are listeners, `true` is present, `false` and null are absent. */
+export function h(tag, attributes = {}, ...children) {
+  return filled(document.createElement(tag), attributes, children);
+}
+
+/** An SVG element. */
+export function s(tag, attributes = {}, ...children) {
+  return filled(document.createElementNS(SVG, tag), attributes, children);
+}
+
+function filled(element, attributes, children) {
+  for (const [name, value] of Object.entries(attributes)) {
+    if (value === false || value === null || value === undefined) continue;
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else element.setAttribute(name, value === true ? "" : value);
+  }
+  element.append(
+    ...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false),
+  );
+  return element;
+}
+
+/** A table: `columns` are `{name, cell(row), numeric}`. The first column heads its row. */
+export function table(caption, columns, rows) {
+  const cell = (row, column, index) =>
+    h(
+      index === 0 ? "th" : "td",
+      { scope: index === 0 ? "row" : null, class: column.numeric ? "number" : null },
+      column.cell(row),
+    );
+  return h(
+    "div",
+    { class: "table", tabindex: 0, role: "region", "aria-label": caption },
+    h(
+      "table",
+      {},
+      h("caption", { class: "unseen" }, caption),
+      h(
+        "thead",
+        {},
+        h(
+          "tr",
+          {},
+          columns.map((column) => h("th", { scope: "col", class: column.numeric ? "number" : null }, column.name)),
+        ),
+      ),
+      h(
+        "tbody",
+        {},
+        rows.map((row) =>
+          h(
+            "tr",
+            {},
+            columns.map((column, index) => cell(row, column, index)),
+          ),
+        ),
+      ),
+    ),
+  );
+}
+
+/** Content that a reader opens; built when first opened. */
+export function disclosure(summary, build) {
+  const details = h("details", {}, h("summary", {}, summary));
+  details.addEventListener("toggle", () => details.children.length === 1 && details.append(build()));
+  return details;
+}
+
+/** Figures that matter, each with its name: `[name, value, note]`. */
+export function facts(entries) {
+  const fact = ([name, value, note]) =>
+    h("div", {}, h("dt", {}, name), h("dd", {}, value), note ? h("dd", { class: "note" }, note) : null);
+  return h("dl", { class: "facts" }, entries.filter(Boolean).map(fact));
+}
+
+/** A titled part of a page. */
+export function section(title, ...children) {
+  const heading = h("h2", { id: `h-${title.toLowerCase().replace(/[^a-z]+/g, "-")}` }, title);
+  return h("section", { "aria-labelledby": heading.id }, heading, children);
+}
+
+/** Says something to readers of screens without moving them. */
+export function announce(text) {
+  document.getElementById("status").textContent = text;
+}

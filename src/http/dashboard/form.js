@@ -1,0 +1,94 @@
+// Fields with their labels, notes and errors; refusals shown at the field they name.
+
+import { h } from "./dom.js";
+
+const identifier = (name) => `f-${name.replace(/[^a-z0-9]+/gi, "-")}`;
+
+function field(name, label, note, control) {
+  const id = identifier(name);
+  const noteId = note ? `${id}-note` : null;
+  control.id = id;
+  control.name = name;
+  if (noteId) control.setAttribute("aria-describedby", noteId);
+  const element = h(
+    "div",
+    { class: "field" },
+    h("label", { for: id }, label),
+    control,
+    note ? h("p", { class: "note", id: noteId }, note) : null,
+  );
+  return { name, element, control };
+}
+
+/** A text field; `changed(text)` at every edit. */
+export function input({ name, label, note, changed, value = "", ...attributes }) {
+  const control = h("input", { type: "text", inputmode: "decimal", autocomplete: "off", ...attributes });
+  control.value = value;
+  if (changed) control.addEventListener("input", () => changed(control.value));
+  return field(name, label, note, control);
+}
+
+/** A choice; `choices` maps values to words. */
+export function select({ name, label, note, choices, changed }) {
+  const control = h(
+    "select",
+    {},
+    Object.entries(choices).map(([value, words]) => h("option", { value }, words)),
+  );
+  if (changed) control.addEventListener("change", () => changed(control.value));
+  return field(name, label, note, control);
+}
+
+export function fieldset(legend, parts) {
+  return h(
+    "fieldset",
+    {},
+    h("legend", {}, legend),
+    h(
+      "div",
+      { class: "fields" },
+      parts.map((part) => part.element ?? part),
+    ),
+  );
+}
+
+/**
+ * Shows a refusal at the field it names, or at the nearest one above it (`problem.history[3]` at `problem.history`),
+ * and moves there; elsewhere, and for failures that name none, in `message`.
+ */
+export function showProblem(form, message, problem, otherwise) {
+  clear(form);
+  let name = problem.field ?? "";
+  let control = null;
+  while (name !== "" && control === null) {
+    const found = form.querySelector(`[name="${CSS.escape(name)}"]`);
+    control = found && found.closest("[hidden]") === null ? found : null;
+    name = name.replace(/(\.[^.[]*|\[\d+\]|^[^.[]*)$/, "");
+  }
+  if (control === null) {
+    message.hidden = false;
+    message.textContent = problem.message;
+    otherwise?.closest("details")?.setAttribute("open", "");
+    (otherwise ?? message).focus();
+    return;
+  }
+  control.closest("details")?.setAttribute("open", "");
+  const error = h("p", { class: "error", role: "alert", id: `${control.id}-error` }, problem.message);
+  control.setAttribute("aria-invalid", "true");
+  control.dataset.described = control.getAttribute("aria-describedby") ?? "";
+  control.setAttribute("aria-describedby", `${error.id} ${control.dataset.described}`.trim());
+  control.closest(".field").append(error);
+  control.focus();
+  control.addEventListener("input", () => clear(form), { once: true });
+}
+
+/** Takes errors away. */
+export function clear(form) {
+  const message = form.querySelector(":scope > .error");
+  if (message) message.hidden = true;
+  for (const control of form.querySelectorAll("[aria-invalid]")) {
+    control.removeAttribute("aria-invalid");
+    control.setAttribute("aria-describedby", control.dataset.described);
+    document.getElementById(`${control.id}-error`)?.remove();
+  }
+}

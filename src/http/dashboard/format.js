@@ -1,0 +1,91 @@
+// Numbers as people read them: a unit, and no more digits than mean something.
+
+const NARROW = "\u202f";
+const MINUS = "\u2212";
+
+function grouped(value, digits) {
+  return value
+    .toLocaleString("en-GB", { minimumFractionDigits: digits, maximumFractionDigits: digits, useGrouping: "min2" })
+    .replace("-", MINUS);
+}
+
+/** A share or a return, given as a fraction. */
+export function percent(fraction, digits = 1) {
+  return Number.isFinite(fraction) ? `${grouped(100 * fraction, digits)}${NARROW}%` : "\u2013";
+}
+
+/** An allocation: nothing and everything are said without decimals. */
+export function allocation(fraction) {
+  return percent(fraction, fraction === 0 || fraction === 1 ? 0 : 1);
+}
+
+/** Wealth, in whatever unit the investor counts. */
+export function wealth(value) {
+  if (!Number.isFinite(value)) return "\u2013";
+  const size = Math.abs(value);
+  if (size !== 0 && (size < 0.1 || size >= 1e9)) return significant(value, 4);
+  return grouped(value, size >= 1e5 ? 0 : 2);
+}
+
+/** `digits` significant digits, with an exponent where that is shorter. */
+export function significant(value, digits = 3) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "\u2013";
+  if (value === 0) return "0";
+  const exponent = Math.floor(Math.log10(Math.abs(value)));
+  if (exponent >= -4 && exponent < 6) return Number(value.toPrecision(digits)).toString().replace("-", MINUS);
+  return value
+    .toExponential(digits - 1)
+    .replace("e+", "e")
+    .replaceAll("-", MINUS);
+}
+
+/** A number on an axis, with the digits that its `step` asks for. */
+export function tick(value, step) {
+  const size = Math.max(Math.abs(value), Math.abs(step) || Math.abs(value));
+  if (size >= 1e7 || (size !== 0 && size < 1e-4)) return significant(value, 2);
+  return grouped(value, Math.min(6, decimals(step)));
+}
+
+/** A share on an axis. */
+export function percentTick(fraction, step) {
+  return percent(fraction, Math.min(4, decimals(100 * step)));
+}
+
+/** Decimals that tell multiples of `step` apart. */
+function decimals(step) {
+  return step > 0 ? Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) : 0;
+}
+
+/** A difference of log certainty equivalents, in basis points (1e-4). */
+export function basisPoints(value) {
+  return value === null || value === undefined ? "\u2013" : `${significant(1e4 * value, 2)}${NARROW}bp`;
+}
+
+/** A whole number. */
+export function count(value) {
+  return grouped(value, 0);
+}
+
+/** `count` things by name. */
+export function counted(value, noun) {
+  return `${count(value)} ${noun}${value === 1 ? "" : "s"}`;
+}
+
+/** Seconds, to the precision of an estimate. */
+export function duration(seconds) {
+  if (seconds < 0.95) return `under 1${NARROW}s`;
+  if (seconds < 90) return `${Math.round(seconds)}${NARROW}s`;
+  if (seconds < 5400) return `${Math.round(seconds / 60)}${NARROW}min`;
+  return `${grouped(seconds / 3600, 1)}${NARROW}h`;
+}
+
+/** A moment, in milliseconds since 1970, in the reader's own time. */
+export function moment(milliseconds) {
+  const options = { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" };
+  return new Date(milliseconds).toLocaleString("en-GB", options);
+}
+
+/** The part of an identifier that tells it from others. */
+export function short(id) {
+  return id.replace(/^[a-z]+_/, "").slice(0, 10);
+}

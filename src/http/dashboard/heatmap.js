@@ -1,0 +1,141 @@
+// A field over a rectangle, as cells: read by pointer and arrow keys, with its scale beside it.
+
+import { axes, figure, plot, scale, ticks } from "./chart.js";
+import { h, s, table } from "./dom.js";
+
+const HEIGHT = 340;
+const LEGEND = 26;
+/** The ramp in the stylesheet has this many colours, `.c0` to `.c10`. */
+const COLOURS = 11;
+
+/**
+ * `x`, `y`: `{name, values, format, tick}`, values ascending; `field[row][column]` over y and x;
+ * `range`: the field's own range, for the colours; `dots`: positions of design points; `start`: the cell first read.
+ */
+export function heatmap({ title, x, y, field, range, format, dots, note, name }) {
+  const [columns, rows] = [x.values.length, y.values.length];
+  const output = h("output", { class: "here", "aria-live": "polite" });
+  const legend = h(
+    "span",
+    { class: "legend" },
+    output,
+    dots.length > 0
+      ? h(
+          "span",
+          {},
+          s(
+            "svg",
+            { class: "swatch", width: 10, height: 10, "aria-hidden": "true" },
+            s("circle", { class: "sample", cx: 5, cy: 5, r: 2.5 }),
+          ),
+          "design points",
+        )
+      : null,
+  );
+  const half = (values) => (values[1] - values[0]) / 2;
+  const [dx, dy] = [half(x.values), half(y.values)];
+  const colour = (value) =>
+    `c${Math.round((COLOURS - 1) * Math.max(0, Math.min(1, (value - range[0]) / (range[1] - range[0] || 1))))}`;
+  let [column, row] = [columns >> 1, rows >> 1],
+    place,
+    cursor;
+  const holder = plot(HEIGHT, (width) => {
+    const yTicks = ticks(y.values[0], y.values.at(-1), 6);
+    const left = 14 + 6.6 * Math.max(...yTicks.map((tick) => y.tick(tick, yTicks[1] - yTicks[0]).length));
+    const right = width - 70;
+    const [across, up] = [
+      scale([x.values[0] - dx, x.values.at(-1) + dx], [left, right]),
+      scale([y.values[0] - dy, y.values.at(-1) + dy], [HEIGHT - 46, 22]),
+    ];
+    place = { across, up };
+    const [wide, high] = [across(2 * dx) - across(0), up(0) - up(2 * dy)];
+    const cells = field.flatMap((values, r) =>
+      values.map((value, c) =>
+        s("rect", {
+          class: `cell ${colour(value)}`,
+          x: across(x.values[c] - dx),
+          y: up(y.values[r] + dy),
+          width: wide + 0.6,
+          height: high + 0.6,
+        }),
+      ),
+    );
+    cursor = s("rect", { class: "cursor", width: wide, height: high });
+    mark();
+    return [
+      axes({
+        x: across,
+        y: up,
+        left,
+        right,
+        bottom: HEIGHT - 46,
+        xTicks: ticks(x.values[0], x.values.at(-1), width / 100),
+        yTicks,
+        xFormat: x.tick,
+        yFormat: y.tick,
+      }),
+      cells,
+      dots
+        .filter(([px, py]) => px >= x.values[0] && px <= x.values.at(-1) && py >= y.values[0] && py <= y.values.at(-1))
+        .map(([px, py]) => s("circle", { class: "sample", cx: across(px), cy: up(py), r: 2 })),
+      s("text", { class: "axis", x: (left + right) / 2, y: HEIGHT - 6, "text-anchor": "middle" }, x.name),
+      s("text", { class: "axis", x: 0, y: 11 }, y.name),
+      ramp(right + 14, range, format),
+      cursor,
+    ];
+  });
+  const mark = () => {
+    cursor?.setAttribute("x", place.across(x.values[column] - dx));
+    cursor?.setAttribute("y", place.up(y.values[row] + dy));
+  };
+  const read = () => {
+    output.textContent = `${x.name} ${x.format(x.values[column])}, ${y.name.toLowerCase()} ${y.format(y.values[row])}: ${name} ${format(field[row][column])}`;
+    if (place) mark();
+  };
+  const go = (c, r) => {
+    [column, row] = [Math.max(0, Math.min(columns - 1, c)), Math.max(0, Math.min(rows - 1, r))];
+    read();
+  };
+  const keys = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+  for (const [attribute, value] of Object.entries({
+    tabindex: 0,
+    role: "application",
+    "aria-label": `${title}. Arrow keys move over the cells.`,
+  }))
+    holder.setAttribute(attribute, value);
+  holder.addEventListener("keydown", (event) => {
+    if (!(event.key in keys)) return;
+    event.preventDefault();
+    go(column + keys[event.key][0], row + keys[event.key][1]);
+  });
+  holder.addEventListener("pointermove", (event) => {
+    const box = holder.getBoundingClientRect();
+    const nearest = (axis, value, d) => Math.round((value - axis.values[0]) / (2 * d));
+    go(
+      nearest(x, place.across.inverse(event.clientX - box.left), dx),
+      nearest(y, place.up.inverse(event.clientY - box.top), dy),
+    );
+  });
+  read();
+  return figure({ title, legend, holder, note, rows: () => fieldTable({ title, x, y, field, format }) });
+}
+
+function ramp(left, [low, high], format) {
+  const [top, bottom] = [22, HEIGHT - 46];
+  const step = (bottom - top) / COLOURS;
+  const blocks = Array.from({ length: COLOURS }, (_, k) =>
+    s("rect", { class: `cell c${k}`, x: left, width: LEGEND / 2, y: bottom - (k + 1) * step, height: step + 0.5 }),
+  );
+  const label = (value, y) => s("text", { class: "tick", x: left + LEGEND / 2 + 5, y, dy: "0.32em" }, format(value));
+  return [blocks, [0, 0.5, 1].map((share) => label(low + share * (high - low), bottom - share * (bottom - top)))];
+}
+
+/** Every third column and row: enough to see the shape, few enough to read. */
+function fieldTable({ title, x, y, field, format }) {
+  const thin = (values) => values.map((_, index) => index).filter((index) => index % 3 === 1);
+  const columns = [{ name: `${y.name} \\ ${x.name}`, cell: (r) => y.format(y.values[r]) }];
+  columns.push(
+    ...thin(x.values).map((c) => ({ name: x.format(x.values[c]), numeric: true, cell: (r) => format(field[r][c]) })),
+  );
+  return table(title, columns, thin(y.values).reverse());
+}

@@ -1,0 +1,51 @@
+// Estimates with their intervals, a line each, on one scale.
+
+import { extent, figure, plot, scale, ticks } from "./chart.js";
+import { s, table } from "./dom.js";
+
+const LINE = 26;
+
+/** `rows`: `{name, value, low, high}`. */
+export function intervalChart({ title, rows, format, tick }) {
+  const height = LINE * rows.length + 34;
+  const bottom = LINE * rows.length + 4;
+  const domain = extent(rows.flatMap(({ low, high }) => [low, high]));
+  const holder = plot(height, (width) => {
+    const left = 20 + 7.2 * Math.max(...rows.map(({ name }) => name.length));
+    const x = scale(domain, [left, width - 24]);
+    const places = ticks(...domain, (width - left) / 110);
+    return [
+      places.map((place) => [
+        s("line", { class: "rule", x1: x(place), x2: x(place), y1: 0, y2: bottom }),
+        s(
+          "text",
+          { class: "tick", x: x(place), y: bottom + 18, "text-anchor": "middle" },
+          tick(place, places[1] - places[0]),
+        ),
+      ]),
+      rows.map(({ name, value, low, high }, index) => {
+        const y = LINE * (index + 0.5) + 2;
+        return [
+          s("text", { class: "tick name", x: 0, y, dy: "0.32em" }, name),
+          s("line", { class: "range", x1: x(low), x2: Math.max(x(high), x(low) + 1), y1: y, y2: y }),
+          s("circle", { class: "dot s0", cx: x(value), cy: y, r: 4.5 }),
+        ];
+      }),
+    ];
+  });
+  return figure({
+    title,
+    holder,
+    rows: () =>
+      table(
+        title,
+        [
+          { name: "Strategy", cell: ({ name }) => name },
+          { name: "Estimate", numeric: true, cell: ({ value }) => format(value) },
+          { name: "From", numeric: true, cell: ({ low }) => format(low) },
+          { name: "To", numeric: true, cell: ({ high }) => format(high) },
+        ],
+        rows,
+      ),
+  });
+}

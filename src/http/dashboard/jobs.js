@@ -1,0 +1,185 @@
+// Jobs: what is being computed, how far it is, and how to stop it.
+
+import { follow, get, isOver, list, Problem, remove } from "./api.js";
+import { announce, h } from "./dom.js";
+import { count, duration, moment, short } from "./format.js";
+
+/** Browsers keep six connections to one address: following two jobs leaves room for everything else. */
+const FOLLOWED = 2;
+/** Jobs that are not followed are asked for this often, in milliseconds. */
+const POLL = 1000;
+
+const WORDS = { train: "Training", evaluate: "Evaluation", walk_forward: "Walk-forward" };
+const named = (kind) => WORDS[kind] ?? kind.replace(/_/g, " ");
+
+export async function view(_, leaving) {
+  const { entries, more } = await list("/jobs", "jobs", leaving);
+  const actions = h("a", { class: "button", href: "#/train" }, "Train a policy");
+  if (entries.length === 0) return { title: "Jobs", body: welcome() };
+  const note = more ? h("p", { class: "note" }, `The newest ${count(entries.length)} jobs.`) : null;
+  return { title: "Jobs", actions, body: [jobList(entries, leaving), note].filter(Boolean) };
+}
+
+/** Jobs that stay up to date until `leaving`; `changed(job)` hears of every change. */
+export function jobList(entries, leaving, changed = () => {}) {
+  const cards = entries.map((job) => card(job, changed));
+  watch(cards, leaving);
+  return h(
+    "ol",
+    { class: "cards" },
+    cards.map(({ element }) => element),
+  );
+}
+
+function welcome() {
+  const step = (title, ...text) => h("li", {}, h("h2", {}, title), h("p", {}, text));
+  return h(
+    "div",
+    { class: "welcome" },
+    h(
+      "p",
+      { class: "lead" },
+      "Ballast tells an investor how much to hold in a risky asset when nobody knows the law of its returns. Nothing has been trained here yet.",
+    ),
+    h(
+      "ol",
+      { class: "steps" },
+      step(
+        "Train a policy",
+        "Give it the returns seen so far. It prepares for the worst law those returns cannot rule out, in seconds to minutes.",
+      ),
+      step("Open a session", "A session is one investor: his wealth, and the returns he has lived through."),
+      step(
+        "Observe and act",
+        "Report each period\u2019s return as it comes. The advice for the next one follows from all of them.",
+      ),
+    ),
+    h("p", {}, h("a", { class: "button", href: "#/train" }, "Train the first policy")),
+  );
+}
+
+/** A job on the page, and how to bring it up to date. */
+function card(job, changed) {
+  const element = h("li", { class: "card job" });
+  const card = { element, job };
+  card.update = (now) => {
+    const ended = isOver(now) && !isOver(card.job);
+    const moved = now.state === card.job.state && now.cancel_requested === card.job.cancel_requested;
+    card.job = now;
+    // Progress comes many times a second: a button replaced between press and release would not be clicked.
+    if (moved && element.firstChild) advanced(element, now);
+    else {
+      const kept = element.contains(document.activeElement);
+      element.replaceChildren(...contents(card));
+      if (kept) element.querySelector("a, button")?.focus();
+    }
+    changed(now);
+    if (ended) announce(`${named(now.kind)} ${short(now.job)} ${now.state}.`);
+  };
+  card.update(job);
+  return card;
+}
+
+/** Brings the moving parts of a running job up to date. */
+function advanced(element, job) {
+  element.querySelector(".summary").textContent = summary(job);
+  const progress = element.querySelector("progress");
+  if (!progress) return;
+  progress.value = done(job.progress);
+  progress.nextSibling.textContent = stepsDone(job.progress);
+}
+
+function contents(card) {
+  const { job } = card;
+  const title = h("h2", {}, named(job.kind), " ", h("code", {}, short(job.job)));
+  const state = h(
+    "span",
+    { class: `state ${job.state}` },
+    job.cancel_requested && !isOver(job) ? "stopping" : job.state,
+  );
+  return [
+    h("div", { class: "row" }, title, state),
+    h("p", { class: "summary" }, summary(job)),
+    bar(job),
+    h("div", { class: "row" }, times(job), links(card)),
+  ].filter(Boolean);
+}
+
+function summary({ state, progress, error, kind }) {
+  if (state === "failed") return error ?? "No reason was recorded.";
+  if (state === "queued") return "Waits for the jobs before it.";
+  if (state === "cancelled") return `Stopped after ${progress.steps_done} of ${progress.steps_total} steps.`;
+  if (state === "succeeded")
+    return kind === "train"
+      ? `${progress.steps_total} steps solved, last to first.`
+      : `${progress.steps_total} steps done.`;
+  const at =
+    progress.step === null || progress.phase === null ? "Starting" : `Step ${progress.step}, ${progress.phase}`;
+  const points = progress.points_total
+    ? `: ${count(progress.points_done)} of ${count(progress.points_total)} points`
+    : "";
+  const left = progress.seconds_left === null ? "" : `, ${duration(progress.seconds_left)} left`;
+  return `${at}${points}${left}`;
+}
+
+function bar({ job, state, progress }) {
+  if (state !== "running") return null;
+  return h(
+    "div",
+    { class: "progress" },
+    h("progress", { max: progress.steps_total, value: done(progress), "aria-label": `Progress of ${short(job)}` }),
+    h("span", {}, stepsDone(progress)),
+  );
+}
+
+const stepsDone = ({ steps_done, steps_total }) => `${steps_done} of ${steps_total} steps`;
+
+/** Steps done, and nine tenths of the one being solved by its points: the rest is fitting. */
+function done({ steps_done, steps_total, points_done, points_total, phase }) {
+  const share = phase === "fitting" ? 1 : points_total ? points_done / points_total : 0;
+  return Math.min(steps_total, steps_done + 0.9 * share);
+}
+
+function times({ created_ms, started_ms, finished_ms }) {
+  const ran = started_ms !== null && finished_ms !== null ? `, ran ${duration((finished_ms - started_ms) / 1000)}` : "";
+  return h("p", { class: "note" }, `Submitted ${moment(created_ms)}${ran}`);
+}
+
+function links(card) {
+  const { job } = card;
+  if (job.policy) return h("a", { class: "button quiet", href: `#/policies/${job.policy}` }, "See the policy");
+  if (job.state === "succeeded")
+    return h("a", { class: "button quiet", href: `#/evaluations/${job.job}` }, "See the report");
+  if (isOver(job)) return null;
+  const stop = h(
+    "button",
+    { class: "quiet", disabled: job.cancel_requested, "aria-label": `Cancel ${short(job.job)}` },
+    "Cancel",
+  );
+  stop.addEventListener("click", async () => {
+    stop.disabled = true;
+    announce("Asked it to stop.");
+    const answer = await remove(`/jobs/${job.job}`).catch((error) => error);
+    if (answer instanceof Problem) announce(answer.message);
+    else card.update(await answer.json());
+  });
+  return stop;
+}
+
+/** Follows the first running jobs and asks for the others now and then. */
+function watch(cards, leaving) {
+  const followed = new Set();
+  const turn = async () => {
+    const pending = cards.filter(({ job }) => !isOver(job));
+    for (const card of pending.filter(({ job }) => job.state === "running")) {
+      const live = [...followed].filter((one) => !isOver(one.job)).length;
+      if (live >= FOLLOWED || followed.has(card)) continue;
+      followed.add(card);
+      follow(card.job.job, card.update, leaving);
+    }
+    const others = pending.filter((card) => !followed.has(card));
+    await Promise.all(others.map((card) => get(`/jobs/${card.job.job}`, leaving).then(card.update, () => {})));
+    if (pending.length > 0 && !leaving.aborted) setTimeout(turn, POLL);
+  };
+  turn();
+}

@@ -1,0 +1,88 @@
+// The frame: which view stands at which address, and what happens on the way from one to the next.
+
+import { offers, Problem } from "./api.js";
+import { announce, h } from "./dom.js";
+import * as evaluation from "./evaluation.js";
+import * as evaluations from "./evaluations.js";
+import * as jobs from "./jobs.js";
+import * as policies from "./policies.js";
+import * as policy from "./policy.js";
+import * as session from "./session.js";
+import * as sessions from "./sessions.js";
+import * as train from "./train.js";
+
+/** Address, view, and the entry of the navigation it belongs to. A view is `async (id, leaving) => {title, body}`. */
+const ROUTES = [
+  [/^#\/jobs$/, jobs.view, "jobs"],
+  [/^#\/train$/, train.view, "jobs"],
+  [/^#\/policies$/, policies.view, "policies"],
+  [/^#\/policies\/([^/]+)$/, policy.view, "policies"],
+  [/^#\/sessions(?:\?(.*))?$/, sessions.view, "sessions"],
+  [/^#\/sessions\/([^/]+)$/, session.view, "sessions"],
+  [/^#\/evaluations(?:\?(.*))?$/, evaluations.view, "evaluations"],
+  [/^#\/evaluations\/([^/]+)$/, evaluation.view, "evaluations"],
+];
+
+const main = document.querySelector("main");
+let leaving = new AbortController();
+let first = true;
+
+/** Shows the view of the address. Focus goes to its heading, as it would on a new page. */
+async function show() {
+  leaving.abort();
+  leaving = new AbortController();
+  const { signal } = leaving;
+  const hash = location.hash || "#/jobs";
+  const [route, match] = ROUTES.map((route) => [route, route[0].exec(hash)]).find(([, match]) => match) ?? [];
+  main.setAttribute("aria-busy", "true");
+  let page;
+  try {
+    page = route ? await route[1](match[1] && decodeURIComponent(match[1]), signal) : missing(hash);
+  } catch (error) {
+    if (signal.aborted) return;
+    page = failed(error);
+  }
+  if (signal.aborted) return;
+  for (const link of document.querySelectorAll("nav a")) {
+    if (link.dataset.view === route?.[2]) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+  const heading = h("h1", { tabindex: -1 }, page.title);
+  main.replaceChildren(
+    h("header", { class: "page" }, h("div", {}, page.trail ?? null, heading), page.actions ?? null),
+    ...[page.body].flat(),
+  );
+  main.removeAttribute("aria-busy");
+  document.title = `${page.title} \u00b7 Ballast`;
+  if (!first) {
+    heading.focus({ preventScroll: true });
+    scrollTo(0, 0);
+  }
+  first = false;
+}
+
+function missing(hash) {
+  return {
+    title: "There is nothing here",
+    body: h("p", {}, `No view stands at ${hash}. `, h("a", { href: "#/jobs" }, "See the jobs"), "."),
+  };
+}
+
+function failed(error) {
+  if (!(error instanceof Problem)) console.error(error);
+  const again = h("button", { onclick: show }, "Try again");
+  return { title: error.title ?? "This view failed", body: [h("p", { role: "alert" }, error.message), again] };
+}
+
+document.querySelector(".skip").addEventListener("click", (event) => {
+  event.preventDefault();
+  main.focus();
+});
+addEventListener("hashchange", () => {
+  announce("");
+  show();
+});
+offers("/evaluate").then((offered) => {
+  document.querySelector("nav [data-view=evaluations]").parentElement.hidden = !offered;
+});
+show();

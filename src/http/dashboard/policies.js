@@ -1,0 +1,81 @@
+// Policies: what trainings gave, and what came in from elsewhere.
+
+import { get, list, post } from "./api.js";
+import { announce, h, table } from "./dom.js";
+import { count, moment, percent, short, significant } from "./format.js";
+import { FRAMEWORKS, radiusRule, utility } from "./specification.js";
+
+export async function view(_, leaving) {
+  const { entries, more } = await list("/policies", "policies", leaving, 50);
+  const details = await Promise.all(
+    entries.map((entry) => get(`/policies/${entry.policy}`, leaving).catch(() => null)),
+  );
+  const rows = entries.map((entry, index) => ({ ...entry, detail: details[index] }));
+  return {
+    title: "Policies",
+    actions: [importer(), h("a", { class: "button", href: "#/train" }, "Train a policy")],
+    body:
+      rows.length === 0
+        ? empty()
+        : [listed(rows), more ? h("p", { class: "note" }, `The newest ${count(rows.length)}.`) : ""],
+  };
+}
+
+function empty() {
+  return h(
+    "div",
+    { class: "empty" },
+    h(
+      "p",
+      { class: "lead" },
+      "No policy yet. A policy says how much to hold at every wealth and after every history; training gives one.",
+    ),
+    h("p", {}, h("a", { href: "#/train" }, "Train one"), ", or import the document another Ballast exported."),
+  );
+}
+
+function listed(rows) {
+  const of =
+    (read) =>
+    ({ detail }) =>
+      detail ? read(detail.specification.problem, detail) : "\u2013";
+  return table(
+    "Policies, newest first",
+    [
+      { name: "Policy", cell: ({ policy }) => h("a", { href: `#/policies/${policy}` }, h("code", {}, short(policy))) },
+      { name: "Framework", cell: of(({ framework }) => FRAMEWORKS[framework]) },
+      { name: "Utility", cell: of((problem) => utility(problem.utility)) },
+      {
+        name: "Radius",
+        cell: of((problem) => (["adaptive", "static"].includes(problem.framework) ? radiusRule(problem.radius) : "0")),
+      },
+      { name: "Decisions", numeric: true, cell: of(({ horizon }) => count(horizon)) },
+      { name: "Bank rate", numeric: true, cell: of(({ rate_per_step }) => percent(rate_per_step, 2)) },
+      { name: "Returns", numeric: true, cell: of(({ history }) => count(history.length)) },
+      { name: "Size", numeric: true, cell: ({ bytes }) => `${significant(bytes / 1e6, 2)} MB` },
+      { name: "Stored", cell: ({ created_ms }) => moment(created_ms) },
+    ],
+    rows,
+  );
+}
+
+function importer() {
+  const file = h("input", {
+    type: "file",
+    accept: "application/json,.json",
+    class: "unseen",
+    id: "import",
+    "aria-label": "Policy document to import",
+  });
+  const label = h("label", { class: "button quiet", for: "import" }, "Import");
+  file.addEventListener("change", async () => {
+    try {
+      const { policy } = await post("/policies/import", await file.files[0].text());
+      location.hash = `#/policies/${policy}`;
+    } catch (error) {
+      announce(error.message);
+      label.after(h("p", { class: "error" }, error.message));
+    }
+  });
+  return h("span", {}, file, label);
+}

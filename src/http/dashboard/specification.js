@@ -1,0 +1,78 @@
+// A training request in words.
+
+import { count, counted, percent, significant, wealth } from "./format.js";
+
+export const FRAMEWORKS = {
+  adaptive: "Adaptive robust",
+  static: "Static robust",
+  known_law: "Known law",
+  plug_in: "Plug-in",
+};
+
+const MEANINGS = {
+  adaptive: "It guards against the worst law near the returns seen, and learns from every new one.",
+  static: "It guards against the worst law near the history, and does not learn.",
+  known_law: "It takes the law as known and guards against nothing.",
+  plug_in: "It takes the returns seen for the whole truth, and learns.",
+};
+
+/** Utility in a few words. */
+export function utility({ kind, risk_aversion }) {
+  if (kind === "log") return "log utility";
+  return `${kind} utility, risk aversion ${significant(risk_aversion)}${kind === "exponential" ? " per unit of wealth" : ""}`;
+}
+
+/** The wealth whose utility is `value`. */
+export function worth({ kind, risk_aversion: aversion }, value) {
+  if (kind === "log") return Math.exp(value);
+  if (kind === "power") return (1 + (1 - aversion) * value) ** (1 / (1 - aversion));
+  return -Math.log1p(-aversion * value) / aversion;
+}
+
+/** The rule of the radius in a few words. */
+export function radiusRule(radius) {
+  switch (radius.rule) {
+    case "bridge": {
+      const times = radius.scale === 1 ? "" : `${significant(radius.scale)} times `;
+      return `${times}the ${percent(1 - radius.alpha, 0)} quantile of the bridge statistic over \u221an`;
+    }
+    case "concentration":
+      return `the concentration bound at ${percent(1 - radius.alpha, 0)} (C ${significant(radius.C)}, c ${significant(radius.c)})`;
+    case "root_n":
+      return `${significant(radius.kappa)} / \u221an`;
+    case "fixed":
+      return `${significant(radius.radius)} at every sample size`;
+    default:
+      return radius.rule;
+  }
+}
+
+/** Mean and standard deviation of log-returns. */
+export function moments(values) {
+  const mean = values.reduce((sum, value) => sum + value, 0) / values.length;
+  const variance = values.reduce((sum, value) => sum + (value - mean) ** 2, 0) / values.length;
+  return { mean, deviation: Math.sqrt(variance) };
+}
+
+/** The whole specification, a sentence a choice. */
+export function inWords({ problem, design, surrogate, seed }) {
+  const { mean, deviation } = moments(problem.history);
+  const limit = problem.action_interval[1];
+  const ball = ["adaptive", "static"].includes(problem.framework)
+    ? ` The radius of the ball is ${radiusRule(problem.radius)}.`
+    : "";
+  const laws = design.initial_laws === "resampled" ? "starting from resampled histories" : "starting from this history";
+  return [
+    `${MEANINGS[problem.framework]}${ball}`,
+    `${counted(problem.horizon, "decision")} with ${utility(problem.utility)}; the bank pays ${percent(problem.rate_per_step, 2)} a period, and up to ${percent(limit, 0)} of wealth may be at risk. It starts with ${wealth(problem.initial_wealth)}.`,
+    `The history holds ${counted(problem.history.length, "log-return")}: mean ${percent(mean, 2)}, standard deviation ${percent(deviation, 2)} a period.`,
+    `Each step was solved at ${counted(design.count, "state")} simulated under ${law(design.sampling_law)}, ${laws}; surrogates of the ${surrogate.target === "value" ? "value" : "gain over the floor"} on ${surrogate.features === "raw_moments" ? "raw" : "standardised"} features. Seed ${count(seed)}.`,
+  ];
+}
+
+function law(sampling) {
+  if (sampling.kind === "gaussian_mixture") return `a mixture of ${counted(sampling.components.length, "normal law")}`;
+  if (sampling.kind === "student_t")
+    return `a Student law with ${significant(sampling.degrees_of_freedom)} degrees of freedom`;
+  return "a smoothed bootstrap of the history";
+}

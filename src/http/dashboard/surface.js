@@ -1,0 +1,172 @@
+// A policy evaluated from its exported document, as docs/policy-format.md says.
+//
+// A point of the surface is a real law, not a free choice of features: the policy's own history, moved to another mean
+// and stretched to another standard deviation. All features of it follow, the robust excess return among them; what the
+// history's shape does not settle (skewness, kurtosis, the level of the rest) stays at the centre of the step's design.
+
+/** `min E[e^Z] / (1 + r) - 1` over the ball: the c of the document by filling from the top. */
+export function robustExcess(atoms, radius, rate) {
+  const sorted = [...atoms].sort((a, b) => b - a);
+  const n = sorted.length;
+  let [above, cut, used] = [0, sorted[0], 0];
+  for (; used < n; used++) {
+    above += sorted[used];
+    cut = (above - n * radius) / (used + 1);
+    if (used + 1 === n || cut >= sorted[used + 1]) break;
+  }
+  const mean = sorted.reduce((sum, atom) => sum + Math.exp(Math.min(atom, cut)), 0) / n;
+  return mean / (1 + rate) - 1;
+}
+
+function central(atoms, order) {
+  const mean = raw(atoms, 1);
+  return atoms.reduce((sum, atom) => sum + (atom - mean) ** order, 0) / atoms.length;
+}
+
+function raw(atoms, order) {
+  return atoms.reduce((sum, atom) => sum + atom ** order, 0) / atoms.length;
+}
+
+/** One named feature of a state `{wealth, atoms, radius, rate}`. */
+export function feature(name, { wealth, atoms, radius, rate }) {
+  const standardised = (order) => central(atoms, order) / central(atoms, 2) ** (order / 2);
+  switch (name) {
+    case "wealth":
+      return wealth;
+    case "log_wealth":
+      return Math.log(wealth);
+    case "mean":
+      return raw(atoms, 1);
+    case "log_standard_deviation":
+      return Math.log(central(atoms, 2)) / 2;
+    case "skewness":
+      return standardised(3);
+    case "log_kurtosis":
+      return Math.log(standardised(4));
+    case "log_radius":
+      return Math.log(Math.max(radius, 1e-12));
+    case "robust_excess":
+      return robustExcess(atoms, radius, rate);
+  }
+  const order = Number(name.split("_")[1]);
+  if (name.startsWith("moment_")) return raw(atoms, order);
+  return order % 2 === 0 ? Math.log(standardised(order)) : standardised(order);
+}
+
+/** The mean of a stored process at scaled inputs. */
+export function predicted({ hyperparameters, weights, offset, scale }, inputs, x) {
+  const lengths = hyperparameters.lengthscales;
+  let sum = 0;
+  for (let j = 0; j < weights.length; j++) {
+    let square = 0;
+    for (let i = 0; i < lengths.length; i++) square += ((x[i] - inputs[i][j]) / lengths[i]) ** 2;
+    const r = Math.sqrt(5 * square);
+    sum += weights[j] * (1 + r + (r * r) / 3) * Math.exp(-r);
+  }
+  return offset + scale * hyperparameters.signal_variance * sum;
+}
+
+/** Allocation at unscaled features, in the order of `names`. */
+export function allocation(solution, features, highest) {
+  const { centre, spread } = solution.scaling;
+  const x = features.map((value, index) => (value - centre[index]) / spread[index]);
+  return Math.max(0, Math.min(highest, predicted(solution.policy, solution.inputs, x)));
+}
+
+/** One step of an exported policy over laws of the history's shape; null where the step holds a single state. */
+export function stepSurface(policy, step) {
+  const { solution, diagnostics } = policy.steps[step];
+  if (solution.kind === "single") return null;
+  const { problem } = policy.specification;
+  const names = diagnostics.policy.features;
+  const { centre, spread } = solution.scaling;
+  const level = Object.fromEntries(
+    names.map((name, index) => [name, { centre: centre[index], spread: spread[index] }]),
+  );
+  const own = { mean: raw(problem.history, 1), deviation: Math.sqrt(central(problem.history, 2)) };
+  const middle = centres(level, problem, step, own);
+  const shape = problem.history.map((atom) => (atom - own.mean) / own.deviation);
+  const state = ({ wealth, mean, deviation, radius }) => ({
+    wealth,
+    radius,
+    rate: problem.rate_per_step,
+    atoms: shape.map((z) => mean + deviation * z),
+  });
+  const base = features(names, state(middle));
+  const at = (place) => {
+    const moved = features(names, state({ ...middle, ...place }));
+    return allocation(
+      solution,
+      moved.map((value, index) => centre[index] + value - base[index]),
+      problem.action_interval[1],
+    );
+  };
+  return { at, middle, ranges: ranges(level, middle), dots: (axis) => designValues(axis, solution, names) };
+}
+
+const features = (names, state) => names.map((name) => feature(name, state));
+
+/** The design's centre, as wealth, mean, standard deviation and radius. */
+function centres(level, problem, step, own) {
+  const of = (name) => level[name]?.centre;
+  const mean = of("mean") ?? of("moment_1") ?? own.mean;
+  const logDeviation = of("log_standard_deviation");
+  const variance = of("moment_2") === undefined ? undefined : of("moment_2") - mean ** 2;
+  const deviation =
+    logDeviation !== undefined ? Math.exp(logDeviation) : variance > 0 ? Math.sqrt(variance) : own.deviation;
+  const wealth = of("log_wealth") !== undefined ? Math.exp(of("log_wealth")) : (of("wealth") ?? problem.initial_wealth);
+  return {
+    wealth,
+    mean,
+    deviation,
+    radius: of("log_radius") !== undefined ? Math.exp(of("log_radius")) : ruledRadius(problem, step),
+  };
+}
+
+/** Radius where it follows from the sample size alone. */
+function ruledRadius({ framework, radius, history }, step) {
+  const n = history.length + step;
+  if (framework === "plug_in" || framework === "known_law") return 0;
+  switch (radius.rule) {
+    case "fixed":
+      return radius.radius;
+    case "root_n":
+      return radius.kappa / Math.sqrt(n);
+    case "concentration":
+      return Math.sqrt(Math.log(radius.C / radius.alpha) / (radius.c * n));
+    default:
+      return 0;
+  }
+}
+
+/** Two and a half standard deviations of the design around its centre, for each axis the step depends on. */
+function ranges(level, middle) {
+  const WIDE = 2.5;
+  const plain = (name, lowest = -Infinity) =>
+    level[name] && [
+      Math.max(lowest, level[name].centre - WIDE * level[name].spread),
+      level[name].centre + WIDE * level[name].spread,
+    ];
+  const logarithmic = (name) => plain(name)?.map(Math.exp);
+  const wealth = logarithmic("log_wealth") ?? plain("wealth", 0.01 * middle.wealth);
+  const found = {
+    wealth,
+    mean: plain("mean") ?? plain("moment_1"),
+    radius: logarithmic("log_radius"),
+    deviation: logarithmic("log_standard_deviation"),
+  };
+  return Object.fromEntries(Object.entries(found).filter(([, range]) => range));
+}
+
+/** Values of one axis over the design points. */
+function designValues(axis, { scaling, inputs }, names) {
+  const choices = {
+    wealth: ["log_wealth", "wealth"],
+    mean: ["mean", "moment_1"],
+    radius: ["log_radius"],
+    deviation: ["log_standard_deviation"],
+  }[axis];
+  const index = names.findIndex((name) => choices.includes(name));
+  const straight = (value) => (names[index].startsWith("log_") ? Math.exp(value) : value);
+  return inputs[index].map((value) => straight(scaling.centre[index] + scaling.spread[index] * value));
+}

@@ -1,0 +1,178 @@
+// A training request, from a form, a file of returns or JSON; the three show the same request.
+
+import { post } from "./api.js";
+import { announce, h } from "./dom.js";
+import { fieldset, input, select, showProblem } from "./form.js";
+import { historySource } from "./history_source.js";
+
+const UTILITIES = { exponential: "Exponential", power: "Power", log: "Log" };
+/** Risk aversions to start from: the paper's, and a usual one. */
+const AVERSION = { exponential: 0.01, power: 3 };
+const FRAMEWORKS = {
+  adaptive: "Adaptive robust",
+  static: "Static robust",
+  plug_in: "Plug-in",
+};
+
+/** What the form starts from. */
+const initial = () => ({
+  problem: {
+    framework: "adaptive",
+    horizon: 12,
+    rate_per_step: 0.002,
+    initial_wealth: 100,
+    utility: { kind: "exponential", risk_aversion: AVERSION.exponential },
+    radius: { rule: "bridge", alpha: 0.1, scale: 1 },
+    history: [],
+  },
+  design: { count: 500 },
+  seed: 1,
+});
+
+const at = (object, path) => path.split(".").reduce((value, key) => value?.[key], object);
+
+function put(object, path, value) {
+  const keys = path.split(".");
+  const last = keys.pop();
+  const parent = keys.reduce((value, key) => (value[key] ??= {}), object);
+  parent[last] = value;
+}
+
+export async function view(_, leaving) {
+  let request = initial();
+  const message = h("p", { class: "error", role: "alert", hidden: true });
+  const json = h("textarea", { id: "json", rows: 18, spellcheck: "false", "aria-describedby": "json-note json-error" });
+  const jsonError = h("p", { id: "json-error", class: "error", hidden: true });
+  const source = historySource((returns) => {
+    put(request, "problem.history", returns);
+    written();
+  });
+  const fields = mainFields((path, value) => {
+    if (path === "problem.utility.kind")
+      put(
+        request,
+        "problem.utility",
+        value === "log" ? { kind: value } : { kind: value, risk_aversion: AVERSION[value] },
+      );
+    else put(request, path, value);
+    if (path === "problem.utility.kind") fields.show(request);
+    written();
+  });
+  const written = () => {
+    json.value = compact(request);
+    jsonError.hidden = true;
+  };
+  json.addEventListener("input", () => {
+    try {
+      request = JSON.parse(json.value);
+      jsonError.hidden = true;
+      fields.show(request);
+      source.show(request.problem?.history ?? []);
+    } catch (error) {
+      jsonError.textContent = error.message;
+      jsonError.hidden = false;
+    }
+  });
+  const advanced = h(
+    "details",
+    { class: "advanced" },
+    h("summary", {}, "Every field, as JSON"),
+    h(
+      "p",
+      { class: "note", id: "json-note" },
+      "The request as it will be sent. What is edited here changes the form and the other way round; ",
+      h("a", { href: "/docs" }, "the interface"),
+      " names every field.",
+    ),
+    h("label", { for: "json", class: "unseen" }, "Training request as JSON"),
+    json,
+    jsonError,
+  );
+  const send = h("button", { type: "submit" }, "Train");
+  const form = h(
+    "form",
+    { novalidate: true },
+    source.element,
+    fields.elements,
+    advanced,
+    message,
+    h(
+      "p",
+      { class: "send" },
+      send,
+      h("span", { class: "note" }, "Trains in the background; the job list shows how far it is."),
+    ),
+  );
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    send.disabled = true;
+    try {
+      const job = await post("/train", json.value);
+      announce(`Training ${job.job} is queued.`);
+      location.hash = "#/jobs";
+    } catch (error) {
+      if (error.field === "body") advanced.open = true;
+      showProblem(form, message, error, json);
+    }
+    send.disabled = false;
+  });
+  fields.show(request);
+  written();
+  const trail = h("p", { class: "trail" }, h("a", { href: "#/jobs" }, "Jobs"));
+  return { title: "Train a policy", trail, body: form };
+}
+
+/** JSON with a line a field, numbers of the history side by side. */
+function compact(request) {
+  return JSON.stringify(request, null, 2).replace(
+    /\[\s*([-\d.e+,\s]*?)\s*\]/g,
+    (_, inside) => `[${inside.replace(/\s+/g, " ")}]`,
+  );
+}
+
+function mainFields(changed) {
+  const number = (path, label, note, options = {}) =>
+    input({
+      name: path,
+      label,
+      note,
+      changed: (text) => changed(path, text.trim() === "" ? null : Number.isNaN(Number(text)) ? text : Number(text)),
+      ...options,
+    });
+  const parts = [
+    select({
+      name: "problem.framework",
+      label: "Framework",
+      note: "Adaptive guards and learns, static only guards, plug-in only learns.",
+      choices: FRAMEWORKS,
+      changed: (value) => changed("problem.framework", value),
+    }),
+    number("problem.horizon", "Decisions", "Periods to live through, 1 to 520."),
+    number("problem.rate_per_step", "Bank return per period", "As a fraction: 0.002 is 0.2 % a period."),
+    number("problem.initial_wealth", "Initial wealth", "In any unit."),
+    select({
+      name: "problem.utility.kind",
+      label: "Utility",
+      choices: UTILITIES,
+      changed: (value) => changed("problem.utility.kind", value),
+    }),
+    number("problem.utility.risk_aversion", "Risk aversion", "Exponential: per unit of wealth. Power: above 1."),
+    number("problem.radius.alpha", "Miscoverage alpha", "Smaller guards against more: 0.1 takes the 90 % quantile."),
+    number("problem.radius.scale", "Radius scale", "Multiplies the radius; 0 trusts the returns seen."),
+    number("design.count", "Design points", "States solved per step: more is finer and slower, 10 to 10,000."),
+    number("seed", "Seed", "The same request and seed give the same policy."),
+  ];
+  const show = (request) => {
+    for (const part of parts) {
+      const value = at(request, part.name);
+      if (part.control !== document.activeElement) part.control.value = value ?? "";
+      part.element.hidden = value === undefined;
+    }
+  };
+  const elements = [
+    fieldset("The investor", parts.slice(1, 6)),
+    fieldset("What he guards against", [parts[0], parts[6], parts[7]]),
+    fieldset("Precision", parts.slice(8)),
+  ];
+  return { elements, show };
+}

@@ -1,0 +1,56 @@
+// The real binary on a free port with a data folder of its own, and the real Chromium.
+
+import { spawn } from "node:child_process";
+import { mkdtemp, rm } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { createInterface } from "node:readline";
+import { fileURLToPath } from "node:url";
+import { chromium } from "playwright-core";
+
+const BINARY = process.env.BALLAST_BINARY ?? fileURLToPath(new URL("../../target/release/ballast", import.meta.url));
+const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
+
+/** Starts the service; `url` is where it listens, `stop()` ends it and takes its data away. */
+export async function service() {
+  const folder = await mkdtemp(join(tmpdir(), "ballast-browser-"));
+  const process_ = spawn(BINARY, ["serve", "--listen", "127.0.0.1:0", "--data", folder], {
+    stdio: ["ignore", "pipe", "ignore"],
+  });
+  const ended = new Promise((resolve) => process_.once("exit", resolve));
+  const failed = new Promise((_, reject) => process_.once("error", reject));
+  const listening = (async () => {
+    for await (const line of createInterface(process_.stdout)) {
+      const address = /listening on (http:\S+)/.exec(line);
+      if (address) return address[1];
+    }
+    throw new Error(`${BINARY} ended before it listened`);
+  })();
+  const url = await Promise.race([listening, failed]);
+  const stop = async () => {
+    process_.kill("SIGTERM");
+    await ended;
+    await rm(folder, { recursive: true });
+  };
+  return { url, stop };
+}
+
+export function browser() {
+  return chromium.launch({
+    executablePath: CHROMIUM,
+    args: ["--no-sandbox", "--disable-gpu", "--disable-background-networking"],
+  });
+}
+
+/** The service's answer to a request with a JSON body. */
+export async function call(url, path, body) {
+  const request = body && {
+    method: "POST",
+    headers: { "content-type": "application/json" },
+    body: JSON.stringify(body),
+  };
+  const response = await fetch(url + path, request);
+  const answer = await response.json();
+  if (!response.ok) throw new Error(`${path}: ${answer.detail}`);
+  return answer;
+}

@@ -1,0 +1,98 @@
+//! The dashboard's files: all of them are served, as what they are, and can do no more than they must.
+
+mod support;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use reqwest::StatusCode;
+use reqwest::header::{ACCEPT, ETAG, IF_NONE_MATCH};
+use support::App;
+
+fn files() -> BTreeMap<String, Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/http/dashboard");
+    let read = |entry: std::fs::DirEntry| {
+        (entry.file_name().into_string().expect("UTF-8"), std::fs::read(entry.path()).expect("a file"))
+    };
+    std::fs::read_dir(folder).expect("the folder").map(|entry| read(entry.expect("an entry"))).collect()
+}
+
+fn media(name: &str) -> &'static str {
+    match name.rsplit('.').next().expect("an extension") {
+        "html" => "text/html; charset=utf-8",
+        "css" => "text/css; charset=utf-8",
+        "js" => "text/javascript; charset=utf-8",
+        "svg" => "image/svg+xml",
+        "woff2" => "font/woff2",
+        "txt" => "text/plain; charset=utf-8",
+        other => panic!("a file of the dashboard ends in {other}"),
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_file_is_served_as_what_it_is_under_a_strict_policy() {
+    let app = App::start().await;
+    let files = files();
+    assert!(files.contains_key("index.html") && files.contains_key("main.js"), "{:?}", files.keys());
+    for (name, bytes) in &files {
+        let address = format!("{}/dashboard/{name}", app.url);
+        let answer = app.client.get(&address).send().await.expect("an answer");
+        assert_eq!(answer.status(), StatusCode::OK, "{name} is not in the table of assets");
+        let headers = answer.headers().clone();
+        assert_eq!(headers["content-type"], media(name), "{name}");
+        assert_eq!(headers["x-content-type-options"], "nosniff", "{name}");
+        assert_eq!(headers["cache-control"], "no-cache", "{name}");
+        let policy = headers["content-security-policy"].to_str().expect("text");
+        assert!(policy.starts_with("default-src 'none'; script-src 'self'; style-src 'self';"), "{policy}");
+        assert!(!policy.contains("unsafe"), "{policy}");
+        assert_eq!(answer.bytes().await.expect("bytes"), bytes.as_slice(), "{name}");
+        let again = app.client.get(&address).header(IF_NONE_MATCH, &headers[ETAG]).send().await.expect("an answer");
+        assert_eq!(again.status(), StatusCode::NOT_MODIFIED, "{name}");
+        assert_eq!(again.headers()[ETAG], headers[ETAG], "{name}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn people_get_the_dashboard_and_programs_the_description() {
+    let app = App::start().await;
+    let page = app.client.get(&app.url).header(ACCEPT, "text/html,*/*;q=0.8").send().await.expect("an answer");
+    assert!(page.headers()["link"].to_str().expect("text").contains("</openapi.json>; rel=\"service-desc\""));
+    assert_eq!(page.bytes().await.expect("bytes"), files()["index.html"].as_slice());
+    let described = app.client.get(&app.url).header(ACCEPT, "application/json").send().await.expect("an answer");
+    assert_eq!(described.headers()["content-type"], "application/json");
+    assert_eq!(described.text().await.expect("text"), ballast::http::description_json());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_file_that_is_not_there_is_a_problem_that_names_it() {
+    let app = App::start().await;
+    let (status, problem) = app.get("/dashboard/..%2Fmod.rs").await;
+    assert_eq!((status.as_u16(), &problem["value"]), (404, &"../mod.rs".into()), "{problem}");
+    let (status, example) = app.get("/dashboard/us_market_monthly.csv").await;
+    assert_eq!(status, 200);
+    assert!(example.as_str().is_some_and(|text| text.starts_with("month,market_return,risk_free_return\n")));
+}
+
+/// Works offline and under the policy: nothing inline, nothing from elsewhere, no markup made from text.
+#[test]
+fn no_file_reaches_beyond_the_service() {
+    const NAMESPACE: &str = "http://www.w3.org/2000/svg";
+    for (name, bytes) in files() {
+        let Ok(text) = String::from_utf8(bytes) else { continue };
+        if name == "inter-LICENSE.txt" {
+            continue;
+        }
+        let text = text.replace(NAMESPACE, "");
+        for forbidden in
+            ["http://", "https://", "innerHTML", "insertAdjacentHTML", "eval(", " style=\"", "<style", "onclick=\""]
+        {
+            assert!(!text.contains(forbidden), "{name} holds {forbidden}");
+        }
+        assert!(text.lines().count() <= 350, "{name} has more than 350 lines");
+        assert_eq!(
+            text.matches("<script").count(),
+            text.matches("<script type=\"module\" src=\"/dashboard/").count(),
+            "{name}"
+        );
+    }
+}
