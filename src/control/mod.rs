@@ -17,4 +17,5 @@ pub mod state;
 pub mod surrogate;
 pub mod uncertainty;
 pub mod utility;
+pub mod what_if;
 pub mod worst_case;
