@@ -5,14 +5,24 @@ use ballast::control::advisor::AdviceSource;
 use super::Backtest;
 use super::analysis::{Estimate, Figures, main_line};
 
+/// Below it a resample of years says nothing about the next one.
+const FEWEST_YEARS: usize = 10;
+
 /// One statement each, the most important first.
 pub fn sentences(backtest: &Backtest) -> Vec<String> {
     let figures = &backtest.analysis.figures;
     let main = main_line(&backtest.lines);
     let mut sentences = vec![ranking(figures, main)];
     let others = figures.iter().enumerate().filter(|(index, _)| *index != main).map(|(_, other)| other);
-    sentences.push(against(others));
-    sentences.extend(timing(figures, main));
+    let years = backtest.analysis.years;
+    if years < FEWEST_YEARS {
+        sentences.push(format!(
+            "The whole years are {years}, fewer than {FEWEST_YEARS}: they do not tell the strategies apart, and the intervals mean nothing."
+        ));
+    } else {
+        sentences.push(against(others));
+        sentences.extend(timing(figures, main));
+    }
     sentences.push(holding(backtest, main));
     sentences.extend(drawdown(figures, main));
     sentences.push(guard(backtest, main));
@@ -116,5 +126,53 @@ fn cost(backtest: &Backtest) -> String {
         format!("Trading costs {basis_points} bp of what is traded in every account; no policy knows of it.")
     } else {
         "Trading costs nothing here: strategies that trade much look better than they would be.".into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures(strategy: &str, value: f64, ahead: [f64; 2], hindsight: bool) -> Figures {
+        let at = |value: f64, interval| Estimate { value, interval };
+        let none = at(0.0, [0.0; 2]);
+        Figures {
+            strategy: strategy.into(),
+            hindsight,
+            yearly_certainty_equivalent: at(value, [value - 1.0, value + 1.0]),
+            adaptive_ahead: at(0.5 * (ahead[0] + ahead[1]), ahead),
+            annual_mean: none,
+            annual_volatility: none,
+            sharpe_ratio: none,
+            annual_turnover: none,
+            max_drawdown: 0.2,
+            final_wealth: 120.0,
+            mean_allocation: 0.25,
+            all_bank_share: 0.5,
+        }
+    }
+
+    #[test]
+    fn the_verdict_follows_the_figures_either_way() {
+        let all = [
+            figures("adaptive, alpha 0.1", 103.0, [0.0; 2], false),
+            figures("all-bank", 104.0, [-1.5, -0.5], false),
+            figures("plug-in", 101.0, [1.0, 3.0], false),
+            figures("60/40", 103.5, [-1.5, 0.5], false),
+            figures("constant 25.0 %", 105.0, [-3.0, -1.0], true),
+        ];
+        assert_eq!(
+            ranking(&all, 0),
+            "adaptive, alpha 0.1: a year from 100 counts as 103.00 for certain, place 3 of 4. The first is all-bank with 104.00."
+        );
+        assert_eq!(
+            against(all[1..4].iter()),
+            "By the interval of the difference it is better than: plug-in. Worse than: all-bank. Not to be told apart from: 60/40."
+        );
+        assert!(timing(&all, 0).unwrap().ends_with("-2.00 [-3.00, -1.00]: changing the allocation cost."));
+        for (ahead, verdict) in [([1.0, 2.0], "changing the allocation paid."), ([-1.0, 2.0], "did anything.")] {
+            let hindsight = figures("constant", 100.0, ahead, true);
+            assert!(timing(&[all[0].clone(), hindsight], 0).unwrap().ends_with(verdict));
+        }
     }
 }
