@@ -205,6 +205,45 @@ fn faulty_sessions() -> Vec<(&'static str, &'static str)> {
     ]
 }
 
+/// What a hypothesis can get wrong, and the field it is answered with.
+fn faulty_hypotheses() -> Vec<(&'static str, &'static str)> {
+    vec![
+        (r#""wealth": 0"#, "wealth"),
+        (r#""wealth": 1e16"#, "wealth"),
+        (r#""radius_scale": -0.1"#, "radius_scale"),
+        (r#""radius_scale": 101"#, "radius_scale"),
+        (r#""radius": -0.1"#, "radius"),
+        (r#""radius": 11"#, "radius"),
+        (r#""radius": 0.1, "radius_scale": 1"#, "radius"),
+        (r#""log_return": 5.1"#, "log_return"),
+        (r#""wealth": 1e15, "log_return": 4.9"#, "log_return"),
+        (r#""simple_return": -1"#, "simple_return"),
+        (r#""wealth": 1e15, "simple_return": 99"#, "simple_return"),
+        (r#""log_return": 0.1, "simple_return": 0.1"#, "simple_return"),
+        (r#""explain": "everything""#, "explain"),
+        (r#""colour": 1"#, "colour"),
+        (r#""sweep": {}"#, "sweep"),
+        (r#""sweep": {"colour": 1}"#, "sweep.colour"),
+        (
+            r#""sweep": {"wealth": {"from": 1, "to": 2, "points": 3}, "radius": {"from": 1, "to": 2, "points": 3}}"#,
+            "sweep",
+        ),
+        (r#""wealth": 1, "sweep": {"wealth": {"from": 1, "to": 2, "points": 3}}"#, "wealth"),
+        (r#""radius": 1, "sweep": {"radius_scale": {"from": 1, "to": 2, "points": 3}}"#, "radius"),
+        (r#""sweep": {"wealth": {"from": 0, "to": 2, "points": 3}}"#, "sweep.wealth.from"),
+        (r#""sweep": {"wealth": {"from": 1e15, "to": 1e308, "points": 3}}"#, "sweep.wealth.to"),
+        (r#""sweep": {"radius_scale": {"from": 0, "to": 101, "points": 3}}"#, "sweep.radius_scale.to"),
+        (r#""sweep": {"radius_scale": {"from": 0, "to": 2, "points": 1}}"#, "sweep.radius_scale.points"),
+        (r#""sweep": {"radius_scale": {"from": 0, "to": 2, "points": 102}}"#, "sweep.radius_scale.points"),
+        (r#""sweep": {"radius_scale": {"from": 0, "to": 2, "points": 2, "step": 1}}"#, "sweep.radius_scale.step"),
+        (r#""sweep": {"radius": {"from": -1, "to": 2, "points": 3}}"#, "sweep.radius.from"),
+        (r#""sweep": {"log_return": {"from": -6, "to": 2, "points": 3}}"#, "sweep.log_return.from"),
+        (r#""wealth": 1e15, "sweep": {"log_return": {"from": 0, "to": 4.9, "points": 3}}"#, "sweep.log_return"),
+        (r#""sweep": {"simple_return": {"from": -1, "to": 2, "points": 3}}"#, "sweep.simple_return.from"),
+        (r#""sweep": {"simple_return": {"from": 0, "points": 3}}"#, "sweep.simple_return.to"),
+    ]
+}
+
 /// Names of the properties of a schema of the description.
 fn properties(schema: &str) -> BTreeSet<String> {
     let description: Value = serde_json::from_str(include_str!("../api/openapi.json")).unwrap();
@@ -221,6 +260,12 @@ fn the_walks_cover_every_field() {
         faulty_sessions().iter().map(|(_, field)| field.split('[').next().unwrap().to_owned()).collect();
     walked.insert("policy".into());
     assert!(properties("OpenSession").is_subset(&walked), "{walked:?}");
+    let mut walked: BTreeSet<String> =
+        faulty_hypotheses().iter().flat_map(|(_, field)| field.split('.').map(str::to_owned)).collect();
+    walked.insert("session".into());
+    for schema in ["WhatIf", "Sweep", "SweepRange"] {
+        assert!(properties(schema).is_subset(&walked), "{schema} {walked:?}");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -243,6 +288,12 @@ async fn every_field_of_a_session_and_a_report_is_named() {
         assert_eq!(status, 422, "{session} {problem}");
         assert_named(&problem, field);
     }
+    for (hypothesis, field) in faulty_hypotheses() {
+        let (status, problem) = post("/what-if", format!(r#"{{"session": "{}", {hypothesis}}}"#, app.session)).await;
+        assert_eq!(status, 422, "{hypothesis} {problem}");
+        assert_named(&problem, field);
+    }
+    assert_named(&post("/what-if", r#"{"wealth": 1}"#.into()).await.1, "session");
     assert_named(&post("/sessions", "{}".into()).await.1, "policy");
     assert_named(&post("/sessions", r#"{"policy": 1}"#.into()).await.1, "policy");
     let (_, session) = app.get(&format!("/sessions/{}", app.session)).await;
@@ -278,6 +329,7 @@ async fn unknown_things_are_refused() {
     assert_refused(&app.post("/sessions", &json!({"policy": "42"})).await, 404, "policy", "42");
     let report = json!({"session": "42", "period": 1, "log_return": 0.1});
     assert_refused(&app.post("/observe", &report).await, 404, "session", "42");
+    assert_refused(&app.post("/what-if", &json!({"session": "42"})).await, 404, "session", "42");
     assert_refused(&app.get("/nowhere").await, 404, "path", "/nowhere");
     assert_refused(&app.get("/jobs/%ff").await, 404, "id", "/jobs/%ff");
     assert_refused(&app.send(Method::DELETE, "/train", None).await, 405, "method", "DELETE");

@@ -11,7 +11,7 @@ use thiserror::Error;
 
 use super::api_client::{ApiClient, ApiError};
 use super::host::{Host, HostError};
-use super::us_market::MarketError;
+use super::monthly_returns::ReturnsError;
 
 mod calls;
 mod progress;
@@ -32,7 +32,7 @@ pub enum DemoError {
     #[error(transparent)]
     Host(#[from] HostError),
     #[error("reading the bundled returns")]
-    Market(#[from] MarketError),
+    Market(#[from] ReturnsError),
     #[error("calling the service")]
     Api(#[from] ApiError),
     #[error("{call} answered JSON of another shape")]

@@ -1,12 +1,13 @@
 //! What the binary can be asked to do.
 
 mod api_client;
+pub mod backtest;
 pub mod bench;
 pub mod demo;
 pub mod healthcheck;
 mod host;
+mod monthly_returns;
 pub mod serve;
-mod us_market;
 
 /// An error and its causes on one line.
 pub fn with_causes(error: &dyn std::error::Error) -> String {

@@ -38,6 +38,8 @@ pub enum AdviceSource {
     Resolved,
     /// Re-solved because the state lies outside the design.
     ResolvedOutsideDesign,
+    /// Re-solved for a hypothetical radius, which the policy surrogate was not trained for.
+    ResolvedOtherRadius,
 }
 
 /// The robust allocation for the coming period and what it is worth.
@@ -83,6 +85,14 @@ pub struct Advisor {
 enum PreparedStep {
     Single(SingleSolution),
     Surrogates { value: Box<ValueSurrogate>, policy: Box<GpMean>, deviation: Box<OnceLock<Option<GaussianProcess>>> },
+}
+
+/// What an advice is for.
+struct Asked<'a> {
+    step: usize,
+    state: &'a State,
+    radius: f64,
+    source: AdviceSource,
 }
 
 /// What the surrogates say of a state.
@@ -138,17 +148,29 @@ impl Advisor {
     /// Cost: two kernel sums and one triangular solve; a robust step where it re-solves.
     pub fn advise(&self, step: usize, state: &State, mode: AdviceMode) -> Advice {
         let predicted = self.predict(step, state);
-        if mode == AdviceMode::Surrogate && predicted.in_design {
-            let source = AdviceSource::PolicySurrogate;
-            return self.advice(step, state, predicted.action, predicted.floor_gain, &predicted, source);
-        }
-        self.resolved(step, state, mode, &predicted).0
+        let radius = self.radius(state);
+        let source = match mode {
+            AdviceMode::Resolve => AdviceSource::Resolved,
+            AdviceMode::Surrogate if predicted.in_design => {
+                let asked = Asked { step, state, radius, source: AdviceSource::PolicySurrogate };
+                return self.advice(&asked, predicted.action, predicted.floor_gain, &predicted);
+            }
+            AdviceMode::Surrogate => AdviceSource::ResolvedOutsideDesign,
+        };
+        self.resolved(&Asked { step, state, radius, source }, &predicted).0
     }
 
     /// The re-solved advice and the worst-case law behind it.
     pub fn explain(&self, step: usize, state: &State) -> (Advice, WorstCase) {
+        self.explain_within(step, state, self.radius(state))
+    }
+
+    /// The same were the radius of the coming period `radius`, whatever the law says; later periods keep their own.
+    pub fn explain_within(&self, step: usize, state: &State, radius: f64) -> (Advice, WorstCase) {
+        let own = radius == self.radius(state);
+        let source = if own { AdviceSource::Resolved } else { AdviceSource::ResolvedOtherRadius };
         let predicted = self.predict(step, state);
-        let (advice, solution) = self.resolved(step, state, AdviceMode::Resolve, &predicted);
+        let (advice, solution) = self.resolved(&Asked { step, state, radius, source }, &predicted);
         let worst = match solution {
             Some(solution) => WorstCase::of(&solution, &advice, self.utility_per_radius(step, state)),
             None => WorstCase::unknown(),
@@ -156,51 +178,39 @@ impl Advisor {
         (advice, worst)
     }
 
+    /// Radius of the ball at a state, in log-return.
+    pub fn radius(&self, state: &State) -> f64 {
+        self.context.radius(state)
+    }
+
     /// The floor gain that the value surrogate predicts, wherever the state lies.
     pub fn surrogate_gain(&self, step: usize, state: &State) -> f64 {
         self.predict(step, state).floor_gain
     }
 
-    fn resolved(
-        &self,
-        step: usize,
-        state: &State,
-        mode: AdviceMode,
-        predicted: &Prediction,
-    ) -> (Advice, Option<RobustSolution>) {
-        let after = self.policy.steps().get(step + 1).map(|after| &after.solution);
-        let next = NextValue::new(self.specification(), step + 1, after);
-        let source =
-            if mode == AdviceMode::Resolve { AdviceSource::Resolved } else { AdviceSource::ResolvedOutsideDesign };
-        match self.context.solve(step, state, &next) {
+    fn resolved(&self, asked: &Asked, predicted: &Prediction) -> (Advice, Option<RobustSolution>) {
+        let after = self.policy.steps().get(asked.step + 1).map(|after| &after.solution);
+        let next = NextValue::new(self.specification(), asked.step + 1, after);
+        match self.context.solve_within(asked.step, asked.state, &next, asked.radius) {
             Ok(solution) if solution.action.is_finite() && solution.floor_gain.is_finite() => {
-                let advice = self.advice(step, state, solution.action, solution.floor_gain, predicted, source);
-                (advice, Some(solution))
+                (self.advice(asked, solution.action, solution.floor_gain, predicted), Some(solution))
             }
             // All-bank is feasible and no law can hurt it.
-            _ => (self.advice(step, state, 0.0, 0.0, predicted, source), None),
+            _ => (self.advice(asked, 0.0, 0.0, predicted), None),
         }
     }
 
-    fn advice(
-        &self,
-        step: usize,
-        state: &State,
-        allocation: f64,
-        floor_gain: f64,
-        predicted: &Prediction,
-        source: AdviceSource,
-    ) -> Advice {
-        let floor = self.context.floor(step, state);
+    fn advice(&self, asked: &Asked, allocation: f64, floor_gain: f64, predicted: &Prediction) -> Advice {
+        let floor = self.context.floor(asked.step, asked.state);
         Advice {
             allocation,
             certainty_equivalent: floor * floor_gain.exp(),
             floor,
-            radius: self.context.radius(state),
-            sample_size: state.law.sample_size(),
+            radius: asked.radius,
+            sample_size: asked.state.law.sample_size(),
             surrogate_sd: predicted.deviation,
             in_design: predicted.in_design,
-            source,
+            source: asked.source,
         }
     }
 
@@ -263,7 +273,7 @@ impl Advisor {
             moments: state.law.raw_moments(self.specification().surrogate.moment_count),
             quantile: quantile.map(|found| found.value),
             quantile_standard_error: quantile.map(|found| found.standard_error),
-            radius: self.context.radius(state),
+            radius: self.radius(state),
         }
     }
 

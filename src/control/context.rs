@@ -84,8 +84,22 @@ impl ProblemContext {
     /// # Errors
     /// A centre that the specification does not define.
     pub fn solve(&self, step: usize, state: &State, next: &NextValue) -> Result<RobustSolution, TrainError> {
+        self.solve_within(step, state, next, self.radius(state))
+    }
+
+    /// The same were the ball of this step alone of another radius; the value of the step after stays what it is.
+    ///
+    /// # Errors
+    /// As [`Self::solve`].
+    pub fn solve_within(
+        &self,
+        step: usize,
+        state: &State,
+        next: &NextValue,
+        radius: f64,
+    ) -> Result<RobustSolution, TrainError> {
         let [lowest, highest] = self.specification.problem.action_interval;
-        let solution = self.solve_between(step, state, next, (lowest, highest))?;
+        let solution = self.priced(step, state, next, (lowest, highest), radius)?;
         // All-bank is feasible and no law can hurt it.
         Ok(RobustSolution { floor_gain: solution.floor_gain.max(0.0), ..solution })
     }
@@ -100,6 +114,17 @@ impl ProblemContext {
         state: &State,
         next: &NextValue,
         actions: (f64, f64),
+    ) -> Result<RobustSolution, TrainError> {
+        self.priced(step, state, next, actions, self.radius(state))
+    }
+
+    fn priced(
+        &self,
+        step: usize,
+        state: &State,
+        next: &NextValue,
+        actions: (f64, f64),
+        radius: f64,
     ) -> Result<RobustSolution, TrainError> {
         let problem = &self.specification.problem;
         let (atoms, masses) = centre(problem, state)?;
@@ -116,7 +141,7 @@ impl ProblemContext {
             support: problem.support,
             atoms: &atoms,
             masses: &masses,
-            radius: self.radius(state),
+            radius,
             variance,
         };
         Ok(robust.solve(state, actions))

@@ -1,5 +1,6 @@
 //! Floor 1: the paper, a file a section.
 
+pub mod account;
 pub mod advisor;
 pub mod backward;
 pub mod bellman;
@@ -17,4 +18,6 @@ pub mod state;
 pub mod surrogate;
 pub mod uncertainty;
 pub mod utility;
+pub mod walk_forward;
+pub mod what_if;
 pub mod worst_case;

@@ -28,7 +28,35 @@ pub struct TransportedMass {
     pub mass: f64,
 }
 
+/// The worst-case law in figures, of log-returns.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct WorstLawSummary {
+    pub mean: f64,
+    pub standard_deviation: f64,
+    /// Share of the probability that moves.
+    pub share_moved: f64,
+    /// Lowest log-return that mass moves to; absent where none moves.
+    pub lowest_destination: Option<f64>,
+}
+
 impl WorstCase {
+    /// The worst law in figures; `None` where the robust step has no solution.
+    pub fn summary(&self) -> Option<WorstLawSummary> {
+        if self.transport.is_empty() {
+            return None;
+        }
+        let expectation =
+            |of: &dyn Fn(f64) -> f64| self.transport.iter().map(|mass| mass.mass * of(mass.moved_to)).sum::<f64>();
+        let mean = expectation(&|z| z);
+        let moved = || self.transport.iter().filter(|mass| mass.atom != mass.moved_to);
+        Some(WorstLawSummary {
+            mean,
+            standard_deviation: expectation(&|z| (z - mean).powi(2)).sqrt(),
+            share_moved: moved().map(|mass| mass.mass).sum(),
+            lowest_destination: moved().map(|mass| mass.moved_to).reduce(f64::min),
+        })
+    }
+
     /// Where the robust step has no finite solution.
     pub fn unknown() -> Self {
         let sentence =

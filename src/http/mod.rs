@@ -16,6 +16,7 @@ mod router;
 mod server;
 mod sessions;
 mod telemetry;
+mod what_if;
 mod wire;
 
 pub use router::description_json;

@@ -15,7 +15,7 @@ use utoipa_axum::routes;
 
 use super::extract::BodyLimit;
 use super::problem::{Problem, ProblemKind};
-use super::{dashboard, described, events, jobs, operations, policies, sessions, telemetry};
+use super::{dashboard, described, events, jobs, operations, policies, sessions, telemetry, what_if};
 use crate::service::Service;
 use crate::service::config::Config;
 
@@ -45,6 +45,7 @@ fn routes() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(sessions::history))
         .routes(routes!(sessions::observe))
         .routes(routes!(sessions::action))
+        .routes(routes!(what_if::what_if))
         .routes(routes!(operations::livez))
         .routes(routes!(operations::readyz))
         .routes(routes!(operations::health))

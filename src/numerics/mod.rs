@@ -1,5 +1,6 @@
 //! Floor 0: mathematics with no investor in it.
 
+pub mod block_bootstrap;
 pub mod bridge;
 pub mod chebyshev;
 pub mod cholesky;

@@ -16,6 +16,7 @@ pub mod progress;
 pub mod sessions;
 pub mod shutdown;
 mod trainer;
+pub mod what_if;
 
 use std::sync::Arc;
 

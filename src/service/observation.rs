@@ -53,6 +53,12 @@ pub struct Observed {
     pub uncertainty: Uncertainty,
 }
 
+/// The log-return of a simple return, named `field` in messages.
+pub(super) fn log_return_of(field: &str, simple_return: f64) -> Result<f64, FieldError> {
+    limits::within(field, simple_return, (-limits::LOG_RETURN).exp_m1(), limits::LOG_RETURN.exp_m1())?;
+    Ok(simple_return.ln_1p().clamp(-limits::LOG_RETURN, limits::LOG_RETURN))
+}
+
 impl Observe {
     /// Tells a repeat from other content under the same period.
     pub(super) fn content_hash(&self) -> Result<String, serde_json::Error> {
@@ -73,10 +79,7 @@ impl Observe {
         }
         match (self.log_return, self.simple_return, self.price) {
             (Some(value), None, None) => limits::log_return("log_return", value).map(|()| value),
-            (None, Some(value), None) => {
-                limits::within("simple_return", value, (-limits::LOG_RETURN).exp_m1(), limits::LOG_RETURN.exp_m1())?;
-                Ok(value.ln_1p().clamp(-limits::LOG_RETURN, limits::LOG_RETURN))
-            }
+            (None, Some(value), None) => log_return_of("simple_return", value),
             (None, None, Some(price)) => self.between_prices(price, known_price),
             (None, None, None) => {
                 Err(FieldError::new("log_return", "null", "must be given, or simple_return or price instead of it"))

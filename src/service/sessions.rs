@@ -36,7 +36,7 @@ pub struct Live {
     pub state: State,
     /// Periods observed.
     pub observed: usize,
-    advisor: Arc<Advisor>,
+    pub(super) advisor: Arc<Advisor>,
     /// Price reported for the last period.
     price: Option<f64>,
     /// The surrogate's advice for the coming period, once computed.
@@ -65,8 +65,8 @@ pub struct Sessions {
     clock: Clock,
     policies: Arc<Policies>,
     slots: Arc<Mutex<HashMap<String, Slot>>>,
-    advising: Bounded,
-    resolving: Bounded,
+    pub(super) advising: Bounded,
+    pub(super) resolving: Bounded,
 }
 
 impl Sessions {

@@ -3,7 +3,7 @@
 use super::DemoError;
 use super::calls::{Advice, Move, advice, observe, open_session, train};
 use crate::command::api_client::ApiClient;
-use crate::command::us_market::{Month, UsMarket};
+use crate::command::monthly_returns::{Month, MonthlyReturns};
 
 const YEAR: &str = "2008";
 const FIRST_MONTH: &str = "2008-01";
@@ -21,7 +21,7 @@ const MOVES_TOLD: usize = 3;
 
 /// Trains, tells why, and lives through the year.
 pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
-    let market = UsMarket::bundled()?;
+    let market = MonthlyReturns::bundled()?;
     let past = Past::before(&market, FIRST_MONTH)?;
     println!(
         "\nTraining on the US stock market of the {HISTORY} months before {FIRST_MONTH} for the {HORIZON} months after:"
@@ -54,13 +54,13 @@ pub struct Past {
 }
 
 impl Past {
-    fn before(market: &UsMarket, month: &str) -> Result<Self, DemoError> {
+    fn before(market: &MonthlyReturns, month: &str) -> Result<Self, DemoError> {
         let months = market.before(month, HISTORY)?;
         Ok(Past {
             month: month.into(),
-            log_returns: months.iter().map(|row| row.market_return.ln_1p()).collect(),
+            log_returns: months.iter().map(|row| row.risky_return.ln_1p()).collect(),
             rate: months.last().map_or(0.0, |row| row.risk_free_return),
-            mean_return: months.iter().map(|row| row.market_return).sum::<f64>() / months.len() as f64,
+            mean_return: months.iter().map(|row| row.risky_return).sum::<f64>() / months.len() as f64,
         })
     }
 
@@ -103,7 +103,7 @@ fn reason(edge: f64, radius: f64) -> &'static str {
 }
 
 /// The same rule, one month ahead, in several Januaries. Cheap: each is a single robust solve.
-async fn compare_januaries(api: &ApiClient, market: &UsMarket, count: usize) -> Result<(), DemoError> {
+async fn compare_januaries(api: &ApiClient, market: &MonthlyReturns, count: usize) -> Result<(), DemoError> {
     println!("\nThe same rule, looking one month ahead, in four Januaries:");
     println!("{:<8} {:>8} {:>11}  stocks beyond the bank", "month", "radius", "allocation");
     for month in JANUARIES {
@@ -132,15 +132,15 @@ async fn live_through(
     let (mut all_bank, mut all_stock, mut last) = (INITIAL_WEALTH, INITIAL_WEALTH, None);
     for (index, month) in year.iter().enumerate() {
         let told = advice(api, session, index + 1 == year.len()).await?;
-        let wealth = observe(api, session, told.period, month.market_return).await?;
+        let wealth = observe(api, session, told.period, month.risky_return).await?;
         all_bank *= 1.0 + past.rate;
-        all_stock *= 1.0 + month.market_return;
+        all_stock *= 1.0 + month.risky_return;
         println!(
             "{:<8} {:>8.4} {:>11.3} {:>8.2} % {wealth:>9.2} {all_bank:>9.2} {all_stock:>10.2}",
             month.month,
             told.radius,
             told.allocation,
-            100.0 * month.market_return
+            100.0 * month.risky_return
         );
         last = Some(told);
     }
@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn january_2008_pays_beyond_the_bank_more_than_the_radius_and_1987_less() {
-        let market = UsMarket::bundled().unwrap();
+        let market = MonthlyReturns::bundled().unwrap();
         assert!(Past::before(&market, FIRST_MONTH).unwrap().edge() > 0.0049);
         assert!(Past::before(&market, "1987-01").unwrap().edge() < 0.0056);
     }

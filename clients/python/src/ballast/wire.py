@@ -6,8 +6,11 @@ from typing import Any, Literal, TypeAlias, TypedDict
 
 from typing_extensions import NotRequired
 
-AdviceSource: TypeAlias = Literal["policy_surrogate", "resolved", "resolved_outside_design"]
+AdviceSource: TypeAlias = Literal["policy_surrogate", "resolved", "resolved_outside_design", "resolved_other_radius"]
 """Where an advice came from."""
+
+
+Explain: TypeAlias = Literal["worst_case"]
 
 
 FeatureMap: TypeAlias = Literal["standardized", "raw_moments"]
@@ -247,6 +250,16 @@ SurrogateTarget: TypeAlias = Literal["floor_gain", "value"]
 """What the value surrogate regresses."""
 
 
+SweepRange = TypedDict(
+    "SweepRange",
+    {
+        "from": float,
+        "to": float,
+        "points": int,
+    },
+)
+
+
 class TransportedMass(TypedDict):
     """Mass of one atom and where the adversary puts it."""
 
@@ -304,6 +317,17 @@ class WorstCase(TypedDict):
     """Difference between primal and dual value, in log certainty equivalent."""
     sentence: str
     """The worst case in one plain sentence."""
+
+
+class WorstLawSummary(TypedDict):
+    """The worst-case law in figures, of log-returns."""
+
+    mean: float
+    standard_deviation: float
+    share_moved: float
+    """Share of the probability that moves."""
+    lowest_destination: NotRequired[float | None]
+    """Lowest log-return that mass moves to; absent where none moves."""
 
 
 class Advice(TypedDict):
@@ -438,6 +462,51 @@ class SurrogateSpecification(TypedDict):
     bounds: NotRequired[HyperparameterBounds]
 
 
+class Sweep(TypedDict):
+    """Exactly one range."""
+
+    wealth: NotRequired[SweepRange | None]
+    radius_scale: NotRequired[SweepRange | None]
+    radius: NotRequired[SweepRange | None]
+    log_return: NotRequired[SweepRange | None]
+    simple_return: NotRequired[SweepRange | None]
+
+
+class WhatIf(TypedDict):
+    """What is supposed of a session. What is not given stays as it is."""
+
+    session: str
+    wealth: NotRequired[float | None]
+    """Wealth now."""
+    radius_scale: NotRequired[float | None]
+    """Factor on the radius of the ball of the period advised; later periods keep their own."""
+    radius: NotRequired[float | None]
+    """That radius itself, in log-return."""
+    log_return: NotRequired[float | None]
+    """Return of the coming period, the advised allocation held through it; the advice is for the period after."""
+    simple_return: NotRequired[float | None]
+    """The same as `price / previous price - 1`."""
+    explain: NotRequired[Explain | None]
+    sweep: NotRequired[Sweep | None]
+
+
+class WhatIfPoint(Advice):
+    """The advice under one hypothesis."""
+
+    period: int
+    """The period advised."""
+    wealth: float
+    """Wealth at its start."""
+    log_return: NotRequired[float | None]
+    """The return supposed, if one was."""
+    radius_scale: NotRequired[float | None]
+    """The factor on the radius supposed, if one was."""
+    gamma: NotRequired[float | None]
+    """Lagrange multiplier of the ball: utility lost per unit of extra radius. Where the step was solved."""
+    worst_law: NotRequired[WorstLawSummary | None]
+    worst_case: NotRequired[WorstCase | None]
+
+
 class Action(Advice):
     """The robust allocation for the coming period."""
 
@@ -480,6 +549,23 @@ class Specification(TypedDict):
     surrogate: NotRequired[SurrogateSpecification]
     seed: NotRequired[int]
     """The same specification and seed give the same policy, bit for bit."""
+
+
+class WhatIfAnswer1(WhatIfPoint):
+    """One point, or the points of a sweep in its order."""
+
+    session: str
+
+
+class WhatIfAnswer2(TypedDict):
+    """One point, or the points of a sweep in its order."""
+
+    session: str
+    points: list[WhatIfPoint]
+
+
+WhatIfAnswer: TypeAlias = WhatIfAnswer1 | WhatIfAnswer2
+"""One point, or the points of a sweep in its order."""
 
 
 class PolicyDetail(TypedDict):

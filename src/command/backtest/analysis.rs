@@ -1,0 +1,175 @@
+//! The books in figures, each with an interval where a resample of the months has a meaning.
+
+use ballast::control::account::{Account, Annual, keep, yearly_certainty_equivalent};
+use ballast::control::walk_forward::{Decision, Period, WalkForward};
+use ballast::numerics::block_bootstrap::circular_blocks;
+use ballast::numerics::streams::stream;
+use ballast::numerics::summary::quantile;
+use serde::Serialize;
+
+use super::MONTHS_PER_YEAR;
+
+/// Wealth at the start of the whole, and of every year whose utility is taken.
+pub const INITIAL_WEALTH: f64 = 100.0;
+/// Resamples, and their blocks: a year of months; three of the years whose utility is averaged.
+pub const RESAMPLES: usize = 2000;
+pub const MONTH_BLOCK: usize = 12;
+pub const YEAR_BLOCK: usize = 3;
+/// Probability that an interval is meant to hold.
+pub const CONFIDENCE: f64 = 0.9;
+
+/// One strategy: what it held, and what became of it.
+pub struct Line {
+    pub name: String,
+    pub decisions: Vec<Decision>,
+    pub account: Account,
+    /// Chosen with what only the end could tell.
+    pub hindsight: bool,
+}
+
+/// A figure with its interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Estimate {
+    pub value: f64,
+    pub interval: [f64; 2],
+}
+
+/// One strategy in figures; returns as fractions.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Figures {
+    pub strategy: String,
+    pub hindsight: bool,
+    /// Of mean utility over the whole years, each from wealth 100.
+    pub yearly_certainty_equivalent: Estimate,
+    /// That of the main adaptive strategy less this one.
+    pub adaptive_ahead: Estimate,
+    pub annual_mean: Estimate,
+    pub annual_volatility: Estimate,
+    pub sharpe_ratio: Estimate,
+    /// Share of wealth that changes between bank and asset in a year.
+    pub annual_turnover: Estimate,
+    pub max_drawdown: f64,
+    pub final_wealth: f64,
+    pub mean_allocation: f64,
+    /// Share of the months with nothing in the risky asset.
+    pub all_bank_share: f64,
+}
+
+pub struct Analysis {
+    pub figures: Vec<Figures>,
+    /// Whole years, whose utility is taken.
+    pub years: usize,
+}
+
+impl Line {
+    pub fn new(name: String, decisions: Vec<Decision>, periods: &[Period], cost: f64) -> Self {
+        let account = keep(decisions.iter().map(|decision| decision.allocation), periods, cost, INITIAL_WEALTH);
+        Line { name, decisions, account, hindsight: false }
+    }
+
+    /// The constant mix that holds on average what the line named `like` held: what its timing is measured against.
+    pub fn hindsight(lines: &[Line], like: &str, periods: &[Period], cost: f64) -> Option<Line> {
+        let line = lines.iter().find(|line| line.name == like)?;
+        let decision = Decision { allocation: line.mean_allocation(), radius: 0.0, source: None };
+        let name = format!("constant {:.1} %", 100.0 * decision.allocation);
+        let line = Line::new(name, vec![decision; periods.len()], periods, cost);
+        Some(Line { hindsight: true, ..line })
+    }
+
+    fn mean_allocation(&self) -> f64 {
+        self.decisions.iter().map(|decision| decision.allocation).sum::<f64>() / self.decisions.len() as f64
+    }
+}
+
+/// What one resample of the months and years gives for one strategy.
+struct Measured {
+    annual: Annual,
+    turnover: f64,
+    certainty_equivalent: f64,
+}
+
+/// The series of one strategy that are resampled.
+struct Series<'a> {
+    returns: Vec<f64>,
+    traded: &'a [f64],
+    growth: Vec<f64>,
+}
+
+impl Series<'_> {
+    fn measure(&self, bank: &[f64], months: &[usize], years: &[usize], walk: &WalkForward) -> Measured {
+        let pick =
+            |values: &[f64], indices: &[usize]| -> Vec<f64> { indices.iter().map(|&index| values[index]).collect() };
+        let per_year = MONTHS_PER_YEAR as f64;
+        let traded: f64 = months.iter().map(|&month| self.traded[month]).sum();
+        Measured {
+            annual: Annual::of(&pick(&self.returns, months), &pick(bank, months), per_year),
+            turnover: per_year * traded / months.len() as f64,
+            certainty_equivalent: yearly_certainty_equivalent(
+                walk.utility(),
+                &pick(&self.growth, years),
+                INITIAL_WEALTH,
+            ),
+        }
+    }
+}
+
+impl Analysis {
+    /// Resamples months and years alike for all strategies, so that differences are of the same worlds.
+    /// The adaptive strategy that others are compared with is the one the hindsight mix follows.
+    pub fn of(lines: &[Line], periods: &[Period], walk: &WalkForward) -> Self {
+        let bank: Vec<f64> = periods.iter().map(|period| period.bank_return).collect();
+        let series: Vec<Series> = lines
+            .iter()
+            .map(|line| Series {
+                returns: line.account.returns(),
+                traded: &line.account.traded,
+                growth: line.account.yearly_growth(MONTHS_PER_YEAR),
+            })
+            .collect();
+        let years = periods.len() / MONTHS_PER_YEAR;
+        let measure = |months: &[usize], years: &[usize]| -> Vec<Measured> {
+            series.iter().map(|series| series.measure(&bank, months, years, walk)).collect()
+        };
+        let whole = measure(&(0..periods.len()).collect::<Vec<_>>(), &(0..years).collect::<Vec<_>>());
+        let resampled: Vec<Vec<Measured>> = (0..RESAMPLES)
+            .map(|draw| {
+                let blocks =
+                    |purpose, length, block| circular_blocks(length, block, &mut stream(walk.seed, purpose, 0, draw));
+                measure(
+                    &blocks("bootstrap months", periods.len(), MONTH_BLOCK),
+                    &blocks("bootstrap years", years, YEAR_BLOCK),
+                )
+            })
+            .collect();
+        let main = main_line(lines);
+        let figures = lines.iter().enumerate().map(|(index, line)| {
+            let estimate = |of: &dyn Fn(&[Measured]) -> f64| {
+                let values: Vec<f64> = resampled.iter().map(|measured| of(measured)).collect();
+                let tail = 0.5 * (1.0 - CONFIDENCE);
+                Estimate { value: of(&whole), interval: [quantile(&values, tail), quantile(&values, 1.0 - tail)] }
+            };
+            let zero = line.decisions.iter().filter(|decision| decision.allocation <= 0.0).count();
+            Figures {
+                strategy: line.name.clone(),
+                hindsight: line.hindsight,
+                yearly_certainty_equivalent: estimate(&|all| all[index].certainty_equivalent),
+                adaptive_ahead: estimate(&|all| all[main].certainty_equivalent - all[index].certainty_equivalent),
+                annual_mean: estimate(&|all| all[index].annual.mean),
+                annual_volatility: estimate(&|all| all[index].annual.volatility),
+                sharpe_ratio: estimate(&|all| all[index].annual.sharpe_ratio),
+                annual_turnover: estimate(&|all| all[index].turnover),
+                max_drawdown: line.account.drawdowns().into_iter().fold(0.0, f64::max),
+                final_wealth: line.account.wealth.last().copied().unwrap_or(INITIAL_WEALTH),
+                mean_allocation: line.mean_allocation(),
+                all_bank_share: zero as f64 / line.decisions.len() as f64,
+            }
+        });
+        Analysis { figures: figures.collect(), years }
+    }
+}
+
+/// The adaptive strategy most is said about: the second, or the only one.
+pub fn main_line(lines: &[Line]) -> usize {
+    let adaptive = lines.iter().filter(|line| line.name.starts_with("adaptive")).count();
+    usize::from(adaptive > 1)
+}

@@ -1,0 +1,177 @@
+//! The report as a page.
+
+use ballast::report::{Axis, BarChart, Chart, Page, Table, interval, number};
+
+use super::analysis::{CONFIDENCE, Estimate, Figures, Line, MONTH_BLOCK, RESAMPLES, YEAR_BLOCK, main_line};
+use super::{Backtest, verdict};
+
+pub fn page(backtest: &Backtest) -> Page {
+    let (first, last) = (bound(backtest, 0), bound(backtest, backtest.months.len() - 1));
+    Page::new(&format!("Walk-forward, {first} to {last}"))
+        .paragraph(method(backtest))
+        .section("What it shows")
+        .points(verdict::sentences(backtest))
+        .table(utility_table(backtest))
+        .figure(
+            certainty_equivalents(backtest),
+            &format!(
+                "Mean utility over {} years, each from 100, as wealth for certain, with {:.0} % intervals.",
+                backtest.analysis.years,
+                100.0 * CONFIDENCE
+            ),
+        )
+        .section("Wealth")
+        .figure(wealth(backtest), "Equal ratios take equal room. The start is 100, all in the bank.")
+        .figure(drawdowns(backtest), "How far wealth is below its highest so far.")
+        .table(performance_table(backtest))
+        .section("What was held")
+        .figure(allocations(backtest), "Share of wealth in the risky asset at the start of each month.")
+        .figure(radii(backtest), "Radius of the Wasserstein ball that month; static ones keep theirs for a year.")
+        .section("How it was done")
+        .points(notes(backtest))
+}
+
+fn bound(backtest: &Backtest, index: usize) -> &str {
+    backtest.months.get(index).map_or("", |month| &month.month)
+}
+
+fn method(backtest: &Backtest) -> String {
+    let args = &backtest.args;
+    format!(
+        "Every {} months a policy is trained on the {} months before and lived by for the year: each month it is asked, \
+         held to, and told the return. Nothing later than a month is used for its allocation. Relative risk aversion {}.",
+        backtest.walk.year, args.window, args.risk_aversion
+    )
+}
+
+fn notes(backtest: &Backtest) -> Vec<String> {
+    let args = &backtest.args;
+    vec![
+        format!("Design points a step {}, seed {}, bridge radius; took {:.0} s.", args.count, args.seed, backtest.seconds),
+        "A policy takes the bank to go on paying what it paid in the last month before the year; accounts are credited \
+         with what it really paid."
+            .into(),
+        format!(
+            "Intervals are the middle {:.0} % of {RESAMPLES} circular block-bootstrap resamples, alike for all strategies: \
+             blocks of {MONTH_BLOCK} months, and of {YEAR_BLOCK} years for certainty equivalents. They take the past as one \
+             draw of a stationary world, so they are too narrow for what was never seen.",
+            100.0 * CONFIDENCE
+        ),
+        "The constant mix of the adaptive strategy's average allocation was chosen with hindsight; it is there to measure \
+         timing, not to be had."
+            .into(),
+        "Turnover is the share of wealth that changes between bank and asset, counted once. Drawdown and final wealth \
+         belong to one path and carry no interval."
+            .into(),
+    ]
+}
+
+/// Months as years and their parts.
+fn years(backtest: &Backtest) -> Vec<f64> {
+    let year = |month: &str| {
+        let (year, month) = month.split_once('-')?;
+        Some(year.parse::<f64>().ok()? + (month.parse::<f64>().ok()? - 1.0) / 12.0)
+    };
+    backtest.months.iter().map(|month| year(&month.month).unwrap_or(0.0)).collect()
+}
+
+fn time() -> Axis {
+    Axis::new("year").tight()
+}
+
+/// Strategies that could have been followed.
+fn followed(backtest: &Backtest) -> impl Iterator<Item = &Line> {
+    backtest.lines.iter().filter(|line| !line.hindsight)
+}
+
+fn wealth(backtest: &Backtest) -> Chart {
+    let years = years(backtest);
+    let start = years.first().map_or(0.0, |first| *first);
+    let times: Vec<f64> = [start].into_iter().chain(years.iter().map(|year| year + 1.0 / 12.0)).collect();
+    let chart = Chart::new("Wealth", time(), Axis::new("wealth, logarithmic").log());
+    followed(backtest).fold(chart, |chart, line| {
+        chart.line(&line.name, times.iter().copied().zip(line.account.wealth.iter().copied()))
+    })
+}
+
+fn drawdowns(backtest: &Backtest) -> Chart {
+    let years = years(backtest);
+    let chart = Chart::new("Drawdown", time(), Axis::new("below the highest wealth so far, %").from_zero());
+    followed(backtest).fold(chart, |chart, line| {
+        let falls = line.account.drawdowns().into_iter().skip(1).map(|fall| -100.0 * fall);
+        chart.line(&line.name, years.iter().copied().zip(falls))
+    })
+}
+
+fn allocations(backtest: &Backtest) -> Chart {
+    let years = years(backtest);
+    let chart = Chart::new("Allocation", time(), Axis::new("share of wealth, %").from_zero());
+    trained(backtest).fold(chart, |chart, line| {
+        let shares = line.decisions.iter().map(|decision| 100.0 * decision.allocation);
+        chart.line(&line.name, years.iter().copied().zip(shares))
+    })
+}
+
+fn radii(backtest: &Backtest) -> Chart {
+    let years = years(backtest);
+    let chart = Chart::new("Radius", time(), Axis::new("log-return a month, %").from_zero());
+    trained(backtest).filter(|line| line.decisions.iter().any(|decision| decision.radius > 0.0)).fold(
+        chart,
+        |chart, line| {
+            let radii = line.decisions.iter().map(|decision| 100.0 * decision.radius);
+            chart.line(&line.name, years.iter().copied().zip(radii))
+        },
+    )
+}
+
+fn trained(backtest: &Backtest) -> impl Iterator<Item = &Line> {
+    followed(backtest).filter(|line| line.decisions.iter().any(|decision| decision.source.is_some()))
+}
+
+fn certainty_equivalents(backtest: &Backtest) -> BarChart {
+    // From 100 on, what a year adds: bars from zero would all look alike.
+    let chart = BarChart::new("What a year from 100 counts as, beyond 100", Axis::new("certainty equivalent less 100"));
+    backtest.analysis.figures.iter().fold(chart, |chart, figures| {
+        let Estimate { value, interval: [low, high] } = figures.yearly_certainty_equivalent;
+        chart.bar(&figures.strategy, value - 100.0, Some([low - 100.0, high - 100.0]))
+    })
+}
+
+fn utility_table(backtest: &Backtest) -> Table {
+    let main = &backtest.lines[main_line(&backtest.lines)].name;
+    let table = Table::new(
+        "Certainty equivalents of a year from 100",
+        &["strategy", "certainty equivalent", &format!("{main} less this"), "mean allocation, %", "all-bank months, %"],
+    );
+    backtest.analysis.figures.iter().fold(table, |table, figures| {
+        table.row([
+            figures.strategy.as_str().into(),
+            estimate(figures.yearly_certainty_equivalent, 1.0, 2),
+            if figures.strategy == *main { number(f64::NAN, 2) } else { estimate(figures.adaptive_ahead, 1.0, 2) },
+            number(100.0 * figures.mean_allocation, 1),
+            number(100.0 * figures.all_bank_share, 0),
+        ])
+    })
+}
+
+fn performance_table(backtest: &Backtest) -> Table {
+    let table = Table::new(
+        "Performance, a year",
+        &["strategy", "mean, %", "volatility, %", "Sharpe ratio", "turnover, %", "max drawdown, %", "final wealth"],
+    );
+    backtest.analysis.figures.iter().fold(table, |table, figures: &Figures| {
+        table.row([
+            figures.strategy.as_str().into(),
+            estimate(figures.annual_mean, 100.0, 2),
+            estimate(figures.annual_volatility, 100.0, 2),
+            estimate(figures.sharpe_ratio, 1.0, 2),
+            estimate(figures.annual_turnover, 100.0, 0),
+            number(100.0 * figures.max_drawdown, 1),
+            number(figures.final_wealth, 0),
+        ])
+    })
+}
+
+fn estimate(estimate: Estimate, unit: f64, decimals: usize) -> ballast::report::Cell {
+    interval(unit * estimate.value, estimate.interval.map(|end| unit * end), decimals)
+}

@@ -1,0 +1,178 @@
+//! What the figures say, flattering or not: every sentence follows from them by a rule that is blind to the strategy.
+
+use ballast::control::advisor::AdviceSource;
+
+use super::Backtest;
+use super::analysis::{Estimate, Figures, main_line};
+
+/// Below it a resample of years says nothing about the next one.
+const FEWEST_YEARS: usize = 10;
+
+/// One statement each, the most important first.
+pub fn sentences(backtest: &Backtest) -> Vec<String> {
+    let figures = &backtest.analysis.figures;
+    let main = main_line(&backtest.lines);
+    let mut sentences = vec![ranking(figures, main)];
+    let others = figures.iter().enumerate().filter(|(index, _)| *index != main).map(|(_, other)| other);
+    let years = backtest.analysis.years;
+    if years < FEWEST_YEARS {
+        sentences.push(format!(
+            "The whole years are {years}, fewer than {FEWEST_YEARS}: they do not tell the strategies apart, and the intervals mean nothing."
+        ));
+    } else {
+        sentences.push(against(others));
+        sentences.extend(timing(figures, main));
+    }
+    sentences.push(holding(backtest, main));
+    sentences.extend(drawdown(figures, main));
+    sentences.push(guard(backtest, main));
+    sentences.push(cost(backtest));
+    sentences
+}
+
+fn ranking(figures: &[Figures], main: usize) -> String {
+    let value = |figures: &Figures| figures.yearly_certainty_equivalent.value;
+    let real: Vec<&Figures> = figures.iter().filter(|figures| !figures.hindsight).collect();
+    let ahead = real.iter().filter(|other| value(other) > value(&figures[main])).count();
+    let best = real.iter().max_by(|a, b| value(a).total_cmp(&value(b)));
+    let best = best.map_or(String::new(), |best| format!(" The first is {} with {:.2}.", best.strategy, value(best)));
+    format!(
+        "{}: a year from 100 counts as {:.2} for certain, place {} of {}.{best}",
+        figures[main].strategy,
+        value(&figures[main]),
+        ahead + 1,
+        real.len()
+    )
+}
+
+/// Which strategies are behind, ahead, or not to be told apart.
+fn against<'a>(others: impl Iterator<Item = &'a Figures>) -> String {
+    let mut groups: [Vec<&str>; 3] = Default::default();
+    for other in others {
+        let Estimate { interval: [low, high], .. } = other.adaptive_ahead;
+        let group = if low > 0.0 {
+            0
+        } else if high < 0.0 {
+            1
+        } else {
+            2
+        };
+        groups[group].push(&other.strategy);
+    }
+    let named = |names: &[&str]| if names.is_empty() { "none".into() } else { names.join("; ") };
+    format!(
+        "By the interval of the difference it is better than: {}. Worse than: {}. Not to be told apart from: {}.",
+        named(&groups[0]),
+        named(&groups[1]),
+        named(&groups[2])
+    )
+}
+
+/// Whether moving in and out did anything that its average would not have done.
+fn timing(figures: &[Figures], main: usize) -> Option<String> {
+    let constant = figures.iter().find(|figures| figures.hindsight)?;
+    let Estimate { value, interval: [low, high] } = constant.adaptive_ahead;
+    let verdict = match () {
+        () if low > 0.0 => "changing the allocation paid",
+        () if high < 0.0 => "changing the allocation cost",
+        () => "the record does not show that changing the allocation did anything",
+    };
+    Some(format!(
+        "Against a constant mix of its own average allocation, {:.1} %, which nobody knew beforehand, {} is ahead by \
+         {value:.2} [{low:.2}, {high:.2}]: {verdict}.",
+        100.0 * figures[main].mean_allocation,
+        figures[main].strategy
+    ))
+}
+
+fn holding(backtest: &Backtest, main: usize) -> String {
+    let figures = &backtest.analysis.figures[main];
+    let held = if figures.mean_allocation <= 0.0 {
+        "it never held stocks, so its returns are the bank's".into()
+    } else {
+        format!("on average {:.1} % in the risky asset", 100.0 * figures.mean_allocation)
+    };
+    format!(
+        "It held nothing but the bank in {:.0} % of {} months; {held}.",
+        100.0 * figures.all_bank_share,
+        backtest.months.len()
+    )
+}
+
+fn drawdown(figures: &[Figures], main: usize) -> Option<String> {
+    let stock = figures.iter().find(|figures| figures.strategy == "all-stock")?;
+    Some(format!(
+        "Its largest fall from a peak was {:.1} %, where all-stock fell {:.1} %; 100 became {:.0}, with all-stock {:.0}.",
+        100.0 * figures[main].max_drawdown,
+        100.0 * stock.max_drawdown,
+        figures[main].final_wealth,
+        stock.final_wealth
+    ))
+}
+
+/// How often the surrogate could not be trusted and the step was solved.
+fn guard(backtest: &Backtest, main: usize) -> String {
+    let decisions = &backtest.lines[main].decisions;
+    let resolved = decisions.iter().filter(|one| one.source == Some(AdviceSource::ResolvedOutsideDesign)).count();
+    format!(
+        "In {:.0} % of the months the state lay outside the design and the robust step was solved anew.",
+        100.0 * resolved as f64 / decisions.len() as f64
+    )
+}
+
+fn cost(backtest: &Backtest) -> String {
+    let basis_points = backtest.args.cost_bp;
+    if basis_points > 0.0 {
+        format!("Trading costs {basis_points} bp of what is traded in every account; no policy knows of it.")
+    } else {
+        "Trading costs nothing here: strategies that trade much look better than they would be.".into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures(strategy: &str, value: f64, ahead: [f64; 2], hindsight: bool) -> Figures {
+        let at = |value: f64, interval| Estimate { value, interval };
+        let none = at(0.0, [0.0; 2]);
+        Figures {
+            strategy: strategy.into(),
+            hindsight,
+            yearly_certainty_equivalent: at(value, [value - 1.0, value + 1.0]),
+            adaptive_ahead: at(0.5 * (ahead[0] + ahead[1]), ahead),
+            annual_mean: none,
+            annual_volatility: none,
+            sharpe_ratio: none,
+            annual_turnover: none,
+            max_drawdown: 0.2,
+            final_wealth: 120.0,
+            mean_allocation: 0.25,
+            all_bank_share: 0.5,
+        }
+    }
+
+    #[test]
+    fn the_verdict_follows_the_figures_either_way() {
+        let all = [
+            figures("adaptive, alpha 0.1", 103.0, [0.0; 2], false),
+            figures("all-bank", 104.0, [-1.5, -0.5], false),
+            figures("plug-in", 101.0, [1.0, 3.0], false),
+            figures("60/40", 103.5, [-1.5, 0.5], false),
+            figures("constant 25.0 %", 105.0, [-3.0, -1.0], true),
+        ];
+        assert_eq!(
+            ranking(&all, 0),
+            "adaptive, alpha 0.1: a year from 100 counts as 103.00 for certain, place 3 of 4. The first is all-bank with 104.00."
+        );
+        assert_eq!(
+            against(all[1..4].iter()),
+            "By the interval of the difference it is better than: plug-in. Worse than: all-bank. Not to be told apart from: 60/40."
+        );
+        assert!(timing(&all, 0).unwrap().ends_with("-2.00 [-3.00, -1.00]: changing the allocation cost."));
+        for (ahead, verdict) in [([1.0, 2.0], "changing the allocation paid."), ([-1.0, 2.0], "did anything.")] {
+            let hindsight = figures("constant", 100.0, ahead, true);
+            assert!(timing(&[all[0].clone(), hindsight], 0).unwrap().ends_with(verdict));
+        }
+    }
+}

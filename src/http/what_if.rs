@@ -1,0 +1,30 @@
+//! Questions that change nothing.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use axum::Json;
+use axum::extract::State;
+
+use super::extract::JsonBody;
+use super::problem::Problem;
+use crate::service::Service;
+use crate::service::metrics::ACTION_SECONDS;
+use crate::service::what_if::{WhatIf, WhatIfAnswer};
+
+/// The allocation were wealth, radius or the next return another; nothing is changed.
+#[utoipa::path(post, path = "/what-if", tag = "sessions", request_body = WhatIf,
+    responses(
+        (status = 200, description = "One point, or the points of a sweep.", body = WhatIfAnswer),
+        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "The session has reached its horizon.", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn what_if(
+    State(service): State<Arc<Service>>,
+    JsonBody(request): JsonBody<WhatIf>,
+) -> Result<Json<WhatIfAnswer>, Problem> {
+    let started = Instant::now();
+    let answer = service.sessions.what_if(request).await?;
+    metrics::histogram!(ACTION_SECONDS, "mode" => "what_if").record(started.elapsed().as_secs_f64());
+    Ok(Json(answer))
+}

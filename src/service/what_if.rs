@@ -1,0 +1,244 @@
+//! Questions about a session that change nothing: one hypothesis, or one part of it swept over a range.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::error::ServiceError;
+use super::observation::log_return_of;
+use super::sessions::Sessions;
+use crate::control::advisor::{Advice, AdviceMode};
+use crate::control::error::FieldError;
+use crate::control::what_if::{Hypothesis, HypotheticalRadius, Supposed};
+use crate::control::worst_case::{WorstCase, WorstLawSummary};
+
+/// Points of a sweep; each is one turn among the robust steps that requests cause.
+const POINTS: std::ops::RangeInclusive<usize> = 2..=101;
+
+/// What is supposed of a session. What is not given stays as it is.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WhatIf {
+    #[schema(example = "session_0123456789abcdef0123456789abcdef")]
+    pub session: String,
+    /// Wealth now.
+    pub wealth: Option<f64>,
+    /// Factor on the radius of the ball of the period advised; later periods keep their own.
+    #[schema(example = 0.5)]
+    pub radius_scale: Option<f64>,
+    /// That radius itself, in log-return.
+    pub radius: Option<f64>,
+    /// Return of the coming period, the advised allocation held through it; the advice is for the period after.
+    pub log_return: Option<f64>,
+    /// The same as `price / previous price - 1`.
+    pub simple_return: Option<f64>,
+    /// `worst_case`: solve the step, and show the whole worst-case law.
+    pub explain: Option<Explain>,
+    /// One of the above over a range instead; every point is solved.
+    pub sweep: Option<Sweep>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Explain {
+    WorstCase,
+}
+
+/// Exactly one range.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sweep {
+    pub wealth: Option<SweepRange>,
+    pub radius_scale: Option<SweepRange>,
+    pub radius: Option<SweepRange>,
+    pub log_return: Option<SweepRange>,
+    pub simple_return: Option<SweepRange>,
+}
+
+/// Evenly spaced values, both ends among them.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SweepRange {
+    #[schema(example = 0.0)]
+    pub from: f64,
+    #[schema(example = 2.0)]
+    pub to: f64,
+    /// 2 to 101.
+    #[schema(example = 21)]
+    pub points: usize,
+}
+
+/// The advice under one hypothesis.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct WhatIfPoint {
+    /// The period advised.
+    pub period: usize,
+    /// Wealth at its start.
+    pub wealth: f64,
+    /// The return supposed, if one was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub log_return: Option<f64>,
+    /// The factor on the radius supposed, if one was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_scale: Option<f64>,
+    #[serde(flatten)]
+    pub advice: Advice,
+    /// Lagrange multiplier of the ball: utility lost per unit of extra radius. Where the step was solved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gamma: Option<f64>,
+    /// The law that is worst for the allocation, in figures. Where the step was solved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub worst_law: Option<WorstLawSummary>,
+    /// That law itself, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub worst_case: Option<WorstCase>,
+}
+
+/// One point, or the points of a sweep in its order.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum WhatIfAnswer {
+    One {
+        session: String,
+        #[serde(flatten)]
+        point: Box<WhatIfPoint>,
+    },
+    Sweep {
+        session: String,
+        points: Vec<WhatIfPoint>,
+    },
+}
+
+impl SweepRange {
+    fn values(&self, field: &str) -> Result<Vec<f64>, FieldError> {
+        if !POINTS.contains(&self.points) {
+            let rule = format!("must lie in [{}, {}]", POINTS.start(), POINTS.end());
+            return Err(FieldError::new(format!("sweep.{field}.points"), self.points, rule));
+        }
+        let last = self.points - 1;
+        // Both ends are met exactly.
+        let at = |index| {
+            if index == last { self.to } else { self.from + (self.to - self.from) * index as f64 / last as f64 }
+        };
+        Ok((0..self.points).map(at).collect())
+    }
+}
+
+impl WhatIf {
+    fn hypothesis(&self) -> Result<Hypothesis, FieldError> {
+        let log_return = match (self.log_return, self.simple_return) {
+            (Some(_), Some(value)) => {
+                return Err(FieldError::new("simple_return", value, "must be absent where log_return is given"));
+            }
+            (None, Some(value)) => Some(log_return_of("simple_return", value)?),
+            (log_return, None) => log_return,
+        };
+        let radius = match (self.radius_scale, self.radius) {
+            (Some(_), Some(value)) => {
+                return Err(FieldError::new("radius", value, "must be absent where radius_scale is given"));
+            }
+            (Some(scale), None) => Some(HypotheticalRadius::Scaled(scale)),
+            (None, radius) => radius.map(HypotheticalRadius::Fixed),
+        };
+        let hypothesis = Hypothesis { wealth: self.wealth, log_return, radius };
+        hypothesis.check()?;
+        Ok(hypothesis)
+    }
+
+    /// Every hypothesis asked about, in order; ends of the ranges are checked, and with them all between.
+    fn hypotheses(&self) -> Result<Vec<Hypothesis>, FieldError> {
+        let Some(sweep) = &self.sweep else { return Ok(vec![self.hypothesis()?]) };
+        type Field = fn(&mut WhatIf) -> &mut Option<f64>;
+        let fields: [(&str, Option<SweepRange>, Field); 5] = [
+            ("wealth", sweep.wealth, |request| &mut request.wealth),
+            ("radius_scale", sweep.radius_scale, |request| &mut request.radius_scale),
+            ("radius", sweep.radius, |request| &mut request.radius),
+            ("log_return", sweep.log_return, |request| &mut request.log_return),
+            ("simple_return", sweep.simple_return, |request| &mut request.simple_return),
+        ];
+        let given: Vec<_> = fields.iter().filter_map(|(name, range, field)| Some((*name, (*range)?, *field))).collect();
+        let [(name, range, field)] = given[..] else {
+            return Err(FieldError::new("sweep", format!("{} ranges", given.len()), "must hold exactly one range"));
+        };
+        let mut point = self.clone();
+        if let Some(value) = *field(&mut point) {
+            return Err(FieldError::new(name, value, format!("must be absent where sweep.{name} is given")));
+        }
+        let mut at = |value: f64| {
+            *field(&mut point) = Some(value);
+            point.hypothesis()
+        };
+        // Rules are intervals: where both ends keep them, so does all between.
+        for (end, value) in [("from", range.from), ("to", range.to)] {
+            at(value).map_err(|error| match error.field == name {
+                true => FieldError { field: format!("sweep.{name}.{end}"), ..error },
+                false => error,
+            })?;
+        }
+        range.values(name)?.into_iter().map(at).collect()
+    }
+
+    /// A refusal of the return supposed, under the name by which the request gave it.
+    fn renamed(&self, error: FieldError) -> FieldError {
+        let sweep = self.sweep.clone().unwrap_or_default();
+        let given = match error.field.as_str() {
+            "log_return" if sweep.log_return.is_some() => "sweep.log_return",
+            "log_return" if sweep.simple_return.is_some() => "sweep.simple_return",
+            "log_return" if self.simple_return.is_some() => "simple_return",
+            _ => return error,
+        };
+        FieldError { field: given.into(), ..error }
+    }
+}
+
+impl Sessions {
+    /// The advice were something else the case; the session is not touched. Each point of a sweep waits its turn by
+    /// itself, so that a long one starves nobody, and a caller who goes away stops it.
+    ///
+    /// # Errors
+    /// A field breaks a rule, there is no such session, it has reached its horizon, or too much waits already.
+    pub async fn what_if(&self, request: WhatIf) -> Result<WhatIfAnswer, ServiceError> {
+        let hypotheses = request.hypotheses()?;
+        let live = self.get(&request.session).await?;
+        if live.observed >= live.row.horizon {
+            return Err(ServiceError::Completed { session: request.session, horizon: live.row.horizon });
+        }
+        let solves = request.sweep.is_some() || request.explain.is_some();
+        let mode = if solves { AdviceMode::Resolve } else { AdviceMode::Surrogate };
+        let mut points = Vec::with_capacity(hypotheses.len());
+        for hypothesis in hypotheses {
+            let (advisor, state, step) = (live.advisor.clone(), live.state.clone(), live.observed);
+            let turns = if solves || hypothesis.radius.is_some() { &self.resolving } else { &self.advising };
+            let supposed = turns.run(move || advisor.suppose(step, &state, &hypothesis, mode)).await?;
+            points.push(WhatIfPoint::new(
+                &hypothesis,
+                supposed.map_err(|error| request.renamed(error))?,
+                request.explain,
+            ));
+        }
+        let session = request.session;
+        match (request.sweep, points.pop()) {
+            (None, Some(point)) => Ok(WhatIfAnswer::One { session, point: Box::new(point) }),
+            (_, last) => Ok(WhatIfAnswer::Sweep { session, points: points.into_iter().chain(last).collect() }),
+        }
+    }
+}
+
+impl WhatIfPoint {
+    fn new(hypothesis: &Hypothesis, supposed: Supposed, explain: Option<Explain>) -> Self {
+        let radius_scale = match hypothesis.radius {
+            Some(HypotheticalRadius::Scaled(scale)) => Some(scale),
+            _ => None,
+        };
+        let worst_case = supposed.worst_case;
+        WhatIfPoint {
+            period: supposed.step + 1,
+            wealth: supposed.wealth,
+            log_return: hypothesis.log_return,
+            radius_scale,
+            advice: supposed.advice,
+            gamma: worst_case.as_ref().map(|worst| worst.multiplier),
+            worst_law: worst_case.as_ref().and_then(WorstCase::summary),
+            worst_case: worst_case.filter(|_| explain.is_some()),
+        }
+    }
+}
