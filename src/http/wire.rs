@@ -10,8 +10,9 @@ use crate::control::specification::{Framework, Specification};
 use crate::control::worst_case::WorstCase;
 use crate::service::error::ServiceError;
 use crate::service::jobs::Job as ServiceJob;
+use crate::service::live::Live;
 use crate::service::observation::Observed;
-use crate::service::sessions::{Action as ServiceAction, Live};
+use crate::service::sessions::Action as ServiceAction;
 use crate::store::{JobKind, JobState, ObservationRow, PolicySummary, SessionSummary};
 
 /// A job.
@@ -161,8 +162,8 @@ fn session_state(observed: usize, horizon: usize) -> SessionState {
 impl From<Live> for Session {
     fn from(live: Live) -> Self {
         Session {
-            period: live.observed + 1,
-            state: session_state(live.observed, live.row.horizon),
+            period: live.observed() + 1,
+            state: session_state(live.observed(), live.row.horizon),
             wealth: live.state.wealth,
             sample_size: live.state.law.sample_size(),
             session: live.row.session,

@@ -1,6 +1,10 @@
 //! A real server on a free port, and a client that tells stories.
 #![allow(dead_code)]
 
+pub mod place;
+pub mod postgres;
+pub mod process;
+
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
