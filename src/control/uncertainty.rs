@@ -1,10 +1,12 @@
-//! Uncertainty sets: the radius of the Wasserstein ball around an empirical law, rule by rule.
+//! Uncertainty sets: the radius of the Wasserstein ball around an empirical law, or of the confidence region of a normal
+//! law's estimates, rule by rule.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::specification::{Framework, RadiusRule, Specification};
 use crate::numerics::bridge::{AbsoluteBridges, Quantile};
+use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
 
 /// Bridge matrices kept at once; live sessions of one policy pass through a horizon's worth of sample sizes.
@@ -21,8 +23,8 @@ pub struct UncertaintySets {
 
 impl UncertaintySets {
     pub fn new(specification: &Specification) -> Self {
-        let uncertain = matches!(specification.problem.framework, Framework::Adaptive | Framework::Static);
-        let rule = specification.problem.radius;
+        let uncertain = !matches!(specification.problem.framework, Framework::KnownLaw | Framework::PlugIn);
+        let rule = specification.problem.radius_rule();
         UncertaintySets { rule, seed: specification.seed, uncertain, bridges: Mutex::new(HashMap::new()) }
     }
 
@@ -58,7 +60,7 @@ impl UncertaintySets {
         }
     }
 
-    /// Radius of the ball around `law`, in log-return.
+    /// Radius of the ball around `law`, in log-return; of the confidence region, in standard deviations of `law`.
     pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
         match self.rule {
             RadiusRule::Bridge { scale, .. } if self.uncertain => {
@@ -89,6 +91,7 @@ impl UncertaintySets {
             RadiusRule::Concentration { alpha, numerator, rate } => ((numerator / alpha).ln() / (rate * size)).sqrt(),
             RadiusRule::RootN { kappa } => kappa / size.sqrt(),
             RadiusRule::Fixed { radius } => radius,
+            RadiusRule::ChiSquare { alpha } => confidence_region::radius(alpha, sample_size),
         }
     }
 }
