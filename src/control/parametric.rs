@@ -47,7 +47,8 @@ impl ParametricStep<'_> {
         let field = GainField::tabulate(self.field, state, self.exact_returns());
         let nodes: Vec<f64> = self.region.angles().flat_map(|angle| self.region.at(angle).nodes()).collect();
         let pricing = Pricing { step: self, field: &field, rows: field.at(&nodes), quadrature: Quadrature::default() };
-        let (low, high) = bracket(lowest, highest, |action| pricing.robust_value(action));
+        let (low, high) =
+            bracket(lowest, highest, |action| pricing.tried(action).into_iter().fold(f64::INFINITY, f64::min));
         let (action, _) = maximise_concave_scalar(|action| pricing.robust_value(action), low, high, ACTION_TOLERANCE);
         pricing.solution(action)
     }
@@ -85,11 +86,14 @@ impl Pricing<'_, '_> {
         self.quadrature.expectation(&self.payoff(&self.field.at(&nodes), action))
     }
 
-    fn worst(&self, action: f64) -> WorstNormal {
+    /// Expected relative utility under the laws that every action is tried against.
+    fn tried(&self, action: f64) -> Vec<f64> {
         let payoff = self.payoff(&self.rows, action);
-        let laws = payoff.chunks_exact(self.quadrature.count());
-        let tried: Vec<f64> = laws.map(|payoff| self.quadrature.expectation(payoff)).collect();
-        self.step.region.worst(&tried, |law| self.expectation(law, action))
+        payoff.chunks_exact(self.quadrature.count()).map(|payoff| self.quadrature.expectation(payoff)).collect()
+    }
+
+    fn worst(&self, action: f64) -> WorstNormal {
+        self.step.region.worst(&self.tried(action), |law| self.expectation(law, action))
     }
 
     /// Worst expected relative utility of an action.

@@ -168,3 +168,57 @@ impl ConfidenceRegion {
         ((at(1.0 - RADIUS_STEP) - at(1.0 + RADIUS_STEP)) / (2.0 * RADIUS_STEP * self.radius)).max(0.0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Payoffs with their expectations under N(mu, s2) in closed form.
+    type Expectation = fn(f64, f64) -> f64;
+    const PAYOFFS: [(fn(f64) -> f64, Expectation); 4] = [
+        (|z| z.exp(), |mu, s2| (mu + 0.5 * s2).exp()),
+        (|z| -(-3.0 * z).exp(), |mu, s2| -(-3.0 * mu + 4.5 * s2).exp()),
+        (|z| (z - 0.02).powi(2), |mu, s2| (mu - 0.02).powi(2) + s2),
+        (|z| (9.0 * z).cos(), |mu, s2| (-40.5 * s2).exp() * (9.0 * mu).cos()),
+    ];
+
+    fn region(size: usize) -> ConfidenceRegion {
+        ConfidenceRegion { estimate: NormalLaw { mean: 0.03, variance: 0.01 }, radius: radius(0.1, size) }
+    }
+
+    fn expectation(payoff: fn(f64) -> f64, law: NormalLaw) -> f64 {
+        let values: Vec<f64> = law.nodes().map(payoff).collect();
+        Quadrature::default().expectation(&values)
+    }
+
+    #[test]
+    fn the_worst_of_the_boundary_is_the_worst_of_the_whole_region() {
+        // From 9 returns down the ellipse passes zero variance.
+        for size in [3, 8, 10, 20, 500] {
+            let region = region(size);
+            for (payoff, exact) in PAYOFFS {
+                let tried: Vec<f64> = region.angles().map(|angle| expectation(payoff, region.at(angle))).collect();
+                let worst = region.worst(&tried, |law| expectation(payoff, law));
+                assert!((exact(worst.law.mean, worst.law.variance) - worst.expectation).abs() < 1e-13);
+                let (width, height) = (region.radius * 0.1, region.radius * 2.0_f64.sqrt() * 0.01);
+                for row in -400..=400 {
+                    for column in -400..=400 {
+                        let (x, y) = (f64::from(column) / 400.0, f64::from(row) / 400.0);
+                        let (mu, s2) = (0.03 + width * x, 0.01 + height * y);
+                        if x * x + y * y <= 1.0 && s2 >= 0.0 {
+                            assert!(exact(mu, s2) >= worst.expectation - 1e-12, "{size}: {mu} {s2} below {worst:?}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_level_is_that_of_chi_square_with_two_degrees_of_freedom() {
+        // P(chi-square(2) > 4.605170) = 0.1.
+        assert!((radius(0.1, 20).powi(2) * 20.0 - 4.605_170_185_988_09).abs() < 1e-12);
+        assert_eq!(radius(1.0, 20), 0.0);
+        assert_eq!(region(20).at(0.0), NormalLaw { mean: 0.03 + radius(0.1, 20) * 0.1, variance: 0.01 });
+    }
+}
