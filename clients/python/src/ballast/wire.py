@@ -14,7 +14,7 @@ FeatureMap: TypeAlias = Literal["standardized", "raw_moments"]
 """How a state becomes the inputs of a surrogate."""
 
 
-Framework: TypeAlias = Literal["adaptive", "static", "known_law", "plug_in"]
+Framework: TypeAlias = Literal["adaptive", "static", "known_law", "plug_in", "parametric_static", "parametric_adaptive"]
 """What the investor is robust against, and whether observing returns changes it."""
 
 
@@ -177,8 +177,21 @@ class RadiusRule4(TypedDict):
     rule: Literal["fixed"]
 
 
-RadiusRule: TypeAlias = RadiusRule1 | RadiusRule2 | RadiusRule3 | RadiusRule4
-"""How the radius of the Wasserstein ball follows from the sample of size n."""
+class RadiusRule5(TypedDict):
+    """
+    `sqrt(kappa / n)` estimated standard deviations, kappa the (1 - alpha)-quantile of chi-square with two degrees
+    of freedom: `n (mu - m)^2 / v + n (s2 - v)^2 / (2 v^2) <= kappa`, m and v the sample's mean and variance.
+    """
+
+    alpha: NotRequired[float]
+    rule: Literal["chi_square"]
+
+
+RadiusRule: TypeAlias = RadiusRule1 | RadiusRule2 | RadiusRule3 | RadiusRule4 | RadiusRule5
+"""
+How the radius of the uncertainty set follows from the sample of size n: `chi_square` of the parametric frameworks'
+confidence region, every other of the Wasserstein ball.
+"""
 
 
 class SamplingLaw1(TypedDict):
@@ -266,6 +279,7 @@ class Uncertainty(TypedDict):
     quantile_standard_error: NotRequired[float | None]
     """Simulation standard error of the quantile."""
     radius: float
+    """As in an advice."""
 
 
 class UtilitySpecification1(TypedDict):
@@ -292,16 +306,13 @@ UtilitySpecification: TypeAlias = UtilitySpecification1 | UtilitySpecification2 
 """Utility of terminal wealth, always maximised."""
 
 
-class WorstCase(TypedDict):
-    """The law that is worst for the advised allocation, as a transport of the empirical law."""
+class WorstNormalLaw(TypedDict):
+    """The worst mean and variance of the log-return of one period, within the confidence region of the estimates."""
 
-    multiplier: float
-    """Lagrange multiplier of the ball: utility lost per unit of extra radius."""
-    transport: list[TransportedMass]
-    duality_gap: float
-    """Difference between primal and dual value, in log certainty equivalent."""
-    sentence: str
-    """The worst case in one plain sentence."""
+    mean: float
+    variance: float
+    estimated_mean: float
+    estimated_variance: float
 
 
 class Advice(TypedDict):
@@ -314,7 +325,10 @@ class Advice(TypedDict):
     floor: float
     """Terminal wealth of all-bank: no law can take it away."""
     radius: float
-    """Radius of the Wasserstein ball, in log-return."""
+    """
+    Radius of the uncertainty set: of the Wasserstein ball, in log-return; in the parametric frameworks half the width
+    of the confidence region in the mean, in estimated standard deviations of a return.
+    """
     sample_size: int
     surrogate_sd: float
     """Predicted standard deviation of the log certainty equivalent."""
@@ -372,7 +386,7 @@ class ProblemSpecification(TypedDict):
     action_interval: NotRequired[list[float]]
     """Share of wealth that may be held in the risky asset: `[0, highest]`."""
     utility: NotRequired[UtilitySpecification]
-    radius: NotRequired[RadiusRule]
+    radius: NotRequired[RadiusRule | None]
     support: NotRequired[Interval | None]
     law: NotRequired[SamplingLaw | None]
     history: list[float]
@@ -423,7 +437,10 @@ class StepDiagnostics(TypedDict):
     uncertified_share: float
     """Share of the design points whose window could not be certified: mass might want to leave it."""
     duality_gap: float
-    """Largest difference between the primal and the dual value of a robust step, in log certainty equivalent."""
+    """
+    Largest difference between the primal and the dual value of a robust step, in log certainty equivalent; 0 in the
+    parametric frameworks, whose step has no dual.
+    """
     value: NotRequired[SurrogateDiagnostics | None]
     policy: NotRequired[SurrogateDiagnostics | None]
 
@@ -432,8 +449,25 @@ class SurrogateSpecification(TypedDict):
     target: NotRequired[SurrogateTarget]
     features: NotRequired[FeatureMap]
     moment_count: NotRequired[int]
-    """Number of moments of the law that enter the features."""
+    """Number of moments of the law that enter the features; at most two in the parametric frameworks, whose law has no more."""
     bounds: NotRequired[HyperparameterBounds]
+
+
+class WorstCase(TypedDict):
+    """
+    The law that is worst for the advised allocation: a transport of the empirical law, or, in the parametric frameworks, a
+    normal law.
+    """
+
+    multiplier: float
+    """Lagrange multiplier of the uncertainty set: utility lost per unit of extra radius."""
+    transport: list[TransportedMass]
+    """Empty in the parametric frameworks."""
+    normal: NotRequired[WorstNormalLaw | None]
+    duality_gap: float
+    """Difference between primal and dual value, in log certainty equivalent; 0 in the parametric frameworks."""
+    sentence: str
+    """The worst case in one plain sentence."""
 
 
 class Action(Advice):
