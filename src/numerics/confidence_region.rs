@@ -173,9 +173,11 @@ impl ConfidenceRegion {
 mod tests {
     use super::*;
 
-    /// Payoffs with their expectations under N(mu, s2) in closed form.
+    type Function = fn(f64) -> f64;
     type Expectation = fn(f64, f64) -> f64;
-    const PAYOFFS: [(fn(f64) -> f64, Expectation); 4] = [
+
+    /// Payoffs with their expectations under N(mu, s2) in closed form.
+    const PAYOFFS: [(Function, Expectation); 4] = [
         (|z| z.exp(), |mu, s2| (mu + 0.5 * s2).exp()),
         (|z| -(-3.0 * z).exp(), |mu, s2| -(-3.0 * mu + 4.5 * s2).exp()),
         (|z| (z - 0.02).powi(2), |mu, s2| (mu - 0.02).powi(2) + s2),
@@ -186,7 +188,7 @@ mod tests {
         ConfidenceRegion { estimate: NormalLaw { mean: 0.03, variance: 0.01 }, radius: radius(0.1, size) }
     }
 
-    fn expectation(payoff: fn(f64) -> f64, law: NormalLaw) -> f64 {
+    fn expectation(payoff: Function, law: NormalLaw) -> f64 {
         let values: Vec<f64> = law.nodes().map(payoff).collect();
         Quadrature::default().expectation(&values)
     }
