@@ -11,7 +11,7 @@ use super::bellman::RobustSolution;
 use super::context::ProblemContext;
 use super::error::FieldError;
 use super::policy::Policy;
-use super::specification::{Framework, Specification, UtilitySpecification};
+use super::specification::{Specification, UtilitySpecification};
 use super::state::{State, next_state};
 use super::surrogate::{NextValue, SingleSolution, Solution, TargetMap, ValueSurrogate};
 use super::utility::depends_on_wealth;
@@ -51,7 +51,8 @@ pub struct Advice {
     pub certainty_equivalent: f64,
     /// Terminal wealth of all-bank: no law can take it away.
     pub floor: f64,
-    /// Radius of the Wasserstein ball, in log-return.
+    /// Radius of the uncertainty set: of the Wasserstein ball, in log-return; in the parametric frameworks half the width
+    /// of the confidence region in the mean, in estimated standard deviations of a return.
     pub radius: f64,
     pub sample_size: usize,
     /// Predicted standard deviation of the log certainty equivalent.
@@ -71,6 +72,7 @@ pub struct Uncertainty {
     pub quantile: Option<f64>,
     /// Simulation standard error of the quantile.
     pub quantile_standard_error: Option<f64>,
+    /// As in an advice.
     pub radius: f64,
 }
 
@@ -131,15 +133,15 @@ impl Advisor {
     /// The state a session starts from: `history` and `wealth` default to the specification's.
     ///
     /// # Errors
-    /// A history or wealth that breaks a rule; a history other than the policy's own under the static framework,
-    /// whose ball is frozen at it.
+    /// A history or wealth that breaks a rule; a history other than the policy's own under a static framework, whose
+    /// uncertainty set is frozen at it.
     pub fn initial_state(&self, history: Option<&[f64]>, wealth: Option<f64>) -> Result<State, FieldError> {
         let problem = &self.specification().problem;
         let own = &problem.history;
         let history = history.unwrap_or(own);
-        if problem.framework == Framework::Static && history != own {
+        if problem.framework.is_frozen() && history != own {
             let value = format!("{} values", history.len());
-            return Err(FieldError::new("history", value, "must be the policy's own under the static framework"));
+            return Err(FieldError::new("history", value, "must be the policy's own under a static framework"));
         }
         State::new(history, wealth.unwrap_or(problem.initial_wealth))
     }
@@ -265,9 +267,7 @@ impl Advisor {
 
     /// Sample size, moments, quantile and radius of a state.
     pub fn uncertainty(&self, state: &State) -> Uncertainty {
-        let frozen = EmpiricalDistribution::new(&self.specification().problem.history);
-        let law = if self.specification().problem.framework == Framework::Static { &frozen } else { &state.law };
-        let quantile = self.context.sets.quantile(law);
+        let quantile = self.context.sets.quantile(&self.context.learned_law(state));
         Uncertainty {
             sample_size: state.law.sample_size(),
             moments: state.law.raw_moments(self.specification().surrogate.moment_count),

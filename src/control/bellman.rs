@@ -10,8 +10,9 @@ use super::gain_field::{FieldContext, FieldRows, GainField};
 use super::specification::Interval;
 use super::state::{State, growth};
 use super::utility::RelativeUtility;
+use crate::numerics::confidence_region::NormalLaw;
 use crate::numerics::minimise::maximise_concave_scalar;
-use crate::numerics::wasserstein::{WassersteinBall, WorstLaw};
+use crate::numerics::wasserstein::{Move, WassersteinBall, WorstLaw};
 
 /// Equal parts of the action interval that are tried before the search between the best one's neighbours.
 const COARSE_ACTIONS: usize = 8;
@@ -32,7 +33,7 @@ const WINDOW_GROWTHS: usize = 4;
 /// Log-returns closer than this are one.
 const COINCIDENT: f64 = 1e-12;
 /// Relative utility that sums of a few hundred roundings may lose.
-const LOSS_OF_ROUNDING: f64 = 1e-14;
+pub const LOSS_OF_ROUNDING: f64 = 1e-14;
 /// Parts into which each interval between exact returns is cut for the support, and again around destinations.
 const SUPPORT_PARTS: usize = 4;
 const REFINED_PARTS: usize = 8;
@@ -59,14 +60,22 @@ pub struct RobustSolution {
     pub extended_action: f64,
     /// Log certainty equivalent over the all-bank floor.
     pub floor_gain: f64,
-    /// Primal minus dual value, in log certainty equivalent.
+    /// Primal minus dual value, in log certainty equivalent; 0 over normal laws, which are searched without a dual.
     pub duality_gap: f64,
     /// Lost relative utility per unit of radius.
     pub multiplier: f64,
-    pub support: Vec<f64>,
-    pub worst: WorstLaw,
-    /// True where the multiplier proves that no mass wants to leave the window.
+    pub adversary: Adversary,
+    /// True where the multiplier proves that no mass wants to leave the window, and over normal laws, which have none.
     pub certified: bool,
+}
+
+/// The law that is worst for an action.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Adversary {
+    /// Of a ball: the centre's masses moved about a support.
+    Transport { support: Vec<f64>, moves: Vec<Move> },
+    /// Of a confidence region, around its estimate.
+    Normal { worst: NormalLaw, estimate: NormalLaw },
 }
 
 /// The support with the centre's masses on it.
@@ -98,9 +107,7 @@ impl RobustStep<'_> {
         let field = GainField::tabulate(self.field, state, returns.clone());
         let mut grid = self.grid(subdivided(&returns, SUPPORT_PARTS, |_| true));
         let mut rows = field.at(&grid.support);
-        let (coarse, _) = self.best_action(&grid, &rows, lowest, highest);
-        let part = (highest - lowest) / COARSE_ACTIONS as f64;
-        let (low, high) = ((coarse - part).max(lowest), (coarse + part).min(highest));
+        let (low, high) = bracket(lowest, highest, |action| self.robust_value(&grid, &rows, action));
         let polished = |grid: &Grid, rows: &FieldRows, tolerance: f64| {
             maximise_concave_scalar(|action| self.robust_value(grid, rows, action), low, high, tolerance).0
         };
@@ -128,8 +135,7 @@ impl RobustStep<'_> {
             duality_gap: gain - self.utility.inverse(worst.dual),
             multiplier: worst.multiplier,
             certified: self.certified(&grid, &payoff, &worst, action),
-            worst,
-            support: grid.support,
+            adversary: Adversary::Transport { support: grid.support, moves: worst.moves },
         }
     }
 
@@ -156,20 +162,6 @@ impl RobustStep<'_> {
         self.ball(grid).worst_expectation(&self.payoff(rows, action)).0
     }
 
-    fn best_action(&self, grid: &Grid, rows: &FieldRows, low: f64, high: f64) -> (f64, f64) {
-        let value = |action: f64| self.robust_value(grid, rows, action);
-        let part = (high - low) / COARSE_ACTIONS as f64;
-        let mut best = (low, value(low));
-        for index in 1..=COARSE_ACTIONS {
-            let action = low + index as f64 * part;
-            let tried = value(action);
-            if tried > best.1 {
-                best = (action, tried);
-            }
-        }
-        best
-    }
-
     /// Support points that receive mass from elsewhere.
     fn destinations(&self, grid: &Grid, rows: &FieldRows, action: f64) -> Vec<bool> {
         let mut near = vec![false; grid.support.len()];
@@ -179,27 +171,10 @@ impl RobustStep<'_> {
         near
     }
 
-    /// An action at a bound, moved past it by the Newton step that the one-sided derivatives there suggest: the optimum
-    /// of the parabola that touches the robust gain at the bound, so that the target crosses the bound without a kink.
     fn extended(&self, grid: &Grid, rows: &FieldRows, action: f64, gain: f64) -> f64 {
-        let highest = self.field.highest_action;
-        let inward = if action <= 0.0 {
-            1.0
-        } else if action >= highest {
-            -1.0
-        } else {
-            return action;
-        };
-        let gain_at =
-            |steps: f64| self.utility.inverse(self.robust_value(grid, rows, action + inward * steps * DERIVATIVE_STEP));
-        let (near, far) = (gain_at(1.0), gain_at(2.0));
-        let slope = (4.0 * near - far - 3.0 * gain) / (2.0 * DERIVATIVE_STEP);
-        let curvature = (2.0 * near - far - gain) / (DERIVATIVE_STEP * DERIVATIVE_STEP);
+        let gain_at = |tried: f64| self.utility.inverse(self.robust_value(grid, rows, tried));
         let reference = self.utility.relative_risk_aversion() * self.variance;
-        let curvature = curvature.clamp(reference / CURVATURE_RANGE, reference * CURVATURE_RANGE);
-        // At a bound the robust gain does not rise inwards: what rounding says otherwise is dropped. Far beyond the bound
-        // the target levels off, smoothly, for what is never wanted needs no resolution.
-        action + inward * LARGEST_EXTENSION * (slope / curvature / LARGEST_EXTENSION).min(0.0).tanh()
+        extended_action(action, self.field.highest_action, gain, reference, gain_at)
     }
 
     /// Proves from the multiplier that no law with mass outside the window does worse.
@@ -275,6 +250,40 @@ impl RobustStep<'_> {
         let (support, masses) = all.into_iter().unzip();
         Grid { support, masses }
     }
+}
+
+/// The neighbours of the best of the actions that cut `[lowest, highest]` into equal parts.
+pub fn bracket(lowest: f64, highest: f64, value: impl Fn(f64) -> f64) -> (f64, f64) {
+    let part = (highest - lowest) / COARSE_ACTIONS as f64;
+    let mut best = (lowest, value(lowest));
+    for index in 1..=COARSE_ACTIONS {
+        let action = lowest + index as f64 * part;
+        let tried = value(action);
+        if tried > best.1 {
+            best = (action, tried);
+        }
+    }
+    ((best.0 - part).max(lowest), (best.0 + part).min(highest))
+}
+
+/// An action at a bound, moved past it by the Newton step that the one-sided derivatives there suggest: the optimum
+/// of the parabola that touches the robust gain at the bound, so that the target crosses the bound without a kink.
+/// `reference` is the curvature expected: relative risk aversion times variance.
+pub fn extended_action(action: f64, highest: f64, gain: f64, reference: f64, gain_at: impl Fn(f64) -> f64) -> f64 {
+    let inward = if action <= 0.0 {
+        1.0
+    } else if action >= highest {
+        -1.0
+    } else {
+        return action;
+    };
+    let [near, far] = [1.0, 2.0].map(|steps| gain_at(action + inward * steps * DERIVATIVE_STEP));
+    let slope = (4.0 * near - far - 3.0 * gain) / (2.0 * DERIVATIVE_STEP);
+    let curvature = (2.0 * near - far - gain) / (DERIVATIVE_STEP * DERIVATIVE_STEP);
+    let curvature = curvature.clamp(reference / CURVATURE_RANGE, reference * CURVATURE_RANGE);
+    // At a bound the robust gain does not rise inwards: what rounding says otherwise is dropped. Far beyond the bound
+    // the target levels off, smoothly, for what is never wanted needs no resolution.
+    action + inward * LARGEST_EXTENSION * (slope / curvature / LARGEST_EXTENSION).min(0.0).tanh()
 }
 
 /// `points` with the chosen intervals cut into equal parts.

@@ -1,15 +1,19 @@
 //! The problem with everything that does not change from step to step, and the robust step at one state of it.
 
+use std::borrow::Cow;
+
 use super::bellman::{RobustSolution, RobustStep};
 use super::design::centre;
 use super::error::TrainError;
 use super::features::{FeatureSelection, LawSummary};
 use super::gain_field::FieldContext;
-use super::specification::{Framework, Specification};
+use super::parametric::ParametricStep;
+use super::specification::Specification;
 use super::state::{State, floor};
 use super::surrogate::NextValue;
 use super::uncertainty::{Radii, UncertaintySets};
 use super::utility::RelativeUtility;
+use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::exponential_mean::ExponentialMean;
 use crate::numerics::moments::CentralMoments;
@@ -31,12 +35,27 @@ impl ProblemContext {
         ProblemContext { specification: specification.clone(), sets, selection }
     }
 
-    /// Radius of the ball at a state: of the history's law where the framework does not learn.
+    /// Radius of the uncertainty set at a state: of the history's law where that is frozen.
     pub fn radius(&self, state: &State) -> f64 {
-        match self.specification.problem.framework {
-            Framework::Static => self.sets.radius(&EmpiricalDistribution::new(&self.specification.problem.history)),
-            _ => self.sets.radius(&state.law),
+        self.sets.radius(&self.learned_law(state))
+    }
+
+    /// The law that the uncertainty set is built on.
+    pub fn learned_law<'s>(&self, state: &'s State) -> Cow<'s, EmpiricalDistribution> {
+        let problem = &self.specification.problem;
+        if problem.framework.is_frozen() {
+            Cow::Owned(EmpiricalDistribution::new(&problem.history))
+        } else {
+            Cow::Borrowed(&state.law)
         }
+    }
+
+    /// The confidence region of the parametric frameworks at a state.
+    fn region(&self, state: &State) -> ConfidenceRegion {
+        let law = self.learned_law(state);
+        let moments = CentralMoments::of(&law);
+        let estimate = NormalLaw { mean: moments.mean(), variance: moments.variance() };
+        ConfidenceRegion { estimate, radius: self.sets.radius(&law) }
     }
 
     /// Terminal all-bank wealth from a state at `step`.
@@ -127,17 +146,22 @@ impl ProblemContext {
         radius: f64,
     ) -> Result<RobustSolution, TrainError> {
         let problem = &self.specification.problem;
+        let field = FieldContext {
+            problem: self,
+            next,
+            rate_per_step: problem.rate_per_step,
+            highest_action: problem.action_interval[1],
+        };
+        let utility = RelativeUtility::new(problem.utility, self.floor(step, state));
+        if problem.framework.is_parametric() {
+            return Ok(ParametricStep { field, utility, region: self.region(state) }.solve(state, actions));
+        }
         let (atoms, masses) = centre(problem, state)?;
         let mean: f64 = atoms.iter().zip(&masses).map(|(atom, mass)| atom * mass).sum();
         let variance = atoms.iter().zip(&masses).map(|(atom, mass)| mass * (atom - mean).powi(2)).sum();
         let robust = RobustStep {
-            field: FieldContext {
-                problem: self,
-                next,
-                rate_per_step: problem.rate_per_step,
-                highest_action: problem.action_interval[1],
-            },
-            utility: RelativeUtility::new(problem.utility, self.floor(step, state)),
+            field,
+            utility,
             support: problem.support,
             atoms: &atoms,
             masses: &masses,

@@ -9,9 +9,12 @@ use std::ops::Range;
 use rand::RngExt;
 
 use super::error::FieldError;
-use super::specification::{Framework, InitialLaws, Interval, ProblemSpecification, SamplingLaw, Specification};
+use super::specification::{
+    Framework, InitialLaws, Interval, ProblemSpecification, RadiusRule, SamplingLaw, Specification,
+};
 use super::state::{State, next_wealth};
 use super::utility::depends_on_wealth;
+use crate::numerics::confidence_region::{self, ConfidenceRegion, NormalLaw};
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::streams::stream;
@@ -141,7 +144,11 @@ fn wealth_ladders(problem: &ProblemSpecification, start: Interval, count: usize)
         _ => merged(EmpiricalDistribution::new(&problem.history).atoms()),
     };
     let mean: f64 = law.0.iter().zip(&law.1).map(|(atom, mass)| atom * mass).sum();
-    let variance: f64 = law.0.iter().zip(&law.1).map(|(atom, mass)| mass * (atom - mean).powi(2)).sum();
+    let mut variance: f64 = law.0.iter().zip(&law.1).map(|(atom, mass)| mass * (atom - mean).powi(2)).sum();
+    if let RadiusRule::ChiSquare { alpha } = problem.radius_rule() {
+        let radius = confidence_region::radius(alpha, problem.history.len());
+        variance = ConfidenceRegion { estimate: NormalLaw { mean, variance }, radius }.largest_variance();
+    }
     let ladder = |point: usize, step: usize| {
         let elapsed = step as f64;
         let spread = REACHED_DEVIATIONS * problem.action_interval[1] * (elapsed * variance).sqrt();
@@ -163,8 +170,8 @@ pub fn centre(problem: &ProblemSpecification, state: &State) -> Result<(Vec<f64>
         (Framework::KnownLaw, None) => {
             Err(FieldError::new("problem.law", "null", "must be given in the known_law framework"))
         }
-        (Framework::Static, _) => Ok(merged(EmpiricalDistribution::new(&problem.history).atoms())),
-        (Framework::Adaptive | Framework::PlugIn, _) => Ok(merged(state.law.atoms())),
+        (framework, _) if framework.is_frozen() => Ok(merged(EmpiricalDistribution::new(&problem.history).atoms())),
+        _ => Ok(merged(state.law.atoms())),
     }
 }
 

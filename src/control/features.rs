@@ -10,6 +10,8 @@ use crate::numerics::moments::CentralMoments;
 
 /// Standard deviations below this count as this: the log stays finite.
 const SMALLEST_DEVIATION: f64 = 1e-8;
+/// Mean and variance say everything of a normal law, and of its confidence region at one sample size.
+const NORMAL_MOMENTS: usize = 2;
 /// Radii below this count as this.
 const SMALLEST_RADIUS: f64 = 1e-12;
 /// A feature whose spread over the design is below this share of its size carries no information.
@@ -39,13 +41,15 @@ impl FeatureSelection {
     /// `radius_varies`: whether laws of one sample size have different radii.
     pub fn new(specification: &Specification, radius_varies: bool) -> Self {
         let learns = specification.problem.framework.learns();
+        let parametric = specification.problem.framework.is_parametric();
+        let most = if parametric { NORMAL_MOMENTS } else { usize::MAX };
         let map = specification.surrogate.features;
         FeatureSelection {
             map,
             wealth: depends_on_wealth(specification.problem.utility),
-            moments: if learns { specification.surrogate.moment_count } else { 0 },
+            moments: if learns { specification.surrogate.moment_count.min(most) } else { 0 },
             radius: learns && radius_varies && map == FeatureMap::Standardized,
-            robust_excess: learns && map == FeatureMap::Standardized,
+            robust_excess: learns && !parametric && map == FeatureMap::Standardized,
         }
     }
 

@@ -52,8 +52,12 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
     }
     open_above_zero("problem.action_interval[1]", highest, 1.0)?;
     utility(problem)?;
-    radius(&problem.radius, problem)?;
+    radius(&problem.radius_rule(), problem)?;
     if let Some(support) = problem.support {
+        if problem.framework.is_parametric() {
+            let rule = "must be absent in the parametric frameworks: a normal law has no bounds";
+            return Err(FieldError::new("problem.support", "an object", rule));
+        }
         interval("problem.support", support, -20.0, 20.0)?;
     }
     match (&problem.law, problem.framework) {
@@ -102,6 +106,27 @@ fn utility(problem: &ProblemSpecification) -> Result<(), FieldError> {
 }
 
 fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), FieldError> {
+    let name = match rule {
+        RadiusRule::Bridge { .. } => "bridge",
+        RadiusRule::Concentration { .. } => "concentration",
+        RadiusRule::RootN { .. } => "root_n",
+        RadiusRule::Fixed { .. } => "fixed",
+        RadiusRule::ChiSquare { .. } => "chi_square",
+    };
+    match (problem.framework.is_parametric(), name == "chi_square") {
+        (true, false) => {
+            return Err(FieldError::new(
+                "problem.radius.rule",
+                name,
+                "must be chi_square in the parametric frameworks",
+            ));
+        }
+        (false, true) => {
+            let rule = "must be another unless the framework is parametric_static or parametric_adaptive";
+            return Err(FieldError::new("problem.radius.rule", name, rule));
+        }
+        _ => {}
+    }
     match *rule {
         RadiusRule::Bridge { alpha, paths, scale } => {
             within("problem.radius.alpha", alpha, 1e-3, 0.999)?;
@@ -120,6 +145,7 @@ fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), Field
         }
         RadiusRule::RootN { kappa } => within("problem.radius.kappa", kappa, 0.0, 100.0),
         RadiusRule::Fixed { radius } => within("problem.radius.radius", radius, 0.0, 10.0),
+        RadiusRule::ChiSquare { alpha } => within("problem.radius.alpha", alpha, 1e-3, 1.0),
     }
 }
 

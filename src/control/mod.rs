@@ -11,6 +11,7 @@ pub mod features;
 pub mod fitting;
 pub mod gain_field;
 pub mod limits;
+pub mod parametric;
 pub mod policy;
 pub mod pool;
 pub mod specification;

@@ -30,7 +30,8 @@ pub struct StepDiagnostics {
     pub all_bank_share: f64,
     /// Share of the design points whose window could not be certified: mass might want to leave it.
     pub uncertified_share: f64,
-    /// Largest difference between the primal and the dual value of a robust step, in log certainty equivalent.
+    /// Largest difference between the primal and the dual value of a robust step, in log certainty equivalent; 0 in the
+    /// parametric frameworks, whose step has no dual.
     pub duality_gap: f64,
     /// Diagnostics of the value surrogate; absent where the step stores a single state's solution.
     pub value: Option<SurrogateDiagnostics>,

@@ -41,9 +41,11 @@ pub struct ProblemSpecification {
     pub action_interval: [f64; 2],
     #[serde(default)]
     pub utility: UtilitySpecification,
-    #[serde(default)]
-    pub radius: RadiusRule,
-    /// Bounds on the log-returns the adversary may use; without it the certified window decides.
+    /// Default: `bridge`; `chi_square` in the parametric frameworks, which take no other.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius: Option<RadiusRule>,
+    /// Bounds on the log-returns the adversary may use; without it the certified window decides. Refused by the
+    /// parametric frameworks: a normal law has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub support: Option<Interval>,
     /// The return law of the `known_law` framework; refused by the others.
@@ -66,12 +68,26 @@ pub enum Framework {
     KnownLaw,
     /// The empirical law is learned and taken as true: radius zero.
     PlugIn,
+    /// Returns are taken as normal: the joint confidence region for their mean and variance, frozen at the history.
+    ParametricStatic,
+    /// The same region, estimated anew with every return (Bielecki, Chen, Cialenco, Cousin and Jeanblanc 2019).
+    ParametricAdaptive,
 }
 
 impl Framework {
     /// True where the empirical law is part of the state.
     pub fn learns(self) -> bool {
-        matches!(self, Framework::Adaptive | Framework::PlugIn)
+        matches!(self, Framework::Adaptive | Framework::PlugIn | Framework::ParametricAdaptive)
+    }
+
+    /// True where the uncertainty set is frozen at the history.
+    pub fn is_frozen(self) -> bool {
+        matches!(self, Framework::Static | Framework::ParametricStatic)
+    }
+
+    /// True where returns are taken as normal.
+    pub fn is_parametric(self) -> bool {
+        matches!(self, Framework::ParametricStatic | Framework::ParametricAdaptive)
     }
 }
 
@@ -93,7 +109,8 @@ impl Default for UtilitySpecification {
     }
 }
 
-/// How the radius of the Wasserstein ball follows from the sample of size n.
+/// How the radius of the uncertainty set follows from the sample of size n: `chi_square` of the parametric frameworks'
+/// confidence region, every other of the Wasserstein ball.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "rule", rename_all = "snake_case", deny_unknown_fields)]
 pub enum RadiusRule {
@@ -119,11 +136,28 @@ pub enum RadiusRule {
     RootN { kappa: f64 },
     /// The same radius at every sample size.
     Fixed { radius: f64 },
+    /// `sqrt(kappa / n)` estimated standard deviations, kappa the (1 - alpha)-quantile of chi-square with two degrees
+    /// of freedom: `n (mu - m)^2 / v + n (s2 - v)^2 / (2 v^2) <= kappa`, m and v the sample's mean and variance.
+    ChiSquare {
+        #[serde(default = "defaults::alpha")]
+        alpha: f64,
+    },
 }
 
 impl Default for RadiusRule {
     fn default() -> Self {
         RadiusRule::Bridge { alpha: defaults::alpha(), paths: defaults::paths(), scale: defaults::scale() }
+    }
+}
+
+impl ProblemSpecification {
+    /// The radius rule given, or the framework's default.
+    pub fn radius_rule(&self) -> RadiusRule {
+        let default = || match self.framework.is_parametric() {
+            true => RadiusRule::ChiSquare { alpha: defaults::alpha() },
+            false => RadiusRule::default(),
+        };
+        self.radius.unwrap_or_else(default)
     }
 }
 
@@ -194,7 +228,7 @@ pub struct SurrogateSpecification {
     pub target: SurrogateTarget,
     #[serde(default)]
     pub features: FeatureMap,
-    /// Number of moments of the law that enter the features.
+    /// Number of moments of the law that enter the features; at most two in the parametric frameworks, whose law has no more.
     #[serde(default = "defaults::moment_count")]
     pub moment_count: usize,
     #[serde(default)]
@@ -289,6 +323,7 @@ impl Specification {
     pub fn completed(mut self) -> Result<Self, FieldError> {
         limits::check(&self)?;
         let learns = self.problem.framework.learns();
+        self.problem.radius = Some(self.problem.radius_rule());
         self.design.count.get_or_insert(if learns {
             limits::DEFAULT_COUNT
         } else {

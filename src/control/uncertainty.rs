@@ -1,14 +1,18 @@
-//! Uncertainty sets: the radius of the Wasserstein ball around an empirical law, rule by rule.
+//! Uncertainty sets: the radius of the Wasserstein ball around an empirical law, or of the confidence region of a normal
+//! law's estimates, rule by rule.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::specification::{Framework, RadiusRule, Specification};
 use crate::numerics::bridge::{AbsoluteBridges, Quantile, UpperQuantile};
+use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
 
-/// Bridge matrices kept at once; live sessions of one policy pass through a horizon's worth of sample sizes.
-const KEPT_MATRICES: usize = 24;
+/// Sample sizes whose bridges are kept at once; live sessions of one policy pass through a horizon's worth of them.
+const KEPT_SIZES: usize = 24;
+/// Values in the bridges kept, where that many sizes have more: 256 MB, but two sizes in any case.
+const KEPT_VALUES: usize = 1 << 25;
 
 /// The radius rule of a specification, with its common random numbers.
 pub struct UncertaintySets {
@@ -38,8 +42,8 @@ pub struct Radii {
 
 impl UncertaintySets {
     pub fn new(specification: &Specification) -> Self {
-        let uncertain = matches!(specification.problem.framework, Framework::Adaptive | Framework::Static);
-        let rule = specification.problem.radius;
+        let uncertain = !matches!(specification.problem.framework, Framework::KnownLaw | Framework::PlugIn);
+        let rule = specification.problem.radius_rule();
         let estimator = match rule {
             RadiusRule::Bridge { alpha, paths, .. } => UpperQuantile::new(paths, alpha),
             _ => UpperQuantile::new(1, 0.5),
@@ -58,11 +62,11 @@ impl UncertaintySets {
         if let Some(found) = kept.get(&sample_size) {
             return Arc::clone(found);
         }
-        if kept.len() >= KEPT_MATRICES {
+        let room = (KEPT_VALUES / (2 * sample_size * paths)).clamp(2, KEPT_SIZES);
+        while kept.len() >= room {
             // The smallest sample size is the one sessions leave behind.
-            if let Some(smallest) = kept.keys().min().copied() {
-                kept.remove(&smallest);
-            }
+            let Some(smallest) = kept.keys().min().copied() else { break };
+            kept.remove(&smallest);
         }
         let simulate = |size| AbsoluteBridges::simulate(size, paths, self.seed);
         let made = Arc::new(Bridges { now: simulate(sample_size), ahead: simulate(sample_size + 1).one_ahead() });
@@ -80,7 +84,7 @@ impl UncertaintySets {
         }
     }
 
-    /// Radius of the ball around `law`, in log-return.
+    /// Radius of the ball around `law`, in log-return; of the confidence region, in standard deviations of `law`.
     pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
         match self.rule {
             RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
@@ -136,6 +140,7 @@ impl UncertaintySets {
             RadiusRule::Concentration { alpha, numerator, rate } => ((numerator / alpha).ln() / (rate * size)).sqrt(),
             RadiusRule::RootN { kappa } => kappa / size.sqrt(),
             RadiusRule::Fixed { radius } => radius,
+            RadiusRule::ChiSquare { alpha } => confidence_region::radius(alpha, sample_size),
         }
     }
 }

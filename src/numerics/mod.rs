@@ -4,6 +4,7 @@ pub mod block_bootstrap;
 pub mod bridge;
 pub mod chebyshev;
 pub mod cholesky;
+pub mod confidence_region;
 pub mod elementary;
 pub mod empirical;
 pub mod exponential_mean;

@@ -62,7 +62,7 @@ pub fn run(bench: &AccuracyBench) -> Result<(), Box<dyn Error>> {
 
 fn compare(bench: &AccuracyBench) -> Result<(), TrainError> {
     let mut base = paper::specification(bench.sample_size, bench.horizon, 1000, InitialLaws::Resampled).completed()?;
-    base.problem.radius = RadiusRule::Bridge { alpha: bench.alpha, paths: 2000, scale: 1.0 };
+    base.problem.radius = Some(RadiusRule::Bridge { alpha: bench.alpha, paths: 2000, scale: 1.0 });
     println!("paper's mixture, t0 = {}, T = {}, alpha = {}", bench.sample_size, bench.horizon, bench.alpha);
     let context = ProblemContext::new(&base);
     let last = bench.horizon - 1;
