@@ -5,7 +5,7 @@ mod command;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use command::{bench, demo, healthcheck, serve};
+use command::{bench, demo, evaluate, healthcheck, serve};
 
 /// Nonparametric adaptive robust control of an investor, as a service.
 #[derive(Debug, Parser)]
@@ -21,6 +21,8 @@ enum Command {
     Demo(demo::DemoArgs),
     /// Run the service.
     Serve(serve::Serve),
+    /// Compare frameworks out of sample, in this process.
+    Evaluate(evaluate::Evaluate),
     /// Exit 0 if a running service is ready, else 1.
     Healthcheck(healthcheck::Healthcheck),
     /// Measure this machine's speed and accuracy.
@@ -35,6 +37,7 @@ async fn main() -> ExitCode {
     let outcome = match CommandLine::parse().command {
         Command::Demo(arguments) => demo::run(arguments).await.map_err(Into::into),
         Command::Serve(arguments) => serve::run(arguments).await,
+        Command::Evaluate(arguments) => tokio::task::block_in_place(|| evaluate::run(&arguments)),
         Command::Bench(bench) => bench::run(bench).await,
         Command::Healthcheck(arguments) => healthcheck::run(&arguments),
         Command::Openapi => {

@@ -2,10 +2,13 @@
 
 mod api_client;
 pub mod bench;
+mod compare;
 pub mod demo;
+pub mod evaluate;
 pub mod healthcheck;
 mod host;
 pub mod serve;
+mod tables;
 mod us_market;
 
 /// An error and its causes on one line.

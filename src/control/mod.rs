@@ -3,9 +3,12 @@
 pub mod advisor;
 pub mod backward;
 pub mod bellman;
+pub mod comparison;
 pub mod context;
 pub mod design;
 pub mod error;
+pub mod evaluate;
+pub mod evaluation;
 pub mod features;
 pub mod fitting;
 pub mod gain_field;

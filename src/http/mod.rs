@@ -3,6 +3,7 @@
 mod decode;
 mod described;
 mod documentation;
+mod evaluations;
 mod events;
 mod extract;
 mod fault;

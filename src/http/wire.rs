@@ -23,6 +23,8 @@ pub struct Job {
     pub progress: JobProgress,
     /// The policy of a succeeded training.
     pub policy: Option<String>,
+    /// Where the report of a succeeded evaluation is.
+    pub report: Option<String>,
     /// Why it failed.
     pub error: Option<String>,
     pub created_ms: i64,
@@ -38,7 +40,7 @@ pub struct JobProgress {
     /// The step being solved; steps are solved from the last to the first.
     pub step: Option<usize>,
     pub phase: Option<Phase>,
-    /// Design points solved in this step.
+    /// Design points solved, or paths simulated, in this step.
     pub points_done: Option<usize>,
     pub points_total: Option<usize>,
     pub seconds_left: Option<f64>,
@@ -57,6 +59,8 @@ impl From<ServiceJob> for Job {
                 points_total: current.map(|current| current.total),
                 seconds_left: progress.and_then(|progress| progress.seconds_left),
             },
+            report: (row.kind == JobKind::Evaluate && row.state == JobState::Succeeded)
+                .then(|| format!("/jobs/{}/report", row.job)),
             job: row.job,
             kind: row.kind,
             state: row.state,

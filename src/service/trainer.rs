@@ -1,4 +1,4 @@
-//! The training worker: claims jobs one at a time and solves them step by step, a checkpoint after each.
+//! The worker: claims jobs one at a time and solves them step by step, a checkpoint after each.
 //!
 //! It runs on a thread of its own with a pool of its own, so that the threads that answer requests stay free.
 //! Stopping (a cancel, a shutdown, a lost lease) always ends in `release_job`: the store knows whether a cancel was
@@ -6,6 +6,7 @@
 //! for the stop signal often, but not inside a factorisation, which takes a minute at ten thousand points: past
 //! [`PATIENCE`] the job is given back without waiting for it, and what it still computes is dropped.
 
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
@@ -26,6 +27,8 @@ use crate::control::policy::{Policy, content_hash};
 use crate::control::pool::TrainingPool;
 use crate::control::specification::Specification;
 use crate::store::{ClaimedJob, JobKind, JobOutcome, Store, StoreError};
+
+mod evaluating;
 
 /// The queue is looked at this often even if nobody rang: a lease may have run out.
 const QUEUE_POLL: Duration = Duration::from_secs(2);
@@ -162,45 +165,60 @@ impl Worker {
     }
 
     fn solve(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<Ended, StoreError> {
-        let job = claimed.row.job.as_str();
-        let failed = |reason: String| Ok(Ended::Finished(JobOutcome::Failed { reason }));
-        if claimed.row.kind != JobKind::Train {
-            return failed(format!("this release cannot do {} jobs", claimed.row.kind.as_str()));
+        match claimed.row.kind {
+            JobKind::Train => self.train(claimed, stop),
+            JobKind::Evaluate => self.evaluate(claimed, stop),
         }
+    }
+
+    fn train(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<Ended, StoreError> {
         let specification: Specification = match serde_json::from_str(&claimed.row.request_json) {
             Ok(specification) => specification,
-            Err(error) => return failed(format!("the stored specification cannot be read: {error}")),
+            Err(error) => return Ok(failed(format!("the stored specification cannot be read: {error}"))),
         };
-        let training = match self.pool.install(|| Training::new(&specification)) {
+        let trained = self.trained(claimed, &specification, 0, stop)?;
+        Ok(trained.map_or_else(|ended| ended, |policy| Ended::Finished(succeeded(&policy))))
+    }
+
+    /// The policy of a specification, going on from the checkpoints; step s is checkpoint `first + s` of the job, whose
+    /// checkpoints below `first` are all there. `Err` is how the job ends instead.
+    fn trained(
+        &self,
+        claimed: &ClaimedJob,
+        specification: &Specification,
+        first: usize,
+        stop: &AtomicBool,
+    ) -> Result<Result<Policy, Ended>, StoreError> {
+        let job = claimed.row.job.as_str();
+        let training = match self.pool.install(|| Training::new(specification)) {
             Ok(training) => training,
-            Err(TrainError::Stopped) => return Ok(Ended::Stopped),
-            Err(error) => return failed(error.to_string()),
+            Err(error) => return Ok(Err(ended_training(&error))),
         };
         let checkpoints = self.runtime.block_on(self.store.checkpoints(job))?;
-        let mut steps = resumed(training.horizon(), &checkpoints);
-        self.board.resume(job, steps.len());
+        let mut steps = resumed(first..first + training.horizon(), &checkpoints);
+        if first == 0 || !steps.is_empty() {
+            self.board.resume(job, first + steps.len());
+        }
         for step in (0..training.horizon() - steps.len()).rev() {
             let watch = Watch { stop, progress: &|progress| self.board.advance(job, progress) };
             let started = Instant::now();
-            let solved = self.pool.install(|| training.solve_step(step, steps.last(), &watch));
-            let solution = match solved {
+            let solution = match self.pool.install(|| training.solve_step(step, steps.last(), &watch)) {
                 Ok(solution) => solution,
-                Err(TrainError::Stopped) => return Ok(Ended::Stopped),
-                Err(error) => return failed(error.to_string()),
+                Err(error) => return Ok(Err(ended_training(&error))),
             };
             metrics::histogram!(names::TRAINING_STEP_SECONDS).record(started.elapsed().as_secs_f64());
             let Ok(bytes) = serde_json::to_vec(&solution) else {
-                return failed(format!("step {step}: the solution cannot be written as JSON"));
+                return Ok(Err(failed(format!("step {step}: the solution cannot be written as JSON"))));
             };
-            let saving = self.store.save_checkpoint(job, claimed.attempt, step, &bytes);
+            let saving = self.store.save_checkpoint(job, claimed.attempt, first + step, &bytes);
             if !self.runtime.block_on(saving)? {
-                return Ok(Ended::Fenced);
+                return Ok(Err(Ended::Fenced));
             }
             steps.push(solution);
             self.board.finish_step(job);
         }
         steps.reverse();
-        Ok(Ended::Finished(succeeded(&training.into_policy(steps))))
+        Ok(Ok(training.into_policy(steps)))
     }
 
     fn close(&self, job: &str, attempt: i64, ended: &Ended) -> Result<(), StoreError> {
@@ -299,11 +317,24 @@ async fn keep_lease(
     }
 }
 
-/// The solutions that need not be computed again: steps `horizon - 1` downwards, without a gap.
-fn resumed(horizon: usize, checkpoints: &[(usize, Vec<u8>)]) -> Vec<StepSolution> {
-    let newest_first = checkpoints.iter().rev();
-    let in_order = newest_first.zip((0..horizon).rev()).take_while(|((step, _), expected)| step == expected);
+/// The solutions that need not be computed again: those of the checkpoints in `range`, from its end downwards without a
+/// gap.
+fn resumed(range: Range<usize>, checkpoints: &[(usize, Vec<u8>)]) -> Vec<StepSolution> {
+    let newest_first = checkpoints.iter().rev().filter(|(step, _)| range.contains(step));
+    let in_order = newest_first.zip(range.clone().rev()).take_while(|((step, _), expected)| step == expected);
     in_order.map_while(|((_, bytes), _)| serde_json::from_slice(bytes).ok()).collect()
+}
+
+fn failed(reason: String) -> Ended {
+    Ended::Finished(JobOutcome::Failed { reason })
+}
+
+/// How a job ends whose training stopped or failed.
+fn ended_training(error: &TrainError) -> Ended {
+    match error {
+        TrainError::Stopped => Ended::Stopped,
+        error => failed(error.to_string()),
+    }
 }
 
 fn succeeded(policy: &Policy) -> JobOutcome {
@@ -321,5 +352,5 @@ fn log_outcome(job: &str, outcome: &JobOutcome) {
 
 fn panic_reason(panic: &(dyn std::any::Any + Send)) -> String {
     let message = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    format!("the training panicked: {}", message.unwrap_or("no message"))
+    format!("the job panicked: {}", message.unwrap_or("no message"))
 }

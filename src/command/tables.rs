@@ -1,0 +1,95 @@
+//! A report as a table on the screen and as CSV.
+
+use std::fmt::Write;
+
+use ballast::control::comparison::{EvaluationReport, StrategyReport};
+use ballast::numerics::summary::Estimate;
+
+/// The estimates of a strategy, by name.
+pub fn estimates(strategy: &StrategyReport) -> Vec<(&'static str, Estimate)> {
+    let utility = &strategy.utility;
+    let mut found = vec![
+        ("mean", utility.mean),
+        ("variance", utility.variance),
+        ("quantile_20", utility.quantile_20),
+        ("quantile_90", utility.quantile_90),
+        ("max", utility.max),
+        ("min", utility.min),
+        ("certainty_equivalent", strategy.certainty_equivalent),
+        ("wealth_mean", strategy.wealth.mean),
+    ];
+    if let Some(difference) = &strategy.difference {
+        found.push(("difference_utility", difference.utility));
+        found.push(("difference_certainty_equivalent", difference.certainty_equivalent));
+    }
+    found
+}
+
+/// One line a strategy: terminal utility, and the difference to the reference.
+pub fn screen(report: &EvaluationReport) -> String {
+    let mut text = format!(
+        "{:<20}{:>22}{:>10}{:>10}{:>10}{:>10}{:>10}{:>12}  {}\n",
+        "terminal utility", "mean", "variance", "20 %", "90 %", "max", "min", "certain", "less the reference"
+    );
+    for strategy in &report.strategies {
+        let utility = &strategy.utility;
+        let difference = strategy.difference.as_ref().map_or(String::from("(the reference)"), |difference| {
+            let Estimate { value, low, high } = difference.utility;
+            format!("{value:+.4} ({low:+.4} to {high:+.4})")
+        });
+        let reach = 0.5 * (utility.mean.high - utility.mean.low);
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{:<20}{:>22}{:>10.4}{:>10.4}{:>10.4}{:>10.4}{:>10.4}{:>12.4}  {difference}",
+            strategy.strategy,
+            format!("{:.4} +- {reach:.4}", utility.mean.value),
+            utility.variance.value,
+            utility.quantile_20.value,
+            utility.quantile_90.value,
+            utility.max.value,
+            utility.min.value,
+            strategy.certainty_equivalent.value,
+        );
+    }
+    text
+}
+
+/// One row a strategy and statistic.
+pub fn csv(report: &EvaluationReport) -> String {
+    let mut text = String::from("strategy,statistic,value,low,high\n");
+    for strategy in &report.strategies {
+        for (name, Estimate { value, low, high }) in estimates(strategy) {
+            let _ = writeln!(text, "{},{name},{value},{low},{high}", strategy.strategy);
+        }
+    }
+    text
+}
+
+/// One row a framework and period.
+pub fn periods_csv(report: &EvaluationReport) -> String {
+    let mut text = String::from(
+        "strategy,period,sample_size,allocation_mean,allocation_10,allocation_90,all_bank_share,radius_mean,radius_10,radius_50,radius_90\n",
+    );
+    for strategy in &report.strategies {
+        for period in strategy.periods.iter().flatten() {
+            let allocation = &period.allocation;
+            let _ = write!(
+                text,
+                "{},{},{},{},{},{},{}",
+                strategy.strategy,
+                period.period,
+                period.sample_size,
+                allocation.mean,
+                allocation.quantile_10,
+                allocation.quantile_90,
+                period.all_bank_share
+            );
+            let _ = match &period.radius {
+                Some(r) => writeln!(text, ",{},{},{},{}", r.mean, r.quantile_10, r.quantile_50, r.quantile_90),
+                None => writeln!(text, ",,,,"),
+            };
+        }
+    }
+    text
+}
