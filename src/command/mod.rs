@@ -7,6 +7,7 @@ pub mod demo;
 pub mod evaluate;
 pub mod healthcheck;
 mod host;
+pub mod reproduce;
 pub mod serve;
 mod tables;
 mod us_market;

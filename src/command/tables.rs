@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use ballast::control::comparison::{EvaluationReport, StrategyReport};
 use ballast::numerics::summary::Estimate;
+use ballast::report::Csv;
 
 /// The estimates of a strategy, by name.
 pub fn estimates(strategy: &StrategyReport) -> Vec<(&'static str, Estimate)> {
@@ -57,39 +58,42 @@ pub fn screen(report: &EvaluationReport) -> String {
 
 /// One row a strategy and statistic.
 pub fn csv(report: &EvaluationReport) -> String {
-    let mut text = String::from("strategy,statistic,value,low,high\n");
+    let mut csv = Csv::new(&["strategy", "statistic", "value", "low", "high"]);
     for strategy in &report.strategies {
         for (name, Estimate { value, low, high }) in estimates(strategy) {
-            let _ = writeln!(text, "{},{name},{value},{low},{high}", strategy.strategy);
+            let figures = [value, low, high].map(|figure| figure.to_string());
+            csv.row([strategy.strategy.clone(), name.to_owned()].into_iter().chain(figures));
         }
     }
-    text
+    csv.into_text()
 }
 
-/// One row a framework and period.
+/// One row a framework and period; no radius where the framework has no ball.
 pub fn periods_csv(report: &EvaluationReport) -> String {
-    let mut text = String::from(
-        "strategy,period,sample_size,allocation_mean,allocation_10,allocation_90,all_bank_share,radius_mean,radius_10,radius_50,radius_90\n",
-    );
+    let mut csv = Csv::new(&[
+        "strategy",
+        "period",
+        "sample_size",
+        "allocation_mean",
+        "allocation_10",
+        "allocation_90",
+        "all_bank_share",
+        "radius_mean",
+        "radius_10",
+        "radius_50",
+        "radius_90",
+    ]);
     for strategy in &report.strategies {
         for period in strategy.periods.iter().flatten() {
-            let allocation = &period.allocation;
-            let _ = write!(
-                text,
-                "{},{},{},{},{},{},{}",
-                strategy.strategy,
-                period.period,
-                period.sample_size,
-                allocation.mean,
-                allocation.quantile_10,
-                allocation.quantile_90,
-                period.all_bank_share
-            );
-            let _ = match &period.radius {
-                Some(r) => writeln!(text, ",{},{},{},{}", r.mean, r.quantile_10, r.quantile_50, r.quantile_90),
-                None => writeln!(text, ",,,,"),
+            let held = &period.allocation;
+            let figures = [held.mean, held.quantile_10, held.quantile_90, period.all_bank_share];
+            let radii = match &period.radius {
+                Some(r) => [r.mean, r.quantile_10, r.quantile_50, r.quantile_90].map(|radius| radius.to_string()),
+                None => Default::default(),
             };
+            let names = [strategy.strategy.clone(), period.period.to_string(), period.sample_size.to_string()];
+            csv.row(names.into_iter().chain(figures.map(|figure| figure.to_string())).chain(radii));
         }
     }
-    text
+    csv.into_text()
 }
