@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::evaluate::{Evaluation, Follower, Lived, Outcome, Outcomes, Start};
+use super::evaluate::{Evaluation, Follower, Lived, Outcomes, Start};
 use super::evaluation::EvaluationRequest;
 use super::policy::content_hash;
 use super::specification::{Framework, RadiusRule};
@@ -332,26 +332,24 @@ impl Table<'_> {
 
     fn coverage(&self, index: usize) -> Coverage {
         let problem = &self.evaluation.request.problem;
-        let held = |lived: &Lived| if lived.distance <= lived.radius { 1.0 } else { 0.0 };
+        let horizon = problem.horizon;
+        let left = |lived: &Lived| lived.distance > lived.radius;
+        let outcomes = &self.outcomes.outcomes;
         let at_size = |step: usize| CoverageAtSize {
             sample_size: problem.history.len() + step,
-            covered: self.sample.mean(&self.at(index, step, held)),
+            covered: self.sample.share(outcomes, |outcome| !left(&outcome.lived[index * horizon + step])),
         };
         // A frozen ball is the same in all periods.
         let steps = if self.followers[index].framework.learns() { problem.horizon } else { 1 };
-        let horizon = problem.horizon;
-        let left = |outcome: &Outcome| {
-            let lived = &outcome.lived[index * horizon..(index + 1) * horizon];
-            if lived.iter().any(|lived| lived.distance > lived.radius) { 1.0 } else { 0.0 }
-        };
-        let ever_left: Vec<f64> = self.outcomes.outcomes.iter().map(left).collect();
         Coverage {
             target: match problem.radius {
                 RadiusRule::Bridge { alpha, .. } | RadiusRule::Concentration { alpha, .. } => Some(1.0 - alpha),
                 RadiusRule::RootN { .. } | RadiusRule::Fixed { .. } => None,
             },
             by_sample_size: (0..steps).map(at_size).collect(),
-            ever_left: self.sample.mean(&ever_left),
+            ever_left: self.sample.share(outcomes, |outcome| {
+                outcome.lived[index * horizon..(index + 1) * horizon].iter().any(left)
+            }),
         }
     }
 
