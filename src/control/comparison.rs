@@ -347,9 +347,9 @@ impl Table<'_> {
                 RadiusRule::RootN { .. } | RadiusRule::Fixed { .. } => None,
             },
             by_sample_size: (0..steps).map(at_size).collect(),
-            ever_left: self.sample.share(outcomes, |outcome| {
-                outcome.lived[index * horizon..(index + 1) * horizon].iter().any(left)
-            }),
+            ever_left: self
+                .sample
+                .share(outcomes, |outcome| outcome.lived[index * horizon..(index + 1) * horizon].iter().any(left)),
         }
     }
 

@@ -37,7 +37,7 @@ pub struct Job {
 pub struct JobProgress {
     pub steps_done: usize,
     pub steps_total: usize,
-    /// The step being solved; steps are solved from the last to the first.
+    /// The step being solved; steps are solved from the last to the first. Null in a simulation.
     pub step: Option<usize>,
     pub phase: Option<Phase>,
     /// Design points solved, or paths simulated, in this step.
@@ -53,7 +53,7 @@ impl From<ServiceJob> for Job {
             progress: JobProgress {
                 steps_done: progress.map_or(row.steps_done, |progress| progress.steps_done.max(row.steps_done)),
                 steps_total: row.steps_total,
-                step: current.map(|current| current.step),
+                step: current.filter(|current| current.phase != Phase::Simulating).map(|current| current.step),
                 phase: current.map(|current| current.phase),
                 points_done: current.map(|current| current.done),
                 points_total: current.map(|current| current.total),

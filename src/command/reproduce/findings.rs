@@ -129,7 +129,7 @@ fn dominated(index: usize, half: &StrategyReport) -> Finding {
     let (mean, variance) = (half.utility.mean, half.utility.variance);
     Finding {
         agrees: !(mean.low > paper[0] && variance.high < paper[1]),
-        statement: format!("Table {}: its adaptive row is efficient.", index + 1),
+        statement: format!("Table {}: no constant mix earns more than its adaptive row at less variance.", index + 1),
         found: format!("A constant half in stocks has mean {} and variance {}.", shown(mean), shown(variance)),
     }
 }
