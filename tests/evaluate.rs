@@ -6,9 +6,9 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use ballast::control::backward::Watch;
-use ballast::control::comparison::{Costs, EvaluationReport};
 use ballast::control::error::TrainError;
 use ballast::control::evaluate::{Evaluation, Follower, Outcomes};
+use ballast::control::evaluation_report::{Costs, EvaluationReport};
 use ballast::control::pool::TrainingPool;
 use ballast::control::utility::utility;
 use reqwest::Method;

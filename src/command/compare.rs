@@ -7,9 +7,9 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use ballast::control::backward::{Phase, StepProgress, Watch};
-use ballast::control::comparison::{Costs, EvaluationReport};
 use ballast::control::error::TrainError;
 use ballast::control::evaluate::{Evaluation, Follower, Outcomes};
+use ballast::control::evaluation_report::{Costs, EvaluationReport};
 use ballast::control::pool::TrainingPool;
 use indicatif::{ProgressBar, ProgressStyle};
 

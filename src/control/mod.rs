@@ -9,6 +9,7 @@ pub mod design;
 pub mod error;
 pub mod evaluate;
 pub mod evaluation;
+pub mod evaluation_report;
 pub mod features;
 pub mod fitting;
 pub mod gain_field;

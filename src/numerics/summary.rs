@@ -152,8 +152,8 @@ mod tests {
         let sample = Clustered::new(4, 5, 0.95);
         assert_estimate(sample.mean(&VALUES), [0.98, 0.4392962226601318, 1.5207037773398682]);
         assert_estimate(sample.variance(&VALUES), [0.3906, 0.1398822021839391, 0.641317797816061]);
-        // All but four: group shares 1, 0.6, 1, 0.6 would reach past 1.
-        assert_estimate(sample.share(&VALUES, |value| *value <= 1.6), [0.8, 0.43247391513348095, 1.0]);
+        // Shares 1, 0.4, 0.8, 0.8 of the groups reach past 1 by t.
+        assert_estimate(sample.share(&VALUES, |value| *value <= 1.6), [0.75, 0.3495509549328149, 1.0]);
         let mut sorted = VALUES;
         sorted.sort_by(f64::total_cmp);
         assert_estimate(sample.quantile(&VALUES, &sorted, 0.9), [1.9, 1.2383380049902388, 2.2]);

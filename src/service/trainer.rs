@@ -6,7 +6,6 @@
 //! for the stop signal often, but not inside a factorisation, which takes a minute at ten thousand points: past
 //! [`PATIENCE`] the job is given back without waiting for it, and what it still computes is dropped.
 
-use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
@@ -18,17 +17,15 @@ use tokio::runtime::Handle;
 use super::clock::Clock;
 use super::config::Config;
 use super::error::ServiceError;
+use super::identity;
 use super::progress::ProgressBoard;
 use super::shutdown::Shutdown;
-use super::{identity, metrics as names};
-use crate::control::backward::{StepSolution, Training, Watch};
 use crate::control::error::TrainError;
-use crate::control::policy::{Policy, content_hash};
 use crate::control::pool::TrainingPool;
-use crate::control::specification::Specification;
 use crate::store::{ClaimedJob, JobKind, JobOutcome, Store, StoreError};
 
 mod evaluating;
+mod training;
 
 /// The queue is looked at this often even if nobody rang: a lease may have run out.
 const QUEUE_POLL: Duration = Duration::from_secs(2);
@@ -171,56 +168,6 @@ impl Worker {
         }
     }
 
-    fn train(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<Ended, StoreError> {
-        let specification: Specification = match serde_json::from_str(&claimed.row.request_json) {
-            Ok(specification) => specification,
-            Err(error) => return Ok(failed(format!("the stored specification cannot be read: {error}"))),
-        };
-        let trained = self.trained(claimed, &specification, 0, stop)?;
-        Ok(trained.map_or_else(|ended| ended, |policy| Ended::Finished(succeeded(&policy))))
-    }
-
-    /// The policy of a specification, going on from the checkpoints; step s is checkpoint `first + s` of the job, whose
-    /// checkpoints below `first` are all there. `Err` is how the job ends instead.
-    fn trained(
-        &self,
-        claimed: &ClaimedJob,
-        specification: &Specification,
-        first: usize,
-        stop: &AtomicBool,
-    ) -> Result<Result<Policy, Ended>, StoreError> {
-        let job = claimed.row.job.as_str();
-        let training = match self.pool.install(|| Training::new(specification)) {
-            Ok(training) => training,
-            Err(error) => return Ok(Err(ended_training(&error))),
-        };
-        let checkpoints = self.runtime.block_on(self.store.checkpoints(job))?;
-        let mut steps = resumed(first..first + training.horizon(), &checkpoints);
-        if first == 0 || !steps.is_empty() {
-            self.board.resume(job, first + steps.len());
-        }
-        for step in (0..training.horizon() - steps.len()).rev() {
-            let watch = Watch { stop, progress: &|progress| self.board.advance(job, progress) };
-            let started = Instant::now();
-            let solution = match self.pool.install(|| training.solve_step(step, steps.last(), &watch)) {
-                Ok(solution) => solution,
-                Err(error) => return Ok(Err(ended_training(&error))),
-            };
-            metrics::histogram!(names::TRAINING_STEP_SECONDS).record(started.elapsed().as_secs_f64());
-            let Ok(bytes) = serde_json::to_vec(&solution) else {
-                return Ok(Err(failed(format!("step {step}: the solution cannot be written as JSON"))));
-            };
-            let saving = self.store.save_checkpoint(job, claimed.attempt, first + step, &bytes);
-            if !self.runtime.block_on(saving)? {
-                return Ok(Err(Ended::Fenced));
-            }
-            steps.push(solution);
-            self.board.finish_step(job);
-        }
-        steps.reverse();
-        Ok(Ok(training.into_policy(steps)))
-    }
-
     fn close(&self, job: &str, attempt: i64, ended: &Ended) -> Result<(), StoreError> {
         let now = self.clock.now_milliseconds();
         let held = match ended {
@@ -317,14 +264,6 @@ async fn keep_lease(
     }
 }
 
-/// The solutions that need not be computed again: those of the checkpoints in `range`, from its end downwards without a
-/// gap.
-fn resumed(range: Range<usize>, checkpoints: &[(usize, Vec<u8>)]) -> Vec<StepSolution> {
-    let newest_first = checkpoints.iter().rev().filter(|(step, _)| range.contains(step));
-    let in_order = newest_first.zip(range.clone().rev()).take_while(|((step, _), expected)| step == expected);
-    in_order.map_while(|((_, bytes), _)| serde_json::from_slice(bytes).ok()).collect()
-}
-
 fn failed(reason: String) -> Ended {
     Ended::Finished(JobOutcome::Failed { reason })
 }
@@ -335,11 +274,6 @@ fn ended_training(error: &TrainError) -> Ended {
         TrainError::Stopped => Ended::Stopped,
         error => failed(error.to_string()),
     }
-}
-
-fn succeeded(policy: &Policy) -> JobOutcome {
-    let policy_json = policy.to_json();
-    JobOutcome::Succeeded { policy_id: content_hash(&policy_json), policy_json }
 }
 
 fn log_outcome(job: &str, outcome: &JobOutcome) {

@@ -2,10 +2,10 @@
 
 use std::error::Error;
 
-use ballast::control::comparison::EvaluationReport;
 use ballast::control::design::continuous_law;
 use ballast::control::evaluate::{Evaluation, Follower, Outcomes};
 use ballast::control::evaluation::EvaluationRequest;
+use ballast::control::evaluation_report::EvaluationReport;
 use ballast::control::pool::TrainingPool;
 use ballast::control::specification::Framework;
 use ballast::control::uncertainty::UncertaintySets;
@@ -222,7 +222,7 @@ fn study_size(plan: &Plan, workshop: &Workshop, sample_size: usize) -> Result<Ve
     let row = |report: &EvaluationReport| {
         let sample = Clustered::new(1, report.histories.len(), report.request.level);
         let kind = report.request.problem.utility;
-        let gap = |history: &ballast::control::comparison::HistoryReport| {
+        let gap = |history: &ballast::control::evaluation_report::HistoryReport| {
             utility(kind, history.promised[0]) - utility(kind, history.promised[1])
         };
         let value: Vec<f64> = report.histories.iter().map(gap).collect();

@@ -10,6 +10,23 @@ AdviceSource: TypeAlias = Literal["policy_surrogate", "resolved", "resolved_outs
 """Where an advice came from."""
 
 
+class Costs(TypedDict):
+    """What the evaluation cost; the only part that differs between two runs."""
+
+    training_seconds: float
+    simulation_seconds: float
+    resolve_seconds: NotRequired[float | None]
+    """Mean of one re-solved step; null where there was none."""
+
+
+class Estimate(TypedDict):
+    """A figure and the interval around it."""
+
+    value: float
+    low: float
+    high: float
+
+
 FeatureMap: TypeAlias = Literal["standardized", "raw_moments"]
 """How a state becomes the inputs of a surrogate."""
 
@@ -28,6 +45,18 @@ class Health(TypedDict):
     sessions: int
 
 
+class HistoryReport(TypedDict):
+    """One initial history."""
+
+    quantile: NotRequired[float | None]
+    """The bridge quantile there; null under other radius rules."""
+    radius: float
+    promised: list[float]
+    """What each framework promises there: the certainty equivalent of its first advice, by its own account."""
+    mean_utility: list[float]
+    """Mean terminal utility of each strategy, in their order."""
+
+
 class HyperparameterBounds(TypedDict):
     """Box of the maximum-likelihood search, for inputs and targets scaled to unit variance."""
 
@@ -40,6 +69,23 @@ class Imported(TypedDict):
     """An imported policy."""
 
     policy: str
+
+
+class InitialHistories1(TypedDict):
+    """The problem's own."""
+
+    kind: Literal["given"]
+
+
+class InitialHistories2(TypedDict):
+    """So many draws from the true law, each as long as the problem's own."""
+
+    count: int
+    kind: Literal["drawn"]
+
+
+InitialHistories: TypeAlias = InitialHistories1 | InitialHistories2
+"""Which histories paths start from."""
 
 
 InitialLaws: TypeAlias = Literal["given", "resampled"]
@@ -108,7 +154,7 @@ class OpenSession(TypedDict):
     """Default: the policy's initial wealth."""
 
 
-Phase: TypeAlias = Literal["solving", "fitting"]
+Phase: TypeAlias = Literal["solving", "fitting", "simulating"]
 
 
 class PolicyEntry(TypedDict):
@@ -181,6 +227,17 @@ RadiusRule: TypeAlias = RadiusRule1 | RadiusRule2 | RadiusRule3 | RadiusRule4
 """How the radius of the Wasserstein ball follows from the sample of size n."""
 
 
+class RadiusSpread(TypedDict):
+    """The radius over paths."""
+
+    mean: float
+    quantile_10: float
+    quantile_50: float
+    quantile_90: float
+    first_path: float
+    """On the first path."""
+
+
 class SamplingLaw1(TypedDict):
     """A law of log-returns that can be drawn from."""
 
@@ -219,6 +276,14 @@ class SessionHistory(TypedDict):
 
 
 SessionState: TypeAlias = Literal["active", "completed"]
+
+
+class Spread(TypedDict):
+    """Mean and quantiles over paths."""
+
+    mean: float
+    quantile_10: float
+    quantile_90: float
 
 
 class SurrogateDiagnostics(TypedDict):
@@ -268,6 +333,18 @@ class Uncertainty(TypedDict):
     radius: float
 
 
+class UtilityReport(TypedDict):
+    """Terminal utility."""
+
+    mean: Estimate
+    variance: Estimate
+    quantile_20: Estimate
+    quantile_90: Estimate
+    max: Estimate
+    """Of the paths of one history, averaged over histories."""
+    min: Estimate
+
+
 class UtilitySpecification1(TypedDict):
     """`(1 - exp(-risk_aversion x)) / risk_aversion`, risk aversion per unit of wealth."""
 
@@ -290,6 +367,12 @@ class UtilitySpecification3(TypedDict):
 
 UtilitySpecification: TypeAlias = UtilitySpecification1 | UtilitySpecification2 | UtilitySpecification3
 """Utility of terminal wealth, always maximised."""
+
+
+class WealthReport(TypedDict):
+    """Terminal wealth."""
+
+    mean: Estimate
 
 
 class WorstCase(TypedDict):
@@ -323,6 +406,11 @@ class Advice(TypedDict):
     source: AdviceSource
 
 
+class CoverageAtSize(TypedDict):
+    sample_size: int
+    covered: Estimate
+
+
 class DesignSpecification(TypedDict):
     """Which states the surrogates are trained on."""
 
@@ -333,16 +421,23 @@ class DesignSpecification(TypedDict):
     wealth: NotRequired[Interval | None]
 
 
+class Difference(TypedDict):
+    """A paired difference to the reference."""
+
+    utility: Estimate
+    certainty_equivalent: Estimate
+
+
 class JobProgress(TypedDict):
     """How far a job is."""
 
     steps_done: int
     steps_total: int
     step: NotRequired[int | None]
-    """The step being solved; steps are solved from the last to the first."""
+    """The step being solved; steps are solved from the last to the first. Null in a simulation."""
     phase: NotRequired[Phase | None]
     points_done: NotRequired[int | None]
-    """Design points solved in this step."""
+    """Design points solved, or paths simulated, in this step."""
     points_total: NotRequired[int | None]
     seconds_left: NotRequired[float | None]
 
@@ -360,6 +455,17 @@ class Observed(Uncertainty):
     """Wealth at the end of the period."""
     completed: bool
     """Whether the horizon is reached."""
+
+
+class PeriodReport(TypedDict):
+    """One period over all paths."""
+
+    period: int
+    sample_size: int
+    allocation: Spread
+    all_bank_share: float
+    """Share of paths that held nothing in the risky asset."""
+    radius: NotRequired[RadiusSpread | None]
 
 
 class ProblemSpecification(TypedDict):
@@ -444,6 +550,40 @@ class Action(Advice):
     worst_case: NotRequired[WorstCase | None]
 
 
+class Coverage(TypedDict):
+    """How often the ball held the true law."""
+
+    target: NotRequired[float | None]
+    """1 - alpha, under a radius rule that has one."""
+    by_sample_size: list[CoverageAtSize]
+    ever_left: Estimate
+    """Share of paths on which some period's ball did not hold it."""
+
+
+class EvaluationRequest(TypedDict):
+    """A comparison of strategies on common simulated returns."""
+
+    problem: ProblemSpecification
+    """
+    As in a training; `framework` is left out, and `law` is the true law that returns are drawn from (default: the
+    design's sampling law).
+    """
+    design: NotRequired[DesignSpecification]
+    surrogate: NotRequired[SurrogateSpecification]
+    seed: NotRequired[int]
+    frameworks: NotRequired[list[Framework]]
+    """Frameworks to compare."""
+    constant_mixes: NotRequired[list[float] | None]
+    """Constant allocations to compare; 0 is all-bank. Default: 0 to 1 by 0.1, as far as the actions go."""
+    policies: NotRequired[dict[str, str]]
+    """A trained policy for a framework; the others are trained inside the job."""
+    paths: NotRequired[int]
+    """Simulated paths per initial history."""
+    histories: NotRequired[InitialHistories]
+    level: NotRequired[float]
+    """Confidence of the intervals."""
+
+
 class Job(TypedDict):
     """A job."""
 
@@ -455,6 +595,8 @@ class Job(TypedDict):
     progress: JobProgress
     policy: NotRequired[str | None]
     """The policy of a succeeded training."""
+    report: NotRequired[str | None]
+    """Where the report of a succeeded evaluation is."""
     error: NotRequired[str | None]
     """Why it failed."""
     created_ms: int
@@ -478,6 +620,44 @@ class Specification(TypedDict):
     surrogate: NotRequired[SurrogateSpecification]
     seed: NotRequired[int]
     """The same specification and seed give the same policy, bit for bit."""
+
+
+class StrategyReport(TypedDict):
+    """One strategy."""
+
+    strategy: str
+    framework: NotRequired[Framework | None]
+    constant_mix: NotRequired[float | None]
+    """The allocation of a constant mix."""
+    policy: NotRequired[str | None]
+    """The policy followed; null for constant mixes and where each history had its own."""
+    utility: UtilityReport
+    certainty_equivalent: Estimate
+    """Terminal wealth that is worth as much for certain."""
+    wealth: WealthReport
+    difference: NotRequired[Difference | None]
+    histogram: list[int]
+    """Counts of the bins between `histogram_edges`."""
+    periods: NotRequired[list[PeriodReport] | None]
+    coverage: NotRequired[Coverage | None]
+    resolved_share: NotRequired[float | None]
+    """Share of steps advised by solving the step anew."""
+
+
+class EvaluationReport(TypedDict):
+    """Strategies compared on common returns. `docs/evaluation.md` says where the intervals come from."""
+
+    format: str
+    request: EvaluationRequest
+    """The completed request."""
+    reference: str
+    """The strategy that differences are taken against."""
+    strategies: list[StrategyReport]
+    """Frameworks first, then constant mixes, in the order of the request."""
+    histogram_edges: list[float]
+    """Common bin edges of terminal utility, ascending."""
+    histories: list[HistoryReport]
+    costs: Costs
 
 
 class PolicyDetail(TypedDict):
