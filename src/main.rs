@@ -5,7 +5,7 @@ mod command;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use command::{backtest, bench, demo, healthcheck, serve};
+use command::{backtest, bench, demo, evaluate, healthcheck, reproduce, serve};
 
 /// Nonparametric adaptive robust control of an investor, as a service.
 #[derive(Debug, Parser)]
@@ -23,6 +23,10 @@ enum Command {
     Serve(serve::Serve),
     /// Train on the past, live through the next year, roll: a report on real returns.
     Backtest(backtest::BacktestArgs),
+    /// Compare frameworks out of sample, in this process.
+    Evaluate(evaluate::Evaluate),
+    /// Compute the tables and figures of the paper's section 3 anew.
+    Reproduce(reproduce::Reproduce),
     /// Exit 0 if a running service is ready, else 1.
     Healthcheck(healthcheck::Healthcheck),
     /// Measure this machine's speed and accuracy.
@@ -38,6 +42,8 @@ async fn main() -> ExitCode {
         Command::Demo(arguments) => demo::run(arguments).await.map_err(Into::into),
         Command::Serve(arguments) => serve::run(arguments).await,
         Command::Backtest(arguments) => tokio::task::block_in_place(|| backtest::run(&arguments)).map_err(Into::into),
+        Command::Evaluate(arguments) => tokio::task::block_in_place(|| evaluate::run(&arguments)),
+        Command::Reproduce(arguments) => tokio::task::block_in_place(|| reproduce::run(&arguments)),
         Command::Bench(bench) => bench::run(bench).await,
         Command::Healthcheck(arguments) => healthcheck::run(&arguments),
         Command::Openapi => {

@@ -244,6 +244,70 @@ fn faulty_hypotheses() -> Vec<(&'static str, &'static str)> {
     ]
 }
 
+/// Changes to an evaluation, and the field each must be answered with.
+fn faulty_evaluations() -> Vec<(&'static str, Value, &'static str)> {
+    vec![
+        ("/problem/framework", json!("static"), "problem.framework"),
+        ("/problem/horizon", json!(0), "problem.horizon"),
+        (
+            "/problem/law",
+            json!({"kind": "student_t", "location": 9.0, "scale": 0.1, "degrees_of_freedom": 5.0}),
+            "problem.law.location",
+        ),
+        ("/design/count", json!(0), "design.count"),
+        ("/surrogate", json!({"moment_count": 0}), "surrogate.moment_count"),
+        ("/seed", json!(0.5), "seed"),
+        ("/frameworks", json!(["adaptive", "bold"]), "frameworks[1]"),
+        ("/frameworks", json!(["adaptive", "static", "adaptive"]), "frameworks[2]"),
+        ("/constant_mixes", json!([0.5, 1.01]), "constant_mixes[1]"),
+        ("/constant_mixes", json!([0.5, 0.5]), "constant_mixes[1]"),
+        ("/constant_mixes", json!(vec![0.5; 102]), "constant_mixes"),
+        ("/policies", json!({"adaptive": "none"}), "policies.adaptive"),
+        ("/paths", json!(99), "paths"),
+        ("/paths", json!(1_000_000), "paths"),
+        ("/histories", json!({"kind": "drawn", "count": 1}), "histories.count"),
+        ("/histories", json!({"kind": "drawn", "count": 1001}), "histories.count"),
+        ("/level", json!(0.4), "level"),
+        ("/level", json!(1.0), "level"),
+        ("/colour", json!(1), "colour"),
+    ]
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_field_of_an_evaluation_is_named() {
+    let mut app = App::start().await;
+    for (pointer, value, field) in faulty_evaluations() {
+        let (status, problem) = app.post("/evaluate", &with(pointer, value)).await;
+        assert_eq!(status, 422, "{pointer} {problem}");
+        assert_named(&problem, field);
+    }
+    let drawn = |rest: Value| {
+        let mut request = with("/histories", json!({"kind": "drawn", "count": 1000}));
+        rest.as_object().unwrap().iter().for_each(|(key, value)| request[key] = value.clone());
+        request
+    };
+    let (status, problem) = app.post("/evaluate", &drawn(json!({"paths": 100_000}))).await;
+    assert_eq!(status, 422, "{problem}");
+    assert_named(&problem, "paths");
+    let (status, problem) = app.post("/evaluate", &with("/frameworks", json!([]))).await;
+    assert_eq!(status, 202, "constant mixes alone are a comparison: {problem}");
+    let mut nothing = with("/frameworks", json!([]));
+    nothing["constant_mixes"] = json!([]);
+    assert_named(&app.post("/evaluate", &nothing).await.1, "frameworks");
+
+    // A policy for another horizon, one of no framework compared, and one for a framework that has one a history.
+    app.train(&specification(3)).await;
+    let policy = app.policy.clone();
+    let other = app.post("/evaluate", &with("/policies", json!({"adaptive": policy}))).await.1;
+    assert_named(&other, "policies.adaptive");
+    assert!(other["rule"].as_str().unwrap().contains("problem.horizon"), "{other}");
+    let mut absent = with("/policies", json!({"adaptive": policy}));
+    absent["frameworks"] = json!(["static"]);
+    assert_named(&app.post("/evaluate", &absent).await.1, "policies.adaptive");
+    let frozen = drawn(json!({"policies": {"static": policy}}));
+    assert_named(&app.post("/evaluate", &frozen).await.1, "policies.static");
+}
+
 /// Names of the properties of a schema of the description.
 fn properties(schema: &str) -> BTreeSet<String> {
     let description: Value = serde_json::from_str(include_str!("../api/openapi.json")).unwrap();
@@ -259,6 +323,10 @@ fn the_walks_cover_every_field() {
     let mut walked: BTreeSet<String> =
         faulty_sessions().iter().map(|(_, field)| field.split('[').next().unwrap().to_owned()).collect();
     walked.insert("policy".into());
+    let evaluated = faulty_evaluations();
+    let evaluated: BTreeSet<String> =
+        evaluated.iter().map(|(_, _, field)| field.split(['.', '[']).next().unwrap().to_owned()).collect();
+    assert!(properties("EvaluationRequest").is_subset(&evaluated), "{evaluated:?}");
     assert!(properties("OpenSession").is_subset(&walked), "{walked:?}");
     let mut walked: BTreeSet<String> =
         faulty_hypotheses().iter().flat_map(|(_, field)| field.split('.').map(str::to_owned)).collect();

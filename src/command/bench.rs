@@ -7,7 +7,7 @@ use clap::Subcommand;
 mod accuracy;
 mod action;
 mod kernels;
-mod paper;
+pub mod paper;
 mod summary;
 mod training;
 

@@ -3,11 +3,15 @@
 mod api_client;
 pub mod backtest;
 pub mod bench;
+mod compare;
 pub mod demo;
+pub mod evaluate;
 pub mod healthcheck;
 mod host;
 mod monthly_returns;
+pub mod reproduce;
 pub mod serve;
+mod tables;
 
 /// An error and its causes on one line.
 pub fn with_causes(error: &dyn std::error::Error) -> String {

@@ -41,7 +41,7 @@ impl Watch<'_> {
 pub struct StepProgress {
     pub step: usize,
     pub phase: Phase,
-    /// Design points solved so far in this step, of `total`.
+    /// Design points solved, or paths simulated, so far in this step, of `total`.
     pub done: usize,
     pub total: usize,
 }
@@ -53,6 +53,8 @@ pub enum Phase {
     Solving,
     /// Fitting the surrogates.
     Fitting,
+    /// Following strategies through simulated paths.
+    Simulating,
 }
 
 /// Everything kept of one solved step; a checkpoint.

@@ -159,15 +159,8 @@ impl ProblemContext {
         let (atoms, masses) = centre(problem, state)?;
         let mean: f64 = atoms.iter().zip(&masses).map(|(atom, mass)| atom * mass).sum();
         let variance = atoms.iter().zip(&masses).map(|(atom, mass)| mass * (atom - mean).powi(2)).sum();
-        let robust = RobustStep {
-            field,
-            utility,
-            support: problem.support,
-            atoms: &atoms,
-            masses: &masses,
-            radius,
-            variance,
-        };
+        let robust =
+            RobustStep { field, utility, support: problem.support, atoms: &atoms, masses: &masses, radius, variance };
         Ok(robust.solve(state, actions))
     }
 }

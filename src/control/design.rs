@@ -58,7 +58,7 @@ pub fn continuous_law(law: &SamplingLaw, history: &[f64]) -> ContinuousLaw {
 }
 
 /// A return the rest of the project accepts: within the support and the limit on log-returns.
-fn admissible(log_return: f64, problem: &ProblemSpecification) -> f64 {
+pub fn admissible(log_return: f64, problem: &ProblemSpecification) -> f64 {
     let limit = super::limits::LOG_RETURN;
     let Interval { min, max } = problem.support.unwrap_or(Interval { min: -limit, max: limit });
     log_return.clamp(min.max(-limit), max.min(limit))

@@ -246,7 +246,8 @@ fn surrogate(surrogate: &SurrogateSpecification) -> Result<(), FieldError> {
     Ok(())
 }
 
-fn whole(field: &str, value: usize, allowed: &std::ops::RangeInclusive<usize>) -> Result<(), FieldError> {
+/// Checks that a count is allowed.
+pub fn whole(field: &str, value: usize, allowed: &std::ops::RangeInclusive<usize>) -> Result<(), FieldError> {
     if allowed.contains(&value) {
         return Ok(());
     }

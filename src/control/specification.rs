@@ -56,7 +56,7 @@ pub struct ProblemSpecification {
 }
 
 /// What the investor is robust against, and whether observing returns changes it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Framework {
     /// Wasserstein ball whose centre and radius follow the observed returns (the paper).
@@ -75,6 +75,12 @@ pub enum Framework {
 }
 
 impl Framework {
+    /// The name on the wire.
+    pub fn name(self) -> String {
+        // A unit variant always has one.
+        serde_json::to_value(self).ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default()
+    }
+
     /// True where the empirical law is part of the state.
     pub fn learns(self) -> bool {
         matches!(self, Framework::Adaptive | Framework::PlugIn | Framework::ParametricAdaptive)
@@ -147,6 +153,18 @@ pub enum RadiusRule {
 impl Default for RadiusRule {
     fn default() -> Self {
         RadiusRule::Bridge { alpha: defaults::alpha(), paths: defaults::paths(), scale: defaults::scale() }
+    }
+}
+
+impl RadiusRule {
+    /// The level of the rules that have one.
+    pub fn alpha(&self) -> Option<f64> {
+        match *self {
+            RadiusRule::Bridge { alpha, .. }
+            | RadiusRule::Concentration { alpha, .. }
+            | RadiusRule::ChiSquare { alpha } => Some(alpha),
+            RadiusRule::RootN { .. } | RadiusRule::Fixed { .. } => None,
+        }
     }
 }
 

@@ -99,7 +99,7 @@ impl WalkForward {
                 initial_wealth: 100.0,
                 action_interval: [0.0, 1.0],
                 utility: self.utility(),
-                radius: RadiusRule::Bridge { alpha, paths: PATHS, scale: 1.0 },
+                radius: Some(RadiusRule::Bridge { alpha, paths: PATHS, scale: 1.0 }),
                 support: None,
                 law: None,
                 history: past.iter().map(|period| period.log_return).collect(),

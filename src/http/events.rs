@@ -83,6 +83,7 @@ fn event_id(job: &wire::Job) -> String {
     let phase = job.progress.phase.map_or("", |phase| match phase {
         crate::control::backward::Phase::Solving => "s",
         crate::control::backward::Phase::Fitting => "f",
+        crate::control::backward::Phase::Simulating => "p",
     });
     format!("{}-{}-{points}{phase}", job.state.as_str(), job.progress.steps_done)
 }

@@ -1,4 +1,4 @@
-//! Training jobs.
+//! Jobs: trainings queued, and all of them listed and cancelled.
 
 use std::sync::Arc;
 
@@ -14,6 +14,7 @@ use super::wire;
 use crate::control::error::FieldError;
 use crate::control::specification::Specification;
 use crate::service::Service;
+use crate::service::jobs::Job;
 
 /// Queue a training.
 #[utoipa::path(post, path = "/train", tag = "jobs", request_body = Specification,
@@ -30,12 +31,17 @@ pub async fn train(
     headers: HeaderMap,
     JsonBody(specification): JsonBody<Specification>,
 ) -> Result<Response, Problem> {
-    let job = wire::Job::from(service.jobs.train(specification, idempotency_key(&headers)?).await?);
-    let location = [(header::LOCATION, format!("/jobs/{}", job.job)), (header::RETRY_AFTER, "1".to_owned())];
-    Ok((StatusCode::ACCEPTED, location, Json(job)).into_response())
+    Ok(accepted(service.jobs.train(specification, idempotency_key(&headers)?).await?))
 }
 
-fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
+/// The answer to a job that was queued.
+pub fn accepted(job: Job) -> Response {
+    let job = wire::Job::from(job);
+    let location = [(header::LOCATION, format!("/jobs/{}", job.job)), (header::RETRY_AFTER, "1".to_owned())];
+    (StatusCode::ACCEPTED, location, Json(job)).into_response()
+}
+
+pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
     let Some(value) = headers.get("idempotency-key") else { return Ok(None) };
     value.to_str().map(|key| Some(key.to_owned())).map_err(|_| {
         let error = FieldError::new("Idempotency-Key", "not ASCII", "must be visible ASCII");

@@ -4,6 +4,7 @@ mod dashboard;
 mod decode;
 mod described;
 mod documentation;
+mod evaluations;
 mod events;
 mod extract;
 mod fault;

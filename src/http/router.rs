@@ -15,7 +15,7 @@ use utoipa_axum::routes;
 
 use super::extract::BodyLimit;
 use super::problem::{Problem, ProblemKind};
-use super::{dashboard, described, events, jobs, operations, policies, sessions, telemetry, what_if};
+use super::{dashboard, described, evaluations, events, jobs, operations, policies, sessions, telemetry, what_if};
 use crate::service::Service;
 use crate::service::config::Config;
 
@@ -23,7 +23,7 @@ use crate::service::config::Config;
 #[openapi(
     info(title = "Ballast", description = "Nonparametric adaptive robust control of an investor. Every error is a problem document (RFC 9457)."),
     tags(
-        (name = "jobs", description = "Train, offline."),
+        (name = "jobs", description = "Train and compare, offline."),
         (name = "policies", description = "What trainings give."),
         (name = "sessions", description = "Act, live."),
         (name = "operations", description = "For the operator."))
@@ -40,6 +40,8 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(jobs::list))
         .routes(routes!(jobs::get, jobs::cancel))
         .routes(routes!(events::follow))
+        .routes(routes!(evaluations::evaluate))
+        .routes(routes!(evaluations::report))
         .routes(routes!(policies::list))
         .routes(routes!(policies::get, policies::delete))
         .routes(routes!(policies::export))

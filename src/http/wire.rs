@@ -26,6 +26,8 @@ pub struct Job {
     pub progress: JobProgress,
     /// The policy of a succeeded training.
     pub policy: Option<String>,
+    /// Where the report of a succeeded evaluation is.
+    pub report: Option<String>,
     /// Why it failed.
     pub error: Option<String>,
     pub created_ms: i64,
@@ -38,10 +40,10 @@ pub struct Job {
 pub struct JobProgress {
     pub steps_done: usize,
     pub steps_total: usize,
-    /// The step being solved; steps are solved from the last to the first.
+    /// The step being solved; steps are solved from the last to the first. Null in a simulation.
     pub step: Option<usize>,
     pub phase: Option<Phase>,
-    /// Design points solved in this step.
+    /// Design points solved, or paths simulated, in this step.
     pub points_done: Option<usize>,
     pub points_total: Option<usize>,
     pub seconds_left: Option<f64>,
@@ -54,12 +56,14 @@ impl From<ServiceJob> for Job {
             progress: JobProgress {
                 steps_done: progress.map_or(row.steps_done, |progress| progress.steps_done.max(row.steps_done)),
                 steps_total: row.steps_total,
-                step: current.map(|current| current.step),
+                step: current.filter(|current| current.phase != Phase::Simulating).map(|current| current.step),
                 phase: current.map(|current| current.phase),
                 points_done: current.map(|current| current.done),
                 points_total: current.map(|current| current.total),
                 seconds_left: progress.and_then(|progress| progress.seconds_left),
             },
+            report: (row.kind == JobKind::Evaluate && row.state == JobState::Succeeded)
+                .then(|| format!("/jobs/{}/report", row.job)),
             job: row.job,
             kind: row.kind,
             state: row.state,

@@ -3,6 +3,8 @@
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal, StudentT};
 
+use super::student::{normal_cdf, normal_density, student_cdf, student_density};
+
 /// A continuous law on the line.
 #[derive(Debug, Clone)]
 pub enum ContinuousLaw {
@@ -55,6 +57,50 @@ impl ContinuousLaw {
                 Ok(standard) => location + scale * standard.sample(generator),
                 Err(_) => *location,
             },
+        }
+    }
+
+    /// E[Z].
+    pub fn mean(&self) -> f64 {
+        match self {
+            ContinuousLaw::GaussianMixture(components) => components.iter().map(|c| c.0 * c.1).sum(),
+            ContinuousLaw::StudentT { location, .. } => *location,
+        }
+    }
+
+    /// P(Z <= z), and the partial mean E[Z; Z <= z].
+    pub fn cumulative(&self, z: f64) -> (f64, f64) {
+        match self {
+            ContinuousLaw::GaussianMixture(components) => {
+                let component = |(sum, mean_below): (f64, f64), &(weight, mean, deviation): &(f64, f64, f64)| {
+                    let normal = (z - mean) / deviation;
+                    let share = normal_cdf(normal);
+                    (sum + weight * share, mean_below + weight * (mean * share - deviation * normal_density(normal)))
+                };
+                components.iter().fold((0.0, 0.0), component)
+            }
+            ContinuousLaw::StudentT { location, scale, degrees_of_freedom: freedom } => {
+                let t = (z - location) / scale;
+                let share = student_cdf(t, *freedom);
+                let lower = (freedom + t * t) / (freedom - 1.0) * student_density(t, *freedom);
+                (share, location * share - scale * lower)
+            }
+        }
+    }
+
+    /// The z with P(Z <= z) = `share`, in (0, 1), to rounding: by bisection.
+    pub fn quantile(&self, share: f64) -> f64 {
+        let (mean, mut reach) = (self.mean(), 1.0);
+        while self.cumulative(mean - reach).0 > share || self.cumulative(mean + reach).0 < share {
+            reach *= 2.0;
+        }
+        let (mut low, mut high) = (mean - reach, mean + reach);
+        loop {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                return middle;
+            }
+            if self.cumulative(middle).0 < share { low = middle } else { high = middle }
         }
     }
 

@@ -9,6 +9,7 @@ use super::error::ServiceError;
 use super::identity;
 use super::progress::{Progress, ProgressBoard};
 use crate::control::error::FieldError;
+use crate::control::evaluation::EvaluationRequest;
 use crate::control::policy::content_hash;
 use crate::control::specification::Specification;
 use crate::store::{CreateJob, JobKind, JobRow, NewJob, Store};
@@ -42,21 +43,44 @@ impl Jobs {
     /// Queues a training. The same key and specification again give the same job.
     ///
     /// # Errors
-    /// A field that breaks its rule; a key used with another specification.
+    /// A field that breaks its rule; a key used with another request.
     pub async fn train(&self, specification: Specification, key: Option<String>) -> Result<Job, ServiceError> {
+        let sent = serde_json::to_vec(&specification).map_err(ServiceError::internal)?;
+        let completed = specification.completed()?;
+        let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
+        self.queue(JobKind::Train, &sent, request_json, completed.problem.horizon, key).await
+    }
+
+    /// Queues an evaluation, whose policies the caller has looked at. The same key and request again give the same job.
+    ///
+    /// # Errors
+    /// As [`Self::train`].
+    pub(super) async fn evaluate(&self, request: EvaluationRequest, key: Option<String>) -> Result<Job, ServiceError> {
+        let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
+        let completed = request.completed()?;
+        let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
+        self.queue(JobKind::Evaluate, &sent, request_json, completed.step_count(), key).await
+    }
+
+    async fn queue(
+        &self,
+        kind: JobKind,
+        sent: &[u8],
+        request_json: String,
+        steps_total: usize,
+        key: Option<String>,
+    ) -> Result<Job, ServiceError> {
         if let Some(key) = key.as_deref().filter(|key| key.is_empty() || key.len() > KEY_LENGTH) {
             let value = format!("{} bytes", key.len());
             return Err(FieldError::new("Idempotency-Key", value, "must hold 1 to 255 characters").into());
         }
-        let sent = serde_json::to_vec(&specification).map_err(ServiceError::internal)?;
-        let completed = specification.completed()?;
         let new = NewJob {
             job: identity::new_id("job")?,
-            kind: JobKind::Train,
-            request_json: serde_json::to_string(&completed).map_err(ServiceError::internal)?,
-            request_hash: content_hash(&sent),
+            kind,
+            request_json,
+            request_hash: content_hash(sent),
             idempotency_key: key.clone(),
-            steps_total: completed.problem.horizon,
+            steps_total,
             created_ms: self.clock.now_milliseconds(),
         };
         match self.store.create_job(new).await? {
@@ -67,6 +91,15 @@ impl Jobs {
             CreateJob::Repeated(row) => Ok(self.with_progress(row)),
             CreateJob::KeyConflict => Err(ServiceError::KeyConflict { key: key.unwrap_or_default() }),
         }
+    }
+
+    /// The report of a succeeded evaluation, as JSON.
+    ///
+    /// # Errors
+    /// There is no such job, or it has no report (yet).
+    pub async fn report(&self, job: &str) -> Result<String, ServiceError> {
+        let row = self.store.job(job).await?.ok_or_else(|| ServiceError::unknown("job", job))?;
+        row.report_json.ok_or_else(|| ServiceError::unknown("report", job))
     }
 
     /// # Errors

@@ -24,13 +24,14 @@ use std::sync::Arc;
 use clock::Clock;
 use config::{Config, Role, StoreLocation};
 use error::ServiceError;
-use jobs::Jobs;
+use jobs::{Job, Jobs};
 use policies::Policies;
 use sessions::Sessions;
 use shutdown::Shutdown;
 use trainer::Trainer;
 
 use crate::control::error::FieldError;
+use crate::control::evaluation::EvaluationRequest;
 use crate::store::{JobCounts, Store};
 
 /// The use cases over one store.
@@ -66,6 +67,25 @@ impl Service {
         let start = || Trainer::start(config, store.clone(), clock, jobs.board(), shutdown.clone());
         let trainer = config.role.runs_jobs().then(start).transpose()?;
         Ok(Arc::new(Service { jobs, policies, sessions, shutdown, store, trainer }))
+    }
+
+    /// Queues an evaluation. The same key and request again give the same job.
+    ///
+    /// # Errors
+    /// A field that breaks its rule, a policy that is absent or was trained for another problem among them; a key used
+    /// with another request.
+    pub async fn evaluate(&self, request: EvaluationRequest, key: Option<String>) -> Result<Job, ServiceError> {
+        let completed = request.clone().completed()?;
+        for (framework, policy) in &completed.policies {
+            let advisor = self.policies.advisor(policy).await.map_err(|error| match error {
+                ServiceError::Unknown { id, .. } => {
+                    FieldError::new(format!("policies.{}", framework.name()), id, "must name a policy").into()
+                }
+                other => other,
+            })?;
+            completed.accepts(*framework, advisor.specification())?;
+        }
+        self.jobs.evaluate(request, key).await
     }
 
     /// Whether the store answers and the service is not draining.

@@ -1,4 +1,4 @@
-//! The training worker: claims jobs one at a time and solves them step by step, a checkpoint after each.
+//! The worker: claims jobs one at a time and solves them step by step, a checkpoint after each.
 //!
 //! It runs on a thread of its own with a pool of its own, so that the threads that answer requests stay free.
 //! Stopping (a cancel, a shutdown, a lost lease) always ends in `release_job`: the store knows whether a cancel was
@@ -17,15 +17,15 @@ use tokio::runtime::Handle;
 use super::clock::Clock;
 use super::config::Config;
 use super::error::ServiceError;
+use super::identity;
 use super::progress::ProgressBoard;
 use super::shutdown::Shutdown;
-use super::{identity, metrics as names};
-use crate::control::backward::{StepSolution, Training, Watch};
 use crate::control::error::TrainError;
-use crate::control::policy::{Policy, content_hash};
 use crate::control::pool::TrainingPool;
-use crate::control::specification::Specification;
 use crate::store::{ClaimedJob, JobKind, JobOutcome, Store, StoreError};
+
+mod evaluating;
+mod training;
 
 /// The queue is looked at this often even if nobody rang: a lease may have run out, or another replica queued a job.
 const QUEUE_POLL: Duration = Duration::from_secs(1);
@@ -166,45 +166,10 @@ impl Worker {
     }
 
     fn solve(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<Ended, StoreError> {
-        let job = claimed.row.job.as_str();
-        let failed = |reason: String| Ok(Ended::Finished(JobOutcome::Failed { reason }));
-        if claimed.row.kind != JobKind::Train {
-            return failed(format!("this release cannot do {} jobs", claimed.row.kind.as_str()));
+        match claimed.row.kind {
+            JobKind::Train => self.train(claimed, stop),
+            JobKind::Evaluate => self.evaluate(claimed, stop),
         }
-        let specification: Specification = match serde_json::from_str(&claimed.row.request_json) {
-            Ok(specification) => specification,
-            Err(error) => return failed(format!("the stored specification cannot be read: {error}")),
-        };
-        let training = match self.pool.install(|| Training::new(&specification)) {
-            Ok(training) => training,
-            Err(TrainError::Stopped) => return Ok(Ended::Stopped),
-            Err(error) => return failed(error.to_string()),
-        };
-        let checkpoints = self.runtime.block_on(self.store.checkpoints(job))?;
-        let mut steps = resumed(training.horizon(), &checkpoints);
-        self.board.resume(job, steps.len());
-        for step in (0..training.horizon() - steps.len()).rev() {
-            let watch = Watch { stop, progress: &|progress| self.board.advance(job, progress) };
-            let started = Instant::now();
-            let solved = self.pool.install(|| training.solve_step(step, steps.last(), &watch));
-            let solution = match solved {
-                Ok(solution) => solution,
-                Err(TrainError::Stopped) => return Ok(Ended::Stopped),
-                Err(error) => return failed(error.to_string()),
-            };
-            metrics::histogram!(names::TRAINING_STEP_SECONDS).record(started.elapsed().as_secs_f64());
-            let Ok(bytes) = serde_json::to_vec(&solution) else {
-                return failed(format!("step {step}: the solution cannot be written as JSON"));
-            };
-            let saving = self.store.save_checkpoint(job, claimed.attempt, step, &bytes);
-            if !self.runtime.block_on(saving)? {
-                return Ok(Ended::Fenced);
-            }
-            steps.push(solution);
-            self.board.finish_step(job);
-        }
-        steps.reverse();
-        Ok(Ended::Finished(succeeded(&training.into_policy(steps))))
     }
 
     fn close(&self, job: &str, attempt: i64, ended: &Ended) -> Result<(), StoreError> {
@@ -307,16 +272,16 @@ async fn keep_lease(
     }
 }
 
-/// The solutions that need not be computed again: steps `horizon - 1` downwards, without a gap.
-fn resumed(horizon: usize, checkpoints: &[(usize, Vec<u8>)]) -> Vec<StepSolution> {
-    let newest_first = checkpoints.iter().rev();
-    let in_order = newest_first.zip((0..horizon).rev()).take_while(|((step, _), expected)| step == expected);
-    in_order.map_while(|((_, bytes), _)| serde_json::from_slice(bytes).ok()).collect()
+fn failed(reason: String) -> Ended {
+    Ended::Finished(JobOutcome::Failed { reason })
 }
 
-fn succeeded(policy: &Policy) -> JobOutcome {
-    let policy_json = policy.to_json();
-    JobOutcome::Succeeded { policy_id: content_hash(&policy_json), policy_json }
+/// How a job ends whose training stopped or failed.
+fn ended_training(error: &TrainError) -> Ended {
+    match error {
+        TrainError::Stopped => Ended::Stopped,
+        error => failed(error.to_string()),
+    }
 }
 
 fn log_outcome(job: &str, outcome: &JobOutcome) {
@@ -329,5 +294,5 @@ fn log_outcome(job: &str, outcome: &JobOutcome) {
 
 fn panic_reason(panic: &(dyn std::any::Any + Send)) -> String {
     let message = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    format!("the training panicked: {}", message.unwrap_or("no message"))
+    format!("the job panicked: {}", message.unwrap_or("no message"))
 }

@@ -74,6 +74,7 @@ fn note_phase(phases: &Mutex<(Spent, Phase, Instant)>, phase: Phase) {
     match noted.1 {
         Phase::Solving => noted.0.solving += elapsed,
         Phase::Fitting => noted.0.fitting += elapsed,
+        Phase::Simulating => {}
     }
     (noted.1, noted.2) = (phase, now);
 }

@@ -1,0 +1,149 @@
+//! `ballast reproduce`: the paper's section 3, computed anew, with everything it prints beside it.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use ballast::numerics::summary::Estimate;
+use ballast::report::Csv;
+use clap::Args;
+use serde::Serialize;
+
+use super::compare::Workshop;
+use super::evaluate::write;
+use super::tables;
+
+mod findings;
+mod page;
+mod printed;
+mod runs;
+
+#[derive(Debug, Clone, Args)]
+pub struct Reproduce {
+    /// Folder for reproduction.html, reproduction.json and the CSV files, created if absent
+    #[arg(long)]
+    out: PathBuf,
+    /// A small run that shows that everything works: tiny designs, few histories; its figures mean little
+    #[arg(long)]
+    quick: bool,
+}
+
+/// How much is computed.
+#[derive(Debug, Clone, Serialize)]
+pub struct Plan {
+    pub horizon: usize,
+    /// Design points of the learning framework; of the others the same up to the paper's 200.
+    pub count: usize,
+    /// Simulated bridges behind a quantile.
+    pub bridges: usize,
+    pub histories: usize,
+    pub paths: usize,
+    /// Histories simulated for each of the paper's two cases.
+    pub close_histories: usize,
+    /// Histories drawn in search of them, at most.
+    pub most_drawn: usize,
+    pub study_sizes: Vec<usize>,
+    pub study_count: usize,
+    pub study_ladder: usize,
+    pub study_histories: usize,
+    pub study_paths: usize,
+}
+
+impl Plan {
+    fn full() -> Self {
+        Plan {
+            horizon: 10,
+            count: 1000,
+            bridges: 2000,
+            histories: 200,
+            paths: 500,
+            close_histories: 40,
+            most_drawn: 200_000,
+            study_sizes: vec![20, 80, 320, 1280],
+            study_count: 300,
+            study_ladder: 40,
+            study_histories: 40,
+            study_paths: 100,
+        }
+    }
+
+    fn quick() -> Self {
+        Plan {
+            count: 40,
+            bridges: 200,
+            histories: 10,
+            paths: 100,
+            close_histories: 3,
+            most_drawn: 20_000,
+            study_sizes: vec![20, 80],
+            study_count: 30,
+            study_ladder: 20,
+            study_histories: 4,
+            ..Plan::full()
+        }
+    }
+}
+
+/// Everything found.
+#[derive(Debug, Serialize)]
+struct Reproduction {
+    plan: Plan,
+    seconds: f64,
+    findings: Vec<findings::Finding>,
+    section: runs::Section,
+    study: runs::Study,
+}
+
+pub fn run(arguments: &Reproduce) -> Result<(), Box<dyn Error>> {
+    let plan = if arguments.quick { Plan::quick() } else { Plan::full() };
+    std::fs::create_dir_all(&arguments.out)?;
+    let workshop = Workshop::new()?;
+    let section = runs::section(&plan, &workshop)?;
+    let study = runs::study(&plan, &workshop)?;
+    workshop.finish();
+    let findings = findings::all(&section, &study);
+    let html = page::page(&plan, arguments.quick, &section, &study, &findings).html()?;
+    let whole = Reproduction { seconds: workshop.seconds(), plan, findings, section, study };
+    write(&arguments.out, "reproduction.html", &html)?;
+    write(&arguments.out, "reproduction.json", &serde_json::to_string_pretty(&whole)?)?;
+    write_tables(&arguments.out, &whole)?;
+    for finding in &whole.findings {
+        println!("{finding}");
+    }
+    println!("\n{} (done in {:.0} s)", arguments.out.join("reproduction.html").display(), whole.seconds);
+    Ok(())
+}
+
+fn write_tables(folder: &Path, whole: &Reproduction) -> Result<(), String> {
+    write(folder, "strategies.csv", &tables::csv(&whole.section.all))?;
+    write(folder, "periods.csv", &tables::periods_csv(&whole.section.all))?;
+    let mut csv = Csv::new(&["table", "strategy", "statistic", "paper", "value", "low", "high"]);
+    for (index, (case, table)) in whole.section.cases.iter().zip(&printed::TABLES).enumerate() {
+        for strategy in case.report.iter().flat_map(|report| &report.strategies) {
+            let Some(column) = table.column(&strategy.strategy) else { continue };
+            let ours = tables::estimates(strategy);
+            for ((name, _), paper) in printed::STATISTICS.iter().zip(column) {
+                let Some((_, Estimate { value, low, high })) = ours.iter().find(|(own, _)| own == name) else {
+                    continue;
+                };
+                let figures = [*paper, *value, *low, *high].map(|figure| figure.to_string());
+                csv.row(
+                    [format!("{}", index + 1), strategy.strategy.clone(), (*name).to_owned()]
+                        .into_iter()
+                        .chain(figures),
+                );
+            }
+        }
+    }
+    write(folder, "tables.csv", &csv.into_text())?;
+    let mut csv = Csv::new(&["quantile"]);
+    whole.section.quantiles.shown.iter().for_each(|quantile| csv.row([quantile]));
+    write(folder, "quantiles.csv", &csv.into_text())?;
+    let mut csv = Csv::new(&["sample_size", "strategy", "radius", "gap", "value", "low", "high"]);
+    for row in &whole.study.rows {
+        for (name, Estimate { value, low, high }) in [("value", row.value_gap), ("realised", row.realised_gap)] {
+            let names = [row.sample_size.to_string(), row.strategy.clone(), row.radius.to_string(), name.to_owned()];
+            csv.row(names.into_iter().chain([value, low, high].map(|figure| figure.to_string())));
+        }
+    }
+    write(folder, "convergence.csv", &csv.into_text())
+}

@@ -1,0 +1,260 @@
+//! What is computed anew for the paper's section 3.
+
+use std::error::Error;
+
+use ballast::control::design::continuous_law;
+use ballast::control::evaluate::{Evaluation, Follower, Outcomes};
+use ballast::control::evaluation::EvaluationRequest;
+use ballast::control::evaluation_report::EvaluationReport;
+use ballast::control::pool::TrainingPool;
+use ballast::control::specification::Framework;
+use ballast::control::uncertainty::UncertaintySets;
+use ballast::control::utility::utility;
+use ballast::numerics::empirical::EmpiricalDistribution;
+use ballast::numerics::streams::stream;
+use ballast::numerics::summary::{Clustered, Estimate};
+use serde::Serialize;
+use serde_json::json;
+
+use super::Plan;
+use super::printed::{QUANTILES, TABLES};
+use crate::command::bench::paper;
+use crate::command::compare::Workshop;
+
+/// Returns of a history.
+pub const SAMPLE_SIZE: usize = 20;
+/// A history belongs to a table where its quantile is this close to the table's, relatively.
+pub const CLOSENESS: f64 = 0.02;
+/// Histories drawn before it is asked whether enough were found.
+const BATCH: usize = 2000;
+
+/// The simulated quantiles.
+#[derive(Debug, Serialize)]
+pub struct Quantiles {
+    pub mean: Estimate,
+    /// 1 % quantile.
+    pub low: Estimate,
+    /// The first of them, as many as the paper shows.
+    pub shown: Vec<f64>,
+    pub drawn: usize,
+}
+
+/// One of the paper's two cases.
+#[derive(Debug, Serialize)]
+pub struct Case {
+    pub quantile: f64,
+    /// Histories as close as [`CLOSENESS`], of those drawn.
+    pub found: usize,
+    /// The comparison over the first of them; absent where fewer than two were found.
+    pub report: Option<EvaluationReport>,
+    /// Terminal utilities of the adaptive and the known-law investor, on all paths.
+    #[serde(skip)]
+    pub utilities: [Vec<f64>; 2],
+}
+
+/// The paper's tables and figures.
+#[derive(Debug, Serialize)]
+pub struct Section {
+    pub quantiles: Quantiles,
+    /// Over histories drawn from the true law.
+    pub all: EvaluationReport,
+    pub cases: Vec<Case>,
+}
+
+/// The request of the paper's problem, for drawn histories of `sample_size` returns.
+pub fn request(plan: &Plan, sample_size: usize, frameworks: &[Framework]) -> Result<EvaluationRequest, Box<dyn Error>> {
+    let mut request = json!({
+        "problem": { "horizon": plan.horizon, "history": paper::history(sample_size, 1) },
+        "design": { "sampling_law": paper::mixture(), "count": plan.count },
+        "frameworks": frameworks, "paths": plan.paths,
+        "histories": { "kind": "drawn", "count": plan.histories },
+    });
+    request["problem"]["radius"] = json!({ "rule": "bridge", "alpha": 0.1, "paths": plan.bridges });
+    Ok(serde_json::from_value(request)?)
+}
+
+pub fn section(plan: &Plan, workshop: &Workshop) -> Result<Section, Box<dyn Error>> {
+    let request = request(plan, SAMPLE_SIZE, &[Framework::Adaptive, Framework::KnownLaw, Framework::Static])?;
+    let evaluation = Evaluation::new(request.clone())?;
+    let (quantiles, close) =
+        workshop.run("looking for the paper's histories", plan.horizon, |_| seek(plan, &evaluation));
+    let started = workshop.seconds();
+    let followers = workshop.train(&evaluation)?;
+    let trained = workshop.seconds() - started;
+    let (_, all) = workshop.compare("simulating all histories", &evaluation, &followers, trained)?;
+    let mut cases = Vec::new();
+    for (table, histories) in TABLES.iter().zip(close) {
+        cases.push(case(plan, workshop, &request, &followers, table.quantile, histories)?);
+    }
+    Ok(Section { quantiles, all, cases })
+}
+
+/// Draws histories until each table has enough of its own, or patience ends; the quantiles of all, and the histories.
+fn seek(plan: &Plan, evaluation: &Evaluation) -> (Quantiles, [Vec<Vec<f64>>; 2]) {
+    let request = &evaluation.request;
+    let sets = UncertaintySets::new(&request.specification(Framework::Adaptive, None));
+    let law = continuous_law(&paper::mixture(), &[]);
+    let draw = |index: usize| {
+        let mut generator = stream(request.seed, "reproduce-seek", index, 0);
+        let history: Vec<f64> = (0..SAMPLE_SIZE).map(|_| law.draw(&mut generator)).collect();
+        let found = sets.quantile(&EmpiricalDistribution::new(&history)).map_or(f64::NAN, |found| found.value);
+        (found, history)
+    };
+    let mut quantiles: Vec<f64> = Vec::new();
+    let mut close: [Vec<Vec<f64>>; 2] = Default::default();
+    while quantiles.len() < plan.most_drawn && close.iter().any(|found| found.len() < plan.close_histories) {
+        let batch = (quantiles.len()..quantiles.len() + BATCH).collect();
+        for (found, history) in TrainingPool::map(batch, draw) {
+            quantiles.push(found);
+            for (table, close) in TABLES.iter().zip(&mut close) {
+                if (found / table.quantile - 1.0).abs() <= CLOSENESS {
+                    close.push(history.clone());
+                }
+            }
+        }
+    }
+    let sample = Clustered::new(1, quantiles.len(), request.level);
+    let mut sorted = quantiles.clone();
+    sorted.sort_by(f64::total_cmp);
+    let found = Quantiles {
+        mean: sample.mean(&quantiles),
+        low: sample.quantile(&quantiles, &sorted, 0.01),
+        drawn: quantiles.len(),
+        shown: quantiles.into_iter().take(QUANTILES).collect(),
+    };
+    (found, close)
+}
+
+fn case(
+    plan: &Plan,
+    workshop: &Workshop,
+    request: &EvaluationRequest,
+    followers: &[Follower],
+    target: f64,
+    mut histories: Vec<Vec<f64>>,
+) -> Result<Case, Box<dyn Error>> {
+    let found = histories.len();
+    histories.truncate(plan.close_histories);
+    if histories.len() < 2 {
+        return Ok(Case { quantile: target, found, report: None, utilities: Default::default() });
+    }
+    let evaluation = Evaluation::starting_at(request.clone(), histories)?;
+    let stage = format!("simulating the histories with Q near {target}");
+    let (outcomes, report) = workshop.compare(&stage, &evaluation, followers, 0.0)?;
+    let utilities = [0, 1].map(|strategy| terminal_utilities(&evaluation, &outcomes, strategy));
+    Ok(Case { quantile: target, found, report: Some(report), utilities })
+}
+
+fn terminal_utilities(evaluation: &Evaluation, outcomes: &Outcomes, strategy: usize) -> Vec<f64> {
+    let kind = evaluation.request.problem.utility;
+    outcomes.outcomes.iter().map(|outcome| utility(kind, outcome.wealth[strategy])).collect()
+}
+
+/// How the gap to the known law closes as histories grow.
+#[derive(Debug, Serialize)]
+pub struct Study {
+    pub rows: Vec<StudyRow>,
+    pub slopes: Vec<Slope>,
+}
+
+/// One length of history.
+#[derive(Debug, Serialize)]
+pub struct StudyRow {
+    pub sample_size: usize,
+    pub strategy: String,
+    pub radius: f64,
+    /// The known law's value less the framework's own robust value at the start, in utility: the paper's V - V*.
+    pub value_gap: Estimate,
+    /// The known law's mean terminal utility less the framework's, on the same returns.
+    pub realised_gap: Estimate,
+}
+
+/// The slope of ln gap over ln t0, by least squares.
+#[derive(Debug, Serialize)]
+pub struct Slope {
+    pub strategy: String,
+    pub gap: &'static str,
+    pub all: f64,
+    /// Between the two longest histories alone.
+    pub last: f64,
+}
+
+pub fn study(plan: &Plan, workshop: &Workshop) -> Result<Study, Box<dyn Error>> {
+    let mut rows = Vec::new();
+    for &sample_size in &plan.study_sizes {
+        rows.extend(study_size(plan, workshop, sample_size)?);
+    }
+    let mut slopes = Vec::new();
+    for strategy in ["adaptive", "static"] {
+        let own = || rows.iter().filter(|row: &&StudyRow| row.strategy == strategy);
+        for (gap, of) in [("value", value_gap as fn(&StudyRow) -> f64), ("realised", realised_gap)] {
+            let points: Vec<(f64, f64)> = own().map(|row| ((row.sample_size as f64).ln(), of(row).ln())).collect();
+            let last = slope(&points[points.len().saturating_sub(2)..]);
+            slopes.push(Slope { strategy: strategy.to_owned(), gap, all: slope(&points), last });
+        }
+    }
+    Ok(Study { rows, slopes })
+}
+
+fn value_gap(row: &StudyRow) -> f64 {
+    row.value_gap.value
+}
+
+fn realised_gap(row: &StudyRow) -> f64 {
+    row.realised_gap.value
+}
+
+fn study_size(plan: &Plan, workshop: &Workshop, sample_size: usize) -> Result<Vec<StudyRow>, Box<dyn Error>> {
+    let sized = |frameworks: &[Framework], count: usize| -> Result<EvaluationReport, Box<dyn Error>> {
+        let mut request = request(plan, sample_size, frameworks)?;
+        request.design.count = Some(count);
+        request.constant_mixes = Some(Vec::new());
+        request.paths = plan.study_paths;
+        request.histories = ballast::control::evaluation::InitialHistories::Drawn { count: plan.study_histories };
+        let evaluation = Evaluation::new(request)?;
+        let followers = workshop.train(&evaluation)?;
+        let stage = format!("simulating histories of {sample_size} returns");
+        Ok(workshop.compare(&stage, &evaluation, &followers, 0.0)?.1)
+    };
+    let adaptive = sized(&[Framework::KnownLaw, Framework::Adaptive], plan.study_count)?;
+    // A ladder of one input needs few points, and every history has its own.
+    let fixed = sized(&[Framework::KnownLaw, Framework::Static], plan.study_ladder)?;
+    let row = |report: &EvaluationReport| {
+        let sample = Clustered::new(1, report.histories.len(), report.request.level);
+        let kind = report.request.problem.utility;
+        let gap = |history: &ballast::control::evaluation_report::HistoryReport| {
+            utility(kind, history.promised[0]) - utility(kind, history.promised[1])
+        };
+        let value: Vec<f64> = report.histories.iter().map(gap).collect();
+        let realised: Vec<f64> =
+            report.histories.iter().map(|history| history.mean_utility[0] - history.mean_utility[1]).collect();
+        StudyRow {
+            sample_size,
+            strategy: report.strategies[1].strategy.clone(),
+            radius: report.histories.iter().map(|history| history.radius).sum::<f64>() / report.histories.len() as f64,
+            value_gap: sample.mean(&value),
+            realised_gap: sample.mean(&realised),
+        }
+    };
+    Ok(vec![row(&adaptive), row(&fixed)])
+}
+
+/// Least squares.
+fn slope(points: &[(f64, f64)]) -> f64 {
+    let count = points.len() as f64;
+    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0 / count, y + point.1 / count));
+    let (above, below) = points.iter().fold((0.0, 0.0), |(above, below), point| {
+        (above + (point.0 - x) * (point.1 - y), below + (point.0 - x).powi(2))
+    });
+    above / below
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_power_law_has_its_slope() {
+        let points: Vec<(f64, f64)> =
+            [20.0, 80.0, 320.0_f64].iter().map(|n| (n.ln(), (3.0 * n.powf(-0.5)).ln())).collect();
+        assert!((super::slope(&points) + 0.5).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,43 @@
+//! Out-of-sample comparisons.
+
+use std::sync::Arc;
+
+use axum::extract::State;
+use axum::http::{HeaderMap, header};
+use axum::response::{IntoResponse, Response};
+
+use super::extract::{Id, JsonBody};
+use super::jobs::{accepted, idempotency_key};
+use super::problem::Problem;
+use super::wire;
+use crate::control::evaluation::EvaluationRequest;
+use crate::control::evaluation_report::EvaluationReport;
+use crate::service::Service;
+
+/// Queue a comparison of frameworks on common simulated returns.
+#[utoipa::path(post, path = "/evaluate", tag = "jobs", request_body = EvaluationRequest,
+    params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
+    responses(
+        (status = 202, description = "Queued; poll the Location or follow its events.", body = wire::Job, headers(
+            ("Location" = String, description = "The job."),
+            ("Retry-After" = u32, description = "Seconds to wait before asking for the job."))),
+        (status = 400, description = "The body is not JSON.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "The key was used with another body.", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn evaluate(
+    State(service): State<Arc<Service>>,
+    headers: HeaderMap,
+    JsonBody(request): JsonBody<EvaluationRequest>,
+) -> Result<Response, Problem> {
+    Ok(accepted(service.evaluate(request, idempotency_key(&headers)?).await?))
+}
+
+/// The report of a succeeded evaluation.
+#[utoipa::path(get, path = "/jobs/{id}/report", tag = "jobs", params(("id" = String, Path, description = "The job.")),
+    responses(
+        (status = 200, description = "The report.", body = EvaluationReport),
+        (status = 404, description = "There is no such job, or it has no report.", body = Problem, content_type = "application/problem+json")))]
+pub async fn report(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Response, Problem> {
+    let report = service.jobs.report(&id).await?;
+    Ok(([(header::CONTENT_TYPE, "application/json")], report).into_response())
+}

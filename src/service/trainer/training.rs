@@ -1,0 +1,77 @@
+//! Training jobs, and the trainings inside other jobs: a checkpoint a step.
+
+use std::ops::Range;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use super::super::metrics as names;
+use super::{Ended, Worker, ended_training, failed};
+use crate::control::backward::{StepSolution, Training, Watch};
+use crate::control::policy::{Policy, content_hash};
+use crate::control::specification::Specification;
+use crate::store::{ClaimedJob, JobOutcome, StoreError};
+
+impl Worker {
+    pub(super) fn train(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<Ended, StoreError> {
+        let specification: Specification = match serde_json::from_str(&claimed.row.request_json) {
+            Ok(specification) => specification,
+            Err(error) => return Ok(failed(format!("the stored specification cannot be read: {error}"))),
+        };
+        let trained = self.trained(claimed, &specification, 0, stop)?;
+        Ok(trained.map_or_else(|ended| ended, |policy| Ended::Finished(succeeded(&policy))))
+    }
+
+    /// The policy of a specification, going on from the checkpoints; step s is checkpoint `first + s` of the job, whose
+    /// checkpoints below `first` are all there. `Err` is how the job ends instead.
+    pub(super) fn trained(
+        &self,
+        claimed: &ClaimedJob,
+        specification: &Specification,
+        first: usize,
+        stop: &AtomicBool,
+    ) -> Result<Result<Policy, Ended>, StoreError> {
+        let job = claimed.row.job.as_str();
+        let training = match self.pool.install(|| Training::new(specification)) {
+            Ok(training) => training,
+            Err(error) => return Ok(Err(ended_training(&error))),
+        };
+        let checkpoints = self.runtime.block_on(self.store.checkpoints(job))?;
+        let mut steps = resumed(first..first + training.horizon(), &checkpoints);
+        if first == 0 || !steps.is_empty() {
+            self.board.resume(job, first + steps.len());
+        }
+        for step in (0..training.horizon() - steps.len()).rev() {
+            let watch = Watch { stop, progress: &|progress| self.board.advance(job, progress) };
+            let started = Instant::now();
+            let solution = match self.pool.install(|| training.solve_step(step, steps.last(), &watch)) {
+                Ok(solution) => solution,
+                Err(error) => return Ok(Err(ended_training(&error))),
+            };
+            metrics::histogram!(names::TRAINING_STEP_SECONDS).record(started.elapsed().as_secs_f64());
+            let Ok(bytes) = serde_json::to_vec(&solution) else {
+                return Ok(Err(failed(format!("step {step}: the solution cannot be written as JSON"))));
+            };
+            let saving = self.store.save_checkpoint(job, claimed.attempt, first + step, &bytes);
+            if !self.runtime.block_on(saving)? {
+                return Ok(Err(Ended::Fenced));
+            }
+            steps.push(solution);
+            self.board.finish_step(job);
+        }
+        steps.reverse();
+        Ok(Ok(training.into_policy(steps)))
+    }
+}
+
+/// The solutions that need not be computed again: those of the checkpoints in `range`, from its end downwards without a
+/// gap.
+fn resumed(range: Range<usize>, checkpoints: &[(usize, Vec<u8>)]) -> Vec<StepSolution> {
+    let newest_first = checkpoints.iter().rev().filter(|(step, _)| range.contains(step));
+    let in_order = newest_first.zip(range.clone().rev()).take_while(|((step, _), expected)| step == expected);
+    in_order.map_while(|((_, bytes), _)| serde_json::from_slice(bytes).ok()).collect()
+}
+
+fn succeeded(policy: &Policy) -> JobOutcome {
+    let policy_json = policy.to_json();
+    JobOutcome::Succeeded { policy_id: content_hash(&policy_json), policy_json }
+}
