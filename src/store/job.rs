@@ -1,13 +1,12 @@
 //! What a job is, as stored.
 
 use serde::{Deserialize, Serialize};
-use sqlx::Row;
-use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
 
 use super::codec::from_sql;
 use super::error::Failure;
 use super::job_state::JobState;
+use super::query::Row;
 
 /// What a job computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
@@ -121,24 +120,24 @@ pub struct JobCounts {
 }
 
 impl JobRow {
-    pub(super) fn from_row(row: &SqliteRow) -> Result<Self, Failure> {
-        let job: String = row.try_get("job")?;
+    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
+        let job: String = row.get("job")?;
         let damaged = |column: &str| Failure::Corrupt(format!("the {column} of job {job}"));
         Ok(JobRow {
-            sequence: row.try_get("sequence")?,
-            kind: JobKind::parse(row.try_get("kind")?).ok_or_else(|| damaged("kind"))?,
-            state: JobState::parse(row.try_get("state")?).ok_or_else(|| damaged("state"))?,
-            request_json: row.try_get("request_json")?,
-            steps_total: from_sql(row.try_get("steps_total")?)?,
-            steps_done: from_sql(row.try_get("steps_done")?)?,
-            cancel_requested: row.try_get("cancel_requested")?,
-            attempt: row.try_get("attempt")?,
-            policy: row.try_get("policy")?,
-            report_json: row.try_get("report_json")?,
-            error: row.try_get("error")?,
-            created_ms: row.try_get("created_ms")?,
-            started_ms: row.try_get("started_ms")?,
-            finished_ms: row.try_get("finished_ms")?,
+            sequence: row.get("sequence")?,
+            kind: JobKind::parse(&row.get::<String>("kind")?).ok_or_else(|| damaged("kind"))?,
+            state: JobState::parse(&row.get::<String>("state")?).ok_or_else(|| damaged("state"))?,
+            request_json: row.get("request_json")?,
+            steps_total: from_sql(row.get("steps_total")?)?,
+            steps_done: from_sql(row.get("steps_done")?)?,
+            cancel_requested: row.get("cancel_requested")?,
+            attempt: row.get("attempt")?,
+            policy: row.get("policy")?,
+            report_json: row.get("report_json")?,
+            error: row.get("error")?,
+            created_ms: row.get("created_ms")?,
+            started_ms: row.get("started_ms")?,
+            finished_ms: row.get("finished_ms")?,
             job,
         })
     }

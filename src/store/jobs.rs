@@ -1,12 +1,12 @@
 //! Jobs as users see them: created once, listed, cancelled.
 
 use futures_util::FutureExt;
-use sqlx::SqliteConnection;
 
 use super::codec::to_sql;
 use super::error::Failure;
 use super::job::{CreateJob, JobCounts, JobRow, NewJob};
 use super::job_state::{JobEvent, JobState};
+use super::query::{Connection, query};
 use super::{Store, StoreError};
 
 impl Store {
@@ -16,17 +16,16 @@ impl Store {
     }
 
     pub async fn job(&self, job: &str) -> Result<Option<JobRow>, StoreError> {
-        let row = sqlx::query("SELECT * FROM jobs WHERE job = ?").bind(job).fetch_optional(&self.readers);
-        self.read("reading a job", async { row.await?.as_ref().map(JobRow::from_row).transpose() }).await
+        let find = query("SELECT * FROM jobs WHERE job = $1").bind(job);
+        self.read("reading a job", find, |rows| rows.first().map(JobRow::from_row).transpose()).await
     }
 
     /// At most `limit` jobs, newest first; `after` is the `sequence` of the last row of the page before.
     pub async fn jobs(&self, limit: usize, after: Option<i64>) -> Result<Vec<JobRow>, StoreError> {
-        let rows = sqlx::query("SELECT * FROM jobs WHERE sequence < ? ORDER BY sequence DESC LIMIT ?")
+        let page = query("SELECT * FROM jobs WHERE sequence < $1 ORDER BY sequence DESC LIMIT $2")
             .bind(after.unwrap_or(i64::MAX))
-            .bind(to_sql(limit))
-            .fetch_all(&self.readers);
-        self.read("listing jobs", async { rows.await?.iter().map(JobRow::from_row).collect() }).await
+            .bind(to_sql(limit));
+        self.read("listing jobs", page, |rows| rows.iter().map(JobRow::from_row).collect()).await
     }
 
     /// Cancels a queued job at once and flags a running one; a terminal job stays as it is. `None` where there is no such
@@ -37,105 +36,110 @@ impl Store {
     }
 
     pub async fn count_jobs_by_state(&self) -> Result<JobCounts, StoreError> {
-        let rows = sqlx::query_as("SELECT state, count(*) FROM jobs GROUP BY state").fetch_all(&self.readers);
-        self.read("counting jobs", async {
-            let rows: Vec<(String, i64)> = rows.await?;
-            let count = |state: JobState| {
-                let found = rows.iter().find(|(name, _)| name == state.as_str());
-                found.map_or(0, |&(_, count)| count.unsigned_abs())
-            };
-            Ok(JobCounts {
-                queued: count(JobState::Queued),
-                running: count(JobState::Running),
-                succeeded: count(JobState::Succeeded),
-                failed: count(JobState::Failed),
-                cancelled: count(JobState::Cancelled),
-            })
+        let count = query("SELECT state, count(*) AS jobs FROM jobs GROUP BY state");
+        self.read("counting jobs", count, |rows| {
+            let mut counts = JobCounts::default();
+            for row in rows {
+                let state: String = row.get("state")?;
+                let jobs = row.get::<i64>("jobs")?.unsigned_abs();
+                match JobState::parse(&state) {
+                    Some(JobState::Queued) => counts.queued = jobs,
+                    Some(JobState::Running) => counts.running = jobs,
+                    Some(JobState::Succeeded) => counts.succeeded = jobs,
+                    Some(JobState::Failed) => counts.failed = jobs,
+                    Some(JobState::Cancelled) => counts.cancelled = jobs,
+                    None => return Err(Failure::Corrupt(format!("the state {state} of a job"))),
+                }
+            }
+            Ok(counts)
         })
         .await
     }
 }
 
-async fn create(connection: &mut SqliteConnection, new: NewJob) -> Result<CreateJob, Failure> {
+async fn create(mut connection: Connection<'_>, new: NewJob) -> Result<CreateJob, Failure> {
+    let connection = &mut connection;
     if let Some(key) = &new.idempotency_key
         && let Some(earlier) = repeated(connection, key, &new.request_hash).await?
     {
         return Ok(earlier);
     }
-    let row = sqlx::query(
-        "INSERT INTO jobs (job, kind, state, request_json, steps_total, created_ms) VALUES (?, ?, ?, ?, ?, ?) RETURNING *",
-    )
-    .bind(&new.job)
-    .bind(new.kind.as_str())
-    .bind(JobState::Queued.as_str())
-    .bind(&new.request_json)
-    .bind(to_sql(new.steps_total))
-    .bind(new.created_ms)
-    .fetch_one(&mut *connection)
-    .await?;
+    let insert = query(
+        "INSERT INTO jobs (job, kind, state, request_json, steps_total, created_ms) VALUES ($1, $2, $3, $4, $5, $6)",
+    );
+    let insert = insert
+        .bind(new.job.as_str())
+        .bind(new.kind.as_str())
+        .bind(JobState::Queued.as_str())
+        .bind(new.request_json)
+        .bind(to_sql(new.steps_total))
+        .bind(new.created_ms);
+    connection.execute(insert).await?;
     if let Some(key) = &new.idempotency_key {
-        sqlx::query("INSERT INTO idempotency_keys (idempotency_key, request_hash, job) VALUES (?, ?, ?)")
-            .bind(key)
-            .bind(&new.request_hash)
-            .bind(&new.job)
-            .execute(connection)
-            .await?;
+        let take = query(
+            "INSERT INTO idempotency_keys (idempotency_key, request_hash, job) VALUES ($1, $2, $3)
+             ON CONFLICT (idempotency_key) DO NOTHING",
+        );
+        let take = take.bind(key.as_str()).bind(new.request_hash.as_str()).bind(new.job.as_str());
+        if connection.execute(take).await? == 0 {
+            // Somebody else took the key in the meantime.
+            connection.execute(query("DELETE FROM jobs WHERE job = $1").bind(new.job)).await?;
+            let earlier = repeated(connection, key, &new.request_hash).await?;
+            return earlier.ok_or_else(|| Failure::Corrupt(format!("the idempotency key {key}")));
+        }
     }
-    Ok(CreateJob::Created(JobRow::from_row(&row)?))
+    let row = find(connection, &new.job).await?;
+    row.map(CreateJob::Created).ok_or_else(|| Failure::Corrupt(format!("the new job {}", new.job)))
 }
 
 /// What an idempotency key used before answers; `None` for a new key.
 async fn repeated(
-    connection: &mut SqliteConnection,
+    connection: &mut Connection<'_>,
     key: &str,
     request_hash: &str,
 ) -> Result<Option<CreateJob>, Failure> {
-    let used: Option<(String, String)> =
-        sqlx::query_as("SELECT request_hash, job FROM idempotency_keys WHERE idempotency_key = ?")
-            .bind(key)
-            .fetch_optional(&mut *connection)
-            .await?;
-    match used {
-        None => Ok(None),
-        Some((hash, _)) if hash != request_hash => Ok(Some(CreateJob::KeyConflict)),
-        Some((_, job)) => match find(connection, &job).await? {
-            Some(row) => Ok(Some(CreateJob::Repeated(row))),
-            None => Err(Failure::Corrupt(format!("the idempotency key of job {job}"))),
-        },
+    let used = query("SELECT request_hash, job FROM idempotency_keys WHERE idempotency_key = $1").bind(key);
+    let Some(used) = connection.row(used).await? else { return Ok(None) };
+    if used.get::<String>("request_hash")? != request_hash {
+        return Ok(Some(CreateJob::KeyConflict));
+    }
+    let job: String = used.get("job")?;
+    match find(connection, &job).await? {
+        Some(row) => Ok(Some(CreateJob::Repeated(row))),
+        None => Err(Failure::Corrupt(format!("the idempotency key of job {job}"))),
     }
 }
 
-pub(super) async fn find(connection: &mut SqliteConnection, job: &str) -> Result<Option<JobRow>, Failure> {
-    let row = sqlx::query("SELECT * FROM jobs WHERE job = ?").bind(job).fetch_optional(connection).await?;
-    row.as_ref().map(JobRow::from_row).transpose()
+/// The job, to be changed by this transaction alone.
+pub(super) async fn find(connection: &mut Connection<'_>, job: &str) -> Result<Option<JobRow>, Failure> {
+    let find = query("SELECT * FROM jobs WHERE job = $1").bind(job).for_update();
+    connection.row(find).await?.as_ref().map(JobRow::from_row).transpose()
 }
 
-async fn cancel(connection: &mut SqliteConnection, job: String, now_ms: i64) -> Result<Option<JobRow>, Failure> {
+async fn cancel(mut connection: Connection<'_>, job: String, now_ms: i64) -> Result<Option<JobRow>, Failure> {
+    let connection = &mut connection;
     let Some(row) = find(connection, &job).await? else { return Ok(None) };
     let Ok(next) = row.state.next(JobEvent::RequestCancel) else { return Ok(Some(row)) };
     if next.is_terminal() {
         end(connection, &row, next, now_ms).await?;
     } else {
-        sqlx::query("UPDATE jobs SET cancel_requested = 1 WHERE job = ?").bind(&job).execute(&mut *connection).await?;
+        connection.execute(query("UPDATE jobs SET cancel_requested = TRUE WHERE job = $1").bind(job.as_str())).await?;
     }
     find(connection, &job).await
 }
 
 /// Sets a terminal state and deletes the checkpoints.
 pub(super) async fn end(
-    connection: &mut SqliteConnection,
+    connection: &mut Connection<'_>,
     row: &JobRow,
     state: JobState,
     now_ms: i64,
 ) -> Result<(), Failure> {
-    sqlx::query("DELETE FROM checkpoints WHERE job = ?").bind(&row.job).execute(&mut *connection).await?;
-    sqlx::query(
-        "UPDATE jobs SET state = ?, finished_ms = ?, cancel_requested = 0, worker = NULL, lease_until_ms = NULL WHERE job = ?",
-    )
-    .bind(state.as_str())
-    .bind(now_ms)
-    .bind(&row.job)
-    .execute(connection)
-    .await?;
+    connection.execute(query("DELETE FROM checkpoints WHERE job = $1").bind(row.job.as_str())).await?;
+    let end = query(
+        "UPDATE jobs SET state = $1, finished_ms = $2, cancel_requested = FALSE, worker = NULL, lease_until_ms = NULL
+         WHERE job = $3",
+    );
+    connection.execute(end.bind(state.as_str()).bind(now_ms).bind(row.job.as_str())).await?;
     Ok(())
 }

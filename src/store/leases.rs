@@ -5,13 +5,13 @@
 //! drop the job.
 
 use futures_util::FutureExt;
-use sqlx::SqliteConnection;
 
 use super::codec::{Seal, from_sql, to_sql};
 use super::error::Failure;
 use super::job::{ClaimedJob, JobOutcome, JobRow};
 use super::job_state::{JobEvent, JobState};
 use super::jobs::{end, find};
+use super::query::{Connection, Row, query};
 use super::{Store, StoreError, policies};
 
 impl Store {
@@ -31,21 +31,7 @@ impl Store {
     /// Holds the job until `until_ms`. False when fenced.
     pub async fn renew_lease(&self, job: &str, attempt: i64, until_ms: i64) -> Result<bool, StoreError> {
         let job = job.to_owned();
-        self.write("renewing a lease", move |connection| {
-            async move {
-                let renewed =
-                    sqlx::query("UPDATE jobs SET lease_until_ms = ? WHERE job = ? AND attempt = ? AND state = ?")
-                        .bind(until_ms)
-                        .bind(job)
-                        .bind(attempt)
-                        .bind(JobState::Running.as_str())
-                        .execute(connection)
-                        .await?;
-                Ok(renewed.rows_affected() > 0)
-            }
-            .boxed()
-        })
-        .await
+        self.write("renewing a lease", move |connection| renew(connection, job, attempt, until_ms).boxed()).await
     }
 
     /// Stores the solution of one step, replacing an earlier one. False when fenced.
@@ -63,17 +49,15 @@ impl Store {
 
     /// Every checkpoint of the job, ascending by step, each verified against its seal.
     pub async fn checkpoints(&self, job: &str) -> Result<Vec<(usize, Vec<u8>)>, StoreError> {
-        let rows = sqlx::query_as("SELECT step, bytes, seal FROM checkpoints WHERE job = ? ORDER BY step")
-            .bind(job)
-            .fetch_all(&self.readers);
-        self.read("reading checkpoints", async {
-            let rows: Vec<(i64, Vec<u8>, Vec<u8>)> = rows.await?;
-            let verified = |(step, bytes, seal): (i64, Vec<u8>, Vec<u8>)| {
+        let find = query("SELECT step, bytes, seal FROM checkpoints WHERE job = $1 ORDER BY step").bind(job);
+        self.read("reading checkpoints", find, |rows| {
+            let verified = |row: &Row| {
+                let (step, bytes) = (row.get("step")?, row.get::<Vec<u8>>("bytes")?);
                 let what = || format!("the checkpoint of step {step} of job {job}");
-                checkpoint_seal(job, step, &bytes).verify(&seal, what)?;
+                checkpoint_seal(job, step, &bytes).verify(&row.get::<Vec<u8>>("seal")?, what)?;
                 Ok((from_sql(step)?, bytes))
             };
-            rows.into_iter().map(verified).collect()
+            rows.iter().map(verified).collect()
         })
         .await
     }
@@ -104,11 +88,12 @@ impl Store {
 }
 
 async fn claim(
-    connection: &mut SqliteConnection,
+    mut connection: Connection<'_>,
     worker: String,
     until_ms: i64,
     now_ms: i64,
 ) -> Result<Option<ClaimedJob>, Failure> {
+    let connection = &mut connection;
     while let Some(row) = claimable(connection, now_ms).await? {
         if row.cancel_requested
             && let Ok(next) = row.state.next(JobEvent::Cancel)
@@ -117,65 +102,63 @@ async fn claim(
             continue;
         }
         let next = row.state.next(JobEvent::Claim).map_err(|error| Failure::Corrupt(error.to_string()))?;
-        let claimed = sqlx::query(
-            "UPDATE jobs SET state = ?, worker = ?, lease_until_ms = ?, attempt = attempt + 1,
-                             started_ms = coalesce(started_ms, ?)
-             WHERE job = ? RETURNING *",
-        )
-        .bind(next.as_str())
-        .bind(&worker)
-        .bind(until_ms)
-        .bind(now_ms)
-        .bind(&row.job)
-        .fetch_one(connection)
-        .await?;
-        let row = JobRow::from_row(&claimed)?;
-        return Ok(Some(ClaimedJob { attempt: row.attempt, row }));
+        let take = query(
+            "UPDATE jobs SET state = $1, worker = $2, lease_until_ms = $3, attempt = attempt + 1,
+                             started_ms = coalesce(started_ms, $4)
+             WHERE job = $5",
+        );
+        let take = take.bind(next.as_str()).bind(worker).bind(until_ms).bind(now_ms).bind(row.job.as_str());
+        connection.execute(take).await?;
+        let row = find(connection, &row.job).await?;
+        return Ok(row.map(|row| ClaimedJob { attempt: row.attempt, row }));
     }
     Ok(None)
 }
 
-/// The oldest job that is queued or whose lease ran out.
-async fn claimable(connection: &mut SqliteConnection, now_ms: i64) -> Result<Option<JobRow>, Failure> {
-    let row = sqlx::query(
-        "SELECT * FROM jobs WHERE state = ? OR (state = ? AND lease_until_ms <= ?) ORDER BY sequence LIMIT 1",
-    )
-    .bind(JobState::Queued.as_str())
-    .bind(JobState::Running.as_str())
-    .bind(now_ms)
-    .fetch_optional(connection)
-    .await?;
-    row.as_ref().map(JobRow::from_row).transpose()
+/// The oldest job that is queued or whose lease ran out, and that nobody else is taking.
+async fn claimable(connection: &mut Connection<'_>, now_ms: i64) -> Result<Option<JobRow>, Failure> {
+    let oldest = query(
+        "SELECT * FROM jobs WHERE state = $1 OR (state = $2 AND lease_until_ms <= $3) ORDER BY sequence LIMIT 1",
+    );
+    let oldest = oldest.bind(JobState::Queued.as_str()).bind(JobState::Running.as_str()).bind(now_ms);
+    connection.row(oldest.for_update_of_free()).await?.as_ref().map(JobRow::from_row).transpose()
 }
 
-/// The job where this attempt still holds it.
-async fn held(connection: &mut SqliteConnection, job: &str, attempt: i64) -> Result<Option<JobRow>, Failure> {
+async fn renew(mut connection: Connection<'_>, job: String, attempt: i64, until_ms: i64) -> Result<bool, Failure> {
+    let renew = query("UPDATE jobs SET lease_until_ms = $1 WHERE job = $2 AND attempt = $3 AND state = $4")
+        .bind(until_ms)
+        .bind(job)
+        .bind(attempt)
+        .bind(JobState::Running.as_str());
+    Ok(connection.execute(renew).await? > 0)
+}
+
+/// The job where this attempt still holds it, and does until this transaction ends.
+async fn held(connection: &mut Connection<'_>, job: &str, attempt: i64) -> Result<Option<JobRow>, Failure> {
     let row = find(connection, job).await?;
     Ok(row.filter(|row| row.state == JobState::Running && row.attempt == attempt))
 }
 
 async fn checkpoint(
-    connection: &mut SqliteConnection,
+    mut connection: Connection<'_>,
     job: String,
     attempt: i64,
     step: i64,
     bytes: Vec<u8>,
 ) -> Result<bool, Failure> {
+    let connection = &mut connection;
     if held(connection, &job, attempt).await?.is_none() {
         return Ok(false);
     }
     let seal = checkpoint_seal(&job, step, &bytes).finish();
-    sqlx::query("INSERT OR REPLACE INTO checkpoints (job, step, bytes, seal) VALUES (?, ?, ?, ?)")
-        .bind(&job)
-        .bind(step)
-        .bind(bytes)
-        .bind(seal)
-        .execute(&mut *connection)
-        .await?;
-    sqlx::query("UPDATE jobs SET steps_done = (SELECT count(*) FROM checkpoints WHERE job = ?1) WHERE job = ?1")
-        .bind(&job)
-        .execute(connection)
-        .await?;
+    let save = query(
+        "INSERT INTO checkpoints (job, step, bytes, seal) VALUES ($1, $2, $3, $4)
+         ON CONFLICT (job, step) DO UPDATE SET bytes = excluded.bytes, seal = excluded.seal",
+    );
+    connection.execute(save.bind(job.as_str()).bind(step).bind(bytes).bind(seal)).await?;
+    let count =
+        query("UPDATE jobs SET steps_done = (SELECT count(*) FROM checkpoints WHERE job = $1) WHERE job = $1");
+    connection.execute(count.bind(job)).await?;
     Ok(true)
 }
 
@@ -184,12 +167,13 @@ fn checkpoint_seal(job: &str, step: i64, bytes: &[u8]) -> Seal {
 }
 
 async fn finish(
-    connection: &mut SqliteConnection,
+    mut connection: Connection<'_>,
     job: String,
     attempt: i64,
     outcome: JobOutcome,
     now_ms: i64,
 ) -> Result<bool, Failure> {
+    let connection = &mut connection;
     let Some(row) = held(connection, &job, attempt).await? else { return Ok(false) };
     let event = match &outcome {
         JobOutcome::Succeeded { .. } | JobOutcome::Reported { .. } => JobEvent::Succeed,
@@ -201,19 +185,20 @@ async fn finish(
     let update = match outcome {
         JobOutcome::Succeeded { policy_id, policy_json } => {
             policies::insert(connection, &policy_id, policy_json, now_ms).await?;
-            sqlx::query("UPDATE jobs SET policy = ?, steps_done = steps_total WHERE job = ?").bind(policy_id)
+            query("UPDATE jobs SET policy = $1, steps_done = steps_total WHERE job = $2").bind(policy_id)
         }
         JobOutcome::Reported { report_json } => {
-            sqlx::query("UPDATE jobs SET report_json = ?, steps_done = steps_total WHERE job = ?").bind(report_json)
+            query("UPDATE jobs SET report_json = $1, steps_done = steps_total WHERE job = $2").bind(report_json)
         }
-        JobOutcome::Failed { reason } => sqlx::query("UPDATE jobs SET error = ? WHERE job = ?").bind(reason),
+        JobOutcome::Failed { reason } => query("UPDATE jobs SET error = $1 WHERE job = $2").bind(reason),
         JobOutcome::Cancelled => return Ok(true),
     };
-    update.bind(job).execute(connection).await?;
+    connection.execute(update.bind(job)).await?;
     Ok(true)
 }
 
-async fn release(connection: &mut SqliteConnection, job: String, attempt: i64, now_ms: i64) -> Result<bool, Failure> {
+async fn release(mut connection: Connection<'_>, job: String, attempt: i64, now_ms: i64) -> Result<bool, Failure> {
+    let connection = &mut connection;
     let Some(row) = held(connection, &job, attempt).await? else { return Ok(false) };
     let event = if row.cancel_requested { JobEvent::Cancel } else { JobEvent::Release };
     let Ok(next) = row.state.next(event) else { return Ok(false) };
@@ -221,10 +206,7 @@ async fn release(connection: &mut SqliteConnection, job: String, attempt: i64, n
         end(connection, &row, next, now_ms).await?;
         return Ok(true);
     }
-    sqlx::query("UPDATE jobs SET state = ?, worker = NULL, lease_until_ms = NULL WHERE job = ?")
-        .bind(next.as_str())
-        .bind(job)
-        .execute(connection)
-        .await?;
+    let release = query("UPDATE jobs SET state = $1, worker = NULL, lease_until_ms = NULL WHERE job = $2");
+    connection.execute(release.bind(next.as_str()).bind(job)).await?;
     Ok(true)
 }

@@ -1,11 +1,11 @@
 //! Observations: append-only, numbered by period from 1, each stored exactly once.
 
 use futures_util::FutureExt;
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row, SqliteConnection};
 
 use super::codec::{Seal, from_sql, to_sql};
 use super::error::Failure;
+use super::query::{Connection, Row, query};
+use super::sessions::Head;
 use super::{Store, StoreError};
 
 /// One period's return and what was answered to it.
@@ -62,12 +62,9 @@ impl Store {
     /// # Errors
     /// [`StoreError::Corrupt`] where the row is not what was written.
     pub async fn observation(&self, session: &str, period: usize) -> Result<Option<ObservationRow>, StoreError> {
-        let row = sqlx::query("SELECT * FROM observations WHERE session = ? AND period = ?")
-            .bind(session)
-            .bind(to_sql(period))
-            .fetch_optional(&self.readers);
-        self.read("reading an observation", async { row.await?.as_ref().map(ObservationRow::from_row).transpose() })
-            .await
+        let find = query("SELECT * FROM observations WHERE session = $1 AND period = $2");
+        let find = find.bind(session).bind(to_sql(period));
+        self.read("reading an observation", find, |rows| rows.first().map(ObservationRow::from_row).transpose()).await
     }
 
     /// Every observation of the session, ascending by period; empty where there is no such session.
@@ -75,11 +72,9 @@ impl Store {
     /// # Errors
     /// [`StoreError::Corrupt`] where a row is not what was written or a period is missing.
     pub async fn observations(&self, session: &str) -> Result<Vec<ObservationRow>, StoreError> {
-        let rows = sqlx::query("SELECT * FROM observations WHERE session = ? ORDER BY period")
-            .bind(session)
-            .fetch_all(&self.readers);
-        self.read("reading observations", async {
-            let rows: Vec<_> = rows.await?.iter().map(ObservationRow::from_row).collect::<Result<_, Failure>>()?;
+        let all = query("SELECT * FROM observations WHERE session = $1 ORDER BY period").bind(session);
+        self.read("reading observations", all, |rows| {
+            let rows: Vec<_> = rows.iter().map(ObservationRow::from_row).collect::<Result<_, Failure>>()?;
             match rows.iter().zip(1..).find(|(row, period)| row.period != *period) {
                 None => Ok(rows),
                 Some((_, period)) => Err(Failure::Corrupt(format!("period {period} of session {session}"))),
@@ -89,15 +84,15 @@ impl Store {
     }
 }
 
-async fn append(connection: &mut SqliteConnection, new: NewObservation) -> Result<Append, Failure> {
-    let last: Option<Option<i64>> = sqlx::query_scalar(
-        "SELECT (SELECT max(period) FROM observations WHERE session = ?1) FROM sessions WHERE session = ?1",
-    )
-    .bind(&new.session)
-    .fetch_optional(&mut *connection)
-    .await?;
-    let Some(last) = last else { return Ok(Append::NoSession) };
-    let expected = from_sql(last.unwrap_or(0))? + 1;
+async fn append(mut connection: Connection<'_>, new: NewObservation) -> Result<Append, Failure> {
+    let connection = &mut connection;
+    let session = query("SELECT sequence FROM sessions WHERE session = $1").bind(new.session.as_str());
+    if connection.row(session.for_update()).await?.is_none() {
+        return Ok(Append::NoSession);
+    }
+    let last = query("SELECT coalesce(max(period), 0) AS period FROM observations WHERE session = $1");
+    let last = connection.row(last.bind(new.session.as_str())).await?.map_or(Ok(0), |row| row.get("period"))?;
+    let expected = from_sql(last)? + 1;
     if (1..expected).contains(&new.period) {
         return repeated(connection, &new).await;
     }
@@ -109,12 +104,9 @@ async fn append(connection: &mut SqliteConnection, new: NewObservation) -> Resul
 }
 
 /// What a period reported before answers.
-async fn repeated(connection: &mut SqliteConnection, new: &NewObservation) -> Result<Append, Failure> {
-    let earlier = sqlx::query("SELECT * FROM observations WHERE session = ? AND period = ?")
-        .bind(&new.session)
-        .bind(to_sql(new.period))
-        .fetch_optional(connection)
-        .await?;
+async fn repeated(connection: &mut Connection<'_>, new: &NewObservation) -> Result<Append, Failure> {
+    let earlier = query("SELECT * FROM observations WHERE session = $1 AND period = $2");
+    let earlier = connection.row(earlier.bind(new.session.as_str()).bind(to_sql(new.period))).await?;
     let missing = || Failure::Corrupt(format!("period {} of session {}", new.period, new.session));
     let earlier = ObservationRow::from_row(&earlier.ok_or_else(missing)?)?;
     Ok(if earlier.content_hash == new.content_hash {
@@ -124,39 +116,58 @@ async fn repeated(connection: &mut SqliteConnection, new: &NewObservation) -> Re
     })
 }
 
-async fn insert(connection: &mut SqliteConnection, new: NewObservation) -> Result<(), Failure> {
-    let row = ObservationRow {
-        period: new.period,
-        content_hash: new.content_hash,
-        log_return: new.log_return,
-        executed_allocation: new.executed_allocation,
-        advised_allocation: new.advised_allocation,
-        wealth_after: new.wealth_after,
-        answer_json: new.answer_json,
-        created_ms: new.created_ms,
-    };
-    let seal = row.seal(&new.session).finish();
-    sqlx::query(
+async fn insert(connection: &mut Connection<'_>, new: NewObservation) -> Result<(), Failure> {
+    let session = new.session.clone();
+    let row = ObservationRow::from(new);
+    let seal = row.seal(&session).finish();
+    let insert = query(
         "INSERT INTO observations (session, period, content_hash, log_return, executed_allocation, advised_allocation,
                                    wealth_after, answer_json, created_ms, seal)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-    )
-    .bind(new.session)
-    .bind(to_sql(row.period))
-    .bind(row.content_hash)
-    .bind(row.log_return)
-    .bind(row.executed_allocation)
-    .bind(row.advised_allocation)
-    .bind(row.wealth_after)
-    .bind(row.answer_json)
-    .bind(row.created_ms)
-    .bind(seal)
-    .execute(connection)
-    .await?;
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10)",
+    );
+    let insert = insert
+        .bind(session)
+        .bind(to_sql(row.period))
+        .bind(row.content_hash)
+        .bind(row.log_return)
+        .bind(row.executed_allocation)
+        .bind(row.advised_allocation)
+        .bind(row.wealth_after)
+        .bind(row.answer_json)
+        .bind(row.created_ms)
+        .bind(seal);
+    connection.execute(insert).await?;
     Ok(())
 }
 
+impl NewObservation {
+    /// The head of its session once it is appended.
+    pub fn head(&self) -> Head {
+        ObservationRow::from(self.clone()).head(&self.session)
+    }
+}
+
+impl From<NewObservation> for ObservationRow {
+    fn from(new: NewObservation) -> Self {
+        ObservationRow {
+            period: new.period,
+            content_hash: new.content_hash,
+            log_return: new.log_return,
+            executed_allocation: new.executed_allocation,
+            advised_allocation: new.advised_allocation,
+            wealth_after: new.wealth_after,
+            answer_json: new.answer_json,
+            created_ms: new.created_ms,
+        }
+    }
+}
+
 impl ObservationRow {
+    /// The head of `session` where this is its last observation.
+    pub fn head(&self, session: &str) -> Head {
+        Head { observed: self.period, seal: self.seal(session).finish() }
+    }
+
     fn seal(&self, session: &str) -> Seal {
         Seal::of("observation")
             .text(session)
@@ -170,19 +181,20 @@ impl ObservationRow {
             .integer(self.created_ms)
     }
 
-    fn from_row(row: &SqliteRow) -> Result<Self, Failure> {
-        let session: &str = row.try_get("session")?;
+    fn from_row(row: &Row) -> Result<Self, Failure> {
+        let session: String = row.get("session")?;
         let read = ObservationRow {
-            period: from_sql(row.try_get("period")?)?,
-            content_hash: row.try_get("content_hash")?,
-            log_return: row.try_get("log_return")?,
-            executed_allocation: row.try_get("executed_allocation")?,
-            advised_allocation: row.try_get("advised_allocation")?,
-            wealth_after: row.try_get("wealth_after")?,
-            answer_json: row.try_get("answer_json")?,
-            created_ms: row.try_get("created_ms")?,
+            period: from_sql(row.get("period")?)?,
+            content_hash: row.get("content_hash")?,
+            log_return: row.get("log_return")?,
+            executed_allocation: row.get("executed_allocation")?,
+            advised_allocation: row.get("advised_allocation")?,
+            wealth_after: row.get("wealth_after")?,
+            answer_json: row.get("answer_json")?,
+            created_ms: row.get("created_ms")?,
         };
-        read.seal(session).verify(row.try_get("seal")?, || format!("period {} of session {session}", read.period))?;
+        let seal: Vec<u8> = row.get("seal")?;
+        read.seal(&session).verify(&seal, || format!("period {} of session {session}", read.period))?;
         Ok(read)
     }
 }

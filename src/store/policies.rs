@@ -1,10 +1,10 @@
 //! Policies: immutable, named by the hash of their bytes.
 
 use futures_util::FutureExt;
-use sqlx::SqliteConnection;
 
 use super::codec::to_sql;
 use super::error::Failure;
+use super::query::{Connection, Row, query};
 use super::{Store, StoreError};
 use crate::control::policy::content_hash;
 
@@ -47,45 +47,33 @@ impl Store {
         let doing = "inserting a policy";
         verify(id, json).map_err(|failure| failure.during(doing))?;
         let (id, json) = (id.to_owned(), json.to_vec());
-        self.write(doing, move |connection| async move { insert(connection, &id, json, created_ms).await }.boxed())
-            .await
+        self.write(doing, move |mut connection| {
+            async move { insert(&mut connection, &id, json, created_ms).await }.boxed()
+        })
+        .await
     }
 
     /// # Errors
     /// [`StoreError::Corrupt`] where the bytes no longer hash to their name.
     pub async fn policy(&self, id: &str) -> Result<Option<PolicyRow>, StoreError> {
-        let row = sqlx::query_as("SELECT policy, created_ms, json FROM policies WHERE policy = ?")
-            .bind(id)
-            .fetch_optional(&self.readers);
-        self.read("reading a policy", async {
-            let row: Option<(String, i64, Vec<u8>)> = row.await?;
-            let Some((policy, created_ms, json)) = row else { return Ok(None) };
+        let find = query("SELECT policy, created_ms, json FROM policies WHERE policy = $1").bind(id);
+        self.read("reading a policy", find, |rows| {
+            let Some(row) = rows.first() else { return Ok(None) };
+            let json: Vec<u8> = row.get("json")?;
             verify(id, &json)?;
-            Ok(Some(PolicyRow { policy, created_ms, json }))
+            Ok(Some(PolicyRow { policy: row.get("policy")?, created_ms: row.get("created_ms")?, json }))
         })
         .await
     }
 
     /// At most `limit` policies, newest first; `after` is the `sequence` of the last row of the page before.
     pub async fn policies(&self, limit: usize, after: Option<i64>) -> Result<Vec<PolicySummary>, StoreError> {
-        let rows = sqlx::query_as(
-            "SELECT sequence, policy, created_ms, length(json) FROM policies
-             WHERE sequence < ? ORDER BY sequence DESC LIMIT ?",
-        )
-        .bind(after.unwrap_or(i64::MAX))
-        .bind(to_sql(limit))
-        .fetch_all(&self.readers);
-        self.read("listing policies", async {
-            let rows: Vec<(i64, String, i64, i64)> = rows.await?;
-            let summary = |(sequence, policy, created_ms, bytes): (i64, String, i64, i64)| PolicySummary {
-                sequence,
-                policy,
-                created_ms,
-                bytes: bytes.unsigned_abs(),
-            };
-            Ok(rows.into_iter().map(summary).collect())
-        })
-        .await
+        let page = query(
+            "SELECT sequence, policy, created_ms, CAST(length(json) AS BIGINT) AS bytes FROM policies
+             WHERE sequence < $1 ORDER BY sequence DESC LIMIT $2",
+        );
+        let page = page.bind(after.unwrap_or(i64::MAX)).bind(to_sql(limit));
+        self.read("listing policies", page, |rows| rows.iter().map(PolicySummary::from_row).collect()).await
     }
 
     pub async fn delete_policy(&self, id: &str) -> Result<DeletePolicy, StoreError> {
@@ -99,29 +87,39 @@ pub(super) fn verify(id: &str, json: &[u8]) -> Result<(), Failure> {
 }
 
 pub(super) async fn insert(
-    connection: &mut SqliteConnection,
+    connection: &mut Connection<'_>,
     id: &str,
     json: Vec<u8>,
     created_ms: i64,
 ) -> Result<bool, Failure> {
-    let inserted =
-        sqlx::query("INSERT INTO policies (policy, created_ms, json) VALUES (?, ?, ?) ON CONFLICT (policy) DO NOTHING")
-            .bind(id)
-            .bind(created_ms)
-            .bind(json)
-            .execute(connection)
-            .await?;
-    Ok(inserted.rows_affected() > 0)
+    let insert = query(
+        "INSERT INTO policies (policy, created_ms, json) VALUES ($1, $2, $3) ON CONFLICT (policy) DO NOTHING",
+    );
+    Ok(connection.execute(insert.bind(id).bind(created_ms).bind(json)).await? > 0)
 }
 
-async fn delete(connection: &mut SqliteConnection, id: String) -> Result<DeletePolicy, Failure> {
-    let sessions: i64 = sqlx::query_scalar("SELECT count(*) FROM sessions WHERE policy = ?")
-        .bind(&id)
-        .fetch_one(&mut *connection)
-        .await?;
+/// The policy stays locked while its sessions are counted: none can be opened in between.
+async fn delete(mut connection: Connection<'_>, id: String) -> Result<DeletePolicy, Failure> {
+    let lock = query("SELECT sequence FROM policies WHERE policy = $1").bind(id.as_str()).for_update();
+    if connection.row(lock).await?.is_none() {
+        return Ok(DeletePolicy::Absent);
+    }
+    let count = query("SELECT count(*) AS sessions FROM sessions WHERE policy = $1").bind(id.as_str());
+    let sessions: i64 = connection.row(count).await?.map_or(Ok(0), |row| row.get("sessions"))?;
     if sessions > 0 {
         return Ok(DeletePolicy::InUse { sessions: sessions.unsigned_abs() });
     }
-    let deleted = sqlx::query("DELETE FROM policies WHERE policy = ?").bind(id).execute(connection).await?;
-    Ok(if deleted.rows_affected() > 0 { DeletePolicy::Deleted } else { DeletePolicy::Absent })
+    connection.execute(query("DELETE FROM policies WHERE policy = $1").bind(id)).await?;
+    Ok(DeletePolicy::Deleted)
+}
+
+impl PolicySummary {
+    fn from_row(row: &Row) -> Result<Self, Failure> {
+        Ok(PolicySummary {
+            sequence: row.get("sequence")?,
+            policy: row.get("policy")?,
+            created_ms: row.get("created_ms")?,
+            bytes: row.get::<i64>("bytes")?.unsigned_abs(),
+        })
+    }
 }

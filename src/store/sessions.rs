@@ -1,11 +1,10 @@
 //! Sessions: where a live investor started.
 
 use futures_util::FutureExt;
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row, SqliteConnection};
 
 use super::codec::{Seal, decode_reals, encode_reals, from_sql, to_sql};
 use super::error::Failure;
+use super::query::{Connection, Row, query};
 use super::{Store, StoreError};
 
 /// A session to open.
@@ -41,6 +40,16 @@ pub struct SessionRow {
     pub created_ms: i64,
 }
 
+/// What tells whether a session is still what it was: how far it is, and the seal of its last row.
+///
+/// Rows are only appended, and a seal covers the time its row was made: equal heads mean equal sessions, even where the
+/// database was restored from a copy and went on differently.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Head {
+    pub observed: usize,
+    pub(super) seal: Vec<u8>,
+}
+
 /// A session without its history.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionSummary {
@@ -63,30 +72,45 @@ impl Store {
     /// # Errors
     /// [`StoreError::Corrupt`] where the row is not what was written.
     pub async fn session(&self, session: &str) -> Result<Option<SessionRow>, StoreError> {
-        let row = sqlx::query("SELECT * FROM sessions WHERE session = ?").bind(session).fetch_optional(&self.readers);
-        self.read("reading a session", async { row.await?.as_ref().map(SessionRow::from_row).transpose() }).await
+        let find = query("SELECT * FROM sessions WHERE session = $1").bind(session);
+        self.read("reading a session", find, |rows| rows.first().map(SessionRow::from_row).transpose()).await
+    }
+
+    /// The head of a session: where it is the one a replay gave, that replay is still the session.
+    pub async fn head(&self, session: &str) -> Result<Option<Head>, StoreError> {
+        let last = query(
+            "SELECT sessions.seal AS start_seal, observations.period, observations.seal
+             FROM sessions LEFT JOIN observations ON observations.session = sessions.session
+             WHERE sessions.session = $1 ORDER BY observations.period DESC LIMIT 1",
+        );
+        self.read("reading the head of a session", last.bind(session), |rows| {
+            let Some(row) = rows.first() else { return Ok(None) };
+            Ok(Some(match row.get::<Option<i64>>("period")? {
+                Some(period) => Head { observed: from_sql(period)?, seal: row.get("seal")? },
+                None => Head { observed: 0, seal: row.get("start_seal")? },
+            }))
+        })
+        .await
     }
 
     /// At most `limit` sessions, newest first; `after` is the `sequence` of the last row of the page before.
     pub async fn sessions(&self, limit: usize, after: Option<i64>) -> Result<Vec<SessionSummary>, StoreError> {
-        let rows = sqlx::query(
+        let page = query(
             "SELECT sequence, session, policy, initial_wealth, horizon, created_ms,
                     (SELECT count(*) FROM observations WHERE observations.session = sessions.session) AS observations
-             FROM sessions WHERE sequence < ? ORDER BY sequence DESC LIMIT ?",
-        )
-        .bind(after.unwrap_or(i64::MAX))
-        .bind(to_sql(limit))
-        .fetch_all(&self.readers);
-        self.read("listing sessions", async { rows.await?.iter().map(SessionSummary::from_row).collect() }).await
+             FROM sessions WHERE sequence < $1 ORDER BY sequence DESC LIMIT $2",
+        );
+        let page = page.bind(after.unwrap_or(i64::MAX)).bind(to_sql(limit));
+        self.read("listing sessions", page, |rows| rows.iter().map(SessionSummary::from_row).collect()).await
     }
 
     /// Deletes a session and its observations. False where there was none.
     pub async fn delete_session(&self, session: &str) -> Result<bool, StoreError> {
         let session = session.to_owned();
-        self.write("deleting a session", move |connection| {
+        self.write("deleting a session", move |mut connection| {
             async move {
-                let delete = sqlx::query("DELETE FROM sessions WHERE session = ?").bind(session);
-                Ok(delete.execute(connection).await?.rows_affected() > 0)
+                let delete = query("DELETE FROM sessions WHERE session = $1").bind(session);
+                Ok(connection.execute(delete).await? > 0)
             }
             .boxed()
         })
@@ -94,45 +118,55 @@ impl Store {
     }
 
     pub async fn count_sessions(&self) -> Result<u64, StoreError> {
-        let count = sqlx::query_scalar("SELECT count(*) FROM sessions").fetch_one(&self.readers);
-        self.read("counting sessions", async { Ok(i64::unsigned_abs(count.await?)) }).await
+        let count = query("SELECT count(*) AS sessions FROM sessions");
+        let counted = |rows: &[Row]| rows.first().map_or(Ok(0), |row| row.get("sessions"));
+        self.read("counting sessions", count, counted).await.map(i64::unsigned_abs)
     }
 }
 
-async fn create(connection: &mut SqliteConnection, new: NewSession) -> Result<CreateSession, Failure> {
-    let policies: i64 = sqlx::query_scalar("SELECT count(*) FROM policies WHERE policy = ?")
-        .bind(&new.policy)
-        .fetch_one(&mut *connection)
-        .await?;
-    if policies == 0 {
+/// The policy stays locked until the session is there: it cannot be deleted in between.
+async fn create(mut connection: Connection<'_>, new: NewSession) -> Result<CreateSession, Failure> {
+    let policy = query("SELECT sequence FROM policies WHERE policy = $1").bind(new.policy.as_str());
+    if connection.row(policy.for_share()).await?.is_none() {
         return Ok(CreateSession::NoPolicy);
     }
-    let row = SessionRow {
-        session: new.session,
-        policy: new.policy,
-        initial_wealth: new.wealth,
-        initial_history: new.history,
-        horizon: new.horizon,
-        created_ms: new.created_ms,
-    };
-    let seal = row.seal().finish();
-    let inserted = sqlx::query(
+    let row = SessionRow::from(new);
+    let insert = query(
         "INSERT INTO sessions (session, policy, initial_wealth, initial_history, horizon, created_ms, seal)
-         VALUES (?, ?, ?, ?, ?, ?, ?) ON CONFLICT (session) DO NOTHING",
-    )
-    .bind(row.session)
-    .bind(row.policy)
-    .bind(row.initial_wealth)
-    .bind(encode_reals(&row.initial_history))
-    .bind(to_sql(row.horizon))
-    .bind(row.created_ms)
-    .bind(seal)
-    .execute(connection)
-    .await?;
-    Ok(if inserted.rows_affected() > 0 { CreateSession::Created } else { CreateSession::Exists })
+         VALUES ($1, $2, $3, $4, $5, $6, $7) ON CONFLICT (session) DO NOTHING",
+    );
+    let seal = row.seal().finish();
+    let insert = insert
+        .bind(row.session)
+        .bind(row.policy)
+        .bind(row.initial_wealth)
+        .bind(encode_reals(&row.initial_history))
+        .bind(to_sql(row.horizon))
+        .bind(row.created_ms)
+        .bind(seal);
+    let inserted = connection.execute(insert).await?;
+    Ok(if inserted > 0 { CreateSession::Created } else { CreateSession::Exists })
+}
+
+impl From<NewSession> for SessionRow {
+    fn from(new: NewSession) -> Self {
+        SessionRow {
+            session: new.session,
+            policy: new.policy,
+            initial_wealth: new.wealth,
+            initial_history: new.history,
+            horizon: new.horizon,
+            created_ms: new.created_ms,
+        }
+    }
 }
 
 impl SessionRow {
+    /// The head of the session before its first observation.
+    pub fn head(&self) -> Head {
+        Head { observed: 0, seal: self.seal().finish() }
+    }
+
     fn seal(&self) -> Seal {
         Seal::of("session")
             .text(&self.session)
@@ -143,33 +177,33 @@ impl SessionRow {
             .integer(self.created_ms)
     }
 
-    fn from_row(row: &SqliteRow) -> Result<Self, Failure> {
-        let session: String = row.try_get("session")?;
+    fn from_row(row: &Row) -> Result<Self, Failure> {
+        let session: String = row.get("session")?;
         let what = || format!("the start of session {session}");
-        let history = decode_reals(row.try_get("initial_history")?);
+        let history = decode_reals(&row.get::<Vec<u8>>("initial_history")?);
         let read = SessionRow {
-            policy: row.try_get("policy")?,
-            initial_wealth: row.try_get("initial_wealth")?,
+            policy: row.get("policy")?,
+            initial_wealth: row.get("initial_wealth")?,
             initial_history: history.ok_or_else(|| Failure::Corrupt(what()))?,
-            horizon: from_sql(row.try_get("horizon")?)?,
-            created_ms: row.try_get("created_ms")?,
+            horizon: from_sql(row.get("horizon")?)?,
+            created_ms: row.get("created_ms")?,
             session: session.clone(),
         };
-        read.seal().verify(row.try_get("seal")?, what)?;
+        read.seal().verify(&row.get::<Vec<u8>>("seal")?, what)?;
         Ok(read)
     }
 }
 
 impl SessionSummary {
-    fn from_row(row: &SqliteRow) -> Result<Self, Failure> {
+    fn from_row(row: &Row) -> Result<Self, Failure> {
         Ok(SessionSummary {
-            sequence: row.try_get("sequence")?,
-            session: row.try_get("session")?,
-            policy: row.try_get("policy")?,
-            initial_wealth: row.try_get("initial_wealth")?,
-            horizon: from_sql(row.try_get("horizon")?)?,
-            created_ms: row.try_get("created_ms")?,
-            observations: from_sql(row.try_get("observations")?)?,
+            sequence: row.get("sequence")?,
+            session: row.get("session")?,
+            policy: row.get("policy")?,
+            initial_wealth: row.get("initial_wealth")?,
+            horizon: from_sql(row.get("horizon")?)?,
+            created_ms: row.get("created_ms")?,
+            observations: from_sql(row.get("observations")?)?,
         })
     }
 }

@@ -5,14 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use sqlx::migrate::Migrator;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
 use sqlx::{ConnectOptions, SqliteConnection};
 
-use super::error::{Failure, StoreError};
-use super::job_state::JobState;
-
-static MIGRATOR: Migrator = sqlx::migrate!("src/store/migrations/sqlite");
+use crate::store::error::{Failure, StoreError};
+use crate::store::job_state::JobState;
+use crate::store::migrations;
 
 const DATABASE: &str = "ballast.sqlite";
 const LOCK: &str = "ballast.lock";
@@ -35,7 +33,6 @@ pub(super) async fn open(dir: &Path) -> Result<Opened, StoreError> {
     let file = dir.join(DATABASE);
     let mut writer = connect(&file).await?;
     refuse_old_engine(&mut writer).await?;
-    refuse_newer_schema(&mut writer).await?;
     migrate(&mut writer).await?;
     end_leases(&mut writer).await?;
     let options = SqliteConnectOptions::new().filename(&file).read_only(true).busy_timeout(BUSY_TIMEOUT);
@@ -83,24 +80,16 @@ async fn refuse_old_engine(connection: &mut SqliteConnection) -> Result<(), Stor
     Ok(())
 }
 
-async fn refuse_newer_schema(connection: &mut SqliteConnection) -> Result<(), StoreError> {
-    let known = MIGRATOR.iter().map(|migration| migration.version).max().unwrap_or_default();
+async fn migrate(connection: &mut SqliteConnection) -> Result<(), StoreError> {
+    let migrator = migrations::sqlite();
     let table = "SELECT count(*) FROM sqlite_schema WHERE name = '_sqlx_migrations'";
     let tables: i64 = sqlx::query_scalar(table).fetch_one(&mut *connection).await.map_err(opening)?;
-    if tables == 0 {
-        return Ok(());
+    if tables > 0 {
+        let newest = "SELECT coalesce(max(version), 0) FROM _sqlx_migrations";
+        let found = sqlx::query_scalar(newest).fetch_one(&mut *connection).await.map_err(opening)?;
+        migrations::refuse_newer(&migrator, found)?;
     }
-    let newest = "SELECT coalesce(max(version), 0) FROM _sqlx_migrations";
-    let found: i64 = sqlx::query_scalar(newest).fetch_one(connection).await.map_err(opening)?;
-    if found > known { Err(StoreError::NewerSchema { found, known }) } else { Ok(()) }
-}
-
-async fn migrate(connection: &mut SqliteConnection) -> Result<(), StoreError> {
-    use sqlx::migrate::MigrateError;
-    MIGRATOR.run(connection).await.map_err(|error| match error {
-        MigrateError::Execute(error) | MigrateError::ExecuteMigration(error, _) => opening(error),
-        error => StoreError::Migration { source: Arc::new(error) },
-    })
+    migrator.run(connection).await.map_err(|error| migrations::failed(error, Failure::Sqlite))
 }
 
 /// The lock shows that whoever held a lease can no longer write: its jobs may be claimed at once.
@@ -115,5 +104,5 @@ async fn end_leases(connection: &mut SqliteConnection) -> Result<(), StoreError>
 }
 
 fn opening(error: sqlx::Error) -> StoreError {
-    Failure::from(error).during("opening the store")
+    Failure::Sqlite(error).during("opening the store")
 }

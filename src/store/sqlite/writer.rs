@@ -13,7 +13,7 @@ use futures_util::future::BoxFuture;
 use sqlx::{Connection, SqliteConnection};
 use tokio::sync::{mpsc, oneshot, watch};
 
-use super::error::{Failure, StoreError};
+use crate::store::error::{Failure, StoreError};
 
 /// Operations in one transaction. At 64 a row costs a hundredth of what it costs alone; more only adds waiting.
 const GROUP: usize = 64;
@@ -64,7 +64,7 @@ impl Operation {
     }
 }
 
-/// Serves requests until the last [`Store`](super::Store) is dropped, one closes it, or a write fails fatally.
+/// Serves requests until the last [`Folder`](super::Folder) is dropped, one closes it, or a write fails fatally.
 /// Holds the folder's lock as long as it can write.
 pub(super) async fn serve(
     mut connection: SqliteConnection,
@@ -151,5 +151,5 @@ async fn run_group(
 
 async fn execute(connection: &mut SqliteConnection, statement: &'static str) -> Result<(), StoreError> {
     let result = sqlx::query(statement).execute(connection).await;
-    result.map(|_| ()).map_err(|error| Failure::from(error).during("committing a group"))
+    result.map(|_| ()).map_err(|error| Failure::Sqlite(error).during("committing a group"))
 }

@@ -1,0 +1,64 @@
+//! The schema of either engine, as a list of steps that only grows.
+
+use std::sync::Arc;
+
+use sqlx::SqlSafeStr;
+use sqlx::migrate::{MigrateError, Migration, MigrationType, Migrator};
+
+use super::error::{Failure, StoreError};
+
+/// Version, description, statements.
+type Step = (i64, &'static str, &'static str);
+
+const SQLITE: [Step; 1] = [(1, "facts", include_str!("migrations/sqlite/0001_facts.sql"))];
+const POSTGRES: [Step; 1] = [(1, "facts", include_str!("migrations/postgres/0001_facts.sql"))];
+
+pub(super) fn sqlite() -> Migrator {
+    migrator(&SQLITE)
+}
+
+/// Runs under an advisory lock, so replicas that start together take turns.
+pub(super) fn postgres() -> Migrator {
+    migrator(&POSTGRES)
+}
+
+fn migrator(steps: &[Step]) -> Migrator {
+    let migration = |&(version, description, statements): &Step| {
+        Migration::new(version, description.into(), MigrationType::Simple, statements.into_sql_str(), false)
+    };
+    Migrator::with_migrations(steps.iter().map(migration).collect())
+}
+
+/// # Errors
+/// [`StoreError::NewerSchema`] where `found` is newer than every step of `migrator`.
+pub(super) fn refuse_newer(migrator: &Migrator, found: i64) -> Result<(), StoreError> {
+    let known = migrator.iter().map(|migration| migration.version).max().unwrap_or_default();
+    if found > known { Err(StoreError::NewerSchema { found, known }) } else { Ok(()) }
+}
+
+/// A failed migration by its cause where that is the database, as `engine` understands it.
+pub(super) fn failed(error: MigrateError, engine: fn(sqlx::Error) -> Failure) -> StoreError {
+    match error {
+        MigrateError::Execute(error) | MigrateError::ExecuteMigration(error, _) => {
+            engine(error).during("bringing the schema up to date")
+        }
+        error => StoreError::Migration { source: Arc::new(error) },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_file_is_a_step_of_its_engine() {
+        for (engine, steps) in [("sqlite", SQLITE.as_slice()), ("postgres", POSTGRES.as_slice())] {
+            let folder = format!("{}/src/store/migrations/{engine}", env!("CARGO_MANIFEST_DIR"));
+            let mut files: Vec<_> =
+                std::fs::read_dir(folder).unwrap().map(|file| file.unwrap().file_name().into_string().unwrap()).collect();
+            files.sort();
+            let named: Vec<_> = steps.iter().map(|(version, name, _)| format!("{version:04}_{name}.sql")).collect();
+            assert_eq!(files, named, "{engine}");
+        }
+    }
+}

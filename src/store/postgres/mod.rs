@@ -1,0 +1,152 @@
+//! A PostgreSQL database that any number of processes share.
+//!
+//! Isolation is `READ COMMITTED`: each decision locks the row it rests on, then reads what the decision needs by a
+//! statement of its own. One statement that locks and reads would not do: after waiting for the lock it would still read
+//! what was there when it began.
+//!
+//! Nothing waits without end: PostgreSQL bounds statements, waits for locks and transactions whose client fell silent
+//! (a stopped worker must not hold a job's row), and this side bounds whole operations, for a server that answers no
+//! more. A connection that met any of it is closed rather than trusted. An operation cut off during its commit may have
+//! happened; callers find out by repeating it, which every operation here allows.
+
+mod classify;
+mod url;
+
+use std::time::Duration;
+
+use futures_util::FutureExt;
+use futures_util::future::BoxFuture;
+use sqlx::pool::PoolConnection;
+use sqlx::postgres::{PgConnection, PgPool, PgPoolOptions};
+use sqlx::{ConnectOptions, Connection as _, Postgres};
+
+use super::error::{Failure, StoreError};
+use super::migrations;
+use super::query::{Connection, Query, Row, query};
+
+pub(super) use classify::classify;
+pub use url::{PostgresUrl, UrlError};
+
+/// Connections of one process. A server takes 100 unless told otherwise: a few replicas, and room for an operator.
+const CONNECTIONS: u32 = 10;
+/// A request waits this long for a connection before it is told to come back.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
+/// Past the server's own bounds below, and within the time of a request.
+const OPERATION_TIMEOUT: Duration = Duration::from_secs(20);
+/// The server's bounds, for every connection. Some run databases with `synchronous_commit` off, which would break the
+/// first promise; a setting that waits for standbys stays.
+const SETTINGS: &str = "SELECT set_config('statement_timeout', '15s', false),
+    set_config('lock_timeout', '3s', false),
+    set_config('idle_in_transaction_session_timeout', '5s', false),
+    set_config('synchronous_commit', CASE current_setting('synchronous_commit') WHEN 'off' THEN 'on'
+               ELSE current_setting('synchronous_commit') END, false)";
+
+#[derive(Clone)]
+pub(super) struct Database {
+    pool: PgPool,
+}
+
+impl Database {
+    pub(super) async fn connect(url: &PostgresUrl) -> Result<Database, StoreError> {
+        let options = url.options().disable_statement_logging();
+        // Without the time limits of the pool: a migration may take what it takes.
+        let connecting = tokio::time::timeout(CONNECT_TIMEOUT, options.connect());
+        let mut connection = match connecting.await {
+            Ok(connected) => connected.map_err(opening)?,
+            Err(_) => return Err(StoreError::Unavailable { doing: OPENING, source: None }),
+        };
+        migrate(&mut connection).await?;
+        // Everything is committed; a server that does not say goodbye changes nothing.
+        let _ = connection.close().await;
+        let pool = PgPoolOptions::new()
+            .max_connections(CONNECTIONS)
+            .acquire_timeout(CONNECT_TIMEOUT)
+            .after_connect(|connection, _| {
+                async move { sqlx::query(SETTINGS).execute(connection).await.map(|_| ()) }.boxed()
+            })
+            .connect_lazy_with(options);
+        Ok(Database { pool })
+    }
+
+    pub(super) async fn ping(&self) -> Result<(), StoreError> {
+        let doing = "answering a ping";
+        let rows = self.read(doing, query("SELECT pg_is_in_recovery() AS standby, EXISTS (SELECT 1 FROM jobs)")).await?;
+        match rows.first().map(|row| row.get("standby")).transpose().map_err(|failure| failure.during(doing))? {
+            Some(true) => Err(StoreError::Unavailable { doing, source: None }),
+            _ => Ok(()),
+        }
+    }
+
+    pub(super) async fn time(&self) -> Result<i64, StoreError> {
+        let doing = "reading the server's clock";
+        let clock = query("SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS BIGINT) AS time_ms");
+        let rows = self.read(doing, clock).await?;
+        let time = rows.first().ok_or(Failure::Postgres(sqlx::Error::RowNotFound)).and_then(|row| row.get("time_ms"));
+        time.map_err(|failure| failure.during(doing))
+    }
+
+    pub(super) async fn close(&self) {
+        self.pool.close().await;
+    }
+
+    /// Runs `work` in a transaction and answers after its commit.
+    pub(super) async fn write<T, W>(&self, doing: &'static str, work: W) -> Result<T, StoreError>
+    where
+        T: Send + 'static,
+        W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
+    {
+        self.bounded(doing, |connection| {
+            async move {
+                // Rolls back where it is dropped before its commit.
+                let mut transaction = connection.begin().await.map_err(Failure::Postgres)?;
+                let answer = work(Connection::Postgres(&mut transaction)).await?;
+                transaction.commit().await.map_err(Failure::Postgres)?;
+                Ok(answer)
+            }
+            .boxed()
+        })
+        .await
+    }
+
+    pub(super) async fn read(&self, doing: &'static str, query: Query) -> Result<Vec<Row>, StoreError> {
+        self.bounded(doing, |connection| {
+            async move { Connection::Postgres(connection).rows(query).await }.boxed()
+        })
+        .await
+    }
+
+    /// Runs `work` on a connection for no longer than [`OPERATION_TIMEOUT`]; one that failed is not used again.
+    async fn bounded<T>(
+        &self,
+        doing: &'static str,
+        work: impl for<'c> FnOnce(&'c mut PoolConnection<Postgres>) -> BoxFuture<'c, Result<T, Failure>>,
+    ) -> Result<T, StoreError> {
+        let acquired = self.pool.acquire().await;
+        let mut connection = acquired.map_err(|error| Failure::Postgres(error).during(doing))?;
+        let result = match tokio::time::timeout(OPERATION_TIMEOUT, work(&mut connection)).await {
+            Ok(result) => result.map_err(|failure| failure.during(doing)),
+            Err(_) => Err(StoreError::Unavailable { doing, source: None }),
+        };
+        if matches!(result, Err(StoreError::Unavailable { .. })) {
+            drop(connection.detach());
+        }
+        result
+    }
+}
+
+const OPENING: &str = "opening the database";
+
+async fn migrate(connection: &mut PgConnection) -> Result<(), StoreError> {
+    let migrator = migrations::postgres();
+    let table = "SELECT to_regclass('_sqlx_migrations') IS NOT NULL";
+    if sqlx::query_scalar(table).fetch_one(&mut *connection).await.map_err(opening)? {
+        let newest = "SELECT coalesce(max(version), 0) FROM _sqlx_migrations";
+        let found = sqlx::query_scalar(newest).fetch_one(&mut *connection).await.map_err(opening)?;
+        migrations::refuse_newer(&migrator, found)?;
+    }
+    migrator.run(connection).await.map_err(|error| migrations::failed(error, Failure::Postgres))
+}
+
+fn opening(error: sqlx::Error) -> StoreError {
+    Failure::Postgres(error).during(OPENING)
+}

@@ -1,0 +1,91 @@
+//! Where a PostgreSQL database is, and with which password.
+
+use std::fmt;
+use std::str::FromStr;
+
+use sqlx::postgres::{PgConnectOptions, PgSslMode};
+use thiserror::Error;
+
+/// A parsed `postgres://user:password@host:port/database`. What it lacks comes from libpq's variables (`PGPASSWORD`, ...)
+/// and password file. It prints without the password.
+#[derive(Clone)]
+pub struct PostgresUrl(PgConnectOptions);
+
+/// Why a text is no such address. The text is not shown: it may hold a password.
+#[derive(Debug, Error)]
+pub enum UrlError {
+    #[error("the store must be given as postgres://user:password@host:port/database")]
+    Scheme,
+    #[error("the address of the store cannot be read")]
+    Address { source: sqlx::Error },
+    #[error("the address of the store asks for sslmode={mode}, and this binary has no TLS")]
+    Encryption { mode: &'static str },
+}
+
+impl PostgresUrl {
+    pub(super) fn options(&self) -> PgConnectOptions {
+        match self.0.get_application_name() {
+            Some(_) => self.0.clone(),
+            None => self.0.clone().application_name("ballast"),
+        }
+    }
+}
+
+impl FromStr for PostgresUrl {
+    type Err = UrlError;
+
+    fn from_str(text: &str) -> Result<Self, UrlError> {
+        if !text.starts_with("postgres://") && !text.starts_with("postgresql://") {
+            return Err(UrlError::Scheme);
+        }
+        let options = PgConnectOptions::from_str(text).map_err(|source| UrlError::Address { source })?;
+        match options.get_ssl_mode() {
+            PgSslMode::Require => Err(UrlError::Encryption { mode: "require" }),
+            PgSslMode::VerifyCa => Err(UrlError::Encryption { mode: "verify-ca" }),
+            PgSslMode::VerifyFull => Err(UrlError::Encryption { mode: "verify-full" }),
+            _ => Ok(PostgresUrl(options)),
+        }
+    }
+}
+
+impl fmt::Display for PostgresUrl {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (options, user) = (&self.0, self.0.get_username());
+        let database = options.get_database().unwrap_or(user);
+        match options.get_socket() {
+            Some(socket) => write!(formatter, "postgres://{user}@{}/{database}", socket.display()),
+            None => write!(formatter, "postgres://{user}@{}:{}/{database}", options.get_host(), options.get_port()),
+        }
+    }
+}
+
+impl fmt::Debug for PostgresUrl {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, formatter)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_password_is_never_printed() {
+        let url: PostgresUrl = "postgres://ballast:secret@db.example:5433/facts".parse().unwrap();
+        assert_eq!(format!("{url} {url:?}"), ["postgres://ballast@db.example:5433/facts"; 2].join(" "));
+        for refused in ["mysql://u:secret@h/d", "secret", "postgres://u:secret@h:secret/d"] {
+            let error = refused.parse::<PostgresUrl>().unwrap_err();
+            let causes = std::iter::successors(std::error::Error::source(&error), |cause| cause.source());
+            let said = causes.fold(format!("{error} {error:?}"), |said, cause| format!("{said} {cause}"));
+            assert!(!said.contains("secret"), "{said}");
+        }
+    }
+
+    #[test]
+    fn encryption_is_refused_rather_than_left_out() {
+        for mode in ["require", "verify-ca", "verify-full"] {
+            let refused = format!("postgres://h/d?sslmode={mode}").parse::<PostgresUrl>().unwrap_err();
+            assert!(refused.to_string().contains(mode), "{refused}");
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! A statement, its values and its rows, over either engine.
+//!
+//! Both engines speak the SQL that is written here, with `$1`; where they differ, it is said once, in this file:
+//! PostgreSQL locks the rows a decision rests on, where SQLite's one writer meets nobody.
+
+use sqlx::postgres::{PgArguments, PgConnection, PgRow};
+use sqlx::query::Query as Statement;
+use sqlx::sqlite::{SqliteArguments, SqliteConnection, SqliteRow};
+use sqlx::{AssertSqlSafe, Database, Decode, Encode, Postgres, Row as _, Sqlite, Type};
+
+use super::error::Failure;
+
+/// A statement and the values of `$1`, `$2` and so on.
+pub(super) struct Query {
+    sql: &'static str,
+    lock: &'static str,
+    values: Vec<Value>,
+}
+
+pub(super) enum Value {
+    Text(String),
+    Integer(i64),
+    Real(f64),
+    Bytes(Vec<u8>),
+}
+
+pub(super) fn query(sql: &'static str) -> Query {
+    Query { sql, lock: "", values: Vec::new() }
+}
+
+impl Query {
+    pub(super) fn bind(mut self, value: impl Into<Value>) -> Self {
+        self.values.push(value.into());
+        self
+    }
+
+    /// Nobody else changes or locks the rows found until this transaction ends; waits for whoever does now.
+    pub(super) fn for_update(self) -> Self {
+        Query { lock: " FOR UPDATE", ..self }
+    }
+
+    /// As [`Query::for_update`], but passes over rows that another transaction holds.
+    pub(super) fn for_update_of_free(self) -> Self {
+        Query { lock: " FOR UPDATE SKIP LOCKED", ..self }
+    }
+
+    /// Nobody changes the rows found until this transaction ends; others may hold them likewise.
+    pub(super) fn for_share(self) -> Self {
+        Query { lock: " FOR SHARE", ..self }
+    }
+
+    fn sqlite(self) -> Statement<'static, Sqlite, SqliteArguments> {
+        bound(sqlx::query(self.sql), self.values)
+    }
+
+    fn postgres(self) -> Statement<'static, Postgres, PgArguments> {
+        let statement = match self.lock {
+            "" => sqlx::query(self.sql),
+            lock => sqlx::query(AssertSqlSafe(format!("{}{lock}", self.sql))),
+        };
+        bound(statement, self.values.into_iter().map(Value::without_nul).collect())
+    }
+}
+
+fn bound<DB: Database>(
+    statement: Statement<'static, DB, DB::Arguments>,
+    values: Vec<Value>,
+) -> Statement<'static, DB, DB::Arguments>
+where
+    String: Encode<'static, DB> + Type<DB>,
+    i64: Encode<'static, DB> + Type<DB>,
+    f64: Encode<'static, DB> + Type<DB>,
+    Vec<u8>: Encode<'static, DB> + Type<DB>,
+{
+    values.into_iter().fold(statement, |statement, value| match value {
+        Value::Text(text) => statement.bind(text),
+        Value::Integer(integer) => statement.bind(integer),
+        Value::Real(real) => statement.bind(real),
+        Value::Bytes(bytes) => statement.bind(bytes),
+    })
+}
+
+impl Value {
+    /// PostgreSQL's text cannot hold NUL. Nothing we name has one, so a name with one still finds nothing.
+    fn without_nul(self) -> Self {
+        match self {
+            Value::Text(text) if text.contains('\0') => Value::Text(text.replace('\0', "\u{fffd}")),
+            other => other,
+        }
+    }
+}
+
+impl From<&str> for Value {
+    fn from(text: &str) -> Self {
+        Value::Text(text.to_owned())
+    }
+}
+
+impl From<String> for Value {
+    fn from(text: String) -> Self {
+        Value::Text(text)
+    }
+}
+
+impl From<i64> for Value {
+    fn from(integer: i64) -> Self {
+        Value::Integer(integer)
+    }
+}
+
+impl From<f64> for Value {
+    fn from(real: f64) -> Self {
+        Value::Real(real)
+    }
+}
+
+impl From<Vec<u8>> for Value {
+    fn from(bytes: Vec<u8>) -> Self {
+        Value::Bytes(bytes)
+    }
+}
+
+pub(super) enum Row {
+    Sqlite(SqliteRow),
+    Postgres(PgRow),
+}
+
+/// What a column can be read as, from either engine.
+pub(super) trait Column:
+    for<'r> Decode<'r, Sqlite> + Type<Sqlite> + for<'r> Decode<'r, Postgres> + Type<Postgres>
+{
+}
+
+impl<T> Column for T where
+    T: for<'r> Decode<'r, Sqlite> + Type<Sqlite> + for<'r> Decode<'r, Postgres> + Type<Postgres>
+{
+}
+
+impl Row {
+    pub(super) fn get<T: Column>(&self, column: &str) -> Result<T, Failure> {
+        match self {
+            Row::Sqlite(row) => row.try_get(column).map_err(Failure::Sqlite),
+            Row::Postgres(row) => row.try_get(column).map_err(Failure::Postgres),
+        }
+    }
+}
+
+/// A connection in the hands of one operation; for a write, in its transaction.
+pub(super) enum Connection<'c> {
+    Sqlite(&'c mut SqliteConnection),
+    Postgres(&'c mut PgConnection),
+}
+
+impl Connection<'_> {
+    pub(super) async fn rows(&mut self, query: Query) -> Result<Vec<Row>, Failure> {
+        match self {
+            Connection::Sqlite(connection) => {
+                let rows = query.sqlite().fetch_all(&mut **connection).await.map_err(Failure::Sqlite)?;
+                Ok(rows.into_iter().map(Row::Sqlite).collect())
+            }
+            Connection::Postgres(connection) => {
+                let rows = query.postgres().fetch_all(&mut **connection).await.map_err(Failure::Postgres)?;
+                Ok(rows.into_iter().map(Row::Postgres).collect())
+            }
+        }
+    }
+
+    /// The first row, where there is one.
+    pub(super) async fn row(&mut self, query: Query) -> Result<Option<Row>, Failure> {
+        Ok(self.rows(query).await?.into_iter().next())
+    }
+
+    /// Number of rows changed.
+    pub(super) async fn execute(&mut self, query: Query) -> Result<u64, Failure> {
+        match self {
+            Connection::Sqlite(connection) => {
+                let done = query.sqlite().execute(&mut **connection).await.map_err(Failure::Sqlite)?;
+                Ok(done.rows_affected())
+            }
+            Connection::Postgres(connection) => {
+                let done = query.postgres().execute(&mut **connection).await.map_err(Failure::Postgres)?;
+                Ok(done.rows_affected())
+            }
+        }
+    }
+}

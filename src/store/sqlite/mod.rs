@@ -1,0 +1,103 @@
+//! SQLite in a folder that one process holds: read connections beside one writer, which commits in groups.
+
+mod classify;
+mod opening;
+mod writer;
+
+use std::path::Path;
+
+use futures_util::FutureExt;
+use futures_util::future::BoxFuture;
+use sqlx::sqlite::SqlitePool;
+use tokio::sync::{mpsc, oneshot, watch};
+
+use super::error::{Failure, StoreError};
+use super::query::{Connection, Query, Row, query};
+use writer::{Operation, Request};
+
+pub(super) use classify::classify;
+
+/// An open folder. Clones share the connections, the lock and the writer.
+#[derive(Clone)]
+pub(super) struct Folder {
+    readers: SqlitePool,
+    requests: mpsc::Sender<Request>,
+    /// The first fatal error, from whichever side met it.
+    fatal: watch::Sender<Option<StoreError>>,
+}
+
+impl Folder {
+    pub(super) async fn open(dir: &Path) -> Result<Folder, StoreError> {
+        let opening::Opened { lock, writer, readers } = opening::open(dir).await?;
+        let (requests, receiver) = mpsc::channel(writer::QUEUE);
+        let fatal = watch::Sender::new(None);
+        tokio::spawn(writer::serve(writer, receiver, fatal.clone(), lock));
+        Ok(Folder { readers, requests, fatal })
+    }
+
+    pub(super) async fn ping(&self) -> Result<(), StoreError> {
+        let doing = "answering a ping";
+        self.refuse_after_fatal()?;
+        if self.requests.is_closed() {
+            return Err(StoreError::Unavailable { doing, source: None });
+        }
+        self.read(doing, query("SELECT job FROM jobs LIMIT 1")).await.map(|_| ())
+    }
+
+    pub(super) async fn until_fatal(&self) -> StoreError {
+        let mut fatal = self.fatal.subscribe();
+        loop {
+            if let Some(error) = fatal.borrow_and_update().clone() {
+                return error;
+            }
+            if fatal.changed().await.is_err() {
+                std::future::pending::<()>().await;
+            }
+        }
+    }
+
+    pub(super) async fn close(&self) {
+        self.readers.close().await;
+        let (answer, closed) = oneshot::channel();
+        if self.requests.send(Request::Close(answer)).await.is_ok() {
+            // An error means that the writer ended first: closed as well.
+            let _ = closed.await;
+        }
+    }
+
+    /// Runs `work` in the writer and answers after its commit.
+    pub(super) async fn write<T, W>(&self, doing: &'static str, work: W) -> Result<T, StoreError>
+    where
+        T: Send + 'static,
+        W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
+    {
+        self.refuse_after_fatal()?;
+        let (operation, answer) =
+            Operation::new(doing, move |connection| work(Connection::Sqlite(connection)).boxed());
+        // A writer that ended drops the operation, and the answer with it.
+        let _ = self.requests.send(Request::Write(operation)).await;
+        match answer.await {
+            Ok(result) => result,
+            Err(_) => self.refuse_after_fatal().and(Err(StoreError::Unavailable { doing, source: None })),
+        }
+    }
+
+    /// Reads, and remembers a fatal failure.
+    pub(super) async fn read(&self, doing: &'static str, query: Query) -> Result<Vec<Row>, StoreError> {
+        let reading = async {
+            let mut reader = self.readers.acquire().await.map_err(Failure::Sqlite)?;
+            Connection::Sqlite(&mut reader).rows(query).await
+        };
+        let result = reading.await.map_err(|failure| failure.during(doing));
+        if let Err(error) = &result
+            && error.is_fatal()
+        {
+            self.fatal.send_if_modified(|fatal| fatal.is_none() && fatal.replace(error.clone()).is_none());
+        }
+        result
+    }
+
+    fn refuse_after_fatal(&self) -> Result<(), StoreError> {
+        self.fatal.borrow().clone().map_or(Ok(()), Err)
+    }
+}
