@@ -1,37 +1,63 @@
-//! The store's promises, on a real file in a temporary folder.
+//! The store's promises, each on both engines: SQLite on a real file, PostgreSQL on a real server.
 
-use std::path::Path;
+mod support;
 
 use ballast::control::policy::content_hash;
 use ballast::store::{
     Append, CreateJob, CreateSession, DeletePolicy, JobCounts, JobKind, JobOutcome, JobRow, JobState, NewJob,
     NewObservation, NewSession, Store, StoreError,
 };
-use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
-use sqlx::{AssertSqlSafe, Connection};
-use tempfile::TempDir;
+use futures_util::future::join_all;
+use support::place::Place;
 
 const POLICY: &[u8] = br#"{"format":"test"}"#;
 
-async fn fresh() -> (TempDir, Store) {
-    let dir = tempfile::tempdir().unwrap();
-    let store = Store::open(&dir.path().join("data")).await.unwrap();
-    (dir, store)
+/// Runs each test over either engine, in a place of its own.
+macro_rules! on_both_engines {
+    ($($name:ident),* $(,)?) => {
+        mod sqlite {
+            $(#[tokio::test(flavor = "multi_thread")]
+            async fn $name() {
+                super::$name(&super::Place::folder()).await;
+            })*
+        }
+        mod postgres {
+            $(#[tokio::test(flavor = "multi_thread")]
+            async fn $name() {
+                if let Some(place) = super::Place::database().await {
+                    super::$name(&place).await;
+                }
+            })*
+        }
+    };
 }
 
-async fn reopened(dir: &TempDir, store: Store) -> Store {
-    store.close().await;
-    Store::open(&dir.path().join("data")).await.unwrap()
-}
-
-/// Changes the file behind a closed store's back.
-async fn tamper(dir: &Path, statement: &str) {
-    let options = SqliteConnectOptions::new().filename(dir.join("data/ballast.sqlite"));
-    let mut connection = SqliteConnection::connect_with(&options).await.unwrap();
-    let changed = sqlx::query(AssertSqlSafe(statement)).execute(&mut connection).await.unwrap();
-    assert_eq!(changed.rows_affected(), 1, "{statement}");
-    connection.close().await.unwrap();
-}
+on_both_engines!(
+    a_closed_store_answers_unavailable,
+    a_newer_schema_is_refused,
+    an_idempotency_key_makes_one_job,
+    a_refused_operation_leaves_its_neighbours_alone,
+    jobs_are_listed_newest_first_by_cursor,
+    the_oldest_job_is_claimed_and_a_lease_that_ran_out_is_taken_over,
+    a_worker_that_lost_its_lease_is_fenced_everywhere,
+    a_finished_training_stores_its_policy_and_drops_its_checkpoints,
+    failures_and_reports_end_a_job,
+    cancelling_ends_a_queued_job_and_flags_a_running_one,
+    a_job_asked_to_stop_is_not_claimed_again,
+    a_released_job_resumes_from_its_checkpoints,
+    a_policy_is_stored_once_listed_and_kept_while_in_use,
+    a_damaged_policy_is_detected,
+    a_session_needs_its_policy_and_a_free_name,
+    a_restart_keeps_sessions_bit_for_bit,
+    every_observation_is_stored_once_and_in_order,
+    sixteen_reports_of_one_period_have_one_winner,
+    many_sessions_commit_in_groups,
+    damage_to_what_an_action_rests_on_is_detected,
+    reads_run_on_any_thread,
+    two_replicas_meet,
+    a_head_follows_the_rows,
+    a_name_nobody_can_have_finds_nothing,
+);
 
 fn new_job(job: &str, key: Option<&str>) -> NewJob {
     NewJob {
@@ -89,19 +115,8 @@ fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
-#[tokio::test]
-async fn a_second_open_is_refused_until_the_first_closes() {
-    let (dir, store) = fresh().await;
-    store.ping().await.unwrap();
-    let second = Store::open(&dir.path().join("data")).await;
-    assert!(matches!(second, Err(StoreError::Locked { .. })));
-    let store = reopened(&dir, store).await;
-    store.ping().await.unwrap();
-}
-
-#[tokio::test]
-async fn a_closed_store_answers_unavailable() {
-    let (_dir, store) = fresh().await;
+async fn a_closed_store_answers_unavailable(place: &Place) {
+    let store = place.open().await;
     store.close().await;
     store.close().await;
     assert!(matches!(store.ping().await, Err(StoreError::Unavailable { .. })));
@@ -109,40 +124,29 @@ async fn a_closed_store_answers_unavailable() {
     assert!(matches!(store.create_job(new_job("j", None)).await, Err(StoreError::Unavailable { .. })));
 }
 
-#[tokio::test]
-async fn a_newer_schema_is_refused() {
-    let (dir, store) = fresh().await;
+async fn a_newer_schema_is_refused(place: &Place) {
+    let store = place.open().await;
     store.close().await;
     let newer = "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
-                 VALUES (9000, 'of a later release', 1, x'00', 0)";
-    tamper(dir.path(), newer).await;
-    let refused = Store::open(&dir.path().join("data")).await;
+                 VALUES (9000, 'of a later release', TRUE, '00', 0)";
+    place.tamper(newer).await;
+    let refused = place.try_open().await;
     assert!(matches!(refused, Err(StoreError::NewerSchema { found: 9000, .. })));
 }
 
-#[tokio::test]
-async fn a_file_that_is_no_database_is_fatal() {
-    let dir = tempfile::tempdir().unwrap();
-    std::fs::write(dir.path().join("ballast.sqlite"), [b'x'; 8192]).unwrap();
-    let refused = Store::open(dir.path()).await.err().expect("a refusal");
-    assert!(refused.is_fatal(), "{refused:?}");
-}
-
-#[tokio::test]
-async fn an_idempotency_key_makes_one_job() {
-    let (dir, store) = fresh().await;
+async fn an_idempotency_key_makes_one_job(place: &Place) {
+    let store = place.open().await;
     let CreateJob::Created(first) = store.create_job(new_job("j1", Some("key"))).await.unwrap() else { panic!() };
     assert_eq!((first.state, first.attempt, first.steps_done), (JobState::Queued, 0, 0));
-    let store = reopened(&dir, store).await;
+    let store = place.reopen(store).await;
     assert_eq!(store.create_job(new_job("j2", Some("key"))).await.unwrap(), CreateJob::Repeated(first.clone()));
     let other = NewJob { request_hash: "other".into(), ..new_job("j3", Some("key")) };
     assert_eq!(store.create_job(other).await.unwrap(), CreateJob::KeyConflict);
     assert_eq!(store.jobs(10, None).await.unwrap(), [first]);
 }
 
-#[tokio::test]
-async fn a_refused_operation_leaves_its_neighbours_alone() {
-    let (_dir, store) = fresh().await;
+async fn a_refused_operation_leaves_its_neighbours_alone(place: &Place) {
+    let store = place.open().await;
     queued(&store, "taken").await;
     let names: Vec<_> = (0..40).map(|n| if n % 4 == 0 { "taken".into() } else { format!("j{n}") }).collect();
     let results = futures_util::future::join_all(names.iter().map(|name| store.create_job(new_job(name, None)))).await;
@@ -155,9 +159,8 @@ async fn a_refused_operation_leaves_its_neighbours_alone() {
     assert_eq!(store.count_jobs_by_state().await.unwrap(), JobCounts { queued: 31, ..JobCounts::default() });
 }
 
-#[tokio::test]
-async fn jobs_are_listed_newest_first_by_cursor() {
-    let (_dir, store) = fresh().await;
+async fn jobs_are_listed_newest_first_by_cursor(place: &Place) {
+    let store = place.open().await;
     for n in 0..5 {
         queued(&store, &format!("j{n}")).await;
     }
@@ -167,9 +170,8 @@ async fn jobs_are_listed_newest_first_by_cursor() {
     assert_eq!(names, ["j4", "j3", "j2", "j1", "j0"]);
 }
 
-#[tokio::test]
-async fn the_oldest_job_is_claimed_and_a_lease_that_ran_out_is_taken_over() {
-    let (_dir, store) = fresh().await;
+async fn the_oldest_job_is_claimed_and_a_lease_that_ran_out_is_taken_over(place: &Place) {
+    let store = place.open().await;
     queued(&store, "j1").await;
     queued(&store, "j2").await;
     assert_eq!(claimed(&store, 0).await, ("j1".into(), 1));
@@ -180,9 +182,8 @@ async fn the_oldest_job_is_claimed_and_a_lease_that_ran_out_is_taken_over() {
     assert_eq!(store.job("j2").await.unwrap().unwrap().started_ms, Some(0));
 }
 
-#[tokio::test]
-async fn a_worker_that_lost_its_lease_is_fenced_everywhere() {
-    let (_dir, store) = fresh().await;
+async fn a_worker_that_lost_its_lease_is_fenced_everywhere(place: &Place) {
+    let store = place.open().await;
     queued(&store, "j").await;
     let (_, stale) = claimed(&store, 0).await;
     assert!(store.save_checkpoint("j", stale, 9, b"nine").await.unwrap());
@@ -196,9 +197,8 @@ async fn a_worker_that_lost_its_lease_is_fenced_everywhere() {
     assert_eq!(store.job("j").await.unwrap().unwrap().steps_done, 2);
 }
 
-#[tokio::test]
-async fn a_finished_training_stores_its_policy_and_drops_its_checkpoints() {
-    let (dir, store) = fresh().await;
+async fn a_finished_training_stores_its_policy_and_drops_its_checkpoints(place: &Place) {
+    let store = place.open().await;
     queued(&store, "j").await;
     let (_, attempt) = claimed(&store, 1).await;
     assert!(store.save_checkpoint("j", attempt, 9, b"nine").await.unwrap());
@@ -206,7 +206,7 @@ async fn a_finished_training_stores_its_policy_and_drops_its_checkpoints() {
     let outcome = JobOutcome::Succeeded { policy_id: policy_id.clone(), policy_json: POLICY.into() };
     assert!(store.finish_job("j", attempt, outcome.clone(), 77).await.unwrap());
     assert!(!store.finish_job("j", attempt, outcome, 78).await.unwrap());
-    let store = reopened(&dir, store).await;
+    let store = place.reopen(store).await;
     let row = store.job("j").await.unwrap().unwrap();
     assert_eq!((row.state, row.steps_done, row.finished_ms), (JobState::Succeeded, 10, Some(77)));
     assert_eq!(row.policy, Some(policy_id.clone()));
@@ -215,9 +215,8 @@ async fn a_finished_training_stores_its_policy_and_drops_its_checkpoints() {
     assert_eq!(store.request_cancel("j", 99).await.unwrap().unwrap(), row);
 }
 
-#[tokio::test]
-async fn failures_and_reports_end_a_job() {
-    let (_dir, store) = fresh().await;
+async fn failures_and_reports_end_a_job(place: &Place) {
+    let store = place.open().await;
     queued(&store, "fails").await;
     queued(&store, "reports").await;
     let (_, attempt) = claimed(&store, 1).await;
@@ -231,9 +230,8 @@ async fn failures_and_reports_end_a_job() {
     assert_eq!(counts, JobCounts { failed: 1, succeeded: 1, ..JobCounts::default() });
 }
 
-#[tokio::test]
-async fn cancelling_ends_a_queued_job_and_flags_a_running_one() {
-    let (_dir, store) = fresh().await;
+async fn cancelling_ends_a_queued_job_and_flags_a_running_one(place: &Place) {
+    let store = place.open().await;
     assert_eq!(store.request_cancel("nobody", 1).await.unwrap(), None);
     queued(&store, "waits").await;
     let row = store.request_cancel("waits", 5).await.unwrap().unwrap();
@@ -246,9 +244,8 @@ async fn cancelling_ends_a_queued_job_and_flags_a_running_one() {
     assert_eq!(store.job("runs").await.unwrap().unwrap().state, JobState::Cancelled);
 }
 
-#[tokio::test]
-async fn a_job_asked_to_stop_is_not_claimed_again() {
-    let (_dir, store) = fresh().await;
+async fn a_job_asked_to_stop_is_not_claimed_again(place: &Place) {
+    let store = place.open().await;
     for job in ["abandoned", "released"] {
         queued(&store, job).await;
         let (_, attempt) = claimed(&store, 0).await;
@@ -262,39 +259,26 @@ async fn a_job_asked_to_stop_is_not_claimed_again() {
     assert_eq!(counts, JobCounts { cancelled: 2, ..JobCounts::default() });
 }
 
-#[tokio::test]
-async fn opening_the_folder_ends_the_leases_of_the_dead() {
-    let (dir, store) = fresh().await;
-    queued(&store, "j").await;
-    let (_, dead) = claimed(&store, 0).await;
-    assert_eq!(store.claim_job("worker", 30, 1).await.unwrap(), None);
-    let store = reopened(&dir, store).await;
-    assert_eq!(claimed(&store, 1).await, ("j".into(), dead + 1));
-    assert!(!store.save_checkpoint("j", dead, 9, b"late").await.unwrap());
-}
-
-#[tokio::test]
-async fn a_released_job_resumes_from_its_checkpoints() {
-    let (dir, store) = fresh().await;
+async fn a_released_job_resumes_from_its_checkpoints(place: &Place) {
+    let store = place.open().await;
     queued(&store, "j").await;
     let (_, attempt) = claimed(&store, 0).await;
     for step in [9, 8] {
         assert!(store.save_checkpoint("j", attempt, step, &[step as u8; 100]).await.unwrap());
     }
     assert!(store.release_job("j", attempt, 1).await.unwrap());
-    let store = reopened(&dir, store).await;
+    let store = place.reopen(store).await;
     let (_, attempt) = claimed(&store, 2).await;
     assert_eq!(attempt, 2);
     assert_eq!(store.checkpoints("j").await.unwrap(), [(8, vec![8; 100]), (9, vec![9; 100])]);
     store.close().await;
-    tamper(dir.path(), "UPDATE checkpoints SET bytes = x'00' WHERE step = 8").await;
-    let store = Store::open(&dir.path().join("data")).await.unwrap();
+    place.tamper("UPDATE checkpoints SET bytes = substr(bytes, 1, 1) WHERE step = 8").await;
+    let store = place.open().await;
     assert!(matches!(store.checkpoints("j").await, Err(StoreError::Corrupt { .. })));
 }
 
-#[tokio::test]
-async fn a_policy_is_stored_once_listed_and_kept_while_in_use() {
-    let (_dir, store) = fresh().await;
+async fn a_policy_is_stored_once_listed_and_kept_while_in_use(place: &Place) {
+    let store = place.open().await;
     let policy = content_hash(POLICY);
     assert!(matches!(store.insert_policy("other", POLICY, 1).await, Err(StoreError::Corrupt { .. })));
     assert!(store.insert_policy(&policy, POLICY, 1).await.unwrap());
@@ -310,21 +294,19 @@ async fn a_policy_is_stored_once_listed_and_kept_while_in_use() {
     assert_eq!(store.policy(&policy).await.unwrap(), None);
 }
 
-#[tokio::test]
-async fn a_damaged_policy_is_detected() {
-    let (dir, store) = fresh().await;
+async fn a_damaged_policy_is_detected(place: &Place) {
+    let store = place.open().await;
     let policy = content_hash(POLICY);
     store.insert_policy(&policy, POLICY, 1).await.unwrap();
     store.close().await;
-    tamper(dir.path(), "UPDATE policies SET json = x'7b7d'").await;
-    let store = Store::open(&dir.path().join("data")).await.unwrap();
+    place.tamper("UPDATE policies SET json = substr(json, 1, 2)").await;
+    let store = place.open().await;
     assert!(matches!(store.policy(&policy).await, Err(StoreError::Corrupt { .. })));
     store.ping().await.unwrap();
 }
 
-#[tokio::test]
-async fn a_session_needs_its_policy_and_a_free_name() {
-    let (_dir, store) = fresh().await;
+async fn a_session_needs_its_policy_and_a_free_name(place: &Place) {
+    let store = place.open().await;
     let new = NewSession {
         session: "s".into(),
         policy: "none".into(),
@@ -343,16 +325,15 @@ async fn a_session_needs_its_policy_and_a_free_name() {
     assert_eq!(store.count_sessions().await.unwrap(), 1);
 }
 
-#[tokio::test]
-async fn a_restart_keeps_sessions_bit_for_bit() {
-    let (dir, store) = fresh().await;
+async fn a_restart_keeps_sessions_bit_for_bit(place: &Place) {
+    let store = place.open().await;
     let history = [0.1, -0.0, 5e-324, -1.0 / 3.0, f64::MAX];
     with_session(&store, "s", &history).await;
     for period in 1..=3 {
         let appended = store.append_observation(observation("s", period, "c")).await.unwrap();
         assert_eq!(appended, Append::Appended);
     }
-    let store = reopened(&dir, store).await;
+    let store = place.reopen(store).await;
     let row = store.session("s").await.unwrap().unwrap();
     assert_eq!(bits(&row.initial_history), bits(&history));
     let read = store.observations("s").await.unwrap();
@@ -366,9 +347,8 @@ async fn a_restart_keeps_sessions_bit_for_bit() {
     assert_eq!(store.sessions(10, None).await.unwrap()[0].observations, 3);
 }
 
-#[tokio::test]
-async fn every_observation_is_stored_once_and_in_order() {
-    let (_dir, store) = fresh().await;
+async fn every_observation_is_stored_once_and_in_order(place: &Place) {
+    let store = place.open().await;
     assert_eq!(store.append_observation(observation("s", 1, "a")).await.unwrap(), Append::NoSession);
     with_session(&store, "s", &[0.1, 0.2]).await;
     let append = async |period, content| store.append_observation(observation("s", period, content)).await.unwrap();
@@ -382,13 +362,13 @@ async fn every_observation_is_stored_once_and_in_order() {
     assert_eq!(store.observations("s").await.unwrap(), []);
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn sixteen_reports_of_one_period_have_one_winner() {
-    let (_dir, store) = fresh().await;
+async fn sixteen_reports_of_one_period_have_one_winner(place: &Place) {
+    let store = place.open().await;
+    let second = place.second(&store).await;
     with_session(&store, "s", &[0.1, 0.2]).await;
     let tasks: Vec<_> = (0..16)
         .map(|client| {
-            let store = store.clone();
+            let store = if client % 2 == 0 { store.clone() } else { second.clone() };
             tokio::spawn(async move { store.append_observation(observation("s", 1, &format!("c{client}"))).await })
         })
         .collect();
@@ -403,9 +383,8 @@ async fn sixteen_reports_of_one_period_have_one_winner() {
     assert_eq!(store.observations("s").await.unwrap().len(), 1);
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn many_sessions_commit_in_groups() {
-    let (dir, store) = fresh().await;
+async fn many_sessions_commit_in_groups(place: &Place) {
+    let store = place.open().await;
     for session in 0..50 {
         with_session(&store, &format!("s{session}"), &[0.1, 0.2]).await;
     }
@@ -417,42 +396,42 @@ async fn many_sessions_commit_in_groups() {
         let appends = futures_util::future::join_all(appends.map(tokio::spawn)).await;
         assert!(appends.into_iter().all(|append| append.unwrap().unwrap() == Append::Appended));
     }
-    let store = reopened(&dir, store).await;
+    let store = place.reopen(store).await;
     let listed = store.sessions(100, None).await.unwrap();
     assert_eq!(listed.len(), 50);
     assert!(listed.iter().all(|session| session.observations == 4));
 }
 
-#[tokio::test]
-async fn damage_to_what_an_action_rests_on_is_detected() {
+async fn damage_to_what_an_action_rests_on_is_detected(place: &Place) {
     let damages = [
-        "UPDATE sessions SET initial_history = x'000000000000f03f000000000000f03f'",
-        "UPDATE sessions SET initial_history = x'00'",
+        "UPDATE sessions SET initial_history = substr(initial_history, 1, 8)",
+        "UPDATE sessions SET initial_history = substr(initial_history, 1, 7)",
         "UPDATE sessions SET initial_wealth = 1e6",
         "UPDATE observations SET log_return = 0.0 WHERE period = 2",
         "UPDATE observations SET answer_json = '{}' WHERE period = 1",
         "DELETE FROM observations WHERE period = 1",
     ];
     for damage in damages {
-        let (dir, store) = fresh().await;
+        let store = place.open().await;
+        store.delete_session("s").await.unwrap();
         with_session(&store, "s", &[0.1, 0.2]).await;
         for period in 1..=2 {
             store.append_observation(observation("s", period, "c")).await.unwrap();
         }
         store.close().await;
-        tamper(dir.path(), damage).await;
-        let store = Store::open(&dir.path().join("data")).await.unwrap();
+        place.tamper(damage).await;
+        let store = place.open().await;
         let damaged = match damage.contains("sessions") {
             true => store.session("s").await.err(),
             false => store.observations("s").await.err(),
         };
         assert!(matches!(damaged, Some(StoreError::Corrupt { .. })), "{damage}: {damaged:?}");
+        store.close().await;
     }
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn reads_run_on_any_thread() {
-    let (_dir, store) = fresh().await;
+async fn reads_run_on_any_thread(place: &Place) {
+    let store = place.open().await;
     with_session(&store, "s", &[0.1, 0.2]).await;
     let read = tokio::spawn(async move {
         store.ping().await?;
@@ -466,4 +445,147 @@ async fn reads_run_on_any_thread() {
         store.session("s").await
     });
     assert_eq!(read.await.unwrap().unwrap().unwrap().session, "s");
+}
+
+/// Everything two replicas can do to each other's jobs, keys and policies at the same moment.
+async fn two_replicas_meet(place: &Place) {
+    let store = place.open().await;
+    let second = place.second(&store).await;
+    let either = |n: usize| if n % 2 == 0 { store.clone() } else { second.clone() };
+
+    let keyed = (0..8).map(|n| {
+        let store = either(n);
+        tokio::spawn(async move { store.create_job(new_job(&format!("k{n}"), Some("key"))).await.unwrap() })
+    });
+    let keyed: Vec<_> = join_all(keyed).await.into_iter().map(Result::unwrap).collect();
+    assert_eq!(keyed.iter().filter(|outcome| matches!(outcome, CreateJob::Created(_))).count(), 1, "{keyed:?}");
+    let first = store.jobs(10, None).await.unwrap();
+    assert_eq!(first.len(), 1, "{first:?}");
+    assert!(keyed.iter().all(|outcome| matches!(outcome,
+        CreateJob::Created(row) | CreateJob::Repeated(row) if row.job == first[0].job)));
+
+    for n in 1..20 {
+        queued(&store, &format!("j{n}")).await;
+    }
+    let claims = (0..40).map(|n| {
+        let store = either(n);
+        tokio::spawn(async move { store.claim_job("worker", 30, 0).await.unwrap() })
+    });
+    let mut claimed: Vec<_> =
+        join_all(claims).await.into_iter().filter_map(|claim| Some(claim.unwrap()?.row.job)).collect();
+    // A claim that met another may come away with nothing while there was still a job.
+    while let Some(late) = store.claim_job("worker", 30, 0).await.unwrap() {
+        claimed.push(late.row.job);
+    }
+    claimed.sort();
+    claimed.dedup();
+    assert_eq!((claimed.len(), store.count_jobs_by_state().await.unwrap().running), (20, 20));
+
+    let policy = content_hash(POLICY);
+    for round in 0..10 {
+        store.insert_policy(&policy, POLICY, 1).await.unwrap();
+        let session = format!("s{round}");
+        let new = NewSession {
+            session: session.clone(),
+            policy: policy.clone(),
+            wealth: 1.0,
+            history: vec![0.1],
+            horizon: 1,
+            created_ms: 1,
+        };
+        match tokio::join!(store.create_session(new), second.delete_policy(&policy)) {
+            (Ok(CreateSession::Created), Ok(DeletePolicy::InUse { sessions: 1 })) => {
+                assert!(second.delete_session(&session).await.unwrap());
+            }
+            (Ok(CreateSession::NoPolicy), Ok(DeletePolicy::Deleted)) => {}
+            met => panic!("{met:?}"),
+        }
+    }
+}
+
+async fn a_head_follows_the_rows(place: &Place) {
+    let store = place.open().await;
+    let second = place.second(&store).await;
+    assert_eq!(store.head("s").await.unwrap(), None);
+    with_session(&store, "s", &[0.1, 0.2]).await;
+    let mut heads = vec![store.session("s").await.unwrap().unwrap().head()];
+    assert_eq!(second.head("s").await.unwrap().as_ref(), heads.last());
+    for period in 1..=3 {
+        let new = observation("s", period, "c");
+        heads.push(new.head());
+        store.append_observation(new).await.unwrap();
+        let head = second.head("s").await.unwrap();
+        assert_eq!((head.as_ref(), head.as_ref().map(|head| head.observed)), (heads.last(), Some(period)));
+        assert_eq!(store.observations("s").await.unwrap()[period - 1].head("s"), heads[period]);
+    }
+    let other = NewObservation { created_ms: 8, ..observation("s", 3, "c") };
+    assert_ne!(other.head(), heads[3], "the same report at another time");
+    assert!(second.delete_session("s").await.unwrap());
+    assert_eq!(store.head("s").await.unwrap(), None);
+}
+
+async fn a_name_nobody_can_have_finds_nothing(place: &Place) {
+    let store = place.open().await;
+    for name in ["", "a\0b", "\u{1f4a9}", "'; DROP TABLE jobs; --"] {
+        assert_eq!(store.job(name).await.unwrap(), None);
+        assert_eq!(store.request_cancel(name, 1).await.unwrap(), None);
+        assert_eq!(store.policy(name).await.unwrap(), None);
+        assert_eq!(store.delete_policy(name).await.unwrap(), DeletePolicy::Absent);
+        assert_eq!(store.session(name).await.unwrap(), None);
+        assert_eq!(store.append_observation(observation(name, 1, "c")).await.unwrap(), Append::NoSession);
+    }
+}
+
+#[tokio::test]
+async fn a_second_open_of_a_folder_is_refused_until_the_first_closes() {
+    let place = Place::folder();
+    let store = place.open().await;
+    store.ping().await.unwrap();
+    assert!(matches!(place.try_open().await, Err(StoreError::Locked { .. })));
+    place.reopen(store).await.ping().await.unwrap();
+}
+
+#[tokio::test]
+async fn a_file_that_is_no_database_is_fatal() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("ballast.sqlite"), [b'x'; 8192]).unwrap();
+    let refused = Store::open(folder.path()).await.err().expect("a refusal");
+    assert!(refused.is_fatal(), "{refused:?}");
+}
+
+#[tokio::test]
+async fn opening_a_folder_ends_the_leases_of_the_dead() {
+    let place = Place::folder();
+    let store = place.open().await;
+    queued(&store, "j").await;
+    let (_, dead) = claimed(&store, 0).await;
+    assert_eq!(store.claim_job("worker", 30, 1).await.unwrap(), None);
+    let store = place.reopen(store).await;
+    assert_eq!(claimed(&store, 1).await, ("j".into(), dead + 1));
+    assert!(!store.save_checkpoint("j", dead, 9, b"late").await.unwrap());
+    assert_eq!(store.lease_time(77).await.unwrap(), 77);
+}
+
+#[tokio::test]
+async fn opening_a_database_leaves_the_leases_of_the_living_and_measures_them_by_its_own_clock() {
+    let Some(place) = Place::database().await else { return };
+    let store = place.open().await;
+    queued(&store, "j").await;
+    let (_, living) = claimed(&store, 0).await;
+    let replicas = join_all((0..4).map(|_| place.open())).await;
+    for replica in &replicas {
+        assert_eq!(replica.claim_job("worker", 30, 1).await.unwrap(), None);
+    }
+    assert!(store.save_checkpoint("j", living, 9, b"nine").await.unwrap());
+    let local = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_millis() as i64;
+    let server = store.lease_time(77).await.unwrap();
+    assert!((server - local).abs() < 60_000, "{server} on the server, {local} here");
+    assert!(replicas[0].lease_time(77).await.unwrap() >= server);
+}
+
+#[tokio::test]
+async fn a_server_that_is_not_there_is_unavailable() {
+    let nowhere = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let refused = Store::connect(&format!("postgres://ballast@{nowhere}/ballast").parse().unwrap()).await;
+    assert!(matches!(refused, Err(StoreError::Unavailable { .. })), "{:?}", refused.err());
 }

@@ -3,6 +3,9 @@
 //! Each event carries the whole job, and its id is made of the state and the progress shown. A client that comes back
 //! with `Last-Event-ID` therefore misses nothing and sees nothing twice, even across a restart of the service. A client
 //! that has seen the terminal state gets 204, which tells an `EventSource` to stay away.
+//!
+//! A job that another replica runs is followed by asking the store: its finished steps show, the points inside a step do
+//! not. Notifications of PostgreSQL would come sooner but can be lost, so that asking would have to stay beside them.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -22,7 +25,7 @@ use crate::service::Service;
 use crate::store::JobState;
 
 /// A change made by another process is noticed within this time.
-const POLL: Duration = Duration::from_secs(2);
+const POLL: Duration = Duration::from_secs(1);
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
 struct Follower {

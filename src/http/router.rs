@@ -31,6 +31,10 @@ use crate::service::config::Config;
 struct Description;
 
 fn routes() -> OpenApiRouter<Arc<Service>> {
+    users().merge(operators()).merge(pages())
+}
+
+fn users() -> OpenApiRouter<Arc<Service>> {
     OpenApiRouter::with_openapi(Description::openapi())
         .routes(routes!(jobs::train))
         .routes(routes!(jobs::list))
@@ -46,14 +50,20 @@ fn routes() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(sessions::observe))
         .routes(routes!(sessions::action))
         .routes(routes!(what_if::what_if))
+}
+
+fn operators() -> OpenApiRouter<Arc<Service>> {
+    OpenApiRouter::new()
         .routes(routes!(operations::livez))
         .routes(routes!(operations::readyz))
         .routes(routes!(operations::health))
         .routes(routes!(operations::metrics))
         .routes(routes!(operations::openapi))
         .routes(routes!(operations::docs))
-        .routes(routes!(dashboard::root))
-        .routes(routes!(dashboard::file))
+}
+
+fn pages() -> OpenApiRouter<Arc<Service>> {
+    OpenApiRouter::new().routes(routes!(dashboard::root)).routes(routes!(dashboard::file))
 }
 
 /// The OpenAPI description.
@@ -68,9 +78,10 @@ pub fn description_json() -> String {
     description().to_pretty_json().unwrap_or_default() + "\n"
 }
 
-/// The whole application.
+/// The whole application; for a replica that only works, the operator's part of it.
 pub fn application(service: Arc<Service>, config: &Config) -> Router {
-    let (router, _) = routes().split_for_parts();
+    let routes = if config.role.answers() { routes() } else { operators() };
+    let (router, _) = routes.split_for_parts();
     router
         .fallback(unknown_route)
         .method_not_allowed_fallback(wrong_method)

@@ -67,7 +67,7 @@ pub async fn serve(config: Config, shutdown: Shutdown) -> Result<Running, ServeE
     let listener = TcpListener::bind(config.listen).await.map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
     let service = Service::start(&config, Clock::system(), shutdown.clone()).await?;
-    tracing::info!(%address, data = %config.data.display(), "listening");
+    tracing::info!(%address, store = %config.store, role = ?config.role, "listening");
     let application = router::application(service.clone(), &config);
     let task = tokio::spawn(run(listener, application, service, config));
     Ok(Running { address, shutdown, task })

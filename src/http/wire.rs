@@ -161,8 +161,8 @@ fn session_state(observed: usize, horizon: usize) -> SessionState {
 impl From<Live> for Session {
     fn from(live: Live) -> Self {
         Session {
-            period: live.observed + 1,
-            state: session_state(live.observed, live.row.horizon),
+            period: live.observed() + 1,
+            state: session_state(live.observed(), live.row.horizon),
             wealth: live.state.wealth,
             sample_size: live.state.law.sample_size(),
             session: live.row.session,

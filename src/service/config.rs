@@ -1,16 +1,58 @@
 //! What an operator may choose.
 
+use std::fmt;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::time::Duration;
+
+use crate::store::PostgresUrl;
+
+/// Where the durable facts are.
+#[derive(Debug, Clone)]
+pub enum StoreLocation {
+    /// SQLite in a folder, created if absent, for this process alone.
+    Folder(PathBuf),
+    /// A database that replicas share.
+    Postgres(PostgresUrl),
+}
+
+impl fmt::Display for StoreLocation {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            StoreLocation::Folder(folder) => write!(formatter, "{}", folder.display()),
+            StoreLocation::Postgres(url) => write!(formatter, "{url}"),
+        }
+    }
+}
+
+/// What one replica does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Answer requests and run jobs.
+    All,
+    /// Answer requests.
+    Api,
+    /// Run jobs; answers the operator's requests only.
+    Worker,
+}
+
+impl Role {
+    pub fn answers(self) -> bool {
+        self != Role::Worker
+    }
+
+    pub fn runs_jobs(self) -> bool {
+        self != Role::Api
+    }
+}
 
 /// The configuration of one process.
 #[derive(Debug, Clone)]
 pub struct Config {
     /// Port 0 picks a free one.
     pub listen: SocketAddr,
-    /// Folder of the database; created if absent.
-    pub data: PathBuf,
+    pub store: StoreLocation,
+    pub role: Role,
     /// Threads of the training pool.
     pub training_threads: usize,
     /// Connections served at a time; more wait in the kernel's queue.
@@ -31,12 +73,13 @@ pub struct Config {
 }
 
 impl Config {
-    /// The defaults: loopback, every core but one for training.
+    /// The defaults over a folder: loopback, every core but one for training.
     pub fn new(data: impl Into<PathBuf>) -> Self {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Config {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
-            data: data.into(),
+            store: StoreLocation::Folder(data.into()),
+            role: Role::All,
             training_threads: cores.saturating_sub(1).max(1),
             connection_limit: 1024,
             body_limit_bytes: 64 << 20,

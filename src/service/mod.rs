@@ -21,7 +21,7 @@ pub mod what_if;
 use std::sync::Arc;
 
 use clock::Clock;
-use config::Config;
+use config::{Config, Role, StoreLocation};
 use error::ServiceError;
 use jobs::Jobs;
 use policies::Policies;
@@ -29,6 +29,7 @@ use sessions::Sessions;
 use shutdown::Shutdown;
 use trainer::Trainer;
 
+use crate::control::error::FieldError;
 use crate::store::{JobCounts, Store};
 
 /// The use cases over one store.
@@ -38,21 +39,29 @@ pub struct Service {
     pub sessions: Sessions,
     pub shutdown: Shutdown,
     store: Store,
-    trainer: Trainer,
+    trainer: Option<Trainer>,
 }
 
 impl Service {
-    /// Opens the store, starts the trainer, and ends the process should the store ever fail past recovery.
+    /// Opens the store, starts the trainer where the role has one, and ends the process should the store ever fail past recovery.
     ///
     /// # Errors
-    /// The store cannot be opened, or the training thread cannot be started.
+    /// The role does not fit the store, the store cannot be opened, or the training thread cannot be started.
     pub async fn start(config: &Config, clock: Clock, shutdown: Shutdown) -> Result<Arc<Self>, ServiceError> {
-        let store = Store::open(&config.data).await?;
+        let store = match &config.store {
+            StoreLocation::Folder(_) if config.role != Role::All => {
+                let role = format!("{:?}", config.role).to_lowercase();
+                return Err(FieldError::new("role", role, "must be all unless replicas share a PostgreSQL store").into());
+            }
+            StoreLocation::Folder(folder) => Store::open(folder).await?,
+            StoreLocation::Postgres(url) => Store::connect(url).await?,
+        };
         exit_on_fatal(store.clone());
         let jobs = Jobs::new(store.clone(), clock.clone());
         let policies = Arc::new(Policies::new(store.clone(), clock.clone()));
         let sessions = Sessions::new(config, store.clone(), clock.clone(), policies.clone());
-        let trainer = Trainer::start(config, store.clone(), clock, jobs.board(), shutdown.clone())?;
+        let start = || Trainer::start(config, store.clone(), clock, jobs.board(), shutdown.clone());
+        let trainer = config.role.runs_jobs().then(start).transpose()?;
         Ok(Arc::new(Service { jobs, policies, sessions, shutdown, store, trainer }))
     }
 
@@ -77,7 +86,9 @@ impl Service {
 
     /// Waits for the running job to be requeued and closes the store. Call after the shutdown has begun.
     pub async fn close(&self) {
-        self.trainer.join().await;
+        if let Some(trainer) = &self.trainer {
+            trainer.join().await;
+        }
         self.store.close().await;
     }
 }

@@ -1,7 +1,9 @@
 //! Live sessions: an investor's wealth and the law learned so far.
 //!
 //! A session is its rows: the state in memory is a replay of them and is dropped whenever a write fails, so memory
-//! never runs ahead of the disk. One lock per session orders its observations.
+//! never runs ahead of the disk. One lock per session orders its observations in this process. Where other processes
+//! write to the same store, the rows' head is read before every use, and a state replayed from other rows is dropped:
+//! no replica advises from a law that another has taken further, or that a restored database never had.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -21,7 +23,7 @@ use crate::control::limits;
 use crate::control::state::State;
 use crate::control::worst_case::WorstCase;
 use crate::store::{
-    Append, CreateSession, NewObservation, NewSession, ObservationRow, SessionRow, SessionSummary, Store,
+    Append, CreateSession, Head, NewObservation, NewSession, ObservationRow, SessionRow, SessionSummary, Store,
 };
 
 /// Sessions kept in memory; past it, those nobody is using are dropped and replayed when next asked for.
@@ -34,8 +36,8 @@ type Slot = Arc<AsyncMutex<Option<Live>>>;
 pub struct Live {
     pub row: SessionRow,
     pub state: State,
-    /// Periods observed.
-    pub observed: usize,
+    /// Of the rows it was replayed from.
+    head: Head,
     pub(super) advisor: Arc<Advisor>,
     /// Price reported for the last period.
     price: Option<f64>,
@@ -106,7 +108,9 @@ impl Sessions {
             created_ms: row.created_ms,
         };
         match self.store.create_session(new).await? {
-            CreateSession::Created => Ok(Live { row, state, observed: 0, advisor, price: None, advice: None }),
+            CreateSession::Created => {
+                Ok(Live { head: row.head(), row, state, advisor, price: None, advice: None })
+            }
             CreateSession::NoPolicy => Err(ServiceError::unknown("policy", policy)),
             CreateSession::Exists => Err(ServiceError::internal("a session of this random name exists")),
         }
@@ -174,12 +178,12 @@ impl Sessions {
         if report.period == 0 {
             return Err(FieldError::new("period", 0, "must be at least 1").into());
         }
-        if report.period <= live.observed {
+        if report.period <= live.observed() {
             return self.repeat(report, &content_hash).await;
         }
         live.expects(report.period)?;
         let log_return = report.checked_log_return(live.price)?;
-        let (next, answer) = live.after(report, log_return, &self.advising).await?;
+        let (state, answer) = live.after(report, log_return, &self.advising).await?;
         let new = NewObservation {
             session: report.session.clone(),
             period: report.period,
@@ -191,6 +195,7 @@ impl Sessions {
             answer_json: serde_json::to_string(&answer).map_err(ServiceError::internal)?,
             created_ms: self.clock.now_milliseconds(),
         };
+        let next = live.taken_to(new.head(), state, report.price);
         match self.store.append_observation(new).await? {
             Append::Appended => {
                 **slot = Some(next);
@@ -220,15 +225,15 @@ impl Sessions {
     pub async fn action(&self, session: &str, question: Question) -> Result<Action, ServiceError> {
         let mut slot = self.slot(session).lock_owned().await;
         let live = self.replayed(session, &mut slot).await?;
-        if live.observed >= live.row.horizon {
+        if live.observed() >= live.row.horizon {
             return Err(ServiceError::Completed { session: session.to_owned(), horizon: live.row.horizon });
         }
-        let period = live.observed + 1;
+        let period = live.observed() + 1;
         if question == Question::Advise(AdviceMode::Surrogate) {
             let advice = live.surrogate_advice(&self.advising).await?;
             return Ok(Action { period, advice, worst_case: None });
         }
-        let (advisor, state, step) = (live.advisor.clone(), live.state.clone(), live.observed);
+        let (advisor, state, step) = (live.advisor.clone(), live.state.clone(), live.observed());
         drop(slot);
         let solving = self.resolving.run(move || match question {
             Question::Explain => {
@@ -241,11 +246,18 @@ impl Sessions {
         Ok(Action { period, advice, worst_case })
     }
 
+    /// The session as its rows have it now.
     async fn replayed<'a>(
         &self,
         session: &str,
         slot: &'a mut OwnedMutexGuard<Option<Live>>,
     ) -> Result<&'a mut Live, ServiceError> {
+        if self.store.is_shared()
+            && let Some(live) = slot.as_ref()
+            && self.store.head(session).await?.as_ref() != Some(&live.head)
+        {
+            **slot = None;
+        }
         if slot.is_none() {
             match self.replay(session).await {
                 Ok(live) => **slot = Some(live),
@@ -268,7 +280,8 @@ impl Sessions {
         }
         let last = observations.last().and_then(|row| serde_json::from_str::<Observed>(&row.answer_json).ok());
         let price = last.and_then(|answer| answer.price);
-        Ok(Live { row, state, observed: observations.len(), advisor, price, advice: None })
+        let head = observations.last().map_or_else(|| row.head(), |last| last.head(session));
+        Ok(Live { row, state, head, advisor, price, advice: None })
     }
 
     fn slot(&self, session: &str) -> Slot {
@@ -290,11 +303,20 @@ impl Sessions {
 }
 
 impl Live {
+    /// Periods observed.
+    pub fn observed(&self) -> usize {
+        self.head.observed
+    }
+
+    fn taken_to(&self, head: Head, state: State, price: Option<f64>) -> Live {
+        Live { head, state, price, advice: None, ..self.clone() }
+    }
+
     fn expects(&self, period: usize) -> Result<(), ServiceError> {
-        if self.observed >= self.row.horizon {
+        if self.observed() >= self.row.horizon {
             return Err(ServiceError::PastHorizon { given: period, horizon: self.row.horizon });
         }
-        let expected = self.observed + 1;
+        let expected = self.observed() + 1;
         if period == expected { Ok(()) } else { Err(ServiceError::PeriodGap { given: period, expected }) }
     }
 
@@ -303,19 +325,19 @@ impl Live {
         if let Some(advice) = &self.advice {
             return Ok(advice.clone());
         }
-        let (advisor, state, step) = (self.advisor.clone(), self.state.clone(), self.observed);
+        let (advisor, state, step) = (self.advisor.clone(), self.state.clone(), self.observed());
         let advice = advising.run(move || advisor.advise(step, &state, AdviceMode::Surrogate)).await?;
         self.advice = Some(advice.clone());
         Ok(advice)
     }
 
-    /// The session after `log_return`, and the answer to it; nothing is changed yet but the memoised advice.
+    /// The state after `log_return`, and the answer to it; nothing is changed yet but the memoised advice.
     async fn after(
         &mut self,
         report: &Observe,
         log_return: f64,
         advising: &Bounded,
-    ) -> Result<(Live, Observed), ServiceError> {
+    ) -> Result<(State, Observed), ServiceError> {
         let advised = self.surrogate_advice(advising).await?.allocation;
         let executed_allocation = report.executed_allocation.unwrap_or(advised);
         let (advisor, before, stated) = (self.advisor.clone(), self.state.clone(), report.wealth);
@@ -337,7 +359,6 @@ impl Live {
             completed: report.period == self.row.horizon,
             uncertainty,
         };
-        let next = Live { state, observed: report.period, price: report.price, advice: None, ..self.clone() };
-        Ok((next, answer))
+        Ok((state, answer))
     }
 }

@@ -27,8 +27,8 @@ use crate::control::pool::TrainingPool;
 use crate::control::specification::Specification;
 use crate::store::{ClaimedJob, JobKind, JobOutcome, Store, StoreError};
 
-/// The queue is looked at this often even if nobody rang: a lease may have run out.
-const QUEUE_POLL: Duration = Duration::from_secs(2);
+/// The queue is looked at this often even if nobody rang: a lease may have run out, or another replica queued a job.
+const QUEUE_POLL: Duration = Duration::from_secs(1);
 /// The store is asked this often whether the running job should stop: half the second a cancel may take.
 const CANCEL_POLL: Duration = Duration::from_millis(500);
 
@@ -101,9 +101,7 @@ impl Worker {
         let mut changes = self.board.subscribe();
         while !self.shutdown.has_begun() {
             changes.mark_unchanged();
-            let lease_seconds = u32::try_from(self.lease.as_secs()).unwrap_or(u32::MAX).max(1);
-            let claim = self.store.claim_job(&self.name, lease_seconds, self.clock.now_milliseconds());
-            match self.runtime.block_on(claim) {
+            match self.runtime.block_on(self.claim()) {
                 Ok(Some(claimed)) => self.work(claimed),
                 Ok(None) => self.runtime.block_on(async {
                     tokio::select! {
@@ -115,6 +113,12 @@ impl Worker {
                 Err(error) => self.pause("claiming a job", &error),
             }
         }
+    }
+
+    async fn claim(&self) -> Result<Option<ClaimedJob>, StoreError> {
+        let lease_seconds = u32::try_from(self.lease.as_secs()).unwrap_or(u32::MAX).max(1);
+        let now = self.store.lease_time(self.clock.now_milliseconds()).await?;
+        self.store.claim_job(&self.name, lease_seconds, now).await
     }
 
     fn work(self: &Arc<Self>, claimed: ClaimedJob) {
@@ -290,7 +294,11 @@ async fn keep_lease(
             stop.store(true, Ordering::Relaxed);
         }
         if renewed.elapsed() >= lease / 3 {
-            match store.renew_lease(&job, attempt, clock.now_milliseconds() + lease_milliseconds).await {
+            let renewal = async {
+                let now = store.lease_time(clock.now_milliseconds()).await?;
+                store.renew_lease(&job, attempt, now.saturating_add(lease_milliseconds)).await
+            };
+            match renewal.await {
                 Ok(true) => renewed = Instant::now(),
                 Ok(false) => stop.store(true, Ordering::Relaxed),
                 Err(error) => tracing::warn!(job, error = &error as &dyn std::error::Error, "lease not renewed"),

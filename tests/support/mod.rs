@@ -1,6 +1,9 @@
 //! A real server on a free port, and a client that tells stories.
 #![allow(dead_code)]
 
+pub mod place;
+pub mod postgres;
+
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};

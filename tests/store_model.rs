@@ -1,0 +1,427 @@
+//! Random lists of operations on the store and on a model that a reader can check by eye: equal answers, equal state.
+//!
+//! The model is maps and vectors in memory, with no transactions, hashes, seals or SQL.
+
+mod support;
+
+use std::collections::BTreeMap;
+
+use ballast::control::policy::content_hash;
+use ballast::store::{
+    Append, CreateJob, CreateSession, DeletePolicy, JobKind, JobOutcome, JobRow, JobState, NewJob, NewObservation,
+    NewSession, Store,
+};
+use proptest::prelude::*;
+use proptest::test_runner::{Config, TestRunner};
+use support::place::Place;
+use tokio::runtime::Runtime;
+
+const CASES: u32 = 24;
+const LENGTH: usize = 60;
+const LEASE_MS: i64 = 10_000;
+
+/// Names are drawn from so few that operations meet.
+#[derive(Debug, Clone)]
+enum Operation {
+    CreateJob { job: u8, key: Option<u8>, hash: u8 },
+    Claim,
+    Renew { job: u8, behind: i64 },
+    Checkpoint { job: u8, behind: i64, step: usize, byte: u8 },
+    Finish { job: u8, behind: i64, outcome: u8 },
+    Release { job: u8, behind: i64 },
+    Cancel { job: u8 },
+    InsertPolicy { policy: u8 },
+    DeletePolicy { policy: u8 },
+    CreateSession { session: u8, policy: u8 },
+    DeleteSession { session: u8 },
+    Append { session: u8, period: usize, content: u8 },
+    Wait { seconds: i64 },
+    Reopen,
+}
+
+fn operation() -> impl Strategy<Value = Operation> {
+    use Operation as O;
+    let (job, policy, session) = (0..6u8, 0..3u8, 0..3u8);
+    // Zero is the attempt that holds the job, one the attempt before.
+    let behind = prop_oneof![3 => Just(0i64), 1 => Just(1i64)];
+    prop_oneof![
+        3 => (job.clone(), proptest::option::of(0..2u8), 0..2u8).prop_map(|(job, key, hash)| O::CreateJob { job, key, hash }),
+        4 => Just(O::Claim),
+        1 => (job.clone(), behind.clone()).prop_map(|(job, behind)| O::Renew { job, behind }),
+        4 => (job.clone(), behind.clone(), 0..3usize, any::<u8>())
+            .prop_map(|(job, behind, step, byte)| O::Checkpoint { job, behind, step, byte }),
+        3 => (job.clone(), behind.clone(), 0..4u8).prop_map(|(job, behind, outcome)| O::Finish { job, behind, outcome }),
+        2 => (job.clone(), behind).prop_map(|(job, behind)| O::Release { job, behind }),
+        2 => job.prop_map(|job| O::Cancel { job }),
+        2 => policy.clone().prop_map(|policy| O::InsertPolicy { policy }),
+        1 => policy.clone().prop_map(|policy| O::DeletePolicy { policy }),
+        3 => (session.clone(), policy).prop_map(|(session, policy)| O::CreateSession { session, policy }),
+        1 => session.clone().prop_map(|session| O::DeleteSession { session }),
+        8 => (session, 0..5usize, 0..2u8).prop_map(|(session, period, content)| O::Append { session, period, content }),
+        2 => (1..12i64).prop_map(|seconds| O::Wait { seconds }),
+        1 => Just(O::Reopen),
+    ]
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Job {
+    name: String,
+    state: JobState,
+    lease_until: i64,
+    attempt: i64,
+    cancel: bool,
+    steps: BTreeMap<usize, u8>,
+    steps_done: usize,
+    result: Option<String>,
+    started: Option<i64>,
+    finished: Option<i64>,
+}
+
+#[derive(Default)]
+struct Model {
+    now: i64,
+    jobs: Vec<Job>,
+    /// Hash and job of each key.
+    keys: BTreeMap<u8, (u8, String)>,
+    policies: Vec<u8>,
+    /// Name, policy and the contents of the periods from 1 on.
+    sessions: Vec<(u8, u8, Vec<u8>)>,
+}
+
+impl Model {
+    fn job(&mut self, job: u8) -> Option<&mut Job> {
+        self.jobs.iter_mut().find(|row| row.name == job_name(job))
+    }
+
+    fn held(&mut self, job: u8, behind: i64) -> Option<&mut Job> {
+        self.job(job).filter(|row| row.state == JobState::Running && behind == 0)
+    }
+
+    /// The attempt that `behind` stands for.
+    fn attempt(&mut self, job: u8, behind: i64) -> i64 {
+        self.job(job).map_or(0, |row| row.attempt) - behind
+    }
+
+    fn claim(&mut self) -> Option<String> {
+        let now = self.now;
+        loop {
+            let row = self.jobs.iter_mut().find(|row| match row.state {
+                JobState::Queued => true,
+                JobState::Running => row.lease_until <= now,
+                _ => false,
+            })?;
+            if row.cancel {
+                row.end(JobState::Cancelled, now);
+                continue;
+            }
+            (row.state, row.lease_until, row.attempt) = (JobState::Running, now + LEASE_MS, row.attempt + 1);
+            row.started = row.started.or(Some(now));
+            return Some(row.name.clone());
+        }
+    }
+}
+
+impl Job {
+    fn end(&mut self, state: JobState, now: i64) {
+        (self.state, self.cancel, self.finished) = (state, false, Some(now));
+        self.steps.clear();
+    }
+}
+
+fn job_name(job: u8) -> String {
+    format!("job_{job}")
+}
+
+fn session_name(session: u8) -> String {
+    format!("session_{session}")
+}
+
+fn policy_json(policy: u8) -> Vec<u8> {
+    format!(r#"{{"policy":{policy}}}"#).into_bytes()
+}
+
+fn policy_name(policy: u8) -> String {
+    content_hash(&policy_json(policy))
+}
+
+fn outcome(number: u8) -> JobOutcome {
+    match number {
+        0 => JobOutcome::Succeeded { policy_id: policy_name(0), policy_json: policy_json(0) },
+        1 => JobOutcome::Reported { report_json: "{}".into() },
+        2 => JobOutcome::Failed { reason: "singular".into() },
+        _ => JobOutcome::Cancelled,
+    }
+}
+
+fn observation(session: u8, period: usize, content: u8) -> NewObservation {
+    NewObservation {
+        session: session_name(session),
+        period,
+        content_hash: format!("content_{content}"),
+        log_return: f64::from(content) * -0.0,
+        executed_allocation: 0.1 + 0.2,
+        advised_allocation: f64::MIN_POSITIVE / 2.0,
+        wealth_after: 100.0 / 3.0 + period as f64,
+        answer_json: format!(r#"{{"answer":{content}}}"#),
+        created_ms: 7,
+    }
+}
+
+/// Runs one operation on both and compares the answers.
+async fn apply(store: &Store, model: &mut Model, operation: &Operation) {
+    use Operation as O;
+    let now = model.now;
+    match *operation {
+        O::CreateJob { job, key, hash } => create_job(store, model, job, key, hash).await,
+        O::Claim => {
+            let claimed = store.claim_job("worker", (LEASE_MS / 1000) as u32, now).await.unwrap();
+            let expected = model.claim();
+            assert_eq!(claimed.as_ref().map(|claimed| &claimed.row.job), expected.as_ref());
+        }
+        O::Renew { job, behind } => {
+            let attempt = model.attempt(job, behind);
+            let held = model.held(job, behind).map(|row| row.lease_until = now + LEASE_MS).is_some();
+            assert_eq!(store.renew_lease(&job_name(job), attempt, now + LEASE_MS).await.unwrap(), held);
+        }
+        O::Checkpoint { job, behind, step, byte } => {
+            let attempt = model.attempt(job, behind);
+            let saved = store.save_checkpoint(&job_name(job), attempt, step, &[byte; 9]).await.unwrap();
+            let held = model.held(job, behind).map(|row| {
+                row.steps.insert(step, byte);
+                row.steps_done = row.steps.len();
+            });
+            assert_eq!(saved, held.is_some());
+        }
+        O::Finish { job, behind, outcome: number } => {
+            let attempt = model.attempt(job, behind);
+            let finished = store.finish_job(&job_name(job), attempt, outcome(number), now).await.unwrap();
+            assert_eq!(finished, finish(model, job, behind, number));
+        }
+        O::Release { job, behind } => {
+            let attempt = model.attempt(job, behind);
+            let released = store.release_job(&job_name(job), attempt, now).await.unwrap();
+            let held = model.held(job, behind).map(|row| match row.cancel {
+                true => row.end(JobState::Cancelled, now),
+                false => row.state = JobState::Queued,
+            });
+            assert_eq!(released, held.is_some());
+        }
+        O::Cancel { job } => {
+            let row = store.request_cancel(&job_name(job), now).await.unwrap();
+            let expected = model.job(job).map(|row| {
+                match row.state {
+                    JobState::Queued => row.end(JobState::Cancelled, now),
+                    JobState::Running => row.cancel = true,
+                    _ => {}
+                }
+                row.state
+            });
+            assert_eq!(row.map(|row| row.state), expected);
+        }
+        O::Wait { seconds } => model.now += 1000 * seconds,
+        O::InsertPolicy { .. }
+        | O::DeletePolicy { .. }
+        | O::CreateSession { .. }
+        | O::DeleteSession { .. }
+        | O::Append { .. } => live(store, model, operation).await,
+        O::Reopen => unreachable!("the caller reopens"),
+    }
+}
+
+async fn create_job(store: &Store, model: &mut Model, job: u8, key: Option<u8>, hash: u8) {
+    let new = NewJob {
+        job: job_name(job),
+        kind: JobKind::Train,
+        request_json: "{}".into(),
+        request_hash: hash.to_string(),
+        idempotency_key: key.map(|key| key.to_string()),
+        steps_total: 3,
+        created_ms: model.now,
+    };
+    let answer = store.create_job(new).await;
+    match key.and_then(|key| model.keys.get(&key).cloned()) {
+        Some((used, _)) if used != hash => assert_eq!(answer.unwrap(), CreateJob::KeyConflict),
+        Some((_, earlier)) => {
+            assert!(matches!(answer.unwrap(), CreateJob::Repeated(row) if row.job == earlier));
+        }
+        None if model.job(job).is_some() => assert!(answer.is_err(), "a name taken twice"),
+        None => {
+            assert!(matches!(answer.unwrap(), CreateJob::Created(row) if row.state == JobState::Queued));
+            if let Some(key) = key {
+                model.keys.insert(key, (hash, job_name(job)));
+            }
+            model.jobs.push(Job {
+                name: job_name(job),
+                state: JobState::Queued,
+                lease_until: 0,
+                attempt: 0,
+                cancel: false,
+                steps: BTreeMap::new(),
+                steps_done: 0,
+                result: None,
+                started: None,
+                finished: None,
+            });
+        }
+    }
+}
+
+fn finish(model: &mut Model, job: u8, behind: i64, number: u8) -> bool {
+    let now = model.now;
+    let Some(row) = model.held(job, behind) else { return false };
+    let (state, result) = match number {
+        0 => (JobState::Succeeded, Some(policy_name(0))),
+        1 => (JobState::Succeeded, Some("{}".into())),
+        2 => (JobState::Failed, Some("singular".into())),
+        _ => (JobState::Cancelled, None),
+    };
+    row.end(state, now);
+    row.result = result;
+    if state == JobState::Succeeded {
+        row.steps_done = 3;
+    }
+    if number == 0 && !model.policies.contains(&0) {
+        model.policies.push(0);
+    }
+    true
+}
+
+/// Policies, sessions and observations.
+async fn live(store: &Store, model: &mut Model, operation: &Operation) {
+    match *operation {
+        Operation::InsertPolicy { policy } => {
+            let inserted = store.insert_policy(&policy_name(policy), &policy_json(policy), model.now).await.unwrap();
+            assert_eq!(inserted, !model.policies.contains(&policy));
+            if inserted {
+                model.policies.push(policy);
+            }
+        }
+        Operation::DeletePolicy { policy } => {
+            let users = model.sessions.iter().filter(|session| session.1 == policy).count() as u64;
+            let expected = match (model.policies.contains(&policy), users) {
+                (false, _) => DeletePolicy::Absent,
+                (true, 0) => DeletePolicy::Deleted,
+                (true, sessions) => DeletePolicy::InUse { sessions },
+            };
+            assert_eq!(store.delete_policy(&policy_name(policy)).await.unwrap(), expected);
+            model.policies.retain(|&kept| kept != policy || expected != DeletePolicy::Deleted);
+        }
+        Operation::CreateSession { session, policy } => {
+            let new = NewSession {
+                session: session_name(session),
+                policy: policy_name(policy),
+                wealth: 100.0,
+                history: vec![0.1, -0.0],
+                horizon: 3,
+                created_ms: model.now,
+            };
+            let taken = model.sessions.iter().any(|row| row.0 == session);
+            let expected = match (model.policies.contains(&policy), taken) {
+                (false, _) => CreateSession::NoPolicy,
+                (true, true) => CreateSession::Exists,
+                (true, false) => CreateSession::Created,
+            };
+            assert_eq!(store.create_session(new).await.unwrap(), expected);
+            if expected == CreateSession::Created {
+                model.sessions.push((session, policy, Vec::new()));
+            }
+        }
+        Operation::DeleteSession { session } => {
+            let before = model.sessions.len();
+            model.sessions.retain(|row| row.0 != session);
+            let deleted = store.delete_session(&session_name(session)).await.unwrap();
+            assert_eq!(deleted, model.sessions.len() < before);
+        }
+        Operation::Append { session, period, content } => {
+            let appended = store.append_observation(observation(session, period, content)).await.unwrap();
+            let Some((.., periods)) = model.sessions.iter_mut().find(|row| row.0 == session) else {
+                return assert_eq!(appended, Append::NoSession);
+            };
+            let expected = match period.checked_sub(1).and_then(|index| periods.get(index)) {
+                Some(&first) if first == content => {
+                    Append::Repeated { answer_json: observation(session, period, first).answer_json }
+                }
+                Some(_) => Append::Conflict,
+                None if period == periods.len() + 1 => Append::Appended,
+                None => Append::OutOfOrder { expected: periods.len() + 1 },
+            };
+            assert_eq!(appended, expected);
+            if expected == Append::Appended {
+                periods.push(content);
+            }
+        }
+        _ => unreachable!("not an operation of live sessions"),
+    }
+}
+
+/// Everything the store can be asked for is what the model has.
+async fn compare(store: &Store, model: &Model) {
+    let mut rows = store.jobs(1000, None).await.unwrap();
+    rows.reverse();
+    assert_eq!(rows.len(), model.jobs.len());
+    for (row, expected) in rows.iter().zip(&model.jobs) {
+        let of = |row: &JobRow| (row.job.clone(), row.state, row.attempt, row.cancel_requested, row.steps_done);
+        let (name, state) = (expected.name.clone(), expected.state);
+        assert_eq!(of(row), (name, state, expected.attempt, expected.cancel, expected.steps_done));
+        assert_eq!((row.started_ms, row.finished_ms), (expected.started, expected.finished));
+        let results = [&row.policy, &row.report_json, &row.error];
+        assert_eq!(results.into_iter().flatten().next(), expected.result.as_ref());
+        let steps: Vec<_> = expected.steps.iter().map(|(&step, &byte)| (step, vec![byte; 9])).collect();
+        assert_eq!(store.checkpoints(&row.job).await.unwrap(), steps);
+    }
+    let policies = store.policies(1000, None).await.unwrap();
+    let policies: Vec<_> = policies.into_iter().rev().map(|row| row.policy).collect();
+    assert_eq!(policies, model.policies.iter().map(|&policy| policy_name(policy)).collect::<Vec<_>>());
+    let sessions = store.sessions(1000, None).await.unwrap();
+    assert_eq!(sessions.len(), model.sessions.len());
+    for (row, (session, policy, periods)) in sessions.iter().rev().zip(&model.sessions) {
+        assert_eq!((&row.session, &row.policy), (&session_name(*session), &policy_name(*policy)));
+        let observations = store.observations(&row.session).await.unwrap();
+        assert_eq!(observations.len(), periods.len());
+        for (read, &content) in observations.iter().zip(periods) {
+            let wrote = observation(*session, read.period, content);
+            assert_eq!(read.head(&row.session), wrote.head());
+            assert_eq!(read.log_return.to_bits(), wrote.log_return.to_bits());
+        }
+    }
+}
+
+async fn replay(place: &Place, operations: &[Operation]) {
+    let (mut store, mut model) = (place.open().await, Model::default());
+    for operation in operations {
+        if let Operation::Reopen = operation {
+            store = place.reopen(store).await;
+            // A folder has no other process: whoever ran a job is gone.
+            if let Place::Folder(_) = place {
+                model.jobs.iter_mut().for_each(|row| row.lease_until = i64::MIN);
+            }
+            continue;
+        }
+        apply(&store, &mut model, operation).await;
+    }
+    compare(&store, &model).await;
+    store.close().await;
+}
+
+fn run(place: impl Fn(&Runtime) -> Option<Place>) {
+    let runtime = Runtime::new().unwrap();
+    let mut runner = TestRunner::new(Config { cases: CASES, failure_persistence: None, ..Config::default() });
+    let operations = proptest::collection::vec(operation(), LENGTH);
+    let outcome = runner.run(&operations, |operations| {
+        if let Some(place) = place(&runtime) {
+            runtime.block_on(replay(&place, &operations));
+        }
+        Ok(())
+    });
+    outcome.unwrap_or_else(|failure| panic!("{failure}"));
+}
+
+#[test]
+fn sqlite_does_what_the_model_does() {
+    run(|_| Some(Place::folder()));
+}
+
+#[test]
+fn postgresql_does_what_the_model_does() {
+    run(|runtime| runtime.block_on(Place::database()));
+}

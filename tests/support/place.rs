@@ -1,0 +1,63 @@
+//! Where a store under test keeps its facts: a folder, or a database.
+
+use ballast::store::Store;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
+use sqlx::{AssertSqlSafe, Connection};
+use tempfile::TempDir;
+
+use super::postgres;
+
+pub enum Place {
+    Folder(TempDir),
+    Database(String),
+}
+
+impl Place {
+    pub fn folder() -> Place {
+        Place::Folder(tempfile::tempdir().unwrap())
+    }
+
+    /// `None` where there is no PostgreSQL.
+    pub async fn database() -> Option<Place> {
+        postgres::database().await.map(Place::Database)
+    }
+
+    pub async fn open(&self) -> Store {
+        self.try_open().await.unwrap()
+    }
+
+    pub async fn try_open(&self) -> Result<Store, ballast::store::StoreError> {
+        match self {
+            Place::Folder(folder) => Store::open(&folder.path().join("data")).await,
+            Place::Database(url) => Store::connect(&url.parse().unwrap()).await,
+        }
+    }
+
+    pub async fn reopen(&self, store: Store) -> Store {
+        store.close().await;
+        self.open().await
+    }
+
+    /// What a second worker or client holds: of the same process over a folder, else of another.
+    pub async fn second(&self, store: &Store) -> Store {
+        match self {
+            Place::Folder(_) => store.clone(),
+            Place::Database(_) => self.open().await,
+        }
+    }
+
+    /// Changes one row behind a closed store's back.
+    pub async fn tamper(&self, statement: &str) {
+        let changed = match self {
+            Place::Folder(folder) => {
+                let options = SqliteConnectOptions::new().filename(folder.path().join("data/ballast.sqlite"));
+                let mut connection = SqliteConnection::connect_with(&options).await.unwrap();
+                let changed = sqlx::query(AssertSqlSafe(statement)).execute(&mut connection).await.unwrap();
+                connection.close().await.unwrap();
+                changed.rows_affected()
+            }
+            Place::Database(url) => postgres::execute(url, statement).await,
+        };
+        assert_eq!(changed, 1, "{statement}");
+    }
+}

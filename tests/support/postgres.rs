@@ -1,0 +1,155 @@
+//! A PostgreSQL server for tests, and a database of it for each.
+//!
+//! `TEST_POSTGRES_URL` where set; else a private cluster in a temporary folder, made by the installed `initdb` and gone
+//! with this process, however that ends. Without either a test says so and passes, unless `BALLAST_TEST_POSTGRES` is
+//! `required`.
+
+use std::io::{BufRead, BufReader, Lines, Write};
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, OnceLock};
+
+use sqlx::postgres::PgConnection;
+use sqlx::{AssertSqlSafe, Connection};
+
+/// Runs as the owner of the cluster until its input ends, which it does with the process that holds the other end.
+const KEEPER: &str = r#"
+    set -eu
+    # An interrupt reaches the whole group; the end of the input still ends this.
+    trap '' INT HUP
+    folder=$(mktemp -d "${TMPDIR:-/tmp}/ballast-postgres.XXXXXX")
+    cd "$folder"
+    trap '"$BIN/pg_ctl" -D data -m immediate stop >>log 2>&1 || true; cd /; rm -rf "$folder"' EXIT
+    start() { "$BIN/pg_ctl" -D data -w -l log -o "-p $PORT -k $folder -c listen_addresses=127.0.0.1" start >>log 2>&1; }
+    "$BIN/initdb" -D data -U ballast -A trust -E UTF8 --locale=C --no-sync >>log 2>&1 || { cat log >&2; exit 1; }
+    start || { cat log >&2; exit 1; }
+    echo done
+    while read -r word; do
+        case $word in
+            start) start ;;
+            stop) "$BIN/pg_ctl" -D data -m immediate stop >>log 2>&1 ;;
+        esac
+        echo done
+    done
+"#;
+
+/// A private server.
+pub struct Cluster {
+    port: u16,
+    keeper: Mutex<(ChildStdin, Lines<BufReader<ChildStdout>>)>,
+}
+
+impl Cluster {
+    /// `None` where no server is installed.
+    pub fn start() -> Option<Cluster> {
+        let bin = installed()?;
+        let port = TcpListener::bind(("127.0.0.1", 0)).unwrap().local_addr().unwrap().port();
+        let root = Command::new("id").arg("-u").output().unwrap().stdout == b"0\n";
+        // The server refuses to run as root.
+        let mut command = if root { Command::new("runuser") } else { Command::new("sh") };
+        if root {
+            command.args(["-u", "postgres", "--", "sh"]);
+        }
+        let mut child = command
+            .args(["-c", KEEPER])
+            .env("BIN", bin)
+            .env("PORT", port.to_string())
+            .current_dir("/")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        let cluster = Cluster { port, keeper: Mutex::new((child.stdin.take().unwrap(), lines)) };
+        cluster.answered();
+        Some(cluster)
+    }
+
+    fn answered(&self) {
+        let answer = self.keeper.lock().unwrap().1.next();
+        assert_eq!(answer.expect("the keeper of the cluster ended").unwrap(), "done");
+    }
+
+    /// Stops the server as a crash does: no checkpoint, connections cut.
+    pub fn crash(&self) {
+        writeln!(self.keeper.lock().unwrap().0, "stop").unwrap();
+        self.answered();
+    }
+
+    /// Starts it again and waits for its recovery.
+    pub fn recover(&self) {
+        writeln!(self.keeper.lock().unwrap().0, "start").unwrap();
+        self.answered();
+    }
+
+    fn url(&self, database: &str) -> String {
+        format!("postgres://ballast@127.0.0.1:{}/{database}", self.port)
+    }
+
+    /// A new database, as its address.
+    pub async fn database(&self) -> String {
+        let name = new_name();
+        create(&self.url("postgres"), &name).await;
+        self.url(&name)
+    }
+}
+
+/// The folder of `initdb` and `pg_ctl`: on the path, else the newest of Debian's.
+fn installed() -> Option<PathBuf> {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let mut folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
+    let versions = std::fs::read_dir("/usr/lib/postgresql").into_iter().flatten();
+    let mut versions: Vec<PathBuf> = versions.filter_map(|entry| Some(entry.ok()?.path().join("bin"))).collect();
+    versions.sort();
+    folders.extend(versions.into_iter().rev());
+    folders.into_iter().find(|folder| ["initdb", "pg_ctl"].iter().all(|tool| Path::new(folder).join(tool).exists()))
+}
+
+fn new_name() -> String {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    format!("ballast_test_{}_{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed))
+}
+
+async fn create(server: &str, name: &str) {
+    execute(server, &format!("CREATE DATABASE {name}")).await;
+}
+
+/// Runs a statement on the database at `url`; the number of rows it changed.
+pub async fn execute(url: &str, statement: &str) -> u64 {
+    let mut connection = PgConnection::connect(url).await.expect("the server");
+    let done = sqlx::query(AssertSqlSafe(statement.to_owned())).execute(&mut connection).await;
+    let changed = done.unwrap_or_else(|error| panic!("{statement}: {error}")).rows_affected();
+    connection.close().await.expect("closed");
+    changed
+}
+
+/// A private cluster for a test that crashes it; `None` as for [`database`].
+pub fn private_cluster() -> Option<Cluster> {
+    Cluster::start().or_else(skip)
+}
+
+/// A new database for one test; `None` where there is no server, after saying so.
+pub async fn database() -> Option<String> {
+    static SHARED: OnceLock<Option<Cluster>> = OnceLock::new();
+    if let Ok(given) = std::env::var("TEST_POSTGRES_URL") {
+        let name = new_name();
+        create(&given, &name).await;
+        let (address, options) = given.split_once('?').unwrap_or((&given, ""));
+        let server = address.rsplit_once('/').map_or(address, |(server, _)| server);
+        return Some(format!("{server}/{name}?{options}"));
+    }
+    match SHARED.get_or_init(Cluster::start) {
+        Some(cluster) => Some(cluster.database().await),
+        None => skip(),
+    }
+}
+
+fn skip<T>() -> Option<T> {
+    let required = std::env::var("BALLAST_TEST_POSTGRES").is_ok_and(|value| value == "required");
+    assert!(!required, "no PostgreSQL: neither TEST_POSTGRES_URL nor an installed initdb");
+    // Past the capture of test output: a suite that ran half must not look whole.
+    let _ = writeln!(std::io::stderr(), "SKIPPED, NO POSTGRESQL: a test of the shared store did not run");
+    None
+}
