@@ -403,14 +403,11 @@ async fn replay(place: &Place, operations: &[Operation]) {
     store.close().await;
 }
 
-fn run(place: impl Fn(&Runtime) -> Option<Place>) {
-    let runtime = Runtime::new().unwrap();
+fn run(runtime: &Runtime, place: impl Fn() -> Place) {
     let mut runner = TestRunner::new(Config { cases: CASES, failure_persistence: None, ..Config::default() });
     let operations = proptest::collection::vec(operation(), LENGTH);
     let outcome = runner.run(&operations, |operations| {
-        if let Some(place) = place(&runtime) {
-            runtime.block_on(replay(&place, &operations));
-        }
+        runtime.block_on(replay(&place(), &operations));
         Ok(())
     });
     outcome.unwrap_or_else(|failure| panic!("{failure}"));
@@ -418,10 +415,21 @@ fn run(place: impl Fn(&Runtime) -> Option<Place>) {
 
 #[test]
 fn sqlite_does_what_the_model_does() {
-    run(|_| Some(Place::folder()));
+    run(&Runtime::new().unwrap(), Place::folder);
 }
 
 #[test]
 fn postgresql_does_what_the_model_does() {
-    run(|runtime| runtime.block_on(Place::database()));
+    let runtime = Runtime::new().unwrap();
+    let Some(url) = runtime.block_on(support::postgres::database()) else { return };
+    let place = || {
+        runtime.block_on(async {
+            let place = Place::Database(url.clone());
+            place.open().await.close().await;
+            let empty = "TRUNCATE jobs, idempotency_keys, checkpoints, policies, sessions, observations";
+            support::postgres::execute(&url, empty).await;
+            place
+        })
+    };
+    run(&runtime, place);
 }

@@ -51,7 +51,9 @@ impl Service {
         let store = match &config.store {
             StoreLocation::Folder(_) if config.role != Role::All => {
                 let role = format!("{:?}", config.role).to_lowercase();
-                return Err(FieldError::new("role", role, "must be all unless replicas share a PostgreSQL store").into());
+                return Err(
+                    FieldError::new("role", role, "must be all unless replicas share a PostgreSQL store").into()
+                );
             }
             StoreLocation::Folder(folder) => Store::open(folder).await?,
             StoreLocation::Postgres(url) => Store::connect(url).await?,

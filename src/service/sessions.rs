@@ -108,9 +108,7 @@ impl Sessions {
             created_ms: row.created_ms,
         };
         match self.store.create_session(new).await? {
-            CreateSession::Created => {
-                Ok(Live { head: row.head(), row, state, advisor, price: None, advice: None })
-            }
+            CreateSession::Created => Ok(Live { head: row.head(), row, state, advisor, price: None, advice: None }),
             CreateSession::NoPolicy => Err(ServiceError::unknown("policy", policy)),
             CreateSession::Exists => Err(ServiceError::internal("a session of this random name exists")),
         }

@@ -117,9 +117,8 @@ async fn claim(
 
 /// The oldest job that is queued or whose lease ran out, and that nobody else is taking.
 async fn claimable(connection: &mut Connection<'_>, now_ms: i64) -> Result<Option<JobRow>, Failure> {
-    let oldest = query(
-        "SELECT * FROM jobs WHERE state = $1 OR (state = $2 AND lease_until_ms <= $3) ORDER BY sequence LIMIT 1",
-    );
+    let oldest =
+        query("SELECT * FROM jobs WHERE state = $1 OR (state = $2 AND lease_until_ms <= $3) ORDER BY sequence LIMIT 1");
     let oldest = oldest.bind(JobState::Queued.as_str()).bind(JobState::Running.as_str()).bind(now_ms);
     connection.row(oldest.for_update_of_free()).await?.as_ref().map(JobRow::from_row).transpose()
 }
@@ -156,8 +155,7 @@ async fn checkpoint(
          ON CONFLICT (job, step) DO UPDATE SET bytes = excluded.bytes, seal = excluded.seal",
     );
     connection.execute(save.bind(job.as_str()).bind(step).bind(bytes).bind(seal)).await?;
-    let count =
-        query("UPDATE jobs SET steps_done = (SELECT count(*) FROM checkpoints WHERE job = $1) WHERE job = $1");
+    let count = query("UPDATE jobs SET steps_done = (SELECT count(*) FROM checkpoints WHERE job = $1) WHERE job = $1");
     connection.execute(count.bind(job)).await?;
     Ok(true)
 }

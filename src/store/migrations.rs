@@ -54,8 +54,10 @@ mod tests {
     fn every_file_is_a_step_of_its_engine() {
         for (engine, steps) in [("sqlite", SQLITE.as_slice()), ("postgres", POSTGRES.as_slice())] {
             let folder = format!("{}/src/store/migrations/{engine}", env!("CARGO_MANIFEST_DIR"));
-            let mut files: Vec<_> =
-                std::fs::read_dir(folder).unwrap().map(|file| file.unwrap().file_name().into_string().unwrap()).collect();
+            let mut files: Vec<_> = std::fs::read_dir(folder)
+                .unwrap()
+                .map(|file| file.unwrap().file_name().into_string().unwrap())
+                .collect();
             files.sort();
             let named: Vec<_> = steps.iter().map(|(version, name, _)| format!("{version:04}_{name}.sql")).collect();
             assert_eq!(files, named, "{engine}");

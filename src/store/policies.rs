@@ -92,9 +92,8 @@ pub(super) async fn insert(
     json: Vec<u8>,
     created_ms: i64,
 ) -> Result<bool, Failure> {
-    let insert = query(
-        "INSERT INTO policies (policy, created_ms, json) VALUES ($1, $2, $3) ON CONFLICT (policy) DO NOTHING",
-    );
+    let insert =
+        query("INSERT INTO policies (policy, created_ms, json) VALUES ($1, $2, $3) ON CONFLICT (policy) DO NOTHING");
     Ok(connection.execute(insert.bind(id).bind(created_ms).bind(json)).await? > 0)
 }
 

@@ -3,6 +3,7 @@
 
 pub mod place;
 pub mod postgres;
+pub mod process;
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;

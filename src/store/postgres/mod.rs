@@ -70,7 +70,8 @@ impl Database {
 
     pub(super) async fn ping(&self) -> Result<(), StoreError> {
         let doing = "answering a ping";
-        let rows = self.read(doing, query("SELECT pg_is_in_recovery() AS standby, EXISTS (SELECT 1 FROM jobs)")).await?;
+        let rows =
+            self.read(doing, query("SELECT pg_is_in_recovery() AS standby, EXISTS (SELECT 1 FROM jobs)")).await?;
         match rows.first().map(|row| row.get("standby")).transpose().map_err(|failure| failure.during(doing))? {
             Some(true) => Err(StoreError::Unavailable { doing, source: None }),
             _ => Ok(()),
@@ -109,10 +110,8 @@ impl Database {
     }
 
     pub(super) async fn read(&self, doing: &'static str, query: Query) -> Result<Vec<Row>, StoreError> {
-        self.bounded(doing, |connection| {
-            async move { Connection::Postgres(connection).rows(query).await }.boxed()
-        })
-        .await
+        self.bounded(doing, |connection| async move { Connection::Postgres(connection).rows(query).await }.boxed())
+            .await
     }
 
     /// Runs `work` on a connection for no longer than [`OPERATION_TIMEOUT`]; one that failed is not used again.

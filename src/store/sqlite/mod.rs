@@ -72,8 +72,7 @@ impl Folder {
         W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
         self.refuse_after_fatal()?;
-        let (operation, answer) =
-            Operation::new(doing, move |connection| work(Connection::Sqlite(connection)).boxed());
+        let (operation, answer) = Operation::new(doing, move |connection| work(Connection::Sqlite(connection)).boxed());
         // A writer that ended drops the operation, and the answer with it.
         let _ = self.requests.send(Request::Write(operation)).await;
         match answer.await {

@@ -1,0 +1,286 @@
+//! Real processes over one PostgreSQL database: any of them may be killed, stopped or raced, and so may the database.
+
+mod support;
+
+use std::process::{Child, Command};
+use std::time::{Duration, Instant};
+
+use ballast::control::advisor::Advisor;
+use ballast::control::policy::Policy;
+use ballast::store::{JobRow, Store};
+use futures_util::future::join_all;
+use reqwest::{Client, StatusCode};
+use serde_json::{Value, json};
+use support::postgres::{database, private_cluster};
+use support::process::{serve, steps_solved};
+use support::{App, specification};
+
+/// Long enough for a loaded machine to renew in, short enough to wait for.
+const LEASE: Duration = Duration::from_secs(3);
+const PATIENCE: Duration = Duration::from_secs(60);
+const STEPS: usize = 40;
+
+struct Replica {
+    child: Child,
+    app: App,
+}
+
+impl Replica {
+    fn start(store: &str, role: &str) -> Replica {
+        let (child, url) = serve(|command| {
+            command.args(["--role", role, "--training-threads", "1", "--lease-seconds"]);
+            command.arg(LEASE.as_secs().to_string()).env("BALLAST_STORE", store);
+            // The faults made here are many, and logged.
+            command.env("RUST_LOG", "off");
+        });
+        Replica { child, app: App::at(url, tempfile::tempdir().unwrap()) }
+    }
+
+    fn signal(&self, name: &str) {
+        let pid = self.child.id().to_string();
+        assert!(Command::new("kill").args([name, &pid]).status().unwrap().success());
+    }
+}
+
+impl Drop for Replica {
+    fn drop(&mut self) {
+        // SIGKILL ends a stopped process too.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+async fn row(store: &str, job: &str) -> JobRow {
+    let store = Store::connect(&store.parse().unwrap()).await.unwrap();
+    let row = store.job(job).await.unwrap().unwrap();
+    store.close().await;
+    row
+}
+
+/// Waits for `reached`, a level that is asked for again and again.
+async fn until<T>(what: &str, mut reached: impl AsyncFnMut() -> Option<T>) -> T {
+    let deadline = Instant::now() + PATIENCE;
+    loop {
+        if let Some(reached) = reached().await {
+            return reached;
+        }
+        assert!(Instant::now() < deadline, "still waiting for {what}");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+}
+
+/// The job ends well, and its policy is the one that a single undisturbed thread trains.
+async fn ends_in_the_same_policy(app: &mut App, job: &str) {
+    let done = app.until(job, |job| job["finished_ms"].is_i64()).await;
+    assert_eq!(done["state"], "succeeded", "{done}");
+    app.policy = done["policy"].as_str().unwrap().to_owned();
+    assert!(app.export().await == support::trained(&specification(STEPS)), "the policies differ");
+}
+
+/// `fault` befalls the worker in the middle of a training; the other takes over from its last finished step.
+async fn a_worker_falls_silent(fault: &str) {
+    let Some(store) = database().await else { return };
+    let mut api = Replica::start(&store, "api");
+    let mut workers = [Replica::start(&store, "worker"), Replica::start(&store, "worker")];
+    let job = api.app.queue(&specification(STEPS)).await;
+    api.app.until(&job, |job| job["progress"]["steps_done"].as_u64() >= Some(2)).await;
+    if steps_solved(&workers[1].app.url).await > 0 {
+        workers.reverse();
+    }
+    let [silent, heir] = workers;
+    silent.signal(fault);
+    let left = row(&store, &job).await;
+    ends_in_the_same_policy(&mut api.app, &job).await;
+    let ended = row(&store, &job).await;
+    assert!(ended.attempt > left.attempt, "{left:?} {ended:?}");
+    assert!(steps_solved(&heir.app.url).await <= STEPS - left.steps_done, "finished steps were solved again");
+    if fault == "-KILL" {
+        return;
+    }
+
+    // It wakes in the middle of a step of a job that has ended, and works on: for the next job.
+    silent.signal("-CONT");
+    drop(heir);
+    let next = api.app.queue(&specification(2)).await;
+    let done = api.app.until(&next, |job| job["finished_ms"].is_i64()).await;
+    assert_eq!(done["state"], "succeeded", "{done}");
+    assert_eq!(row(&store, &job).await, ended, "a stale worker changed a job");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_killed_worker_is_replaced() {
+    a_worker_falls_silent("-KILL").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stopped_worker_is_replaced_and_changes_nothing_when_it_wakes() {
+    a_worker_falls_silent("-STOP").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_job_is_followed_and_cancelled_through_a_replica_that_does_not_run_it() {
+    let Some(store) = database().await else { return };
+    let (api, worker) = (Replica::start(&store, "api"), Replica::start(&store, "worker"));
+    let job = api.app.queue(&specification(STEPS)).await;
+    let events = format!("{}/jobs/{job}/events", api.app.url);
+    let text = api.app.client.get(&events).send().await.unwrap().text().await.unwrap();
+    assert!(text.contains(r#""state":"running""#) && text.contains(r#""state":"succeeded""#), "{text}");
+    assert_eq!(steps_solved(&worker.app.url).await, STEPS);
+
+    let job = api.app.queue(&specification(400)).await;
+    let following = api.app.client.get(format!("{}/jobs/{job}/events", api.app.url)).send().await.unwrap();
+    api.app.until(&job, |job| job["progress"]["steps_done"].as_u64() >= Some(1)).await;
+    let asked = Instant::now();
+    assert_eq!(api.app.delete(&format!("/jobs/{job}")).await, 202);
+    api.app.until(&job, |job| job["state"] == "cancelled").await;
+    assert!(asked.elapsed() < Duration::from_secs(2), "{:?}", asked.elapsed());
+    let text = following.text().await.unwrap();
+    assert!(text.contains("event: state") && text.contains(r#""state":"cancelled""#), "{text}");
+    // The worker is free again.
+    let next = api.app.queue(&specification(1)).await;
+    api.app.until(&next, |job| job["state"] == "succeeded").await;
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
+}
+
+/// Every action of either replica is the simulator's for exactly the returns acknowledged by then.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_lives_on_two_replicas_at_once() {
+    const HORIZON: usize = 6;
+    let Some(store) = database().await else { return };
+    let (mut first, mut second) = (Replica::start(&store, "all"), Replica::start(&store, "api"));
+    let mut request = specification(HORIZON);
+    // A radius small enough that the robust allocation is not always zero.
+    request["problem"]["radius"]["scale"] = json!(0.1);
+    first.app.train(&request).await;
+    first.app.open().await;
+    second.app.session = first.app.session.clone();
+    let advisor = Advisor::new(Policy::from_json(&first.app.export().await).unwrap());
+    let start = advisor.initial_state(None, None).unwrap();
+    let apps = [&first.app, &second.app];
+
+    let mut returns: Vec<f64> = Vec::new();
+    for period in 1..=HORIZON {
+        let mut expected = returns.clone();
+        expected.push(0.0);
+        let (advices, _) = advisor.simulate(start.clone(), &expected);
+        for app in apps {
+            let (status, action) = app.action().await;
+            assert_eq!((status.as_u16(), &action["period"]), (200, &json!(period)), "{action}");
+            assert_eq!(number(&action["allocation"]), advices[period - 1].allocation);
+            assert_eq!(number(&action["radius"]), advices[period - 1].radius);
+        }
+        // Odd periods: eight times the same report. Even ones: eight reports that contradict each other.
+        let reports = (0..8).map(|client| {
+            let log_return = if period % 2 == 1 { 0.01 } else { 0.01 * (f64::from(client) - 3.5) };
+            let app = apps[client as usize % 2];
+            async move { app.observe(period, log_return).await }
+        });
+        let answers = join_all(reports).await;
+        let (accepted, refused): (Vec<_>, Vec<_>) = answers.iter().partition(|(status, _)| *status == StatusCode::OK);
+        assert_eq!(accepted.len(), if period % 2 == 1 { 8 } else { 1 }, "{answers:?}");
+        assert!(accepted.iter().all(|(_, answer)| *answer == accepted[0].1), "{accepted:?}");
+        assert!(refused.iter().all(|(_, problem)| problem["type"] == "/problems/period-conflict"), "{refused:?}");
+        returns.push(number(&accepted[0].1["log_return"]));
+    }
+    for app in apps {
+        let (_, history) = app.get(&format!("/sessions/{}/history", app.session)).await;
+        let stored: Vec<f64> =
+            history["observations"].as_array().unwrap().iter().map(|row| number(&row["log_return"])).collect();
+        assert_eq!(stored, returns);
+        assert_eq!(app.action().await.0, 409);
+    }
+    assert_eq!(second.app.delete(&format!("/sessions/{}", second.app.session)).await, 204);
+    assert_eq!(first.app.action().await.0, 404);
+}
+
+/// Reports periods one after the other, each until it is acknowledged; the answers.
+async fn report_all(app: &App, periods: std::ops::RangeInclusive<usize>) -> Vec<Value> {
+    let mut answers = Vec::new();
+    for period in periods {
+        let answer = until("an acknowledgement", async || {
+            let (status, answer) = app.observe(period, 0.001 * period as f64).await;
+            assert!(status == 200 || status == 503, "{status} {answer}");
+            (status == 200).then_some(answer)
+        });
+        answers.push(answer.await);
+    }
+    answers
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_crash_of_the_database_loses_and_doubles_nothing() {
+    let Some(cluster) = private_cluster() else { return };
+    let store = cluster.database().await;
+    let (mut api, worker) = (Replica::start(&store, "api"), Replica::start(&store, "worker"));
+    api.app.train(&specification(STEPS)).await;
+    api.app.open().await;
+    let mut slow = specification(STEPS);
+    slow["design"] = json!({ "count": 30 });
+    let job = api.app.queue(&slow).await;
+    api.app.until(&job, |job| job["progress"]["steps_done"].as_u64() >= Some(2)).await;
+    let reporting = async {
+        let before = report_all(&api.app, 1..=STEPS / 2).await;
+        [before, report_all(&api.app, STEPS / 2 + 1..=STEPS).await].concat()
+    };
+    let crashing = async {
+        until("some reports", async || {
+            let (_, session) = api.app.get(&format!("/sessions/{}", api.app.session)).await;
+            (session["period"].as_u64() >= Some(5)).then_some(())
+        })
+        .await;
+        tokio::task::block_in_place(|| cluster.crash());
+        let down = [format!("/action?session={}", api.app.session), "/readyz".into(), format!("/jobs/{job}")];
+        for path in down {
+            let answer = Client::new().get(format!("{}{path}", api.app.url)).send().await.unwrap();
+            assert_eq!((answer.status().as_u16(), answer.headers()["retry-after"].to_str().unwrap()), (503, "1"));
+            assert_eq!(support::read(answer).await.1["type"], "/problems/overloaded");
+        }
+        assert_eq!(api.app.get("/livez").await.0, 200);
+        tokio::task::block_in_place(|| cluster.recover());
+        for replica in [&api, &worker] {
+            let app = &replica.app;
+            until("readiness", async || (app.get("/readyz").await.0 == 200).then_some(())).await;
+        }
+    };
+    let (answers, ()) = tokio::join!(reporting, crashing);
+
+    let (_, history) = api.app.get(&format!("/sessions/{}/history", api.app.session)).await;
+    let rows = history["observations"].as_array().unwrap();
+    assert_eq!((rows.len(), answers.len()), (STEPS, STEPS));
+    for (period, (row, answer)) in (1..).zip(rows.iter().zip(&answers)) {
+        assert_eq!((&row["period"], &row["wealth"]), (&json!(period), &answer["wealth"]), "{row}");
+        assert_eq!(api.app.observe(period, 0.001 * period as f64).await, (StatusCode::OK, answer.clone()));
+    }
+    let done = api.app.until(&job, |job| job["finished_ms"].is_i64()).await;
+    assert_eq!(done["state"], "succeeded", "{done}");
+    api.app.policy = done["policy"].as_str().unwrap().to_owned();
+    assert!(api.app.export().await == support::trained(&slow), "the policies differ");
+    for mut replica in [api, worker] {
+        assert_eq!(replica.child.try_wait().unwrap(), None, "a replica ended");
+        replica.signal("-TERM");
+        assert_eq!(replica.child.wait().unwrap().code(), Some(0));
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_worker_answers_operators_only_and_a_folder_has_no_roles() {
+    for role in ["api", "worker"] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
+        command.args(["serve", "--listen", "127.0.0.1:0", "--role", role, "--data"]).arg(folder.path());
+        let refused = command.env_remove("BALLAST_STORE").output().unwrap();
+        let said = String::from_utf8_lossy(&refused.stderr);
+        assert!(refused.status.code() == Some(1) && said.contains(&format!("role is {role}")), "{said}");
+    }
+    let Some(store) = database().await else { return };
+    let worker = Replica::start(&store, "worker");
+    for path in ["/livez", "/readyz", "/health", "/metrics"] {
+        assert_eq!(worker.app.get(path).await.0, 200, "{path}");
+    }
+    let train = worker.app.client.post(format!("{}/train", worker.app.url)).json(&specification(1));
+    let (status, problem) = support::read(train.send().await.unwrap()).await;
+    assert_eq!((status.as_u16(), &problem["type"]), (404, &json!("/problems/unknown-route")));
+}
