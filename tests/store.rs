@@ -451,7 +451,7 @@ async fn reads_run_on_any_thread(place: &Place) {
 async fn two_replicas_meet(place: &Place) {
     let store = place.open().await;
     let second = place.second(&store).await;
-    let either = |n: usize| if n % 2 == 0 { store.clone() } else { second.clone() };
+    let either = |n: usize| if n.is_multiple_of(2) { store.clone() } else { second.clone() };
 
     let keyed = (0..8).map(|n| {
         let store = either(n);

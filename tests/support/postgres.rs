@@ -7,7 +7,7 @@
 use std::io::{BufRead, BufReader, Lines, Write};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
-use std::process::{ChildStdin, ChildStdout, Command, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, OnceLock};
 
@@ -38,7 +38,7 @@ const KEEPER: &str = r#"
 /// A private server.
 pub struct Cluster {
     port: u16,
-    keeper: Mutex<(ChildStdin, Lines<BufReader<ChildStdout>>)>,
+    keeper: Mutex<(Child, Lines<BufReader<ChildStdout>>)>,
 }
 
 impl Cluster {
@@ -62,9 +62,14 @@ impl Cluster {
             .spawn()
             .unwrap();
         let lines = BufReader::new(child.stdout.take().unwrap()).lines();
-        let cluster = Cluster { port, keeper: Mutex::new((child.stdin.take().unwrap(), lines)) };
+        let cluster = Cluster { port, keeper: Mutex::new((child, lines)) };
         cluster.answered();
         Some(cluster)
+    }
+
+    fn tell(&self, word: &str) {
+        writeln!(self.keeper.lock().unwrap().0.stdin.as_mut().unwrap(), "{word}").unwrap();
+        self.answered();
     }
 
     fn answered(&self) {
@@ -74,14 +79,12 @@ impl Cluster {
 
     /// Stops the server as a crash does: no checkpoint, connections cut.
     pub fn crash(&self) {
-        writeln!(self.keeper.lock().unwrap().0, "stop").unwrap();
-        self.answered();
+        self.tell("stop");
     }
 
     /// Starts it again and waits for its recovery.
     pub fn recover(&self) {
-        writeln!(self.keeper.lock().unwrap().0, "start").unwrap();
-        self.answered();
+        self.tell("start");
     }
 
     fn url(&self, database: &str) -> String {
@@ -93,6 +96,13 @@ impl Cluster {
         let name = new_name();
         create(&self.url("postgres"), &name).await;
         self.url(&name)
+    }
+}
+
+impl Drop for Cluster {
+    fn drop(&mut self) {
+        // Waiting ends its input first.
+        let _ = self.keeper.get_mut().unwrap().0.wait();
     }
 }
 

@@ -9,7 +9,7 @@ use thiserror::Error;
 /// A parsed `postgres://user:password@host:port/database`. What it lacks comes from libpq's variables (`PGPASSWORD`, ...)
 /// and password file. It prints without the password.
 #[derive(Clone)]
-pub struct PostgresUrl(PgConnectOptions);
+pub struct PostgresUrl(Box<PgConnectOptions>);
 
 /// Why a text is no such address. The text is not shown: it may hold a password.
 #[derive(Debug, Error)]
@@ -25,8 +25,8 @@ pub enum UrlError {
 impl PostgresUrl {
     pub(super) fn options(&self) -> PgConnectOptions {
         match self.0.get_application_name() {
-            Some(_) => self.0.clone(),
-            None => self.0.clone().application_name("ballast"),
+            Some(_) => (*self.0).clone(),
+            None => (*self.0).clone().application_name("ballast"),
         }
     }
 }
@@ -43,7 +43,7 @@ impl FromStr for PostgresUrl {
             PgSslMode::Require => Err(UrlError::Encryption { mode: "require" }),
             PgSslMode::VerifyCa => Err(UrlError::Encryption { mode: "verify-ca" }),
             PgSslMode::VerifyFull => Err(UrlError::Encryption { mode: "verify-full" }),
-            _ => Ok(PostgresUrl(options)),
+            _ => Ok(PostgresUrl(Box::new(options))),
         }
     }
 }
