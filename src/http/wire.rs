@@ -10,8 +10,9 @@ use crate::control::specification::{Framework, Specification};
 use crate::control::worst_case::WorstCase;
 use crate::service::error::ServiceError;
 use crate::service::jobs::Job as ServiceJob;
+use crate::service::live::Live;
 use crate::service::observation::Observed;
-use crate::service::sessions::{Action as ServiceAction, Live};
+use crate::service::sessions::Action as ServiceAction;
 use crate::store::{JobKind, JobState, ObservationRow, PolicySummary, SessionSummary};
 
 /// A job.

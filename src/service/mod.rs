@@ -9,6 +9,7 @@ pub mod config;
 pub mod error;
 mod identity;
 pub mod jobs;
+pub mod live;
 pub mod metrics;
 pub mod observation;
 pub mod policies;

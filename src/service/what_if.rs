@@ -199,14 +199,14 @@ impl Sessions {
     pub async fn what_if(&self, request: WhatIf) -> Result<WhatIfAnswer, ServiceError> {
         let hypotheses = request.hypotheses()?;
         let live = self.get(&request.session).await?;
-        if live.observed >= live.row.horizon {
+        if live.observed() >= live.row.horizon {
             return Err(ServiceError::Completed { session: request.session, horizon: live.row.horizon });
         }
         let solves = request.sweep.is_some() || request.explain.is_some();
         let mode = if solves { AdviceMode::Resolve } else { AdviceMode::Surrogate };
         let mut points = Vec::with_capacity(hypotheses.len());
         for hypothesis in hypotheses {
-            let (advisor, state, step) = (live.advisor.clone(), live.state.clone(), live.observed);
+            let (advisor, state, step) = (live.advisor.clone(), live.state.clone(), live.observed());
             let turns = if solves || hypothesis.radius.is_some() { &self.resolving } else { &self.advising };
             let supposed = turns.run(move || advisor.suppose(step, &state, &hypothesis, mode)).await?;
             points.push(WhatIfPoint::new(
