@@ -31,7 +31,7 @@ use crate::service::config::Config;
 struct Description;
 
 fn routes() -> OpenApiRouter<Arc<Service>> {
-    users().merge(operators())
+    users().merge(operators()).merge(pages())
 }
 
 fn users() -> OpenApiRouter<Arc<Service>> {
@@ -62,8 +62,10 @@ fn operators() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(operations::metrics))
         .routes(routes!(operations::openapi))
         .routes(routes!(operations::docs))
-        .routes(routes!(dashboard::root))
-        .routes(routes!(dashboard::file))
+}
+
+fn pages() -> OpenApiRouter<Arc<Service>> {
+    OpenApiRouter::new().routes(routes!(dashboard::root)).routes(routes!(dashboard::file))
 }
 
 /// The OpenAPI description.
