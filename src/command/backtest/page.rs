@@ -94,10 +94,13 @@ fn wealth(backtest: &Backtest) -> Chart {
     })
 }
 
+/// The adaptive strategy most is said about and two everybody knows: more cover each other.
 fn drawdowns(backtest: &Backtest) -> Chart {
     let years = years(backtest);
     let chart = Chart::new("Drawdown", time(), Axis::new("below the highest wealth so far, %").from_zero());
-    followed(backtest).fold(chart, |chart, line| {
+    let main = &backtest.lines[main_line(&backtest.lines)].name;
+    let shown = ["all-stock", "60/40", main.as_str()];
+    shown.iter().filter_map(|name| backtest.lines.iter().find(|line| line.name == *name)).fold(chart, |chart, line| {
         let falls = line.account.drawdowns().into_iter().skip(1).map(|fall| -100.0 * fall);
         chart.line(&line.name, years.iter().copied().zip(falls))
     })

@@ -78,8 +78,8 @@ fn timing(figures: &[Figures], main: usize) -> Option<String> {
         () => "the record does not show that changing the allocation did anything",
     };
     Some(format!(
-        "Against a constant mix of its own average allocation, {:.1} %, which nobody knew beforehand, {} is ahead by \
-         {value:.2} [{low:.2}, {high:.2}]: {verdict}.",
+        "Against a constant mix of its own average allocation, {:.1} %, which nobody knew beforehand, {} differs \
+         by {value:+.2} [{low:.2}, {high:.2}]: {verdict}.",
         100.0 * figures[main].mean_allocation,
         figures[main].strategy
     ))
