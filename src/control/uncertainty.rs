@@ -20,6 +20,8 @@ pub struct UncertaintySets {
     seed: u64,
     /// False where the framework has no uncertainty (known law, plug-in).
     uncertain: bool,
+    /// Sample size at the last step.
+    last_size: usize,
     /// The quantile under the bridge rule.
     estimator: UpperQuantile,
     bridges: Mutex<HashMap<usize, Arc<Bridges>>>,
@@ -28,15 +30,15 @@ pub struct UncertaintySets {
 /// The common random numbers of one sample size.
 struct Bridges {
     now: AbsoluteBridges,
-    /// Of the mean statistic one return later.
-    ahead: AbsoluteBridges,
+    /// Of the mean statistic one return later; `None` where no step comes after.
+    ahead: Option<AbsoluteBridges>,
 }
 
 /// The radius of a law and what it tends to be one return later.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Radii {
     pub radius: f64,
-    /// Of the mean statistic over the laws with one value of this law twice.
+    /// Of the mean statistic over the laws with one value of this law twice; the radius itself where no step comes after.
     pub radius_ahead: f64,
 }
 
@@ -48,7 +50,9 @@ impl UncertaintySets {
             RadiusRule::Bridge { alpha, paths, .. } => UpperQuantile::new(paths, alpha),
             _ => UpperQuantile::new(1, 0.5),
         };
-        UncertaintySets { rule, seed: specification.seed, uncertain, estimator, bridges: Mutex::new(HashMap::new()) }
+        let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
+        let bridges = Mutex::new(HashMap::new());
+        UncertaintySets { rule, seed: specification.seed, uncertain, last_size, estimator, bridges }
     }
 
     /// True where laws of one sample size have different radii.
@@ -69,7 +73,8 @@ impl UncertaintySets {
             kept.remove(&smallest);
         }
         let simulate = |size| AbsoluteBridges::simulate(size, paths, self.seed);
-        let made = Arc::new(Bridges { now: simulate(sample_size), ahead: simulate(sample_size + 1).one_ahead() });
+        let ahead = (sample_size < self.last_size).then(|| simulate(sample_size + 1).one_ahead());
+        let made = Arc::new(Bridges { now: simulate(sample_size), ahead });
         kept.insert(sample_size, Arc::clone(&made));
         made
     }
@@ -101,12 +106,12 @@ impl UncertaintySets {
         match self.rule {
             RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
                 let bridges = self.bridges(size, paths);
-                Radii {
-                    radius: radius(scale, bridges.now.quantile(law, &self.estimator), size),
-                    radius_ahead: radius(scale, bridges.ahead.quantile(law, &self.estimator), size + 1),
-                }
+                let radius_now = radius(scale, bridges.now.quantile(law, &self.estimator), size);
+                let ahead = bridges.ahead.as_ref().map(|ahead| ahead.quantile(law, &self.estimator));
+                let radius_ahead = ahead.map_or(radius_now, |quantile| radius(scale, quantile, size + 1));
+                Radii { radius: radius_now, radius_ahead }
             }
-            _ => Radii { radius: self.radius_of_size(size), radius_ahead: self.radius_of_size(size + 1) },
+            _ => Radii { radius: self.radius_of_size(size), radius_ahead: self.radius_of_size(size) },
         }
     }
 
@@ -116,17 +121,17 @@ impl UncertaintySets {
         match self.rule {
             RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
                 let bridges = self.bridges(size, paths);
-                let now = bridges.now.quantiles_with(law.atoms(), values, &self.estimator);
-                let ahead = bridges.ahead.quantiles_with(law.atoms(), values, &self.estimator);
-                let radii = |(now, ahead)| Radii {
-                    radius: radius(scale, now, size),
-                    radius_ahead: radius(scale, ahead, size + 1),
+                let quantiles = |bridges: &AbsoluteBridges, size: usize| -> Vec<f64> {
+                    let found = bridges.quantiles_with(law.atoms(), values, &self.estimator);
+                    found.into_iter().map(|quantile| radius(scale, quantile, size)).collect()
                 };
-                now.into_iter().zip(ahead).map(radii).collect()
+                let now = quantiles(&bridges.now, size);
+                let ahead = bridges.ahead.as_ref().map_or_else(|| now.clone(), |ahead| quantiles(ahead, size + 1));
+                now.into_iter().zip(ahead).map(|(radius, radius_ahead)| Radii { radius, radius_ahead }).collect()
             }
             _ => {
-                let (radius, radius_ahead) = (self.radius_of_size(size), self.radius_of_size(size + 1));
-                vec![Radii { radius, radius_ahead }; values.len()]
+                let radius = self.radius_of_size(size);
+                vec![Radii { radius, radius_ahead: radius }; values.len()]
             }
         }
     }

@@ -155,6 +155,9 @@ test("a report whose answer is lost is sent again and counts once", async () => 
 });
 
 test("the surface is what the service advises", async () => {
+  // A session of its own, at the last step, whose features follow from the returns and the radius alone.
+  const { session } = await call(ballast.url, "/sessions", { policy });
+  for (const period of [1, 2, 3]) await call(ballast.url, "/observe", { session, period, log_return: 0.01 * period });
   const action = await call(ballast.url, `/action?session=${session}`);
   const history = await call(ballast.url, `/sessions/${session}/history`);
   const { wealth } = await call(ballast.url, `/sessions/${session}`);

@@ -47,6 +47,9 @@ export function feature(name, { wealth, atoms, radius, rate }) {
       return Math.log(Math.max(radius, 1e-12));
     case "robust_excess":
       return robustExcess(atoms, radius, rate);
+    case "radius_trend":
+      // Takes the simulated bridges, which a policy does not carry: it stays at the centre of the design.
+      return 0;
   }
   const order = Number(name.split("_")[1]);
   if (name.startsWith("moment_")) return raw(atoms, order);

@@ -10,6 +10,23 @@ AdviceSource: TypeAlias = Literal["policy_surrogate", "resolved", "resolved_outs
 """Where an advice came from."""
 
 
+class Costs(TypedDict):
+    """What the evaluation cost; the only part that differs between two runs."""
+
+    training_seconds: float
+    simulation_seconds: float
+    resolve_seconds: NotRequired[float | None]
+    """Mean of one re-solved step; null where there was none."""
+
+
+class Estimate(TypedDict):
+    """A figure and the interval around it."""
+
+    value: float
+    low: float
+    high: float
+
+
 Explain: TypeAlias = Literal["worst_case"]
 
 
@@ -17,7 +34,7 @@ FeatureMap: TypeAlias = Literal["standardized", "raw_moments"]
 """How a state becomes the inputs of a surrogate."""
 
 
-Framework: TypeAlias = Literal["adaptive", "static", "known_law", "plug_in"]
+Framework: TypeAlias = Literal["adaptive", "static", "known_law", "plug_in", "parametric_static", "parametric_adaptive"]
 """What the investor is robust against, and whether observing returns changes it."""
 
 
@@ -29,6 +46,18 @@ class Health(TypedDict):
     jobs_queued: int
     jobs_running: int
     sessions: int
+
+
+class HistoryReport(TypedDict):
+    """One initial history."""
+
+    quantile: NotRequired[float | None]
+    """The bridge quantile there; null under other radius rules."""
+    radius: float
+    promised: list[float]
+    """What each framework promises there: the certainty equivalent of its first advice, by its own account."""
+    mean_utility: list[float]
+    """Mean terminal utility of each strategy, in their order."""
 
 
 class HyperparameterBounds(TypedDict):
@@ -43,6 +72,23 @@ class Imported(TypedDict):
     """An imported policy."""
 
     policy: str
+
+
+class InitialHistories1(TypedDict):
+    """The problem's own."""
+
+    kind: Literal["given"]
+
+
+class InitialHistories2(TypedDict):
+    """So many draws from the true law, each as long as the problem's own."""
+
+    count: int
+    kind: Literal["drawn"]
+
+
+InitialHistories: TypeAlias = InitialHistories1 | InitialHistories2
+"""Which histories paths start from."""
 
 
 InitialLaws: TypeAlias = Literal["given", "resampled"]
@@ -113,7 +159,7 @@ class OpenSession(TypedDict):
     """Default: the policy's initial wealth."""
 
 
-Phase: TypeAlias = Literal["solving", "fitting"]
+Phase: TypeAlias = Literal["solving", "fitting", "simulating"]
 
 
 class PolicyEntry(TypedDict):
@@ -182,8 +228,32 @@ class RadiusRule4(TypedDict):
     rule: Literal["fixed"]
 
 
-RadiusRule: TypeAlias = RadiusRule1 | RadiusRule2 | RadiusRule3 | RadiusRule4
-"""How the radius of the Wasserstein ball follows from the sample of size n."""
+class RadiusRule5(TypedDict):
+    """
+    `sqrt(kappa / n)` estimated standard deviations, kappa the (1 - alpha)-quantile of chi-square with two degrees
+    of freedom: `n (mu - m)^2 / v + n (s2 - v)^2 / (2 v^2) <= kappa`, m and v the sample's mean and variance.
+    """
+
+    alpha: NotRequired[float]
+    rule: Literal["chi_square"]
+
+
+RadiusRule: TypeAlias = RadiusRule1 | RadiusRule2 | RadiusRule3 | RadiusRule4 | RadiusRule5
+"""
+How the radius of the uncertainty set follows from the sample of size n: `chi_square` of the parametric frameworks'
+confidence region, every other of the Wasserstein ball.
+"""
+
+
+class RadiusSpread(TypedDict):
+    """The radius over paths."""
+
+    mean: float
+    quantile_10: float
+    quantile_50: float
+    quantile_90: float
+    first_path: float
+    """On the first path."""
 
 
 class SamplingLaw1(TypedDict):
@@ -224,6 +294,14 @@ class SessionHistory(TypedDict):
 
 
 SessionState: TypeAlias = Literal["active", "completed"]
+
+
+class Spread(TypedDict):
+    """Mean and quantiles over paths."""
+
+    mean: float
+    quantile_10: float
+    quantile_90: float
 
 
 class SurrogateDiagnostics(TypedDict):
@@ -281,6 +359,19 @@ class Uncertainty(TypedDict):
     quantile_standard_error: NotRequired[float | None]
     """Simulation standard error of the quantile."""
     radius: float
+    """As in an advice."""
+
+
+class UtilityReport(TypedDict):
+    """Terminal utility."""
+
+    mean: Estimate
+    variance: Estimate
+    quantile_20: Estimate
+    quantile_90: Estimate
+    max: Estimate
+    """Of the paths of one history, averaged over histories."""
+    min: Estimate
 
 
 class UtilitySpecification1(TypedDict):
@@ -307,16 +398,10 @@ UtilitySpecification: TypeAlias = UtilitySpecification1 | UtilitySpecification2 
 """Utility of terminal wealth, always maximised."""
 
 
-class WorstCase(TypedDict):
-    """The law that is worst for the advised allocation, as a transport of the empirical law."""
+class WealthReport(TypedDict):
+    """Terminal wealth."""
 
-    multiplier: float
-    """Lagrange multiplier of the ball: utility lost per unit of extra radius."""
-    transport: list[TransportedMass]
-    duality_gap: float
-    """Difference between primal and dual value, in log certainty equivalent."""
-    sentence: str
-    """The worst case in one plain sentence."""
+    mean: Estimate
 
 
 class WorstLawSummary(TypedDict):
@@ -330,6 +415,15 @@ class WorstLawSummary(TypedDict):
     """Lowest log-return that mass moves to; absent where none moves."""
 
 
+class WorstNormalLaw(TypedDict):
+    """The worst mean and variance of the log-return of one period, within the confidence region of the estimates."""
+
+    mean: float
+    variance: float
+    estimated_mean: float
+    estimated_variance: float
+
+
 class Advice(TypedDict):
     """The robust allocation for the coming period and what it is worth."""
 
@@ -340,13 +434,21 @@ class Advice(TypedDict):
     floor: float
     """Terminal wealth of all-bank: no law can take it away."""
     radius: float
-    """Radius of the Wasserstein ball, in log-return."""
+    """
+    Radius of the uncertainty set: of the Wasserstein ball, in log-return; in the parametric frameworks half the width
+    of the confidence region in the mean, in estimated standard deviations of a return.
+    """
     sample_size: int
     surrogate_sd: float
     """Predicted standard deviation of the log certainty equivalent."""
     in_design: bool
     """Whether the state lies where the surrogates were trained."""
     source: AdviceSource
+
+
+class CoverageAtSize(TypedDict):
+    sample_size: int
+    covered: Estimate
 
 
 class DesignSpecification(TypedDict):
@@ -359,16 +461,23 @@ class DesignSpecification(TypedDict):
     wealth: NotRequired[Interval | None]
 
 
+class Difference(TypedDict):
+    """A paired difference to the reference."""
+
+    utility: Estimate
+    certainty_equivalent: Estimate
+
+
 class JobProgress(TypedDict):
     """How far a job is."""
 
     steps_done: int
     steps_total: int
     step: NotRequired[int | None]
-    """The step being solved; steps are solved from the last to the first."""
+    """The step being solved; steps are solved from the last to the first. Null in a simulation."""
     phase: NotRequired[Phase | None]
     points_done: NotRequired[int | None]
-    """Design points solved in this step."""
+    """Design points solved, or paths simulated, in this step."""
     points_total: NotRequired[int | None]
     seconds_left: NotRequired[float | None]
 
@@ -388,6 +497,17 @@ class Observed(Uncertainty):
     """Whether the horizon is reached."""
 
 
+class PeriodReport(TypedDict):
+    """One period over all paths."""
+
+    period: int
+    sample_size: int
+    allocation: Spread
+    all_bank_share: float
+    """Share of paths that held nothing in the risky asset."""
+    radius: NotRequired[RadiusSpread | None]
+
+
 class ProblemSpecification(TypedDict):
     framework: NotRequired[Framework]
     horizon: NotRequired[int]
@@ -398,7 +518,7 @@ class ProblemSpecification(TypedDict):
     action_interval: NotRequired[list[float]]
     """Share of wealth that may be held in the risky asset: `[0, highest]`."""
     utility: NotRequired[UtilitySpecification]
-    radius: NotRequired[RadiusRule]
+    radius: NotRequired[RadiusRule | None]
     support: NotRequired[Interval | None]
     law: NotRequired[SamplingLaw | None]
     history: list[float]
@@ -449,7 +569,10 @@ class StepDiagnostics(TypedDict):
     uncertified_share: float
     """Share of the design points whose window could not be certified: mass might want to leave it."""
     duality_gap: float
-    """Largest difference between the primal and the dual value of a robust step, in log certainty equivalent."""
+    """
+    Largest difference between the primal and the dual value of a robust step, in log certainty equivalent; 0 in the
+    parametric frameworks, whose step has no dual.
+    """
     value: NotRequired[SurrogateDiagnostics | None]
     policy: NotRequired[SurrogateDiagnostics | None]
 
@@ -458,7 +581,7 @@ class SurrogateSpecification(TypedDict):
     target: NotRequired[SurrogateTarget]
     features: NotRequired[FeatureMap]
     moment_count: NotRequired[int]
-    """Number of moments of the law that enter the features."""
+    """Number of moments of the law that enter the features; at most two in the parametric frameworks, whose law has no more."""
     bounds: NotRequired[HyperparameterBounds]
 
 
@@ -490,21 +613,21 @@ class WhatIf(TypedDict):
     sweep: NotRequired[Sweep | None]
 
 
-class WhatIfPoint(Advice):
-    """The advice under one hypothesis."""
+class WorstCase(TypedDict):
+    """
+    The law that is worst for the advised allocation: a transport of the empirical law, or, in the parametric frameworks, a
+    normal law.
+    """
 
-    period: int
-    """The period advised."""
-    wealth: float
-    """Wealth at its start."""
-    log_return: NotRequired[float | None]
-    """The return supposed, if one was."""
-    radius_scale: NotRequired[float | None]
-    """The factor on the radius supposed, if one was."""
-    gamma: NotRequired[float | None]
-    """Lagrange multiplier of the ball: utility lost per unit of extra radius. Where the step was solved."""
-    worst_law: NotRequired[WorstLawSummary | None]
-    worst_case: NotRequired[WorstCase | None]
+    multiplier: float
+    """Lagrange multiplier of the uncertainty set: utility lost per unit of extra radius."""
+    transport: list[TransportedMass]
+    """Empty in the parametric frameworks."""
+    normal: NotRequired[WorstNormalLaw | None]
+    duality_gap: float
+    """Difference between primal and dual value, in log certainty equivalent; 0 in the parametric frameworks."""
+    sentence: str
+    """The worst case in one plain sentence."""
 
 
 class Action(Advice):
@@ -513,6 +636,40 @@ class Action(Advice):
     session: str
     period: int
     worst_case: NotRequired[WorstCase | None]
+
+
+class Coverage(TypedDict):
+    """How often the ball held the true law."""
+
+    target: NotRequired[float | None]
+    """1 - alpha, under a radius rule that has one."""
+    by_sample_size: list[CoverageAtSize]
+    ever_left: Estimate
+    """Share of paths on which some period's ball did not hold it."""
+
+
+class EvaluationRequest(TypedDict):
+    """A comparison of strategies on common simulated returns."""
+
+    problem: ProblemSpecification
+    """
+    As in a training; `framework` is left out, and `law` is the true law that returns are drawn from (default: the
+    design's sampling law).
+    """
+    design: NotRequired[DesignSpecification]
+    surrogate: NotRequired[SurrogateSpecification]
+    seed: NotRequired[int]
+    frameworks: NotRequired[list[Framework]]
+    """Frameworks to compare."""
+    constant_mixes: NotRequired[list[float] | None]
+    """Constant allocations to compare; 0 is all-bank. Default: 0 to 1 by 0.1, as far as the actions go."""
+    policies: NotRequired[dict[str, str]]
+    """A trained policy for a framework; the others are trained inside the job."""
+    paths: NotRequired[int]
+    """Simulated paths per initial history."""
+    histories: NotRequired[InitialHistories]
+    level: NotRequired[float]
+    """Confidence of the intervals."""
 
 
 class Job(TypedDict):
@@ -526,6 +683,8 @@ class Job(TypedDict):
     progress: JobProgress
     policy: NotRequired[str | None]
     """The policy of a succeeded training."""
+    report: NotRequired[str | None]
+    """Where the report of a succeeded evaluation is."""
     error: NotRequired[str | None]
     """Why it failed."""
     created_ms: int
@@ -551,6 +710,72 @@ class Specification(TypedDict):
     """The same specification and seed give the same policy, bit for bit."""
 
 
+class StrategyReport(TypedDict):
+    """One strategy."""
+
+    strategy: str
+    framework: NotRequired[Framework | None]
+    constant_mix: NotRequired[float | None]
+    """The allocation of a constant mix."""
+    policy: NotRequired[str | None]
+    """The policy followed; null for constant mixes and where each history had its own."""
+    utility: UtilityReport
+    certainty_equivalent: Estimate
+    """Terminal wealth that is worth as much for certain."""
+    wealth: WealthReport
+    difference: NotRequired[Difference | None]
+    histogram: list[int]
+    """Counts of the bins between `histogram_edges`."""
+    periods: NotRequired[list[PeriodReport] | None]
+    coverage: NotRequired[Coverage | None]
+    resolved_share: NotRequired[float | None]
+    """Share of steps advised by solving the step anew."""
+
+
+class WhatIfPoint(Advice):
+    """The advice under one hypothesis."""
+
+    period: int
+    """The period advised."""
+    wealth: float
+    """Wealth at its start."""
+    log_return: NotRequired[float | None]
+    """The return supposed, if one was."""
+    radius_scale: NotRequired[float | None]
+    """The factor on the radius supposed, if one was."""
+    gamma: NotRequired[float | None]
+    """Lagrange multiplier of the ball: utility lost per unit of extra radius. Where the step was solved."""
+    worst_law: NotRequired[WorstLawSummary | None]
+    worst_case: NotRequired[WorstCase | None]
+
+
+class EvaluationReport(TypedDict):
+    """Strategies compared on common returns. `docs/evaluation.md` says where the intervals come from."""
+
+    format: str
+    request: EvaluationRequest
+    """The completed request."""
+    reference: str
+    """The strategy that differences are taken against."""
+    strategies: list[StrategyReport]
+    """Frameworks first, then constant mixes, in the order of the request."""
+    histogram_edges: list[float]
+    """Common bin edges of terminal utility, ascending."""
+    histories: list[HistoryReport]
+    costs: Costs
+
+
+class PolicyDetail(TypedDict):
+    """A policy, and how well each of its steps was solved."""
+
+    policy: str
+    created_ms: int
+    framework: Framework
+    horizon: int
+    specification: Specification
+    diagnostics: list[StepDiagnostics]
+
+
 class WhatIfAnswer1(WhatIfPoint):
     """One point, or the points of a sweep in its order."""
 
@@ -566,14 +791,3 @@ class WhatIfAnswer2(TypedDict):
 
 WhatIfAnswer: TypeAlias = WhatIfAnswer1 | WhatIfAnswer2
 """One point, or the points of a sweep in its order."""
-
-
-class PolicyDetail(TypedDict):
-    """A policy, and how well each of its steps was solved."""
-
-    policy: str
-    created_ms: int
-    framework: Framework
-    horizon: int
-    specification: Specification
-    diagnostics: list[StepDiagnostics]
