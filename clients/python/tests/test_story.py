@@ -10,7 +10,7 @@ import pytest
 from conftest import REPOSITORY, RETURNS, Network, train
 
 import ballast as package
-from ballast import Ballast, Session, wire
+from ballast import Ballast, Evaluation, Session, wire
 
 
 def test_an_investor_lives_to_the_horizon(session: Session) -> None:
@@ -79,6 +79,7 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     policy = training.policy()
     own = policy.session(history=RETURNS[:5])
     own.action(mode="resolve")
+    own.what_if(radius_scale=0.5)
     own.observe(log_return=0.01)
     own.refresh().history()
     assert own.id in [entry["session"] for entry in ballast.sessions()]
@@ -90,13 +91,41 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     assert training.id in [job["job"] for job in ballast.jobs()]
     assert ballast.training(training.id).cancel()["state"] == "succeeded"
     assert ballast.health()["status"] == "ok"
+    evaluation = compare(ballast)
+    assert ballast.evaluation(evaluation.id).report()["reference"] == "all_bank"
 
-    ids = {training.id: "{id}", policy.id: "{id}", own.id: "{id}", session.id: "{id}"}
+    ids = {training.id: "{id}", evaluation.id: "{id}", policy.id: "{id}", own.id: "{id}", session.id: "{id}"}
     reached = {(method, "/".join(ids.get(part, part) for part in path.split("/"))) for method, path in network.sent}
     paths = json.loads((REPOSITORY / "api/openapi.json").read_text())["paths"]
     described = {(method.upper(), path) for path, item in paths.items() for method in item if for_clients(item)}
     assert len(described) >= 17
     assert described - reached == set()
+
+
+def compare(ballast: Ballast) -> Evaluation:
+    """Constant mixes alone, which need no training."""
+    problem: wire.ProblemSpecification = {"history": RETURNS, "horizon": 2}
+    return ballast.evaluate({"problem": problem, "frameworks": [], "constant_mixes": [0.0, 0.5], "paths": 200})
+
+
+def test_what_if_supposes_and_touches_nothing(session: Session) -> None:
+    before = session.action()
+    answer = session.what_if(sweep={"radius_scale": {"from": 0.0, "to": 2.0, "points": 3}})
+    worths = [point["certainty_equivalent"] for point in answer["points"]]  # type: ignore[typeddict-item]
+    assert worths == sorted(worths, reverse=True)
+    assert session.action() == before
+
+
+def test_an_evaluation_ends_in_a_report(ballast: Ballast) -> None:
+    report = compare(ballast).report()
+    bank, half = report["strategies"]
+    assert (bank["strategy"], bank["utility"]["variance"]["value"]) == ("all_bank", 0.0)
+    assert half["utility"]["mean"]["low"] <= half["utility"]["mean"]["value"] <= half["utility"]["mean"]["high"]
+
+
+def test_every_hypothesis_is_an_argument() -> None:
+    arguments = set(inspect.signature(Session.what_if).parameters) - {"self"}
+    assert arguments == set(wire.WhatIf.__annotations__) - {"session"}
 
 
 def for_clients(item: dict[str, dict[str, list[str]]]) -> bool:

@@ -36,13 +36,14 @@ from .errors import (
 )
 from .policy import Policy
 from .session import Session
-from .training import ProgressPrinter, Training
+from .training import Evaluation, ProgressPrinter, Training
 
 __all__ = [
     "Ballast",
     "BallastError",
     "BodyTooLarge",
     "DamagedPolicy",
+    "Evaluation",
     "IdempotencyConflict",
     "InUse",
     "Internal",

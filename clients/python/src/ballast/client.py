@@ -14,7 +14,7 @@ from . import wire
 from .policy import Policy
 from .returns import Kind, Returns, log_returns
 from .session import Session
-from .training import Training
+from .training import Evaluation, Training
 from .transport import Transport
 
 
@@ -81,14 +81,19 @@ class Ballast:
 
     def submit(self, specification: wire.Specification, *, idempotency_key: str | None = None) -> Training:
         """Queues the training of a whole specification, such as ``Policy.detail`` shows."""
-        # Without a key of the caller's, one of this call's own: a repetition after a lost answer finds the same job.
-        headers = {"Idempotency-Key": str(uuid.uuid4()) if idempotency_key is None else idempotency_key}
-        job: wire.Job = self._transport.json("POST", "/train", body=specification, headers=headers)
-        return Training(self._transport, job)
+        return Training(self._transport, self._queued("/train", specification, idempotency_key))
 
     def training(self, job: str) -> Training:
         """A training that was queued before."""
         return Training(self._transport, self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
+
+    def evaluate(self, request: wire.EvaluationRequest, *, idempotency_key: str | None = None) -> Evaluation:
+        """Queues a comparison of strategies on common simulated returns, and does not wait for it."""
+        return Evaluation(self._transport, self._queued("/evaluate", request, idempotency_key))
+
+    def evaluation(self, job: str) -> Evaluation:
+        """An evaluation that was queued before."""
+        return Evaluation(self._transport, self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
 
     def policy(self, policy: str) -> Policy:
         """A policy by its name. Asks nothing of the service yet."""
@@ -122,6 +127,11 @@ class Ballast:
     def close(self) -> None:
         """Closes the connections."""
         self._transport.http.close()
+
+    def _queued(self, path: str, request: Mapping[str, Any], idempotency_key: str | None) -> wire.Job:
+        # Without a key of the caller's, one of this call's own: a repetition after a lost answer finds the same job.
+        headers = {"Idempotency-Key": str(uuid.uuid4()) if idempotency_key is None else idempotency_key}
+        return cast(wire.Job, self._transport.json("POST", path, body=request, headers=headers))
 
     def _listed(self, path: str, name: str) -> Iterator[Any]:
         after: int | None = None

@@ -82,6 +82,33 @@ class Session:
             self.period, self.wealth = observed["period"] + 1, observed["wealth"]
         return self
 
+    def what_if(
+        self,
+        *,
+        wealth: float | None = None,
+        radius_scale: float | None = None,
+        radius: float | None = None,
+        log_return: float | None = None,
+        simple_return: float | None = None,
+        explain: Literal["worst_case"] | None = None,
+        sweep: wire.Sweep | None = None,
+    ) -> wire.WhatIfAnswer:
+        """The advice for a hypothetical wealth, radius or next return, or for a ``sweep`` of one of them.
+
+        Touches nothing: the session stays as it is.
+        """
+        supposed: wire.WhatIf = {
+            "session": self.id,
+            "wealth": wealth,
+            "radius_scale": radius_scale,
+            "radius": radius,
+            "log_return": log_return,
+            "simple_return": simple_return,
+            "explain": explain,
+            "sweep": sweep,
+        }
+        return cast(wire.WhatIfAnswer, self._transport.json("POST", "/what-if", body=supposed))
+
     def history(self) -> wire.SessionHistory:
         """Where the session started and everything it observed."""
         return cast(wire.SessionHistory, self._transport.json("GET", f"{self._path}/history"))

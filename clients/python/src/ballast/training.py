@@ -1,4 +1,4 @@
-"""A training: a job that ends in a policy."""
+"""Jobs: a training ends in a policy, an evaluation in a report."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from typing import TextIO
+from typing import TextIO, cast
 from urllib.parse import quote
 
 import httpx
@@ -26,8 +26,8 @@ Watch = Callable[[wire.Job], object]
 _TERMINAL = ("succeeded", "failed", "cancelled")
 
 
-class Training:
-    """A job of the service. It goes on whether or not anybody waits for it; ``Ballast.training(id)`` finds it again."""
+class Job:
+    """A job of the service. It goes on whether or not anybody waits for it."""
 
     def __init__(self, transport: Transport, job: wire.Job) -> None:
         self._transport = transport
@@ -74,15 +74,27 @@ class Training:
             time.sleep(growing_pause(failures))
             failures += 1
 
+    def _watched(self, watch: Watch | None) -> wire.Job:
+        for job in self.events():
+            if watch is not None:
+                watch(job)
+        if self.job["state"] != "succeeded":
+            raise JobEnded(self.job)
+        return self.job
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.id} {self.job['state']}>"
+
+
+class Training(Job):
+    """A job that ends in a policy; ``Ballast.training(id)`` finds it again."""
+
     def policy(self, watch: Watch | None = None) -> Policy:
         """Waits for the end of the training, showing each change to ``watch``.
 
         Raises :class:`JobEnded` where the job fails or is cancelled.
         """
-        for job in self.events():
-            if watch is not None:
-                watch(job)
-        policy = self.job.get("policy")
+        policy = self._watched(watch).get("policy")
         if policy is None:
             raise JobEnded(self.job)
         return Policy(self._transport, policy)
@@ -98,8 +110,19 @@ class Training:
         """Waits for the policy and opens a session of it, as :meth:`Policy.session` does."""
         return self.policy(watch).session(history=history, kind=kind, wealth=wealth)
 
-    def __repr__(self) -> str:
-        return f"<Training {self.id} {self.job['state']}>"
+
+class Evaluation(Job):
+    """A job that ends in a report; ``Ballast.evaluation(id)`` finds it again."""
+
+    def report(self, watch: Watch | None = None) -> wire.EvaluationReport:
+        """Waits for the end of the evaluation, showing each change to ``watch``.
+
+        Raises :class:`JobEnded` where the job fails or is cancelled.
+        """
+        path = self._watched(watch).get("report")
+        if path is None:
+            raise JobEnded(self.job)
+        return cast(wire.EvaluationReport, self._transport.json("GET", path))
 
 
 class ProgressPrinter:
