@@ -11,6 +11,7 @@ use ballast::control::policy::Policy;
 use ballast::control::specification::Specification;
 use ballast::control::state::State;
 use ballast::control::surrogate::NextValue;
+use ballast::control::what_if::{Hypothesis, HypotheticalRadius};
 use serde_json::{Value, json};
 use support::App;
 
@@ -224,6 +225,30 @@ fn the_region_of_the_answers_is_that_of_the_returns_seen() {
         assert!((distance.sqrt() / radius(last) - 1.0).abs() < 1e-9, "the worst law lies on the boundary: {normal:?}");
     }
     assert!(frozen.initial_state(Some(&[0.01, 0.02]), None).is_err());
+}
+
+#[test]
+fn a_radius_supposed_is_the_radius_of_the_region() {
+    for framework in FRAMEWORKS {
+        let solved = advisor(small(framework, 0.5));
+        let state = solved.initial_state(None, None).unwrap();
+        let suppose = |radius: HypotheticalRadius| {
+            let hypothesis = Hypothesis { radius: Some(radius), ..Hypothesis::default() };
+            let supposed = solved.suppose(2, &state, &hypothesis, AdviceMode::Surrogate).unwrap();
+            (supposed.advice, supposed.worst_case.unwrap().normal.unwrap())
+        };
+        let own = solved.advise(2, &state, AdviceMode::Resolve);
+        let (point, at_point) = suppose(HypotheticalRadius::Fixed(0.0));
+        let (same, _) = suppose(HypotheticalRadius::Scaled(1.0));
+        let (wide, at_wide) = suppose(HypotheticalRadius::Scaled(1.5));
+        assert_eq!((same.allocation, same.certainty_equivalent), (own.allocation, own.certainty_equivalent));
+        assert!(wide.certainty_equivalent < own.certainty_equivalent, "{framework}");
+        assert!(own.certainty_equivalent < point.certainty_equivalent, "{framework}");
+        assert_eq!((at_point.mean, at_point.variance), (at_point.estimated_mean, at_point.estimated_variance));
+        let (mean, variance) = (at_wide.mean - at_wide.estimated_mean, at_wide.variance / at_wide.estimated_variance);
+        let distance = mean.powi(2) / at_wide.estimated_variance + (variance - 1.0).powi(2) / 2.0;
+        assert!((distance.sqrt() / (1.5 * own.radius) - 1.0).abs() < 1e-9, "{framework}: {at_wide:?}");
+    }
 }
 
 #[test]

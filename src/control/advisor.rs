@@ -180,7 +180,7 @@ impl Advisor {
         (advice, worst)
     }
 
-    /// Radius of the ball at a state, in log-return.
+    /// Radius of the uncertainty set at a state, as in an advice.
     pub fn radius(&self, state: &State) -> f64 {
         self.context.radius(state)
     }

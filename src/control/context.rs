@@ -50,12 +50,10 @@ impl ProblemContext {
         }
     }
 
-    /// The confidence region of the parametric frameworks at a state.
-    fn region(&self, state: &State) -> ConfidenceRegion {
-        let law = self.learned_law(state);
-        let moments = CentralMoments::of(&law);
-        let estimate = NormalLaw { mean: moments.mean(), variance: moments.variance() };
-        ConfidenceRegion { estimate, radius: self.sets.radius(&law) }
+    /// The confidence region of the parametric frameworks at a state, were its radius `radius`.
+    fn region(&self, state: &State, radius: f64) -> ConfidenceRegion {
+        let moments = CentralMoments::of(&self.learned_law(state));
+        ConfidenceRegion { estimate: NormalLaw { mean: moments.mean(), variance: moments.variance() }, radius }
     }
 
     /// Terminal all-bank wealth from a state at `step`.
@@ -154,7 +152,7 @@ impl ProblemContext {
         };
         let utility = RelativeUtility::new(problem.utility, self.floor(step, state));
         if problem.framework.is_parametric() {
-            return Ok(ParametricStep { field, utility, region: self.region(state) }.solve(state, actions));
+            return Ok(ParametricStep { field, utility, region: self.region(state, radius) }.solve(state, actions));
         }
         let (atoms, masses) = centre(problem, state)?;
         let mean: f64 = atoms.iter().zip(&masses).map(|(atom, mass)| atom * mass).sum();

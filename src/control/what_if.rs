@@ -17,7 +17,7 @@ pub struct Hypothesis {
     pub wealth: Option<f64>,
     /// Return of the coming period, through which the advised allocation is held; the advice is for the period after.
     pub log_return: Option<f64>,
-    /// The ball of the period advised; later ones keep their own.
+    /// The uncertainty set of the period advised; later ones keep their own.
     pub radius: Option<HypotheticalRadius>,
 }
 
@@ -25,7 +25,7 @@ pub struct Hypothesis {
 pub enum HypotheticalRadius {
     /// So many times the state's own.
     Scaled(f64),
-    /// In log-return.
+    /// In the unit of an advice's radius.
     Fixed(f64),
 }
 

@@ -232,7 +232,7 @@ pub struct Observation {
     pub executed_allocation: f64,
     /// Wealth at the end of the period.
     pub wealth: f64,
-    /// Radius of the Wasserstein ball after the period, in log-return.
+    /// Radius of the uncertainty set after the period, in the unit of an advice's.
     pub radius: f64,
     pub observed_ms: i64,
 }

@@ -22,10 +22,10 @@ pub struct WhatIf {
     pub session: String,
     /// Wealth now.
     pub wealth: Option<f64>,
-    /// Factor on the radius of the ball of the period advised; later periods keep their own.
+    /// Factor on the radius of the uncertainty set of the period advised; later periods keep their own.
     #[schema(example = 0.5)]
     pub radius_scale: Option<f64>,
-    /// That radius itself, in log-return.
+    /// That radius itself, in the unit of an advice's.
     pub radius: Option<f64>,
     /// Return of the coming period, the advised allocation held through it; the advice is for the period after.
     pub log_return: Option<f64>,
