@@ -13,6 +13,7 @@ pub mod evaluation;
 pub mod evaluation_report;
 pub mod features;
 pub mod fitting;
+pub mod framework;
 pub mod gain_field;
 pub mod limits;
 pub mod parametric;
