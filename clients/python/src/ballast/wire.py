@@ -125,7 +125,7 @@ class Observation(TypedDict):
     wealth: float
     """Wealth at the end of the period."""
     radius: float
-    """Radius of the Wasserstein ball after the period, in log-return."""
+    """Radius of the uncertainty set after the period, in the unit of an advice's."""
     observed_ms: int
 
 
@@ -602,9 +602,9 @@ class WhatIf(TypedDict):
     wealth: NotRequired[float | None]
     """Wealth now."""
     radius_scale: NotRequired[float | None]
-    """Factor on the radius of the ball of the period advised; later periods keep their own."""
+    """Factor on the radius of the uncertainty set of the period advised; later periods keep their own."""
     radius: NotRequired[float | None]
-    """That radius itself, in log-return."""
+    """That radius itself, in the unit of an advice's."""
     log_return: NotRequired[float | None]
     """Return of the coming period, the advised allocation held through it; the advice is for the period after."""
     simple_return: NotRequired[float | None]
