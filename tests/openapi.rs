@@ -51,5 +51,5 @@ fn every_operation_lists_what_its_shape_can_answer() {
             }
         }
     }
-    assert_eq!(with_body, 5);
+    assert_eq!(with_body, 6);
 }

@@ -125,7 +125,7 @@ class Observation(TypedDict):
     wealth: float
     """Wealth at the end of the period."""
     radius: float
-    """Radius of the Wasserstein ball after the period, in log-return."""
+    """Radius of the uncertainty set after the period, in the unit of an advice's."""
     observed_ms: int
 
 
@@ -409,8 +409,8 @@ class WorstLawSummary(TypedDict):
 
     mean: float
     standard_deviation: float
-    share_moved: float
-    """Share of the probability that moves."""
+    share_moved: NotRequired[float | None]
+    """Share of the probability that moves; absent where laws are normal, and none is a transport of what was seen."""
     lowest_destination: NotRequired[float | None]
     """Lowest log-return that mass moves to; absent where none moves."""
 
@@ -602,9 +602,9 @@ class WhatIf(TypedDict):
     wealth: NotRequired[float | None]
     """Wealth now."""
     radius_scale: NotRequired[float | None]
-    """Factor on the radius of the ball of the period advised; later periods keep their own."""
+    """Factor on the radius of the uncertainty set of the period advised; later periods keep their own."""
     radius: NotRequired[float | None]
-    """That radius itself, in log-return."""
+    """That radius itself, in the unit of an advice's."""
     log_return: NotRequired[float | None]
     """Return of the coming period, the advised allocation held through it; the advice is for the period after."""
     simple_return: NotRequired[float | None]
