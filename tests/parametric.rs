@@ -235,7 +235,11 @@ fn a_radius_supposed_is_the_radius_of_the_region() {
         let suppose = |radius: HypotheticalRadius| {
             let hypothesis = Hypothesis { radius: Some(radius), ..Hypothesis::default() };
             let supposed = solved.suppose(2, &state, &hypothesis, AdviceMode::Surrogate).unwrap();
-            (supposed.advice, supposed.worst_case.unwrap().normal.unwrap())
+            let worst = supposed.worst_case.unwrap();
+            let (normal, summary) = (worst.normal.unwrap(), worst.summary().unwrap());
+            assert_eq!((summary.mean, summary.standard_deviation), (normal.mean, normal.variance.sqrt()));
+            assert_eq!((summary.share_moved, summary.lowest_destination), (None, None));
+            (supposed.advice, normal)
         };
         let own = solved.advise(2, &state, AdviceMode::Resolve);
         let (point, at_point) = suppose(HypotheticalRadius::Fixed(0.0));

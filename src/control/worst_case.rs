@@ -49,8 +49,8 @@ pub struct TransportedMass {
 pub struct WorstLawSummary {
     pub mean: f64,
     pub standard_deviation: f64,
-    /// Share of the probability that moves.
-    pub share_moved: f64,
+    /// Share of the probability that moves; absent where laws are normal, and none is a transport of what was seen.
+    pub share_moved: Option<f64>,
     /// Lowest log-return that mass moves to; absent where none moves.
     pub lowest_destination: Option<f64>,
 }
@@ -58,6 +58,10 @@ pub struct WorstLawSummary {
 impl WorstCase {
     /// The worst law in figures; `None` where the robust step has no solution.
     pub fn summary(&self) -> Option<WorstLawSummary> {
+        if let Some(normal) = self.normal {
+            let (mean, standard_deviation) = (normal.mean, normal.variance.sqrt());
+            return Some(WorstLawSummary { mean, standard_deviation, share_moved: None, lowest_destination: None });
+        }
         if self.transport.is_empty() {
             return None;
         }
@@ -68,7 +72,7 @@ impl WorstCase {
         Some(WorstLawSummary {
             mean,
             standard_deviation: expectation(&|z| (z - mean).powi(2)).sqrt(),
-            share_moved: moved().map(|mass| mass.mass).sum(),
+            share_moved: Some(moved().map(|mass| mass.mass).sum()),
             lowest_destination: moved().map(|mass| mass.moved_to).reduce(f64::min),
         })
     }

@@ -409,8 +409,8 @@ class WorstLawSummary(TypedDict):
 
     mean: float
     standard_deviation: float
-    share_moved: float
-    """Share of the probability that moves."""
+    share_moved: NotRequired[float | None]
+    """Share of the probability that moves; absent where laws are normal, and none is a transport of what was seen."""
     lowest_destination: NotRequired[float | None]
     """Lowest log-return that mass moves to; absent where none moves."""
 
