@@ -200,6 +200,30 @@ fn the_bridge_ball_covers_the_paper_s_law_less_often_than_it_promises() {
 }
 
 #[test]
+fn every_framework_takes_part_whatever_its_default_radius_rule() {
+    use ballast::control::specification::Specification;
+    let names = ["adaptive", "static", "known_law", "plug_in", "parametric_static", "parametric_adaptive"];
+    let rest = json!({ "frameworks": names, "constant_mixes": [0.0], "histories": { "kind": "drawn", "count": 2 } });
+    let mut request = small(rest);
+    request["problem"].as_object_mut().unwrap().remove("radius");
+    let (evaluation, followers, outcomes) = simulated(request);
+    let report = EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS);
+    for (strategy, name) in report.strategies.iter().zip(names) {
+        assert_eq!(strategy.strategy, name);
+        // A Wasserstein ball is what coverage speaks of, and a set frozen at its history has a policy for each.
+        assert_eq!(strategy.coverage.is_some(), ["adaptive", "static"].contains(&name), "{name}");
+        assert_eq!(strategy.policy.is_none(), ["static", "parametric_static"].contains(&name), "{name}");
+        let mean = strategy.utility.mean;
+        assert!(mean.low <= mean.value && mean.value <= mean.high, "{name} {mean:?}");
+    }
+    // What a training stores is what the request asks for, defaults filled in.
+    for framework in [followers[0].framework, followers[2].framework] {
+        let trained: Specification = evaluation.request.specification(framework, None).completed().unwrap();
+        assert_eq!(evaluation.request.accepts(framework, &trained), Ok(()));
+    }
+}
+
+#[test]
 fn the_stop_signal_ends_a_simulation() {
     let (evaluation, followers, _) = simulated(small(json!({})));
     let watch = Watch { stop: &AtomicBool::new(true), progress: &|_| {} };

@@ -170,7 +170,7 @@ impl EvaluationRequest {
 
     /// True where a single policy serves every initial history: a framework frozen at its history has one a history.
     pub fn one_policy_for_all(&self, framework: Framework) -> bool {
-        self.histories == InitialHistories::Given || framework.learns() || framework == Framework::KnownLaw
+        self.histories == InitialHistories::Given || !framework.is_frozen()
     }
 
     /// The frameworks that are trained once, before the simulation.
@@ -214,8 +214,8 @@ impl EvaluationRequest {
     /// # Errors
     /// The first part of the problem that differs, under `policies.<framework>`.
     pub fn accepts(&self, framework: Framework, found: &Specification) -> Result<(), FieldError> {
-        let mut wanted = self.specification(framework, None).problem;
-        if framework.learns() || framework == Framework::KnownLaw {
+        let mut wanted = self.specification(framework, None).completed()?.problem;
+        if !framework.is_frozen() {
             wanted.history.clone_from(&found.problem.history);
         }
         let parts = |problem: &ProblemSpecification| serde_json::to_value(problem).unwrap_or_default();
