@@ -119,7 +119,9 @@ def test_what_if_supposes_and_touches_nothing(session: Session) -> None:
 def test_an_evaluation_ends_in_a_report(ballast: Ballast) -> None:
     report = compare(ballast).report()
     bank, half = report["strategies"]
-    assert (bank["strategy"], bank["utility"]["variance"]["value"]) == ("all_bank", 0.0)
+    assert bank["strategy"] == "all_bank"
+    # Every path of the bank ends alike, up to rounding.
+    assert bank["utility"]["variance"]["value"] == pytest.approx(0.0, abs=1e-20)
     assert half["utility"]["mean"]["low"] <= half["utility"]["mean"]["value"] <= half["utility"]["mean"]["high"]
 
 
