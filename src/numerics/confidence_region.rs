@@ -53,7 +53,7 @@ pub struct ConfidenceRegion {
 }
 
 impl NormalLaw {
-    /// Nodes of the quadrature, ascending. Their masses are [`Quadrature::masses`].
+    /// Nodes of the quadrature, ascending. Their masses come from `Quadrature::masses`.
     pub fn nodes(self) -> impl Iterator<Item = f64> {
         let step = REACH / f64::from(NODES) * self.variance.sqrt();
         (-NODES..=NODES).map(move |index| self.mean + f64::from(index) * step)

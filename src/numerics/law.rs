@@ -60,7 +60,7 @@ impl ContinuousLaw {
         }
     }
 
-    /// E[Z].
+    /// `E[Z]`.
     pub fn mean(&self) -> f64 {
         match self {
             ContinuousLaw::GaussianMixture(components) => components.iter().map(|c| c.0 * c.1).sum(),
