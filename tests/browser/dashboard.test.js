@@ -125,11 +125,13 @@ test("a session is opened, observed, and the same after a reload", async () => {
   const { observations } = await call(ballast.url, `/sessions/${session}/history`);
   assert.equal(observations.length, 1);
   assert.ok(Math.abs(observations[0].log_return - Math.log1p(0.012)) < 1e-15);
-  await page.getByRole("slider", { name: "Returns seen and the worst law" }).waitFor();
-  const shown = () => page.locator("main").innerText();
+  const shown = async () => {
+    await page.getByRole("slider", { name: "Returns seen and the worst law" }).waitFor();
+    await page.getByRole("slider", { name: "Worth for certain by radius" }).waitFor();
+    return page.locator("main").innerText();
+  };
   const before = await shown();
   await page.reload();
-  await page.getByRole("slider", { name: "Returns seen and the worst law" }).waitFor();
   assert.equal(await shown(), before);
 });
 
