@@ -4,9 +4,8 @@
 //! wealth L of all-bank: with `w = ln(x_T / L)`, `u(0) = 0` and `u'(0) = 1`. Rounding is then relative to the gain
 //! the investor cares about, at any wealth and risk aversion.
 
-use pulp::Arch;
-
 use super::specification::UtilitySpecification;
+use crate::numerics::dispatch::dispatched;
 use crate::numerics::elementary::{exp_m1, ln};
 
 /// Largest exponent taken: exp(600) is finite, and a loss that deep is never chosen.
@@ -46,30 +45,27 @@ impl RelativeUtility {
 
     /// u(ln(relative_j) + gains_j) for all j, in place of `relative`: wealth over all-bank wealth, positive.
     pub fn values(self, mut relative: Vec<f64>, gains: &[f64]) -> Vec<f64> {
-        Arch::new().dispatch(
-            #[inline(always)]
-            || match self {
-                RelativeUtility::Exponential { k } => {
-                    for (value, gain) in relative.iter_mut().zip(gains) {
-                        let excess = (*value - 1.0) + *value * exp_m1(*gain);
-                        let loss = -k * excess;
-                        *value = -exp_m1(if loss < LARGEST_EXPONENT { loss } else { LARGEST_EXPONENT }) / k;
-                    }
+        dispatched!(match self {
+            RelativeUtility::Exponential { k } => {
+                for (value, gain) in relative.iter_mut().zip(gains) {
+                    let excess = (*value - 1.0) + *value * exp_m1(*gain);
+                    let loss = -k * excess;
+                    *value = -exp_m1(if loss < LARGEST_EXPONENT { loss } else { LARGEST_EXPONENT }) / k;
                 }
-                RelativeUtility::Power { eta } => {
-                    for (value, gain) in relative.iter_mut().zip(gains) {
-                        let power = (1.0 - eta) * (ln(*value) + gain);
-                        let power = if power < LARGEST_EXPONENT { power } else { LARGEST_EXPONENT };
-                        *value = exp_m1(power) / (1.0 - eta);
-                    }
+            }
+            RelativeUtility::Power { eta } => {
+                for (value, gain) in relative.iter_mut().zip(gains) {
+                    let power = (1.0 - eta) * (ln(*value) + gain);
+                    let power = if power < LARGEST_EXPONENT { power } else { LARGEST_EXPONENT };
+                    *value = exp_m1(power) / (1.0 - eta);
                 }
-                RelativeUtility::Log => {
-                    for (value, gain) in relative.iter_mut().zip(gains) {
-                        *value = ln(*value) + gain;
-                    }
+            }
+            RelativeUtility::Log => {
+                for (value, gain) in relative.iter_mut().zip(gains) {
+                    *value = ln(*value) + gain;
                 }
-            },
-        );
+            }
+        });
         relative
     }
 

@@ -4,8 +4,8 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::{MatMut, MatRef, Par};
 use nalgebra::DMatrix;
-use pulp::Arch;
 
+use super::dispatch::dispatched;
 use super::matern::dot_inline;
 
 /// From this many rows on, faer's blocked factorisation beats nalgebra's.
@@ -28,45 +28,47 @@ pub struct Singular {
 /// The factor L of A = L L^T, lower triangular with a positive diagonal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cholesky {
+    /// Above the diagonal stands whatever stood there in the matrix factored.
     lower: DMatrix<f64>,
 }
 
 impl Cholesky {
-    /// Factors a symmetric matrix, of which only the lower triangle is read; `None` unless positive definite
-    /// to working precision.
+    /// Factors a symmetric matrix in its own memory, reading the lower triangle alone; `None` unless it is positive
+    /// definite to working precision.
     ///
-    /// Cost n^3 / 3 and one copy of the matrix.
-    pub fn factor(matrix: &DMatrix<f64>) -> Option<Cholesky> {
-        let n = matrix.nrows();
-        assert_eq!(n, matrix.ncols(), "a matrix to factor must be square");
-        let lower = if n < BLOCKED_FROM_ROWS {
-            nalgebra::Cholesky::new(matrix.clone())?.unpack()
+    /// Cost n^3 / 3.
+    pub fn factor(matrix: DMatrix<f64>) -> Option<Cholesky> {
+        let mut lower = matrix;
+        let n = lower.nrows();
+        assert_eq!(n, lower.ncols(), "a matrix to factor must be square");
+        let diagonal = lower.diagonal();
+        if n < BLOCKED_FROM_ROWS {
+            lower = nalgebra::Cholesky::new(lower)?.unpack_dirty();
         } else {
-            let mut lower = matrix.clone();
             factor_blocked(lower.as_mut_slice(), n)?;
-            lower.fill_upper_triangle(0.0, 1);
-            lower
-        };
-        let positive = (0..n).all(|i| {
-            let pivot = lower[(i, i)] * lower[(i, i)];
-            pivot > LEAST_PIVOT_SHARE * matrix[(i, i)] && pivot.is_finite()
+        }
+        let positive = diagonal.iter().zip(lower.diagonal().iter()).all(|(entry, root)| {
+            let pivot = root * root;
+            pivot > LEAST_PIVOT_SHARE * entry && pivot.is_finite()
         });
         positive.then_some(Cholesky { lower })
+    }
+
+    /// The memory of the factor, for another matrix.
+    pub fn into_memory(self) -> DMatrix<f64> {
+        self.lower
     }
 
     /// x with A x = `right`. Cost 2 n^2.
     pub fn solve(&self, right: &[f64]) -> Vec<f64> {
         let mut x = self.solve_lower(right);
         let (l, n) = (self.lower.as_slice(), self.lower.nrows());
-        Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                for j in (0..n).rev() {
-                    let column = &l[j * n..(j + 1) * n];
-                    x[j] = (x[j] - dot_inline(&column[j + 1..], &x[j + 1..])) / column[j];
-                }
-            },
-        );
+        dispatched!({
+            for j in (0..n).rev() {
+                let column = &l[j * n..(j + 1) * n];
+                x[j] = (x[j] - dot_inline(&column[j + 1..], &x[j + 1..])) / column[j];
+            }
+        });
         x
     }
 
@@ -75,29 +77,26 @@ impl Cholesky {
         let (l, n) = (self.lower.as_slice(), self.lower.nrows());
         assert_eq!(right.len(), n);
         let mut x = right.to_vec();
-        Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                let blocked = n - n % COLUMNS;
-                for j in (0..blocked).step_by(COLUMNS) {
-                    eliminate_block(l, n, j, &mut x);
+        dispatched!({
+            let blocked = n - n % COLUMNS;
+            for j in (0..blocked).step_by(COLUMNS) {
+                eliminate_block(l, n, j, &mut x);
+            }
+            for j in blocked..n {
+                x[j] /= l[j * n + j];
+                let pivot = x[j];
+                for i in j + 1..n {
+                    x[i] -= l[j * n + i] * pivot;
                 }
-                for j in blocked..n {
-                    x[j] /= l[j * n + j];
-                    let pivot = x[j];
-                    for i in j + 1..n {
-                        x[i] -= l[j * n + i] * pivot;
-                    }
-                }
-            },
-        );
+            }
+        });
         x
     }
 
-    /// A^-1, both triangles filled. Cost 2 n^3 / 3.
-    pub fn inverse(&self) -> DMatrix<f64> {
+    /// Writes A^-1 on and below the diagonal of `inverse`, n by n. Cost 2 n^3 / 3.
+    pub fn inverse_lower(&self, inverse: &mut DMatrix<f64>) {
         let n = self.lower.nrows();
-        let mut inverse = DMatrix::zeros(n, n);
+        assert_eq!(inverse.shape(), (n, n), "room for the inverse");
         let mut memory = MemBuffer::new(llt::inverse::inverse_scratch::<f64>(n, Par::Seq));
         llt::inverse::inverse(
             MatMut::from_column_major_slice_mut(inverse.as_mut_slice(), n, n),
@@ -105,8 +104,6 @@ impl Cholesky {
             Par::Seq,
             MemStack::new(&mut memory),
         );
-        inverse.fill_upper_triangle_with_lower_triangle();
-        inverse
     }
 
     /// ln det A = 2 sum_i ln L_ii. Cost O(n).
@@ -164,14 +161,9 @@ pub fn factor_with_jitter(matrix: &DMatrix<f64>) -> Result<(Cholesky, f64), Sing
     let mut jitter = 0.0;
     for relative in RELATIVE_JITTERS {
         jitter = relative * scale;
-        let factor = if jitter == 0.0 {
-            Cholesky::factor(matrix)
-        } else {
-            let mut shifted = matrix.clone();
-            (0..n).for_each(|i| shifted[(i, i)] += jitter);
-            Cholesky::factor(&shifted)
-        };
-        if let Some(factor) = factor {
+        let mut shifted = matrix.clone();
+        (0..n).for_each(|i| shifted[(i, i)] += jitter);
+        if let Some(factor) = Cholesky::factor(shifted) {
             return Ok((factor, jitter));
         }
     }
@@ -194,12 +186,15 @@ mod tests {
     fn solutions_and_inverses_satisfy_their_equations_on_both_sides_of_the_threshold() {
         for n in [1, 2, 3, 5, 63, 64, 65, 130] {
             let a = dominant(n);
-            let factor = Cholesky::factor(&a).unwrap();
+            let factor = Cholesky::factor(a.clone()).unwrap();
             let right: Vec<f64> = (0..n).map(|i| (i as f64).sin()).collect();
             let x = nalgebra::DVector::from_vec(factor.solve(&right));
             let residual = &a * x - nalgebra::DVector::from_column_slice(&right);
             assert!(residual.amax() < 1e-12, "n = {n}");
-            assert!((factor.inverse() * &a - DMatrix::identity(n, n)).amax() < 1e-12, "n = {n}");
+            let mut inverse = DMatrix::from_element(n, n, f64::NAN);
+            factor.inverse_lower(&mut inverse);
+            inverse.fill_upper_triangle_with_lower_triangle();
+            assert!((inverse * &a - DMatrix::identity(n, n)).amax() < 1e-12, "n = {n}");
             let expected = a.determinant().ln();
             assert!(!expected.is_finite() || (factor.log_determinant() - expected).abs() < 1e-9);
         }
@@ -213,7 +208,7 @@ mod tests {
             assert_eq!(factor_with_jitter(&dominant(n)).unwrap().1, 0.0);
             let refused = factor_with_jitter(&(-dominant(n))).unwrap_err();
             assert!(refused.to_string().contains("not positive definite"));
-            assert!(Cholesky::factor(&DMatrix::from_element(n, n, f64::NAN)).is_none());
+            assert!(Cholesky::factor(DMatrix::from_element(n, n, f64::NAN)).is_none());
         }
     }
 }

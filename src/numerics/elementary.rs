@@ -1,7 +1,8 @@
 //! Exponential and logarithm that LLVM can turn into vector code.
 //!
-//! Plain multiplications and additions, nothing fused, so that the bits of a result do not depend on the vector width
-//! of the processor. Called inside loops that `pulp` compiles once for each instruction set.
+//! Multiplications and additions are fused where the formula says so and nowhere else, so that the bits of a result do
+//! not depend on the processor: one without the instruction computes the same fused result, slowly. Called inside loops
+//! that `pulp` compiles once for each instruction set.
 
 /// Outside this range the exponential has no normal value; it is held at its ends, about 3e-308 and 8e307.
 const EXPONENT_RANGE: (f64, f64) = (-708.0, 709.0);
@@ -37,21 +38,21 @@ pub fn exp_m1(x: f64) -> f64 {
 fn reduced(x: f64) -> (f64, f64) {
     let x = if x < EXPONENT_RANGE.0 { EXPONENT_RANGE.0 } else { x };
     let x = if x > EXPONENT_RANGE.1 { EXPONENT_RANGE.1 } else { x };
-    let rounded = x * std::f64::consts::LOG2_E + ROUNDER;
+    let rounded = x.mul_add(std::f64::consts::LOG2_E, ROUNDER);
     let k = rounded - ROUNDER;
-    let t = (x - k * LN2_HIGH) - k * LN2_LOW;
-    let mut sum = 1.0 / 479_001_600.0;
-    sum = sum * t + 1.0 / 39_916_800.0;
-    sum = sum * t + 1.0 / 3_628_800.0;
-    sum = sum * t + 1.0 / 362_880.0;
-    sum = sum * t + 1.0 / 40_320.0;
-    sum = sum * t + 1.0 / 5_040.0;
-    sum = sum * t + 1.0 / 720.0;
-    sum = sum * t + 1.0 / 120.0;
-    sum = sum * t + 1.0 / 24.0;
-    sum = sum * t + 1.0 / 6.0;
-    sum = sum * t + 0.5;
-    sum = sum * t + 1.0;
+    let t = k.mul_add(-LN2_LOW, k.mul_add(-LN2_HIGH, x));
+    let mut sum: f64 = 1.0 / 479_001_600.0;
+    sum = sum.mul_add(t, 1.0 / 39_916_800.0);
+    sum = sum.mul_add(t, 1.0 / 3_628_800.0);
+    sum = sum.mul_add(t, 1.0 / 362_880.0);
+    sum = sum.mul_add(t, 1.0 / 40_320.0);
+    sum = sum.mul_add(t, 1.0 / 5_040.0);
+    sum = sum.mul_add(t, 1.0 / 720.0);
+    sum = sum.mul_add(t, 1.0 / 120.0);
+    sum = sum.mul_add(t, 1.0 / 24.0);
+    sum = sum.mul_add(t, 1.0 / 6.0);
+    sum = sum.mul_add(t, 0.5);
+    sum = sum.mul_add(t, 1.0);
     (sum * t, f64::from_bits(rounded.to_bits().wrapping_add(1023) << 52))
 }
 
@@ -69,12 +70,12 @@ pub fn ln(x: f64) -> f64 {
     let mantissa = f64::from_bits((shifted & 0x000f_ffff_ffff_ffff).wrapping_add(SQRT_HALF_BITS));
     let s = (mantissa - 1.0) / (mantissa + 1.0);
     let square = s * s;
-    let mut sum = 1.0 / 21.0;
+    let mut sum: f64 = 1.0 / 21.0;
     for odd in [19.0, 17.0, 15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0] {
-        sum = sum * square + 1.0 / odd;
+        sum = sum.mul_add(square, 1.0 / odd);
     }
-    let log = 2.0 * s + 2.0 * s * square * sum;
-    k * LN2_HIGH + (k * LN2_LOW + log)
+    let log = (2.0 * s * square).mul_add(sum, 2.0 * s);
+    k.mul_add(LN2_HIGH, k.mul_add(LN2_LOW, log))
 }
 
 #[cfg(test)]

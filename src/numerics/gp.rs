@@ -35,15 +35,14 @@ impl Hyperparameters {
 
 /// Squared distances from row `row` of `scaled` to each later row, written to `out` of length n - row - 1.
 pub(super) fn squared_distances_below(scaled: &DMatrix<f64>, row: usize, out: &mut [f64]) {
-    for (i, column) in scaled.as_slice().chunks_exact(scaled.nrows()).enumerate() {
-        matern::add_squared_differences(&column[row + 1..], column[row], i == 0, out);
-    }
+    let centre: Vec<f64> = scaled.row(row).iter().copied().collect();
+    matern::squared_distances(scaled.as_slice(), scaled.nrows(), row + 1, &centre, out);
 }
 
-/// The lower triangle of K + noise I over the rows of `scaled`; the upper is left at zero. Cost O(n^2 d / 2).
-pub(super) fn kernel_lower(scaled: &DMatrix<f64>, hyper: &Hyperparameters) -> DMatrix<f64> {
+/// Writes K + noise I over the rows of `scaled` on and below the diagonal of `kernel`, n by n. Cost O(n^2 d / 2).
+pub(super) fn kernel_lower(scaled: &DMatrix<f64>, hyper: &Hyperparameters, kernel: &mut DMatrix<f64>) {
     let n = scaled.nrows();
-    let mut kernel = DMatrix::zeros(n, n);
+    assert_eq!(kernel.shape(), (n, n), "one row and one column for each input");
     for (j, column) in kernel.as_mut_slice().chunks_exact_mut(n.max(1)).enumerate() {
         column[j] = hyper.signal_variance + hyper.noise_variance;
         let below = &mut column[j + 1..];
@@ -51,7 +50,6 @@ pub(super) fn kernel_lower(scaled: &DMatrix<f64>, hyper: &Hyperparameters) -> DM
         matern::matern_from_squared(below);
         below.iter_mut().for_each(|value| *value *= hyper.signal_variance);
     }
-    kernel
 }
 
 /// ln p(y) = -y^T alpha / 2 - ln det K / 2 - n ln(2 pi) / 2. Source: Rasmussen and Williams 2006, eq. (2.30).
@@ -102,13 +100,15 @@ impl GpMean {
     pub fn squared_distances(&self, query: &[f64], dimensions: Range<usize>, out: &mut [f64]) {
         assert_eq!(query.len(), self.lengthscales.len(), "one query entry for each column");
         assert_eq!(out.len(), self.weights.len(), "one distance for each row");
-        if dimensions.is_empty() {
-            out.fill(0.0);
-        }
-        for (position, i) in dimensions.enumerate() {
-            let column = &self.inputs.as_slice()[i * out.len()..(i + 1) * out.len()];
-            matern::add_squared_differences(column, query[i] / self.lengthscales[i], position == 0, out);
-        }
+        let n = out.len();
+        let centre: Vec<f64> = dimensions.clone().map(|i| query[i] / self.lengthscales[i]).collect();
+        matern::squared_distances(
+            &self.inputs.as_slice()[dimensions.start * n..dimensions.end * n],
+            n,
+            0,
+            &centre,
+            out,
+        );
     }
 
     /// m at the point whose squared scaled distances to the n inputs are given. Cost O(n), no allocation.
@@ -154,7 +154,8 @@ impl GaussianProcess {
         hyper: &Hyperparameters,
     ) -> Result<GaussianProcess, Singular> {
         assert_eq!(inputs.nrows(), targets.len(), "one target for each row");
-        let kernel = kernel_lower(&hyper.scale(inputs), hyper);
+        let mut kernel = DMatrix::zeros(targets.len(), targets.len());
+        kernel_lower(&hyper.scale(inputs), hyper, &mut kernel);
         let (cholesky, jitter) = factor_with_jitter(&kernel)?;
         let weights = cholesky.solve(targets);
         let mean = GpMean::new(inputs, &weights, hyper);
@@ -201,7 +202,9 @@ impl GaussianProcess {
     ///
     /// Cost O(2 n^3 / 3). Source: Rasmussen and Williams 2006, eqs. (5.10) to (5.12).
     pub fn leave_one_out(&self, targets: &[f64]) -> LeaveOneOut {
-        let precision = self.cholesky.inverse().diagonal();
+        let mut inverse = DMatrix::zeros(targets.len(), targets.len());
+        self.cholesky.inverse_lower(&mut inverse);
+        let precision = inverse.diagonal();
         let weights = self.cholesky.solve(targets);
         let errors = weights.iter().zip(precision.iter()).map(|(weight, p)| weight / p).collect();
         let latent_sd = precision.iter().map(|p| (1.0 / p - self.hyper.noise_variance).max(0.0).sqrt()).collect();

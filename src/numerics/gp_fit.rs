@@ -12,7 +12,7 @@ use super::minimise::{Minimum, SearchOutcome, minimise_bounded};
 const ITERATION_LIMIT: usize = 100;
 /// Subsets searched first: their rows, the number of rows above which they are, and the iterations allowed after them,
 /// for the optimum of a subset is close to that of all rows. An evaluation on 300 rows costs 1/40 of one on 1000.
-const SUBSETS: [(usize, usize, usize); 2] = [(300, 400, 20), (1000, 2500, 8)];
+const SUBSETS: [(usize, usize, usize); 3] = [(300, 400, 15), (500, 800, 10), (1000, 2500, 8)];
 /// Default start: the share of the targets' variance taken for noise.
 const START_NOISE_SHARE: f64 = 1e-2;
 /// A search starts from length scales no longer than this, in units of the inputs: beyond, the likelihood is flat to the
@@ -42,8 +42,8 @@ pub struct Fit {
 /// The scales in `bounds` under which `targets` (n) at `inputs` (n rows, d columns) are most likely.
 ///
 /// Bounded L-BFGS-B over natural logarithms, the signal variance profiled out, from `start` (moved into the bounds) or
-/// from the spread of the data. Above 400 rows it searches 300 of them first, evenly strided, above 2500 then 1000, and
-/// polishes on all. A start whose kernel matrix is singular is retried with the greatest noise allowed; `Singular` when
+/// from the spread of the data. Above 400 rows it searches 300 of them first, evenly strided, above 800 then 500, above
+/// 2500 then 1000, and polishes on all. A start whose kernel matrix is singular is retried with the greatest noise allowed; `Singular` when
 /// that fails too.
 /// Cost O(n^3) for each evaluation. Source: Rasmussen and Williams 2006, section 5.4.1.
 pub fn fit(
@@ -61,17 +61,16 @@ pub fn fit(
             shorten(&mut point, inputs.ncols());
             let chosen: Vec<usize> = (0..rows).map(|k| k * n / rows).collect();
             let some_targets: Vec<f64> = chosen.iter().map(|&row| targets[row]).collect();
-            let found = search(&inputs.select_rows(&chosen), &some_targets, bounds, &point, iteration_limit)?;
+            let (found, _) = search(&inputs.select_rows(&chosen), &some_targets, bounds, &point, iteration_limit)?;
             evaluations += found.evaluations;
             point = found.point;
             iteration_limit = limit_after;
         }
     }
     shorten(&mut point, inputs.ncols());
-    let fine = search(inputs, targets, bounds, &point, iteration_limit)?;
-    let best = profiled(inputs, targets, bounds, &fine.point).ok_or(Singular { jitter: 0.0 })?;
+    let (fine, signal_variance) = search(inputs, targets, bounds, &point, iteration_limit)?;
     Ok(Fit {
-        hyperparameters: hyperparameters(&fine.point, best.signal_variance),
+        hyperparameters: hyperparameters(&fine.point, signal_variance),
         log_likelihood: -fine.value,
         evaluations: evaluations + fine.evaluations,
         outcome: fine.outcome,
@@ -96,14 +95,40 @@ pub fn log_likelihood_and_gradient(
     hyper: &Hyperparameters,
 ) -> Option<(f64, Vec<f64>)> {
     let scaled = hyper.scale(inputs);
-    let factor = Cholesky::factor(&kernel_lower(&scaled, hyper))?;
+    let mut matrices = Matrices::new(targets.len());
+    let factor = matrices.factor(&scaled, hyper)?;
     let weights = factor.solve(targets);
     let value = log_likelihood(&factor, targets, &weights);
-    Some((value, contract(&scaled, factor.inverse(), &weights, hyper)))
+    factor.inverse_lower(&mut matrices.inverse);
+    Some((value, contract(&scaled, &mut matrices.inverse, &weights, hyper)))
+}
+
+/// The memory of an evaluation, kept for the next: fresh pages would cost a fifth of its time.
+struct Matrices {
+    /// K, then its factor.
+    kernel: DMatrix<f64>,
+    inverse: DMatrix<f64>,
+}
+
+impl Matrices {
+    fn new(n: usize) -> Self {
+        Matrices { kernel: DMatrix::zeros(n, n), inverse: DMatrix::zeros(n, n) }
+    }
+
+    /// The factor of K + noise I over the rows of `scaled`, in the memory of `kernel`.
+    fn factor(&mut self, scaled: &DMatrix<f64>, hyper: &Hyperparameters) -> Option<Cholesky> {
+        let n = scaled.nrows();
+        let mut kernel = std::mem::replace(&mut self.kernel, DMatrix::zeros(0, 0));
+        if kernel.nrows() != n {
+            kernel = DMatrix::zeros(n, n);
+        }
+        kernel_lower(scaled, hyper, &mut kernel);
+        Cholesky::factor(kernel)
+    }
 }
 
 /// The sums of W .* dK over one triangle, doubled; `inverse` is overwritten column by column.
-fn contract(scaled: &DMatrix<f64>, mut inverse: DMatrix<f64>, alpha: &[f64], hyper: &Hyperparameters) -> Vec<f64> {
+fn contract(scaled: &DMatrix<f64>, inverse: &mut DMatrix<f64>, alpha: &[f64], hyper: &Hyperparameters) -> Vec<f64> {
     let (n, d) = scaled.shape();
     let mut squared = vec![0.0; n];
     let mut lengths = vec![0.0; d];
@@ -144,12 +169,18 @@ struct Profiled {
 /// Where s2 is inside its bounds its own slope vanishes, so the gradient is the partial one; where a bound of the noise
 /// holds it, s2 moves against nu. The ridge along which s2 and the length scales trade places is gone, and with it most
 /// iterations of a search. `None` where A is singular. Cost as [`log_likelihood_and_gradient`].
-fn profiled(inputs: &DMatrix<f64>, targets: &[f64], bounds: &Bounds, point: &[f64]) -> Option<Profiled> {
+fn profiled(
+    inputs: &DMatrix<f64>,
+    targets: &[f64],
+    bounds: &Bounds,
+    point: &[f64],
+    matrices: &mut Matrices,
+) -> Option<Profiled> {
     let n = targets.len() as f64;
     let unit = hyperparameters(point, 1.0);
     let ratio = unit.noise_variance;
     let scaled = unit.scale(inputs);
-    let factor = Cholesky::factor(&kernel_lower(&scaled, &unit))?;
+    let factor = matrices.factor(&scaled, &unit)?;
     let mut weights = factor.solve(targets);
     let squares = matern::dot(targets, &weights);
     let (signal, noise) = (bounds.signal_variance, bounds.noise_variance);
@@ -159,20 +190,23 @@ fn profiled(inputs: &DMatrix<f64>, targets: &[f64], bounds: &Bounds, point: &[f6
         -0.5 * squares / signal_variance - 0.5 * factor.log_determinant() - 0.5 * n * (TAU * signal_variance).ln();
     let root = signal_variance.sqrt();
     weights.iter_mut().for_each(|weight| *weight /= root);
-    let mut gradient = contract(&scaled, factor.inverse(), &weights, &unit);
+    factor.inverse_lower(&mut matrices.inverse);
+    matrices.kernel = factor.into_memory();
+    let mut gradient = contract(&scaled, &mut matrices.inverse, &weights, &unit);
     let (noise_slope, signal_slope) = (gradient.pop()?, gradient.pop()?);
     let held_by_noise = signal_variance == noise[0] / ratio || signal_variance == noise[1] / ratio;
     gradient.push(if held_by_noise { -signal_slope } else { noise_slope });
     Some(Profiled { log_likelihood, gradient, signal_variance })
 }
 
+/// The best point found, and the signal variance profiled out there.
 fn search(
     inputs: &DMatrix<f64>,
     targets: &[f64],
     bounds: &Bounds,
     start: &[f64],
     iteration_limit: usize,
-) -> Result<Minimum, Singular> {
+) -> Result<(Minimum, f64), Singular> {
     let d = inputs.ncols();
     let (signal, noise) = (bounds.signal_variance, bounds.noise_variance);
     let box_of = |side: usize| {
@@ -181,19 +215,26 @@ fn search(
         logs
     };
     let (lower, upper) = (box_of(0), box_of(1));
-    let objective = |point: &[f64]| match profiled(inputs, targets, bounds, point) {
-        Some(found) => (-found.log_likelihood, found.gradient.into_iter().map(|slope| -slope).collect()),
+    let mut matrices = Matrices::new(targets.len());
+    let mut best = (f64::INFINITY, f64::NAN);
+    let mut objective = |point: &[f64]| match profiled(inputs, targets, bounds, point, &mut matrices) {
+        Some(found) => {
+            if -found.log_likelihood < best.0 {
+                best = (-found.log_likelihood, found.signal_variance);
+            }
+            (-found.log_likelihood, found.gradient.into_iter().map(|slope| -slope).collect())
+        }
         None => (f64::INFINITY, vec![0.0; point.len()]),
     };
-    let mut minimum = minimise_bounded(objective, start, &lower, &upper, iteration_limit);
+    let mut minimum = minimise_bounded(&mut objective, start, &lower, &upper, iteration_limit);
     if minimum.value == f64::INFINITY {
         let mut noisy = start.to_vec();
         noisy[d] = upper[d];
         let spent = minimum.evaluations;
-        minimum = minimise_bounded(objective, &noisy, &lower, &upper, iteration_limit);
+        minimum = minimise_bounded(&mut objective, &noisy, &lower, &upper, iteration_limit);
         minimum.evaluations += spent;
     }
-    if minimum.value == f64::INFINITY { Err(Singular { jitter: 0.0 }) } else { Ok(minimum) }
+    if minimum.value == f64::INFINITY { Err(Singular { jitter: 0.0 }) } else { Ok((minimum, best.1)) }
 }
 
 /// Length scales of sqrt(d) standard deviations, so that typical points lie about one length apart.

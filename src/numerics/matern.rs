@@ -1,11 +1,9 @@
 //! The Matern-5/2 kernel with a length scale for each dimension, over contiguous slices.
 //!
-//! Every loop is plain multiplications and additions, compiled once for each instruction set and chosen at run
-//! time. Nothing is fused and every sum has `LANES` fixed accumulators, so the bits of a result do not depend
-//! on the vector width of the processor.
+//! Every loop is compiled once for each instruction set and chosen at run time. What is fused is written fused and every
+//! sum has `LANES` fixed accumulators, so the bits of a result do not depend on the processor.
 
-use pulp::Arch;
-
+use super::dispatch::dispatched;
 use super::elementary::exp;
 
 /// Accumulators of a sum: two 256-bit vectors of four, or one of eight.
@@ -16,7 +14,7 @@ const BLOCK: usize = 256;
 #[inline(always)]
 fn correlation(squared: f64) -> f64 {
     let r = (5.0 * squared).sqrt();
-    (1.0 + r + r * r * (1.0 / 3.0)) * exp(-r)
+    (r * (1.0 / 3.0)).mul_add(r, 1.0 + r) * exp(-r)
 }
 
 /// (5/3)(1 + r) exp(-r): minus twice the derivative of [`correlation`] with respect to d2.
@@ -33,11 +31,11 @@ fn accumulate(lanes: &mut [f64; LANES], left: &[f64], right: &[f64]) {
     let tails = (left_blocks.remainder(), right_blocks.remainder());
     for (left, right) in left_blocks.zip(right_blocks) {
         for lane in 0..LANES {
-            lanes[lane] += left[lane] * right[lane];
+            lanes[lane] = left[lane].mul_add(right[lane], lanes[lane]);
         }
     }
     for ((lane, left), right) in lanes.iter_mut().zip(tails.0).zip(tails.1) {
-        *lane += left * right;
+        *lane = left.mul_add(*right, *lane);
     }
 }
 
@@ -57,10 +55,7 @@ pub(super) fn dot_inline(left: &[f64], right: &[f64]) -> f64 {
 /// sum_j left_j right_j over slices of one length. Cost O(n).
 pub fn dot(left: &[f64], right: &[f64]) -> f64 {
     assert_eq!(left.len(), right.len());
-    Arch::new().dispatch(
-        #[inline(always)]
-        || dot_inline(left, right),
-    )
+    dispatched!(dot_inline(left, right))
 }
 
 /// sum_j w_j (1 + r_j + r_j^2/3) exp(-r_j) with r_j = sqrt(5 d2_j), without the signal variance.
@@ -76,35 +71,47 @@ pub fn weighted_sum(squared_distances: &[f64], weights: &[f64]) -> f64 {
         staged.copy_from_slice(squared);
         // Dispatched apart: in one function with the sum, LLVM leaves the loop over the exponential scalar.
         matern_from_squared(staged);
-        Arch::new().dispatch(
-            #[inline(always)]
-            || accumulate(&mut lanes, staged, weights),
-        );
+        dispatched!(accumulate(&mut lanes, staged, weights));
     }
     total(&lanes)
 }
 
 /// Replaces each squared scaled distance by its correlation (1 + r + r^2/3) exp(-r), r = sqrt(5 d2). Cost O(n).
 pub fn matern_from_squared(squared: &mut [f64]) {
-    Arch::new().dispatch(
-        #[inline(always)]
-        || {
-            for value in squared.iter_mut() {
-                *value = correlation(*value);
-            }
-        },
-    );
+    dispatched!({
+        for value in squared.iter_mut() {
+            *value = correlation(*value);
+        }
+    });
 }
 
-/// Adds (column_j - centre)^2 to each `out[j]`, or writes it there when `first`.
+/// Writes sum_i (x_ij - centre_i)^2 to each `out[j]`.
 ///
-/// Both already divided by the length scale, and of one length. Cost O(n).
-pub(super) fn add_squared_differences(column: &[f64], centre: f64, first: bool, out: &mut [f64]) {
-    assert_eq!(column.len(), out.len());
-    Arch::new().dispatch(
-        #[inline(always)]
-        || add_squares(column, centre, out, first),
-    );
+/// `columns` holds x column by column, `stride` entries each, and `out` stands for the rows from `first` on; all are
+/// already divided by the length scales. Each block of `LANES` sums stays in registers over the columns. Cost O(n d).
+pub(super) fn squared_distances(columns: &[f64], stride: usize, first: usize, centre: &[f64], out: &mut [f64]) {
+    assert!(columns.len() == stride * centre.len() && first + out.len() <= stride, "a block of the columns");
+    dispatched!({
+        let count = out.len();
+        let mut blocks = out.chunks_exact_mut(LANES);
+        for (block, at) in blocks.by_ref().zip((first..).step_by(LANES)) {
+            let mut sums = [0.0; LANES];
+            for (column, centre) in columns.chunks_exact(stride).zip(centre) {
+                let values = &column[at..at + LANES];
+                for lane in 0..LANES {
+                    let difference = values[lane] - centre;
+                    sums[lane] = difference.mul_add(difference, sums[lane]);
+                }
+            }
+            block.copy_from_slice(&sums);
+        }
+        let tail = blocks.into_remainder();
+        let at = first + count - tail.len();
+        tail.fill(0.0);
+        for (column, &centre) in columns.chunks_exact(stride).zip(centre) {
+            add_squares(&column[at..at + tail.len()], centre, tail, false);
+        }
+    });
 }
 
 #[inline(always)]
@@ -115,7 +122,8 @@ fn add_squares(column: &[f64], centre: f64, out: &mut [f64], overwrite: bool) {
         }
     } else {
         for (out, &x) in out.iter_mut().zip(column) {
-            *out += (x - centre) * (x - centre);
+            let difference = x - centre;
+            *out = difference.mul_add(difference, *out);
         }
     }
 }
@@ -127,33 +135,27 @@ fn add_squares(column: &[f64], centre: f64, out: &mut [f64], overwrite: bool) {
 /// number is sum_j w_j k_j. Both without the signal variance. Cost O(n).
 pub fn contract_column(squared: &[f64], weights: &mut [f64]) -> f64 {
     let value = weighted_sum(squared, weights);
-    Arch::new().dispatch(
-        #[inline(always)]
-        || {
-            for (weight, &squared) in weights.iter_mut().zip(squared) {
-                *weight *= steepness(squared);
-            }
-        },
-    );
+    dispatched!({
+        for (weight, &squared) in weights.iter_mut().zip(squared) {
+            *weight *= steepness(squared);
+        }
+    });
     value
 }
 
 /// sum_j weights_j (column_j - centre)^2. Cost O(n).
 pub fn weighted_squares(column: &[f64], centre: f64, weights: &[f64]) -> f64 {
     assert_eq!(column.len(), weights.len());
-    Arch::new().dispatch(
-        #[inline(always)]
-        || {
-            let mut lanes = [0.0; LANES];
-            let mut staged = [0.0; BLOCK];
-            for (column, weights) in column.chunks(BLOCK).zip(weights.chunks(BLOCK)) {
-                let staged = &mut staged[..column.len()];
-                add_squares(column, centre, staged, true);
-                accumulate(&mut lanes, staged, weights);
-            }
-            total(&lanes)
-        },
-    )
+    dispatched!({
+        let mut lanes = [0.0; LANES];
+        let mut staged = [0.0; BLOCK];
+        for (column, weights) in column.chunks(BLOCK).zip(weights.chunks(BLOCK)) {
+            let staged = &mut staged[..column.len()];
+            add_squares(column, centre, staged, true);
+            accumulate(&mut lanes, staged, weights);
+        }
+        total(&lanes)
+    })
 }
 
 #[cfg(test)]

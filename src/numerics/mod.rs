@@ -5,6 +5,7 @@ pub mod bridge;
 pub mod chebyshev;
 pub mod cholesky;
 pub mod confidence_region;
+pub(crate) mod dispatch;
 pub mod elementary;
 pub mod empirical;
 pub mod exponential_mean;
