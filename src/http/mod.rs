@@ -1,5 +1,6 @@
 //! Floor 4: translation between the wire and the use cases, and nothing else.
 
+mod access;
 mod dashboard;
 mod decode;
 mod described;

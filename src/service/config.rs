@@ -5,6 +5,7 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::time::Duration;
 
+use super::allowance::Limits;
 use crate::store::PostgresUrl;
 
 /// Where the durable facts are.
@@ -51,6 +52,9 @@ impl Role {
 pub struct Config {
     /// Port 0 picks a free one.
     pub listen: SocketAddr,
+    /// Whether an address that others reach may be listened on while the store holds no key.
+    pub allow_anonymous: bool,
+    pub limits: Limits,
     pub store: StoreLocation,
     pub role: Role,
     /// Threads of the training pool.
@@ -78,6 +82,8 @@ impl Config {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Config {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
+            allow_anonymous: false,
+            limits: Limits::default(),
             store: StoreLocation::Folder(data.into()),
             role: Role::All,
             training_threads: cores.saturating_sub(1).max(1),
