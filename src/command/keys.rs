@@ -105,7 +105,7 @@ async fn list(arguments: List) -> Result<(), Box<dyn std::error::Error>> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "key\ttenant\troles\tcreated_ms\trevoked_ms")?;
     for KeyRow { key, tenant, roles, created_ms, revoked_ms, .. } in rows {
-        let revoked = revoked_ms.map_or(String::new(), |revoked| revoked.to_string());
+        let revoked = revoked_ms.map_or("-".to_owned(), |revoked| revoked.to_string());
         writeln!(out, "{key}\t{tenant}\t{roles}\t{created_ms}\t{revoked}")?;
     }
     Ok(())
