@@ -370,3 +370,71 @@ async fn an_address_that_others_reach_asks_for_keys() {
         assert_eq!(reqwest::get(format!("{url}/readyz")).await.unwrap().status(), 200);
     }
 }
+
+/// Uses a key, a wrong one and a key in the wrong place against a service that logs all it can; what it logged.
+async fn log_of(configure: impl FnOnce(&mut Command), issue: impl AsyncFnOnce() -> String) -> (String, Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("log");
+    let file = std::fs::File::create(&log).unwrap();
+    let (child, url) = process::serve(|command| {
+        command.env("RUST_LOG", "trace").stderr(file);
+        configure(command);
+    });
+    let (process, mut app) = (Process(child), App::at(url, folder));
+    let key = issue().await;
+    app.hold("");
+    until("the door to close", async || app.get("/jobs").await.0 == 401).await;
+    let wrong = format!("ballast_{}", "5ec4e7".repeat(10));
+    for shown in [&key, &wrong] {
+        app.hold(shown);
+        for (method, path, _) in operations() {
+            ask(&app, &method, &path).await;
+        }
+    }
+    let basic = app.client.get(format!("{}/jobs", app.url)).header(AUTHORIZATION, format!("Basic {key}"));
+    assert_eq!(basic.send().await.unwrap().status(), 401);
+    drop(process);
+    (std::fs::read_to_string(log).unwrap(), vec![key, wrong])
+}
+
+fn assert_no_secret(log: &str, secrets: &[String]) {
+    // It did log at this level, and the requests too.
+    assert!(log.contains("TRACE") && log.contains("/observe") && log.lines().count() > 100, "{log}");
+    for secret in secrets {
+        // A part that is cut out gives as much away.
+        let part = &secret[secret.len() - 16..];
+        let line = log.lines().find(|line| line.contains(part));
+        assert_eq!(line, None, "a secret is in the log");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn no_secret_is_logged_over_a_folder() {
+    let data = tempfile::tempdir().unwrap();
+    let (log, secrets) = log_of(
+        |command| {
+            command.arg("--data").arg(data.path());
+        },
+        async || issue_key(&KeyRing::open(data.path()).await.unwrap(), "north", "admin").await,
+    )
+    .await;
+    assert_no_secret(&log, &secrets);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn no_secret_is_logged_over_a_database() {
+    let Some(url) = postgres::database().await else { return };
+    // The server of the tests trusts whoever comes, so any password will do.
+    let password = "open-sesame-to-the-database";
+    let with_password =
+        if url.contains("ballast@") { url.replace("ballast@", &format!("ballast:{password}@")) } else { url.clone() };
+    let (log, mut secrets) = log_of(
+        |command| {
+            command.env("BALLAST_STORE", &with_password);
+        },
+        async || issue_key(&KeyRing::connect(&url.parse().unwrap()).await.unwrap(), "north", "admin").await,
+    )
+    .await;
+    secrets.push(password.to_owned());
+    assert_no_secret(&log, &secrets);
+}

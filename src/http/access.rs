@@ -5,21 +5,21 @@
 //! describe a published program. Everything else tells of somebody's data, so it asks for a key: `/health` and `/metrics`
 //! too, whose figures are of all tenants together. An operation that is in no line of the table is for admins alone.
 //!
-//! The gate refuses in this order: no key, no role, too fast, too much at a time. All of it happens before a body is
-//! read, and an unknown or another tenant's thing is found to be so by the use cases, with one and the same 404.
+//! The gate refuses in this order: no key, no role, too fast, too much at a time. The first three come before a body is
+//! read. An unknown or another tenant's thing is found to be so by the use cases, with one and the same 404.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use axum::extract::{DefaultBodyLimit, FromRequestParts, MatchedPath, Request, State};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, header};
+use axum::http::{HeaderMap, Method, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use super::extract::BodyLimit;
 use super::problem::{Problem, ProblemKind};
 use crate::service::Service;
-use crate::service::allowance::{Class, TooMany};
+use crate::service::allowance::{Class, Places, TooMany};
 use crate::service::keys::{Caller, PREFIX, Turned};
 use crate::store::KeyRole;
 
@@ -75,6 +75,7 @@ pub async fn admit(State(gate): State<Gate>, mut request: Request, next: Next) -
     let route = matched.as_ref().map(MatchedPath::as_str);
     let access = access(method, route);
     let limit = if route == Some(LARGE_BODY) { gate.large_body_bytes } else { gate.body_bytes };
+    let has_body = request.method() == Method::POST;
     let class = class(method, route, request.uri().query().unwrap_or_default());
     let admitted = match access {
         Access::Open => None,
@@ -83,16 +84,17 @@ pub async fn admit(State(gate): State<Gate>, mut request: Request, next: Next) -
             Err(problem) => return problem.into_response(),
         },
     };
-    let mut places = None;
+    let mut turn = None;
     if let Some(caller) = admitted {
         if let Err(refused) = caller.allowance.take(class) {
             return too_many(class, refused);
         }
         if class == Class::Heavy {
-            places = caller.allowance.places();
-            if places.is_none() {
-                let detail = "as many calls that solve, train or import are under way as may be at a time";
-                return Problem::new(ProblemKind::Overloaded, detail).into_response();
+            let own = turn.insert(Turn { caller: caller.clone(), places: Arc::default() });
+            if has_body {
+                request.extensions_mut().insert(own.clone());
+            } else if let Err(problem) = own.begin() {
+                return problem.into_response();
             }
         }
         request.extensions_mut().insert(caller);
@@ -100,8 +102,29 @@ pub async fn admit(State(gate): State<Gate>, mut request: Request, next: Next) -
     DefaultBodyLimit::max(limit).apply(&mut request);
     request.extensions_mut().insert(BodyLimit(limit));
     let response = next.run(request).await;
-    drop(places);
+    drop(turn);
     response
+}
+
+/// The places of a heavy call: taken once its body is there, so that whoever sends his slowly holds none; given up with
+/// the answer.
+#[derive(Clone)]
+pub struct Turn {
+    caller: Arc<Caller>,
+    places: Arc<OnceLock<Places>>,
+}
+
+impl Turn {
+    /// # Errors
+    /// All places are taken.
+    pub fn begin(&self) -> Result<(), Problem> {
+        let places = self.caller.allowance.places().ok_or_else(|| {
+            let detail = "as many calls that solve, train or import are under way as may be at a time";
+            Problem::new(ProblemKind::Overloaded, detail)
+        })?;
+        self.places.get_or_init(|| places);
+        Ok(())
+    }
 }
 
 fn admitted(service: &Service, access: Access, headers: &HeaderMap) -> Result<Arc<Caller>, Problem> {

@@ -12,6 +12,7 @@ mod fault;
 mod jobs;
 mod operations;
 mod page;
+mod patient;
 mod policies;
 pub mod problem;
 mod router;

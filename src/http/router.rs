@@ -1,6 +1,6 @@
 //! Every route, once: the router and its OpenAPI description come from the same list.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use axum::Router;
@@ -80,9 +80,10 @@ pub fn description() -> utoipa::openapi::OpenApi {
     description
 }
 
-/// The description as checked in under `api/openapi.json`.
-pub fn description_json() -> String {
-    description().to_pretty_json().unwrap_or_default() + "\n"
+/// The description as checked in under `api/openapi.json`. Made once: anybody may ask for it, as often as he likes.
+pub fn description_json() -> &'static str {
+    static JSON: LazyLock<String> = LazyLock::new(|| description().to_pretty_json().unwrap_or_default() + "\n");
+    &JSON
 }
 
 /// The whole application; for a replica that only works, the operator's part of it.

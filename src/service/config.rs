@@ -59,7 +59,7 @@ pub struct Config {
     pub role: Role,
     /// Threads of the training pool.
     pub training_threads: usize,
-    /// Connections served at a time; more wait in the kernel's queue.
+    /// Connections served at a time, as far as there are descriptors; more wait in the kernel's queue.
     pub connection_limit: usize,
     /// Largest request body, in bytes: an exported policy of a few thousand design points fits.
     pub body_limit_bytes: usize,
@@ -87,7 +87,7 @@ impl Config {
             store: StoreLocation::Folder(data.into()),
             role: Role::All,
             training_threads: cores.saturating_sub(1).max(1),
-            connection_limit: 1024,
+            connection_limit: 4096,
             body_limit_bytes: 64 << 20,
             request_timeout: Duration::from_secs(30),
             resolve_limit: cores.div_ceil(2),
