@@ -46,10 +46,10 @@ fn is_closed(socket: &mut TcpStream) -> bool {
     }
 }
 
-/// The slowest of 60 rounds of calls, each answered with 200.
+/// The slowest of 30 rounds of calls, each answered with 200.
 async fn slowest(app: &App, first: usize) -> Duration {
     let mut slowest = Duration::ZERO;
-    for round in 0..60 {
+    for round in 0..30 {
         let asked = Instant::now();
         let (status, answer) = match round % 3 {
             0 => app.action().await,
@@ -70,7 +70,7 @@ async fn a_thousand_slow_sockets_harm_nobody_else() {
     });
     let address = url.strip_prefix("http://").unwrap().to_owned();
     let (_process, mut app) = (Process(child), App::at(url, folder));
-    app.train(&specification(60)).await;
+    app.train(&specification(21)).await;
     app.open().await;
     let before = slowest(&app, 1).await;
 
@@ -81,10 +81,10 @@ async fn a_thousand_slow_sockets_harm_nobody_else() {
     let mut sockets: Vec<TcpStream> =
         (0..SLOW_SOCKETS).map(|index| open_socket(&address, &kinds[index % kinds.len()])).collect();
     let opened = Instant::now();
-    let under = slowest(&app, 21).await;
+    let under = slowest(&app, 11).await;
     let mut bodies = sockets.iter_mut().skip(1).step_by(kinds.len());
     assert!(bodies.all(|socket| !is_closed(socket)), "a slow body was cut off before its time");
-    println!("slowest of 60 calls: {before:?} before, {under:?} with {SLOW_SOCKETS} slow sockets open");
+    println!("slowest of 30 calls: {before:?} before, {under:?} with {SLOW_SOCKETS} slow sockets open");
     assert!(under < ANSWERED_WITHIN, "{under:?}");
 
     let deadline = opened + Duration::from_secs(20);
@@ -163,14 +163,14 @@ async fn a_tenant_that_calls_too_often_is_put_off_and_another_is_not() {
 #[tokio::test(flavor = "multi_thread")]
 async fn heavy_calls_past_the_bound_come_back_later_and_starve_nobody() {
     let mut app = App::configured(|config| config.limits = Limits::new([0; 3], 2)).await;
-    app.train(&specification(40)).await;
+    app.train(&specification(21)).await;
     app.open().await;
     let sweep =
         json!({ "session": app.session, "sweep": { "radius_scale": { "from": 0.0, "to": 2.0, "points": 101 } } });
     let heavy = join_all((0..24).map(|_| app.client.post(format!("{}/what-if", app.url)).json(&sweep).send()));
     let live = async {
         let mut slowest = Duration::ZERO;
-        for period in 1..=30 {
+        for period in 1..=20 {
             let asked = Instant::now();
             assert_eq!(app.action().await.0, 200);
             assert_eq!(app.observe(period, 0.001).await.0, 200);
@@ -245,7 +245,7 @@ fn mutations(sound: &Value) -> Vec<(String, Value)> {
 async fn a_mutated_policy_is_refused_or_advises_within_bounds() {
     let app = App::start().await;
     let mut request = specification(2);
-    request["design"]["count"] = json!(6);
+    request["design"]["count"] = json!(10);
     let sound: Value = serde_json::from_slice(&trained(&request)).unwrap();
     assert_eq!(app.post("/policies/import", &sound).await.0, 201);
     let mutations = mutations(&sound);

@@ -24,8 +24,8 @@ use crate::service::shutdown::Shutdown;
 
 /// A client that has not sent its headers by then is cut off.
 const HEADER_TIMEOUT: Duration = Duration::from_secs(5);
-/// Largest head of a request, in bytes; hyper takes at most 100 header lines of it.
-const HEAD_BYTES: usize = 64 << 10;
+/// A head that is not whole after so many bytes, and one read of as many, is refused; hyper takes 100 lines at most.
+const HEAD_BYTES: usize = 32 << 10;
 /// A client that takes nothing of its answer for so long is cut off.
 const READER_TIMEOUT: Duration = Duration::from_secs(30);
 /// Descriptors that are not connections: the store's files, the runtime, the standard streams.
