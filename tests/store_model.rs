@@ -431,7 +431,7 @@ fn postgresql_does_what_the_model_does() {
         runtime.block_on(async {
             let place = Place::Database(url.clone());
             place.open().await.close().await;
-            let empty = "TRUNCATE jobs, idempotency_keys, checkpoints, policies, sessions, observations";
+            let empty = "TRUNCATE jobs, idempotency_keys, checkpoints, policies, policy_owners, sessions, observations";
             support::postgres::execute(&url, empty).await;
             place
         })
