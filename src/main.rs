@@ -5,7 +5,7 @@ mod command;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use command::{backtest, bench, demo, evaluate, healthcheck, reproduce, serve};
+use command::{backtest, bench, demo, evaluate, healthcheck, keys, reproduce, serve};
 
 /// Nonparametric adaptive robust control of an investor, as a service.
 #[derive(Debug, Parser)]
@@ -27,6 +27,9 @@ enum Command {
     Evaluate(evaluate::Evaluate),
     /// Compute the tables and figures of the paper's section 3 anew.
     Reproduce(reproduce::Reproduce),
+    /// Say who may call a service.
+    #[command(subcommand)]
+    Keys(keys::Keys),
     /// Exit 0 if a running service is ready, else 1.
     Healthcheck(healthcheck::Healthcheck),
     /// Measure this machine's speed and accuracy.
@@ -45,6 +48,7 @@ async fn main() -> ExitCode {
         Command::Evaluate(arguments) => tokio::task::block_in_place(|| evaluate::run(&arguments)),
         Command::Reproduce(arguments) => tokio::task::block_in_place(|| reproduce::run(&arguments)),
         Command::Bench(bench) => bench::run(bench).await,
+        Command::Keys(arguments) => keys::run(arguments).await,
         Command::Healthcheck(arguments) => healthcheck::run(&arguments),
         Command::Openapi => {
             print!("{}", ballast::http::description_json());

@@ -4,8 +4,8 @@ mod support;
 
 use ballast::control::policy::content_hash;
 use ballast::store::{
-    Append, CreateJob, CreateSession, DeletePolicy, JobCounts, JobKind, JobOutcome, JobRow, JobState, NewJob,
-    NewObservation, NewSession, Store, StoreError,
+    Append, CreateJob, CreateSession, DeletePolicy, JobCounts, JobKind, JobOutcome, JobRow, JobState, NewJob, NewKey,
+    NewObservation, NewSession, Store, StoreError, Tenant,
 };
 use futures_util::future::join_all;
 use support::place::Place;
@@ -47,6 +47,10 @@ on_both_engines!(
     a_released_job_resumes_from_its_checkpoints,
     a_policy_is_stored_once_listed_and_kept_while_in_use,
     a_damaged_policy_is_detected,
+    tenants_see_only_their_own,
+    a_key_is_listed_and_revoked_beside_the_store,
+    what_was_there_before_keys_is_the_default_tenants,
+    a_session_moved_to_another_tenant_is_damaged,
     a_session_needs_its_policy_and_a_free_name,
     a_restart_keeps_sessions_bit_for_bit,
     every_observation_is_stored_once_and_in_order,
@@ -62,6 +66,7 @@ on_both_engines!(
 fn new_job(job: &str, key: Option<&str>) -> NewJob {
     NewJob {
         job: job.into(),
+        tenant: Tenant::default(),
         kind: JobKind::Train,
         request_json: r#"{"seed":1}"#.into(),
         request_hash: "hash".into(),
@@ -85,9 +90,10 @@ async fn claimed(store: &Store, now_ms: i64) -> (String, i64) {
 
 async fn with_session(store: &Store, session: &str, history: &[f64]) {
     let policy = content_hash(POLICY);
-    store.insert_policy(&policy, POLICY, 1).await.unwrap();
+    store.insert_policy(&Tenant::default(), &policy, POLICY, 1).await.unwrap();
     let new = NewSession {
         session: session.into(),
+        tenant: Tenant::default(),
         policy,
         wealth: 100.0,
         history: history.into(),
@@ -142,7 +148,7 @@ async fn an_idempotency_key_makes_one_job(place: &Place) {
     assert_eq!(store.create_job(new_job("j2", Some("key"))).await.unwrap(), CreateJob::Repeated(first.clone()));
     let other = NewJob { request_hash: "other".into(), ..new_job("j3", Some("key")) };
     assert_eq!(store.create_job(other).await.unwrap(), CreateJob::KeyConflict);
-    assert_eq!(store.jobs(10, None).await.unwrap(), [first]);
+    assert_eq!(store.jobs(&Tenant::default(), 10, None).await.unwrap(), [first]);
 }
 
 async fn a_refused_operation_leaves_its_neighbours_alone(place: &Place) {
@@ -164,8 +170,8 @@ async fn jobs_are_listed_newest_first_by_cursor(place: &Place) {
     for n in 0..5 {
         queued(&store, &format!("j{n}")).await;
     }
-    let first = store.jobs(2, None).await.unwrap();
-    let rest = store.jobs(10, Some(first[1].sequence)).await.unwrap();
+    let first = store.jobs(&Tenant::default(), 2, None).await.unwrap();
+    let rest = store.jobs(&Tenant::default(), 10, Some(first[1].sequence)).await.unwrap();
     let names: Vec<_> = first.iter().chain(&rest).map(|row| row.job.as_str()).collect();
     assert_eq!(names, ["j4", "j3", "j2", "j1", "j0"]);
 }
@@ -210,7 +216,7 @@ async fn a_finished_training_stores_its_policy_and_drops_its_checkpoints(place: 
     let row = store.job("j").await.unwrap().unwrap();
     assert_eq!((row.state, row.steps_done, row.finished_ms), (JobState::Succeeded, 10, Some(77)));
     assert_eq!(row.policy, Some(policy_id.clone()));
-    assert_eq!(store.policy(&policy_id).await.unwrap().unwrap().json, POLICY);
+    assert_eq!(store.policy(&Tenant::default(), &policy_id).await.unwrap().unwrap().json, POLICY);
     assert_eq!(store.checkpoints("j").await.unwrap(), []);
     assert_eq!(store.request_cancel("j", 99).await.unwrap().unwrap(), row);
 }
@@ -280,28 +286,31 @@ async fn a_released_job_resumes_from_its_checkpoints(place: &Place) {
 async fn a_policy_is_stored_once_listed_and_kept_while_in_use(place: &Place) {
     let store = place.open().await;
     let policy = content_hash(POLICY);
-    assert!(matches!(store.insert_policy("other", POLICY, 1).await, Err(StoreError::Corrupt { .. })));
-    assert!(store.insert_policy(&policy, POLICY, 1).await.unwrap());
-    assert!(!store.insert_policy(&policy, POLICY, 2).await.unwrap());
-    let listed = store.policies(10, None).await.unwrap();
+    assert!(matches!(
+        store.insert_policy(&Tenant::default(), "other", POLICY, 1).await,
+        Err(StoreError::Corrupt { .. })
+    ));
+    assert!(store.insert_policy(&Tenant::default(), &policy, POLICY, 1).await.unwrap());
+    assert!(!store.insert_policy(&Tenant::default(), &policy, POLICY, 2).await.unwrap());
+    let listed = store.policies(&Tenant::default(), 10, None).await.unwrap();
     assert_eq!((listed.len(), listed[0].created_ms, listed[0].bytes), (1, 1, POLICY.len() as u64));
-    assert_eq!(store.policies(10, Some(listed[0].sequence)).await.unwrap(), []);
+    assert_eq!(store.policies(&Tenant::default(), 10, Some(listed[0].sequence)).await.unwrap(), []);
     with_session(&store, "s", &[0.1, 0.2]).await;
-    assert_eq!(store.delete_policy(&policy).await.unwrap(), DeletePolicy::InUse { sessions: 1 });
-    assert!(store.delete_session("s").await.unwrap());
-    assert_eq!(store.delete_policy(&policy).await.unwrap(), DeletePolicy::Deleted);
-    assert_eq!(store.delete_policy(&policy).await.unwrap(), DeletePolicy::Absent);
-    assert_eq!(store.policy(&policy).await.unwrap(), None);
+    assert_eq!(store.delete_policy(&Tenant::default(), &policy).await.unwrap(), DeletePolicy::InUse { sessions: 1 });
+    assert!(store.delete_session(&Tenant::default(), "s").await.unwrap());
+    assert_eq!(store.delete_policy(&Tenant::default(), &policy).await.unwrap(), DeletePolicy::Deleted);
+    assert_eq!(store.delete_policy(&Tenant::default(), &policy).await.unwrap(), DeletePolicy::Absent);
+    assert_eq!(store.policy(&Tenant::default(), &policy).await.unwrap(), None);
 }
 
 async fn a_damaged_policy_is_detected(place: &Place) {
     let store = place.open().await;
     let policy = content_hash(POLICY);
-    store.insert_policy(&policy, POLICY, 1).await.unwrap();
+    store.insert_policy(&Tenant::default(), &policy, POLICY, 1).await.unwrap();
     store.close().await;
     place.tamper("UPDATE policies SET json = substr(json, 1, 2)").await;
     let store = place.open().await;
-    assert!(matches!(store.policy(&policy).await, Err(StoreError::Corrupt { .. })));
+    assert!(matches!(store.policy(&Tenant::default(), &policy).await, Err(StoreError::Corrupt { .. })));
     store.ping().await.unwrap();
 }
 
@@ -309,6 +318,7 @@ async fn a_session_needs_its_policy_and_a_free_name(place: &Place) {
     let store = place.open().await;
     let new = NewSession {
         session: "s".into(),
+        tenant: Tenant::default(),
         policy: "none".into(),
         wealth: 1.0,
         history: vec![],
@@ -321,7 +331,7 @@ async fn a_session_needs_its_policy_and_a_free_name(place: &Place) {
     assert_eq!(store.create_session(again).await.unwrap(), CreateSession::Exists);
     assert_eq!(store.session("s").await.unwrap().unwrap().initial_wealth, 100.0);
     assert_eq!(store.session("nobody").await.unwrap(), None);
-    assert!(!store.delete_session("nobody").await.unwrap());
+    assert!(!store.delete_session(&Tenant::default(), "nobody").await.unwrap());
     assert_eq!(store.count_sessions().await.unwrap(), 1);
 }
 
@@ -344,7 +354,7 @@ async fn a_restart_keeps_sessions_bit_for_bit(place: &Place) {
         bits(&[wrote.log_return, wrote.executed_allocation, wrote.advised_allocation, wrote.wealth_after])
     );
     assert_eq!(store.observation("s", 2).await.unwrap().as_ref(), Some(read));
-    assert_eq!(store.sessions(10, None).await.unwrap()[0].observations, 3);
+    assert_eq!(store.sessions(&Tenant::default(), 10, None).await.unwrap()[0].observations, 3);
 }
 
 async fn every_observation_is_stored_once_and_in_order(place: &Place) {
@@ -358,7 +368,7 @@ async fn every_observation_is_stored_once_and_in_order(place: &Place) {
     assert_eq!(append(1, "a").await, Append::Repeated { answer_json: r#"{"answer":"a"}"#.into() });
     assert_eq!(append(1, "b").await, Append::Conflict);
     assert_eq!(append(3, "a").await, Append::OutOfOrder { expected: 2 });
-    assert!(store.delete_session("s").await.unwrap());
+    assert!(store.delete_session(&Tenant::default(), "s").await.unwrap());
     assert_eq!(store.observations("s").await.unwrap(), []);
 }
 
@@ -394,7 +404,7 @@ async fn many_sessions_commit_in_groups(place: &Place) {
         assert!(appends.into_iter().all(|append| append.unwrap().unwrap() == Append::Appended));
     }
     let store = place.reopen(store).await;
-    let listed = store.sessions(100, None).await.unwrap();
+    let listed = store.sessions(&Tenant::default(), 100, None).await.unwrap();
     assert_eq!(listed.len(), 50);
     assert!(listed.iter().all(|session| session.observations == 4));
 }
@@ -410,7 +420,7 @@ async fn damage_to_what_an_action_rests_on_is_detected(place: &Place) {
     ];
     for damage in damages {
         let store = place.open().await;
-        store.delete_session("s").await.unwrap();
+        store.delete_session(&Tenant::default(), "s").await.unwrap();
         with_session(&store, "s", &[0.1, 0.2]).await;
         for period in 1..=2 {
             store.append_observation(observation("s", period, "c")).await.unwrap();
@@ -434,11 +444,11 @@ async fn reads_run_on_any_thread(place: &Place) {
         store.ping().await?;
         store.checkpoints("j").await?;
         store.count_jobs_by_state().await?;
-        store.policy(&content_hash(POLICY)).await?;
-        store.policies(1, None).await?;
-        store.jobs(1, None).await?;
+        store.policy(&Tenant::default(), &content_hash(POLICY)).await?;
+        store.policies(&Tenant::default(), 1, None).await?;
+        store.jobs(&Tenant::default(), 1, None).await?;
         store.observations("s").await?;
-        store.sessions(1, None).await?;
+        store.sessions(&Tenant::default(), 1, None).await?;
         store.session("s").await
     });
     assert_eq!(read.await.unwrap().unwrap().unwrap().session, "s");
@@ -458,7 +468,7 @@ async fn two_replicas_meet(place: &Place) {
     });
     let keyed: Vec<_> = join_all(keyed).await.into_iter().map(Result::unwrap).collect();
     assert_eq!(keyed.iter().filter(|outcome| matches!(outcome, CreateJob::Created(_))).count(), 1, "{keyed:?}");
-    let first = store.jobs(10, None).await.unwrap();
+    let first = store.jobs(&Tenant::default(), 10, None).await.unwrap();
     assert_eq!(first.len(), 1, "{first:?}");
     assert!(keyed.iter().all(|outcome| matches!(outcome,
         CreateJob::Created(row) | CreateJob::Repeated(row) if row.job == first[0].job)));
@@ -482,19 +492,21 @@ async fn two_replicas_meet(place: &Place) {
 
     let policy = content_hash(POLICY);
     for round in 0..10 {
-        store.insert_policy(&policy, POLICY, 1).await.unwrap();
+        store.insert_policy(&Tenant::default(), &policy, POLICY, 1).await.unwrap();
         let session = format!("s{round}");
         let new = NewSession {
             session: session.clone(),
+            tenant: Tenant::default(),
             policy: policy.clone(),
             wealth: 1.0,
             history: vec![0.1],
             horizon: 1,
             created_ms: 1,
         };
-        match tokio::join!(store.create_session(new), second.delete_policy(&policy)) {
+        let tenant = Tenant::default();
+        match tokio::join!(store.create_session(new), second.delete_policy(&tenant, &policy)) {
             (Ok(CreateSession::Created), Ok(DeletePolicy::InUse { sessions: 1 })) => {
-                assert!(second.delete_session(&session).await.unwrap());
+                assert!(second.delete_session(&Tenant::default(), &session).await.unwrap());
             }
             (Ok(CreateSession::NoPolicy), Ok(DeletePolicy::Deleted)) => {}
             met => panic!("{met:?}"),
@@ -519,7 +531,7 @@ async fn a_head_follows_the_rows(place: &Place) {
     }
     let other = NewObservation { created_ms: 8, ..observation("s", 3, "c") };
     assert_ne!(other.head(), heads[3], "the same report at another time");
-    assert!(second.delete_session("s").await.unwrap());
+    assert!(second.delete_session(&Tenant::default(), "s").await.unwrap());
     assert_eq!(store.head("s").await.unwrap(), None);
 }
 
@@ -528,8 +540,8 @@ async fn a_name_nobody_can_have_finds_nothing(place: &Place) {
     for name in ["", "a\0b", "\u{1f4a9}", "'; DROP TABLE jobs; --"] {
         assert_eq!(store.job(name).await.unwrap(), None);
         assert_eq!(store.request_cancel(name, 1).await.unwrap(), None);
-        assert_eq!(store.policy(name).await.unwrap(), None);
-        assert_eq!(store.delete_policy(name).await.unwrap(), DeletePolicy::Absent);
+        assert_eq!(store.policy(&Tenant::default(), name).await.unwrap(), None);
+        assert_eq!(store.delete_policy(&Tenant::default(), name).await.unwrap(), DeletePolicy::Absent);
         assert_eq!(store.session(name).await.unwrap(), None);
         assert_eq!(store.append_observation(observation(name, 1, "c")).await.unwrap(), Append::NoSession);
     }
@@ -587,4 +599,120 @@ async fn a_server_that_is_not_there_is_unavailable() {
     let nowhere = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let refused = Store::connect(&format!("postgres://ballast@{nowhere}/ballast").parse().unwrap()).await;
     assert!(matches!(refused, Err(StoreError::Unavailable { .. })), "{:?}", refused.err());
+}
+
+fn tenant(name: &str) -> Tenant {
+    name.parse().unwrap()
+}
+
+fn session_of(owner: &str, session: &str) -> NewSession {
+    NewSession {
+        session: session.into(),
+        tenant: tenant(owner),
+        policy: content_hash(POLICY),
+        wealth: 100.0,
+        history: vec![0.01, -0.02],
+        horizon: 3,
+        created_ms: 5,
+    }
+}
+
+async fn tenants_see_only_their_own(place: &Place) {
+    let store = place.open().await;
+    let (north, south) = (tenant("north"), tenant("south"));
+    let policy = content_hash(POLICY);
+    assert!(store.insert_policy(&north, &policy, POLICY, 1).await.unwrap());
+    assert_eq!(store.create_session(session_of("south", "s1")).await.unwrap(), CreateSession::NoPolicy);
+    assert_eq!(store.policy(&south, &policy).await.unwrap(), None);
+    assert_eq!(store.delete_policy(&south, &policy).await.unwrap(), DeletePolicy::Absent);
+    assert!(store.insert_policy(&south, &policy, POLICY, 2).await.unwrap());
+    for (owner, created_ms) in [(&north, 1), (&south, 2)] {
+        let row = store.policy(owner, &policy).await.unwrap().unwrap();
+        assert_eq!((row.created_ms, row.json.as_slice()), (created_ms, POLICY));
+        assert_eq!(store.policies(owner, 10, None).await.unwrap()[0].created_ms, created_ms);
+    }
+    assert_eq!(store.create_session(session_of("south", "s1")).await.unwrap(), CreateSession::Created);
+    assert_eq!(store.sessions(&north, 10, None).await.unwrap(), []);
+    assert_eq!(store.sessions(&south, 10, None).await.unwrap().len(), 1);
+    assert!(!store.delete_session(&north, "s1").await.unwrap());
+    // The sessions of one tenant keep its policy, not that of another; the bytes go with the last owner.
+    assert_eq!(store.delete_policy(&north, &policy).await.unwrap(), DeletePolicy::Deleted);
+    assert_eq!(store.delete_policy(&south, &policy).await.unwrap(), DeletePolicy::InUse { sessions: 1 });
+    assert!(store.delete_session(&south, "s1").await.unwrap());
+    assert_eq!(store.delete_policy(&south, &policy).await.unwrap(), DeletePolicy::Deleted);
+    assert_eq!(store.policy(&south, &policy).await.unwrap(), None);
+
+    let job = |owner: &str, job: &str| NewJob { tenant: tenant(owner), ..new_job(job, Some("key")) };
+    for (owner, name) in [("north", "n1"), ("south", "t1")] {
+        assert!(matches!(store.create_job(job(owner, name)).await.unwrap(), CreateJob::Created(_)));
+        let repeated = store.create_job(job(owner, "other")).await.unwrap();
+        assert!(matches!(repeated, CreateJob::Repeated(row) if row.job == name));
+        let listed = store.jobs(&tenant(owner), 10, None).await.unwrap();
+        assert_eq!(listed.iter().map(|row| row.job.as_str()).collect::<Vec<_>>(), [name]);
+    }
+    let claimed = store.claim_job("w", 10, 0).await.unwrap().unwrap();
+    let outcome = JobOutcome::Succeeded { policy_id: policy.clone(), policy_json: POLICY.to_vec() };
+    assert!(store.finish_job("n1", claimed.attempt, outcome, 9).await.unwrap());
+    assert_eq!(store.policy(&north, &policy).await.unwrap().unwrap().created_ms, 9);
+    assert_eq!(store.policy(&south, &policy).await.unwrap(), None);
+}
+
+/// Over a folder, the store is open and holds the lock.
+async fn a_key_is_listed_and_revoked_beside_the_store(place: &Place) {
+    let store = place.open().await;
+    assert_eq!(store.keys().await.unwrap(), []);
+    let ring = place.key_ring().await.unwrap();
+    let new = NewKey {
+        key: "key_1".into(),
+        hash: [7; 32],
+        tenant: tenant("north"),
+        roles: "operate,read".parse().unwrap(),
+        created_ms: 3,
+    };
+    ring.create(new.clone()).await.unwrap();
+    assert!(ring.create(NewKey { key: "key_2".into(), ..new.clone() }).await.is_err(), "two keys of one text");
+    let rows = store.keys().await.unwrap();
+    assert_eq!(rows, ring.list().await.unwrap());
+    assert_eq!((rows[0].hash, &rows[0].tenant, rows[0].revoked_ms), (new.hash, &new.tenant, None));
+    assert_eq!(rows[0].roles.to_string(), "read,operate");
+    assert!(!ring.revoke("key_2", 4).await.unwrap());
+    assert!(ring.revoke("key_1", 4).await.unwrap() && ring.revoke("key_1", 5).await.unwrap());
+    assert_eq!(store.keys().await.unwrap()[0].revoked_ms, Some(4));
+    ring.close().await;
+    // The store writes on, and keys can be made where nobody serves it.
+    queued(&store, "j1").await;
+    store.close().await;
+    let ring = place.key_ring().await.unwrap();
+    assert_eq!(ring.list().await.unwrap().len(), 1);
+    ring.close().await;
+    place.tamper("UPDATE access_keys SET roles = 'root' WHERE access_key = 'key_1'").await;
+    assert!(matches!(place.open().await.keys().await, Err(StoreError::Corrupt { .. })));
+}
+
+/// A store of the release before: the first migration alone, with rows.
+async fn what_was_there_before_keys_is_the_default_tenants(place: &Place) {
+    place.create_of_schema_1(&content_hash(POLICY), POLICY).await;
+    let store = place.open().await;
+    let (policy, here) = (content_hash(POLICY), Tenant::default());
+    assert_eq!(store.policy(&here, &policy).await.unwrap().unwrap().created_ms, 1);
+    assert_eq!(store.policies(&here, 10, None).await.unwrap().len(), 1);
+    assert_eq!(store.jobs(&here, 10, None).await.unwrap()[0].job, "old");
+    let again = store.create_job(new_job("new", Some("old key"))).await.unwrap();
+    assert!(matches!(again, CreateJob::Repeated(row) if row.job == "old"));
+    assert_eq!(store.jobs(&tenant("north"), 10, None).await.unwrap(), []);
+}
+
+async fn a_session_moved_to_another_tenant_is_damaged(place: &Place) {
+    for (from, to) in [("default", "south"), ("north", "default"), ("north", "south")] {
+        let store = place.open().await;
+        let session = format!("{from}_{to}");
+        store.insert_policy(&tenant(from), &content_hash(POLICY), POLICY, 1).await.unwrap();
+        store.create_session(session_of(from, &session)).await.unwrap();
+        assert_eq!(store.session(&session).await.unwrap().unwrap().tenant, tenant(from));
+        store.close().await;
+        place.tamper(&format!("UPDATE sessions SET tenant = '{to}' WHERE session = '{session}'")).await;
+        let store = place.open().await;
+        assert!(matches!(store.session(&session).await, Err(StoreError::Corrupt { .. })));
+        store.close().await;
+    }
 }

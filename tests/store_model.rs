@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use ballast::control::policy::content_hash;
 use ballast::store::{
     Append, CreateJob, CreateSession, DeletePolicy, JobKind, JobOutcome, JobRow, JobState, NewJob, NewObservation,
-    NewSession, Store,
+    NewSession, Store, Tenant,
 };
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
@@ -231,6 +231,7 @@ async fn apply(store: &Store, model: &mut Model, operation: &Operation) {
 async fn create_job(store: &Store, model: &mut Model, job: u8, key: Option<u8>, hash: u8) {
     let new = NewJob {
         job: job_name(job),
+        tenant: Tenant::default(),
         kind: JobKind::Train,
         request_json: "{}".into(),
         request_hash: hash.to_string(),
@@ -290,7 +291,10 @@ fn finish(model: &mut Model, job: u8, behind: i64, number: u8) -> bool {
 async fn live(store: &Store, model: &mut Model, operation: &Operation) {
     match *operation {
         Operation::InsertPolicy { policy } => {
-            let inserted = store.insert_policy(&policy_name(policy), &policy_json(policy), model.now).await.unwrap();
+            let inserted = store
+                .insert_policy(&Tenant::default(), &policy_name(policy), &policy_json(policy), model.now)
+                .await
+                .unwrap();
             assert_eq!(inserted, !model.policies.contains(&policy));
             if inserted {
                 model.policies.push(policy);
@@ -303,12 +307,13 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
                 (true, 0) => DeletePolicy::Deleted,
                 (true, sessions) => DeletePolicy::InUse { sessions },
             };
-            assert_eq!(store.delete_policy(&policy_name(policy)).await.unwrap(), expected);
+            assert_eq!(store.delete_policy(&Tenant::default(), &policy_name(policy)).await.unwrap(), expected);
             model.policies.retain(|&kept| kept != policy || expected != DeletePolicy::Deleted);
         }
         Operation::CreateSession { session, policy } => {
             let new = NewSession {
                 session: session_name(session),
+                tenant: Tenant::default(),
                 policy: policy_name(policy),
                 wealth: 100.0,
                 history: vec![0.1, -0.0],
@@ -329,7 +334,7 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
         Operation::DeleteSession { session } => {
             let before = model.sessions.len();
             model.sessions.retain(|row| row.0 != session);
-            let deleted = store.delete_session(&session_name(session)).await.unwrap();
+            let deleted = store.delete_session(&Tenant::default(), &session_name(session)).await.unwrap();
             assert_eq!(deleted, model.sessions.len() < before);
         }
         Operation::Append { session, period, content } => {
@@ -356,7 +361,7 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
 
 /// Everything the store can be asked for is what the model has.
 async fn compare(store: &Store, model: &Model) {
-    let mut rows = store.jobs(1000, None).await.unwrap();
+    let mut rows = store.jobs(&Tenant::default(), 1000, None).await.unwrap();
     rows.reverse();
     assert_eq!(rows.len(), model.jobs.len());
     for (row, expected) in rows.iter().zip(&model.jobs) {
@@ -369,10 +374,10 @@ async fn compare(store: &Store, model: &Model) {
         let steps: Vec<_> = expected.steps.iter().map(|(&step, &byte)| (step, vec![byte; 9])).collect();
         assert_eq!(store.checkpoints(&row.job).await.unwrap(), steps);
     }
-    let policies = store.policies(1000, None).await.unwrap();
+    let policies = store.policies(&Tenant::default(), 1000, None).await.unwrap();
     let policies: Vec<_> = policies.into_iter().rev().map(|row| row.policy).collect();
     assert_eq!(policies, model.policies.iter().map(|&policy| policy_name(policy)).collect::<Vec<_>>());
-    let sessions = store.sessions(1000, None).await.unwrap();
+    let sessions = store.sessions(&Tenant::default(), 1000, None).await.unwrap();
     assert_eq!(sessions.len(), model.sessions.len());
     for (row, (session, policy, periods)) in sessions.iter().rev().zip(&model.sessions) {
         assert_eq!((&row.session, &row.policy), (&session_name(*session), &policy_name(*policy)));
@@ -426,7 +431,7 @@ fn postgresql_does_what_the_model_does() {
         runtime.block_on(async {
             let place = Place::Database(url.clone());
             place.open().await.close().await;
-            let empty = "TRUNCATE jobs, idempotency_keys, checkpoints, policies, sessions, observations";
+            let empty = "TRUNCATE jobs, idempotency_keys, checkpoints, policies, policy_owners, sessions, observations";
             support::postgres::execute(&url, empty).await;
             place
         })

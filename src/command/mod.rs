@@ -8,9 +8,11 @@ pub mod demo;
 pub mod evaluate;
 pub mod healthcheck;
 mod host;
+pub mod keys;
 mod monthly_returns;
 pub mod reproduce;
 pub mod serve;
+mod store_location;
 mod tables;
 
 /// An error and its causes on one line.

@@ -2,27 +2,29 @@
 
 use std::io::IsTerminal;
 use std::net::SocketAddr;
-use std::path::PathBuf;
 use std::time::Duration;
 
 use ballast::http;
-use ballast::service::config::{Config, Role, StoreLocation};
+use ballast::service::allowance::Limits;
+use ballast::service::config::{Config, Role};
 use ballast::service::shutdown::Shutdown;
+use clap::builder::FalseyValueParser;
 use clap::{Args, ValueEnum};
 use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::EnvFilter;
+
+use super::store_location::StoreArgs;
 
 #[derive(Debug, Args)]
 pub struct Serve {
     /// Address to listen on; port 0 picks a free one.
     #[arg(long, env = "BALLAST_LISTEN", default_value = "127.0.0.1:8080")]
     listen: SocketAddr,
-    /// Folder of the SQLite database, unless there is a `--store`.
-    #[arg(long, env = "BALLAST_DATA", default_value = "ballast-data")]
-    data: PathBuf,
-    /// PostgreSQL database that replicas share: postgres://user:password@host:port/database.
-    #[arg(long, env = "BALLAST_STORE", hide_env_values = true)]
-    store: Option<String>,
+    #[command(flatten)]
+    store: StoreArgs,
+    /// Listen where others reach it even while the store holds no key.
+    #[arg(long, env = "BALLAST_ALLOW_ANONYMOUS", value_parser = FalseyValueParser::new())]
+    allow_anonymous: bool,
     /// What this replica does.
     #[arg(long, env = "BALLAST_ROLE", value_enum, default_value_t = RoleName::All)]
     role: RoleName,
@@ -32,6 +34,25 @@ pub struct Serve {
     /// Threads that train. Default: every core but one.
     #[arg(long, env = "BALLAST_TRAINING_THREADS", value_parser = clap::value_parser!(u16).range(1..=1024))]
     training_threads: Option<u16>,
+    #[command(flatten)]
+    limits: LimitArgs,
+}
+
+/// What one tenant may ask.
+#[derive(Debug, Args)]
+struct LimitArgs {
+    /// Advice, observations and sessions opened or deleted, a second, of one tenant; 0: any number.
+    #[arg(long, env = "BALLAST_RATE_LIVE", default_value_t = 50_000)]
+    rate_live: u32,
+    /// Robust steps solved on request, jobs queued and policies imported, a second, of one tenant; 0: any number.
+    #[arg(long, env = "BALLAST_RATE_HEAVY", default_value_t = 500)]
+    rate_heavy: u32,
+    /// Other calls, a second, of one tenant; 0: any number.
+    #[arg(long, env = "BALLAST_RATE_READ", default_value_t = 10_000)]
+    rate_read: u32,
+    /// Calls of the heavy class under way at a time; a tenant gets half.
+    #[arg(long, env = "BALLAST_HEAVY_CALLS", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..))]
+    heavy_calls: u16,
 }
 
 /// [`Role`] as the command line names it.
@@ -57,10 +78,11 @@ impl From<RoleName> for Role {
 
 pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     start_logging();
-    let mut config = Config { listen: arguments.listen, ..Config::new(arguments.data) };
-    if let Some(store) = arguments.store.filter(|store| !store.is_empty()) {
-        config.store = StoreLocation::Postgres(store.parse()?);
-    }
+    let mut config = Config { listen: arguments.listen, ..Config::new("") };
+    config.store = arguments.store.location()?;
+    config.allow_anonymous = arguments.allow_anonymous;
+    let limits = arguments.limits;
+    config.limits = Limits::new([limits.rate_live, limits.rate_heavy, limits.rate_read], limits.heavy_calls.into());
     config.role = arguments.role.into();
     config.lease = Duration::from_secs(arguments.lease_seconds.into());
     config.training_threads = arguments.training_threads.map_or(config.training_threads, usize::from);

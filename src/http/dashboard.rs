@@ -57,6 +57,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "history_source.js": SCRIPT,
         "interval_chart.js": SCRIPT,
         "jobs.js": SCRIPT,
+        "key.js": SCRIPT,
         "law_chart.js": SCRIPT,
         "main.js": SCRIPT,
         "observe.js": SCRIPT,

@@ -1,4 +1,4 @@
-//! The problems of every operation, derived from its shape and the problem table.
+//! The problems of every operation, derived from its shape, the table of access and the problem table.
 //!
 //! A handler describes the problems that are its own, such as the 409 of a period gap; what follows from having a body,
 //! a query, a path or the store is added here, so that no operation forgets it.
@@ -6,8 +6,10 @@
 use std::collections::BTreeMap;
 
 use utoipa::openapi::path::{Operation, ParameterIn};
+use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
 use utoipa::openapi::{ContentBuilder, OpenApi, Ref, RefOr, Response, ResponseBuilder};
 
+use super::access::{Access, access};
 use super::problem::ProblemKind;
 
 /// Operations that touch no store and take no input: they answer or the process is gone.
@@ -19,9 +21,34 @@ pub fn with_every_problem(description: &mut OpenApi) {
         if INFALLIBLE.contains(&path.as_str()) {
             continue;
         }
-        let (reads, writes) = ([&mut item.get], [&mut item.post, &mut item.delete]);
-        reads.into_iter().flatten().for_each(|operation| complete(operation, &[]));
-        writes.into_iter().flatten().for_each(|operation| complete(operation, &[ProblemKind::StorageFull]));
+        for (method, operation) in [("GET", &mut item.get), ("POST", &mut item.post), ("DELETE", &mut item.delete)] {
+            let Some(operation) = operation else { continue };
+            let own: &[_] = if method == "GET" { &[] } else { &[ProblemKind::StorageFull] };
+            if let Access::Role(role) = access(method, Some(path)) {
+                guard(operation, role.as_str());
+            }
+            complete(operation, own);
+        }
+    }
+    let key = HttpBuilder::new().scheme(HttpAuthScheme::Bearer).description(Some(KEY)).build();
+    let components = description.components.get_or_insert_default();
+    components.add_security_scheme(SCHEME, SecurityScheme::Http(key));
+}
+
+const SCHEME: &str = "key";
+const KEY: &str = "A key of `ballast keys create`. A service whose store holds none asks for none.";
+
+/// Says that the operation asks for a key with this role, and how it refuses.
+fn guard(operation: &mut Operation, role: &str) {
+    operation.security = Some(vec![SecurityRequirement::new(SCHEME, [role])]);
+    let titled = |kind: ProblemKind| kind.entry().2;
+    let responses = [
+        ("401", titled(ProblemKind::Unauthenticated).to_owned()),
+        ("403", format!("{}: {role}", titled(ProblemKind::Forbidden))),
+        ("429", titled(ProblemKind::TooManyRequests).to_owned()),
+    ];
+    for (status, meaning) in responses {
+        operation.responses.responses.insert(status.into(), RefOr::T(response(&meaning)));
     }
 }
 

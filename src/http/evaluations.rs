@@ -6,6 +6,7 @@ use axum::extract::State;
 use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse, Response};
 
+use super::access::By;
 use super::extract::{Id, JsonBody};
 use super::jobs::{accepted, idempotency_key};
 use super::problem::Problem;
@@ -26,10 +27,11 @@ use crate::service::Service;
         (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn evaluate(
     State(service): State<Arc<Service>>,
+    By(caller): By,
     headers: HeaderMap,
     JsonBody(request): JsonBody<EvaluationRequest>,
 ) -> Result<Response, Problem> {
-    Ok(accepted(service.evaluate(request, idempotency_key(&headers)?).await?))
+    Ok(accepted(service.evaluate(&caller.tenant, request, idempotency_key(&headers)?).await?))
 }
 
 /// The report of a succeeded evaluation.
@@ -37,7 +39,7 @@ pub async fn evaluate(
     responses(
         (status = 200, description = "The report.", body = EvaluationReport),
         (status = 404, description = "There is no such job, or it has no report.", body = Problem, content_type = "application/problem+json")))]
-pub async fn report(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Response, Problem> {
-    let report = service.jobs.report(&id).await?;
+pub async fn report(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<Response, Problem> {
+    let report = service.jobs.report(&caller.tenant, &id).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], report).into_response())
 }

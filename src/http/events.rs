@@ -18,10 +18,12 @@ use axum::response::{IntoResponse, Response};
 use futures_util::stream;
 use tokio::sync::watch;
 
+use super::access::By;
 use super::extract::Id;
 use super::problem::Problem;
 use super::wire;
 use crate::service::Service;
+use crate::service::keys::Caller;
 use crate::store::JobState;
 
 /// A change made by another process is noticed within this time.
@@ -30,6 +32,7 @@ const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
 struct Follower {
     service: Arc<Service>,
+    caller: Arc<Caller>,
     job: String,
     changes: watch::Receiver<u64>,
     last_id: String,
@@ -44,24 +47,29 @@ struct Follower {
         (status = 200, description = "Server-sent events, each with the job as JSON.", body = String, content_type = "text/event-stream"),
         (status = 204, description = "The terminal state was seen already."),
         (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json")))]
-pub async fn follow(State(service): State<Arc<Service>>, Id(job): Id, headers: HeaderMap) -> Result<Response, Problem> {
+pub async fn follow(
+    State(service): State<Arc<Service>>,
+    By(caller): By,
+    Id(job): Id,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
     let changes = service.jobs.changes();
-    let now = wire::Job::from(service.jobs.get(&job).await?);
+    let now = wire::Job::from(service.jobs.get(&caller.tenant, &job).await?);
     let last_id = headers.get("last-event-id").and_then(|id| id.to_str().ok()).unwrap_or("").to_owned();
     if now.state.is_terminal() && last_id == event_id(&now) {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
-    let follower = Follower { service, job, changes, last_id, last_state: None };
+    let follower = Follower { service, caller, job, changes, last_id, last_state: None };
     let events = stream::unfold(Some(follower), |follower| async { follower?.next().await });
     Ok(Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE)).into_response())
 }
 
 impl Follower {
-    /// The next event that differs from the last; none once the job or the service ends.
+    /// The next event that differs from the last; none once the job or the service ends, or the key is revoked.
     async fn next(mut self) -> Option<(Result<Event, Infallible>, Option<Self>)> {
-        loop {
+        while !self.caller.is_revoked() {
             self.changes.mark_unchanged();
-            let job = wire::Job::from(self.service.jobs.get(&self.job).await.ok()?);
+            let job = wire::Job::from(self.service.jobs.get(&self.caller.tenant, &self.job).await.ok()?);
             let id = event_id(&job);
             if id != self.last_id {
                 let name = if self.last_state == Some(job.state) { "progress" } else { "state" };
@@ -75,6 +83,7 @@ impl Follower {
                 () = self.service.shutdown.begun() => return None,
             }
         }
+        None
     }
 }
 

@@ -6,6 +6,7 @@ use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode, header};
 use serde::de::DeserializeOwned;
 
+use super::access::Turn;
 use super::decode;
 use super::problem::{Problem, ProblemKind};
 
@@ -36,7 +37,8 @@ impl<S: Send + Sync> FromRequest<S> for JsonBytes {
         let declared = request.headers().get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok());
         let size = declared.and_then(|length| length.parse::<u64>().ok()).map(|length| format!("{length} bytes"));
         let limit = request.extensions().get::<BodyLimit>().map_or(0, |limit| limit.0);
-        Bytes::from_request(request, state).await.map(JsonBytes).map_err(|rejection| {
+        let turn = request.extensions().get::<Turn>().cloned();
+        let bytes = Bytes::from_request(request, state).await.map_err(|rejection| {
             let size = size.unwrap_or_else(|| "a stream".to_owned());
             match rejection.status() {
                 StatusCode::PAYLOAD_TOO_LARGE => {
@@ -49,7 +51,9 @@ impl<S: Send + Sync> FromRequest<S> for JsonBytes {
                     "must arrive complete",
                 ),
             }
-        })
+        })?;
+        turn.map_or(Ok(()), |turn| turn.begin())?;
+        Ok(JsonBytes(bytes))
     }
 }
 

@@ -44,6 +44,8 @@ impl From<ServiceError> for Problem {
                 problem(Kind::InvalidPolicy).naming("steps", Value::Null, format!("must make a policy: {cause}"))
             }
             ServiceError::Draining | ServiceError::Busy => problem(Kind::Overloaded),
+            // Said at the start, before anybody asks.
+            error @ ServiceError::NobodyAsked { .. } => Problem::new(Kind::Internal, error.to_string()),
             ServiceError::Store(error) => of_store(&error),
             ServiceError::Internal(reason) => {
                 tracing::error!(reason, "a request failed");

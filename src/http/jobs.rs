@@ -7,6 +7,7 @@ use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
+use super::access::By;
 use super::extract::{Id, JsonBody, Parameters};
 use super::page::{self, Page};
 use super::problem::{Problem, ProblemKind};
@@ -28,10 +29,11 @@ use crate::service::jobs::Job;
         (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn train(
     State(service): State<Arc<Service>>,
+    By(caller): By,
     headers: HeaderMap,
     JsonBody(specification): JsonBody<Specification>,
 ) -> Result<Response, Problem> {
-    Ok(accepted(service.jobs.train(specification, idempotency_key(&headers)?).await?))
+    Ok(accepted(service.jobs.train(&caller.tenant, specification, idempotency_key(&headers)?).await?))
 }
 
 /// The answer to a job that was queued.
@@ -58,10 +60,11 @@ pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
         (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn list(
     State(service): State<Arc<Service>>,
+    By(caller): By,
     Parameters(page): Parameters<Page>,
 ) -> Result<Json<wire::JobPage>, Problem> {
     let (limit, after) = page.bounds()?;
-    let jobs = service.jobs.list(limit, after).await?;
+    let jobs = service.jobs.list(&caller.tenant, limit, after).await?;
     let next = page::next(jobs.len(), limit, jobs.last().map(|job| job.row.sequence));
     Ok(Json(wire::JobPage { jobs: jobs.into_iter().map(Into::into).collect(), next }))
 }
@@ -71,8 +74,8 @@ pub async fn list(
     responses(
         (status = 200, description = "The job.", body = wire::Job),
         (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json")))]
-pub async fn get(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Json<wire::Job>, Problem> {
-    Ok(Json(service.jobs.get(&id).await?.into()))
+pub async fn get(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<Json<wire::Job>, Problem> {
+    Ok(Json(service.jobs.get(&caller.tenant, &id).await?.into()))
 }
 
 /// Cancel a job: always accepted; it stops within a second. A finished job stays as it is.
@@ -80,7 +83,7 @@ pub async fn get(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Json
     responses(
         (status = 202, description = "The job as it is now.", body = wire::Job),
         (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json")))]
-pub async fn cancel(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Response, Problem> {
-    let job = wire::Job::from(service.jobs.cancel(&id).await?);
+pub async fn cancel(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<Response, Problem> {
+    let job = wire::Job::from(service.jobs.cancel(&caller.tenant, &id).await?);
     Ok((StatusCode::ACCEPTED, Json(job)).into_response())
 }

@@ -1,5 +1,6 @@
 //! Floor 4: translation between the wire and the use cases, and nothing else.
 
+mod access;
 mod dashboard;
 mod decode;
 mod described;
@@ -11,6 +12,7 @@ mod fault;
 mod jobs;
 mod operations;
 mod page;
+mod patient;
 mod policies;
 pub mod problem;
 mod router;

@@ -1,6 +1,6 @@
 //! For the operator: is it alive, is it ready, how is it doing.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use axum::Json;
 use axum::extract::State;
@@ -76,6 +76,7 @@ pub async fn openapi() -> Response {
 /// The description as a page to read.
 #[utoipa::path(get, path = "/docs", tag = "operations",
     responses((status = 200, description = "A page.", body = String, content_type = "text/html")))]
-pub async fn docs() -> Html<String> {
-    Html(documentation::page(&router::description()))
+pub async fn docs() -> Html<&'static str> {
+    static PAGE: LazyLock<String> = LazyLock::new(|| documentation::page(&router::description()));
+    Html(&PAGE)
 }

@@ -7,6 +7,7 @@ use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
+use super::access::By;
 use super::decode;
 use super::extract::{Id, JsonBytes, Parameters};
 use super::page::{self, Page};
@@ -25,10 +26,11 @@ use crate::service::error::ServiceError;
         (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn list(
     State(service): State<Arc<Service>>,
+    By(caller): By,
     Parameters(page): Parameters<Page>,
 ) -> Result<Json<wire::PolicyPage>, Problem> {
     let (limit, after) = page.bounds()?;
-    let rows = service.policies.list(limit, after).await?;
+    let rows = service.policies.list(&caller.tenant, limit, after).await?;
     let next = page::next(rows.len(), limit, rows.last().map(|row| row.sequence));
     Ok(Json(wire::PolicyPage { policies: rows.into_iter().map(Into::into).collect(), next }))
 }
@@ -38,9 +40,13 @@ pub async fn list(
     responses(
         (status = 200, description = "The policy.", body = wire::PolicyDetail),
         (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json")))]
-pub async fn get(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Json<wire::PolicyDetail>, Problem> {
-    let row = service.policies.get(&id).await?;
-    let advisor = service.policies.advisor(&id).await?;
+pub async fn get(
+    State(service): State<Arc<Service>>,
+    By(caller): By,
+    Id(id): Id,
+) -> Result<Json<wire::PolicyDetail>, Problem> {
+    let row = service.policies.get(&caller.tenant, &id).await?;
+    let advisor = service.policies.advisor(&caller.tenant, &id).await?;
     let specification = advisor.specification().clone();
     Ok(Json(wire::PolicyDetail {
         policy: row.policy,
@@ -57,8 +63,8 @@ pub async fn get(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Json
     responses(
         (status = 200, description = "The document.", body = serde_json::Value),
         (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json")))]
-pub async fn export(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Response, Problem> {
-    let row = service.policies.get(&id).await?;
+pub async fn export(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<Response, Problem> {
+    let row = service.policies.get(&caller.tenant, &id).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], row.json).into_response())
 }
 
@@ -68,10 +74,14 @@ pub async fn export(State(service): State<Arc<Service>>, Id(id): Id) -> Result<R
         (status = 201, description = "Stored, or known already.", body = wire::Imported,
             headers(("Location" = String, description = "The policy."))),
         (status = 422, description = "The document is not a usable policy.", body = Problem, content_type = "application/problem+json")))]
-pub async fn import(State(service): State<Arc<Service>>, JsonBytes(document): JsonBytes) -> Result<Response, Problem> {
+pub async fn import(
+    State(service): State<Arc<Service>>,
+    By(caller): By,
+    JsonBytes(document): JsonBytes,
+) -> Result<Response, Problem> {
     // A document may hold 64 MB: too much to parse between two requests.
     let decoded = tokio::task::spawn_blocking(move || decode::json::<Policy>(&document));
-    let policy = service.policies.import(decoded.await.map_err(ServiceError::internal)??).await?;
+    let policy = service.policies.import(&caller.tenant, decoded.await.map_err(ServiceError::internal)??).await?;
     let location = [(header::LOCATION, format!("/policies/{policy}"))];
     Ok((StatusCode::CREATED, location, Json(wire::Imported { policy })).into_response())
 }
@@ -82,7 +92,7 @@ pub async fn import(State(service): State<Arc<Service>>, JsonBytes(document): Js
         (status = 204, description = "Deleted."),
         (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json"),
         (status = 409, description = "Sessions live by it.", body = Problem, content_type = "application/problem+json")))]
-pub async fn delete(State(service): State<Arc<Service>>, Id(id): Id) -> Result<StatusCode, Problem> {
-    service.policies.delete(&id).await?;
+pub async fn delete(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<StatusCode, Problem> {
+    service.policies.delete(&caller.tenant, &id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -17,6 +17,8 @@ use crate::control::error::FieldError;
 pub enum ProblemKind {
     MalformedJson,
     InvalidQuery,
+    Unauthenticated,
+    Forbidden,
     UnknownRoute,
     NotFound,
     WrongMethod,
@@ -29,6 +31,7 @@ pub enum ProblemKind {
     UnsupportedMediaType,
     InvalidField,
     InvalidPolicy,
+    TooManyRequests,
     Internal,
     Overloaded,
     StorageFull,
@@ -36,9 +39,11 @@ pub enum ProblemKind {
 
 impl ProblemKind {
     /// In ascending order of status.
-    pub const ALL: [ProblemKind; 17] = [
+    pub const ALL: [ProblemKind; 20] = [
         ProblemKind::MalformedJson,
         ProblemKind::InvalidQuery,
+        ProblemKind::Unauthenticated,
+        ProblemKind::Forbidden,
         ProblemKind::UnknownRoute,
         ProblemKind::NotFound,
         ProblemKind::WrongMethod,
@@ -51,6 +56,7 @@ impl ProblemKind {
         ProblemKind::UnsupportedMediaType,
         ProblemKind::InvalidField,
         ProblemKind::InvalidPolicy,
+        ProblemKind::TooManyRequests,
         ProblemKind::Internal,
         ProblemKind::Overloaded,
         ProblemKind::StorageFull,
@@ -62,6 +68,8 @@ impl ProblemKind {
         match self {
             Self::MalformedJson => ("malformed-json", S::BAD_REQUEST, "The body is not JSON"),
             Self::InvalidQuery => ("invalid-query", S::BAD_REQUEST, "A query parameter breaks a rule"),
+            Self::Unauthenticated => ("unauthenticated", S::UNAUTHORIZED, "The call needs a key"),
+            Self::Forbidden => ("forbidden", S::FORBIDDEN, "The key lacks a role"),
             Self::UnknownRoute => ("unknown-route", S::NOT_FOUND, "There is nothing at this address"),
             Self::NotFound => ("not-found", S::NOT_FOUND, "There is no such thing"),
             Self::WrongMethod => ("wrong-method", S::METHOD_NOT_ALLOWED, "The address does not take this method"),
@@ -78,6 +86,7 @@ impl ProblemKind {
             }
             Self::InvalidField => ("invalid-field", S::UNPROCESSABLE_ENTITY, "A field breaks a rule"),
             Self::InvalidPolicy => ("invalid-policy", S::UNPROCESSABLE_ENTITY, "The document is not a usable policy"),
+            Self::TooManyRequests => ("too-many-requests", S::TOO_MANY_REQUESTS, "The tenant calls too often"),
             Self::Internal => ("internal", S::INTERNAL_SERVER_ERROR, "The service failed"),
             Self::Overloaded => ("overloaded", S::SERVICE_UNAVAILABLE, "The service cannot answer now"),
             Self::StorageFull => ("storage-full", S::INSUFFICIENT_STORAGE, "The data folder is full"),
@@ -147,6 +156,9 @@ impl IntoResponse for Problem {
         let mut response = (status, Json(self)).into_response();
         let headers = response.headers_mut();
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
+        if status == StatusCode::UNAUTHORIZED {
+            headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+        }
         if status == StatusCode::SERVICE_UNAVAILABLE || status == StatusCode::INSUFFICIENT_STORAGE {
             headers.insert(header::RETRY_AFTER, RETRY_AFTER_SECONDS);
         }

@@ -1,23 +1,28 @@
 //! Every route, once: the router and its OpenAPI description come from the same list.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
-use axum::extract::{DefaultBodyLimit, Request, State};
+use axum::Router;
+use axum::extract::{Request, State};
 use axum::http::{Method, Uri};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
-use axum::{Extension, Router};
 use tower_http::catch_panic::CatchPanicLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use super::extract::BodyLimit;
+use super::access::Gate;
 use super::problem::{Problem, ProblemKind};
-use super::{dashboard, described, evaluations, events, jobs, operations, policies, sessions, telemetry, what_if};
+use super::{
+    access, dashboard, described, evaluations, events, jobs, operations, policies, sessions, telemetry, what_if,
+};
 use crate::service::Service;
 use crate::service::config::Config;
+
+/// Bodies other than policies: the longest history and a design fit several times.
+const BODY_BYTES: usize = 4 << 20;
 
 #[derive(OpenApi)]
 #[openapi(
@@ -75,20 +80,25 @@ pub fn description() -> utoipa::openapi::OpenApi {
     description
 }
 
-/// The description as checked in under `api/openapi.json`.
-pub fn description_json() -> String {
-    description().to_pretty_json().unwrap_or_default() + "\n"
+/// The description as checked in under `api/openapi.json`. Made once: anybody may ask for it, as often as he likes.
+pub fn description_json() -> &'static str {
+    static JSON: LazyLock<String> = LazyLock::new(|| description().to_pretty_json().unwrap_or_default() + "\n");
+    &JSON
 }
 
 /// The whole application; for a replica that only works, the operator's part of it.
 pub fn application(service: Arc<Service>, config: &Config) -> Router {
     let routes = if config.role.answers() { routes() } else { operators() };
     let (router, _) = routes.split_for_parts();
+    let gate = Gate {
+        service: service.clone(),
+        large_body_bytes: config.body_limit_bytes,
+        body_bytes: config.body_limit_bytes.min(BODY_BYTES),
+    };
     router
         .fallback(unknown_route)
         .method_not_allowed_fallback(wrong_method)
-        .layer(DefaultBodyLimit::max(config.body_limit_bytes))
-        .layer(Extension(BodyLimit(config.body_limit_bytes)))
+        .layer(middleware::from_fn_with_state(gate, access::admit))
         .layer(middleware::from_fn_with_state(config.request_timeout, within_time))
         .layer(CatchPanicLayer::custom(|_| {
             Problem::new(ProblemKind::Internal, "the cause is in the log").into_response()

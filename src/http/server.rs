@@ -1,4 +1,4 @@
-//! The accept loop: bounded connections, bounded header time, a drain at the end.
+//! The accept loop: bounded connections, bounded headers, bounded silence, a drain at the end.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -14,6 +14,7 @@ use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 use tokio::task::JoinHandle;
 
+use super::patient::Patient;
 use super::{router, telemetry};
 use crate::service::Service;
 use crate::service::clock::Clock;
@@ -23,6 +24,12 @@ use crate::service::shutdown::Shutdown;
 
 /// A client that has not sent its headers by then is cut off.
 const HEADER_TIMEOUT: Duration = Duration::from_secs(5);
+/// A head that is not whole after so many bytes, and one read of as many, is refused; hyper takes 100 lines at most.
+const HEAD_BYTES: usize = 32 << 10;
+/// A client that takes nothing of its answer for so long is cut off.
+const READER_TIMEOUT: Duration = Duration::from_secs(30);
+/// Descriptors that are not connections: the store's files, the runtime, the standard streams.
+const OTHER_DESCRIPTORS: usize = 128;
 /// Pause after a failed accept: out of descriptors, most likely.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
@@ -75,7 +82,7 @@ pub async fn serve(config: Config, shutdown: Shutdown) -> Result<Running, ServeE
 
 async fn run(listener: TcpListener, application: Router, service: Arc<Service>, config: Config) {
     let connections = GracefulShutdown::new();
-    let permits = Arc::new(Semaphore::new(config.connection_limit));
+    let permits = Arc::new(Semaphore::new(connection_limit(config.connection_limit)));
     loop {
         let accepted = async {
             let permit = permits.clone().acquire_owned().await;
@@ -93,7 +100,8 @@ async fn run(listener: TcpListener, application: Router, service: Arc<Service>, 
         let connection = http1::Builder::new()
             .timer(TokioTimer::new())
             .header_read_timeout(HEADER_TIMEOUT)
-            .serve_connection(TokioIo::new(stream), handler);
+            .max_buf_size(HEAD_BYTES)
+            .serve_connection(TokioIo::new(Patient::new(stream, READER_TIMEOUT)), handler);
         let connection = connections.watch(connection);
         tokio::spawn(async move {
             if let Err(error) = connection.await {
@@ -109,4 +117,19 @@ async fn run(listener: TcpListener, application: Router, service: Arc<Service>, 
     }
     service.close().await;
     tracing::info!("stopped");
+}
+
+/// As many as asked for, but never so many that the store finds no descriptor for its files.
+fn connection_limit(asked: usize) -> usize {
+    match descriptors() {
+        Some(descriptors) => asked.min(descriptors.saturating_sub(OTHER_DESCRIPTORS).max(1)),
+        None => asked,
+    }
+}
+
+/// Files and sockets this process may open, where the system tells (Linux).
+fn descriptors() -> Option<usize> {
+    let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
+    let line = limits.lines().find_map(|line| line.strip_prefix("Max open files"))?;
+    line.split_whitespace().next()?.parse().ok()
 }

@@ -9,6 +9,7 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 
+use super::access::By;
 use super::extract::{Id, JsonBody, Parameters};
 use super::page::{self, Page};
 use super::problem::Problem;
@@ -27,9 +28,10 @@ use crate::service::sessions::Question;
         (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn open(
     State(service): State<Arc<Service>>,
+    By(caller): By,
     JsonBody(request): JsonBody<wire::OpenSession>,
 ) -> Result<Response, Problem> {
-    let live = service.sessions.open(&request.policy, request.history, request.wealth).await?;
+    let live = service.sessions.open(&caller.tenant, &request.policy, request.history, request.wealth).await?;
     let session = wire::Session::from(live);
     let location = [(header::LOCATION, format!("/sessions/{}", session.session))];
     Ok((StatusCode::CREATED, location, Json(session)).into_response())
@@ -44,10 +46,11 @@ pub async fn open(
         (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn list(
     State(service): State<Arc<Service>>,
+    By(caller): By,
     Parameters(page): Parameters<Page>,
 ) -> Result<Json<wire::SessionPage>, Problem> {
     let (limit, after) = page.bounds()?;
-    let rows = service.sessions.list(limit, after).await?;
+    let rows = service.sessions.list(&caller.tenant, limit, after).await?;
     let next = page::next(rows.len(), limit, rows.last().map(|row| row.sequence));
     Ok(Json(wire::SessionPage { sessions: rows.into_iter().map(Into::into).collect(), next }))
 }
@@ -57,8 +60,12 @@ pub async fn list(
     responses(
         (status = 200, description = "The session.", body = wire::Session),
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json")))]
-pub async fn get(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Json<wire::Session>, Problem> {
-    Ok(Json(service.sessions.get(&id).await?.into()))
+pub async fn get(
+    State(service): State<Arc<Service>>,
+    By(caller): By,
+    Id(id): Id,
+) -> Result<Json<wire::Session>, Problem> {
+    Ok(Json(service.sessions.get(&caller.tenant, &id).await?.into()))
 }
 
 /// Where a session started and everything it observed.
@@ -66,8 +73,12 @@ pub async fn get(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Json
     responses(
         (status = 200, description = "The history.", body = wire::SessionHistory),
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json")))]
-pub async fn history(State(service): State<Arc<Service>>, Id(id): Id) -> Result<Json<wire::SessionHistory>, Problem> {
-    let (row, observations) = service.sessions.history(&id).await?;
+pub async fn history(
+    State(service): State<Arc<Service>>,
+    By(caller): By,
+    Id(id): Id,
+) -> Result<Json<wire::SessionHistory>, Problem> {
+    let (row, observations) = service.sessions.history(&caller.tenant, &id).await?;
     Ok(Json(wire::SessionHistory {
         session: row.session,
         policy: row.policy,
@@ -82,8 +93,8 @@ pub async fn history(State(service): State<Arc<Service>>, Id(id): Id) -> Result<
     responses(
         (status = 204, description = "Deleted."),
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json")))]
-pub async fn delete(State(service): State<Arc<Service>>, Id(id): Id) -> Result<StatusCode, Problem> {
-    service.sessions.delete(&id).await?;
+pub async fn delete(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<StatusCode, Problem> {
+    service.sessions.delete(&caller.tenant, &id).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -96,10 +107,11 @@ pub async fn delete(State(service): State<Arc<Service>>, Id(id): Id) -> Result<S
         (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn observe(
     State(service): State<Arc<Service>>,
+    By(caller): By,
     JsonBody(report): JsonBody<Observe>,
 ) -> Result<Json<Observed>, Problem> {
     let started = Instant::now();
-    let observed = service.sessions.observe(report).await?;
+    let observed = service.sessions.observe(&caller.tenant, report).await?;
     metrics::histogram!(OBSERVE_SECONDS).record(started.elapsed().as_secs_f64());
     Ok(Json(observed))
 }
@@ -138,6 +150,7 @@ enum Explain {
         (status = 409, description = "The session has reached its horizon.", body = Problem, content_type = "application/problem+json")))]
 pub async fn action(
     State(service): State<Arc<Service>>,
+    By(caller): By,
     Parameters(ask): Parameters<Ask>,
 ) -> Result<Json<wire::Action>, Problem> {
     let (question, label) = match (ask.explain, ask.mode) {
@@ -146,7 +159,7 @@ pub async fn action(
         (None, _) => (Question::Advise(AdviceMode::Surrogate), "surrogate"),
     };
     let started = Instant::now();
-    let action = service.sessions.action(&ask.session, question).await?;
+    let action = service.sessions.action(&caller.tenant, &ask.session, question).await?;
     metrics::histogram!(ACTION_SECONDS, "mode" => label).record(started.elapsed().as_secs_f64());
     Ok(Json(wire::Action::new(ask.session, action)))
 }

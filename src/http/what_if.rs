@@ -6,6 +6,7 @@ use std::time::Instant;
 use axum::Json;
 use axum::extract::State;
 
+use super::access::By;
 use super::extract::JsonBody;
 use super::problem::Problem;
 use crate::service::Service;
@@ -21,10 +22,11 @@ use crate::service::what_if::{WhatIf, WhatIfAnswer};
         (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn what_if(
     State(service): State<Arc<Service>>,
+    By(caller): By,
     JsonBody(request): JsonBody<WhatIf>,
 ) -> Result<Json<WhatIfAnswer>, Problem> {
     let started = Instant::now();
-    let answer = service.sessions.what_if(request).await?;
+    let answer = service.sessions.what_if(&caller.tenant, request).await?;
     metrics::histogram!(ACTION_SECONDS, "mode" => "what_if").record(started.elapsed().as_secs_f64());
     Ok(Json(answer))
 }

@@ -5,6 +5,7 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::time::Duration;
 
+use super::allowance::Limits;
 use crate::store::PostgresUrl;
 
 /// Where the durable facts are.
@@ -51,11 +52,14 @@ impl Role {
 pub struct Config {
     /// Port 0 picks a free one.
     pub listen: SocketAddr,
+    /// Whether an address that others reach may be listened on while the store holds no key.
+    pub allow_anonymous: bool,
+    pub limits: Limits,
     pub store: StoreLocation,
     pub role: Role,
     /// Threads of the training pool.
     pub training_threads: usize,
-    /// Connections served at a time; more wait in the kernel's queue.
+    /// Connections served at a time, as far as there are descriptors; more wait in the kernel's queue.
     pub connection_limit: usize,
     /// Largest request body, in bytes: an exported policy of a few thousand design points fits.
     pub body_limit_bytes: usize,
@@ -78,10 +82,12 @@ impl Config {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Config {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
+            allow_anonymous: false,
+            limits: Limits::default(),
             store: StoreLocation::Folder(data.into()),
             role: Role::All,
             training_threads: cores.saturating_sub(1).max(1),
-            connection_limit: 1024,
+            connection_limit: 4096,
             body_limit_bytes: 64 << 20,
             request_timeout: Duration::from_secs(30),
             resolve_limit: cores.div_ceil(2),

@@ -1,5 +1,7 @@
 //! Why a use case could not be done.
 
+use std::net::SocketAddr;
+
 use thiserror::Error;
 
 use crate::control::error::{FieldError, PolicyError};
@@ -27,6 +29,10 @@ pub enum ServiceError {
     Policy(PolicyError),
     #[error(transparent)]
     Store(#[from] StoreError),
+    #[error(
+        "{address} can be reached by others and the store holds no key: make one with `ballast keys create`, listen on loopback, or say --allow-anonymous"
+    )]
+    NobodyAsked { address: SocketAddr },
     #[error("the service is shutting down")]
     Draining,
     #[error("too many requests of this kind wait already")]

@@ -1,4 +1,4 @@
-//! Training jobs as their users see them.
+//! Training jobs as their users see them: each tenant its own.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::control::error::FieldError;
 use crate::control::evaluation::EvaluationRequest;
 use crate::control::policy::content_hash;
 use crate::control::specification::Specification;
-use crate::store::{CreateJob, JobKind, JobRow, NewJob, Store};
+use crate::store::{CreateJob, JobKind, JobRow, NewJob, Store, Tenant};
 
 /// Longest idempotency key taken, in bytes.
 const KEY_LENGTH: usize = 255;
@@ -44,26 +44,37 @@ impl Jobs {
     ///
     /// # Errors
     /// A field that breaks its rule; a key used with another request.
-    pub async fn train(&self, specification: Specification, key: Option<String>) -> Result<Job, ServiceError> {
+    pub async fn train(
+        &self,
+        tenant: &Tenant,
+        specification: Specification,
+        key: Option<String>,
+    ) -> Result<Job, ServiceError> {
         let sent = serde_json::to_vec(&specification).map_err(ServiceError::internal)?;
         let completed = specification.completed()?;
         let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
-        self.queue(JobKind::Train, &sent, request_json, completed.problem.horizon, key).await
+        self.queue(tenant, JobKind::Train, &sent, request_json, completed.problem.horizon, key).await
     }
 
     /// Queues an evaluation, whose policies the caller has looked at. The same key and request again give the same job.
     ///
     /// # Errors
     /// As [`Self::train`].
-    pub(super) async fn evaluate(&self, request: EvaluationRequest, key: Option<String>) -> Result<Job, ServiceError> {
+    pub(super) async fn evaluate(
+        &self,
+        tenant: &Tenant,
+        request: EvaluationRequest,
+        key: Option<String>,
+    ) -> Result<Job, ServiceError> {
         let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
         let completed = request.completed()?;
         let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
-        self.queue(JobKind::Evaluate, &sent, request_json, completed.step_count(), key).await
+        self.queue(tenant, JobKind::Evaluate, &sent, request_json, completed.step_count(), key).await
     }
 
     async fn queue(
         &self,
+        tenant: &Tenant,
         kind: JobKind,
         sent: &[u8],
         request_json: String,
@@ -76,6 +87,7 @@ impl Jobs {
         }
         let new = NewJob {
             job: identity::new_id("job")?,
+            tenant: tenant.clone(),
             kind,
             request_json,
             request_hash: content_hash(sent),
@@ -97,24 +109,23 @@ impl Jobs {
     ///
     /// # Errors
     /// There is no such job, or it has no report (yet).
-    pub async fn report(&self, job: &str) -> Result<String, ServiceError> {
-        let row = self.store.job(job).await?.ok_or_else(|| ServiceError::unknown("job", job))?;
+    pub async fn report(&self, tenant: &Tenant, job: &str) -> Result<String, ServiceError> {
+        let row = self.of(tenant, job).await?;
         row.report_json.ok_or_else(|| ServiceError::unknown("report", job))
     }
 
     /// # Errors
     /// There is no such job.
-    pub async fn get(&self, job: &str) -> Result<Job, ServiceError> {
-        let row = self.store.job(job).await?.ok_or_else(|| ServiceError::unknown("job", job))?;
-        Ok(self.with_progress(row))
+    pub async fn get(&self, tenant: &Tenant, job: &str) -> Result<Job, ServiceError> {
+        Ok(self.with_progress(self.of(tenant, job).await?))
     }
 
     /// At most `limit` jobs, newest first, after the job with sequence `after`.
     ///
     /// # Errors
     /// The store does not answer.
-    pub async fn list(&self, limit: usize, after: Option<i64>) -> Result<Vec<Job>, ServiceError> {
-        let rows = self.store.jobs(limit, after).await?;
+    pub async fn list(&self, tenant: &Tenant, limit: usize, after: Option<i64>) -> Result<Vec<Job>, ServiceError> {
+        let rows = self.store.jobs(tenant, limit, after).await?;
         Ok(rows.into_iter().map(|row| self.with_progress(row)).collect())
     }
 
@@ -122,7 +133,8 @@ impl Jobs {
     ///
     /// # Errors
     /// There is no such job.
-    pub async fn cancel(&self, job: &str) -> Result<Job, ServiceError> {
+    pub async fn cancel(&self, tenant: &Tenant, job: &str) -> Result<Job, ServiceError> {
+        self.of(tenant, job).await?;
         let row = self.store.request_cancel(job, self.clock.now_milliseconds()).await?;
         let row = row.ok_or_else(|| ServiceError::unknown("job", job))?;
         self.board.stop(job);
@@ -133,6 +145,12 @@ impl Jobs {
     /// Changes whenever a job's state or progress may have changed.
     pub fn changes(&self) -> watch::Receiver<u64> {
         self.board.subscribe()
+    }
+
+    /// The row, where it is the tenant's.
+    async fn of(&self, tenant: &Tenant, job: &str) -> Result<JobRow, ServiceError> {
+        let row = self.store.job(job).await?.filter(|row| row.tenant == *tenant);
+        row.ok_or_else(|| ServiceError::unknown("job", job))
     }
 
     fn with_progress(&self, row: JobRow) -> Job {

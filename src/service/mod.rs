@@ -3,12 +3,14 @@
 //! [`Service`] is what a transport needs: the store, the jobs and their trainer, the policies made ready to answer,
 //! and the live sessions. Everything acknowledged is in the store first; memory only saves recomputing.
 
+pub mod allowance;
 mod bounded;
 pub mod clock;
 pub mod config;
 pub mod error;
 mod identity;
 pub mod jobs;
+pub mod keys;
 pub mod live;
 pub mod metrics;
 pub mod observation;
@@ -25,6 +27,7 @@ use clock::Clock;
 use config::{Config, Role, StoreLocation};
 use error::ServiceError;
 use jobs::{Job, Jobs};
+use keys::Keys;
 use policies::Policies;
 use sessions::Sessions;
 use shutdown::Shutdown;
@@ -32,11 +35,12 @@ use trainer::Trainer;
 
 use crate::control::error::FieldError;
 use crate::control::evaluation::EvaluationRequest;
-use crate::store::{JobCounts, Store};
+use crate::store::{JobCounts, Store, Tenant};
 
 /// The use cases over one store.
 pub struct Service {
     pub jobs: Jobs,
+    pub keys: Arc<Keys>,
     pub policies: Arc<Policies>,
     pub sessions: Sessions,
     pub shutdown: Shutdown,
@@ -48,7 +52,7 @@ impl Service {
     /// Opens the store, starts the trainer where the role has one, and ends the process should the store ever fail past recovery.
     ///
     /// # Errors
-    /// The role does not fit the store, the store cannot be opened, or the training thread cannot be started.
+    /// The role does not fit the store, others reach the address and nobody would be asked for a key, the store cannot be opened, or the training thread cannot be started.
     pub async fn start(config: &Config, clock: Clock, shutdown: Shutdown) -> Result<Arc<Self>, ServiceError> {
         let store = match &config.store {
             StoreLocation::Folder(_) if config.role != Role::All => {
@@ -61,12 +65,17 @@ impl Service {
             StoreLocation::Postgres(url) => Store::connect(url).await?,
         };
         exit_on_fatal(store.clone());
+        let keys = Arc::new(Keys::load(store.clone(), config.limits.clone()).await?);
+        if keys.are_absent() && !config.allow_anonymous && !config.listen.ip().to_canonical().is_loopback() {
+            return Err(ServiceError::NobodyAsked { address: config.listen });
+        }
+        tokio::spawn(keys::keep_fresh(keys.clone(), shutdown.clone()));
         let jobs = Jobs::new(store.clone(), clock.clone());
         let policies = Arc::new(Policies::new(store.clone(), clock.clone()));
         let sessions = Sessions::new(config, store.clone(), clock.clone(), policies.clone());
         let start = || Trainer::start(config, store.clone(), clock, jobs.board(), shutdown.clone());
         let trainer = config.role.runs_jobs().then(start).transpose()?;
-        Ok(Arc::new(Service { jobs, policies, sessions, shutdown, store, trainer }))
+        Ok(Arc::new(Service { jobs, keys, policies, sessions, shutdown, store, trainer }))
     }
 
     /// Queues an evaluation. The same key and request again give the same job.
@@ -74,10 +83,15 @@ impl Service {
     /// # Errors
     /// A field that breaks its rule, a policy that is absent or was trained for another problem among them; a key used
     /// with another request.
-    pub async fn evaluate(&self, request: EvaluationRequest, key: Option<String>) -> Result<Job, ServiceError> {
+    pub async fn evaluate(
+        &self,
+        tenant: &Tenant,
+        request: EvaluationRequest,
+        key: Option<String>,
+    ) -> Result<Job, ServiceError> {
         let completed = request.clone().completed()?;
         for (framework, policy) in &completed.policies {
-            let advisor = self.policies.advisor(policy).await.map_err(|error| match error {
+            let advisor = self.policies.advisor(tenant, policy).await.map_err(|error| match error {
                 ServiceError::Unknown { id, .. } => {
                     FieldError::new(format!("policies.{}", framework.name()), id, "must name a policy").into()
                 }
@@ -85,7 +99,7 @@ impl Service {
             })?;
             completed.accepts(*framework, advisor.specification())?;
         }
-        self.jobs.evaluate(request, key).await
+        self.jobs.evaluate(tenant, request, key).await
     }
 
     /// Whether the store answers and the service is not draining.

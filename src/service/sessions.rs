@@ -3,7 +3,8 @@
 //! A session is its rows: the state in memory is a replay of them and is dropped whenever a write fails, so memory
 //! never runs ahead of the disk. One lock per session orders its observations in this process. Where other processes
 //! write to the same store, the rows' head is read before every use, and a state replayed from other rows is dropped:
-//! no replica advises from a law that another has taken further, or that a restored database never had.
+//! no replica advises from a law that another has taken further, or that a restored database never had. A session is its
+//! tenant's: to everybody else it does not exist.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -22,7 +23,7 @@ use crate::control::advisor::{Advice, AdviceMode};
 use crate::control::error::FieldError;
 use crate::control::worst_case::WorstCase;
 use crate::store::{
-    Append, CreateSession, NewObservation, NewSession, ObservationRow, SessionRow, SessionSummary, Store,
+    Append, CreateSession, NewObservation, NewSession, ObservationRow, SessionRow, SessionSummary, Store, Tenant,
 };
 
 /// Sessions kept in memory; past it, those nobody is using are dropped and replayed when next asked for.
@@ -69,15 +70,17 @@ impl Sessions {
     /// There is no such policy, or history or wealth breaks a rule.
     pub async fn open(
         &self,
+        tenant: &Tenant,
         policy: &str,
         history: Option<Vec<f64>>,
         wealth: Option<f64>,
     ) -> Result<Live, ServiceError> {
-        let advisor = self.policies.advisor(policy).await?;
+        let advisor = self.policies.advisor(tenant, policy).await?;
         let state = advisor.initial_state(history.as_deref(), wealth)?;
         let problem = &advisor.specification().problem;
         let row = SessionRow {
             session: identity::new_id("session")?,
+            tenant: tenant.clone(),
             policy: policy.to_owned(),
             initial_wealth: state.wealth,
             initial_history: history.unwrap_or_else(|| problem.history.clone()),
@@ -86,6 +89,7 @@ impl Sessions {
         };
         let new = NewSession {
             session: row.session.clone(),
+            tenant: tenant.clone(),
             policy: row.policy.clone(),
             wealth: row.initial_wealth,
             history: row.initial_history.clone(),
@@ -101,34 +105,44 @@ impl Sessions {
 
     /// # Errors
     /// There is no such session.
-    pub async fn get(&self, session: &str) -> Result<Live, ServiceError> {
+    pub async fn get(&self, tenant: &Tenant, session: &str) -> Result<Live, ServiceError> {
         let mut slot = self.slot(session).lock_owned().await;
-        self.replayed(session, &mut slot).await.cloned()
+        self.replayed(tenant, session, &mut slot).await.cloned()
     }
 
     /// At most `limit` sessions, newest first, after the session with sequence `after`.
     ///
     /// # Errors
     /// The store does not answer.
-    pub async fn list(&self, limit: usize, after: Option<i64>) -> Result<Vec<SessionSummary>, ServiceError> {
-        Ok(self.store.sessions(limit, after).await?)
+    pub async fn list(
+        &self,
+        tenant: &Tenant,
+        limit: usize,
+        after: Option<i64>,
+    ) -> Result<Vec<SessionSummary>, ServiceError> {
+        Ok(self.store.sessions(tenant, limit, after).await?)
     }
 
     /// The session's start and every observation.
     ///
     /// # Errors
     /// There is no such session.
-    pub async fn history(&self, session: &str) -> Result<(SessionRow, Vec<ObservationRow>), ServiceError> {
-        let row = self.store.session(session).await?.ok_or_else(|| ServiceError::unknown("session", session))?;
+    pub async fn history(
+        &self,
+        tenant: &Tenant,
+        session: &str,
+    ) -> Result<(SessionRow, Vec<ObservationRow>), ServiceError> {
+        let row = self.store.session(session).await?.filter(|row| row.tenant == *tenant);
+        let row = row.ok_or_else(|| ServiceError::unknown("session", session))?;
         Ok((row, self.store.observations(session).await?))
     }
 
     /// # Errors
     /// There is no such session.
-    pub async fn delete(&self, session: &str) -> Result<(), ServiceError> {
+    pub async fn delete(&self, tenant: &Tenant, session: &str) -> Result<(), ServiceError> {
         let mut slot = self.slot(session).lock_owned().await;
         *slot = None;
-        let deleted = self.store.delete_session(session).await?;
+        let deleted = self.store.delete_session(tenant, session).await?;
         self.forget(session);
         if deleted { Ok(()) } else { Err(ServiceError::unknown("session", session)) }
     }
@@ -138,11 +152,11 @@ impl Sessions {
     ///
     /// # Errors
     /// A field breaks a rule; the period was observed with other content, is not the next, or lies past the horizon.
-    pub async fn observe(&self, report: Observe) -> Result<Observed, ServiceError> {
-        let sessions = self.clone();
+    pub async fn observe(&self, tenant: &Tenant, report: Observe) -> Result<Observed, ServiceError> {
+        let (sessions, tenant) = (self.clone(), tenant.clone());
         let recording = tokio::spawn(async move {
             let mut slot = sessions.slot(&report.session).lock_owned().await;
-            let outcome = sessions.record(&report, &mut slot).await;
+            let outcome = sessions.record(&tenant, &report, &mut slot).await;
             if let Err(ServiceError::Store(_) | ServiceError::Internal(_)) = outcome {
                 *slot = None;
             }
@@ -153,10 +167,11 @@ impl Sessions {
 
     async fn record(
         &self,
+        tenant: &Tenant,
         report: &Observe,
         slot: &mut OwnedMutexGuard<Option<Live>>,
     ) -> Result<Observed, ServiceError> {
-        let live = self.replayed(&report.session, slot).await?;
+        let live = self.replayed(tenant, &report.session, slot).await?;
         let content_hash = report.content_hash().map_err(ServiceError::internal)?;
         if report.period == 0 {
             return Err(FieldError::new("period", 0, "must be at least 1").into());
@@ -205,9 +220,9 @@ impl Sessions {
     ///
     /// # Errors
     /// There is no such session, or it has reached its horizon.
-    pub async fn action(&self, session: &str, question: Question) -> Result<Action, ServiceError> {
+    pub async fn action(&self, tenant: &Tenant, session: &str, question: Question) -> Result<Action, ServiceError> {
         let mut slot = self.slot(session).lock_owned().await;
-        let live = self.replayed(session, &mut slot).await?;
+        let live = self.replayed(tenant, session, &mut slot).await?;
         if live.observed() >= live.row.horizon {
             return Err(ServiceError::Completed { session: session.to_owned(), horizon: live.row.horizon });
         }
@@ -229,9 +244,10 @@ impl Sessions {
         Ok(Action { period, advice, worst_case })
     }
 
-    /// The session as its rows have it now.
+    /// The session as its rows have it now, where it is the tenant's.
     async fn replayed<'a>(
         &self,
+        tenant: &Tenant,
         session: &str,
         slot: &'a mut OwnedMutexGuard<Option<Live>>,
     ) -> Result<&'a mut Live, ServiceError> {
@@ -242,7 +258,7 @@ impl Sessions {
             **slot = None;
         }
         if slot.is_none() {
-            match self.replay(session).await {
+            match self.replay(tenant, session).await {
                 Ok(live) => **slot = Some(live),
                 Err(error) => {
                     self.forget(session);
@@ -250,12 +266,13 @@ impl Sessions {
                 }
             }
         }
-        slot.as_mut().ok_or_else(|| ServiceError::internal("a session vanished while it was locked"))
+        let live = slot.as_mut().ok_or_else(|| ServiceError::internal("a session vanished while it was locked"))?;
+        if live.row.tenant == *tenant { Ok(live) } else { Err(ServiceError::unknown("session", session)) }
     }
 
-    async fn replay(&self, session: &str) -> Result<Live, ServiceError> {
-        let (row, observations) = self.history(session).await?;
-        let advisor = self.policies.advisor(&row.policy).await?;
+    async fn replay(&self, tenant: &Tenant, session: &str) -> Result<Live, ServiceError> {
+        let (row, observations) = self.history(tenant, session).await?;
+        let advisor = self.policies.advisor(tenant, &row.policy).await?;
         let mut state = advisor.initial_state(Some(&row.initial_history), Some(row.initial_wealth))?;
         for observation in &observations {
             state = advisor.advance(&state, observation.executed_allocation, observation.log_return);

@@ -10,6 +10,7 @@ use crate::control::advisor::{Advice, AdviceMode};
 use crate::control::error::FieldError;
 use crate::control::what_if::{Hypothesis, HypotheticalRadius, Supposed};
 use crate::control::worst_case::{WorstCase, WorstLawSummary};
+use crate::store::Tenant;
 
 /// Points of a sweep; each is one turn among the robust steps that requests cause.
 const POINTS: std::ops::RangeInclusive<usize> = 2..=101;
@@ -196,9 +197,9 @@ impl Sessions {
     ///
     /// # Errors
     /// A field breaks a rule, there is no such session, it has reached its horizon, or too much waits already.
-    pub async fn what_if(&self, request: WhatIf) -> Result<WhatIfAnswer, ServiceError> {
+    pub async fn what_if(&self, tenant: &Tenant, request: WhatIf) -> Result<WhatIfAnswer, ServiceError> {
         let hypotheses = request.hypotheses()?;
-        let live = self.get(&request.session).await?;
+        let live = self.get(tenant, &request.session).await?;
         if live.observed() >= live.row.horizon {
             return Err(ServiceError::Completed { session: request.session, horizon: live.row.horizon });
         }

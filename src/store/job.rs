@@ -7,6 +7,7 @@ use super::codec::from_sql;
 use super::error::Failure;
 use super::job_state::JobState;
 use super::query::Row;
+use super::tenant::Tenant;
 
 /// What a job computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
@@ -34,6 +35,7 @@ impl JobKind {
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewJob {
     pub job: String,
+    pub tenant: Tenant,
     pub kind: JobKind,
     /// The completed request, as the worker reads it back.
     pub request_json: String,
@@ -50,6 +52,7 @@ pub struct JobRow {
     /// Order of creation; the cursor of [`Store::jobs`](super::Store::jobs).
     pub sequence: i64,
     pub job: String,
+    pub tenant: Tenant,
     pub kind: JobKind,
     pub state: JobState,
     pub request_json: String,
@@ -77,9 +80,9 @@ pub struct JobRow {
 #[derive(Debug, Clone, PartialEq)]
 pub enum CreateJob {
     Created(JobRow),
-    /// The idempotency key was used with the same request: the job it made, as it is now.
+    /// The tenant used the idempotency key with the same request: the job it made, as it is now.
     Repeated(JobRow),
-    /// The idempotency key was used with another request.
+    /// The tenant used the idempotency key with another request.
     KeyConflict,
 }
 
@@ -125,6 +128,7 @@ impl JobRow {
         let damaged = |column: &str| Failure::Corrupt(format!("the {column} of job {job}"));
         Ok(JobRow {
             sequence: row.get("sequence")?,
+            tenant: Tenant::stored(&row.get::<String>("tenant")?),
             kind: JobKind::parse(&row.get::<String>("kind")?).ok_or_else(|| damaged("kind"))?,
             state: JobState::parse(&row.get::<String>("state")?).ok_or_else(|| damaged("state"))?,
             request_json: row.get("request_json")?,

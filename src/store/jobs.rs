@@ -7,6 +7,7 @@ use super::error::Failure;
 use super::job::{CreateJob, JobCounts, JobRow, NewJob};
 use super::job_state::{JobEvent, JobState};
 use super::query::{Connection, query};
+use super::tenant::Tenant;
 use super::{Store, StoreError};
 
 impl Store {
@@ -20,9 +21,10 @@ impl Store {
         self.read("reading a job", find, |rows| rows.first().map(JobRow::from_row).transpose()).await
     }
 
-    /// At most `limit` jobs, newest first; `after` is the `sequence` of the last row of the page before.
-    pub async fn jobs(&self, limit: usize, after: Option<i64>) -> Result<Vec<JobRow>, StoreError> {
-        let page = query("SELECT * FROM jobs WHERE sequence < $1 ORDER BY sequence DESC LIMIT $2")
+    /// At most `limit` jobs of a tenant, newest first; `after` is the `sequence` of the last row of the page before.
+    pub async fn jobs(&self, tenant: &Tenant, limit: usize, after: Option<i64>) -> Result<Vec<JobRow>, StoreError> {
+        let page = query("SELECT * FROM jobs WHERE tenant = $1 AND sequence < $2 ORDER BY sequence DESC LIMIT $3")
+            .bind(tenant.as_str())
             .bind(after.unwrap_or(i64::MAX))
             .bind(to_sql(limit));
         self.read("listing jobs", page, |rows| rows.iter().map(JobRow::from_row).collect()).await
@@ -60,12 +62,13 @@ impl Store {
 async fn create(mut connection: Connection<'_>, new: NewJob) -> Result<CreateJob, Failure> {
     let connection = &mut connection;
     if let Some(key) = &new.idempotency_key
-        && let Some(earlier) = repeated(connection, key, &new.request_hash).await?
+        && let Some(earlier) = repeated(connection, &new.tenant, key, &new.request_hash).await?
     {
         return Ok(earlier);
     }
     let insert = query(
-        "INSERT INTO jobs (job, kind, state, request_json, steps_total, created_ms) VALUES ($1, $2, $3, $4, $5, $6)",
+        "INSERT INTO jobs (job, kind, state, request_json, steps_total, created_ms, tenant)
+         VALUES ($1, $2, $3, $4, $5, $6, $7)",
     );
     let insert = insert
         .bind(new.job.as_str())
@@ -73,18 +76,20 @@ async fn create(mut connection: Connection<'_>, new: NewJob) -> Result<CreateJob
         .bind(JobState::Queued.as_str())
         .bind(new.request_json)
         .bind(to_sql(new.steps_total))
-        .bind(new.created_ms);
+        .bind(new.created_ms)
+        .bind(new.tenant.as_str());
     connection.execute(insert).await?;
     if let Some(key) = &new.idempotency_key {
         let take = query(
-            "INSERT INTO idempotency_keys (idempotency_key, request_hash, job) VALUES ($1, $2, $3)
-             ON CONFLICT (idempotency_key) DO NOTHING",
+            "INSERT INTO idempotency_keys (tenant, idempotency_key, request_hash, job) VALUES ($1, $2, $3, $4)
+             ON CONFLICT (tenant, idempotency_key) DO NOTHING",
         );
-        let take = take.bind(key.as_str()).bind(new.request_hash.as_str()).bind(new.job.as_str());
+        let take =
+            take.bind(new.tenant.as_str()).bind(key.as_str()).bind(new.request_hash.as_str()).bind(new.job.as_str());
         if connection.execute(take).await? == 0 {
             // Somebody else took the key in the meantime.
             connection.execute(query("DELETE FROM jobs WHERE job = $1").bind(new.job)).await?;
-            let earlier = repeated(connection, key, &new.request_hash).await?;
+            let earlier = repeated(connection, &new.tenant, key, &new.request_hash).await?;
             return earlier.ok_or_else(|| Failure::Corrupt(format!("the idempotency key {key}")));
         }
     }
@@ -95,10 +100,12 @@ async fn create(mut connection: Connection<'_>, new: NewJob) -> Result<CreateJob
 /// What an idempotency key used before answers; `None` for a new key.
 async fn repeated(
     connection: &mut Connection<'_>,
+    tenant: &Tenant,
     key: &str,
     request_hash: &str,
 ) -> Result<Option<CreateJob>, Failure> {
-    let used = query("SELECT request_hash, job FROM idempotency_keys WHERE idempotency_key = $1").bind(key);
+    let used = query("SELECT request_hash, job FROM idempotency_keys WHERE tenant = $1 AND idempotency_key = $2");
+    let used = used.bind(tenant.as_str()).bind(key);
     let Some(used) = connection.row(used).await? else { return Ok(None) };
     if used.get::<String>("request_hash")? != request_hash {
         return Ok(Some(CreateJob::KeyConflict));

@@ -182,7 +182,7 @@ async fn finish(
     end(connection, &row, next, now_ms).await?;
     let update = match outcome {
         JobOutcome::Succeeded { policy_id, policy_json } => {
-            policies::insert(connection, &policy_id, policy_json, now_ms).await?;
+            policies::insert(connection, &row.tenant, &policy_id, policy_json, now_ms).await?;
             query("UPDATE jobs SET policy = $1, steps_done = steps_total WHERE job = $2").bind(policy_id)
         }
         JobOutcome::Reported { report_json } => {

@@ -10,8 +10,14 @@ use super::error::{Failure, StoreError};
 /// Version, description, statements.
 type Step = (i64, &'static str, &'static str);
 
-const SQLITE: [Step; 1] = [(1, "facts", include_str!("migrations/sqlite/0001_facts.sql"))];
-const POSTGRES: [Step; 1] = [(1, "facts", include_str!("migrations/postgres/0001_facts.sql"))];
+const SQLITE: [Step; 2] = [
+    (1, "facts", include_str!("migrations/sqlite/0001_facts.sql")),
+    (2, "keys", include_str!("migrations/sqlite/0002_keys.sql")),
+];
+const POSTGRES: [Step; 2] = [
+    (1, "facts", include_str!("migrations/postgres/0001_facts.sql")),
+    (2, "keys", include_str!("migrations/postgres/0002_keys.sql")),
+];
 
 pub(super) fn sqlite() -> Migrator {
     migrator(&SQLITE)
@@ -32,8 +38,13 @@ fn migrator(steps: &[Step]) -> Migrator {
 /// # Errors
 /// [`StoreError::NewerSchema`] where `found` is newer than every step of `migrator`.
 pub(super) fn refuse_newer(migrator: &Migrator, found: i64) -> Result<(), StoreError> {
-    let known = migrator.iter().map(|migration| migration.version).max().unwrap_or_default();
+    let known = newest(migrator);
     if found > known { Err(StoreError::NewerSchema { found, known }) } else { Ok(()) }
+}
+
+/// The version of its last step.
+pub(super) fn newest(migrator: &Migrator) -> i64 {
+    migrator.iter().map(|migration| migration.version).max().unwrap_or_default()
 }
 
 /// A failed migration by its cause where that is the database, as `engine` understands it.

@@ -7,9 +7,10 @@
 //!    checks, so a damaged row is [`StoreError::Corrupt`], never an action.
 //! 3. A worker whose lease ran out changes nothing: every write of a job names the `attempt` it was claimed under.
 //! 4. Decisions about one thing follow each other, whoever makes them: over SQLite because one process holds the folder
-//!    and has one writer, over PostgreSQL because each decision first locks the row it rests on.
+//!    and has one writer, over PostgreSQL because each decision first locks the row it rests on. Keys are the exception:
+//!    a [`KeyRing`] adds and revokes them beside the process that holds the folder, one statement each.
 //!
-//! What is decided is written once, in `jobs`, `leases`, `policies`, `sessions` and `observations`; how a statement is
+//! What is decided is written once, in `jobs`, `keys`, `leases`, `policies`, `sessions` and `observations`; how a statement is
 //! run, how a group of writes is committed and what an error means is the engine's, in `sqlite` and `postgres`.
 //!
 //! Conflicts, repeats and gaps are outcomes, not errors. The store reads no clock: time enters as milliseconds since the
@@ -23,6 +24,7 @@ mod error;
 mod job;
 mod job_state;
 mod jobs;
+mod keys;
 mod leases;
 mod migrations;
 mod observations;
@@ -31,6 +33,7 @@ mod postgres;
 mod query;
 mod sessions;
 mod sqlite;
+mod tenant;
 
 use std::path::Path;
 
@@ -42,10 +45,12 @@ use query::{Connection, Query, Row};
 pub use error::StoreError;
 pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, NewJob};
 pub use job_state::{IllegalTransition, JobEvent, JobState};
+pub use keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey};
 pub use observations::{Append, NewObservation, ObservationRow};
 pub use policies::{DeletePolicy, PolicyRow, PolicySummary};
 pub use postgres::{PostgresUrl, UrlError};
 pub use sessions::{CreateSession, Head, NewSession, SessionRow, SessionSummary};
+pub use tenant::Tenant;
 
 /// The durable facts of one folder or one database. Clones share the connections.
 #[derive(Clone)]

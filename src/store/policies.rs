@@ -1,10 +1,12 @@
-//! Policies: immutable, named by the hash of their bytes.
+//! Policies: immutable, named by the hash of their bytes. Tenants may have the same one: the bytes are stored once, and
+//! each tenant sees, dates and deletes its own; the bytes go with their last owner.
 
 use futures_util::FutureExt;
 
 use super::codec::to_sql;
 use super::error::Failure;
 use super::query::{Connection, Row, query};
+use super::tenant::Tenant;
 use super::{Store, StoreError};
 use crate::control::policy::content_hash;
 
@@ -39,24 +41,35 @@ pub enum DeletePolicy {
 }
 
 impl Store {
-    /// Stores a policy under its content hash. False where it existed.
+    /// Stores a policy of a tenant under its content hash. False where the tenant had it.
     ///
     /// # Errors
     /// [`StoreError::Corrupt`] where `id` is not the hash of `json`.
-    pub async fn insert_policy(&self, id: &str, json: &[u8], created_ms: i64) -> Result<bool, StoreError> {
+    pub async fn insert_policy(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        json: &[u8],
+        created_ms: i64,
+    ) -> Result<bool, StoreError> {
         let doing = "inserting a policy";
         verify(id, json).map_err(|failure| failure.during(doing))?;
-        let (id, json) = (id.to_owned(), json.to_vec());
+        let (tenant, id, json) = (tenant.clone(), id.to_owned(), json.to_vec());
         self.write(doing, move |mut connection| {
-            async move { insert(&mut connection, &id, json, created_ms).await }.boxed()
+            async move { insert(&mut connection, &tenant, &id, json, created_ms).await }.boxed()
         })
         .await
     }
 
     /// # Errors
     /// [`StoreError::Corrupt`] where the bytes no longer hash to their name.
-    pub async fn policy(&self, id: &str) -> Result<Option<PolicyRow>, StoreError> {
-        let find = query("SELECT policy, created_ms, json FROM policies WHERE policy = $1").bind(id);
+    pub async fn policy(&self, tenant: &Tenant, id: &str) -> Result<Option<PolicyRow>, StoreError> {
+        let find = query(
+            "SELECT policies.policy, policy_owners.created_ms, json
+             FROM policies JOIN policy_owners ON policy_owners.policy = policies.policy
+             WHERE policies.policy = $1 AND tenant = $2",
+        );
+        let find = find.bind(id).bind(tenant.as_str());
         self.read("reading a policy", find, |rows| {
             let Some(row) = rows.first() else { return Ok(None) };
             let json: Vec<u8> = row.get("json")?;
@@ -66,19 +79,26 @@ impl Store {
         .await
     }
 
-    /// At most `limit` policies, newest first; `after` is the `sequence` of the last row of the page before.
-    pub async fn policies(&self, limit: usize, after: Option<i64>) -> Result<Vec<PolicySummary>, StoreError> {
+    /// At most `limit` policies of a tenant, newest first; `after` is the `sequence` of the last row of the page before.
+    pub async fn policies(
+        &self,
+        tenant: &Tenant,
+        limit: usize,
+        after: Option<i64>,
+    ) -> Result<Vec<PolicySummary>, StoreError> {
         let page = query(
-            "SELECT sequence, policy, created_ms, CAST(length(json) AS BIGINT) AS bytes FROM policies
-             WHERE sequence < $1 ORDER BY sequence DESC LIMIT $2",
+            "SELECT policy_owners.sequence, policies.policy, policy_owners.created_ms,
+                    CAST(length(json) AS BIGINT) AS bytes
+             FROM policy_owners JOIN policies ON policies.policy = policy_owners.policy
+             WHERE tenant = $1 AND policy_owners.sequence < $2 ORDER BY policy_owners.sequence DESC LIMIT $3",
         );
-        let page = page.bind(after.unwrap_or(i64::MAX)).bind(to_sql(limit));
+        let page = page.bind(tenant.as_str()).bind(after.unwrap_or(i64::MAX)).bind(to_sql(limit));
         self.read("listing policies", page, |rows| rows.iter().map(PolicySummary::from_row).collect()).await
     }
 
-    pub async fn delete_policy(&self, id: &str) -> Result<DeletePolicy, StoreError> {
-        let id = id.to_owned();
-        self.write("deleting a policy", move |connection| delete(connection, id).boxed()).await
+    pub async fn delete_policy(&self, tenant: &Tenant, id: &str) -> Result<DeletePolicy, StoreError> {
+        let (tenant, id) = (tenant.clone(), id.to_owned());
+        self.write("deleting a policy", move |connection| delete(connection, tenant, id).boxed()).await
     }
 }
 
@@ -88,27 +108,55 @@ pub(super) fn verify(id: &str, json: &[u8]) -> Result<(), Failure> {
 
 pub(super) async fn insert(
     connection: &mut Connection<'_>,
+    tenant: &Tenant,
     id: &str,
     json: Vec<u8>,
     created_ms: i64,
 ) -> Result<bool, Failure> {
-    let insert =
-        query("INSERT INTO policies (policy, created_ms, json) VALUES ($1, $2, $3) ON CONFLICT (policy) DO NOTHING");
-    Ok(connection.execute(insert.bind(id).bind(created_ms).bind(json)).await? > 0)
+    let insert = |json: Vec<u8>| {
+        query("INSERT INTO policies (policy, created_ms, json) VALUES ($1, $2, $3) ON CONFLICT (policy) DO NOTHING")
+            .bind(id)
+            .bind(created_ms)
+            .bind(json)
+    };
+    connection.execute(insert(json.clone())).await?;
+    let kept = query("SELECT sequence FROM policies WHERE policy = $1").bind(id);
+    if connection.row(kept.for_share()).await?.is_none() {
+        // Its last owner deleted it in the meantime.
+        connection.execute(insert(json)).await?;
+    }
+    let own = query(
+        "INSERT INTO policy_owners (tenant, policy, created_ms) VALUES ($1, $2, $3)
+         ON CONFLICT (policy, tenant) DO NOTHING",
+    );
+    Ok(connection.execute(own.bind(tenant.as_str()).bind(id).bind(created_ms)).await? > 0)
+}
+
+pub(super) async fn is_owned(connection: &mut Connection<'_>, tenant: &Tenant, id: &str) -> Result<bool, Failure> {
+    let owner = query("SELECT sequence FROM policy_owners WHERE policy = $1 AND tenant = $2");
+    Ok(connection.row(owner.bind(id).bind(tenant.as_str())).await?.is_some())
 }
 
 /// The policy stays locked while its sessions are counted: none can be opened in between.
-async fn delete(mut connection: Connection<'_>, id: String) -> Result<DeletePolicy, Failure> {
+async fn delete(mut connection: Connection<'_>, tenant: Tenant, id: String) -> Result<DeletePolicy, Failure> {
+    let connection = &mut connection;
     let lock = query("SELECT sequence FROM policies WHERE policy = $1").bind(id.as_str()).for_update();
-    if connection.row(lock).await?.is_none() {
+    if connection.row(lock).await?.is_none() || !is_owned(connection, &tenant, &id).await? {
         return Ok(DeletePolicy::Absent);
     }
-    let count = query("SELECT count(*) AS sessions FROM sessions WHERE policy = $1").bind(id.as_str());
+    let count = query("SELECT count(*) AS sessions FROM sessions WHERE policy = $1 AND tenant = $2");
+    let count = count.bind(id.as_str()).bind(tenant.as_str());
     let sessions: i64 = connection.row(count).await?.map_or(Ok(0), |row| row.get("sessions"))?;
     if sessions > 0 {
         return Ok(DeletePolicy::InUse { sessions: sessions.unsigned_abs() });
     }
-    connection.execute(query("DELETE FROM policies WHERE policy = $1").bind(id)).await?;
+    let disown = query("DELETE FROM policy_owners WHERE policy = $1 AND tenant = $2");
+    connection.execute(disown.bind(id.as_str()).bind(tenant.as_str())).await?;
+    let unowned = query(
+        "DELETE FROM policies WHERE policy = $1
+         AND NOT EXISTS (SELECT 1 FROM policy_owners WHERE policy_owners.policy = policies.policy)",
+    );
+    connection.execute(unowned.bind(id)).await?;
     Ok(DeletePolicy::Deleted)
 }
 

@@ -5,12 +5,14 @@ use futures_util::FutureExt;
 use super::codec::{Seal, decode_reals, encode_reals, from_sql, to_sql};
 use super::error::Failure;
 use super::query::{Connection, Row, query};
-use super::{Store, StoreError};
+use super::tenant::Tenant;
+use super::{Store, StoreError, policies};
 
 /// A session to open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewSession {
     pub session: String,
+    pub tenant: Tenant,
     pub policy: String,
     pub wealth: f64,
     /// The log-returns known at the start.
@@ -23,7 +25,7 @@ pub struct NewSession {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CreateSession {
     Created,
-    /// There is no such policy.
+    /// The tenant has no such policy.
     NoPolicy,
     /// The identifier is taken.
     Exists,
@@ -33,6 +35,7 @@ pub enum CreateSession {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionRow {
     pub session: String,
+    pub tenant: Tenant,
     pub policy: String,
     pub initial_wealth: f64,
     pub initial_history: Vec<f64>,
@@ -93,24 +96,29 @@ impl Store {
         .await
     }
 
-    /// At most `limit` sessions, newest first; `after` is the `sequence` of the last row of the page before.
-    pub async fn sessions(&self, limit: usize, after: Option<i64>) -> Result<Vec<SessionSummary>, StoreError> {
+    /// At most `limit` sessions of a tenant, newest first; `after` is the `sequence` of the last row of the page before.
+    pub async fn sessions(
+        &self,
+        tenant: &Tenant,
+        limit: usize,
+        after: Option<i64>,
+    ) -> Result<Vec<SessionSummary>, StoreError> {
         let page = query(
             "SELECT sequence, session, policy, initial_wealth, horizon, created_ms,
                     (SELECT count(*) FROM observations WHERE observations.session = sessions.session) AS observations
-             FROM sessions WHERE sequence < $1 ORDER BY sequence DESC LIMIT $2",
+             FROM sessions WHERE tenant = $1 AND sequence < $2 ORDER BY sequence DESC LIMIT $3",
         );
-        let page = page.bind(after.unwrap_or(i64::MAX)).bind(to_sql(limit));
+        let page = page.bind(tenant.as_str()).bind(after.unwrap_or(i64::MAX)).bind(to_sql(limit));
         self.read("listing sessions", page, |rows| rows.iter().map(SessionSummary::from_row).collect()).await
     }
 
-    /// Deletes a session and its observations. False where there was none.
-    pub async fn delete_session(&self, session: &str) -> Result<bool, StoreError> {
-        let session = session.to_owned();
+    /// Deletes a session of a tenant and its observations. False where there was none.
+    pub async fn delete_session(&self, tenant: &Tenant, session: &str) -> Result<bool, StoreError> {
+        let (tenant, session) = (tenant.clone(), session.to_owned());
         self.write("deleting a session", move |mut connection| {
             async move {
-                let delete = query("DELETE FROM sessions WHERE session = $1").bind(session);
-                Ok(connection.execute(delete).await? > 0)
+                let delete = query("DELETE FROM sessions WHERE session = $1 AND tenant = $2");
+                Ok(connection.execute(delete.bind(session).bind(tenant.as_str())).await? > 0)
             }
             .boxed()
         })
@@ -127,13 +135,15 @@ impl Store {
 /// The policy stays locked until the session is there: it cannot be deleted in between.
 async fn create(mut connection: Connection<'_>, new: NewSession) -> Result<CreateSession, Failure> {
     let policy = query("SELECT sequence FROM policies WHERE policy = $1").bind(new.policy.as_str());
-    if connection.row(policy.for_share()).await?.is_none() {
+    if connection.row(policy.for_share()).await?.is_none()
+        || !policies::is_owned(&mut connection, &new.tenant, &new.policy).await?
+    {
         return Ok(CreateSession::NoPolicy);
     }
     let row = SessionRow::from(new);
     let insert = query(
-        "INSERT INTO sessions (session, policy, initial_wealth, initial_history, horizon, created_ms, seal)
-         VALUES ($1, $2, $3, $4, $5, $6, $7) ON CONFLICT (session) DO NOTHING",
+        "INSERT INTO sessions (session, policy, initial_wealth, initial_history, horizon, created_ms, seal, tenant)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8) ON CONFLICT (session) DO NOTHING",
     );
     let seal = row.seal().finish();
     let insert = insert
@@ -143,7 +153,8 @@ async fn create(mut connection: Connection<'_>, new: NewSession) -> Result<Creat
         .bind(encode_reals(&row.initial_history))
         .bind(to_sql(row.horizon))
         .bind(row.created_ms)
-        .bind(seal);
+        .bind(seal)
+        .bind(row.tenant.as_str());
     let inserted = connection.execute(insert).await?;
     Ok(if inserted > 0 { CreateSession::Created } else { CreateSession::Exists })
 }
@@ -152,6 +163,7 @@ impl From<NewSession> for SessionRow {
     fn from(new: NewSession) -> Self {
         SessionRow {
             session: new.session,
+            tenant: new.tenant,
             policy: new.policy,
             initial_wealth: new.wealth,
             initial_history: new.history,
@@ -168,13 +180,15 @@ impl SessionRow {
     }
 
     fn seal(&self) -> Seal {
-        Seal::of("session")
+        let seal = Seal::of("session")
             .text(&self.session)
             .text(&self.policy)
             .real(self.initial_wealth)
             .bytes(&encode_reals(&self.initial_history))
             .integer(to_sql(self.horizon))
-            .integer(self.created_ms)
+            .integer(self.created_ms);
+        // Sessions sealed before there were tenants are the default one's.
+        if self.tenant.is_default() { seal } else { seal.text(self.tenant.as_str()) }
     }
 
     fn from_row(row: &Row) -> Result<Self, Failure> {
@@ -182,6 +196,7 @@ impl SessionRow {
         let what = || format!("the start of session {session}");
         let history = decode_reals(&row.get::<Vec<u8>>("initial_history")?);
         let read = SessionRow {
+            tenant: Tenant::stored(&row.get::<String>("tenant")?),
             policy: row.get("policy")?,
             initial_wealth: row.get("initial_wealth")?,
             initial_history: history.ok_or_else(|| Failure::Corrupt(what()))?,

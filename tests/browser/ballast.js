@@ -1,17 +1,19 @@
 // The real binary on a free port with a data folder of its own, and the real Chromium.
 
-import { spawn } from "node:child_process";
+import { execFile, spawn } from "node:child_process";
 import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { createInterface } from "node:readline";
 import { fileURLToPath } from "node:url";
+import { promisify } from "node:util";
 import { chromium } from "playwright-core";
 
+const run = promisify(execFile);
 const BINARY = process.env.BALLAST_BINARY ?? fileURLToPath(new URL("../../target/release/ballast", import.meta.url));
 const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 
-/** Starts the service; `url` is where it listens, `stop()` ends it and takes its data away. */
+/** Starts the service; `url` is where it listens, `key(...roles)` makes a key, `stop()` ends it and takes its data away. */
 export async function service() {
   const folder = await mkdtemp(join(tmpdir(), "ballast-browser-"));
   const process_ = spawn(BINARY, ["serve", "--listen", "127.0.0.1:0", "--data", folder], {
@@ -32,7 +34,11 @@ export async function service() {
     await ended;
     await rm(folder, { recursive: true });
   };
-  return { url, stop };
+  const key = async (...roles) => {
+    const given = roles.flatMap((role) => ["--role", role]);
+    return (await run(BINARY, ["keys", "create", "--data", folder, ...given])).stdout.trim();
+  };
+  return { url, stop, key };
 }
 
 export function browser() {

@@ -11,8 +11,12 @@ use std::time::{Duration, Instant};
 
 use ballast::control::backward::{Training, Watch};
 use ballast::http::{self, Running};
+use ballast::service::clock::Clock;
 use ballast::service::config::Config;
+use ballast::service::keys;
 use ballast::service::shutdown::Shutdown;
+use ballast::store::KeyRing;
+use reqwest::header::{AUTHORIZATION, HeaderMap};
 use reqwest::{Client, Method, Response, StatusCode};
 use serde_json::{Value, json};
 use sqlx::Connection;
@@ -78,6 +82,14 @@ pub async fn lock_out(folder: &Path, time: Duration) {
     connection.close().await.expect("closed");
 }
 
+/// Makes a key; its text.
+pub async fn issue_key(ring: &KeyRing, tenant: &str, roles: &str) -> String {
+    let (tenant, roles) = (tenant.parse().expect("a tenant"), roles.parse().expect("roles"));
+    let (_, secret) = keys::issue(ring, tenant, roles, &Clock::system()).await.expect("a key");
+    ring.close().await;
+    secret.reveal().to_owned()
+}
+
 fn config(folder: &Path) -> Config {
     Config { listen: ([127, 0, 0, 1], 0).into(), body_limit_bytes: 1 << 20, ..Config::new(folder) }
 }
@@ -105,6 +117,17 @@ impl App {
     pub fn at(url: String, folder: TempDir) -> App {
         let (session, policy) = (String::new(), String::new());
         App { client: Client::new(), url, session, policy, folder, running: None }
+    }
+
+    /// Shows `key` with every request from now on; none where it is empty.
+    pub fn hold(&mut self, key: &str) {
+        let shown = (!key.is_empty()).then(|| (AUTHORIZATION, format!("Bearer {key}").parse().expect("a header")));
+        self.client = Client::builder().default_headers(HeaderMap::from_iter(shown)).build().expect("a client");
+    }
+
+    /// Makes a key beside the service that runs over this folder.
+    pub async fn key(&self, tenant: &str, roles: &str) -> String {
+        issue_key(&KeyRing::open(self.folder()).await.expect("the keys"), tenant, roles).await
     }
 
     pub fn folder(&self) -> &Path {

@@ -1,8 +1,10 @@
 //! Where a store under test keeps its facts: a folder, or a database.
 
-use ballast::store::Store;
+use ballast::store::{KeyRing, Store, StoreError};
+use sqlx::migrate::{Migration, MigrationType, Migrator};
+use sqlx::postgres::PgConnection;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
-use sqlx::{AssertSqlSafe, Connection};
+use sqlx::{AssertSqlSafe, Connection, SqlSafeStr};
 use tempfile::TempDir;
 
 use super::postgres;
@@ -26,11 +28,60 @@ impl Place {
         self.try_open().await.unwrap()
     }
 
-    pub async fn try_open(&self) -> Result<Store, ballast::store::StoreError> {
+    pub async fn try_open(&self) -> Result<Store, StoreError> {
         match self {
             Place::Folder(folder) => Store::open(&folder.path().join("data")).await,
             Place::Database(url) => Store::connect(&url.parse().unwrap()).await,
         }
+    }
+
+    /// Its keys, beside whoever has it open.
+    pub async fn key_ring(&self) -> Result<KeyRing, StoreError> {
+        match self {
+            Place::Folder(folder) => KeyRing::open(&folder.path().join("data")).await,
+            Place::Database(url) => KeyRing::connect(&url.parse().unwrap()).await,
+        }
+    }
+
+    /// Makes what a release with the first migration alone left: a policy, and a job under an idempotency key.
+    pub async fn create_of_schema_1(&self, policy: &str, json: &[u8]) {
+        let migrator = |facts: &'static str| {
+            let kind = MigrationType::Simple;
+            Migrator::with_migrations(vec![Migration::new(1, "facts".into(), kind, facts.into_sql_str(), false)])
+        };
+        match self {
+            Place::Folder(folder) => {
+                std::fs::create_dir(folder.path().join("data")).unwrap();
+                let file = folder.path().join("data/ballast.sqlite");
+                let options = SqliteConnectOptions::new().filename(file).create_if_missing(true);
+                let mut connection = SqliteConnection::connect_with(&options).await.unwrap();
+                migrator(include_str!("../../src/store/migrations/sqlite/0001_facts.sql"))
+                    .run(&mut connection)
+                    .await
+                    .unwrap();
+                connection.close().await.unwrap();
+            }
+            Place::Database(url) => {
+                let mut connection = PgConnection::connect(url).await.unwrap();
+                migrator(include_str!("../../src/store/migrations/postgres/0001_facts.sql"))
+                    .run(&mut connection)
+                    .await
+                    .unwrap();
+                connection.close().await.unwrap();
+            }
+        }
+        let hex: String = json.iter().map(|byte| format!("{byte:02x}")).collect();
+        let bytes = match self {
+            Place::Folder(_) => format!("x'{hex}'"),
+            Place::Database(_) => format!("decode('{hex}', 'hex')"),
+        };
+        self.tamper(&format!("INSERT INTO policies (policy, created_ms, json) VALUES ('{policy}', 1, {bytes})")).await;
+        self.tamper(
+            "INSERT INTO jobs (job, kind, state, request_json, steps_total, created_ms)
+             VALUES ('old', 'train', 'queued', '{}', 1, 1)",
+        )
+        .await;
+        self.tamper("INSERT INTO idempotency_keys VALUES ('old key', 'hash', 'old')").await;
     }
 
     pub async fn reopen(&self, store: Store) -> Store {

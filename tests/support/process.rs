@@ -6,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 /// Starts `ballast serve` on a free port, with what `configure` adds; the process and its address.
 pub fn serve(configure: impl FnOnce(&mut Command)) -> (Child, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
-    command.args(["serve", "--listen", "127.0.0.1:0"]).env("RUST_LOG", "warn").stdout(Stdio::piped());
+    command.arg("serve").env("BALLAST_LISTEN", "127.0.0.1:0").env("RUST_LOG", "warn").stdout(Stdio::piped());
     configure(&mut command);
     let mut child = command.spawn().unwrap();
     let mut line = String::new();

@@ -1,5 +1,10 @@
 // The service's own interface, as /docs describes it.
 
+import { held, shown } from "./key.js";
+
+/** A stream that broke off is opened again after so long, in milliseconds. */
+const RECONNECT = 1000;
+
 /** A refusal or a failure, as a problem document (RFC 9457). */
 export class Problem extends Error {
   constructor(document) {
@@ -9,12 +14,12 @@ export class Problem extends Error {
 
   /** Whether the request may have gone through unheard, or may do so later: sending it again is what to do. */
   get passing() {
-    return this.status === 0 || this.status === 503;
+    return this.status === 0 || this.status === 429 || this.status === 503;
   }
 }
 
-async function send(method, path, body, signal) {
-  const request = { method, signal, headers: {} };
+async function send(method, path, body, signal, headers = {}) {
+  const request = { method, signal, headers: { ...headers, ...shown() } };
   if (body !== undefined) {
     request.headers["content-type"] = "application/json";
     request.body = typeof body === "string" ? body : JSON.stringify(body);
@@ -54,19 +59,58 @@ export async function list(path, name, signal, most = 200) {
 }
 
 /**
- * Follows a job: `changed(job)` at once and at every change, until it ends or `signal` aborts.
- * The browser reconnects by itself and says which event it saw last.
+ * Follows a job: `changed(job)` at once and at every change, until it ends or `signal` aborts. A stream that breaks off
+ * is opened again, and told which event was seen last. By `fetch`, for an `EventSource` cannot show a key.
  */
-export function follow(job, changed, signal) {
-  const source = new EventSource(`/jobs/${job}/events`);
-  const heard = (event) => {
-    const now = JSON.parse(event.data);
-    if (isOver(now)) source.close();
-    changed(now);
-  };
-  source.addEventListener("state", heard);
-  source.addEventListener("progress", heard);
-  signal.addEventListener("abort", () => source.close());
+export async function follow(job, changed, signal) {
+  let seen = {};
+  while (!signal.aborted) {
+    try {
+      const stream = await send("GET", `/jobs/${job}/events`, undefined, signal, seen);
+      if (stream.status === 204) return;
+      for await (const event of events(stream.body)) {
+        seen = { "last-event-id": event.id };
+        const now = JSON.parse(event.data);
+        changed(now);
+        if (isOver(now)) return;
+      }
+    } catch (error) {
+      if (signal.aborted || (error instanceof Problem && !error.passing)) return;
+    }
+    await new Promise((resolve) => setTimeout(resolve, RECONNECT));
+  }
+}
+
+/** The events in a stream, each with its fields; comments have no data and are passed over. */
+async function* events(body) {
+  const reader = body.pipeThrough(new TextDecoderStream()).getReader();
+  const field = (line) => [line.split(":", 1)[0], line.slice(line.indexOf(":") + 1).trimStart()];
+  let rest = "";
+  try {
+    for (;;) {
+      const { value, done } = await reader.read();
+      if (done) return;
+      const blocks = (rest + value).split("\n\n");
+      rest = blocks.pop();
+      const found = blocks.map((block) => Object.fromEntries(block.split("\n").map(field)));
+      yield* found.filter((event) => event.data);
+    }
+  } finally {
+    reader.cancel().catch(() => {});
+  }
+}
+
+/** Listener of a link that downloads: with a key held, the browser alone would be refused. */
+export async function download(event) {
+  const link = event.currentTarget;
+  if (!held() || link.href.startsWith("blob:")) return;
+  event.preventDefault();
+  const file = await (await send("GET", link.getAttribute("href"))).blob();
+  const address = link.getAttribute("href");
+  link.href = URL.createObjectURL(file);
+  link.click();
+  URL.revokeObjectURL(link.href);
+  link.setAttribute("href", address);
 }
 
 export const isOver = (job) => ["succeeded", "failed", "cancelled"].includes(job.state);

@@ -1,6 +1,6 @@
 // The report of one evaluation, as docs/evaluation.md describes it.
 
-import { get, isOver } from "./api.js";
+import { download, get, isOver } from "./api.js";
 import { lineChart } from "./chart.js";
 import { facts, h, section, table } from "./dom.js";
 import { count, counted, duration, percent, percentTick, short, significant, tick, wealth } from "./format.js";
@@ -17,7 +17,7 @@ export async function view(id, leaving) {
   const names = report.strategies.map(named);
   const export_ = h(
     "a",
-    { class: "button quiet", href: job.report, download: `evaluation-${short(id)}.json` },
+    { class: "button quiet", href: job.report, download: `evaluation-${short(id)}.json`, onclick: download },
     "Export",
   );
   return {

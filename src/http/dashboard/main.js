@@ -5,6 +5,7 @@ import { announce, h } from "./dom.js";
 import * as evaluation from "./evaluation.js";
 import * as evaluations from "./evaluations.js";
 import * as jobs from "./jobs.js";
+import { keyForm } from "./key.js";
 import * as policies from "./policies.js";
 import * as policy from "./policy.js";
 import * as session from "./session.js";
@@ -21,6 +22,7 @@ const ROUTES = [
   [/^#\/sessions\/([^/]+)$/, session.view, "sessions"],
   [/^#\/evaluations(?:\?(.*))?$/, evaluations.view, "evaluations"],
   [/^#\/evaluations\/([^/]+)$/, evaluation.view, "evaluations"],
+  [/^#\/key$/, key, "key"],
 ];
 
 const main = document.querySelector("main");
@@ -43,7 +45,7 @@ async function show() {
     page = failed(error);
   }
   if (signal.aborted) return;
-  for (const link of document.querySelectorAll("nav a")) {
+  for (const link of document.querySelectorAll(".bar [data-view]")) {
     if (link.dataset.view === route?.[2]) link.setAttribute("aria-current", "page");
     else link.removeAttribute("aria-current");
   }
@@ -61,6 +63,13 @@ async function show() {
   first = false;
 }
 
+/** Where a key is typed in, or given up. */
+function key() {
+  const note = "A service that asks for keys shows nothing without one. This tab alone keeps it, until it is closed.";
+  const home = () => location.assign("#/jobs");
+  return { title: "Key", body: [h("p", {}, note), keyForm(home)] };
+}
+
 function missing(hash) {
   return {
     title: "There is nothing here",
@@ -70,6 +79,7 @@ function missing(hash) {
 
 function failed(error) {
   if (!(error instanceof Problem)) console.error(error);
+  if (error.status === 401) return { title: "A key is needed", body: [h("p", { role: "alert" }, error.message), keyForm(show)] };
   const again = h("button", { onclick: show }, "Try again");
   return { title: error.title ?? "This view failed", body: [h("p", { role: "alert" }, error.message), again] };
 }

@@ -1,6 +1,6 @@
 // One policy: what it was asked, what it does, how well it was solved.
 
-import { get, offers, remove } from "./api.js";
+import { download, get, offers, remove } from "./api.js";
 import { lineChart } from "./chart.js";
 import { announce, disclosure, h, section, table } from "./dom.js";
 import { basisPoints, count, moment, percent, percentTick, short, significant, tick, wealth } from "./format.js";
@@ -35,7 +35,11 @@ export async function view(id, leaving) {
     { class: "actions" },
     h("a", { class: "button", href: `#/sessions?policy=${id}` }, "Open a session"),
     evaluate,
-    h("a", { class: "button quiet", href: `/policies/${id}/export`, download: `policy-${short(id)}.json` }, "Export"),
+    h(
+      "a",
+      { class: "button quiet", href: `/policies/${id}/export`, download: `policy-${short(id)}.json`, onclick: download },
+      "Export",
+    ),
     deletion(id),
   );
   const trail = h(

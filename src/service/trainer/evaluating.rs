@@ -52,7 +52,7 @@ impl Worker {
     ) -> Result<Result<Follower, Ended>, StoreError> {
         let request = &evaluation.request;
         let policy = if let Some(id) = request.policies.get(&framework) {
-            let Some(row) = self.runtime.block_on(self.store.policy(id))? else {
+            let Some(row) = self.runtime.block_on(self.store.policy(&claimed.row.tenant, id))? else {
                 return Ok(Err(failed(format!("the policy {id} was deleted"))));
             };
             match Policy::from_json(&row.json) {

@@ -28,11 +28,19 @@ pub(super) struct Folder {
 
 impl Folder {
     pub(super) async fn open(dir: &Path) -> Result<Folder, StoreError> {
-        let opening::Opened { lock, writer, readers } = opening::open(dir).await?;
+        Ok(Folder::over(opening::open(dir).await?))
+    }
+
+    /// A folder that another process may hold, for writes that meet none of its own.
+    pub(super) async fn open_beside(dir: &Path) -> Result<Folder, StoreError> {
+        Ok(Folder::over(opening::open_beside(dir).await?))
+    }
+
+    fn over(opening::Opened { lock, writer, readers }: opening::Opened) -> Folder {
         let (requests, receiver) = mpsc::channel(writer::QUEUE);
         let fatal = watch::Sender::new(None);
         tokio::spawn(writer::serve(writer, receiver, fatal.clone(), lock));
-        Ok(Folder { readers, requests, fatal })
+        Folder { readers, requests, fatal }
     }
 
     pub(super) async fn ping(&self) -> Result<(), StoreError> {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
-use sqlx::{ConnectOptions, SqliteConnection};
+use sqlx::{ConnectOptions, Connection, SqliteConnection};
 
 use crate::store::error::{Failure, StoreError};
 use crate::store::job_state::JobState;
@@ -16,14 +16,14 @@ const DATABASE: &str = "ballast.sqlite";
 const LOCK: &str = "ballast.lock";
 /// The first release without the reset bug of the write-ahead log.
 const OLDEST_ENGINE: [u32; 3] = [3, 51, 3];
-/// A reader waits this long for recovery after a crash; writers never meet.
+/// A reader waits this long for recovery after a crash, and a writer for one that adds or revokes a key.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 /// Each read connection is a thread; reads are short.
 const READERS: u32 = 4;
 
-/// A folder that is ours, its schema up to date.
+/// A folder, its schema up to date. It is ours where there is a lock.
 pub(super) struct Opened {
-    pub lock: File,
+    pub lock: Option<File>,
     pub writer: SqliteConnection,
     pub readers: SqlitePool,
 }
@@ -35,13 +35,45 @@ pub(super) async fn open(dir: &Path) -> Result<Opened, StoreError> {
     refuse_old_engine(&mut writer).await?;
     migrate(&mut writer).await?;
     end_leases(&mut writer).await?;
-    let options = SqliteConnectOptions::new().filename(&file).read_only(true).busy_timeout(BUSY_TIMEOUT);
-    let readers = SqlitePoolOptions::new()
+    Ok(Opened { lock: Some(lock), writer, readers: readers(&file) })
+}
+
+/// As [`open`], without holding the folder and without touching what its holder does. The lock is needed only to bring
+/// the schema up to date, and given up after.
+pub(super) async fn open_beside(dir: &Path) -> Result<Opened, StoreError> {
+    let file = dir.join(DATABASE);
+    if !is_current(&file).await? {
+        let lock = lock(dir)?;
+        let mut connection = connect(&file).await?;
+        refuse_old_engine(&mut connection).await?;
+        migrate(&mut connection).await?;
+        connection.close().await.map_err(opening)?;
+        drop(lock);
+    }
+    let mut writer = connect(&file).await?;
+    refuse_old_engine(&mut writer).await?;
+    Ok(Opened { lock: None, writer, readers: readers(&file) })
+}
+
+/// Whether the file is there with the schema of this binary.
+async fn is_current(file: &Path) -> Result<bool, StoreError> {
+    if !file.exists() {
+        return Ok(false);
+    }
+    let (mut connection, migrator) = (connect(file).await?, migrations::sqlite());
+    let found = version(&mut connection).await?;
+    migrations::refuse_newer(&migrator, found)?;
+    connection.close().await.map_err(opening)?;
+    Ok(found == migrations::newest(&migrator))
+}
+
+fn readers(file: &Path) -> SqlitePool {
+    let options = SqliteConnectOptions::new().filename(file).read_only(true).busy_timeout(BUSY_TIMEOUT);
+    SqlitePoolOptions::new()
         .max_connections(READERS)
         .acquire_timeout(BUSY_TIMEOUT)
         .test_before_acquire(false)
-        .connect_lazy_with(options.disable_statement_logging());
-    Ok(Opened { lock, writer, readers })
+        .connect_lazy_with(options.disable_statement_logging())
 }
 
 fn lock(dir: &Path) -> Result<File, StoreError> {
@@ -82,14 +114,19 @@ async fn refuse_old_engine(connection: &mut SqliteConnection) -> Result<(), Stor
 
 async fn migrate(connection: &mut SqliteConnection) -> Result<(), StoreError> {
     let migrator = migrations::sqlite();
+    migrations::refuse_newer(&migrator, version(connection).await?)?;
+    migrator.run(connection).await.map_err(|error| migrations::failed(error, Failure::Sqlite))
+}
+
+/// The version of the schema; 0 where there is none yet.
+async fn version(connection: &mut SqliteConnection) -> Result<i64, StoreError> {
     let table = "SELECT count(*) FROM sqlite_schema WHERE name = '_sqlx_migrations'";
     let tables: i64 = sqlx::query_scalar(table).fetch_one(&mut *connection).await.map_err(opening)?;
-    if tables > 0 {
-        let newest = "SELECT coalesce(max(version), 0) FROM _sqlx_migrations";
-        let found = sqlx::query_scalar(newest).fetch_one(&mut *connection).await.map_err(opening)?;
-        migrations::refuse_newer(&migrator, found)?;
+    if tables == 0 {
+        return Ok(0);
     }
-    migrator.run(connection).await.map_err(|error| migrations::failed(error, Failure::Sqlite))
+    let newest = "SELECT coalesce(max(version), 0) FROM _sqlx_migrations";
+    sqlx::query_scalar(newest).fetch_one(connection).await.map_err(opening)
 }
 
 /// The lock shows that whoever held a lease can no longer write: its jobs may be claimed at once.

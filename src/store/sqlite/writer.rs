@@ -65,12 +65,12 @@ impl Operation {
 }
 
 /// Serves requests until the last [`Folder`](super::Folder) is dropped, one closes it, or a write fails fatally.
-/// Holds the folder's lock as long as it can write.
+/// Holds the folder's lock, where it has it, as long as it can write.
 pub(super) async fn serve(
     mut connection: SqliteConnection,
     mut requests: mpsc::Receiver<Request>,
     fatal: watch::Sender<Option<StoreError>>,
-    lock: File,
+    lock: Option<File>,
 ) {
     let mut waiting = VecDeque::new();
     let mut closed = Vec::new();

@@ -18,6 +18,7 @@ from .errors import (
     BallastError,
     BodyTooLarge,
     DamagedPolicy,
+    Forbidden,
     IdempotencyConflict,
     Internal,
     InUse,
@@ -32,6 +33,8 @@ from .errors import (
     ProblemError,
     SessionCompleted,
     StorageFull,
+    TooManyRequests,
+    Unauthenticated,
     Unreachable,
 )
 from .policy import Policy
@@ -44,6 +47,7 @@ __all__ = [
     "BodyTooLarge",
     "DamagedPolicy",
     "Evaluation",
+    "Forbidden",
     "IdempotencyConflict",
     "InUse",
     "Internal",
@@ -61,7 +65,9 @@ __all__ = [
     "Session",
     "SessionCompleted",
     "StorageFull",
+    "TooManyRequests",
     "Training",
+    "Unauthenticated",
     "Unreachable",
     "wire",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from types import TracebackType
@@ -21,6 +22,7 @@ from .transport import Transport
 class Ballast:
     """A service at ``url``.
 
+    ``key`` is shown with every request: ``BALLAST_KEY`` of the environment unless given.
     ``timeout`` bounds each wait for the network, in seconds. A request that is lost or put off is sent again up to
     ``retries`` times, after 0.2 s, 0.4 s and so on (``ballast.transport`` says which, and why that is safe).
     ``headers`` go with every request, and ``transport`` replaces the connections themselves (proxies, certificates).
@@ -31,12 +33,15 @@ class Ballast:
         self,
         url: str = "http://127.0.0.1:8080",
         *,
+        key: str | None = None,
         timeout: float = 30.0,
         retries: int = 6,
         headers: Mapping[str, str] | None = None,
         transport: httpx.BaseTransport | None = None,
     ) -> None:
-        http = httpx.Client(base_url=url, timeout=timeout, headers=headers, transport=transport)
+        key = os.environ.get("BALLAST_KEY") if key is None else key
+        shown = {"authorization": f"Bearer {key}"} if key else {}
+        http = httpx.Client(base_url=url, timeout=timeout, headers={**shown, **(headers or {})}, transport=transport)
         self._transport = Transport(http, retries)
 
     def train(

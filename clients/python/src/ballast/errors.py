@@ -76,6 +76,14 @@ class InvalidPolicy(ProblemError, slug="invalid-policy"):
     """The imported document is not a usable policy."""
 
 
+class Unauthenticated(ProblemError, slug="unauthenticated"):
+    """The service asks for a key, and was shown none that is in force."""
+
+
+class Forbidden(ProblemError, slug="forbidden"):
+    """The key lacks the role that the call needs; ``rule`` names it."""
+
+
 class NotFound(ProblemError, slug="not-found"):
     """There is no such job, policy or session."""
 
@@ -102,6 +110,10 @@ class SessionCompleted(ProblemError, slug="session-completed"):
 
 class BodyTooLarge(ProblemError, slug="body-too-large"):
     """The body is larger than the service takes."""
+
+
+class TooManyRequests(ProblemError, slug="too-many-requests"):
+    """The tenant of the key calls too often, and still did at the last of the repetitions."""
 
 
 class Overloaded(ProblemError, slug="overloaded"):

@@ -1,0 +1,273 @@
+//! Clients that are slow, greedy or hostile: they are refused, and nobody else notices.
+
+mod support;
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use ballast::service::allowance::Limits;
+use futures_util::future::join_all;
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+use support::{App, process, read, specification, trained};
+
+struct Process(std::process::Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+const SLOW_SOCKETS: usize = 1000;
+/// What a call may take at most while all of them are open, on a machine that builds something else meanwhile.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(2);
+
+/// Sends `bytes` and leaves the connection as it is.
+fn open_socket(address: &str, bytes: &str) -> TcpStream {
+    let mut socket = TcpStream::connect(address).unwrap();
+    socket.set_nonblocking(true).unwrap();
+    // Past what the buffers between the two take, the rest stays unsent.
+    let _ = socket.write(bytes.as_bytes());
+    socket
+}
+
+/// Whether the other side has closed; what it sent is taken.
+fn is_closed(socket: &mut TcpStream) -> bool {
+    let mut taken = [0; 1024];
+    loop {
+        match socket.read(&mut taken) {
+            Ok(0) => return true,
+            Ok(_) => {}
+            Err(error) => return error.kind() != ErrorKind::WouldBlock,
+        }
+    }
+}
+
+/// The slowest of 30 rounds of calls, each answered with 200.
+async fn slowest(app: &App, first: usize) -> Duration {
+    let mut slowest = Duration::ZERO;
+    for round in 0..30 {
+        let asked = Instant::now();
+        let (status, answer) = match round % 3 {
+            0 => app.action().await,
+            1 => app.observe(first + round / 3, 0.001).await,
+            _ => app.post("/what-if", &json!({ "session": app.session, "wealth": 50.0 })).await,
+        };
+        assert_eq!(status, 200, "round {round}: {answer}");
+        slowest = slowest.max(asked.elapsed());
+    }
+    slowest
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_thousand_slow_sockets_harm_nobody_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let (child, url) = process::serve(|command| {
+        command.arg("--data").arg(folder.path());
+    });
+    let address = url.strip_prefix("http://").unwrap().to_owned();
+    let (_process, mut app) = (Process(child), App::at(url, folder));
+    app.train(&specification(21)).await;
+    app.open().await;
+    let before = slowest(&app, 1).await;
+
+    let head = "GET /readyz HTTP/1.1\r\nHost: here\r\nX-Slow: ".to_owned();
+    let body = "POST /train HTTP/1.1\r\nHost: here\r\nContent-Type: application/json\r\nContent-Length: 9999\r\n\r\n{";
+    let reader = "GET /openapi.json HTTP/1.1\r\nHost: here\r\n\r\n".repeat(100);
+    let kinds = [head, body.to_owned(), reader];
+    let mut sockets: Vec<TcpStream> =
+        (0..SLOW_SOCKETS).map(|index| open_socket(&address, &kinds[index % kinds.len()])).collect();
+    let opened = Instant::now();
+    let under = slowest(&app, 11).await;
+    let mut bodies = sockets.iter_mut().skip(1).step_by(kinds.len());
+    assert!(bodies.all(|socket| !is_closed(socket)), "a slow body was cut off before its time");
+    println!("slowest of 30 calls: {before:?} before, {under:?} with {SLOW_SOCKETS} slow sockets open");
+    assert!(under < ANSWERED_WITHIN, "{under:?}");
+
+    let deadline = opened + Duration::from_secs(20);
+    for socket in sockets.iter_mut().step_by(kinds.len()) {
+        while !is_closed(socket) {
+            assert!(Instant::now() < deadline, "a client without headers is still connected");
+            let _ = socket.write(b" ");
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_body_that_does_not_come_is_not_waited_for() {
+    let app = App::configured(|config| config.request_timeout = Duration::from_millis(300)).await;
+    let address = app.url.strip_prefix("http://").unwrap();
+    let head = "POST /train HTTP/1.1\r\nHost: here\r\nContent-Type: application/json\r\nContent-Length: 9\r\n\r\n{";
+    let mut socket = TcpStream::connect(address).unwrap();
+    socket.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    socket.write_all(head.as_bytes()).unwrap();
+    let mut answer = String::new();
+    tokio::task::block_in_place(|| socket.read_to_string(&mut answer)).unwrap();
+    assert!(answer.starts_with("HTTP/1.1 503") && answer.contains("retry-after: 1"), "{answer}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn heads_and_depths_are_bounded() {
+    let app = App::start().await;
+    let many = (0..101).fold(app.client.get(format!("{}/readyz", app.url)), |request, index| {
+        request.header(format!("x-{index}"), "1")
+    });
+    assert_eq!(many.send().await.unwrap().status(), StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE);
+    let long = app.client.get(format!("{}/readyz", app.url)).header("x-long", "1".repeat(100_000));
+    assert_eq!(long.send().await.unwrap().status(), StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE);
+    for path in ["train", "evaluate", "sessions", "observe", "what-if", "policies/import"] {
+        for deep in [format!("{}{}", "[".repeat(200_000), "]".repeat(200_000)), r#"{"a":"#.repeat(100_000)] {
+            let request = app.client.post(format!("{}/{path}", app.url)).header("content-type", "application/json");
+            let (status, problem) = read(request.body(deep).send().await.unwrap()).await;
+            assert!(status == 400 || status == 422, "{path}: {problem}");
+        }
+        let long = app.client.post(format!("{}/{path}", app.url)).header("content-type", "application/json");
+        let (status, problem) = read(long.body("[".repeat((1 << 20) + 1)).send().await.unwrap()).await;
+        assert_eq!((status.as_u16(), &problem["type"]), (413, &json!("/problems/body-too-large")), "{path}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_tenant_that_calls_too_often_is_put_off_and_another_is_not() {
+    let mut app = App::configured(|config| config.limits = Limits::new([0, 0, 20], 4)).await;
+    let (north, south) = (app.key("north", "read").await, app.key("south", "read").await);
+    let deadline = Instant::now() + Duration::from_secs(20);
+    app.hold(&south);
+    while app.client.get(format!("{}/no-such-path", app.url)).send().await.unwrap().status() != 404
+        || reqwest::get(format!("{}/jobs", app.url)).await.unwrap().status() != 401
+    {
+        assert!(Instant::now() < deadline, "the keys do not count yet");
+        tokio::time::sleep(Duration::from_millis(200)).await;
+    }
+    app.hold(&north);
+    let flood = join_all((0..200).map(|_| app.client.get(format!("{}/jobs", app.url)).send())).await;
+    let flood: Vec<_> = flood.into_iter().map(Result::unwrap).collect();
+    let answered = flood.iter().filter(|answer| answer.status() == 200).count();
+    assert!((20..150).contains(&answered), "{answered} of 200 were answered");
+    let refused = flood.into_iter().find(|answer| answer.status() != 200).unwrap();
+    let pause: u64 = refused.headers()["retry-after"].to_str().unwrap().parse().unwrap();
+    assert_eq!(pause, 1);
+    let (status, problem) = read(refused).await;
+    assert_eq!((status.as_u16(), &problem["type"]), (429, &json!("/problems/too-many-requests")));
+    app.hold(&south);
+    assert_eq!(app.get("/jobs").await.0, 200);
+    app.hold(&north);
+    tokio::time::sleep(Duration::from_secs(pause)).await;
+    assert_eq!(app.get("/jobs").await.0, 200);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn heavy_calls_past_the_bound_come_back_later_and_starve_nobody() {
+    let mut app = App::configured(|config| config.limits = Limits::new([0; 3], 2)).await;
+    app.train(&specification(21)).await;
+    app.open().await;
+    let sweep =
+        json!({ "session": app.session, "sweep": { "radius_scale": { "from": 0.0, "to": 2.0, "points": 101 } } });
+    let heavy = join_all((0..24).map(|_| app.client.post(format!("{}/what-if", app.url)).json(&sweep).send()));
+    let live = async {
+        let mut slowest = Duration::ZERO;
+        for period in 1..=20 {
+            let asked = Instant::now();
+            assert_eq!(app.action().await.0, 200);
+            assert_eq!(app.observe(period, 0.001).await.0, 200);
+            slowest = slowest.max(asked.elapsed());
+        }
+        slowest
+    };
+    let (heavy, slowest) = tokio::join!(heavy, live);
+    let statuses: Vec<u16> = heavy.iter().map(|answer| answer.as_ref().unwrap().status().as_u16()).collect();
+    assert!(statuses.iter().all(|status| [200, 503].contains(status)), "{statuses:?}");
+    assert!(statuses.contains(&200) && statuses.contains(&503), "{statuses:?}");
+    let put_off = heavy.into_iter().map(Result::unwrap).find(|answer| answer.status() == 503).unwrap();
+    assert_eq!(put_off.headers()["retry-after"], "1");
+    assert!(slowest < ANSWERED_WITHIN, "{slowest:?}");
+    // Every place was given up again.
+    assert_eq!(app.post("/what-if", &sweep).await.0, 200);
+}
+
+/// Pointers to everything in a document; of a list only the ends, for its entries are alike.
+fn pointers(value: &Value, at: String, found: &mut Vec<String>) {
+    found.push(at.clone());
+    match value {
+        Value::Object(members) => {
+            members.iter().for_each(|(name, value)| pointers(value, format!("{at}/{name}"), found));
+        }
+        Value::Array(entries) => {
+            let ends = [0, entries.len().saturating_sub(1)];
+            for index in ends.into_iter().take(entries.len().min(2)) {
+                pointers(&entries[index], format!("{at}/{index}"), found);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Documents that differ from a sound one in one place.
+fn mutations(sound: &Value) -> Vec<(String, Value)> {
+    let mut places = Vec::new();
+    pointers(sound, String::new(), &mut places);
+    let mut mutations = Vec::new();
+    for place in places.into_iter().skip(1) {
+        let old = sound.pointer(&place).unwrap();
+        let mut values =
+            vec![Value::Null, json!("x"), json!([]), json!({}), json!(-1), json!(0), json!(1e308), json!(-1e-308)];
+        if let Value::Array(entries) = old {
+            values.push(entries[..entries.len().saturating_sub(1)].into());
+            values.push([entries.as_slice(), entries.as_slice()].concat().into());
+        }
+        if let Value::Object(members) = old {
+            let mut stranger = members.clone();
+            stranger.insert("stranger".into(), json!(1));
+            values.push(stranger.into());
+        }
+        for value in values.into_iter().filter(|value| value != old) {
+            let mut document = sound.clone();
+            *document.pointer_mut(&place).unwrap() = value.clone();
+            mutations
+                .push((format!("{place} = {}", &value.to_string().chars().take(40).collect::<String>()), document));
+        }
+        let (parent, name) = place.rsplit_once('/').unwrap();
+        let mut document = sound.clone();
+        if let Some(Value::Object(members)) = document.pointer_mut(parent) {
+            members.remove(name);
+            mutations.push((format!("{place} removed"), document));
+        }
+    }
+    mutations
+}
+
+/// A mutated policy is refused with the field named, or it advises within the bounds of an allocation all the same.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_mutated_policy_is_refused_or_advises_within_bounds() {
+    let app = App::start().await;
+    let mut request = specification(2);
+    request["design"]["count"] = json!(10);
+    let sound: Value = serde_json::from_slice(&trained(&request)).unwrap();
+    assert_eq!(app.post("/policies/import", &sound).await.0, 201);
+    let mutations = mutations(&sound);
+    assert!(mutations.len() > 500, "{}", mutations.len());
+    let mut accepted = 0;
+    for (what, document) in mutations {
+        let (status, answer) = app.post("/policies/import", &document).await;
+        assert!([201, 400, 422].contains(&status.as_u16()), "{what}: {status} {answer}");
+        if status != 201 {
+            continue;
+        }
+        accepted += 1;
+        let (status, session) = app.post("/sessions", &json!({ "policy": answer["policy"] })).await;
+        assert_eq!(status, 201, "{what}: {session}");
+        for _ in 0..2 {
+            let (status, action) = app.get(&format!("/action?session={}", session["session"].as_str().unwrap())).await;
+            let allocation = action["allocation"].as_f64();
+            assert!(status == 200 && allocation.is_some_and(|a| (0.0..=1.0).contains(&a)), "{what}: {status} {action}");
+            let report = json!({ "session": session["session"], "period": 1, "log_return": 0.01 });
+            assert_eq!(app.post("/observe", &report).await.0, 200, "{what}");
+        }
+    }
+    // Diagnostics, and numbers that may be what they will.
+    assert!(accepted > 10, "{accepted}");
+}

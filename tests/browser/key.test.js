@@ -1,0 +1,60 @@
+// The dashboard of a service that asks for keys: nothing without one, everything with it, its streams and files too.
+
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { after, before, test } from "node:test";
+import { browser, service } from "./ballast.js";
+
+let ballast, chromium, page, key;
+const faults = [];
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  key = await ballast.key("read", "operate", "train");
+  page = await chromium.newPage();
+  page.setDefaultTimeout(60_000);
+  page.on("pageerror", (error) => faults.push(error.message));
+  // The door closes within half a second.
+  while ((await fetch(`${ballast.url}/jobs`)).status !== 401) await new Promise((resolve) => setTimeout(resolve, 50));
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+test("a key is asked for, and a wrong one is refused", async () => {
+  await page.goto(ballast.url);
+  await page.getByRole("heading", { level: 1, name: "A key is needed" }).waitFor();
+  await page.getByLabel("Key", { exact: true }).fill("ballast_wrong");
+  await page.getByRole("button", { name: "Use this key" }).click();
+  await page.getByText("the key is not one in force").waitFor();
+});
+
+test("with the key the page works, and its streams and files show it too", async () => {
+  await page.getByLabel("Key", { exact: true }).fill(key);
+  await page.getByRole("button", { name: "Use this key" }).click();
+  await page.getByText("Nothing has been trained here yet").waitFor();
+  const authorization = { authorization: `Bearer ${key}`, "content-type": "application/json" };
+  const history = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
+  const body = JSON.stringify({ problem: { horizon: 40, history }, design: { count: 30 } });
+  const queued = await (await fetch(`${ballast.url}/train`, { method: "POST", headers: authorization, body })).json();
+  const stream = page.waitForRequest((request) => request.url().endsWith(`/jobs/${queued.job}/events`));
+  await page.reload();
+  assert.equal((await (await stream).allHeaders()).authorization, `Bearer ${key}`);
+  await page.getByRole("link", { name: "See the policy" }).waitFor();
+  const { policies } = await (await fetch(`${ballast.url}/policies`, { headers: authorization })).json();
+  await page.goto(`${ballast.url}/#/policies/${policies[0].policy}`);
+  const saving = page.waitForEvent("download");
+  await page.getByRole("link", { name: "Export" }).click();
+  const saved = JSON.parse(await readFile(await (await saving).path(), "utf8"));
+  assert.equal(saved.format, "ballast-policy-1");
+});
+
+test("a key that is given up is gone", async () => {
+  await page.getByRole("link", { name: "Key", exact: true }).click();
+  await page.getByRole("button", { name: "Forget the key held" }).click();
+  await page.getByRole("heading", { level: 1, name: "A key is needed" }).waitFor();
+  assert.equal(await page.evaluate(() => sessionStorage.length), 0);
+  assert.deepEqual(faults, []);
+});
