@@ -5,7 +5,7 @@ mod command;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use command::{backtest, bench, demo, evaluate, healthcheck, reproduce, serve};
+use command::{backtest, bench, demo, evaluate, healthcheck, loadtest, reproduce, serve};
 
 /// Nonparametric adaptive robust control of an investor, as a service.
 #[derive(Debug, Parser)]
@@ -32,6 +32,8 @@ enum Command {
     /// Measure this machine's speed and accuracy.
     #[command(subcommand)]
     Bench(bench::Bench),
+    /// Measure what the live service bears on this machine.
+    Loadtest(loadtest::LoadTest),
     /// Print the OpenAPI description.
     Openapi,
 }
@@ -44,6 +46,7 @@ async fn main() -> ExitCode {
         Command::Backtest(arguments) => tokio::task::block_in_place(|| backtest::run(&arguments)).map_err(Into::into),
         Command::Evaluate(arguments) => tokio::task::block_in_place(|| evaluate::run(&arguments)),
         Command::Reproduce(arguments) => tokio::task::block_in_place(|| reproduce::run(&arguments)),
+        Command::Loadtest(arguments) => tokio::task::block_in_place(|| loadtest::run(&arguments)),
         Command::Bench(bench) => bench::run(bench).await,
         Command::Healthcheck(arguments) => healthcheck::run(&arguments),
         Command::Openapi => {

@@ -8,6 +8,7 @@ pub mod demo;
 pub mod evaluate;
 pub mod healthcheck;
 mod host;
+pub mod loadtest;
 mod monthly_returns;
 pub mod reproduce;
 pub mod serve;
