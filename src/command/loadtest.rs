@@ -1,7 +1,7 @@
 //! `ballast loadtest`: what the live service bears on this machine, beside what the machine itself does.
 //!
-//! Runs `ballast serve` as a process of its own over a new data folder, trains a policy of the paper's problem with a
-//! small design, and drives it from one thread over keep-alive connections; or does so at a service that is up already.
+//! Runs `ballast serve` as a process of its own over a new data folder, gives it a policy of the paper's
+//! problem with a small design, and drives it from one thread over keep-alive connections; or does so at a service that is up already.
 //! The server is ended by killing it, as a crash would: what it acknowledged must be there when it is started again.
 
 use std::error::Error;
@@ -40,14 +40,17 @@ pub struct LoadTest {
     /// Sessions that are asked
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     sessions: u32,
+    /// How often `observe` is run, each time with new sessions
+    #[arg(long, default_value_t = 3)]
+    rounds: u32,
     /// Sessions of `sessions-100k`
     #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
     live_sessions: u32,
     /// Periods of a session
-    #[arg(long, default_value_t = 60)]
+    #[arg(long, default_value_t = 20)]
     horizon: usize,
     /// Design points a step of the policy asked
-    #[arg(long, default_value_t = 100)]
+    #[arg(long, default_value_t = 60)]
     count: usize,
     /// Seconds that each measurement of `/action`, of `/livez` and of the disk takes
     #[arg(long, default_value_t = 6.0)]

@@ -2,19 +2,22 @@
 
 use std::error::Error;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
+use ballast::control::backward::{Training, Watch};
 use ballast::control::policy::content_hash;
+use ballast::control::pool::TrainingPool;
 use ballast::control::specification::{InitialLaws, Specification};
 use ballast::store::{CreateSession, NewSession, Store};
 use futures_util::{StreamExt, stream};
 use serde_json::Value;
 
-use super::connection::{get, post};
+use super::connection::{Connection, get, post};
 use super::load::bodies;
+use super::server::Server;
 use super::{LoadTest, tell};
 use crate::command::api_client::ApiClient;
 use crate::command::bench::paper;
-use crate::command::loadtest::server::Server;
 
 /// Returns that sessions see, in turn: enough that no two sessions see the same.
 const RETURNS: usize = 4093;
@@ -37,19 +40,18 @@ fn specification(horizon: usize, count: usize) -> Specification {
 }
 
 impl World {
-    /// Trains the policy.
+    /// Trains the policy here, on every core, and hands it to the service.
     pub async fn train(server: &Server, arguments: &LoadTest) -> Result<Self, Box<dyn Error>> {
         let LoadTest { horizon, count, .. } = *arguments;
         tell(&format!("training {horizon} steps of {count} design points"));
-        let specification = specification(horizon, count);
-        let api = ApiClient::new(server.address);
-        let job = start_training(&api, &specification).await?;
-        let mut events = api.events(&format!("/jobs/{job}/events")).await?;
-        let mut last = Value::Null;
-        while let Some(event) = events.next().await? {
-            last = event;
-        }
-        let policy = text(&last, "policy")?;
+        let training = Training::new(&specification(horizon, count))?;
+        let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+        let pool = TrainingPool::new(std::thread::available_parallelism().map_or(1, usize::from))?;
+        let trained = pool.install(|| training.run(&watch))?;
+        let import = post("/policies/import", &String::from_utf8(trained.to_json())?);
+        let imported = Connection::open(server.address).await?.exchange(&import).await?.to_vec();
+        let policy = text(&serde_json::from_slice(&imported)?, "policy")?;
+        let specification = trained.specification().clone();
         Ok(World { policy, horizon, specification, returns: paper::history(RETURNS, 2) })
     }
 
@@ -105,11 +107,7 @@ impl World {
 pub async fn long_training(server: &Server) -> Result<String, Box<dyn Error>> {
     let mut specification = specification(60, 1000);
     specification.seed = 2;
-    start_training(&ApiClient::new(server.address), &specification).await
-}
-
-async fn start_training(api: &ApiClient, specification: &Specification) -> Result<String, Box<dyn Error>> {
-    let job = api.post("/train", &serde_json::to_value(specification)?).await?;
+    let job = ApiClient::new(server.address).post("/train", &serde_json::to_value(&specification)?).await?;
     text(&job, "job")
 }
 

@@ -27,14 +27,13 @@ pub async fn run(arguments: &LoadTest, server: &mut Server, report: &mut Report)
     let time = Duration::from_secs_f64(arguments.seconds);
     if let Some(folder) = server.folder() {
         tell("syncing the disk");
-        let rate = tokio::task::block_in_place(|| limits::syncs_per_second(folder, time / 3))?;
+        let rate = limits::syncs_per_second(folder, time / 3)?;
         report.rate("limit: pages written and synced, one by one", rate);
     }
     let world = World::train(server, arguments).await?;
     let test = Test { arguments, world, clients: usize::from(arguments.clients), time };
     if arguments.runs(Scenario::Observe) {
-        let sessions = test.world.open(server, test.clients, arguments.sessions).await?;
-        test.observe(server, report, &sessions).await?;
+        test.observe(server, report).await?;
     }
     if [Scenario::ActionVsLivez, Scenario::ActionIdle, Scenario::ActionWhileTraining].iter().any(|&one| arguments.runs(one))
     {
@@ -71,16 +70,20 @@ impl Test<'_> {
         Ok(saturate(server.address, self.clients, requests).await?)
     }
 
-    async fn observe(&self, server: &Server, report: &mut Report, sessions: &[String]) -> Result<(), Box<dyn Error>> {
-        let (count, horizon) = (sessions.len(), self.world.horizon);
-        tell(&format!("{} observations from {} clients", count * horizon, self.clients));
-        let load = self.observed(server, sessions, 1..=horizon).await?;
+    async fn observe(&self, server: &Server, report: &mut Report) -> Result<(), Box<dyn Error>> {
+        let (count, horizon) = (self.arguments.sessions, self.world.horizon);
+        let mut load = Load::default();
+        for _ in 0..self.arguments.rounds {
+            let sessions = self.world.open(server, self.clients, count).await?;
+            tell(&format!("{} observations from {} clients", sessions.len() * horizon, self.clients));
+            load.add(self.observed(server, &sessions, 1..=horizon).await?);
+            let coming = periods(server, self.clients, &sessions).await?;
+            if let Some(period) = coming.iter().find(|&&period| period != horizon as u64 + 1) {
+                return Err(format!("a session is at period {period} after {horizon} observations").into());
+            }
+        }
         let must = Must { rate: Some(OBSERVES_PER_SECOND), p99_ms: Some(OBSERVE_P99_MS) };
         report.load(format!("observe: {} clients, {count} sessions", self.clients), &load, must);
-        let coming = periods(server, self.clients, sessions).await?;
-        if let Some(period) = coming.iter().find(|&&period| period != horizon as u64 + 1) {
-            return Err(format!("a session is at period {period} after {horizon} acknowledged observations").into());
-        }
         Ok(())
     }
 
