@@ -93,7 +93,10 @@ impl Sessions {
             created_ms: row.created_ms,
         };
         match self.store.create_session(new).await? {
-            CreateSession::Created => Ok(Live { head: row.head(), row, state, advisor, price: None, advice: None }),
+            CreateSession::Created => {
+                let head = row.head();
+                Ok(Live { row: Arc::new(row), state, head, advisor, price: None, radius: None, advice: None })
+            }
             CreateSession::NoPolicy => Err(ServiceError::unknown("policy", policy)),
             CreateSession::Exists => Err(ServiceError::internal("a session of this random name exists")),
         }
@@ -178,7 +181,7 @@ impl Sessions {
             answer_json: serde_json::to_string(&answer).map_err(ServiceError::internal)?,
             created_ms: self.clock.now_milliseconds(),
         };
-        let next = live.taken_to(new.head(), state, report.price);
+        let next = live.taken_to(new.head(), state, report.price, answer.uncertainty.radius);
         match self.store.append_observation(new).await? {
             Append::Appended => {
                 **slot = Some(next);
@@ -213,7 +216,7 @@ impl Sessions {
         }
         let period = live.observed() + 1;
         if question == Question::Advise(AdviceMode::Surrogate) {
-            let advice = live.surrogate_advice(&self.advising).await?;
+            let advice = live.surrogate_advice(&self.advising).await?.clone();
             return Ok(Action { period, advice, worst_case: None });
         }
         let (advisor, state, step) = (live.advisor.clone(), live.state.clone(), live.observed());
@@ -264,7 +267,7 @@ impl Sessions {
         let last = observations.last().and_then(|row| serde_json::from_str::<Observed>(&row.answer_json).ok());
         let price = last.and_then(|answer| answer.price);
         let head = observations.last().map_or_else(|| row.head(), |last| last.head(session));
-        Ok(Live { row, state, head, advisor, price, advice: None })
+        Ok(Live { row: Arc::new(row), state, head, advisor, price, radius: None, advice: None })
     }
 
     fn slot(&self, session: &str) -> Slot {

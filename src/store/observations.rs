@@ -56,7 +56,7 @@ pub enum Append {
 impl Store {
     /// Appends the period after the last, or says why not; decided and written in one transaction.
     pub async fn append_observation(&self, new: NewObservation) -> Result<Append, StoreError> {
-        self.write("appending an observation", move |connection| append(connection, new).boxed()).await
+        self.write_row("appending an observation", move |connection| append(connection, new).boxed()).await
     }
 
     /// # Errors
@@ -84,23 +84,30 @@ impl Store {
     }
 }
 
+/// The row is inserted by a statement that decides itself whether it is the next one; why it was not is found out after.
 async fn append(mut connection: Connection<'_>, new: NewObservation) -> Result<Append, Failure> {
     let connection = &mut connection;
     let session = query("SELECT sequence FROM sessions WHERE session = $1").bind(new.session.as_str());
-    if connection.row(session.for_update()).await?.is_none() {
+    connection.lock(session.for_update()).await?;
+    if insert_next(connection, &new).await? {
+        return Ok(Append::Appended);
+    }
+    refused(connection, &new).await
+}
+
+/// Why a period was not inserted.
+async fn refused(connection: &mut Connection<'_>, new: &NewObservation) -> Result<Append, Failure> {
+    let session = query("SELECT sequence FROM sessions WHERE session = $1").bind(new.session.as_str());
+    if connection.row(session).await?.is_none() {
         return Ok(Append::NoSession);
     }
     let last = query("SELECT coalesce(max(period), 0) AS period FROM observations WHERE session = $1");
     let last = connection.row(last.bind(new.session.as_str())).await?.map_or(Ok(0), |row| row.get("period"))?;
     let expected = from_sql(last)? + 1;
     if (1..expected).contains(&new.period) {
-        return repeated(connection, &new).await;
+        return repeated(connection, new).await;
     }
-    if new.period != expected {
-        return Ok(Append::OutOfOrder { expected });
-    }
-    insert(connection, new).await?;
-    Ok(Append::Appended)
+    Ok(Append::OutOfOrder { expected })
 }
 
 /// What a period reported before answers.
@@ -116,17 +123,18 @@ async fn repeated(connection: &mut Connection<'_>, new: &NewObservation) -> Resu
     })
 }
 
-async fn insert(connection: &mut Connection<'_>, new: NewObservation) -> Result<(), Failure> {
-    let session = new.session.clone();
-    let row = ObservationRow::from(new);
-    let seal = row.seal(&session).finish();
+/// Inserts the period where it is the one after the last of a session that exists.
+async fn insert_next(connection: &mut Connection<'_>, new: &NewObservation) -> Result<bool, Failure> {
+    let row = ObservationRow::from(new.clone());
+    let seal = row.seal(&new.session).finish();
     let insert = query(
         "INSERT INTO observations (session, period, content_hash, log_return, executed_allocation, advised_allocation,
                                    wealth_after, answer_json, created_ms, seal)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10)",
+         SELECT session, $2, $3, $4, $5, $6, $7, $8, $9, $10 FROM sessions WHERE session = $1 AND $2 =
+             (SELECT coalesce(max(period), 0) + 1 FROM observations WHERE observations.session = $1)",
     );
     let insert = insert
-        .bind(session)
+        .bind(new.session.as_str())
         .bind(to_sql(row.period))
         .bind(row.content_hash)
         .bind(row.log_return)
@@ -136,8 +144,7 @@ async fn insert(connection: &mut Connection<'_>, new: NewObservation) -> Result<
         .bind(row.answer_json)
         .bind(row.created_ms)
         .bind(seal);
-    connection.execute(insert).await?;
-    Ok(())
+    Ok(connection.execute(insert).await? > 0)
 }
 
 impl NewObservation {

@@ -35,7 +35,9 @@ pub async fn run(arguments: &LoadTest, server: &mut Server, report: &mut Report)
     if arguments.runs(Scenario::Observe) {
         test.observe(server, report).await?;
     }
-    if [Scenario::ActionVsLivez, Scenario::ActionIdle, Scenario::ActionWhileTraining].iter().any(|&one| arguments.runs(one))
+    if [Scenario::ActionVsLivez, Scenario::ActionIdle, Scenario::ActionWhileTraining]
+        .iter()
+        .any(|&one| arguments.runs(one))
     {
         let sessions = test.world.open(server, test.clients, arguments.sessions).await?;
         // The first step is solved at one state; from the second on a step answers from its surrogates.
@@ -123,15 +125,16 @@ impl Test<'_> {
     ) -> Result<(), Box<dyn Error>> {
         tell("asking for advice and for life, in turns");
         let actions: Vec<_> = sessions.iter().map(|session| action(session)).collect();
-        let first = saturate(server.address, self.clients, |client| {
-            actions.iter().skip(client).step_by(self.clients).cloned()
-        });
+        let first =
+            saturate(server.address, self.clients, |client| actions.iter().skip(client).step_by(self.clients).cloned());
         report.load("action: first asks, all clients", &first.await?, Must::default());
         let (mut livez, mut asked) = (Load::default(), Load::default());
         for _ in 0..TURNS {
             let end = Instant::now() + self.time / TURNS;
             let now = |_: &Vec<u8>| Instant::now() < end;
-            livez.add(saturate(server.address, self.clients, |_| std::iter::repeat(get("/livez")).take_while(now)).await?);
+            livez.add(
+                saturate(server.address, self.clients, |_| std::iter::repeat(get("/livez")).take_while(now)).await?,
+            );
             let end = Instant::now() + self.time / TURNS;
             let now = |_: &Vec<u8>| Instant::now() < end;
             let requests = |client| actions.iter().cycle().skip(client * 17).cloned().take_while(now);

@@ -16,6 +16,7 @@ use super::query::{Connection, Query, Row, query};
 use writer::{Operation, Request};
 
 pub(super) use classify::classify;
+pub(super) use writer::Undo;
 
 /// An open folder. Clones share the connections, the lock and the writer.
 #[derive(Clone)]
@@ -66,13 +67,14 @@ impl Folder {
     }
 
     /// Runs `work` in the writer and answers after its commit.
-    pub(super) async fn write<T, W>(&self, doing: &'static str, work: W) -> Result<T, StoreError>
+    pub(super) async fn write<T, W>(&self, doing: &'static str, undo: Undo, work: W) -> Result<T, StoreError>
     where
         T: Send + 'static,
         W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
         self.refuse_after_fatal()?;
-        let (operation, answer) = Operation::new(doing, move |connection| work(Connection::Sqlite(connection)).boxed());
+        let (operation, answer) =
+            Operation::new(doing, undo, move |connection| work(Connection::Sqlite(connection)).boxed());
         // A writer that ended drops the operation, and the answer with it.
         let _ = self.requests.send(Request::Write(operation)).await;
         match answer.await {

@@ -1,7 +1,7 @@
 //! The one writer: operations that wait together are committed together.
 //!
 //! A commit costs one fsync however much it holds, so each transaction takes every operation that waits, up to [`GROUP`].
-//! Each runs in a savepoint of its own: one that fails is undone alone. Answers leave after the commit. Errors after which
+//! Each runs in a savepoint of its own, or changes rows by a single statement: one that fails is undone alone. Answers leave after the commit. Errors after which
 //! SQLite may have rolled back by itself (disk full, I/O) fail every operation that ran in the group; those that had not
 //! run yet go to the next one. After a fatal error the writer stops for good.
 
@@ -27,7 +27,19 @@ pub(super) enum Request {
 }
 
 /// One caller's reads and writes. Given an error instead of a connection, it passes that on as its own.
-pub(super) struct Operation(Run);
+pub(super) struct Operation {
+    undo: Undo,
+    run: Run,
+}
+
+/// How what an operation changed before it failed is undone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::store) enum Undo {
+    /// By a savepoint, two statements more.
+    Savepoint,
+    /// By SQLite, as it changes rows by one statement.
+    Statement,
+}
 
 type Run = Box<dyn for<'c> FnOnce(Result<&'c mut SqliteConnection, StoreError>) -> BoxFuture<'c, Ran> + Send>;
 
@@ -41,7 +53,11 @@ type Answer = Box<dyn FnOnce(Result<(), StoreError>) + Send>;
 
 impl Operation {
     /// `work` as an operation, and where its answer arrives.
-    pub(super) fn new<T, W>(doing: &'static str, work: W) -> (Self, oneshot::Receiver<Result<T, StoreError>>)
+    pub(super) fn new<T, W>(
+        doing: &'static str,
+        undo: Undo,
+        work: W,
+    ) -> (Self, oneshot::Receiver<Result<T, StoreError>>)
     where
         T: Send + 'static,
         W: for<'c> FnOnce(&'c mut SqliteConnection) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
@@ -60,7 +76,7 @@ impl Operation {
             }
             .boxed()
         });
-        (Operation(run), receiver)
+        (Operation { undo, run }, receiver)
     }
 }
 
@@ -134,17 +150,20 @@ async fn run_group(
 ) -> Result<(), StoreError> {
     let mut begun = execute(connection, "BEGIN IMMEDIATE").await;
     while let Some(operation) = waiting.pop_front() {
-        if begun.is_ok() {
+        let saved = operation.undo == Undo::Savepoint;
+        if begun.is_ok() && saved {
             begun = execute(connection, "SAVEPOINT operation").await;
         }
-        let ran = (operation.0)(begun.clone().map(|()| &mut *connection)).await;
+        let ran = (operation.run)(begun.clone().map(|()| &mut *connection)).await;
         answers.push(ran.answer);
         match ran.end {
-            Ok(()) => {}
             Err(error) if begun.is_err() || error.ends_group() => return Err(error),
-            Err(_) => execute(connection, "ROLLBACK TO operation").await?,
+            Err(_) if saved => execute(connection, "ROLLBACK TO operation").await?,
+            _ => {}
         }
-        execute(connection, "RELEASE operation").await?;
+        if saved {
+            execute(connection, "RELEASE operation").await?;
+        }
     }
     execute(connection, "COMMIT").await
 }
