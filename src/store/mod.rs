@@ -38,7 +38,6 @@ use futures_util::future::BoxFuture;
 
 use error::Failure;
 use query::{Connection, Query, Row};
-use sqlite::Undo;
 
 pub use error::StoreError;
 pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, NewJob};
@@ -126,19 +125,7 @@ impl Store {
         W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
         match &self.0 {
-            Engine::Sqlite(folder) => folder.write(doing, Undo::Savepoint, work).await,
-            Engine::Postgres(database) => database.write(doing, work).await,
-        }
-    }
-
-    /// The same for work that changes rows by one statement only: it undoes itself where it fails, and is faster.
-    async fn write_row<T, W>(&self, doing: &'static str, work: W) -> Result<T, StoreError>
-    where
-        T: Send + 'static,
-        W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
-    {
-        match &self.0 {
-            Engine::Sqlite(folder) => folder.write(doing, Undo::Statement, work).await,
+            Engine::Sqlite(folder) => folder.write(doing, work).await,
             Engine::Postgres(database) => database.write(doing, work).await,
         }
     }

@@ -21,6 +21,8 @@ struct Figure {
     p50_ms: Option<f64>,
     p99_ms: Option<f64>,
     max_ms: Option<f64>,
+    /// Of the service's processors, a request.
+    processor_us: Option<f64>,
     bounds: Vec<Bound>,
 }
 
@@ -58,6 +60,7 @@ impl Report {
             p50_ms: Some(p50),
             p99_ms: Some(p99),
             max_ms: Some(max),
+            processor_us: load.processor_us(),
             bounds: rate.into_iter().chain(latency).collect(),
         });
     }
@@ -77,20 +80,23 @@ impl Report {
     }
 
     fn line(&mut self, what: impl Into<String>, rate: Option<f64>, bounds: Vec<Bound>) {
-        self.figures.push(Figure { what: what.into(), rate, p50_ms: None, p99_ms: None, max_ms: None, bounds });
+        let (p50_ms, p99_ms, max_ms, processor_us) = (None, None, None, None);
+        self.figures.push(Figure { what: what.into(), rate, p50_ms, p99_ms, max_ms, processor_us, bounds });
     }
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let titles = ["", "a second", "p50 ms", "p99 ms", "max ms"];
-        writeln!(out, "{:<56}{:>10}{:>9}{:>9}{:>9}  bound", titles[0], titles[1], titles[2], titles[3], titles[4])?;
+        write!(out, "{:<56}{:>10}", "", "a second")?;
+        ["p50 ms", "p99 ms", "max ms", "CPU us"].iter().try_for_each(|title| write!(out, "{title:>9}"))?;
+        writeln!(out, "  bound")?;
         for figure in &self.figures {
             let number = |value: Option<f64>, digits| value.map_or(String::new(), |found| format!("{found:.digits$}"));
             write!(out, "{:<56}{:>10}", figure.what, number(figure.rate, 0))?;
             for milliseconds in [figure.p50_ms, figure.p99_ms, figure.max_ms] {
                 write!(out, "{:>9}", number(milliseconds, 2))?;
             }
+            write!(out, "{:>9}", number(figure.processor_us, 0))?;
             let met = |bound: &Bound| format!("{}: {}", bound.rule, if bound.met { "met" } else { "NOT MET" });
             let bounds: Vec<String> = figure.bounds.iter().map(met).collect();
             writeln!(out, "  {}", bounds.join("; "))?;

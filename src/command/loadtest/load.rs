@@ -6,15 +6,34 @@ use std::time::{Duration, Instant};
 use futures_util::future::{join_all, try_join_all};
 
 use super::connection::{Connection, ConnectionError};
+use super::server::Server;
 
 /// Milliseconds from the first byte sent to the last received, one a request.
 #[derive(Debug, Default)]
 pub struct Load {
     milliseconds: Vec<f64>,
     seconds: f64,
+    /// Processor time of the service, where it is known.
+    processor_seconds: Option<f64>,
 }
 
 impl Load {
+    /// What `driving` gives, with the processor time that the service takes for it.
+    pub async fn on(
+        server: &Server,
+        driving: impl Future<Output = Result<Load, ConnectionError>>,
+    ) -> Result<Load, ConnectionError> {
+        let before = server.processor_seconds();
+        let load = driving.await?;
+        let processor_seconds = server.processor_seconds().zip(before).map(|(after, before)| after - before);
+        Ok(Load { processor_seconds, ..load })
+    }
+
+    /// Microseconds of the service's processors for one request.
+    pub fn processor_us(&self) -> Option<f64> {
+        self.processor_seconds.map(|seconds| 1e6 * seconds / self.requests() as f64)
+    }
+
     pub fn requests(&self) -> usize {
         self.milliseconds.len()
     }
@@ -35,6 +54,10 @@ impl Load {
     pub fn add(&mut self, other: Load) {
         self.milliseconds.extend(other.milliseconds);
         self.seconds += other.seconds;
+        self.processor_seconds = match self.processor_seconds {
+            Some(seconds) => other.processor_seconds.map(|other| seconds + other),
+            None => other.processor_seconds,
+        };
     }
 }
 
@@ -48,7 +71,7 @@ pub async fn saturate<R: Iterator<Item = Vec<u8>>>(
     let started = Instant::now();
     let clients = connections.iter_mut().zip(0..).map(|(connection, client)| one_by_one(connection, requests(client)));
     let milliseconds = try_join_all(clients).await?.concat();
-    Ok(Load { milliseconds, seconds: started.elapsed().as_secs_f64() })
+    Ok(Load { milliseconds, seconds: started.elapsed().as_secs_f64(), processor_seconds: None })
 }
 
 async fn one_by_one(
@@ -92,7 +115,8 @@ pub async fn paced(
         Ok(milliseconds)
     });
     let answered: Result<Vec<_>, ConnectionError> = join_all(clients).await.into_iter().collect();
-    Ok(Load { milliseconds: answered?.concat(), seconds: started.elapsed().as_secs_f64() })
+    let seconds = started.elapsed().as_secs_f64();
+    Ok(Load { milliseconds: answered?.concat(), seconds, processor_seconds: None })
 }
 
 /// The bodies of the answers to `requests`, in their order, from `clients` connections.

@@ -69,7 +69,7 @@ impl Test<'_> {
         let report = |period: usize, (index, session): (usize, &String)| self.world.observation(session, index, period);
         let requests =
             |client: usize| periods.clone().flat_map(move |period| own(client).map(move |one| report(period, one)));
-        Ok(saturate(server.address, self.clients, requests).await?)
+        Ok(Load::on(server, saturate(server.address, self.clients, requests)).await?)
     }
 
     async fn observe(&self, server: &Server, report: &mut Report) -> Result<(), Box<dyn Error>> {
@@ -113,7 +113,7 @@ impl Test<'_> {
 
     async fn now_and_then(&self, server: &Server, sessions: &[String]) -> Result<Load, Box<dyn Error>> {
         let ask = |turn: usize| action(&sessions[turn % sessions.len()]);
-        Ok(paced(server.address, LOW_RATE, self.time, ask).await?)
+        Ok(Load::on(server, paced(server.address, LOW_RATE, self.time, ask)).await?)
     }
 
     /// In turns, so that what else the machine does meets both.
@@ -125,20 +125,15 @@ impl Test<'_> {
     ) -> Result<(), Box<dyn Error>> {
         tell("asking for advice and for life, in turns");
         let actions: Vec<_> = sessions.iter().map(|session| action(session)).collect();
-        let first =
-            saturate(server.address, self.clients, |client| actions.iter().skip(client).step_by(self.clients).cloned());
-        report.load("action: first asks, all clients", &first.await?, Must::default());
+        let own = |client: usize| actions.iter().skip(client).step_by(self.clients).cloned();
+        let first = Load::on(server, saturate(server.address, self.clients, own)).await?;
+        report.load("action: first asks, all clients", &first, Must::default());
         let (mut livez, mut asked) = (Load::default(), Load::default());
         for _ in 0..TURNS {
-            let end = Instant::now() + self.time / TURNS;
-            let now = |_: &Vec<u8>| Instant::now() < end;
-            livez.add(
-                saturate(server.address, self.clients, |_| std::iter::repeat(get("/livez")).take_while(now)).await?,
-            );
-            let end = Instant::now() + self.time / TURNS;
-            let now = |_: &Vec<u8>| Instant::now() < end;
-            let requests = |client| actions.iter().cycle().skip(client * 17).cloned().take_while(now);
-            asked.add(saturate(server.address, self.clients, requests).await?);
+            let alive = |_| self.for_a_turn(std::iter::repeat(get("/livez")));
+            livez.add(Load::on(server, saturate(server.address, self.clients, alive)).await?);
+            let advised = |client| self.for_a_turn(actions.iter().cycle().skip(17 * client).cloned());
+            asked.add(Load::on(server, saturate(server.address, self.clients, advised)).await?);
         }
         report.load(format!("limit: /livez, {} clients", self.clients), &livez, Must::default());
         report.load(format!("action: {} clients, in turns with /livez", self.clients), &asked, Must::default());
@@ -148,6 +143,11 @@ impl Test<'_> {
             Bound::at_least(share, SHARE_OF_LIVEZ, "of /livez"),
         );
         Ok(())
+    }
+
+    fn for_a_turn(&self, requests: impl Iterator<Item = Vec<u8>>) -> impl Iterator<Item = Vec<u8>> {
+        let end = Instant::now() + self.time / TURNS;
+        requests.take_while(move |_| Instant::now() < end)
     }
 
     async fn many(&self, server: &mut Server, report: &mut Report) -> Result<(), Box<dyn Error>> {

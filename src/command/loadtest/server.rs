@@ -96,6 +96,16 @@ impl Server {
         line.trim().strip_suffix(" kB")?.parse::<f64>().ok().map(|kb| kb / 1024.0)
     }
 
+    /// Processor time its threads have taken, in seconds; `None` as above.
+    pub fn processor_seconds(&self) -> Option<f64> {
+        let tasks = std::fs::read_dir(format!("/proc/{}/task", self.own.as_ref()?.child.id())).ok()?;
+        let nanoseconds = tasks.filter_map(|task| {
+            let spent = std::fs::read_to_string(task.ok()?.path().join("schedstat")).ok()?;
+            spent.split(' ').next()?.parse::<f64>().ok()
+        });
+        Some(1e-9 * nanoseconds.sum::<f64>())
+    }
+
     async fn until_ready(&self) -> Result<(), ServerError> {
         let started = Instant::now();
         while started.elapsed() < PATIENCE {

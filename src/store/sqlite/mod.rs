@@ -1,5 +1,6 @@
 //! SQLite in a folder that one process holds: read connections beside one writer, which commits in groups.
 
+mod batch;
 mod classify;
 mod opening;
 mod writer;
@@ -12,11 +13,12 @@ use sqlx::sqlite::SqlitePool;
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::error::{Failure, StoreError};
+use super::observations::{APPENDING, Append, NewObservation};
 use super::query::{Connection, Query, Row, query};
-use writer::{Operation, Request};
+use batch::Appending;
+use writer::{Operation, Request, Undo};
 
 pub(super) use classify::classify;
-pub(super) use writer::Undo;
 
 /// An open folder. Clones share the connections, the lock and the writer.
 #[derive(Clone)]
@@ -32,7 +34,7 @@ impl Folder {
         let opening::Opened { lock, writer, readers } = opening::open(dir).await?;
         let (requests, receiver) = mpsc::channel(writer::QUEUE);
         let fatal = watch::Sender::new(None);
-        tokio::spawn(writer::serve(writer, receiver, fatal.clone(), lock));
+        writer::start(writer, receiver, fatal.clone(), lock)?;
         Ok(Folder { readers, requests, fatal })
     }
 
@@ -67,16 +69,36 @@ impl Folder {
     }
 
     /// Runs `work` in the writer and answers after its commit.
-    pub(super) async fn write<T, W>(&self, doing: &'static str, undo: Undo, work: W) -> Result<T, StoreError>
+    pub(super) async fn write<T, W>(&self, doing: &'static str, work: W) -> Result<T, StoreError>
     where
         T: Send + 'static,
         W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
+        let request = |answer| {
+            Request::Write(Operation::new(
+                doing,
+                Undo::Savepoint,
+                move |connection| work(Connection::Sqlite(connection)).boxed(),
+                answer,
+            ))
+        };
+        self.request(doing, request).await
+    }
+
+    /// Appends in the writer, many observations to a statement, and answers after the commit.
+    pub(super) async fn append(&self, new: NewObservation) -> Result<Append, StoreError> {
+        self.request(APPENDING, |answer| Request::Append(Appending { new, answer })).await
+    }
+
+    async fn request<T>(
+        &self,
+        doing: &'static str,
+        request: impl FnOnce(oneshot::Sender<Result<T, StoreError>>) -> Request,
+    ) -> Result<T, StoreError> {
         self.refuse_after_fatal()?;
-        let (operation, answer) =
-            Operation::new(doing, undo, move |connection| work(Connection::Sqlite(connection)).boxed());
-        // A writer that ended drops the operation, and the answer with it.
-        let _ = self.requests.send(Request::Write(operation)).await;
+        let (sender, answer) = oneshot::channel();
+        // A writer that ended drops the request, and the answer with it.
+        let _ = self.requests.send(request(sender)).await;
         match answer.await {
             Ok(result) => result,
             Err(_) => self.refuse_after_fatal().and(Err(StoreError::Unavailable { doing, source: None })),
