@@ -5,10 +5,9 @@
 //! write to the same store, the rows' head is read before every use, and a state replayed from other rows is dropped:
 //! no replica advises from a law that another has taken further, or that a restored database never had.
 
-use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard};
+use tokio::sync::OwnedMutexGuard;
 
 use super::bounded::Bounded;
 use super::clock::Clock;
@@ -18,17 +17,13 @@ use super::identity;
 use super::live::Live;
 use super::observation::{Observe, Observed};
 use super::policies::Policies;
+use super::slots::{Slot, Slots};
 use crate::control::advisor::{Advice, AdviceMode};
 use crate::control::error::FieldError;
 use crate::control::worst_case::WorstCase;
 use crate::store::{
     Append, CreateSession, NewObservation, NewSession, ObservationRow, SessionRow, SessionSummary, Store,
 };
-
-/// Sessions kept in memory; past it, those nobody is using are dropped and replayed when next asked for.
-const KEPT_LIVE: usize = 20_000;
-
-type Slot = Arc<AsyncMutex<Option<Live>>>;
 
 /// What [`Sessions::action`] found.
 pub struct Action {
@@ -51,7 +46,7 @@ pub struct Sessions {
     store: Store,
     clock: Clock,
     policies: Arc<Policies>,
-    slots: Arc<Mutex<HashMap<String, Slot>>>,
+    slots: Arc<Mutex<Slots>>,
     pub(super) advising: Bounded,
     pub(super) resolving: Bounded,
 }
@@ -266,23 +261,20 @@ impl Sessions {
         }
         let last = observations.last().and_then(|row| serde_json::from_str::<Observed>(&row.answer_json).ok());
         let price = last.and_then(|answer| answer.price);
+        self.lock().grow(state.law.sample_size() + row.initial_history.len());
         let head = observations.last().map_or_else(|| row.head(), |last| last.head(session));
         Ok(Live { row: Arc::new(row), state, head, advisor, price, radius: None, advice: None })
     }
 
     fn slot(&self, session: &str) -> Slot {
-        let mut slots = self.lock();
-        if slots.len() >= KEPT_LIVE && !slots.contains_key(session) {
-            slots.retain(|_, slot| Arc::strong_count(slot) > 1);
-        }
-        slots.entry(session.to_owned()).or_default().clone()
+        self.lock().of(session)
     }
 
     fn forget(&self, session: &str) {
-        self.lock().remove(session);
+        self.lock().forget(session);
     }
 
-    fn lock(&self) -> MutexGuard<'_, HashMap<String, Slot>> {
+    fn lock(&self) -> MutexGuard<'_, Slots> {
         // No code panics while holding the lock.
         self.slots.lock().unwrap_or_else(PoisonError::into_inner)
     }
