@@ -13,7 +13,7 @@ use super::error::FieldError;
 use super::policy::Policy;
 use super::specification::{Specification, UtilitySpecification};
 use super::state::{State, next_state};
-use super::surrogate::{NextValue, SingleSolution, Solution, TargetMap, ValueSurrogate};
+use super::surrogate::{NextValue, SingleSolution, Solution, StepSurrogates, TargetMap, ValueSurrogate};
 use super::uncertainty::Measure;
 use super::utility::depends_on_wealth;
 use super::worst_case::WorstCase;
@@ -109,6 +109,12 @@ struct Prediction {
     in_design: bool,
 }
 
+/// The process behind the predicted deviation, which does not depend on the targets.
+fn stored_process(stored: &StepSurrogates) -> Option<GaussianProcess> {
+    let zeros = vec![0.0; stored.value.weights.len()];
+    GaussianProcess::condition(&stored.matrix(), &zeros, &stored.value.hyperparameters).ok()
+}
+
 impl Advisor {
     pub fn new(policy: Policy) -> Self {
         let context = ProblemContext::new(policy.specification());
@@ -184,6 +190,16 @@ impl Advisor {
         prepared && cost.is_some_and(|cost| cost + points * points / 2 <= PROMPT_COST)
     }
 
+    /// Makes what [`Self::is_prompt`] asks for.
+    pub fn prepare(&self, step: usize, state: &State) {
+        self.context.sets.prepare(self.context.learned_size(state));
+        if let Some(PreparedStep::Surrogates { deviation, .. }) = self.steps.get(step)
+            && let Some(Solution::Surrogates(stored)) = self.policy.steps().get(step).map(|step| &step.solution)
+        {
+            deviation.get_or_init(|| stored_process(stored));
+        }
+    }
+
     fn predicted(&self, step: usize, state: &State, radius: f64, predicted: &Prediction) -> Advice {
         let asked = Asked { step, state, radius, source: AdviceSource::PolicySurrogate };
         self.advice(&asked, predicted.action, predicted.floor_gain, predicted)
@@ -255,10 +271,7 @@ impl Advisor {
                 let Solution::Surrogates(stored) = &self.policy.steps()[step].solution else {
                     return Prediction { action: 0.0, floor_gain: 0.0, deviation: f64::INFINITY, in_design: false };
                 };
-                let process = deviation.get_or_init(|| {
-                    let zeros = vec![0.0; stored.value.weights.len()];
-                    GaussianProcess::condition(&stored.matrix(), &zeros, &stored.value.hyperparameters).ok()
-                });
+                let process = deviation.get_or_init(|| stored_process(stored));
                 let deviation = process.as_ref().map_or(f64::INFINITY, |found| found.latent_variance(&input).sqrt());
                 let highest = self.specification().problem.action_interval[1];
                 let action = stored.policy.offset + stored.policy.scale * policy.mean(&input);

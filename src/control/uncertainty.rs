@@ -105,6 +105,17 @@ impl UncertaintySets {
         }
     }
 
+    /// Simulates what measuring laws of this size takes, where that is yet to be done.
+    pub fn prepare(&self, sample_size: usize) {
+        if let RadiusRule::Bridge { paths, .. } = self.rule
+            && self.uncertain
+        {
+            let bridges = self.bridges(sample_size, paths);
+            self.now(&bridges, sample_size, paths);
+            self.ahead(&bridges, sample_size, paths);
+        }
+    }
+
     /// The bridge quantile of a law; `None` under other rules and frameworks.
     pub fn quantile(&self, law: &EmpiricalDistribution) -> Option<Quantile> {
         self.measure(law).quantile

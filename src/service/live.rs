@@ -95,11 +95,12 @@ impl Live {
             let uncertainty = self.advisor.uncertainty(&state);
             return Ok((state, uncertainty));
         }
-        let advisor = self.advisor.clone();
-        let measuring = advising.run(move || {
-            let uncertainty = advisor.uncertainty(&state);
-            (state, uncertainty)
-        });
-        measuring.await
+        let (advisor, step) = (self.advisor.clone(), self.observed() + 1);
+        let measured = advising.run(move || (advisor.uncertainty(&state), state)).await;
+        let (uncertainty, state) = measured?;
+        // The first session to get this far: the next advice finds its common random numbers simulated.
+        let (advisor, reached) = (self.advisor.clone(), state.clone());
+        tokio::task::spawn_blocking(move || advisor.prepare(step, &reached));
+        Ok((state, uncertainty))
     }
 }
