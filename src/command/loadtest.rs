@@ -8,6 +8,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use tokio::signal::unix::{SignalKind, signal};
 
 mod connection;
 mod figures;
@@ -86,7 +87,15 @@ impl LoadTest {
 pub fn run(arguments: &LoadTest) -> Result<(), Box<dyn Error>> {
     // One thread: the generator shares the cores with what it measures.
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    let report = runtime.block_on(measure(arguments))?;
+    let report = runtime.block_on(async {
+        let mut terminate = signal(SignalKind::terminate())?;
+        // What was started ends with this process, and its folder goes.
+        tokio::select! {
+            report = measure(arguments) => report,
+            _ = terminate.recv() => Err("stopped".into()),
+            _ = tokio::signal::ctrl_c() => Err("stopped".into()),
+        }
+    })?;
     if arguments.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
     } else {
