@@ -5,7 +5,7 @@ mod command;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use command::{backtest, bench, demo, evaluate, healthcheck, keys, reproduce, serve};
+use command::{backtest, bench, demo, evaluate, healthcheck, keys, loadtest, reproduce, serve};
 
 /// Nonparametric adaptive robust control of an investor, as a service.
 #[derive(Debug, Parser)]
@@ -35,6 +35,8 @@ enum Command {
     /// Measure this machine's speed and accuracy.
     #[command(subcommand)]
     Bench(bench::Bench),
+    /// Measure what the live service bears on this machine.
+    Loadtest(loadtest::LoadTest),
     /// Print the OpenAPI description.
     Openapi,
 }
@@ -47,6 +49,7 @@ async fn main() -> ExitCode {
         Command::Backtest(arguments) => tokio::task::block_in_place(|| backtest::run(&arguments)).map_err(Into::into),
         Command::Evaluate(arguments) => tokio::task::block_in_place(|| evaluate::run(&arguments)),
         Command::Reproduce(arguments) => tokio::task::block_in_place(|| reproduce::run(&arguments)),
+        Command::Loadtest(arguments) => tokio::task::block_in_place(|| loadtest::run(&arguments)),
         Command::Bench(bench) => bench::run(bench).await,
         Command::Keys(arguments) => keys::run(arguments).await,
         Command::Healthcheck(arguments) => healthcheck::run(&arguments),

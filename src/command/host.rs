@@ -1,7 +1,7 @@
 //! The service in this process, as `serve` runs it, on a free loopback port with a data folder of its own.
 
 use std::net::{Ipv4Addr, SocketAddr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use ballast::http::{Running, serve};
 use ballast::service::config::Config;
@@ -17,7 +17,20 @@ pub enum HostError {
 }
 
 /// A data folder that is removed with everything in it.
-struct DataFolder(PathBuf);
+pub struct DataFolder(PathBuf);
+
+impl DataFolder {
+    /// Makes one in `parent`, named after `purpose`.
+    pub fn make_in(parent: &Path, purpose: &str) -> Result<Self, HostError> {
+        let path = parent.join(format!("ballast-{purpose}-{}", std::process::id()));
+        std::fs::create_dir(&path).map_err(|source| HostError::Folder { path: path.clone(), source })?;
+        Ok(DataFolder(path))
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+}
 
 impl Drop for DataFolder {
     fn drop(&mut self) {
@@ -37,10 +50,8 @@ pub struct Host {
 impl Host {
     /// Starts it over a new folder named after `purpose`, training on every core: nobody else is being served.
     pub async fn start(purpose: &str) -> Result<Self, HostError> {
-        let path = std::env::temp_dir().join(format!("ballast-{purpose}-{}", std::process::id()));
-        std::fs::create_dir(&path).map_err(|source| HostError::Folder { path: path.clone(), source })?;
-        let folder = DataFolder(path);
-        let mut config = Config::new(&folder.0);
+        let folder = DataFolder::make_in(&std::env::temp_dir(), purpose)?;
+        let mut config = Config::new(folder.path());
         config.listen = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
         config.training_threads = std::thread::available_parallelism().map_or(1, usize::from);
         let started = serve(config, Shutdown::new()).await;
@@ -48,8 +59,8 @@ impl Host {
         Ok(Host { address: running.address, running, folder })
     }
 
-    pub fn folder(&self) -> &std::path::Path {
-        &self.folder.0
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
     }
 
     /// Drains it and waits for its end.

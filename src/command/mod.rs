@@ -9,6 +9,7 @@ pub mod evaluate;
 pub mod healthcheck;
 mod host;
 pub mod keys;
+pub mod loadtest;
 mod monthly_returns;
 pub mod reproduce;
 pub mod serve;

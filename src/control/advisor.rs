@@ -13,11 +13,15 @@ use super::error::FieldError;
 use super::policy::Policy;
 use super::specification::{Specification, UtilitySpecification};
 use super::state::{State, next_state};
-use super::surrogate::{NextValue, SingleSolution, Solution, TargetMap, ValueSurrogate};
+use super::surrogate::{NextValue, SingleSolution, Solution, StepSurrogates, TargetMap, ValueSurrogate};
+use super::uncertainty::Measure;
 use super::utility::depends_on_wealth;
 use super::worst_case::WorstCase;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::gp::{GaussianProcess, GpMean};
+
+/// Numbers read in some hundreds of microseconds.
+const PROMPT_COST: usize = 1 << 20;
 
 /// How an allocation is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,6 +109,12 @@ struct Prediction {
     in_design: bool,
 }
 
+/// The process behind the predicted deviation, which does not depend on the targets.
+fn stored_process(stored: &StepSurrogates) -> Option<GaussianProcess> {
+    let zeros = vec![0.0; stored.value.weights.len()];
+    GaussianProcess::condition(&stored.matrix(), &zeros, &stored.value.hyperparameters).ok()
+}
+
 impl Advisor {
     pub fn new(policy: Policy) -> Self {
         let context = ProblemContext::new(policy.specification());
@@ -149,17 +159,50 @@ impl Advisor {
     /// The advice for the period after `step` observed periods. `step` must be below the horizon.
     /// Cost: two kernel sums and one triangular solve; a robust step where it re-solves.
     pub fn advise(&self, step: usize, state: &State, mode: AdviceMode) -> Advice {
-        let predicted = self.predict(step, state);
         let radius = self.radius(state);
+        let predicted = self.predict(step, state, radius);
         let source = match mode {
             AdviceMode::Resolve => AdviceSource::Resolved,
-            AdviceMode::Surrogate if predicted.in_design => {
-                let asked = Asked { step, state, radius, source: AdviceSource::PolicySurrogate };
-                return self.advice(&asked, predicted.action, predicted.floor_gain, &predicted);
-            }
+            AdviceMode::Surrogate if predicted.in_design => return self.predicted(step, state, radius, &predicted),
             AdviceMode::Surrogate => AdviceSource::ResolvedOutsideDesign,
         };
         self.resolved(&Asked { step, state, radius, source }, &predicted).0
+    }
+
+    /// [`Self::advise`] from the policy surrogate where the radius of the state is known; `None` outside the design.
+    pub fn advise_from_surrogate(&self, step: usize, state: &State, radius: f64) -> Option<Advice> {
+        let predicted = self.predict(step, state, radius);
+        predicted.in_design.then(|| self.predicted(step, state, radius, &predicted))
+    }
+
+    /// Whether [`Self::advise_from_surrogate`] and [`Self::uncertainty`] take well below a millisecond: what they need is
+    /// prepared, and small.
+    pub fn is_prompt(&self, step: usize, state: &State) -> bool {
+        let points = match self.policy.steps().get(step).map(|step| &step.solution) {
+            Some(Solution::Surrogates(stored)) => stored.value.weights.len(),
+            _ => 0,
+        };
+        let prepared = match self.steps.get(step) {
+            Some(PreparedStep::Surrogates { deviation, .. }) => deviation.get().is_some(),
+            _ => true,
+        };
+        let cost = self.context.sets.cost(self.context.learned_size(state));
+        prepared && cost.is_some_and(|cost| cost + points * points / 2 <= PROMPT_COST)
+    }
+
+    /// Makes what [`Self::is_prompt`] asks for.
+    pub fn prepare(&self, step: usize, state: &State) {
+        self.context.sets.prepare(self.context.learned_size(state));
+        if let Some(PreparedStep::Surrogates { deviation, .. }) = self.steps.get(step)
+            && let Some(Solution::Surrogates(stored)) = self.policy.steps().get(step).map(|step| &step.solution)
+        {
+            deviation.get_or_init(|| stored_process(stored));
+        }
+    }
+
+    fn predicted(&self, step: usize, state: &State, radius: f64, predicted: &Prediction) -> Advice {
+        let asked = Asked { step, state, radius, source: AdviceSource::PolicySurrogate };
+        self.advice(&asked, predicted.action, predicted.floor_gain, predicted)
     }
 
     /// The re-solved advice and the worst-case law behind it.
@@ -169,9 +212,9 @@ impl Advisor {
 
     /// The same were the radius of the coming period `radius`, whatever the law says; later periods keep their own.
     pub fn explain_within(&self, step: usize, state: &State, radius: f64) -> (Advice, WorstCase) {
-        let own = radius == self.radius(state);
-        let source = if own { AdviceSource::Resolved } else { AdviceSource::ResolvedOtherRadius };
-        let predicted = self.predict(step, state);
+        let own = self.radius(state);
+        let source = if radius == own { AdviceSource::Resolved } else { AdviceSource::ResolvedOtherRadius };
+        let predicted = self.predict(step, state, own);
         let (advice, solution) = self.resolved(&Asked { step, state, radius, source }, &predicted);
         let worst = match solution {
             Some(solution) => WorstCase::of(&solution, &advice, self.utility_per_radius(step, state)),
@@ -187,7 +230,7 @@ impl Advisor {
 
     /// The floor gain that the value surrogate predicts, wherever the state lies.
     pub fn surrogate_gain(&self, step: usize, state: &State) -> f64 {
-        self.predict(step, state).floor_gain
+        self.predict(step, state, self.radius(state)).floor_gain
     }
 
     fn resolved(&self, asked: &Asked, predicted: &Prediction) -> (Advice, Option<RobustSolution>) {
@@ -216,21 +259,19 @@ impl Advisor {
         }
     }
 
-    fn predict(&self, step: usize, state: &State) -> Prediction {
+    /// `radius` is that of the state.
+    fn predict(&self, step: usize, state: &State, radius: f64) -> Prediction {
         match &self.steps[step] {
             PreparedStep::Single(single) => {
                 let in_design = self.is_single_state(step, state);
                 Prediction { action: single.action, floor_gain: single.floor_gain, deviation: 0.0, in_design }
             }
             PreparedStep::Surrogates { value, policy, deviation } => {
-                let input = value.scaling.apply(&self.context.features(state));
+                let input = value.scaling.apply(&self.context.features_within(state, radius));
                 let Solution::Surrogates(stored) = &self.policy.steps()[step].solution else {
                     return Prediction { action: 0.0, floor_gain: 0.0, deviation: f64::INFINITY, in_design: false };
                 };
-                let process = deviation.get_or_init(|| {
-                    let zeros = vec![0.0; stored.value.weights.len()];
-                    GaussianProcess::condition(&stored.matrix(), &zeros, &stored.value.hyperparameters).ok()
-                });
+                let process = deviation.get_or_init(|| stored_process(stored));
                 let deviation = process.as_ref().map_or(f64::INFINITY, |found| found.latent_variance(&input).sqrt());
                 let highest = self.specification().problem.action_interval[1];
                 let action = stored.policy.offset + stored.policy.scale * policy.mean(&input);
@@ -267,13 +308,13 @@ impl Advisor {
 
     /// Sample size, moments, quantile and radius of a state.
     pub fn uncertainty(&self, state: &State) -> Uncertainty {
-        let quantile = self.context.sets.quantile(&self.context.learned_law(state));
+        let Measure { radius, quantile } = self.context.measure(state);
         Uncertainty {
             sample_size: state.law.sample_size(),
             moments: state.law.raw_moments(self.specification().surrogate.moment_count),
             quantile: quantile.map(|found| found.value),
             quantile_standard_error: quantile.map(|found| found.standard_error),
-            radius: self.radius(state),
+            radius,
         }
     }
 

@@ -11,7 +11,7 @@ use super::parametric::ParametricStep;
 use super::specification::Specification;
 use super::state::{State, floor};
 use super::surrogate::NextValue;
-use super::uncertainty::{Radii, UncertaintySets};
+use super::uncertainty::{Measure, Radii, UncertaintySets};
 use super::utility::RelativeUtility;
 use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
 use crate::numerics::empirical::EmpiricalDistribution;
@@ -50,6 +50,12 @@ impl ProblemContext {
         }
     }
 
+    /// Its sample size.
+    pub fn learned_size(&self, state: &State) -> usize {
+        let problem = &self.specification.problem;
+        if problem.framework.is_frozen() { problem.history.len() } else { state.law.sample_size() }
+    }
+
     /// The confidence region of the parametric frameworks at a state, were its radius `radius`.
     fn region(&self, state: &State, radius: f64) -> ConfidenceRegion {
         let moments = CentralMoments::of(&self.learned_law(state));
@@ -62,11 +68,21 @@ impl ProblemContext {
         floor(state.wealth, problem.rate_per_step, problem.horizon - step)
     }
 
+    /// The radius of a state and what it is made of.
+    pub fn measure(&self, state: &State) -> Measure {
+        self.sets.measure(&self.learned_law(state))
+    }
+
     /// The features of a state, unscaled.
     pub fn features(&self, state: &State) -> Vec<f64> {
+        self.features_within(state, if self.selection.has_ball() { self.radius(state) } else { 0.0 })
+    }
+
+    /// The same where the radius of the state is known already.
+    pub fn features_within(&self, state: &State, radius: f64) -> Vec<f64> {
         let (mut radii, mut robust_excess) = (NO_BALL, 0.0);
         if self.selection.has_ball() {
-            radii = self.sets.radii(&state.law);
+            radii = self.sets.radii(&state.law, radius);
             let worst = ExponentialMean::of(&state.law, self.lowest_return()).worst(radii.radius);
             robust_excess = excess(worst, self.specification.problem.rate_per_step);
         }

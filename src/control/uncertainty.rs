@@ -2,7 +2,7 @@
 //! law's estimates, rule by rule.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::specification::{Framework, RadiusRule, Specification};
 use crate::numerics::bridge::{AbsoluteBridges, Quantile, UpperQuantile};
@@ -10,9 +10,11 @@ use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
 
 /// Sample sizes whose bridges are kept at once; live sessions of one policy pass through a horizon's worth of them.
-const KEPT_SIZES: usize = 24;
-/// Values in the bridges kept, where that many sizes have more: 256 MB, but two sizes in any case.
+const KEPT_SIZES: usize = 128;
+/// Values in the bridges kept, where that many sizes have more: 256 MB, but [`FEWEST_SIZES`] in any case.
 const KEPT_VALUES: usize = 1 << 25;
+/// A robust step looks at its own sample size and the next.
+const FEWEST_SIZES: usize = 2;
 
 /// The radius rule of a specification, with its common random numbers.
 pub struct UncertaintySets {
@@ -27,11 +29,19 @@ pub struct UncertaintySets {
     bridges: Mutex<HashMap<usize, Arc<Bridges>>>,
 }
 
-/// The common random numbers of one sample size.
+/// The common random numbers of one sample size, each simulated on first use.
+#[derive(Default)]
 struct Bridges {
-    now: AbsoluteBridges,
-    /// Of the mean statistic one return later; `None` where no step comes after.
-    ahead: Option<AbsoluteBridges>,
+    now: OnceLock<AbsoluteBridges>,
+    /// Of the mean statistic one return later.
+    ahead: OnceLock<AbsoluteBridges>,
+}
+
+/// The uncertainty set of a law: its radius, and the quantile behind it under the bridge rule.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measure {
+    pub radius: f64,
+    pub quantile: Option<Quantile>,
 }
 
 /// The radius of a law and what it tends to be one return later.
@@ -60,59 +70,107 @@ impl UncertaintySets {
         self.uncertain && matches!(self.rule, RadiusRule::Bridge { scale, .. } if scale > 0.0)
     }
 
-    /// The bridges of sample size n, simulated on first use.
+    /// The bridges of sample size n. None is simulated under the lock: who asks for one size does not wait for another.
     fn bridges(&self, sample_size: usize, paths: usize) -> Arc<Bridges> {
-        let mut kept = self.bridges.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.kept();
         if let Some(found) = kept.get(&sample_size) {
             return Arc::clone(found);
         }
-        let room = (KEPT_VALUES / (2 * sample_size * paths)).clamp(2, KEPT_SIZES);
-        while kept.len() >= room {
-            // The smallest sample size is the one sessions leave behind.
-            let Some(smallest) = kept.keys().min().copied() else { break };
-            kept.remove(&smallest);
+        while kept.len() >= room(sample_size, paths) {
+            // Sessions go up and trainings go down, a size at a time.
+            let Some(farthest) = kept.keys().max_by_key(|size| size.abs_diff(sample_size)).copied() else { break };
+            kept.remove(&farthest);
         }
-        let simulate = |size| AbsoluteBridges::simulate(size, paths, self.seed);
-        let ahead = (sample_size < self.last_size).then(|| simulate(sample_size + 1).one_ahead());
-        let made = Arc::new(Bridges { now: simulate(sample_size), ahead });
-        kept.insert(sample_size, Arc::clone(&made));
-        made
+        Arc::clone(kept.entry(sample_size).or_default())
+    }
+
+    fn kept(&self) -> MutexGuard<'_, HashMap<usize, Arc<Bridges>>> {
+        self.bridges.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn simulated(&self, sample_size: usize, paths: usize) -> AbsoluteBridges {
+        AbsoluteBridges::simulate(sample_size, paths, self.seed)
+    }
+
+    /// Numbers read to measure a law of this size, or `None` where its bridges are yet to be simulated.
+    pub fn cost(&self, sample_size: usize) -> Option<usize> {
+        match self.rule {
+            RadiusRule::Bridge { paths, .. } if self.uncertain => {
+                let kept = self.kept();
+                let found = kept.get(&sample_size)?;
+                let ahead = sample_size >= self.last_size || found.ahead.get().is_some();
+                (ahead && found.now.get().is_some()).then_some(2 * sample_size * paths)
+            }
+            _ => Some(sample_size),
+        }
+    }
+
+    /// Simulates what measuring laws of this size takes, where that is yet to be done.
+    pub fn prepare(&self, sample_size: usize) {
+        if let RadiusRule::Bridge { paths, .. } = self.rule
+            && self.uncertain
+        {
+            let bridges = self.bridges(sample_size, paths);
+            self.now(&bridges, sample_size, paths);
+            self.ahead(&bridges, sample_size, paths);
+        }
     }
 
     /// The bridge quantile of a law; `None` under other rules and frameworks.
     pub fn quantile(&self, law: &EmpiricalDistribution) -> Option<Quantile> {
-        match self.rule {
-            RadiusRule::Bridge { paths, .. } if self.uncertain => {
-                Some(self.bridges(law.sample_size(), paths).now.quantile_with_error(law, &self.estimator))
-            }
-            _ => None,
-        }
+        self.measure(law).quantile
     }
 
     /// Radius of the ball around `law`, in log-return; of the confidence region, in standard deviations of `law`.
     pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
-        match self.rule {
-            RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
-                let bridges = self.bridges(law.sample_size(), paths);
-                radius(scale, bridges.now.quantile(law, &self.estimator), law.sample_size())
-            }
-            _ => self.radius_of_size(law.sample_size()),
-        }
-    }
-
-    /// The radius of `law`, and what it tends to be one return later.
-    pub fn radii(&self, law: &EmpiricalDistribution) -> Radii {
         let size = law.sample_size();
         match self.rule {
             RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
                 let bridges = self.bridges(size, paths);
-                let radius_now = radius(scale, bridges.now.quantile(law, &self.estimator), size);
-                let ahead = bridges.ahead.as_ref().map(|ahead| ahead.quantile(law, &self.estimator));
-                let radius_ahead = ahead.map_or(radius_now, |quantile| radius(scale, quantile, size + 1));
-                Radii { radius: radius_now, radius_ahead }
+                radius(scale, self.now(&bridges, size, paths).quantile(law, &self.estimator), size)
             }
-            _ => Radii { radius: self.radius_of_size(size), radius_ahead: self.radius_of_size(size) },
+            _ => self.radius_of_size(size),
         }
+    }
+
+    /// The radius of `law` and what it is made of.
+    pub fn measure(&self, law: &EmpiricalDistribution) -> Measure {
+        let size = law.sample_size();
+        match self.rule {
+            RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
+                let bridges = self.bridges(size, paths);
+                let quantile = self.now(&bridges, size, paths).quantile_with_error(law, &self.estimator);
+                Measure { radius: radius(scale, quantile.value, size), quantile: Some(quantile) }
+            }
+            _ => Measure { radius: self.radius_of_size(size), quantile: None },
+        }
+    }
+
+    /// The radius of `law`, which is known, and what it tends to be one return later.
+    pub fn radii(&self, law: &EmpiricalDistribution, known: f64) -> Radii {
+        let size = law.sample_size();
+        let radius_ahead = match self.rule {
+            RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
+                let ahead = |ahead: &AbsoluteBridges| radius(scale, ahead.quantile(law, &self.estimator), size + 1);
+                self.ahead(&self.bridges(size, paths), size, paths).map_or(known, ahead)
+            }
+            _ => self.radius_of_size(size),
+        };
+        Radii { radius: known, radius_ahead }
+    }
+
+    fn now<'b>(&self, bridges: &'b Bridges, sample_size: usize, paths: usize) -> &'b AbsoluteBridges {
+        bridges.now.get_or_init(|| self.simulated(sample_size, paths))
+    }
+
+    /// The bridges of the mean statistic one return later; `None` where no step comes after.
+    fn ahead<'b>(&self, bridges: &'b Bridges, sample_size: usize, paths: usize) -> Option<&'b AbsoluteBridges> {
+        let next = sample_size + 1;
+        let simulate = || match room(next, paths) {
+            0..=FEWEST_SIZES => self.simulated(next, paths).one_ahead(),
+            _ => self.now(&self.bridges(next, paths), next, paths).one_ahead(),
+        };
+        (sample_size < self.last_size).then(|| bridges.ahead.get_or_init(simulate))
     }
 
     /// The same for `law` with one more value, for every value in ascending `values`.
@@ -125,8 +183,9 @@ impl UncertaintySets {
                     let found = bridges.quantiles_with(law.atoms(), values, &self.estimator);
                     found.into_iter().map(|quantile| radius(scale, quantile, size)).collect()
                 };
-                let now = quantiles(&bridges.now, size);
-                let ahead = bridges.ahead.as_ref().map_or_else(|| now.clone(), |ahead| quantiles(ahead, size + 1));
+                let now = quantiles(self.now(&bridges, size, paths), size);
+                let ahead = self.ahead(&bridges, size, paths);
+                let ahead = ahead.map_or_else(|| now.clone(), |ahead| quantiles(ahead, size + 1));
                 now.into_iter().zip(ahead).map(|(radius, radius_ahead)| Radii { radius, radius_ahead }).collect()
             }
             _ => {
@@ -148,6 +207,11 @@ impl UncertaintySets {
             RadiusRule::ChiSquare { alpha } => confidence_region::radius(alpha, sample_size),
         }
     }
+}
+
+/// Sample sizes kept where one of them is `sample_size`.
+fn room(sample_size: usize, paths: usize) -> usize {
+    (KEPT_VALUES / (2 * sample_size * paths)).clamp(FEWEST_SIZES, KEPT_SIZES)
 }
 
 fn radius(scale: f64, quantile: f64, sample_size: usize) -> f64 {

@@ -81,6 +81,7 @@ pub async fn serve(config: Config, shutdown: Shutdown) -> Result<Running, ServeE
 }
 
 async fn run(listener: TcpListener, application: Router, service: Arc<Service>, config: Config) {
+    let upkeep = tokio::spawn(telemetry::keep_up());
     let connections = GracefulShutdown::new();
     let permits = Arc::new(Semaphore::new(connection_limit(config.connection_limit)));
     loop {
@@ -116,6 +117,7 @@ async fn run(listener: TcpListener, application: Router, service: Arc<Service>, 
         tracing::warn!("some connections were still open at the end of the drain");
     }
     service.close().await;
+    upkeep.abort();
     tracing::info!("stopped");
 }
 

@@ -1,7 +1,7 @@
 //! One log line and two metrics a request; the metrics page.
 
 use std::sync::OnceLock;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use axum::extract::{MatchedPath, Request};
 use axum::middleware::Next;
@@ -25,6 +25,19 @@ pub fn install_recorder() {
         names::describe();
         handle.inspect_err(|error| tracing::error!(%error, "no metrics")).ok()
     });
+}
+
+/// Histograms hold every sample until they are read: this bounds what gathers where nobody reads the page.
+const UPKEEP: Duration = Duration::from_secs(5);
+
+/// Reads the histograms now and then, without end.
+pub async fn keep_up() {
+    loop {
+        tokio::time::sleep(UPKEEP).await;
+        if let Some(recorder) = RECORDER.get().and_then(Option::as_ref) {
+            recorder.run_upkeep();
+        }
+    }
 }
 
 /// The metrics page, with the counts of the store as they are now.

@@ -170,8 +170,8 @@ impl From<Live> for Session {
             state: session_state(live.observed(), live.row.horizon),
             wealth: live.state.wealth,
             sample_size: live.state.law.sample_size(),
-            session: live.row.session,
-            policy: live.row.policy,
+            session: live.row.session.clone(),
+            policy: live.row.policy.clone(),
             horizon: live.row.horizon,
             created_ms: live.row.created_ms,
         }

@@ -38,14 +38,24 @@ impl HarrellDavis {
 
     /// The estimate from `sample`, which it reorders. Cost O(n), and a sort of the order statistics that count.
     pub fn estimate(&self, sample: &mut [f64]) -> f64 {
-        assert_eq!(sample.len(), self.size);
-        let (_, _, _) = sample.select_nth_unstable_by(self.first, f64::total_cmp);
-        let upper = &mut sample[self.first..];
-        let last = self.weights.len() - 1;
-        let (_, _, _) = upper.select_nth_unstable_by(last, f64::total_cmp);
-        let around = &mut upper[..=last];
+        let [estimate] = HarrellDavis::estimates([self], sample);
+        estimate
+    }
+
+    /// Several estimates from one `sample`: the order statistics that count for any of them are sorted once.
+    pub fn estimates<const N: usize>(estimators: [&HarrellDavis; N], sample: &mut [f64]) -> [f64; N] {
+        assert!(estimators.iter().all(|estimator| estimator.size == sample.len()));
+        let first = estimators.iter().map(|estimator| estimator.first).min().unwrap_or(0);
+        let end = estimators.iter().map(|estimator| estimator.first + estimator.weights.len()).max().unwrap_or(first);
+        let (_, _, _) = sample.select_nth_unstable_by(first, f64::total_cmp);
+        let upper = &mut sample[first..];
+        let (_, _, _) = upper.select_nth_unstable_by(end - first - 1, f64::total_cmp);
+        let around = &mut upper[..end - first];
         around.sort_unstable_by(f64::total_cmp);
-        around.iter().zip(&self.weights).map(|(value, weight)| value * weight).sum()
+        estimators.map(|estimator| {
+            let counted = around[estimator.first - first..].iter().zip(&estimator.weights);
+            counted.map(|(value, weight)| value * weight).sum()
+        })
     }
 }
 
@@ -62,6 +72,14 @@ mod tests {
             let found = HarrellDavis::new(200, share).estimate(&mut sample.clone());
             assert!((found - expected).abs() < 2.0, "{share}: {found} against {expected}");
         }
+    }
+
+    #[test]
+    fn estimates_together_are_those_alone() {
+        let sample: Vec<f64> = (0..500).map(|k| f64::from(k * 7919 % 500).sqrt()).collect();
+        let estimators = [0.3, 0.9, 0.91].map(|share| HarrellDavis::new(500, share));
+        let together = HarrellDavis::estimates(estimators.each_ref(), &mut sample.clone());
+        assert_eq!(together, estimators.map(|estimator| estimator.estimate(&mut sample.clone())));
     }
 
     #[test]

@@ -5,8 +5,7 @@ use std::sync::Arc;
 use super::bounded::Bounded;
 use super::error::ServiceError;
 use super::observation::{Observe, Observed};
-use crate::control::advisor::{Advice, AdviceMode, Advisor};
-use crate::control::error::FieldError;
+use crate::control::advisor::{Advice, AdviceMode, Advisor, Uncertainty};
 use crate::control::limits;
 use crate::control::state::State;
 use crate::store::{Head, SessionRow};
@@ -14,11 +13,13 @@ use crate::store::{Head, SessionRow};
 /// A session replayed from its rows.
 #[derive(Clone)]
 pub struct Live {
-    pub row: SessionRow,
+    pub row: Arc<SessionRow>,
     pub state: State,
     /// Of the rows it was replayed from.
     pub(super) head: Head,
     pub(super) advisor: Arc<Advisor>,
+    /// Radius of the state, once computed.
+    pub(super) radius: Option<f64>,
     /// Price reported for the last period.
     pub(super) price: Option<f64>,
     /// The surrogate's advice for the coming period, once computed.
@@ -31,8 +32,10 @@ impl Live {
         self.head.observed
     }
 
-    pub(super) fn taken_to(&self, head: Head, state: State, price: Option<f64>) -> Live {
-        Live { head, state, price, advice: None, ..self.clone() }
+    /// The session after an observation that left `state`, whose radius is `radius`.
+    pub(super) fn taken_to(&self, head: Head, state: State, price: Option<f64>, radius: f64) -> Live {
+        let (row, advisor) = (self.row.clone(), self.advisor.clone());
+        Live { row, state, head, advisor, price, radius: Some(radius), advice: None }
     }
 
     pub(super) fn expects(&self, period: usize) -> Result<(), ServiceError> {
@@ -43,15 +46,22 @@ impl Live {
         if period == expected { Ok(()) } else { Err(ServiceError::PeriodGap { given: period, expected }) }
     }
 
-    /// The surrogate's advice for the coming period, computed once.
-    pub(super) async fn surrogate_advice(&mut self, advising: &Bounded) -> Result<Advice, ServiceError> {
-        if let Some(advice) = &self.advice {
-            return Ok(advice.clone());
+    /// The surrogate's advice for the coming period, computed once: here where that takes less than a thread would, else
+    /// on a thread that may block.
+    pub(super) async fn surrogate_advice(&mut self, advising: &Bounded) -> Result<&Advice, ServiceError> {
+        let step = self.observed();
+        if self.advice.is_none() && self.advisor.is_prompt(step, &self.state) {
+            let radius = self.radius.unwrap_or_else(|| self.advisor.radius(&self.state));
+            self.advice = self.advisor.advise_from_surrogate(step, &self.state, radius);
         }
-        let (advisor, state, step) = (self.advisor.clone(), self.state.clone(), self.observed());
-        let advice = advising.run(move || advisor.advise(step, &state, AdviceMode::Surrogate)).await?;
-        self.advice = Some(advice.clone());
-        Ok(advice)
+        let advice = match self.advice.take() {
+            Some(advice) => advice,
+            None => {
+                let (advisor, state) = (self.advisor.clone(), self.state.clone());
+                advising.run(move || advisor.advise(step, &state, AdviceMode::Surrogate)).await?
+            }
+        };
+        Ok(self.advice.insert(advice))
     }
 
     /// The state after `log_return`, and the answer to it; nothing is changed yet but the memoised advice.
@@ -63,15 +73,10 @@ impl Live {
     ) -> Result<(State, Observed), ServiceError> {
         let advised = self.surrogate_advice(advising).await?.allocation;
         let executed_allocation = report.executed_allocation.unwrap_or(advised);
-        let (advisor, before, stated) = (self.advisor.clone(), self.state.clone(), report.wealth);
-        let advancing = advising.run(move || {
-            let mut state = advisor.advance(&before, executed_allocation, log_return);
-            state.wealth = stated.unwrap_or(state.wealth);
-            limits::within("wealth", state.wealth, limits::WEALTH.0, limits::WEALTH.1)?;
-            let uncertainty = advisor.uncertainty(&state);
-            Ok::<_, FieldError>((state, uncertainty))
-        });
-        let (state, uncertainty) = advancing.await??;
+        let mut state = self.advisor.advance(&self.state, executed_allocation, log_return);
+        state.wealth = report.wealth.unwrap_or(state.wealth);
+        limits::within("wealth", state.wealth, limits::WEALTH.0, limits::WEALTH.1)?;
+        let (state, uncertainty) = self.measured(state, advising).await?;
         let answer = Observed {
             session: report.session.clone(),
             period: report.period,
@@ -83,5 +88,19 @@ impl Live {
             uncertainty,
         };
         Ok((state, answer))
+    }
+
+    async fn measured(&self, state: State, advising: &Bounded) -> Result<(State, Uncertainty), ServiceError> {
+        if self.advisor.is_prompt(self.observed() + 1, &state) {
+            let uncertainty = self.advisor.uncertainty(&state);
+            return Ok((state, uncertainty));
+        }
+        let (advisor, step) = (self.advisor.clone(), self.observed() + 1);
+        let measured = advising.run(move || (advisor.uncertainty(&state), state)).await;
+        let (uncertainty, state) = measured?;
+        // The first session to get this far: the next advice finds its common random numbers simulated.
+        let (advisor, reached) = (self.advisor.clone(), state.clone());
+        tokio::task::spawn_blocking(move || advisor.prepare(step, &reached));
+        Ok((state, uncertainty))
     }
 }

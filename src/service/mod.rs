@@ -18,6 +18,7 @@ pub mod policies;
 pub mod progress;
 pub mod sessions;
 pub mod shutdown;
+mod slots;
 mod trainer;
 pub mod what_if;
 

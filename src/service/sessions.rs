@@ -6,10 +6,9 @@
 //! no replica advises from a law that another has taken further, or that a restored database never had. A session is its
 //! tenant's: to everybody else it does not exist.
 
-use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard};
+use tokio::sync::OwnedMutexGuard;
 
 use super::bounded::Bounded;
 use super::clock::Clock;
@@ -19,17 +18,13 @@ use super::identity;
 use super::live::Live;
 use super::observation::{Observe, Observed};
 use super::policies::Policies;
+use super::slots::{Slot, Slots};
 use crate::control::advisor::{Advice, AdviceMode};
 use crate::control::error::FieldError;
 use crate::control::worst_case::WorstCase;
 use crate::store::{
     Append, CreateSession, NewObservation, NewSession, ObservationRow, SessionRow, SessionSummary, Store, Tenant,
 };
-
-/// Sessions kept in memory; past it, those nobody is using are dropped and replayed when next asked for.
-const KEPT_LIVE: usize = 20_000;
-
-type Slot = Arc<AsyncMutex<Option<Live>>>;
 
 /// What [`Sessions::action`] found.
 pub struct Action {
@@ -52,7 +47,7 @@ pub struct Sessions {
     store: Store,
     clock: Clock,
     policies: Arc<Policies>,
-    slots: Arc<Mutex<HashMap<String, Slot>>>,
+    slots: Arc<Mutex<Slots>>,
     pub(super) advising: Bounded,
     pub(super) resolving: Bounded,
 }
@@ -97,7 +92,10 @@ impl Sessions {
             created_ms: row.created_ms,
         };
         match self.store.create_session(new).await? {
-            CreateSession::Created => Ok(Live { head: row.head(), row, state, advisor, price: None, advice: None }),
+            CreateSession::Created => {
+                let head = row.head();
+                Ok(Live { row: Arc::new(row), state, head, advisor, price: None, radius: None, advice: None })
+            }
             CreateSession::NoPolicy => Err(ServiceError::unknown("policy", policy)),
             CreateSession::Exists => Err(ServiceError::internal("a session of this random name exists")),
         }
@@ -193,7 +191,7 @@ impl Sessions {
             answer_json: serde_json::to_string(&answer).map_err(ServiceError::internal)?,
             created_ms: self.clock.now_milliseconds(),
         };
-        let next = live.taken_to(new.head(), state, report.price);
+        let next = live.taken_to(new.head(), state, report.price, answer.uncertainty.radius);
         match self.store.append_observation(new).await? {
             Append::Appended => {
                 **slot = Some(next);
@@ -228,7 +226,7 @@ impl Sessions {
         }
         let period = live.observed() + 1;
         if question == Question::Advise(AdviceMode::Surrogate) {
-            let advice = live.surrogate_advice(&self.advising).await?;
+            let advice = live.surrogate_advice(&self.advising).await?.clone();
             return Ok(Action { period, advice, worst_case: None });
         }
         let (advisor, state, step) = (live.advisor.clone(), live.state.clone(), live.observed());
@@ -280,23 +278,20 @@ impl Sessions {
         }
         let last = observations.last().and_then(|row| serde_json::from_str::<Observed>(&row.answer_json).ok());
         let price = last.and_then(|answer| answer.price);
+        self.lock().grow(state.law.sample_size() + row.initial_history.len());
         let head = observations.last().map_or_else(|| row.head(), |last| last.head(session));
-        Ok(Live { row, state, head, advisor, price, advice: None })
+        Ok(Live { row: Arc::new(row), state, head, advisor, price, radius: None, advice: None })
     }
 
     fn slot(&self, session: &str) -> Slot {
-        let mut slots = self.lock();
-        if slots.len() >= KEPT_LIVE && !slots.contains_key(session) {
-            slots.retain(|_, slot| Arc::strong_count(slot) > 1);
-        }
-        slots.entry(session.to_owned()).or_default().clone()
+        self.lock().of(session)
     }
 
     fn forget(&self, session: &str) {
-        self.lock().remove(session);
+        self.lock().forget(session);
     }
 
-    fn lock(&self) -> MutexGuard<'_, HashMap<String, Slot>> {
+    fn lock(&self) -> MutexGuard<'_, Slots> {
         // No code panics while holding the lock.
         self.slots.lock().unwrap_or_else(PoisonError::into_inner)
     }

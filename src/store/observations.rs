@@ -1,12 +1,15 @@
 //! Observations: append-only, numbered by period from 1, each stored exactly once.
 
+use std::fmt::Write;
+use std::sync::LazyLock;
+
 use futures_util::FutureExt;
 
 use super::codec::{Seal, from_sql, to_sql};
 use super::error::Failure;
-use super::query::{Connection, Row, query};
+use super::query::{Connection, Query, Row, query};
 use super::sessions::Head;
-use super::{Store, StoreError};
+use super::{Engine, Store, StoreError};
 
 /// One period's return and what was answered to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,7 +59,12 @@ pub enum Append {
 impl Store {
     /// Appends the period after the last, or says why not; decided and written in one transaction.
     pub async fn append_observation(&self, new: NewObservation) -> Result<Append, StoreError> {
-        self.write("appending an observation", move |connection| append(connection, new).boxed()).await
+        match &self.0 {
+            Engine::Sqlite(folder) => folder.append(new).await,
+            Engine::Postgres(database) => {
+                database.write(APPENDING, move |connection| append(connection, new).boxed()).await
+            }
+        }
     }
 
     /// # Errors
@@ -84,23 +92,34 @@ impl Store {
     }
 }
 
-async fn append(mut connection: Connection<'_>, new: NewObservation) -> Result<Append, Failure> {
+/// What appending calls itself in errors.
+pub(super) const APPENDING: &str = "appending an observation";
+
+/// The row is inserted by a statement that decides itself whether it is the next one; why it was not is found out after.
+/// It changes rows by that statement only.
+pub(super) async fn append(mut connection: Connection<'_>, new: NewObservation) -> Result<Append, Failure> {
     let connection = &mut connection;
     let session = query("SELECT sequence FROM sessions WHERE session = $1").bind(new.session.as_str());
-    if connection.row(session.for_update()).await?.is_none() {
+    connection.lock(session.for_update()).await?;
+    if insert_next(connection, &new).await? {
+        return Ok(Append::Appended);
+    }
+    refused(connection, &new).await
+}
+
+/// Why a period was not inserted.
+async fn refused(connection: &mut Connection<'_>, new: &NewObservation) -> Result<Append, Failure> {
+    let session = query("SELECT sequence FROM sessions WHERE session = $1").bind(new.session.as_str());
+    if connection.row(session).await?.is_none() {
         return Ok(Append::NoSession);
     }
     let last = query("SELECT coalesce(max(period), 0) AS period FROM observations WHERE session = $1");
     let last = connection.row(last.bind(new.session.as_str())).await?.map_or(Ok(0), |row| row.get("period"))?;
     let expected = from_sql(last)? + 1;
     if (1..expected).contains(&new.period) {
-        return repeated(connection, &new).await;
+        return repeated(connection, new).await;
     }
-    if new.period != expected {
-        return Ok(Append::OutOfOrder { expected });
-    }
-    insert(connection, new).await?;
-    Ok(Append::Appended)
+    Ok(Append::OutOfOrder { expected })
 }
 
 /// What a period reported before answers.
@@ -116,17 +135,47 @@ async fn repeated(connection: &mut Connection<'_>, new: &NewObservation) -> Resu
     })
 }
 
-async fn insert(connection: &mut Connection<'_>, new: NewObservation) -> Result<(), Failure> {
-    let session = new.session.clone();
-    let row = ObservationRow::from(new);
-    let seal = row.seal(&session).finish();
-    let insert = query(
-        "INSERT INTO observations (session, period, content_hash, log_return, executed_allocation, advised_allocation,
-                                   wealth_after, answer_json, created_ms, seal)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10)",
-    );
-    let insert = insert
-        .bind(session)
+/// Rows that one statement takes where many wait.
+pub(super) const ROWS_AT_ONCE: usize = 8;
+const COLUMNS: usize = 10;
+
+static INSERT_ONE: LazyLock<String> = LazyLock::new(|| insert_statement(1));
+static INSERT_MANY: LazyLock<String> = LazyLock::new(|| insert_statement(ROWS_AT_ONCE));
+
+/// Inserts, of so many rows, each whose period is the one after the last of a session that exists.
+fn insert_statement(rows: usize) -> String {
+    const NAMES: &str = "session, period, content_hash, log_return, executed_allocation, advised_allocation,
+                         wealth_after, answer_json, created_ms, seal";
+    let mut values = String::new();
+    for row in 0..rows {
+        let numbers: Vec<String> = (1..=COLUMNS).map(|column| format!("${}", row * COLUMNS + column)).collect();
+        // Writing to a string cannot fail.
+        let _ = write!(values, "{}({})", if row == 0 { "" } else { ", " }, numbers.join(", "));
+    }
+    format!(
+        "WITH new ({NAMES}) AS (VALUES {values})
+         INSERT INTO observations ({NAMES}) SELECT new.* FROM new CROSS JOIN sessions
+         WHERE sessions.session = new.session AND new.period =
+             (SELECT coalesce(max(period), 0) + 1 FROM observations WHERE observations.session = new.session)"
+    )
+}
+
+/// Inserts [`ROWS_AT_ONCE`] rows. False where not all of them are the next ones of their sessions: some may be inserted.
+pub(super) async fn append_many(connection: &mut Connection<'_>, new: &[&NewObservation]) -> Result<bool, Failure> {
+    let insert = new.iter().fold(query(INSERT_MANY.as_str()), |insert, new| bind_row(insert, new));
+    Ok(connection.execute(insert).await? == new.len() as u64)
+}
+
+/// Inserts the period where it is the one after the last of a session that exists.
+async fn insert_next(connection: &mut Connection<'_>, new: &NewObservation) -> Result<bool, Failure> {
+    Ok(connection.execute(bind_row(query(INSERT_ONE.as_str()), new)).await? > 0)
+}
+
+fn bind_row(insert: Query, new: &NewObservation) -> Query {
+    let row = ObservationRow::from(new.clone());
+    let seal = row.seal(&new.session).finish();
+    insert
+        .bind(new.session.as_str())
         .bind(to_sql(row.period))
         .bind(row.content_hash)
         .bind(row.log_return)
@@ -135,9 +184,7 @@ async fn insert(connection: &mut Connection<'_>, new: NewObservation) -> Result<
         .bind(row.wealth_after)
         .bind(row.answer_json)
         .bind(row.created_ms)
-        .bind(seal);
-    connection.execute(insert).await?;
-    Ok(())
+        .bind(seal)
 }
 
 impl NewObservation {

@@ -167,6 +167,14 @@ impl Connection<'_> {
         Ok(self.rows(query).await?.into_iter().next())
     }
 
+    /// Holds the rows a decision rests on until the end of the transaction, where anybody else could change them.
+    pub(super) async fn lock(&mut self, query: Query) -> Result<(), Failure> {
+        match self {
+            Connection::Sqlite(_) => Ok(()),
+            Connection::Postgres(_) => self.rows(query).await.map(drop),
+        }
+    }
+
     /// Number of rows changed.
     pub(super) async fn execute(&mut self, query: Query) -> Result<u64, Failure> {
         match self {

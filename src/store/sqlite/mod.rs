@@ -1,5 +1,6 @@
 //! SQLite in a folder that one process holds: read connections beside one writer, which commits in groups.
 
+mod batch;
 mod classify;
 mod opening;
 mod writer;
@@ -12,8 +13,10 @@ use sqlx::sqlite::SqlitePool;
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::error::{Failure, StoreError};
+use super::observations::{APPENDING, Append, NewObservation};
 use super::query::{Connection, Query, Row, query};
-use writer::{Operation, Request};
+use batch::Appending;
+use writer::{Operation, Request, Undo};
 
 pub(super) use classify::classify;
 
@@ -28,19 +31,19 @@ pub(super) struct Folder {
 
 impl Folder {
     pub(super) async fn open(dir: &Path) -> Result<Folder, StoreError> {
-        Ok(Folder::over(opening::open(dir).await?))
+        Folder::over(opening::open(dir).await?)
     }
 
     /// A folder that another process may hold, for writes that meet none of its own.
     pub(super) async fn open_beside(dir: &Path) -> Result<Folder, StoreError> {
-        Ok(Folder::over(opening::open_beside(dir).await?))
+        Folder::over(opening::open_beside(dir).await?)
     }
 
-    fn over(opening::Opened { lock, writer, readers }: opening::Opened) -> Folder {
+    fn over(opening::Opened { lock, writer, readers }: opening::Opened) -> Result<Folder, StoreError> {
         let (requests, receiver) = mpsc::channel(writer::QUEUE);
         let fatal = watch::Sender::new(None);
-        tokio::spawn(writer::serve(writer, receiver, fatal.clone(), lock));
-        Folder { readers, requests, fatal }
+        writer::start(writer, receiver, fatal.clone(), lock)?;
+        Ok(Folder { readers, requests, fatal })
     }
 
     pub(super) async fn ping(&self) -> Result<(), StoreError> {
@@ -79,10 +82,31 @@ impl Folder {
         T: Send + 'static,
         W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
+        let request = |answer| {
+            Request::Write(Operation::new(
+                doing,
+                Undo::Savepoint,
+                move |connection| work(Connection::Sqlite(connection)).boxed(),
+                answer,
+            ))
+        };
+        self.request(doing, request).await
+    }
+
+    /// Appends in the writer, many observations to a statement, and answers after the commit.
+    pub(super) async fn append(&self, new: NewObservation) -> Result<Append, StoreError> {
+        self.request(APPENDING, |answer| Request::Append(Appending { new, answer })).await
+    }
+
+    async fn request<T>(
+        &self,
+        doing: &'static str,
+        request: impl FnOnce(oneshot::Sender<Result<T, StoreError>>) -> Request,
+    ) -> Result<T, StoreError> {
         self.refuse_after_fatal()?;
-        let (operation, answer) = Operation::new(doing, move |connection| work(Connection::Sqlite(connection)).boxed());
-        // A writer that ended drops the operation, and the answer with it.
-        let _ = self.requests.send(Request::Write(operation)).await;
+        let (sender, answer) = oneshot::channel();
+        // A writer that ended drops the request, and the answer with it.
+        let _ = self.requests.send(request(sender)).await;
         match answer.await {
             Ok(result) => result,
             Err(_) => self.refuse_after_fatal().and(Err(StoreError::Unavailable { doing, source: None })),

@@ -1,7 +1,7 @@
 //! The one writer: operations that wait together are committed together.
 //!
 //! A commit costs one fsync however much it holds, so each transaction takes every operation that waits, up to [`GROUP`].
-//! Each runs in a savepoint of its own: one that fails is undone alone. Answers leave after the commit. Errors after which
+//! Each runs in a savepoint of its own, or changes rows by a single statement: one that fails is undone alone. Answers leave after the commit. Errors after which
 //! SQLite may have rolled back by itself (disk full, I/O) fail every operation that ran in the group; those that had not
 //! run yet go to the next one. After a fatal error the writer stops for good.
 
@@ -13,6 +13,7 @@ use futures_util::future::BoxFuture;
 use sqlx::{Connection, SqliteConnection};
 use tokio::sync::{mpsc, oneshot, watch};
 
+use super::batch::{self, Appending};
 use crate::store::error::{Failure, StoreError};
 
 /// Operations in one transaction. At 64 a row costs a hundredth of what it costs alone; more only adds waiting.
@@ -22,12 +23,25 @@ pub(super) const QUEUE: usize = 1024;
 
 pub(super) enum Request {
     Write(Operation),
+    Append(Appending),
     /// Commit what waits, then close and answer.
     Close(oneshot::Sender<()>),
 }
 
 /// One caller's reads and writes. Given an error instead of a connection, it passes that on as its own.
-pub(super) struct Operation(Run);
+pub(super) struct Operation {
+    undo: Undo,
+    run: Run,
+}
+
+/// How what an operation changed before it failed is undone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Undo {
+    /// By a savepoint, two statements more.
+    Savepoint,
+    /// By SQLite, as it changes rows by one statement.
+    Statement,
+}
 
 type Run = Box<dyn for<'c> FnOnce(Result<&'c mut SqliteConnection, StoreError>) -> BoxFuture<'c, Ran> + Send>;
 
@@ -37,16 +51,21 @@ struct Ran {
     answer: Answer,
 }
 
-type Answer = Box<dyn FnOnce(Result<(), StoreError>) + Send>;
+/// Tells a caller how its group ended.
+pub(super) type Answer = Box<dyn FnOnce(Result<(), StoreError>) + Send>;
 
 impl Operation {
-    /// `work` as an operation, and where its answer arrives.
-    pub(super) fn new<T, W>(doing: &'static str, work: W) -> (Self, oneshot::Receiver<Result<T, StoreError>>)
+    /// `work` as an operation, answered to `sender`.
+    pub(super) fn new<T, W>(
+        doing: &'static str,
+        undo: Undo,
+        work: W,
+        sender: oneshot::Sender<Result<T, StoreError>>,
+    ) -> Self
     where
         T: Send + 'static,
         W: for<'c> FnOnce(&'c mut SqliteConnection) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
-        let (sender, receiver) = oneshot::channel();
         let run: Run = Box::new(move |connection| {
             async move {
                 let result = match connection {
@@ -60,19 +79,45 @@ impl Operation {
             }
             .boxed()
         });
-        (Operation(run), receiver)
+        Operation { undo, run }
     }
+}
+
+/// What the next group is made of.
+#[derive(Default)]
+pub(super) struct Waiting {
+    pub operations: VecDeque<Operation>,
+    pub appends: Vec<Appending>,
+}
+
+impl Waiting {
+    fn is_empty(&self) -> bool {
+        self.operations.is_empty() && self.appends.is_empty()
+    }
+}
+
+/// Starts the writer on a thread of its own: its many short waits for SQLite do not queue behind requests.
+pub(super) fn start(
+    connection: SqliteConnection,
+    requests: mpsc::Receiver<Request>,
+    fatal: watch::Sender<Option<StoreError>>,
+    lock: Option<File>,
+) -> Result<(), StoreError> {
+    let unavailable = |_| StoreError::Unavailable { doing: "starting the writer", source: None };
+    let runtime = tokio::runtime::Builder::new_current_thread().build().map_err(unavailable)?;
+    let serving = move || runtime.block_on(serve(connection, requests, fatal, lock));
+    std::thread::Builder::new().name("writer".into()).spawn(serving).map(drop).map_err(unavailable)
 }
 
 /// Serves requests until the last [`Folder`](super::Folder) is dropped, one closes it, or a write fails fatally.
 /// Holds the folder's lock, where it has it, as long as it can write.
-pub(super) async fn serve(
+async fn serve(
     mut connection: SqliteConnection,
     mut requests: mpsc::Receiver<Request>,
     fatal: watch::Sender<Option<StoreError>>,
     lock: Option<File>,
 ) {
-    let mut waiting = VecDeque::new();
+    let mut waiting = Waiting::default();
     let mut closed = Vec::new();
     while !waiting.is_empty() || receive(&mut requests, &mut waiting, &mut closed).await {
         if let Err(error) = commit_group(&mut connection, &mut waiting).await
@@ -93,14 +138,15 @@ pub(super) async fn serve(
 /// Waits for a request and takes those behind it, a group at most. False once there will be no more.
 async fn receive(
     requests: &mut mpsc::Receiver<Request>,
-    waiting: &mut VecDeque<Operation>,
+    waiting: &mut Waiting,
     closed: &mut Vec<oneshot::Sender<()>>,
 ) -> bool {
     let mut received = Vec::new();
     let count = requests.recv_many(&mut received, GROUP).await;
     for request in received {
         match request {
-            Request::Write(operation) => waiting.push_back(operation),
+            Request::Write(operation) => waiting.operations.push_back(operation),
+            Request::Append(append) => waiting.appends.push(append),
             Request::Close(answer) => {
                 requests.close();
                 closed.push(answer);
@@ -114,7 +160,7 @@ async fn receive(
 ///
 /// # Errors
 /// What ended the group before its commit.
-async fn commit_group(connection: &mut SqliteConnection, waiting: &mut VecDeque<Operation>) -> Result<(), StoreError> {
+async fn commit_group(connection: &mut SqliteConnection, waiting: &mut Waiting) -> Result<(), StoreError> {
     let mut answers = Vec::new();
     let end = run_group(connection, waiting, &mut answers).await;
     if end.is_err() {
@@ -129,27 +175,34 @@ async fn commit_group(connection: &mut SqliteConnection, waiting: &mut VecDeque<
 
 async fn run_group(
     connection: &mut SqliteConnection,
-    waiting: &mut VecDeque<Operation>,
+    waiting: &mut Waiting,
     answers: &mut Vec<Answer>,
 ) -> Result<(), StoreError> {
     let mut begun = execute(connection, "BEGIN IMMEDIATE").await;
-    while let Some(operation) = waiting.pop_front() {
-        if begun.is_ok() {
+    if begun.is_ok() {
+        batch::append_all(connection, waiting, answers).await?;
+    }
+    waiting.operations.extend(waiting.appends.drain(..).map(Appending::alone));
+    while let Some(operation) = waiting.operations.pop_front() {
+        let saved = operation.undo == Undo::Savepoint;
+        if begun.is_ok() && saved {
             begun = execute(connection, "SAVEPOINT operation").await;
         }
-        let ran = (operation.0)(begun.clone().map(|()| &mut *connection)).await;
+        let ran = (operation.run)(begun.clone().map(|()| &mut *connection)).await;
         answers.push(ran.answer);
         match ran.end {
-            Ok(()) => {}
             Err(error) if begun.is_err() || error.ends_group() => return Err(error),
-            Err(_) => execute(connection, "ROLLBACK TO operation").await?,
+            Err(_) if saved => execute(connection, "ROLLBACK TO operation").await?,
+            _ => {}
         }
-        execute(connection, "RELEASE operation").await?;
+        if saved {
+            execute(connection, "RELEASE operation").await?;
+        }
     }
     execute(connection, "COMMIT").await
 }
 
-async fn execute(connection: &mut SqliteConnection, statement: &'static str) -> Result<(), StoreError> {
+pub(super) async fn execute(connection: &mut SqliteConnection, statement: &'static str) -> Result<(), StoreError> {
     let result = sqlx::query(statement).execute(connection).await;
     result.map(|_| ()).map_err(|error| Failure::Sqlite(error).during("committing a group"))
 }

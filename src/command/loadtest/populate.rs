@@ -1,0 +1,130 @@
+//! What a scenario needs to be there: a policy, and sessions that live by it.
+
+use std::error::Error;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use ballast::control::backward::{Training, Watch};
+use ballast::control::policy::content_hash;
+use ballast::control::pool::TrainingPool;
+use ballast::control::specification::{InitialLaws, Specification};
+use ballast::store::{CreateSession, NewSession, Store, Tenant};
+use futures_util::{StreamExt, stream};
+use serde_json::Value;
+
+use super::connection::{Connection, get, post};
+use super::load::bodies;
+use super::server::Server;
+use super::{LoadTest, tell};
+use crate::command::api_client::ApiClient;
+use crate::command::bench::paper;
+
+/// Returns that sessions see, in turn: enough that no two sessions see the same.
+const RETURNS: usize = 4093;
+/// Returns before a session starts, as in the paper.
+const HISTORY: usize = 20;
+/// Sessions that wait for the store's commits at a time.
+const IN_FLIGHT: usize = 1024;
+
+/// A policy and the returns its sessions live through.
+pub struct World {
+    pub policy: String,
+    pub horizon: usize,
+    specification: Specification,
+    returns: Vec<f64>,
+}
+
+/// The paper's problem with `horizon` steps and `count` design points a step.
+fn specification(horizon: usize, count: usize) -> Specification {
+    paper::specification(HISTORY, horizon, count, InitialLaws::Given)
+}
+
+impl World {
+    /// Trains the policy here, on every core, and hands it to the service.
+    pub async fn train(server: &Server, arguments: &LoadTest) -> Result<Self, Box<dyn Error>> {
+        let LoadTest { horizon, count, .. } = *arguments;
+        tell(&format!("training {horizon} steps of {count} design points"));
+        let training = Training::new(&specification(horizon, count))?;
+        let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+        let pool = TrainingPool::new(std::thread::available_parallelism().map_or(1, usize::from))?;
+        let trained = pool.install(|| training.run(&watch))?;
+        let import = post("/policies/import", &String::from_utf8(trained.to_json())?);
+        let imported = Connection::open(server.address).await?.exchange(&import).await?.to_vec();
+        let policy = text(&serde_json::from_slice(&imported)?, "policy")?;
+        let specification = trained.specification().clone();
+        Ok(World { policy, horizon, specification, returns: paper::history(RETURNS, 2) })
+    }
+
+    /// Opens `count` sessions over HTTP.
+    pub async fn open(&self, server: &Server, clients: usize, count: u32) -> Result<Vec<String>, Box<dyn Error>> {
+        tell(&format!("opening {count} sessions"));
+        let request = post("/sessions", &format!(r#"{{"policy":"{}"}}"#, self.policy));
+        let opened = bodies(server.address, clients, &vec![request; count as usize]).await?;
+        opened.iter().map(|body| text(&serde_json::from_slice(body)?, "session")).collect()
+    }
+
+    /// The report of a session's `period`; `index` is the session's place among those of the scenario.
+    pub fn observation(&self, session: &str, index: usize, period: usize) -> Vec<u8> {
+        let log_return = self.returns[(index + 61 * period) % RETURNS];
+        post("/observe", &format!(r#"{{"session":"{session}","period":{period},"log_return":{log_return}}}"#))
+    }
+
+    /// Writes `count` sessions straight into the store of a service that is down, many to a commit.
+    pub async fn fill(&self, folder: &Path, store: Option<&str>, count: u32) -> Result<Vec<String>, Box<dyn Error>> {
+        tell(&format!("writing {count} sessions into the store"));
+        let store = match store {
+            Some(url) => Store::connect(&url.parse()?).await?,
+            None => Store::open(folder).await?,
+        };
+        let creating = stream::iter(0..count).map(|index| {
+            let (store, new) = (store.clone(), self.session(index));
+            async move { store.create_session(new.clone()).await.map(|outcome| (outcome, new.session)) }
+        });
+        let created: Vec<_> = creating.buffered(IN_FLIGHT).collect().await;
+        store.close().await;
+        let session = |created| match created? {
+            (CreateSession::Created, session) => Ok(session),
+            (refused, session) => Err(format!("the store answered {refused:?} to {session}").into()),
+        };
+        created.into_iter().map(session).collect()
+    }
+
+    fn session(&self, index: u32) -> NewSession {
+        let problem = &self.specification.problem;
+        NewSession {
+            tenant: Tenant::default(),
+            // As spread as the service's own, which are random.
+            session: format!("session_{}", &content_hash(&index.to_le_bytes())[..32]),
+            policy: self.policy.clone(),
+            wealth: problem.initial_wealth,
+            history: problem.history.clone(),
+            horizon: self.horizon,
+            created_ms: 0,
+        }
+    }
+}
+
+/// Starts a training of 1,000 design points; its job.
+pub async fn long_training(server: &Server) -> Result<String, Box<dyn Error>> {
+    let mut specification = specification(60, 1000);
+    specification.seed = 2;
+    let job = ApiClient::new(server.address).post("/train", &serde_json::to_value(&specification)?).await?;
+    text(&job, "job")
+}
+
+/// The coming period of each session.
+pub async fn periods(server: &Server, clients: usize, sessions: &[String]) -> Result<Vec<u64>, Box<dyn Error>> {
+    let requests: Vec<_> = sessions.iter().map(|session| get(&format!("/sessions/{session}"))).collect();
+    let answers = bodies(server.address, clients, &requests).await?;
+    answers
+        .iter()
+        .map(|body| {
+            let session: Value = serde_json::from_slice(body)?;
+            session["period"].as_u64().ok_or_else(|| format!("no period in {session}").into())
+        })
+        .collect()
+}
+
+fn text(value: &Value, field: &str) -> Result<String, Box<dyn Error>> {
+    value[field].as_str().map(str::to_owned).ok_or_else(|| format!("no {field} in {value}").into())
+}

@@ -1,0 +1,191 @@
+//! The scenarios: what is asked of the service, and what must hold of its answers.
+
+use std::error::Error;
+use std::time::{Duration, Instant};
+
+use super::connection::get;
+use super::figures::{Bound, Must, Report};
+use super::load::{Load, paced, saturate};
+use super::populate::{World, long_training, periods};
+use super::server::Server;
+use super::{LoadTest, Scenario, limits, tell};
+use crate::command::api_client::ApiClient;
+
+const OBSERVES_PER_SECOND: f64 = 8000.0;
+const OBSERVE_P99_MS: f64 = 40.0;
+const IDLE_P99_MS: f64 = 2.0;
+const TRAINING_P99_MS: f64 = 10.0;
+const SHARE_OF_LIVEZ: f64 = 0.6;
+const START_SECONDS: f64 = 5.0;
+const MEMORY_MB: f64 = 1024.0;
+/// Requests a second that leave the service idle most of the time.
+const LOW_RATE: f64 = 200.0;
+/// Turns that two loads take in one comparison.
+const TURNS: u32 = 6;
+
+pub async fn run(arguments: &LoadTest, server: &mut Server, report: &mut Report) -> Result<(), Box<dyn Error>> {
+    let time = Duration::from_secs_f64(arguments.seconds);
+    if let Some(folder) = server.folder() {
+        tell("syncing the disk");
+        let rate = limits::syncs_per_second(folder, time / 3)?;
+        report.rate("limit: pages written and synced, one by one", rate);
+    }
+    let world = World::train(server, arguments).await?;
+    let test = Test { arguments, world, clients: usize::from(arguments.clients), time };
+    if arguments.runs(Scenario::Observe) {
+        test.observe(server, report).await?;
+    }
+    if [Scenario::ActionVsLivez, Scenario::ActionIdle, Scenario::ActionWhileTraining]
+        .iter()
+        .any(|&one| arguments.runs(one))
+    {
+        let sessions = test.world.open(server, test.clients, arguments.sessions).await?;
+        // The first step is solved at one state; from the second on a step answers from its surrogates.
+        test.observed(server, &sessions, 1..=1).await?;
+        test.actions(server, report, &sessions).await?;
+    }
+    if arguments.runs(Scenario::Sessions100k) {
+        test.many(server, report).await?;
+    }
+    Ok(())
+}
+
+struct Test<'a> {
+    arguments: &'a LoadTest,
+    world: World,
+    clients: usize,
+    time: Duration,
+}
+
+impl Test<'_> {
+    /// Every session through `periods`; each client has sessions of its own.
+    async fn observed(
+        &self,
+        server: &Server,
+        sessions: &[String],
+        periods: std::ops::RangeInclusive<usize>,
+    ) -> Result<Load, Box<dyn Error>> {
+        let own = |client: usize| sessions.iter().enumerate().skip(client).step_by(self.clients);
+        let report = |period: usize, (index, session): (usize, &String)| self.world.observation(session, index, period);
+        let requests =
+            |client: usize| periods.clone().flat_map(move |period| own(client).map(move |one| report(period, one)));
+        Ok(Load::on(server, saturate(server.address, self.clients, requests)).await?)
+    }
+
+    async fn observe(&self, server: &Server, report: &mut Report) -> Result<(), Box<dyn Error>> {
+        let (count, horizon) = (self.arguments.sessions, self.world.horizon);
+        let mut load = Load::default();
+        for _ in 0..self.arguments.rounds {
+            let sessions = self.world.open(server, self.clients, count).await?;
+            tell(&format!("{} observations from {} clients", sessions.len() * horizon, self.clients));
+            load.add(self.observed(server, &sessions, 1..=horizon).await?);
+            let coming = periods(server, self.clients, &sessions).await?;
+            if let Some(period) = coming.iter().find(|&&period| period != horizon as u64 + 1) {
+                return Err(format!("a session is at period {period} after {horizon} observations").into());
+            }
+        }
+        let must = Must { rate: Some(OBSERVES_PER_SECOND), p99_ms: Some(OBSERVE_P99_MS) };
+        report.load(format!("observe: {} clients, {count} sessions", self.clients), &load, must);
+        Ok(())
+    }
+
+    async fn actions(&self, server: &Server, report: &mut Report, sessions: &[String]) -> Result<(), Box<dyn Error>> {
+        if self.arguments.runs(Scenario::ActionVsLivez) {
+            self.against_livez(server, report, sessions).await?;
+        }
+        if self.arguments.runs(Scenario::ActionIdle) {
+            tell("asking for advice, now and then");
+            let load = self.now_and_then(server, sessions).await?;
+            let must = Must { p99_ms: Some(IDLE_P99_MS), ..Must::default() };
+            report.load("action-idle: first and later asks", &load, must);
+        }
+        if self.arguments.runs(Scenario::ActionWhileTraining) {
+            self.observed(server, sessions, 2..=2).await?;
+            tell("the same while 1,000 design points are trained");
+            let job = long_training(server).await?;
+            let load = self.now_and_then(server, sessions).await?;
+            ApiClient::new(server.address).delete(&format!("/jobs/{job}")).await?;
+            let must = Must { p99_ms: Some(TRAINING_P99_MS), ..Must::default() };
+            report.load("action-while-training", &load, must);
+        }
+        Ok(())
+    }
+
+    async fn now_and_then(&self, server: &Server, sessions: &[String]) -> Result<Load, Box<dyn Error>> {
+        let ask = |turn: usize| action(&sessions[turn % sessions.len()]);
+        Ok(Load::on(server, paced(server.address, LOW_RATE, self.time, ask)).await?)
+    }
+
+    /// In turns, so that what else the machine does meets both.
+    async fn against_livez(
+        &self,
+        server: &Server,
+        report: &mut Report,
+        sessions: &[String],
+    ) -> Result<(), Box<dyn Error>> {
+        tell("asking for advice and for life, in turns");
+        let actions: Vec<_> = sessions.iter().map(|session| action(session)).collect();
+        let own = |client: usize| actions.iter().skip(client).step_by(self.clients).cloned();
+        let first = Load::on(server, saturate(server.address, self.clients, own)).await?;
+        report.load("action: first asks, all clients", &first, Must::default());
+        let (mut livez, mut asked) = (Load::default(), Load::default());
+        for _ in 0..TURNS {
+            let alive = |_| self.for_a_turn(std::iter::repeat(get("/livez")));
+            livez.add(Load::on(server, saturate(server.address, self.clients, alive)).await?);
+            let advised = |client| self.for_a_turn(actions.iter().cycle().skip(17 * client).cloned());
+            asked.add(Load::on(server, saturate(server.address, self.clients, advised)).await?);
+        }
+        report.load(format!("limit: /livez, {} clients", self.clients), &livez, Must::default());
+        report.load(format!("action: {} clients, in turns with /livez", self.clients), &asked, Must::default());
+        let share = asked.rate() / livez.rate();
+        report.bounded(
+            format!("action-vs-livez: {share:.2} of its rate"),
+            Bound::at_least(share, SHARE_OF_LIVEZ, "of /livez"),
+        );
+        Ok(())
+    }
+
+    fn for_a_turn(&self, requests: impl Iterator<Item = Vec<u8>>) -> impl Iterator<Item = Vec<u8>> {
+        let end = Instant::now() + self.time / TURNS;
+        requests.take_while(move |_| Instant::now() < end)
+    }
+
+    async fn many(&self, server: &mut Server, report: &mut Report) -> Result<(), Box<dyn Error>> {
+        let count = self.arguments.live_sessions;
+        let mut sessions = Vec::new();
+        let world = &self.world;
+        let ready = server
+            .restart::<Box<dyn Error>>(async |folder, store| {
+                sessions = world.fill(folder, store, count).await?;
+                Ok(())
+            })
+            .await?;
+        let Some(ready) = ready else {
+            report.note("sessions-100k writes into the store itself: not done at a service that runs already");
+            return Ok(());
+        };
+        report.note(format!("the {count} sessions were written through the library's store, not over HTTP"));
+        let seconds = ready.as_secs_f64();
+        let start = Bound::below(seconds, START_SECONDS, "s");
+        report.bounded(format!("sessions-100k: {seconds:.2} s from start to ready"), start);
+        tell(&format!("{count} sessions observe and are advised"));
+        let observed = self.observed(server, &sessions, 1..=1).await?;
+        let must = Must { rate: None, p99_ms: Some(OBSERVE_P99_MS) };
+        report.load("sessions-100k: each observes, read from the store", &observed, must);
+        let observed = self.observed(server, &sessions, 2..=2).await?;
+        let must = Must { rate: Some(OBSERVES_PER_SECOND), p99_ms: Some(OBSERVE_P99_MS) };
+        report.load("sessions-100k: each observes again", &observed, must);
+        let load = self.now_and_then(server, &sessions).await?;
+        let must = Must { p99_ms: Some(IDLE_P99_MS), ..Must::default() };
+        report.load("sessions-100k: action-idle", &load, must);
+        if let Some(memory) = server.peak_memory_mb() {
+            let bound = Bound::below(memory, MEMORY_MB, "MB");
+            report.bounded(format!("sessions-100k: {memory:.0} MB resident at most"), bound);
+        }
+        Ok(())
+    }
+}
+
+fn action(session: &str) -> Vec<u8> {
+    get(&format!("/action?session={session}"))
+}
