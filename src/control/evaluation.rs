@@ -69,7 +69,8 @@ mod defaults {
         1
     }
     pub fn frameworks() -> Vec<Framework> {
-        vec![Framework::Adaptive, Framework::Static, Framework::KnownLaw, Framework::PlugIn]
+        use Framework::*;
+        vec![Adaptive, Static, KnownLaw, PlugIn, ParametricStatic, ParametricAdaptive]
     }
     pub fn paths() -> usize {
         1000

@@ -3,7 +3,7 @@
 import { get, list, post } from "./api.js";
 import { announce, h, table } from "./dom.js";
 import { count, moment, percent, short, significant } from "./format.js";
-import { FRAMEWORKS, radiusRule, utility } from "./specification.js";
+import { FRAMEWORKS, hasBall, isParametric, radiusRule, utility } from "./specification.js";
 
 export async function view(_, leaving) {
   const { entries, more } = await list("/policies", "policies", leaving, 50);
@@ -47,7 +47,7 @@ function listed(rows) {
       { name: "Utility", cell: of((problem) => utility(problem.utility)) },
       {
         name: "Radius",
-        cell: of((problem) => (["adaptive", "static"].includes(problem.framework) ? radiusRule(problem.radius) : "0")),
+        cell: of((problem) => (hasBall(problem) || isParametric(problem.framework) ? radiusRule(problem.radius) : "0")),
       },
       { name: "Decisions", numeric: true, cell: of(({ horizon }) => count(horizon)) },
       { name: "Bank rate", numeric: true, cell: of(({ rate_per_step }) => percent(rate_per_step, 2)) },

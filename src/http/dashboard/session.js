@@ -82,7 +82,7 @@ function figures({ session, history }, action) {
     ["Wealth", wealth(session.wealth), `${change >= 0 ? "+" : ""}${percent(change)} since the start`],
     action && ["Certainty equivalent", wealth(action.certainty_equivalent), "for certain at the horizon"],
     action && ["Floor", wealth(action.floor), "all in the bank until then"],
-    action && ["Radius", significant(action.radius, 3), "of the ball, in log-return"],
+    action && ["Radius", significant(action.radius, 3), "of the set of laws guarded against"],
     [
       "Returns seen",
       count(session.sample_size),
@@ -191,7 +191,7 @@ function course({ session, history, policy }, action) {
       ],
     }),
     lineChart({
-      title: "Radius of the ball",
+      title: "Radius of the set of laws",
       gutter,
       height: 130,
       x,

@@ -7,6 +7,8 @@ export const FRAMEWORKS = {
   static: "Static robust",
   known_law: "Known law",
   plug_in: "Plug-in",
+  parametric_static: "Parametric static",
+  parametric_adaptive: "Parametric adaptive",
 };
 
 const MEANINGS = {
@@ -14,6 +16,9 @@ const MEANINGS = {
   static: "It guards against the worst law near the history, and does not learn.",
   known_law: "It takes the law as known and guards against nothing.",
   plug_in: "It takes the returns seen for the whole truth, and learns.",
+  parametric_static: "It takes returns as normal, guards against every mean and variance near the history's, and does not learn.",
+  parametric_adaptive:
+    "It takes returns as normal, guards against every mean and variance near those of the returns seen, and learns.",
 };
 
 /** Utility in a few words. */
@@ -40,6 +45,8 @@ export function radiusRule(radius) {
       return `the concentration bound at ${percent(1 - radius.alpha, 0)} (C ${significant(radius.C)}, c ${significant(radius.c)})`;
     case "root_n":
       return `${significant(radius.kappa)} / \u221an`;
+    case "chi_square":
+      return `the ${percent(1 - radius.alpha, 0)} confidence region of mean and variance`;
     case "fixed":
       return `${significant(radius.radius)} at every sample size`;
     default:
@@ -54,13 +61,17 @@ export function moments(values) {
   return { mean, deviation: Math.sqrt(variance) };
 }
 
+/** True where the uncertainty set is a ball of laws. */
+export const hasBall = ({ framework }) => framework === "adaptive" || framework === "static";
+
+/** True where the uncertainty set is a confidence region of a normal law. */
+export const isParametric = (framework) => framework.startsWith("parametric");
+
 /** The whole specification, a sentence a choice. */
 export function inWords({ problem, design, surrogate, seed }) {
   const { mean, deviation } = moments(problem.history);
   const limit = problem.action_interval[1];
-  const ball = ["adaptive", "static"].includes(problem.framework)
-    ? ` The radius of the ball is ${radiusRule(problem.radius)}.`
-    : "";
+  const ball = hasBall(problem) ? ` The radius of the ball is ${radiusRule(problem.radius)}.` : "";
   const laws = design.initial_laws === "resampled" ? "starting from resampled histories" : "starting from this history";
   return [
     `${MEANINGS[problem.framework]}${ball}`,

@@ -135,6 +135,8 @@ function ruledRadius({ framework, radius, history }, step) {
       return radius.radius;
     case "root_n":
       return radius.kappa / Math.sqrt(n);
+    case "chi_square":
+      return Math.sqrt((-2 * Math.log(radius.alpha)) / n);
     case "concentration":
       return Math.sqrt(Math.log(radius.C / radius.alpha) / (radius.c * n));
     default:

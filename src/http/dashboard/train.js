@@ -4,6 +4,7 @@ import { post } from "./api.js";
 import { announce, h } from "./dom.js";
 import { fieldset, input, select, showProblem } from "./form.js";
 import { historySource } from "./history_source.js";
+import { isParametric } from "./specification.js";
 
 const UTILITIES = { exponential: "Exponential", power: "Power", log: "Log" };
 /** Risk aversions to start from: the paper's, and a usual one. */
@@ -12,6 +13,8 @@ const FRAMEWORKS = {
   adaptive: "Adaptive robust",
   static: "Static robust",
   plug_in: "Plug-in",
+  parametric_adaptive: "Parametric adaptive",
+  parametric_static: "Parametric static",
 };
 
 /** What the form starts from. */
@@ -55,7 +58,11 @@ export async function view(_, leaving) {
         value === "log" ? { kind: value } : { kind: value, risk_aversion: AVERSION[value] },
       );
     else put(request, path, value);
-    if (path === "problem.utility.kind") fields.show(request);
+    if (path === "problem.framework") {
+      const { alpha = 0.1 } = request.problem.radius ?? {};
+      request.problem.radius = isParametric(value) ? { rule: "chi_square", alpha } : { rule: "bridge", alpha, scale: 1 };
+    }
+    if (path === "problem.utility.kind" || path === "problem.framework") fields.show(request);
     written();
   });
   const written = () => {
@@ -143,7 +150,7 @@ function mainFields(changed) {
     select({
       name: "problem.framework",
       label: "Framework",
-      note: "Adaptive guards and learns, static only guards, plug-in only learns.",
+      note: "Adaptive guards and learns, static only guards, plug-in only learns; the parametric ones take returns as normal.",
       choices: FRAMEWORKS,
       changed: (value) => changed("problem.framework", value),
     }),
