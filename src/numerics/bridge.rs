@@ -1,9 +1,9 @@
 //! The bridge statistic: the limit law of the Wasserstein distance between an empirical law and the true one.
 
-use pulp::Arch;
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
+use super::dispatch::dispatched;
 use super::empirical::EmpiricalDistribution;
 use super::harrell_davis::HarrellDavis;
 use super::streams::stream;
@@ -119,9 +119,7 @@ impl AbsoluteBridges {
     /// Adds `gap` times node `node` (1 to n - 1) of every path to `statistic`.
     fn add(&self, node: usize, gap: f64, statistic: &mut [f64]) {
         let column = &self.values[(node - 1) * self.paths..node * self.paths];
-        for (sum, value) in statistic.iter_mut().zip(column) {
-            *sum += gap * value;
-        }
+        dispatched!(statistic.iter_mut().zip(column).for_each(|(sum, value)| *sum += gap * value));
     }
 
     /// `H = sum_{i=1}^{n-1} |B(i/n)| (z_(i+1) - z_(i))` on every path. `atoms` ascending, n of them. Cost O(n paths).
@@ -129,10 +127,7 @@ impl AbsoluteBridges {
     pub fn statistic(&self, atoms: &[f64]) -> Vec<f64> {
         let gaps: Vec<f64> = atoms.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let mut statistic = vec![0.0; self.paths];
-        Arch::new().dispatch(
-            #[inline(always)]
-            || add_nodes(&gaps, &self.values, &mut statistic),
-        );
+        dispatched!(add_nodes(&gaps, &self.values, &mut statistic));
         statistic
     }
 
