@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::specification::{Framework, RadiusRule, Specification};
-use crate::numerics::bridge::{AbsoluteBridges, Quantile, UpperQuantile};
+use crate::numerics::bridge::{Quantile, Statistic, UpperQuantile};
+use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
 use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
 
@@ -26,16 +27,12 @@ pub struct UncertaintySets {
     last_size: usize,
     /// The quantile under the bridge rule.
     estimator: UpperQuantile,
+    /// The common random numbers by sample size; all large ones share those of [`GRADED_FROM`].
     bridges: Mutex<HashMap<usize, Arc<Bridges>>>,
 }
 
-/// The common random numbers of one sample size, each simulated on first use.
-#[derive(Default)]
-struct Bridges {
-    now: OnceLock<AbsoluteBridges>,
-    /// Of the mean statistic one return later.
-    ahead: OnceLock<AbsoluteBridges>,
-}
+/// Common random numbers, simulated on first use.
+type Bridges = OnceLock<Arc<AbsoluteBridges>>;
 
 /// The uncertainty set of a law: its radius, and the quantile behind it under the bridge rule.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,25 +68,31 @@ impl UncertaintySets {
     }
 
     /// The bridges of sample size n. None is simulated under the lock: who asks for one size does not wait for another.
-    fn bridges(&self, sample_size: usize, paths: usize) -> Arc<Bridges> {
-        let mut kept = self.kept();
-        if let Some(found) = kept.get(&sample_size) {
-            return Arc::clone(found);
-        }
-        while kept.len() >= room(sample_size, paths) {
-            // Sessions go up and trainings go down, a size at a time.
-            let Some(farthest) = kept.keys().max_by_key(|size| size.abs_diff(sample_size)).copied() else { break };
-            kept.remove(&farthest);
-        }
-        Arc::clone(kept.entry(sample_size).or_default())
+    fn bridges(&self, sample_size: usize, paths: usize) -> Arc<AbsoluteBridges> {
+        let key = sample_size.min(GRADED_FROM);
+        let found = {
+            let mut kept = self.kept();
+            while kept.len() >= room(key, paths) && !kept.contains_key(&key) {
+                // Sessions go up and trainings go down, a size at a time.
+                let Some(farthest) = kept.keys().max_by_key(|size| size.abs_diff(key)).copied() else { break };
+                kept.remove(&farthest);
+            }
+            Arc::clone(kept.entry(key).or_default())
+        };
+        let simulate = || match key {
+            GRADED_FROM => AbsoluteBridges::graded(paths, self.seed),
+            _ => AbsoluteBridges::simulate(sample_size, paths, self.seed),
+        };
+        Arc::clone(found.get_or_init(|| Arc::new(simulate())))
     }
 
     fn kept(&self) -> MutexGuard<'_, HashMap<usize, Arc<Bridges>>> {
         self.bridges.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn simulated(&self, sample_size: usize, paths: usize) -> AbsoluteBridges {
-        AbsoluteBridges::simulate(sample_size, paths, self.seed)
+    /// What measuring laws of `sample_size` reads: its bridges, and those of the next where a step comes after.
+    fn sizes(&self, sample_size: usize) -> impl Iterator<Item = usize> {
+        [sample_size, sample_size + 1].into_iter().take(if sample_size < self.last_size { 2 } else { 1 })
     }
 
     /// Numbers read to measure a law of this size, or `None` where its bridges are yet to be simulated.
@@ -97,9 +100,8 @@ impl UncertaintySets {
         match self.rule {
             RadiusRule::Bridge { paths, .. } if self.uncertain => {
                 let kept = self.kept();
-                let found = kept.get(&sample_size)?;
-                let ahead = sample_size >= self.last_size || found.ahead.get().is_some();
-                (ahead && found.now.get().is_some()).then_some(2 * sample_size * paths)
+                let ready = |size: usize| kept.get(&size.min(GRADED_FROM)).is_some_and(|found| found.get().is_some());
+                self.sizes(sample_size).all(ready).then_some(2 * sample_size.min(GRADED_FROM) * paths)
             }
             _ => Some(sample_size),
         }
@@ -110,9 +112,7 @@ impl UncertaintySets {
         if let RadiusRule::Bridge { paths, .. } = self.rule
             && self.uncertain
         {
-            let bridges = self.bridges(sample_size, paths);
-            self.now(&bridges, sample_size, paths);
-            self.ahead(&bridges, sample_size, paths);
+            self.sizes(sample_size).for_each(|size| drop(self.bridges(size, paths)));
         }
     }
 
@@ -127,7 +127,7 @@ impl UncertaintySets {
         match self.rule {
             RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
                 let bridges = self.bridges(size, paths);
-                radius(scale, self.now(&bridges, size, paths).quantile(law, &self.estimator), size)
+                radius(scale, bridges.quantile(law, Statistic::Now, &self.estimator), size)
             }
             _ => self.radius_of_size(size),
         }
@@ -138,8 +138,7 @@ impl UncertaintySets {
         let size = law.sample_size();
         match self.rule {
             RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
-                let bridges = self.bridges(size, paths);
-                let quantile = self.now(&bridges, size, paths).quantile_with_error(law, &self.estimator);
+                let quantile = self.bridges(size, paths).quantile_with_error(law, &self.estimator);
                 Measure { radius: radius(scale, quantile.value, size), quantile: Some(quantile) }
             }
             _ => Measure { radius: self.radius_of_size(size), quantile: None },
@@ -150,27 +149,14 @@ impl UncertaintySets {
     pub fn radii(&self, law: &EmpiricalDistribution, known: f64) -> Radii {
         let size = law.sample_size();
         let radius_ahead = match self.rule {
+            RadiusRule::Bridge { .. } if self.uncertain && size >= self.last_size => known,
             RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
-                let ahead = |ahead: &AbsoluteBridges| radius(scale, ahead.quantile(law, &self.estimator), size + 1);
-                self.ahead(&self.bridges(size, paths), size, paths).map_or(known, ahead)
+                let bridges = self.bridges(size + 1, paths);
+                radius(scale, bridges.quantile(law, Statistic::OneLater, &self.estimator), size + 1)
             }
             _ => self.radius_of_size(size),
         };
         Radii { radius: known, radius_ahead }
-    }
-
-    fn now<'b>(&self, bridges: &'b Bridges, sample_size: usize, paths: usize) -> &'b AbsoluteBridges {
-        bridges.now.get_or_init(|| self.simulated(sample_size, paths))
-    }
-
-    /// The bridges of the mean statistic one return later; `None` where no step comes after.
-    fn ahead<'b>(&self, bridges: &'b Bridges, sample_size: usize, paths: usize) -> Option<&'b AbsoluteBridges> {
-        let next = sample_size + 1;
-        let simulate = || match room(next, paths) {
-            0..=FEWEST_SIZES => self.simulated(next, paths).one_ahead(),
-            _ => self.now(&self.bridges(next, paths), next, paths).one_ahead(),
-        };
-        (sample_size < self.last_size).then(|| bridges.ahead.get_or_init(simulate))
     }
 
     /// The same for `law` with one more value, for every value in ascending `values`.
@@ -178,15 +164,13 @@ impl UncertaintySets {
         let size = law.sample_size() + 1;
         match self.rule {
             RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
-                let bridges = self.bridges(size, paths);
-                let quantiles = |bridges: &AbsoluteBridges, size: usize| -> Vec<f64> {
-                    let found = bridges.quantiles_with(law.atoms(), values, &self.estimator);
-                    found.into_iter().map(|quantile| radius(scale, quantile, size)).collect()
+                let quantiles = |which, size| {
+                    let found = self.bridges(size, paths).quantiles_with(law.atoms(), values, which, &self.estimator);
+                    found.into_iter().map(|quantile| radius(scale, quantile, size)).collect::<Vec<f64>>()
                 };
-                let now = quantiles(self.now(&bridges, size, paths), size);
-                let ahead = self.ahead(&bridges, size, paths);
-                let ahead = ahead.map_or_else(|| now.clone(), |ahead| quantiles(ahead, size + 1));
-                now.into_iter().zip(ahead).map(|(radius, radius_ahead)| Radii { radius, radius_ahead }).collect()
+                let now = quantiles(Statistic::Now, size);
+                let later = if size < self.last_size { quantiles(Statistic::OneLater, size + 1) } else { now.clone() };
+                now.into_iter().zip(later).map(|(radius, radius_ahead)| Radii { radius, radius_ahead }).collect()
             }
             _ => {
                 let radius = self.radius_of_size(size);
@@ -211,7 +195,7 @@ impl UncertaintySets {
 
 /// Sample sizes kept where one of them is `sample_size`.
 fn room(sample_size: usize, paths: usize) -> usize {
-    (KEPT_VALUES / (2 * sample_size * paths)).clamp(FEWEST_SIZES, KEPT_SIZES)
+    (KEPT_VALUES / (sample_size * paths)).clamp(FEWEST_SIZES, KEPT_SIZES)
 }
 
 fn radius(scale: f64, quantile: f64, sample_size: usize) -> f64 {

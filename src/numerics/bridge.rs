@@ -1,21 +1,21 @@
 //! The bridge statistic: the limit law of the Wasserstein distance between an empirical law and the true one.
 
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
+use std::ops::Range;
 
+use super::bridge_paths::{AbsoluteBridges, Times};
 use super::dispatch::dispatched;
 use super::empirical::EmpiricalDistribution;
 use super::harrell_davis::HarrellDavis;
-use super::streams::stream;
 
-/// Simulated `|B(i/n)|`, i = 1 to n - 1, for one sample size n: common random numbers for every law of that size.
-///
-/// Stored node by node (all paths of i = 1, then of i = 2, ...), because a statistic adds node after node.
-#[derive(Debug, Clone)]
-pub struct AbsoluteBridges {
-    sample_size: usize,
-    paths: usize,
-    values: Vec<f64>,
+/// A statistic of a law of n values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Statistic {
+    /// Of the law itself, over bridges of sample size n.
+    Now,
+    /// The mean over the n laws that have one of its values twice, over bridges of sample size n + 1: what the statistic
+    /// becomes, on average, when the next value comes from the law itself. A value doubled at rank j moves the gaps above
+    /// it one node up, so that gap i lies at node i in n - i of the laws and at node i + 1 in the other i.
+    OneLater,
 }
 
 /// A simulated quantile and the standard error of its simulation.
@@ -44,165 +44,152 @@ impl UpperQuantile {
     }
 }
 
-/// Cells of the dyadic grid that carries the paths, at least.
-const LEAST_CELLS: usize = 1024;
-
-/// Fills `bridge`, of 2^m + 1 values, by midpoint displacement (Levy's construction), coarse levels first: a finer
-/// grid refines the same path.
-fn refine(bridge: &mut [f64], generator: &mut impl Rng) {
-    let cells = bridge.len() - 1;
-    (bridge[0], bridge[cells]) = (0.0, 0.0);
-    let mut width = cells;
-    while width > 1 {
-        let deviation = 0.5 * (width as f64 / cells as f64).sqrt();
-        for left in (0..cells).step_by(width) {
-            let normal: f64 = generator.sample(StandardNormal);
-            bridge[left + width / 2] = 0.5 * (bridge[left] + bridge[left + width]) + deviation * normal;
-        }
-        width /= 2;
-    }
-}
-
-/// Where a node lies in the dyadic grid: between `left` and the next grid point, with these weights.
-struct Place {
-    left: usize,
-    weights: [f64; 2],
-}
-
-impl Place {
-    /// Node i/n among `cells`; the weights are those of linear interpolation, scaled to the variance i/n (1 - i/n).
-    fn of(node: usize, sample_size: usize, cells: usize) -> Self {
-        let time = node as f64 / sample_size as f64;
-        let position = time * cells as f64;
-        let left = (position as usize).min(cells - 1);
-        let share = position - left as f64;
-        let (start, end) = (left as f64 / cells as f64, (left + 1) as f64 / cells as f64);
-        let variance = (1.0 - share).powi(2) * start * (1.0 - start)
-            + share * share * end * (1.0 - end)
-            + 2.0 * share * (1.0 - share) * start * (1.0 - end);
-        let scale = (time * (1.0 - time) / variance).sqrt();
-        Place { left, weights: [scale * (1.0 - share), scale * share] }
-    }
-
-    fn interpolate(&self, bridge: &[f64]) -> f64 {
-        self.weights[0] * bridge[self.left] + self.weights[1] * bridge[self.left + 1]
-    }
-}
-
 impl AbsoluteBridges {
-    /// Simulates `paths` standard Brownian bridges on the grid i/n.
-    ///
-    /// Path p is the same path at every sample size, so that the quantile moves from one sample size to the next as the
-    /// law does, and not as two simulations differ: the stream (seed, "bridge", 0, p) refines it by midpoints on 2^m
-    /// cells, m the least with at least 1024 and 4n of them, and B(i/n) is interpolated between their ends and scaled
-    /// to its exact variance i/n (1 - i/n). Covariances are off by less than the cell, 1/1024. Cost O(n paths) and a
-    /// few thousand normals a path.
-    pub fn simulate(sample_size: usize, paths: usize, seed: u64) -> Self {
-        let nodes = sample_size.saturating_sub(1);
-        let mut values = vec![0.0; nodes * paths];
-        let cells = LEAST_CELLS.max(4 * sample_size).next_power_of_two();
-        let places: Vec<Place> = (1..=nodes).map(|node| Place::of(node, sample_size, cells)).collect();
-        let mut bridge = vec![0.0; cells + 1];
-        for path in 0..paths {
-            refine(&mut bridge, &mut stream(seed, "bridge", 0, path));
-            for (node, place) in places.iter().enumerate() {
-                values[node * paths + path] = place.interpolate(&bridge).abs();
-            }
+    /// `H = sum_{i=1}^{n-1} |B(i/n)| (z_(i+1) - z_(i))` on every path, or what it becomes. `atoms` ascending, n of them.
+    /// Cost O(min(n, 540) paths). Source: the paper, section 2.1.
+    pub fn statistic(&self, atoms: &[f64], which: Statistic) -> Vec<f64> {
+        let mut weights = Weights::new(self);
+        for (pair, gap) in atoms.windows(2).zip(1..) {
+            weights.place(gap, atoms.len(), pair[1] - pair[0], which);
         }
-        AbsoluteBridges { sample_size, paths, values }
-    }
-
-    pub fn sample_size(&self) -> usize {
-        self.sample_size
-    }
-
-    /// Adds `gap` times node `node` (1 to n - 1) of every path to `statistic`.
-    fn add(&self, node: usize, gap: f64, statistic: &mut [f64]) {
-        let column = &self.values[(node - 1) * self.paths..node * self.paths];
-        dispatched!(statistic.iter_mut().zip(column).for_each(|(sum, value)| *sum += gap * value));
-    }
-
-    /// `H = sum_{i=1}^{n-1} |B(i/n)| (z_(i+1) - z_(i))` on every path. `atoms` ascending, n of them. Cost O(n paths).
-    /// Source: the paper, section 2.1.
-    pub fn statistic(&self, atoms: &[f64]) -> Vec<f64> {
-        let gaps: Vec<f64> = atoms.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let mut statistic = vec![0.0; self.paths];
-        dispatched!(add_nodes(&gaps, &self.values, &mut statistic));
+        weights.pour(&mut statistic);
         statistic
     }
 
-    /// The quantile of the statistic of `law`, whose sample size must be n.
-    pub fn quantile(&self, law: &EmpiricalDistribution, estimator: &UpperQuantile) -> f64 {
-        estimator.at.estimate(&mut self.statistic(law.atoms()))
+    /// The quantile of a statistic of `law`.
+    pub fn quantile(&self, law: &EmpiricalDistribution, which: Statistic, estimator: &UpperQuantile) -> f64 {
+        estimator.at.estimate(&mut self.statistic(law.atoms(), which))
     }
 
-    /// The same with the standard error of its simulation: half the distance of the quantiles one standard deviation of
-    /// the share of paths to either side.
+    /// That of the law itself, with the standard error of its simulation: half the distance of the quantiles one standard
+    /// deviation of the share of paths to either side.
     pub fn quantile_with_error(&self, law: &EmpiricalDistribution, estimator: &UpperQuantile) -> Quantile {
         let [below, above] = &estimator.beside;
         let all = [&estimator.at, below, above];
-        let [value, below, above] = HarrellDavis::estimates(all, &mut self.statistic(law.atoms()));
+        let mut statistic = self.statistic(law.atoms(), Statistic::Now);
+        let [value, below, above] = HarrellDavis::estimates(all, &mut statistic);
         Quantile { value, standard_error: 0.5 * (above - below) }
     }
 
-    /// Columns whose statistic, for a law of n - 1 values, is the mean of this one's over the n - 1 laws that have one of
-    /// its values twice: what the statistic becomes, on average, when the next value comes from the law itself. A value
-    /// doubled at rank j moves the gaps above it one node up, so that gap i lies at node i in n - 1 - i of them and at
-    /// node i + 1 in the other i. Cost O(n paths).
-    pub fn one_ahead(&self) -> AbsoluteBridges {
-        let sample_size = self.sample_size.saturating_sub(1);
-        let mut values = Vec::with_capacity(sample_size.saturating_sub(1) * self.paths);
-        for node in 1..sample_size {
-            let share = node as f64 / sample_size as f64;
-            let at = |node: usize| &self.values[(node - 1) * self.paths..node * self.paths];
-            values.extend(at(node).iter().zip(at(node + 1)).map(|(low, high)| (1.0 - share) * low + share * high));
-        }
-        AbsoluteBridges { sample_size, paths: self.paths, values }
-    }
-
-    /// Quantiles of the laws of `atoms` (n - 1 of them, ascending) with one more value, for every value in
-    /// ascending `values`. Cost O((n + values) paths): sums left and right of the value are carried along.
-    pub fn quantiles_with(&self, atoms: &[f64], values: &[f64], estimator: &UpperQuantile) -> Vec<f64> {
-        let size = atoms.len();
-        let mut left = vec![0.0; self.paths];
-        let mut right = vec![0.0; self.paths];
-        for gap in 1..size {
-            self.add(gap + 1, atoms[gap] - atoms[gap - 1], &mut right);
-        }
+    /// Quantiles of a statistic of the laws of `atoms` (m of them, ascending) with one more value, for every value in
+    /// ascending `values`. Cost O((min(m, 540) + values) paths): between two values only the gaps that they enclose move.
+    pub fn quantiles_with(
+        &self,
+        atoms: &[f64],
+        values: &[f64],
+        which: Statistic,
+        estimator: &UpperQuantile,
+    ) -> Vec<f64> {
+        let (count, size) = (atoms.len(), atoms.len() + 1);
+        let mut weights = Weights::new(self);
+        // Gap j lies between atoms j - 1 and j: below the value at node j, above it at node j + 1.
+        let gap = |j: usize| atoms[j] - atoms[j - 1];
+        (1..count).for_each(|j| weights.place(j + 1, size, gap(j), which));
+        let mut carried = vec![0.0; self.paths];
+        weights.pour(&mut carried);
         let mut below = 0;
         let mut statistic = vec![0.0; self.paths];
         let mut quantiles = Vec::with_capacity(values.len());
         for &value in values {
-            while below < size && atoms[below] <= value {
+            while below < count && atoms[below] <= value {
                 below += 1;
-                // The gap below `below` joins the left side, the gap above it leaves the right side.
+                // The gap under the atom passed is below the value now; the one above it is to be cut in two.
                 if below >= 2 {
-                    self.add(below - 1, atoms[below - 1] - atoms[below - 2], &mut left);
+                    weights.place(below - 1, size, gap(below - 1), which);
                 }
-                if below < size {
-                    self.add(below + 1, -(atoms[below] - atoms[below - 1]), &mut right);
+                if below < count {
+                    weights.place(below + 1, size, -gap(below), which);
                 }
             }
-            for ((sum, l), r) in statistic.iter_mut().zip(&left).zip(&right) {
-                *sum = l + r;
-            }
+            weights.pour(&mut carried);
+            statistic.copy_from_slice(&carried);
             if below > 0 {
-                self.add(below, value - atoms[below - 1], &mut statistic);
+                weights.place(below, size, value - atoms[below - 1], which);
             }
-            if below < size {
-                self.add(below + 1, atoms[below] - value, &mut statistic);
+            if below < count {
+                weights.place(below + 1, size, atoms[below] - value, which);
             }
+            weights.pour(&mut statistic);
             quantiles.push(estimator.at.estimate(&mut statistic));
         }
         quantiles
     }
 }
 
+/// What is yet to be added to a statistic: a weight for each time of the bridges.
+struct Weights<'a> {
+    bridges: &'a AbsoluteBridges,
+    weights: Vec<f64>,
+    /// Times outside have weight zero.
+    touched: Range<usize>,
+}
+
+impl<'a> Weights<'a> {
+    fn new(bridges: &'a AbsoluteBridges) -> Self {
+        Weights { bridges, weights: vec![0.0; bridges.values.len() / bridges.paths], touched: 0..0 }
+    }
+
+    /// Gap `gap`, of 1 to n - 1, of a law of `size` = n values, `length` wide.
+    fn place(&mut self, gap: usize, size: usize, length: f64, which: Statistic) {
+        match which {
+            Statistic::Now => self.place_at(gap, size, length),
+            Statistic::OneLater => {
+                let share = gap as f64 / size as f64;
+                self.place_at(gap, size + 1, (1.0 - share) * length);
+                self.place_at(gap + 1, size + 1, share * length);
+            }
+        }
+    }
+
+    /// `length` at the time node/size.
+    fn place_at(&mut self, node: usize, size: usize, length: f64) {
+        match &self.bridges.times {
+            Times::Sample(own) => {
+                assert_eq!(*own, size, "bridges of the sample size of the law");
+                self.put(node - 1, length);
+            }
+            Times::Graded(times) => {
+                let time = node as f64 / size as f64;
+                let after = times.partition_point(|&known| known < time);
+                let known = |index: usize| times.get(index).copied().unwrap_or(1.0);
+                let (low, high) = (if after == 0 { 0.0 } else { known(after - 1) }, known(after));
+                let share = (time - low) / (high - low);
+                let deviation = |time: f64| (time * (1.0 - time)).sqrt();
+                let interpolated = (1.0 - share) * deviation(low) + share * deviation(high);
+                let scaled = length * deviation(time) / interpolated;
+                if after > 0 {
+                    self.put(after - 1, (1.0 - share) * scaled);
+                }
+                if after < times.len() {
+                    self.put(after, share * scaled);
+                }
+            }
+        }
+    }
+
+    fn put(&mut self, time: usize, weight: f64) {
+        self.weights[time] += weight;
+        let Range { start, end } = self.touched;
+        self.touched = if start == end { time..time + 1 } else { start.min(time)..end.max(time + 1) };
+    }
+
+    /// Adds what is waiting to `statistic`.
+    fn pour(&mut self, statistic: &mut [f64]) {
+        let touched = std::mem::take(&mut self.touched);
+        let paths = self.bridges.paths;
+        let values = &self.bridges.values[touched.start * paths..touched.end * paths];
+        let weights = &mut self.weights[touched];
+        dispatched!(add_nodes(weights, values, statistic));
+        weights.fill(0.0);
+    }
+}
+
 /// Nodes added in one pass over the statistic.
 const NODES: usize = 4;
 
-/// Adds `gaps[i]` times node i + 1 of every path, node after node, to `statistic`. Nothing is fused and the order is that
-/// of the nodes: the bits do not depend on the width of the processor's vectors.
+/// Adds `gaps[i]` times node i of every path, node after node, to `statistic`. Nothing is fused and the order is that of
+/// the nodes: the bits do not depend on the width of the processor's vectors.
 #[inline(always)]
 fn add_nodes(gaps: &[f64], nodes: &[f64], statistic: &mut [f64]) {
     let paths = statistic.len();
@@ -225,50 +212,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bridges_have_their_covariance_at_every_sample_size() {
-        // 20,000 paths: a sample covariance of numbers of variance at most 1/4 has a standard error below 0.0025.
-        for sample_size in [3, 10, 600] {
-            let mut cells = vec![0.0; LEAST_CELLS.max(4 * sample_size).next_power_of_two() + 1];
-            let nodes = [sample_size / 3, sample_size / 2, sample_size - 1].map(|node| node.max(1));
-            let places = nodes.map(|node| Place::of(node, sample_size, cells.len() - 1));
-            let mut sums = [[0.0; 3]; 3];
-            for path in 0..20_000 {
-                refine(&mut cells, &mut stream(5, "bridge", 0, path));
-                let values = places.each_ref().map(|place| place.interpolate(&cells));
-                for (row, left) in sums.iter_mut().zip(values) {
-                    row.iter_mut().zip(values).for_each(|(sum, right)| *sum += left * right / 20_000.0);
-                }
-            }
-            for (row, left) in sums.iter().zip(nodes) {
-                for (&found, right) in row.iter().zip(nodes) {
-                    let [s, t] = [left.min(right), left.max(right)].map(|node| node as f64 / sample_size as f64);
-                    assert!((found - s * (1.0 - t)).abs() < 0.01, "{sample_size}: {found} against {}", s * (1.0 - t));
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn a_path_is_the_same_at_every_sample_size() {
-        let (few, many) = (AbsoluteBridges::simulate(4, 50, 3), AbsoluteBridges::simulate(2048, 50, 3));
-        for path in 0..50 {
-            // Node 2 of 4 and node 1024 of 2048 are both the middle.
-            assert_eq!(few.values[50 + path], many.values[1023 * 50 + path]);
-        }
-    }
-
-    #[test]
     fn carrying_sums_equals_building_each_law() {
         let law = EmpiricalDistribution::new(&[0.02, -0.05, 0.11, 0.04, 0.04]);
         let bridges = AbsoluteBridges::simulate(6, 300, 9);
         let values = [-0.4, -0.05, 0.0, 0.04, 0.05, 0.3];
         let estimator = UpperQuantile::new(300, 0.1);
-        let carried = bridges.quantiles_with(law.atoms(), &values, &estimator);
+        let carried = bridges.quantiles_with(law.atoms(), &values, Statistic::Now, &estimator);
         for (value, quantile) in values.iter().zip(carried) {
             let mut larger = law.clone();
             larger.push(*value);
             // Six additions and subtractions of numbers below 1.
-            assert!((bridges.quantile(&larger, &estimator) - quantile).abs() < 1e-14);
+            assert!((bridges.quantile(&larger, Statistic::Now, &estimator) - quantile).abs() < 1e-14);
         }
     }
 
@@ -278,8 +232,10 @@ mod tests {
             let bridges = AbsoluteBridges::simulate(size, 37, 4);
             let atoms: Vec<f64> = (0..size).map(|k| (k as f64).powf(1.3)).collect();
             let mut plain = vec![0.0; 37];
-            (1..size).for_each(|node| bridges.add(node, atoms[node] - atoms[node - 1], &mut plain));
-            assert_eq!(bridges.statistic(&atoms), plain);
+            for (pair, column) in atoms.windows(2).zip(bridges.values.chunks_exact(bridges.paths)) {
+                plain.iter_mut().zip(column).for_each(|(sum, value)| *sum += (pair[1] - pair[0]) * value);
+            }
+            assert_eq!(bridges.statistic(&atoms, Statistic::Now), plain);
         }
     }
 
@@ -296,19 +252,53 @@ mod tests {
     }
 
     #[test]
-    fn one_ahead_is_the_mean_over_the_values_of_the_law() {
+    fn one_later_is_the_mean_over_the_values_of_the_law() {
         let law = EmpiricalDistribution::new(&[0.02, -0.05, 0.11, 0.04, 0.07]);
         let bridges = AbsoluteBridges::simulate(6, 20, 1);
         let mut mean = vec![0.0; 20];
         for &atom in law.atoms() {
             let mut doubled = law.clone();
             doubled.push(atom);
-            let statistic = bridges.statistic(doubled.atoms());
+            let statistic = bridges.statistic(doubled.atoms(), Statistic::Now);
             mean.iter_mut().zip(statistic).for_each(|(sum, value)| *sum += value / 5.0);
         }
-        for (found, expected) in bridges.one_ahead().statistic(law.atoms()).iter().zip(mean) {
+        for (found, expected) in bridges.statistic(law.atoms(), Statistic::OneLater).iter().zip(mean) {
             // A dozen roundings of numbers below 1.
             assert!((found - expected).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn graded_times_serve_large_samples() {
+        // A Student-like sample: its widest gaps lie where the grid is finest.
+        let sample: Vec<f64> = (0..1500).map(|k| (f64::from(k) - 749.5) / (f64::from(k.min(1499 - k)) + 0.5)).collect();
+        let law = EmpiricalDistribution::new(&sample);
+        let (exact, graded) = (AbsoluteBridges::simulate(1500, 2000, 4), AbsoluteBridges::graded(2000, 4));
+        let estimator = UpperQuantile::new(2000, 0.1);
+        let expected = exact.quantile_with_error(&law, &estimator);
+        let found = graded.quantile_with_error(&law, &estimator);
+        // Paths inside a cell are other draws: four standard deviations of the difference, were all of it so.
+        let allowed = 4.0 * expected.standard_error.hypot(found.standard_error);
+        assert!((found.value - expected.value).abs() < allowed, "{found:?} against {expected:?}");
+        let means = [&exact, &graded].map(|bridges| bridges.statistic(law.atoms(), Statistic::Now).iter().sum::<f64>());
+        // The statistic's deviation is about half its mean: four standard errors of the mean of 2000 are 5 %.
+        assert!((means[1] / means[0] - 1.0).abs() < 0.05, "{means:?}");
+    }
+
+    #[test]
+    fn graded_sums_are_carried_too() {
+        let atoms: Vec<f64> = (0..3000).map(|k| (f64::from(k) / 1500.0 - 1.0).powi(3)).collect();
+        let bridges = AbsoluteBridges::graded(50, 2);
+        let estimator = UpperQuantile::new(50, 0.1);
+        let values = [-2.0, -0.7, 0.001, 0.4, 0.41, 3.0];
+        for which in [Statistic::Now, Statistic::OneLater] {
+            let carried = bridges.quantiles_with(&atoms, &values, which, &estimator);
+            for (value, quantile) in values.iter().zip(carried) {
+                let mut larger = EmpiricalDistribution::new(&atoms);
+                larger.push(*value);
+                // Thousands of roundings of weights that sum to 5.
+                assert!((bridges.quantile(&larger, which, &estimator) - quantile).abs() < 1e-12);
+            }
         }
     }
 }
