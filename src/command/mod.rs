@@ -2,7 +2,9 @@
 
 mod api_client;
 pub mod backtest;
+pub mod backup;
 pub mod bench;
+pub mod check;
 mod compare;
 pub mod demo;
 pub mod evaluate;

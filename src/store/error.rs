@@ -22,6 +22,11 @@ pub enum StoreError {
     /// The file was written by a later release.
     #[error("the store has schema {found}, newer than {known}, the newest this binary knows")]
     NewerSchema { found: i64, known: i64 },
+    /// The file was written by an earlier release; where nothing may be changed, it is not brought up to date.
+    #[error(
+        "the store has schema {found}, older than {known}, this binary's; a start of the service brings it up to date"
+    )]
+    OlderSchema { found: i64, known: i64 },
     /// Another process holds the folder.
     #[error("{} is locked by another process", path.display())]
     Locked { path: PathBuf },

@@ -121,7 +121,7 @@ async fn create(mut connection: Connection<'_>, new: NewKey) -> Result<(), Failu
 }
 
 impl KeyRow {
-    fn from_row(row: &Row) -> Result<Self, Failure> {
+    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
         let key: String = row.get("access_key")?;
         let damaged = |column: &str| Failure::Corrupt(format!("the {column} of key {key}"));
         let roles: String = row.get("roles")?;

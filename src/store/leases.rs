@@ -11,7 +11,7 @@ use super::error::Failure;
 use super::job::{ClaimedJob, JobOutcome, JobRow};
 use super::job_state::{JobEvent, JobState};
 use super::jobs::{end, find};
-use super::query::{Connection, Row, query};
+use super::query::{Connection, Query, Row, query};
 use super::{Store, StoreError, policies};
 
 impl Store {
@@ -49,17 +49,7 @@ impl Store {
 
     /// Every checkpoint of the job, ascending by step, each verified against its seal.
     pub async fn checkpoints(&self, job: &str) -> Result<Vec<(usize, Vec<u8>)>, StoreError> {
-        let find = query("SELECT step, bytes, seal FROM checkpoints WHERE job = $1 ORDER BY step").bind(job);
-        self.read("reading checkpoints", find, |rows| {
-            let verified = |row: &Row| {
-                let (step, bytes) = (row.get("step")?, row.get::<Vec<u8>>("bytes")?);
-                let what = || format!("the checkpoint of step {step} of job {job}");
-                checkpoint_seal(job, step, &bytes).verify(&row.get::<Vec<u8>>("seal")?, what)?;
-                Ok((from_sql(step)?, bytes))
-            };
-            rows.iter().map(verified).collect()
-        })
-        .await
+        self.read("reading checkpoints", checkpoints_of(job), |rows| verified_checkpoints(job, rows)).await
     }
 
     /// Stores the result, sets the terminal state and deletes the checkpoints, all or nothing. False when fenced.
@@ -158,6 +148,21 @@ async fn checkpoint(
     let count = query("UPDATE jobs SET steps_done = (SELECT count(*) FROM checkpoints WHERE job = $1) WHERE job = $1");
     connection.execute(count.bind(job)).await?;
     Ok(true)
+}
+
+pub(super) fn checkpoints_of(job: &str) -> Query {
+    query("SELECT step, bytes, seal FROM checkpoints WHERE job = $1 ORDER BY step").bind(job)
+}
+
+/// What [`checkpoints_of`] finds, each verified against its seal.
+pub(super) fn verified_checkpoints(job: &str, rows: &[Row]) -> Result<Vec<(usize, Vec<u8>)>, Failure> {
+    let verified = |row: &Row| {
+        let (step, bytes) = (row.get("step")?, row.get::<Vec<u8>>("bytes")?);
+        let what = || format!("the checkpoint of step {step} of job {job}");
+        checkpoint_seal(job, step, &bytes).verify(&row.get::<Vec<u8>>("seal")?, what)?;
+        Ok((from_sql(step)?, bytes))
+    };
+    rows.iter().map(verified).collect()
 }
 
 fn checkpoint_seal(job: &str, step: i64, bytes: &[u8]) -> Seal {

@@ -42,6 +42,14 @@ pub(super) fn refuse_newer(migrator: &Migrator, found: i64) -> Result<(), StoreE
     if found > known { Err(StoreError::NewerSchema { found, known }) } else { Ok(()) }
 }
 
+/// # Errors
+/// [`StoreError::NewerSchema`], [`StoreError::OlderSchema`] where `found` is not the last step of `migrator`.
+pub(super) fn require_newest(migrator: &Migrator, found: i64) -> Result<i64, StoreError> {
+    refuse_newer(migrator, found)?;
+    let known = newest(migrator);
+    if found < known { Err(StoreError::OlderSchema { found, known }) } else { Ok(found) }
+}
+
 /// The version of its last step.
 pub(super) fn newest(migrator: &Migrator) -> i64 {
     migrator.iter().map(|migration| migration.version).max().unwrap_or_default()

@@ -19,6 +19,7 @@
 //! Not done, and why: a digest over the end of a session's observations (a lost tail needs a lost file, which the
 //! write-ahead log already detects); deleting old jobs (they are small, and an idempotency key must outlive its request).
 
+mod check;
 mod codec;
 mod error;
 mod job;
@@ -42,6 +43,7 @@ use futures_util::future::BoxFuture;
 use error::Failure;
 use query::{Connection, Query, Row};
 
+pub use check::Inspection;
 pub use error::StoreError;
 pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, NewJob};
 pub use job_state::{IllegalTransition, JobEvent, JobState};
@@ -50,6 +52,7 @@ pub use observations::{Append, NewObservation, ObservationRow};
 pub use policies::{DeletePolicy, PolicyRow, PolicySummary};
 pub use postgres::{PostgresUrl, UrlError};
 pub use sessions::{CreateSession, Head, NewSession, SessionRow, SessionSummary};
+pub use sqlite::{backup, restore};
 pub use tenant::Tenant;
 
 /// The durable facts of one folder or one database. Clones share the connections.

@@ -80,15 +80,20 @@ impl Store {
     /// # Errors
     /// [`StoreError::Corrupt`] where a row is not what was written or a period is missing.
     pub async fn observations(&self, session: &str) -> Result<Vec<ObservationRow>, StoreError> {
-        let all = query("SELECT * FROM observations WHERE session = $1 ORDER BY period").bind(session);
-        self.read("reading observations", all, |rows| {
-            let rows: Vec<_> = rows.iter().map(ObservationRow::from_row).collect::<Result<_, Failure>>()?;
-            match rows.iter().zip(1..).find(|(row, period)| row.period != *period) {
-                None => Ok(rows),
-                Some((_, period)) => Err(Failure::Corrupt(format!("period {period} of session {session}"))),
-            }
-        })
-        .await
+        self.read("reading observations", all_of(session), |rows| numbered(session, rows)).await
+    }
+}
+
+pub(super) fn all_of(session: &str) -> Query {
+    query("SELECT * FROM observations WHERE session = $1 ORDER BY period").bind(session)
+}
+
+/// What [`all_of`] finds, each row verified and none missing before the last.
+pub(super) fn numbered(session: &str, rows: &[Row]) -> Result<Vec<ObservationRow>, Failure> {
+    let rows: Vec<_> = rows.iter().map(ObservationRow::from_row).collect::<Result<_, Failure>>()?;
+    match rows.iter().zip(1..).find(|(row, period)| row.period != *period) {
+        None => Ok(rows),
+        Some((_, period)) => Err(Failure::Corrupt(format!("period {period} of session {session}"))),
     }
 }
 

@@ -191,7 +191,7 @@ impl SessionRow {
         if self.tenant.is_default() { seal } else { seal.text(self.tenant.as_str()) }
     }
 
-    fn from_row(row: &Row) -> Result<Self, Failure> {
+    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
         let session: String = row.get("session")?;
         let what = || format!("the start of session {session}");
         let history = decode_reals(&row.get::<Vec<u8>>("initial_history")?);

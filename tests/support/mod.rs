@@ -149,6 +149,15 @@ impl App {
         self.running = Some(running);
     }
 
+    /// Stops the service and starts one over a folder within this one.
+    pub async fn move_to(&mut self, folder: &str) {
+        self.client = Client::new();
+        self.running.take().expect("running").stop().await;
+        let running = start(config(&self.folder.path().join(folder))).await;
+        self.url = format!("http://{}", running.address);
+        self.running = Some(running);
+    }
+
     pub async fn send(&self, method: Method, path: &str, body: Option<&Value>) -> (StatusCode, Value) {
         let request = self.client.request(method.clone(), format!("{}{path}", self.url));
         let request = match body {

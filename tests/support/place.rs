@@ -1,5 +1,7 @@
 //! Where a store under test keeps its facts: a folder, or a database.
 
+use std::path::Path;
+
 use ballast::store::{KeyRing, Store, StoreError};
 use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::postgres::PgConnection;
@@ -95,6 +97,15 @@ impl Place {
             Place::Folder(_) => store.clone(),
             Place::Database(_) => self.open().await,
         }
+    }
+
+    /// Changes a database file without minding what refers to what.
+    pub async fn break_references(file: &Path, statement: &'static str) {
+        let options = SqliteConnectOptions::new().filename(file).foreign_keys(false);
+        let mut connection = SqliteConnection::connect_with(&options).await.unwrap();
+        let changed = sqlx::query(statement).execute(&mut connection).await.unwrap();
+        assert_eq!(changed.rows_affected(), 1, "{statement}");
+        connection.close().await.unwrap();
     }
 
     /// Changes one row behind a closed store's back.

@@ -17,7 +17,7 @@ use std::time::Duration;
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
 use sqlx::pool::PoolConnection;
-use sqlx::postgres::{PgConnection, PgPool, PgPoolOptions};
+use sqlx::postgres::{PgConnectOptions, PgConnection, PgPool, PgPoolOptions};
 use sqlx::{ConnectOptions, Connection as _, Postgres};
 
 use super::error::{Failure, StoreError};
@@ -50,11 +50,7 @@ impl Database {
     pub(super) async fn connect(url: &PostgresUrl) -> Result<Database, StoreError> {
         let options = url.options().disable_statement_logging();
         // Without the time limits of the pool: a migration may take what it takes.
-        let connecting = tokio::time::timeout(CONNECT_TIMEOUT, options.connect());
-        let mut connection = match connecting.await {
-            Ok(connected) => connected.map_err(opening)?,
-            Err(_) => return Err(StoreError::Unavailable { doing: OPENING, source: None }),
-        };
+        let mut connection = connect(&options).await?;
         migrate(&mut connection).await?;
         // Everything is committed; a server that does not say goodbye changes nothing.
         let _ = connection.close().await;
@@ -135,14 +131,34 @@ impl Database {
 
 const OPENING: &str = "opening the database";
 
+async fn connect(options: &PgConnectOptions) -> Result<PgConnection, StoreError> {
+    match tokio::time::timeout(CONNECT_TIMEOUT, options.connect()).await {
+        Ok(connected) => connected.map_err(opening),
+        Err(_) => Err(StoreError::Unavailable { doing: OPENING, source: None }),
+    }
+}
+
+/// One connection to the database, to be read only.
+pub(super) async fn inspect(url: &PostgresUrl) -> Result<PgConnection, StoreError> {
+    let mut connection = connect(&url.options().disable_statement_logging()).await?;
+    let read_only = "SET default_transaction_read_only = on";
+    sqlx::query(read_only).execute(&mut connection).await.map_err(opening)?;
+    Ok(connection)
+}
+
+/// The version of the schema; 0 where there is none yet.
+pub(super) async fn version(connection: &mut PgConnection) -> Result<i64, StoreError> {
+    let table = "SELECT to_regclass('_sqlx_migrations') IS NOT NULL";
+    if !sqlx::query_scalar(table).fetch_one(&mut *connection).await.map_err(opening)? {
+        return Ok(0);
+    }
+    let newest = "SELECT coalesce(max(version), 0) FROM _sqlx_migrations";
+    sqlx::query_scalar(newest).fetch_one(connection).await.map_err(opening)
+}
+
 async fn migrate(connection: &mut PgConnection) -> Result<(), StoreError> {
     let migrator = migrations::postgres();
-    let table = "SELECT to_regclass('_sqlx_migrations') IS NOT NULL";
-    if sqlx::query_scalar(table).fetch_one(&mut *connection).await.map_err(opening)? {
-        let newest = "SELECT coalesce(max(version), 0) FROM _sqlx_migrations";
-        let found = sqlx::query_scalar(newest).fetch_one(&mut *connection).await.map_err(opening)?;
-        migrations::refuse_newer(&migrator, found)?;
-    }
+    migrations::refuse_newer(&migrator, version(connection).await?)?;
     migrator.run(connection).await.map_err(|error| migrations::failed(error, Failure::Postgres))
 }
 

@@ -2,6 +2,7 @@
 
 mod batch;
 mod classify;
+mod copy;
 mod opening;
 mod writer;
 
@@ -19,6 +20,8 @@ use batch::Appending;
 use writer::{Operation, Request, Undo};
 
 pub(super) use classify::classify;
+pub use copy::{backup, restore};
+pub(super) use opening::{inspect, inspect_file, version};
 
 /// An open folder. Clones share the connections, the lock and the writer.
 #[derive(Clone)]

@@ -12,7 +12,7 @@ use crate::store::error::{Failure, StoreError};
 use crate::store::job_state::JobState;
 use crate::store::migrations;
 
-const DATABASE: &str = "ballast.sqlite";
+pub(super) const DATABASE: &str = "ballast.sqlite";
 const LOCK: &str = "ballast.lock";
 /// The first release without the reset bug of the write-ahead log.
 const OLDEST_ENGINE: [u32; 3] = [3, 51, 3];
@@ -55,6 +55,25 @@ pub(super) async fn open_beside(dir: &Path) -> Result<Opened, StoreError> {
     Ok(Opened { lock: None, writer, readers: readers(&file) })
 }
 
+/// The database of a folder, whether or not a process holds it, to be read only.
+pub(in crate::store) async fn inspect(dir: &Path) -> Result<SqliteConnection, StoreError> {
+    let file = dir.join(DATABASE);
+    existing(&file)?;
+    let options = SqliteConnectOptions::new().filename(file).read_only(true).busy_timeout(BUSY_TIMEOUT);
+    options.disable_statement_logging().connect().await.map_err(opening)
+}
+
+/// A database in a file that nobody writes to, without leaving anything beside it.
+pub(in crate::store) async fn inspect_file(file: &Path) -> Result<SqliteConnection, StoreError> {
+    existing(file)?;
+    let options = SqliteConnectOptions::new().filename(file).read_only(true).immutable(true);
+    options.disable_statement_logging().connect().await.map_err(opening)
+}
+
+fn existing(file: &Path) -> Result<(), StoreError> {
+    file.metadata().map(drop).map_err(|error| unusable(file, error))
+}
+
 /// Whether the file is there with the schema of this binary.
 async fn is_current(file: &Path) -> Result<bool, StoreError> {
     if !file.exists() {
@@ -76,20 +95,23 @@ fn readers(file: &Path) -> SqlitePool {
         .connect_lazy_with(options.disable_statement_logging())
 }
 
-fn lock(dir: &Path) -> Result<File, StoreError> {
-    let folder = |path: &Path, error| StoreError::Folder { path: PathBuf::from(path), source: Arc::new(error) };
-    std::fs::create_dir_all(dir).map_err(|error| folder(dir, error))?;
+pub(super) fn unusable(path: &Path, error: std::io::Error) -> StoreError {
+    StoreError::Folder { path: PathBuf::from(path), source: Arc::new(error) }
+}
+
+pub(super) fn lock(dir: &Path) -> Result<File, StoreError> {
+    std::fs::create_dir_all(dir).map_err(|error| unusable(dir, error))?;
     let path = dir.join(LOCK);
     let file = File::options().create(true).truncate(false).write(true).open(&path);
-    let file = file.map_err(|error| folder(&path, error))?;
+    let file = file.map_err(|error| unusable(&path, error))?;
     match file.try_lock() {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(StoreError::Locked { path }),
-        Err(TryLockError::Error(error)) => Err(folder(&path, error)),
+        Err(TryLockError::Error(error)) => Err(unusable(&path, error)),
     }
 }
 
-async fn connect(file: &Path) -> Result<SqliteConnection, StoreError> {
+pub(super) async fn connect(file: &Path) -> Result<SqliteConnection, StoreError> {
     SqliteConnectOptions::new()
         .filename(file)
         .create_if_missing(true)
@@ -112,14 +134,14 @@ async fn refuse_old_engine(connection: &mut SqliteConnection) -> Result<(), Stor
     Ok(())
 }
 
-async fn migrate(connection: &mut SqliteConnection) -> Result<(), StoreError> {
+pub(super) async fn migrate(connection: &mut SqliteConnection) -> Result<(), StoreError> {
     let migrator = migrations::sqlite();
     migrations::refuse_newer(&migrator, version(connection).await?)?;
     migrator.run(connection).await.map_err(|error| migrations::failed(error, Failure::Sqlite))
 }
 
 /// The version of the schema; 0 where there is none yet.
-async fn version(connection: &mut SqliteConnection) -> Result<i64, StoreError> {
+pub(in crate::store) async fn version(connection: &mut SqliteConnection) -> Result<i64, StoreError> {
     let table = "SELECT count(*) FROM sqlite_schema WHERE name = '_sqlx_migrations'";
     let tables: i64 = sqlx::query_scalar(table).fetch_one(&mut *connection).await.map_err(opening)?;
     if tables == 0 {
@@ -140,6 +162,6 @@ async fn end_leases(connection: &mut SqliteConnection) -> Result<(), StoreError>
         .map_err(opening)
 }
 
-fn opening(error: sqlx::Error) -> StoreError {
+pub(super) fn opening(error: sqlx::Error) -> StoreError {
     Failure::Sqlite(error).during("opening the store")
 }

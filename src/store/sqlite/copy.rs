@@ -1,0 +1,119 @@
+//! A folder's database as one file, and back.
+//!
+//! The copy is made by `VACUUM INTO`: one read transaction, so it holds exactly what was committed when it began, and the
+//! writer goes on meanwhile. SQLite's other way, the backup API, starts anew whenever another process writes, which under
+//! load may be never, and copies pages without reading them; this reads every row, and a damaged page ends it. Its cost is
+//! that the write-ahead log grows until the copy is done.
+//!
+//! Either way a name appears only once what it names is whole, verified and on the disk.
+
+use std::fs::{File, OpenOptions};
+use std::io::{Error, ErrorKind};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+
+use sqlx::Connection;
+
+use super::opening::{DATABASE, connect, inspect, lock, migrate, opening, unusable, version};
+use crate::store::check::Inspection;
+use crate::store::error::{Failure, StoreError};
+
+/// Copies the database of `dir` into the new file `out`, readable by its owner alone, and verifies the copy, telling what
+/// was verified. A process may hold the folder and write.
+///
+/// # Errors
+/// `out` or `out.partial` exists, the database or its copy is damaged, or the disk fails; nothing is left at `out`.
+pub async fn backup(dir: &Path, out: &Path, tell: &mut impl FnMut(String)) -> Result<(), StoreError> {
+    refuse_existing(out)?;
+    let partial = beside(out, ".partial");
+    let made = OpenOptions::new().write(true).create_new(true).mode(0o600).open(&partial);
+    drop(made.map_err(|error| unusable(&partial, error))?);
+    let copied = async {
+        copy(dir, &partial).await?;
+        Inspection::of_backup(&partial).await?.run(tell).await?;
+        publish(&partial, out)
+    };
+    let copied = copied.await;
+    if copied.is_err() {
+        // What failed is what the caller must hear.
+        let _ = std::fs::remove_file(&partial);
+    }
+    copied
+}
+
+/// Makes `dir` a folder with the database of the backup `from`, its schema brought up to date, and verifies it, telling
+/// what was verified.
+///
+/// # Errors
+/// `dir` holds a database or is held by a process, the backup is damaged or of a later release, or the disk fails; `dir`
+/// then has no database.
+pub async fn restore(from: &Path, dir: &Path, tell: &mut impl FnMut(String)) -> Result<(), StoreError> {
+    let held = lock(dir)?;
+    let (database, partial) = (dir.join(DATABASE), dir.join(DATABASE).with_extension("partial"));
+    for taken in [database.clone(), beside(&database, "-wal"), beside(&database, "-journal")] {
+        refuse_existing(&taken)?;
+    }
+    // What a restore that was cut off left; the lock says that nobody is at it.
+    let leftovers = ["", "-wal", "-shm", "-journal"].map(|end| beside(&partial, end));
+    leftovers.iter().try_for_each(|file| remove(file))?;
+    let restored = async {
+        std::fs::copy(from, &partial).map_err(|error| unusable(from, error))?;
+        let mut connection = connect(&partial).await?;
+        if version(&mut connection).await? == 0 {
+            return Err(unusable(from, Error::new(ErrorKind::InvalidData, "it is no backup of a store")));
+        }
+        migrate(&mut connection).await?;
+        connection.close().await.map_err(opening)?;
+        Inspection::of_backup(&partial).await?.run(tell).await?;
+        publish(&partial, &database)
+    };
+    let restored = restored.await;
+    if restored.is_err() {
+        let _ = leftovers.iter().try_for_each(|file| remove(file));
+    }
+    drop(held);
+    restored
+}
+
+async fn copy(dir: &Path, partial: &Path) -> Result<(), StoreError> {
+    let name = partial.to_str().ok_or_else(|| unusable(partial, Error::other("its name is not UTF-8")))?;
+    let mut connection = inspect(dir).await?;
+    let copied = sqlx::query("VACUUM INTO ?").bind(name).execute(&mut connection).await;
+    copied.map_err(|error| Failure::Sqlite(error).during("copying the database"))?;
+    connection.close().await.map_err(opening)
+}
+
+/// Gives what is verified its name, durably.
+fn publish(partial: &Path, name: &Path) -> Result<(), StoreError> {
+    let folder = match name.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    let publish = || {
+        File::open(partial)?.sync_all()?;
+        std::fs::rename(partial, name)?;
+        File::open(folder)?.sync_all()
+    };
+    publish().map_err(|error| unusable(name, error))
+}
+
+fn refuse_existing(path: &Path) -> Result<(), StoreError> {
+    match path.try_exists() {
+        Ok(false) => Ok(()),
+        Ok(true) => Err(unusable(path, Error::new(ErrorKind::AlreadyExists, "it exists already"))),
+        Err(error) => Err(unusable(path, error)),
+    }
+}
+
+fn remove(file: &Path) -> Result<(), StoreError> {
+    match std::fs::remove_file(file) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(unusable(file, error)),
+        _ => Ok(()),
+    }
+}
+
+fn beside(path: &Path, end: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(end);
+    name.into()
+}
