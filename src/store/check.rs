@@ -97,7 +97,7 @@ impl Inspection {
 
     /// What SQLite knows of its file: the trees and indexes, and that no row refers to one that is not there.
     async fn file(&mut self) -> Result<(), Failure> {
-        let found = self.read(query("SELECT integrity_check AS found FROM pragma_integrity_check(1)")).await?;
+        let found = self.read(query("SELECT integrity_check AS found FROM pragma_integrity_check LIMIT 1")).await?;
         let found: String = found.first().map_or(Ok("nothing".to_owned()), |row| row.get("found"))?;
         if found != "ok" {
             return Err(Failure::Corrupt(format!("the file of the database ({found})")));
