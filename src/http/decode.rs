@@ -21,7 +21,7 @@ pub fn json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
             let cause = error.into_inner();
             match cause.classify() {
                 serde_json::error::Category::Data => Err(mismatch(bytes, path, &cause)),
-                _ => Err(syntax(bytes, &path, &cause)),
+                _ => Err(overlong(bytes, &path).unwrap_or_else(|| syntax(bytes, &path, &cause))),
             }
         }
     }
@@ -48,6 +48,14 @@ pub fn parameters<T: DeserializeOwned>(pairs: Vec<(String, String)>) -> Result<T
 fn mismatch(bytes: &[u8], path: String, cause: &serde_json::Error) -> Problem {
     let given = serde_json::from_slice(bytes).unwrap_or(Value::Null);
     Problem::of_field(ProblemKind::InvalidField, located(&given, path, &without_position(cause)))
+}
+
+/// The parser stops at an element too many as at a byte too many; the body is JSON all the same.
+fn overlong(bytes: &[u8], path: &str) -> Option<Problem> {
+    let given: Value = serde_json::from_slice(bytes).ok()?;
+    let value = lookup(&given, path).unwrap_or(&given);
+    let error = FieldError::new(path, shortened(&value.to_string()), "must have fewer elements");
+    Some(Problem::of_field(ProblemKind::InvalidField, error))
 }
 
 /// Names the field a message of serde is about: unknown and missing fields stand in the message, not in the path.
@@ -153,6 +161,14 @@ mod tests {
             refused(r#"{"problem": {"history": [], "utility": {"kind": "log", "x": 1}}}"#).0,
             "problem.utility.x"
         );
+    }
+
+    #[test]
+    fn an_element_too_many_is_no_fault_of_the_syntax() {
+        let body = r#"{"problem": {"history": [], "action_interval": [0, 1, 2]}}"#;
+        assert_eq!(json::<Specification>(body.as_bytes()).unwrap_err().kind, "/problems/invalid-field");
+        let (field, _, rule) = refused(body);
+        assert_eq!((field.as_str(), rule.as_str()), ("problem.action_interval", "must have fewer elements"));
     }
 
     #[test]

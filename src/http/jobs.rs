@@ -53,7 +53,7 @@ pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
 
 /// List jobs, newest first.
 #[utoipa::path(get, path = "/jobs", tag = "jobs",
-    params(("limit" = Option<usize>, Query, description = "1 to 1000; default 50."),
+    params(("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
            ("after" = Option<i64>, Query, description = "The `next` of the page before.")),
     responses(
         (status = 200, description = "A page of jobs.", body = wire::JobPage),

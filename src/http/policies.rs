@@ -19,7 +19,7 @@ use crate::service::error::ServiceError;
 
 /// List policies, newest first.
 #[utoipa::path(get, path = "/policies", tag = "policies",
-    params(("limit" = Option<usize>, Query, description = "1 to 1000; default 50."),
+    params(("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
            ("after" = Option<i64>, Query, description = "The `next` of the page before.")),
     responses(
         (status = 200, description = "A page of policies.", body = wire::PolicyPage),

@@ -8,6 +8,7 @@ use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
+use utoipa::ToSchema;
 
 use super::access::By;
 use super::extract::{Id, JsonBody, Parameters};
@@ -39,7 +40,7 @@ pub async fn open(
 
 /// List sessions, newest first.
 #[utoipa::path(get, path = "/sessions", tag = "sessions",
-    params(("limit" = Option<usize>, Query, description = "1 to 1000; default 50."),
+    params(("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
            ("after" = Option<i64>, Query, description = "The `next` of the page before.")),
     responses(
         (status = 200, description = "A page of sessions.", body = wire::SessionPage),
@@ -125,14 +126,14 @@ pub struct Ask {
     explain: Option<Explain>,
 }
 
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 enum Mode {
     Surrogate,
     Resolve,
 }
 
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 enum Explain {
     WorstCase,
@@ -141,8 +142,8 @@ enum Explain {
 /// The robust allocation for the coming period.
 #[utoipa::path(get, path = "/action", tag = "sessions",
     params(("session" = String, Query, description = "The session."),
-           ("mode" = Option<String>, Query, description = "`surrogate` (default) or `resolve`."),
-           ("explain" = Option<String>, Query, description = "`worst_case`: re-solve, and show the worst-case law.")),
+           ("mode" = inline(Option<Mode>), Query, description = "`surrogate` (default) or `resolve`."),
+           ("explain" = inline(Option<Explain>), Query, description = "`worst_case`: re-solve, and show the worst-case law.")),
     responses(
         (status = 200, description = "The allocation.", body = wire::Action),
         (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json"),

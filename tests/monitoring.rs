@@ -1,0 +1,89 @@
+//! The dashboard and the alerts ask for metrics that a service in use has.
+
+mod support;
+
+use std::collections::BTreeSet;
+
+use serde_json::{Value, json};
+use support::{App, specification};
+
+const DASHBOARD: &str = include_str!("../docker/grafana/ballast.json");
+const ALERTS: &str = include_str!("../docker/alerts.yaml");
+const PROMETHEUS: &str = include_str!("../docker/prometheus.yaml");
+const CLUSTER: &str = include_str!("../docker/compose.cluster.yaml");
+
+/// Every `ballast_...` name with the labels asked of it, one each: `name` alone, or `name` and `label="value"`; of a status
+/// the name alone, since the one asked for may never happen.
+fn metrics(expression: &str) -> Vec<(String, Option<String>)> {
+    let mut found = Vec::new();
+    for (start, _) in expression.match_indices("ballast_") {
+        let rest = &expression[start..];
+        let end = rest.find(|letter: char| !letter.is_ascii_alphanumeric() && letter != '_').unwrap_or(rest.len());
+        let name = rest[..end].to_owned();
+        let braces = rest[end..].strip_prefix('{').and_then(|labels| labels.split('}').next());
+        found.push((name.clone(), None));
+        for label in braces.into_iter().flat_map(|labels| labels.split(',')).map(str::trim) {
+            if label.contains("=\"") {
+                let label = if label.starts_with("status=") { "status=" } else { label };
+                found.push((name.clone(), Some(label.to_owned())));
+            }
+        }
+    }
+    found
+}
+
+/// What `/metrics` says after a training, an observation, an allocation and a refusal.
+async fn exposition() -> String {
+    let mut app = App::start().await;
+    app.train(&specification(2)).await;
+    app.open().await;
+    assert_eq!(app.observe(1, 0.01).await.0, 200);
+    assert_eq!(app.action().await.0, 200);
+    assert_eq!(app.get("/sessions/nobody").await.0, 404);
+    assert_eq!(app.post("/what-if", &json!({ "session": app.session })).await.0, 200);
+    app.client.get(format!("{}/metrics", app.url)).send().await.unwrap().text().await.unwrap()
+}
+
+/// The expressions of the dashboard's panels.
+fn panels() -> Vec<String> {
+    let dashboard: Value = serde_json::from_str(DASHBOARD).expect("JSON");
+    let panels = dashboard["panels"].as_array().expect("panels");
+    let targets = panels.iter().flat_map(|panel| panel["targets"].as_array().expect("targets"));
+    targets.map(|target| target["expr"].as_str().expect("an expression").to_owned()).collect()
+}
+
+/// The expressions of the rules, each on a line of its own.
+fn rules() -> Vec<String> {
+    let expressions: Vec<_> =
+        ALERTS.lines().filter_map(|line| line.trim().strip_prefix("expr: ")).map(str::to_owned).collect();
+    assert_eq!(expressions.len(), ALERTS.matches("- alert: ").count(), "every alert has an expression on its line");
+    expressions
+}
+
+#[tokio::test]
+async fn every_metric_of_the_dashboard_and_the_alerts_exists_in_a_service_in_use() {
+    let exposition = exposition().await;
+    let (panels, rules) = (panels(), rules());
+    assert!(panels.len() >= 10 && rules.len() >= 5, "{} panels, {} rules", panels.len(), rules.len());
+    let asked: BTreeSet<_> = panels.iter().chain(&rules).flat_map(|expression| metrics(expression)).collect();
+    let samples: Vec<_> = exposition.lines().filter(|line| !line.starts_with('#')).collect();
+    for (name, label) in asked {
+        let named = |line: &&str| line.split(['{', ' ']).next() == Some(name.as_str());
+        let mut found = samples.iter().copied().filter(named).peekable();
+        assert!(found.peek().is_some(), "nothing is called {name} in\n{exposition}");
+        if let Some(label) = label {
+            assert!(found.any(|line| line.contains(&label)), "{name} never has {label}");
+        }
+    }
+    // And the other way round: what the service measures is looked at.
+    for described in exposition.lines().filter_map(|line| line.strip_prefix("# HELP ")) {
+        let name = described.split(' ').next().unwrap();
+        assert!(panels.iter().any(|expression| expression.contains(name)), "no panel shows {name}");
+    }
+}
+
+#[test]
+fn prometheus_is_given_the_rules() {
+    assert!(PROMETHEUS.contains("rule_files:\n  - alerts.yaml"));
+    assert!(CLUSTER.contains("./alerts.yaml:/etc/prometheus/alerts.yaml:ro"));
+}
