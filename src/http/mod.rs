@@ -2,7 +2,7 @@
 
 mod access;
 mod dashboard;
-mod decode;
+pub mod decode;
 mod described;
 mod documentation;
 mod evaluations;
