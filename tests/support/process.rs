@@ -5,14 +5,21 @@ use std::process::{Child, Command, Stdio};
 
 /// Starts `ballast serve` on a free port, with what `configure` adds; the process and its address.
 pub fn serve(configure: impl FnOnce(&mut Command)) -> (Child, String) {
+    try_serve(configure).unwrap_or_else(|(_, printed)| panic!("printed {printed:?}"))
+}
+
+/// As [`serve`]; where it does not get as far as listening, the process and what it printed instead.
+pub fn try_serve(configure: impl FnOnce(&mut Command)) -> Result<(Child, String), (Child, String)> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
     command.arg("serve").env("BALLAST_LISTEN", "127.0.0.1:0").env("RUST_LOG", "warn").stdout(Stdio::piped());
     configure(&mut command);
     let mut child = command.spawn().unwrap();
     let mut line = String::new();
     BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
-    let url = line.trim().strip_prefix("listening on ").unwrap_or_else(|| panic!("printed {line:?}")).to_owned();
-    (child, url)
+    match line.trim().strip_prefix("listening on ") {
+        Some(url) => Ok((child, url.to_owned())),
+        None => Err((child, line)),
+    }
 }
 
 /// Backward steps that the process at `url` has solved since it started.

@@ -1,0 +1,124 @@
+//! Broken on purpose: the real binary is killed, starved, cut off and lied to, and then asked for everything it
+//! acknowledged. Prints a table; fails where anything is lost, doubled or panicked.
+//!
+//! `cargo test --test reliability` is the short form. `cargo test --test reliability -- --trials 100 kill` runs a hundred
+//! trials of every row whose name contains `kill`; `BALLAST_RELIABILITY_TRIALS` does the same for all rows. Rows that need
+//! root, a loop device, strace or PostgreSQL say so where they have to be left out.
+//!
+//! Not here: random lists of operations against a model of the store, which `tests/store_model.rs` runs on both engines.
+
+mod caller;
+mod damage;
+mod disk;
+mod kills;
+mod ledger;
+mod load;
+mod mount;
+mod power;
+mod replicas;
+mod scene;
+mod server;
+mod storm;
+#[path = "../support/mod.rs"]
+mod support;
+mod syncs;
+mod tracer;
+
+use std::process::ExitCode;
+use std::time::Instant;
+
+use futures_util::FutureExt;
+use futures_util::future::BoxFuture;
+
+use crate::scene::{Outcome, Tally};
+
+struct Row {
+    fault: &'static str,
+    /// Trials of the short form.
+    trials: usize,
+    run: fn(usize) -> BoxFuture<'static, Outcome>,
+    /// A control loses what it is made to lose: were it to lose nothing, its neighbours' zeros would mean nothing.
+    control: bool,
+}
+
+macro_rules! row {
+    ($fault:literal, $trials:literal, $run:path) => {
+        Row { fault: $fault, trials: $trials, run: |trials| $run(trials).boxed(), control: false }
+    };
+    (control $fault:literal, $trials:literal, $run:path) => {
+        Row { control: true, ..row!($fault, $trials, $run) }
+    };
+}
+
+const ROWS: [Row; 10] = [
+    row!("kill -9 under load", 8, kills::killed),
+    row!("SIGTERM under load", 4, kills::terminated),
+    row!("retry storm, 16 clients", 2, storm::storm),
+    row!("disk full, then freed", 3, disk::full),
+    row!("power cut under load", 4, power::cut),
+    row!(control "power cut, fsync ignored", 1, power::cut_without_fsync),
+    row!("I/O error at an fsync", 4, syncs::failed),
+    row!("kill -9 at an fsync", 4, syncs::killed),
+    row!("damaged bytes on disk", 60, damage::flipped),
+    row!("replicas and database", 1, replicas::crashed),
+];
+
+/// Trials asked for, and the parts of names to choose rows by.
+fn arguments() -> (Option<usize>, Vec<String>) {
+    let mut trials = std::env::var("BALLAST_RELIABILITY_TRIALS").ok();
+    let (mut given, mut names) = (std::env::args().skip(1), Vec::new());
+    while let Some(argument) = given.next() {
+        match argument.as_str() {
+            "--trials" => trials = given.next(),
+            flag if flag.starts_with("--") => {} // meant for the usual harness
+            _ => names.push(argument),
+        }
+    }
+    (trials.map(|count| count.parse().expect("--trials takes a number")), names)
+}
+
+#[tokio::main]
+async fn main() -> ExitCode {
+    let (trials, names) = arguments();
+    let started = Instant::now();
+    println!("{}", header());
+    let mut sound = true;
+    for row in &ROWS {
+        if names.is_empty() || names.iter().any(|name| row.fault.contains(name.as_str())) {
+            let running = tokio::spawn((row.run)(trials.unwrap_or(row.trials)));
+            sound &= report(row, running.await.unwrap_or_else(|panic| Err(panic.to_string())));
+        }
+    }
+    println!("in {} s", started.elapsed().as_secs());
+    if sound { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+fn header() -> String {
+    let [trials, faults, acknowledged, lost] = ["trials", "faults", "acknowledged", "lost"];
+    let [doubled, panics, ready] = ["doubled", "panics", "ready in"];
+    format!("{:<26}{trials:>7}{faults:>8}{acknowledged:>14}{lost:>6}{doubled:>9}{panics:>8}{ready:>11}", "fault")
+}
+
+/// Prints the row; whether it is as it must be.
+fn report(row: &Row, outcome: Outcome) -> bool {
+    let tally = match outcome {
+        Ok(Some(tally)) => tally,
+        Ok(None) => return true,
+        Err(reason) => {
+            println!("{:<26} FAILED: {reason}", row.fault);
+            return false;
+        }
+    };
+    let Tally { trials, faults, audit, panics, ready, complaints } = &tally;
+    println!(
+        "{:<26}{trials:>7}{faults:>8}{:>14}{:>6}{:>9}{panics:>8}{:>8} ms{}",
+        row.fault,
+        audit.acknowledged,
+        audit.lost,
+        audit.doubled,
+        ready.as_millis(),
+        if row.control { "  (must lose)" } else { "" },
+    );
+    complaints.iter().take(10).for_each(|complaint| println!("    {complaint}"));
+    if row.control { audit.lost > 0 } else { tally.is_sound() }
+}

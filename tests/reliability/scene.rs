@@ -1,0 +1,86 @@
+//! What every fault befalls: a policy, sessions by it, trainings; and the count of what came of it.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::time::Duration;
+
+use ballast::control::policy::content_hash;
+
+use crate::caller::Caller;
+use crate::ledger::{Audit, Ledger};
+use crate::server::Server;
+use crate::support::{specification, trained};
+
+/// Periods of a session.
+pub const HORIZON: usize = 50;
+/// A server with an intact folder is ready this soon.
+const READY: Duration = Duration::from_secs(2);
+
+/// What came of a row; nothing where this machine cannot make the fault.
+pub type Outcome = Result<Option<Tally>, String>;
+
+/// The policy that a training of so many steps gives when nothing disturbs it.
+fn undisturbed(steps: usize) -> Vec<u8> {
+    static POLICIES: Mutex<BTreeMap<usize, Vec<u8>>> = Mutex::new(BTreeMap::new());
+    POLICIES.lock().unwrap().entry(steps).or_insert_with(|| trained(&specification(steps))).clone()
+}
+
+/// Brings a policy of [`HORIZON`] periods in; its name.
+pub async fn import(caller: &Caller) -> String {
+    let policy = serde_json::from_slice(&undisturbed(HORIZON)).unwrap();
+    let (status, imported) = caller.post("/policies/import", &policy).await.unwrap();
+    assert_eq!(status, 201, "{imported}");
+    imported["policy"].as_str().unwrap().to_owned()
+}
+
+/// What was done, and what came of it.
+#[derive(Default)]
+pub struct Tally {
+    pub trials: usize,
+    pub faults: usize,
+    pub audit: Audit,
+    pub panics: usize,
+    /// The slowest start.
+    pub ready: Duration,
+    pub complaints: Vec<String>,
+}
+
+impl Tally {
+    pub fn is_sound(&self) -> bool {
+        let Audit { acknowledged, lost, doubled } = self.audit;
+        acknowledged > 0 && (lost, doubled, self.panics) == (0, 0, 0) && self.complaints.is_empty()
+    }
+
+    pub fn complain(&mut self, complaint: impl Into<String>) {
+        self.complaints.push(complaint.into());
+    }
+
+    /// Notes how long a server took to get ready.
+    pub fn started(&mut self, server: &Server) {
+        self.ready = self.ready.max(server.ready);
+        if server.ready > READY {
+            self.complain(format!("ready only after {} ms", server.ready.as_millis()));
+        }
+    }
+
+    /// Asks for everything in `ledger` and counts the jobs, of which there must be one for each of `keys` and those new.
+    pub async fn examine(&mut self, ledger: &Ledger, caller: &Caller, keys: &mut usize) {
+        self.audit += ledger.audit(caller).await;
+        self.complaints.extend(ledger.complaints.iter().cloned());
+        *keys += ledger.trainings.len();
+        let Some(jobs) = caller.jobs().await else { return self.complain("the jobs are not to be had") };
+        self.audit.doubled += jobs.len().saturating_sub(*keys);
+        self.audit.lost += keys.saturating_sub(jobs.len());
+        for job in &jobs {
+            let steps = job["progress"]["steps_total"].as_u64().unwrap_or_default() as usize;
+            let sound = match job["state"].as_str() {
+                Some("queued" | "running") => true,
+                Some("succeeded") => job["policy"] == content_hash(&undisturbed(steps)),
+                _ => false,
+            };
+            if !sound {
+                self.complain(format!("not what an undisturbed training gives: {job}"));
+            }
+        }
+    }
+}
