@@ -16,8 +16,8 @@
 //! Conflicts, repeats and gaps are outcomes, not errors. The store reads no clock: time enters as milliseconds since the
 //! epoch; leases are measured by [`Store::lease_time`]. Identifiers are opaque and made by the caller.
 //!
-//! Not done, and why: a digest over the end of a session's observations (a lost tail needs a lost file, which the
-//! write-ahead log already detects); deleting old jobs (they are small, and an idempotency key must outlive its request).
+//! Not done, and why: a digest over the end of a session's observations (a lost tail needs a lost file; a
+//! write-ahead log that damage cut short is refused at the start); deleting old jobs (they are small, and an idempotency key must outlive its request).
 
 mod check;
 mod codec;

@@ -26,30 +26,21 @@ struct Specimen {
 
 pub async fn flipped(trials: usize) -> Outcome {
     let (specimen, mut tally) = (Specimen::new().await?, Tally::default());
+    let (mut refused, mut same) = (0, 0);
     for trial in 0..trials {
         let site = Site::new();
         let what = specimen.copy_damaged(&site.data(), &mut ChaCha8Rng::seed_from_u64(trial as u64));
         (tally.trials, tally.faults) = (trial + 1, tally.faults + 1);
-        // A server that refuses to start says so, and no more is asked of it.
-        if let Ok(server) = site.start().await {
-            let caller = Caller::new(&[&server.url]);
-            for (question, before) in &specimen.answers {
-                let now = caller.get(question).await;
-                if differs(before, now.as_ref()) {
-                    tally.audit.lost += 1;
-                    tally.complain(format!("{what}: {question} answers {now:?}"));
-                }
-            }
+        match site.start().await {
+            Ok(server) => same += specimen.ask(&server, &what, &mut tally).await,
+            Err(_) => refused += 1,
         }
         tally.audit.acknowledged += specimen.answers.len();
         tally.panics += site.panics();
     }
+    let asked = (trials - refused) * specimen.answers.len();
+    tally.note = format!("{refused} refused to start; of {asked} answers {same} as before, the others refused");
     Ok(Some(tally))
-}
-
-/// Whether another answer than `before` was given; a failure is none.
-fn differs(before: &Answer, now: Option<&Answer>) -> bool {
-    now.is_some_and(|(status, body)| *status < 400 && (*status, body) != (before.0, &before.1))
 }
 
 impl Specimen {
@@ -84,6 +75,21 @@ impl Specimen {
         caller.open(&policy).await.ok_or("no session")?;
         drop::<Server>(server);
         Ok(Specimen { site, log_bytes, answers })
+    }
+
+    /// Asks everything again: the same answer, or none. How many are the same.
+    async fn ask(&self, server: &Server, what: &str, tally: &mut Tally) -> usize {
+        let (caller, mut same) = (Caller::new(&[&server.url]), 0);
+        for (question, before) in &self.answers {
+            let now = caller.get(question).await.filter(|(status, _)| *status < 400);
+            same += usize::from(now.as_ref() == Some(before));
+            if now.as_ref().is_some_and(|now| now != before) {
+                tally.audit.lost += 1;
+                tally.complain(format!("{what}: {question} answers {now:?}"));
+            }
+        }
+        tally.ready = tally.ready.max(server.ready);
+        same
     }
 
     /// Copies it and changes a few bytes, all in one file; where.

@@ -75,7 +75,8 @@ impl Session {
             return Audit { acknowledged, lost: acknowledged, doubled: 0 };
         };
         let kept = |(index, (_, answer)): &(usize, &(Value, Value))| {
-            rows.get(*index).is_some_and(|row| ["period", "log_return", "wealth"].iter().all(|at| row[at] == answer[at]))
+            rows.get(*index)
+                .is_some_and(|row| ["period", "log_return", "wealth"].iter().all(|at| row[at] == answer[at]))
         };
         let mut lost = self.reports.iter().enumerate().filter(|report| !kept(report)).count();
         for (report, answer) in &self.reports {

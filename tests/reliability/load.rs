@@ -11,8 +11,7 @@ use tokio::task::JoinHandle;
 
 use crate::caller::{Answer, Caller};
 use crate::ledger::{Ledger, Session, Training};
-use crate::scene::HORIZON;
-use crate::support::specification;
+use crate::scene::{HORIZON, specification};
 
 /// Pause after no answer.
 const PAUSE: Duration = Duration::from_millis(5);
@@ -197,7 +196,8 @@ impl Client {
         if !self.expects(200, "a job", &answer) {
             return false;
         }
-        self.ledger.trainings[index].ended = answer.map(|(_, job)| job).filter(|job: &Value| job["finished_ms"].is_i64());
+        self.ledger.trainings[index].ended =
+            answer.map(|(_, job)| job).filter(|job: &Value| job["finished_ms"].is_i64());
         true
     }
 }

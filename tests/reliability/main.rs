@@ -32,6 +32,9 @@ use futures_util::future::BoxFuture;
 
 use crate::scene::{Outcome, Tally};
 
+/// Printed of a row; the first tells most.
+const COMPLAINTS: usize = 10;
+
 struct Row {
     fault: &'static str,
     /// Trials of the short form.
@@ -109,16 +112,15 @@ fn report(row: &Row, outcome: Outcome) -> bool {
             return false;
         }
     };
-    let Tally { trials, faults, audit, panics, ready, complaints } = &tally;
+    let Tally { trials, faults, audit, panics, ready, complaints, note } = &tally;
     println!(
-        "{:<26}{trials:>7}{faults:>8}{:>14}{:>6}{:>9}{panics:>8}{:>8} ms{}",
+        "{:<26}{trials:>7}{faults:>8}{:>14}{:>6}{:>9}{panics:>8}{:>8} ms  {note}",
         row.fault,
         audit.acknowledged,
         audit.lost,
         audit.doubled,
         ready.as_millis(),
-        if row.control { "  (must lose)" } else { "" },
     );
-    complaints.iter().take(10).for_each(|complaint| println!("    {complaint}"));
+    complaints.iter().take(COMPLAINTS).for_each(|complaint| println!("    {complaint:.300}"));
     if row.control { audit.lost > 0 } else { tally.is_sound() }
 }

@@ -5,11 +5,12 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 use ballast::control::policy::content_hash;
+use serde_json::{Value, json};
 
 use crate::caller::Caller;
 use crate::ledger::{Audit, Ledger};
 use crate::server::Server;
-use crate::support::{specification, trained};
+use crate::support::{self, trained};
 
 /// Periods of a session.
 pub const HORIZON: usize = 50;
@@ -18,6 +19,13 @@ const READY: Duration = Duration::from_secs(2);
 
 /// What came of a row; nothing where this machine cannot make the fault.
 pub type Outcome = Result<Option<Tally>, String>;
+
+/// A small training, with a radius at which the advice is not always to stay in the bank.
+pub fn specification(horizon: usize) -> Value {
+    let mut specification = support::specification(horizon);
+    specification["problem"]["radius"]["scale"] = json!(0.1);
+    specification
+}
 
 /// The policy that a training of so many steps gives when nothing disturbs it.
 fn undisturbed(steps: usize) -> Vec<u8> {
@@ -43,6 +51,8 @@ pub struct Tally {
     /// The slowest start.
     pub ready: Duration,
     pub complaints: Vec<String>,
+    /// What a reader of the row should know.
+    pub note: String,
 }
 
 impl Tally {

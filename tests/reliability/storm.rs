@@ -113,7 +113,11 @@ async fn equals_replay(caller: &Caller, session: &str, patient: &str) -> Result<
     let stormed = rows(session).await?;
     for row in &stormed {
         let report = json!({ "session": patient, "period": row["period"], "log_return": row["log_return"] });
-        caller.post("/observe", &report).await.filter(|(status, _)| *status == 200).ok_or("a replayed report failed")?;
+        caller
+            .post("/observe", &report)
+            .await
+            .filter(|(status, _)| *status == 200)
+            .ok_or("a replayed report failed")?;
     }
     let without_time = |mut rows: Vec<Value>| {
         rows.iter_mut().for_each(|row| row["observed_ms"] = Value::Null);

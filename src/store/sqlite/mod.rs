@@ -4,6 +4,7 @@ mod batch;
 mod classify;
 mod copy;
 mod opening;
+mod write_ahead_log;
 mod writer;
 
 use std::path::Path;

@@ -8,11 +8,13 @@ use std::time::Duration;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
 use sqlx::{ConnectOptions, Connection, SqliteConnection};
 
+use super::write_ahead_log;
 use crate::store::error::{Failure, StoreError};
 use crate::store::job_state::JobState;
 use crate::store::migrations;
 
 pub(super) const DATABASE: &str = "ballast.sqlite";
+const LOG: &str = "ballast.sqlite-wal";
 const LOCK: &str = "ballast.lock";
 /// The first release without the reset bug of the write-ahead log.
 const OLDEST_ENGINE: [u32; 3] = [3, 51, 3];
@@ -30,18 +32,27 @@ pub(super) struct Opened {
 
 pub(super) async fn open(dir: &Path) -> Result<Opened, StoreError> {
     let lock = lock(dir)?;
+    refuse_damaged_log(dir)?;
     let file = dir.join(DATABASE);
     let mut writer = connect(&file).await?;
     refuse_old_engine(&mut writer).await?;
     migrate(&mut writer).await?;
     end_leases(&mut writer).await?;
+    empty_log(&mut writer).await?;
     Ok(Opened { lock: Some(lock), writer, readers: readers(&file) })
 }
 
 /// As [`open`], without holding the folder and without touching what its holder does. The lock is needed only to bring
-/// the schema up to date, and given up after.
+/// the schema up to date and to look at a log that nobody writes, and given up after.
 pub(super) async fn open_beside(dir: &Path) -> Result<Opened, StoreError> {
     let file = dir.join(DATABASE);
+    match lock(dir) {
+        // Whoever is the last to close a log takes what is left of it for all of it.
+        Ok(_held) => refuse_damaged_log(dir)?,
+        // Its holder looked when it started.
+        Err(StoreError::Locked { .. }) => {}
+        Err(error) => return Err(error),
+    }
     if !is_current(&file).await? {
         let lock = lock(dir)?;
         let mut connection = connect(&file).await?;
@@ -108,6 +119,25 @@ pub(super) fn lock(dir: &Path) -> Result<File, StoreError> {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(StoreError::Locked { path }),
         Err(TryLockError::Error(error)) => Err(unusable(&path, error)),
+    }
+}
+
+/// SQLite would drop every commit from the damage on, without a word.
+fn refuse_damaged_log(dir: &Path) -> Result<(), StoreError> {
+    let path = dir.join(LOG);
+    let found = write_ahead_log::damage(&path);
+    match found.map_err(|error| unusable(&path, error))? {
+        None => Ok(()),
+        Some(damage) => Err(StoreError::Corrupt { what: damage.to_string() }),
+    }
+}
+
+/// Empties the log: what a crash left torn in it must not be there when the next one comes. A disk too full for that, or a
+/// reader beside, is no reason not to start.
+async fn empty_log(connection: &mut SqliteConnection) -> Result<(), StoreError> {
+    match sqlx::query("PRAGMA wal_checkpoint(TRUNCATE)").execute(connection).await.map_err(opening) {
+        Err(error) if error.is_fatal() => Err(error),
+        _ => Ok(()),
     }
 }
 
