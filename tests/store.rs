@@ -565,6 +565,21 @@ async fn a_file_that_is_no_database_is_fatal() {
 }
 
 #[tokio::test]
+async fn a_schema_that_is_not_text_is_refused() {
+    const COLUMN: &[u8] = b"wealth_after";
+    let folder = tempfile::tempdir().unwrap();
+    Store::open(folder.path()).await.unwrap().close().await;
+    let file = folder.path().join("ballast.sqlite");
+    let mut bytes = std::fs::read(&file).unwrap();
+    let places: Vec<usize> = (0..bytes.len()).filter(|&at| bytes[at..].starts_with(COLUMN)).collect();
+    assert!(!places.is_empty());
+    places.iter().for_each(|&at| bytes[at] = 0xff);
+    std::fs::write(&file, bytes).unwrap();
+    let refused = Store::open(folder.path()).await.err().expect("a refusal");
+    assert!(matches!(refused, StoreError::Corrupt { .. }), "{refused:?}");
+}
+
+#[tokio::test]
 async fn opening_a_folder_ends_the_leases_of_the_dead() {
     let place = Place::folder();
     let store = place.open().await;

@@ -36,7 +36,7 @@ pub async fn flipped(trials: usize) -> Outcome {
             Err(_) => refused += 1,
         }
         tally.audit.acknowledged += specimen.answers.len();
-        tally.panics += site.panics();
+        tally.listen(&site);
     }
     let asked = (trials - refused) * specimen.answers.len();
     tally.note = format!("{refused} refused to start; of {asked} answers {same} as before, the others refused");

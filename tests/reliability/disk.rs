@@ -50,7 +50,7 @@ pub async fn full(trials: usize) -> Outcome {
         if found != "ok" {
             tally.complain(found);
         }
-        tally.panics += site.panics();
+        tally.listen(&site);
         drop(server);
     }
     Ok(Some(tally))

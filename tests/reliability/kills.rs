@@ -45,6 +45,6 @@ async fn interrupted(trials: usize, signal: &str) -> Outcome {
     if found != "ok" {
         tally.complain(found);
     }
-    tally.panics = site.panics();
+    tally.listen(&site);
     Ok(Some(tally))
 }

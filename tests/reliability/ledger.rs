@@ -104,10 +104,8 @@ impl Training {
         let again = caller.train(&self.key, &self.request).await;
         let Some(job) = &self.job else { return Audit::default() };
         let same_job = again.is_some_and(|(status, again)| status == 202 && again["job"] == job.as_str());
-        let same_end = match &self.ended {
-            None => true,
-            Some(ended) => caller.get(&format!("/jobs/{job}")).await.is_some_and(|(_, now)| now == *ended),
-        };
+        let now = caller.get(&format!("/jobs/{job}")).await.map(|(_, now)| now);
+        let same_end = self.ended.is_none() || self.ended == now;
         Audit { acknowledged: 1, lost: usize::from(!same_job || !same_end), doubled: 0 }
     }
 }

@@ -62,7 +62,8 @@ async fn crash_all(cluster: &Cluster, seed: u64, tally: &mut Tally) -> Result<()
     let ledger = load.stop().await;
     until_idle(&caller).await?;
     tally.examine(&ledger, &Caller::new(&[&other_api.url]), &mut 0).await;
-    tally.panics += answering.panics() + working.panics();
+    tally.listen(&answering);
+    tally.listen(&working);
     Ok(())
 }
 

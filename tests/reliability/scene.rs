@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::caller::Caller;
 use crate::ledger::{Audit, Ledger};
-use crate::server::Server;
+use crate::server::{Server, Site};
 use crate::support::{self, trained};
 
 /// Periods of a session.
@@ -63,6 +63,13 @@ impl Tally {
 
     pub fn complain(&mut self, complaint: impl Into<String>) {
         self.complaints.push(complaint.into());
+    }
+
+    /// Notes what the servers of `site` said of panics.
+    pub fn listen(&mut self, site: &Site) {
+        let panics = site.panics();
+        self.panics += panics.len();
+        self.complaints.extend(panics);
     }
 
     /// Notes how long a server took to get ready.

@@ -82,9 +82,12 @@ impl Site {
         self.said().lines().last().unwrap_or("said nothing").to_owned()
     }
 
-    /// How many panics the servers started here reported.
-    pub fn panics(&self) -> usize {
-        self.said().matches("panicked at").count()
+    /// What the servers started here said of panics.
+    pub fn panics(&self) -> Vec<String> {
+        let said = self.said();
+        let lines: Vec<&str> = said.lines().collect();
+        let panics = (0..lines.len()).filter(|&at| lines[at].contains("panicked at"));
+        panics.map(|at| lines[at..lines.len().min(at + 2)].join(" ")).collect()
     }
 
     /// What SQLite says of the file: `ok`, or its complaints.
@@ -119,6 +122,23 @@ impl Server {
 
     pub fn signal(&self, name: &str) {
         assert!(Command::new("kill").args([name, &self.pid()]).status().unwrap().success());
+    }
+
+    /// Stops it; returns once none of its threads is in a system call any more.
+    pub async fn freeze(&self) {
+        self.signal("-STOP");
+        while !self.is_frozen() {
+            tokio::time::sleep(POLL).await;
+        }
+    }
+
+    fn is_frozen(&self) -> bool {
+        let threads = std::fs::read_dir(format!("/proc/{}/task", self.pid())).unwrap();
+        // The state follows the name, which is in brackets. A traced thread stops as `t`.
+        threads.flatten().all(|thread| {
+            let stat = std::fs::read_to_string(thread.path().join("stat")).unwrap_or_default();
+            stat.rsplit(") ").next().is_some_and(|rest| rest.starts_with(['T', 't']))
+        })
     }
 
     /// Waits for its end; `None` where it does not come.

@@ -44,7 +44,7 @@ pub async fn storm(trials: usize) -> Outcome {
             tally.complain(difference);
         }
     }
-    tally.panics = site.panics();
+    tally.listen(&site);
     Ok(Some(tally))
 }
 

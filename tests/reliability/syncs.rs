@@ -53,6 +53,6 @@ async fn broken(trials: usize, how: &str, as_it_must: fn(&std::process::ExitStat
     if found != "ok" {
         tally.complain(found);
     }
-    tally.panics = site.panics();
+    tally.listen(&site);
     Ok(Some(tally))
 }

@@ -142,17 +142,27 @@ async fn empty_log(connection: &mut SqliteConnection) -> Result<(), StoreError> 
 }
 
 pub(super) async fn connect(file: &Path) -> Result<SqliteConnection, StoreError> {
-    SqliteConnectOptions::new()
+    let options = SqliteConnectOptions::new()
         .filename(file)
         .create_if_missing(true)
         .journal_mode(SqliteJournalMode::Wal)
         .synchronous(SqliteSynchronous::Full)
         .foreign_keys(true)
         .busy_timeout(BUSY_TIMEOUT)
-        .disable_statement_logging()
-        .connect()
-        .await
-        .map_err(opening)
+        .disable_statement_logging();
+    let mut connection = options.connect().await.map_err(opening)?;
+    refuse_damaged_schema(&mut connection).await?;
+    Ok(connection)
+}
+
+/// The driver takes the names of columns from the schema, and panics where they are not text.
+async fn refuse_damaged_schema(connection: &mut SqliteConnection) -> Result<(), StoreError> {
+    let statements = "SELECT CAST(coalesce(sql, '') AS BLOB) AS statement FROM sqlite_schema";
+    let statements: Vec<Vec<u8>> = sqlx::query_scalar(statements).fetch_all(connection).await.map_err(opening)?;
+    if statements.iter().any(|statement| std::str::from_utf8(statement).is_err()) {
+        return Err(StoreError::Corrupt { what: "the schema".into() });
+    }
+    Ok(())
 }
 
 async fn refuse_old_engine(connection: &mut SqliteConnection) -> Result<(), StoreError> {
