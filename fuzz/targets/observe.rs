@@ -37,7 +37,7 @@ static LIVE: LazyLock<Live> = LazyLock::new(|| {
 
 fn open(runtime: &Runtime, service: &Service, policy: &str) -> String {
     let opened = runtime.block_on(service.sessions.open(&Tenant::default(), policy, None, None));
-    opened.expect("a session").row.session
+    opened.expect("a session").row.session.clone()
 }
 
 fuzz_target!(|body: &[u8]| {

@@ -15,6 +15,6 @@ fuzz_target!(|body: &[u8]| {
     let state = advisor.initial_state(None, None).expect("its own start");
     for step in 0..advisor.policy().steps().len().min(2) {
         let advice = advisor.advise(step, &state, AdviceMode::Surrogate);
-        assert!((0.0..=1.0).contains(&advice.action), "{}", advice.action);
+        assert!((0.0..=1.0).contains(&advice.allocation), "{}", advice.allocation);
     }
 });
