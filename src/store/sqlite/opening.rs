@@ -46,13 +46,7 @@ pub(super) async fn open(dir: &Path) -> Result<Opened, StoreError> {
 /// the schema up to date and to look at a log that nobody writes, and given up after.
 pub(super) async fn open_beside(dir: &Path) -> Result<Opened, StoreError> {
     let file = dir.join(DATABASE);
-    match lock(dir) {
-        // Whoever is the last to close a log takes what is left of it for all of it.
-        Ok(_held) => refuse_damaged_log(dir)?,
-        // Its holder looked when it started.
-        Err(StoreError::Locked { .. }) => {}
-        Err(error) => return Err(error),
-    }
+    refuse_damaged_log_unless_held(dir)?;
     if !is_current(&file).await? {
         let lock = lock(dir)?;
         let mut connection = connect(&file).await?;
@@ -70,6 +64,7 @@ pub(super) async fn open_beside(dir: &Path) -> Result<Opened, StoreError> {
 pub(in crate::store) async fn inspect(dir: &Path) -> Result<SqliteConnection, StoreError> {
     let file = dir.join(DATABASE);
     existing(&file)?;
+    refuse_damaged_log_unless_held(dir)?;
     let options = SqliteConnectOptions::new().filename(file).read_only(true).busy_timeout(BUSY_TIMEOUT);
     options.disable_statement_logging().connect().await.map_err(opening)
 }
@@ -119,6 +114,16 @@ pub(super) fn lock(dir: &Path) -> Result<File, StoreError> {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(StoreError::Locked { path }),
         Err(TryLockError::Error(error)) => Err(unusable(&path, error)),
+    }
+}
+
+/// Looks at the log where nobody writes it; a process that holds the folder looked when it started.
+fn refuse_damaged_log_unless_held(dir: &Path) -> Result<(), StoreError> {
+    match lock(dir) {
+        // Whoever is the last to close a log takes what is left of it for all of it.
+        Ok(_held) => refuse_damaged_log(dir),
+        Err(StoreError::Locked { .. }) => Ok(()),
+        Err(error) => Err(error),
     }
 }
 
