@@ -143,7 +143,7 @@ fn threads_change_nothing() {
     let request = small(json!({ "histories": { "kind": "drawn", "count": 3 }, "constant_mixes": [0.3] }));
     let on = |threads| TrainingPool::new(threads).unwrap().install(|| reported(request.clone()));
     let once = on(1);
-    assert_eq!(once.strategies.len(), 5);
+    assert_eq!(once.strategies.len(), 7);
     for threads in [2, 4] {
         assert!(on(threads) == once, "{threads} threads");
     }
@@ -278,7 +278,7 @@ async fn an_evaluation_is_cancelled_within_a_second_in_every_stage() {
         let (_, job) = app.post("/evaluate", &small(many.clone())).await;
         let job = job["job"].as_str().unwrap().to_owned();
         let running = app.until(&job, |job| job["progress"]["phase"] == phase).await;
-        assert_eq!(running["progress"]["steps_total"], 17);
+        assert_eq!(running["progress"]["steps_total"], 25);
         let asked = Instant::now();
         assert_eq!(app.delete(&format!("/jobs/{job}")).await, 202);
         app.until(&job, |job| job["state"] == "cancelled").await;
