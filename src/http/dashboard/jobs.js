@@ -63,6 +63,8 @@ function card(job, changed) {
   const element = h("li", { class: "card job" });
   const card = { element, job };
   card.update = (now) => {
+    // The answer to a cancellation may come after the event that it has ended.
+    if (isOver(card.job) && !isOver(now)) return;
     const ended = isOver(now) && !isOver(card.job);
     const moved = now.state === card.job.state && now.cancel_requested === card.job.cancel_requested;
     card.job = now;
