@@ -46,10 +46,7 @@ pub async fn full(trials: usize) -> Outcome {
         };
         tally.examine(&ledger, &caller, &mut 0).await;
         (tally.trials, tally.faults) = (trial + 1, tally.faults + 1);
-        let found = site.integrity().await;
-        if found != "ok" {
-            tally.complain(found);
-        }
+        tally.inspect(&site).await;
         tally.listen(&site);
         drop(server);
     }

@@ -37,14 +37,9 @@ async fn interrupted(trials: usize, signal: &str) -> Outcome {
             tally.complain(format!("ended with {status}"));
         }
         server = site.start().await?;
-        tally.started(&server);
-        tally.examine(&ledger, &Caller::new(&[&server.url]), &mut keys).await;
-        (tally.trials, tally.faults) = (trial + 1, tally.faults + 1);
+        tally.recovered(&server, &ledger, &mut keys).await;
     }
-    let found = site.integrity().await;
-    if found != "ok" {
-        tally.complain(found);
-    }
+    tally.inspect(&site).await;
     tally.listen(&site);
     Ok(Some(tally))
 }

@@ -28,13 +28,8 @@ pub async fn cut(trials: usize) -> Outcome {
         load.acknowledges(random.random_range(1..200)).await;
         let ledger = cut_off(&mount, server, load, &mut tally).await?;
         server = site.start().await?;
-        tally.started(&server);
-        tally.examine(&ledger, &Caller::new(&[&server.url]), &mut keys).await;
-        let found = site.integrity().await;
-        if found != "ok" {
-            tally.complain(found);
-        }
-        (tally.trials, tally.faults) = (trial + 1, tally.faults + 1);
+        tally.recovered(&server, &ledger, &mut keys).await;
+        tally.inspect(&site).await;
     }
     tally.listen(&site);
     Ok(Some(tally))

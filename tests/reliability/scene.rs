@@ -80,6 +80,22 @@ impl Tally {
         }
     }
 
+    /// Complains where the database of `site` is not whole.
+    pub async fn inspect(&mut self, site: &Site) {
+        let found = site.integrity().await;
+        if found != "ok" {
+            self.complain(found);
+        }
+    }
+
+    /// Counts a trial with one fault, after which `server` must know all that is in `ledger`.
+    pub async fn recovered(&mut self, server: &Server, ledger: &Ledger, keys: &mut usize) {
+        self.started(server);
+        self.examine(ledger, &Caller::new(&[&server.url]), keys).await;
+        self.trials += 1;
+        self.faults += 1;
+    }
+
     /// Asks for everything in `ledger` and counts the jobs, of which there must be one for each of `keys` and those new.
     pub async fn examine(&mut self, ledger: &Ledger, caller: &Caller, keys: &mut usize) {
         self.audit += ledger.audit(caller).await;

@@ -45,14 +45,9 @@ async fn broken(trials: usize, how: &str, as_it_must: fn(&std::process::ExitStat
         // The failure itself was told to whoever waited for it.
         ledger.complaints.retain(|complaint| !complaint.contains("/problems/internal"));
         server = site.start().await?;
-        tally.started(&server);
-        tally.examine(&ledger, &Caller::new(&[&server.url]), &mut keys).await;
-        (tally.trials, tally.faults) = (trial + 1, tally.faults + 1);
+        tally.recovered(&server, &ledger, &mut keys).await;
     }
-    let found = site.integrity().await;
-    if found != "ok" {
-        tally.complain(found);
-    }
+    tally.inspect(&site).await;
     tally.listen(&site);
     Ok(Some(tally))
 }
