@@ -224,6 +224,19 @@ fn a_training_asked_to_stop_solves_nothing() {
     assert!(matches!(training.solve_step(9, None, &watch), Err(TrainError::Stopped)));
 }
 
+#[test]
+fn a_step_kept_by_a_release_with_other_inputs_is_not_gone_on_from() {
+    let specification = specification(json!({ "problem": { "horizon": 2, "history": twenty_returns() },
+        "design": { "count": 12, "initial_laws": "resampled" } }));
+    let training = Training::new(&specification).unwrap();
+    let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+    let mut kept = training.solve_step(1, None, &watch).unwrap();
+    assert!(training.accepts(&kept));
+    let features = &mut kept.diagnostics.value.as_mut().unwrap().features;
+    *features.last_mut().unwrap() = "robust_excess".to_owned();
+    assert!(!training.accepts(&kept));
+}
+
 /// `docs/policy-format.md` in plain code.
 fn prediction(step: &Value, process: &str, features: &[f64]) -> f64 {
     let numbers = |value: &Value| -> Vec<f64> { serde_json::from_value(value.clone()).unwrap() };
@@ -275,7 +288,8 @@ fn anybody_can_evaluate_an_exported_policy() {
             deviation.ln(),
             central(3) / deviation.powi(3),
             (central(4) / deviation.powi(4)).ln(),
-            excess,
+            // The risk aversion 0.01 at wealth 100.
+            (excess / central(2)).asinh(),
         ];
         let stored = &document["steps"][step]["solution"];
         let advice = solved.advise(step, &state, AdviceMode::Surrogate);

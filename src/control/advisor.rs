@@ -117,7 +117,7 @@ fn stored_process(stored: &StepSurrogates) -> Option<GaussianProcess> {
 
 impl Advisor {
     pub fn new(policy: Policy) -> Self {
-        let context = ProblemContext::new(policy.specification());
+        let context = policy.context();
         let prepare = |step: &StepSolution| match &step.solution {
             Solution::Single(single) => PreparedStep::Single(*single),
             Solution::Surrogates(stored) => {

@@ -87,6 +87,15 @@ impl Training {
         self.context.specification.problem.horizon
     }
 
+    /// Whether a solution kept from an earlier run can be gone on from: its inputs are those of this release.
+    pub fn accepts(&self, kept: &StepSolution) -> bool {
+        let Solution::Surrogates(stored) = &kept.solution else { return true };
+        let names = self.context.selection.names();
+        let names: Option<Vec<&String>> = stored.scaling.active.iter().map(|&feature| names.get(feature)).collect();
+        let found = kept.diagnostics.value.as_ref().map(|value| value.features.iter().collect());
+        names.is_some() && names == found
+    }
+
     /// Solves one step given the step after it (`None` at `horizon - 1`), on the current rayon pool.
     /// The result depends on nothing but the specification and `after`.
     ///
@@ -119,7 +128,8 @@ impl Training {
         };
         if count > as_drawn.len() {
             let inputs: Vec<Vec<f64>> = candidates.iter().map(|features| scaling.apply(features)).collect();
-            let chosen = farthest_points(&inputs, &start.value.lengthscales, as_drawn.len(), count);
+            let weights = fitting.weights(&solved, &start.value, &inputs)?;
+            let chosen = farthest_points(&inputs, &start.value.lengthscales, &weights, as_drawn.len(), count);
             solved = crew.solve(&chosen[as_drawn.len()..], &candidates, solved)?;
         }
         let guards = crew.features(self.design.guards(step))?;

@@ -266,24 +266,28 @@ pub fn bracket(lowest: f64, highest: f64, value: impl Fn(f64) -> f64) -> (f64, f
     ((best.0 - part).max(lowest), (best.0 + part).min(highest))
 }
 
-/// An action at a bound, moved past it by the Newton step that the one-sided derivatives there suggest: the optimum
-/// of the parabola that touches the robust gain at the bound, so that the target crosses the bound without a kink.
+/// An action at a bound, or so near that the value of the step after may have put it there by its own error, moved past
+/// the bound by the Newton step that the one-sided derivatives there suggest: the optimum of the parabola that touches the
+/// robust gain at the bound, so that the target crosses the bound without a kink. `gain` is the robust gain of `action`,
 /// `reference` is the curvature expected: relative risk aversion times variance.
 pub fn extended_action(action: f64, highest: f64, gain: f64, reference: f64, gain_at: impl Fn(f64) -> f64) -> f64 {
-    let inward = if action <= 0.0 {
-        1.0
-    } else if action >= highest {
-        -1.0
+    let (bound, inward) = if action < DERIVATIVE_STEP {
+        (0.0, 1.0)
+    } else if action > highest - DERIVATIVE_STEP {
+        (highest, -1.0)
     } else {
         return action;
     };
-    let [near, far] = [1.0, 2.0].map(|steps| gain_at(action + inward * steps * DERIVATIVE_STEP));
+    let gain = if action == bound { gain } else { gain_at(bound) };
+    let [near, far] = [1.0, 2.0].map(|steps| gain_at(bound + inward * steps * DERIVATIVE_STEP));
     let slope = (4.0 * near - far - 3.0 * gain) / (2.0 * DERIVATIVE_STEP);
+    if slope > 0.0 {
+        return action;
+    }
     let curvature = (2.0 * near - far - gain) / (DERIVATIVE_STEP * DERIVATIVE_STEP);
     let curvature = curvature.clamp(reference / CURVATURE_RANGE, reference * CURVATURE_RANGE);
-    // At a bound the robust gain does not rise inwards: what rounding says otherwise is dropped. Far beyond the bound
-    // the target levels off, smoothly, for what is never wanted needs no resolution.
-    action + inward * LARGEST_EXTENSION * (slope / curvature / LARGEST_EXTENSION).min(0.0).tanh()
+    // Far beyond the bound the target levels off, smoothly, for what is never wanted needs no resolution.
+    bound + inward * LARGEST_EXTENSION * (slope / curvature / LARGEST_EXTENSION).tanh()
 }
 
 /// `points` with the chosen intervals cut into equal parts.

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use super::bellman::{RobustSolution, RobustStep};
 use super::design::centre;
 use super::error::TrainError;
-use super::features::{FeatureSelection, LawSummary};
+use super::features::{BallFeature, FeatureSelection, LawSummary};
 use super::gain_field::FieldContext;
 use super::parametric::ParametricStep;
 use super::specification::Specification;
@@ -30,8 +30,13 @@ pub struct ProblemContext {
 
 impl ProblemContext {
     pub fn new(specification: &Specification) -> Self {
+        ProblemContext::with(specification, BallFeature::default())
+    }
+
+    /// With the features of a policy whose ball is described by `ball_feature`.
+    pub fn with(specification: &Specification, ball_feature: BallFeature) -> Self {
         let sets = UncertaintySets::new(specification);
-        let selection = FeatureSelection::new(specification, sets.varies());
+        let selection = FeatureSelection::new(specification, sets.varies(), ball_feature);
         ProblemContext { specification: specification.clone(), sets, selection }
     }
 

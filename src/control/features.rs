@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::specification::{FeatureMap, Specification};
 use super::uncertainty::Radii;
-use super::utility::depends_on_wealth;
+use super::utility::{RelativeUtility, depends_on_wealth};
 use crate::numerics::moments::CentralMoments;
 
 /// Standard deviations below this count as this: the log stays finite.
@@ -24,7 +24,21 @@ pub struct FeatureSelection {
     wealth: bool,
     moments: usize,
     radius: bool,
-    robust_excess: bool,
+    ball: Option<BallFeature>,
+    /// Relative risk aversion at the initial wealth.
+    risk_aversion: f64,
+}
+
+/// What the last feature says of the worst law in the ball.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BallFeature {
+    /// [`LawSummary::robust_excess`] itself: policies of the first format.
+    RobustExcess,
+    /// `asinh(robust_excess / (rho s^2))`, rho the relative risk aversion at the initial wealth, s^2 the variance: to
+    /// second order the allocation of an investor who thinks of one period alone (Merton's ratio). What is held, and what
+    /// it earns, turn where it passes 0 and 1; its ends, which count for less, are drawn together.
+    #[default]
+    RobustMertonRatio,
 }
 
 /// What of an empirical law and its ball the features are made of.
@@ -39,17 +53,19 @@ pub struct LawSummary {
 
 impl FeatureSelection {
     /// `radius_varies`: whether laws of one sample size have different radii.
-    pub fn new(specification: &Specification, radius_varies: bool) -> Self {
-        let learns = specification.problem.framework.learns();
-        let parametric = specification.problem.framework.is_parametric();
+    pub fn new(specification: &Specification, radius_varies: bool, ball: BallFeature) -> Self {
+        let problem = &specification.problem;
+        let learns = problem.framework.learns();
+        let parametric = problem.framework.is_parametric();
         let most = if parametric { NORMAL_MOMENTS } else { usize::MAX };
         let map = specification.surrogate.features;
         FeatureSelection {
             map,
-            wealth: depends_on_wealth(specification.problem.utility),
+            wealth: depends_on_wealth(problem.utility),
             moments: if learns { specification.surrogate.moment_count.min(most) } else { 0 },
             radius: learns && radius_varies && map == FeatureMap::Standardized,
-            robust_excess: learns && !parametric && map == FeatureMap::Standardized,
+            ball: (learns && !parametric && map == FeatureMap::Standardized).then_some(ball),
+            risk_aversion: RelativeUtility::new(problem.utility, problem.initial_wealth).relative_risk_aversion(),
         }
     }
 
@@ -60,7 +76,7 @@ impl FeatureSelection {
 
     /// True where the features depend on the ball and not on its centre alone.
     pub fn has_ball(&self) -> bool {
-        self.robust_excess
+        self.ball.is_some()
     }
 
     /// Names, in order.
@@ -84,8 +100,10 @@ impl FeatureSelection {
             names.push("log_radius".to_owned());
             names.push("radius_trend".to_owned());
         }
-        if self.robust_excess {
-            names.push("robust_excess".to_owned());
+        match self.ball {
+            Some(BallFeature::RobustExcess) => names.push("robust_excess".to_owned()),
+            Some(BallFeature::RobustMertonRatio) => names.push("robust_merton_ratio".to_owned()),
+            None => {}
         }
         names
     }
@@ -113,8 +131,13 @@ impl FeatureSelection {
             features.push(log(radii.radius));
             features.push(log(radii.radius_ahead) - log(radii.radius));
         }
-        if self.robust_excess {
-            features.push(*robust_excess);
+        match self.ball {
+            Some(BallFeature::RobustExcess) => features.push(*robust_excess),
+            Some(BallFeature::RobustMertonRatio) => {
+                let variance = moments.variance().max(SMALLEST_DEVIATION * SMALLEST_DEVIATION);
+                features.push((robust_excess / (self.risk_aversion * variance)).asinh());
+            }
+            None => {}
         }
         features
     }

@@ -17,6 +17,10 @@ use crate::numerics::summary::quantile;
 /// Share of the states of the design's own law that lie within the guard.
 const GUARDED_SHARE: f64 = 0.99;
 
+/// Weight that a floor gain of the design's root mean square adds to a candidate. At 1,000 points of the paper's problem
+/// 3 and 10 leave half the error that 0 does, without a clear winner.
+const WEIGHT_OF_GAIN: f64 = 3.0;
+
 /// One solved design point.
 pub struct Solved {
     pub wealth: f64,
@@ -89,6 +93,26 @@ impl Fitting<'_> {
             value: self.search("value", &inputs, &value.scaled, None)?.hyperparameters,
             policy: self.search("policy", &inputs, &policy.scaled, None)?.hyperparameters,
         })
+    }
+
+    /// How much farther than they are the candidates at `inputs` count as being from the design: a state without floor
+    /// gain once, one whose gain is the root mean square of the design's 4 times. The gain is predicted from the design
+    /// points solved so far.
+    ///
+    /// # Errors
+    /// A covariance matrix that stays singular.
+    pub fn weights(
+        &self,
+        solved: &[Solved],
+        hyper: &Hyperparameters,
+        inputs: &[Vec<f64>],
+    ) -> Result<Vec<f64>, TrainError> {
+        let gains: Vec<f64> = solved.iter().map(|point| point.solution.floor_gain).collect();
+        let gains = Targets::new(&gains, Centre::Zero);
+        let process = GaussianProcess::condition(&self.inputs(solved), &gains.scaled, hyper)
+            .map_err(|error| self.singular("value", error.jitter))?;
+        let weight = |input: &Vec<f64>| 1.0 + WEIGHT_OF_GAIN * process.mean(input).abs().sqrt();
+        Ok(inputs.par_iter().map(weight).collect())
     }
 
     /// Both surrogates, by maximum likelihood. `guards` are features of independent states of the design's own law: the

@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 use super::backward::StepSolution;
 use super::context::ProblemContext;
 use super::error::{FieldError, PolicyError};
+use super::features::BallFeature;
 use super::limits;
 use super::specification::Specification;
 use super::surrogate::{SingleSolution, Solution, StepSurrogates};
@@ -60,13 +61,14 @@ pub struct SurrogateDiagnostics {
     pub search: String,
 }
 
-/// Name and version of the portable form.
-const FORMAT: &str = "ballast-policy-1";
+/// Name and version of the portable form, and the ball's feature in it: those of this release first.
+const FORMATS: [(&str, BallFeature); 2] =
+    [("ballast-policy-2", BallFeature::RobustMertonRatio), ("ballast-policy-1", BallFeature::RobustExcess)];
 
 impl Policy {
     /// The policy of a completed specification from the solutions of all its steps, ascending.
     pub fn new(specification: Specification, steps: Vec<StepSolution>) -> Self {
-        Policy { format: FORMAT.to_owned(), specification, steps }
+        Policy { format: FORMATS[0].0.to_owned(), specification, steps }
     }
 
     /// The completed specification it was trained from.
@@ -82,6 +84,12 @@ impl Policy {
     /// Diagnostics of every step, ascending.
     pub fn diagnostics(&self) -> impl Iterator<Item = &StepDiagnostics> {
         self.steps.iter().map(|step| &step.diagnostics)
+    }
+
+    /// The problem it solves, with the features its surrogates were fitted on.
+    pub fn context(&self) -> ProblemContext {
+        let known = FORMATS.iter().find(|(format, _)| self.format == *format);
+        ProblemContext::with(&self.specification, known.map_or_else(BallFeature::default, |(_, ball)| *ball))
     }
 
     /// The portable form: JSON whose numbers parse back to the same bits.
@@ -109,8 +117,9 @@ impl Policy {
     }
 
     fn check(&self) -> Result<(), FieldError> {
-        if self.format != FORMAT {
-            return Err(FieldError::new("format", &self.format, format!("must be {FORMAT}")));
+        if !FORMATS.iter().any(|(format, _)| self.format == *format) {
+            let [(newest, _), (older, _)] = FORMATS;
+            return Err(FieldError::new("format", &self.format, format!("must be {newest} or {older}")));
         }
         if self.specification.clone().completed()? != self.specification {
             return Err(FieldError::new("specification", "an object with holes", "must be completed"));
@@ -119,7 +128,7 @@ impl Policy {
         if self.steps.len() != horizon {
             return Err(FieldError::new("steps", self.steps.len(), format!("must hold horizon = {horizon} steps")));
         }
-        let context = ProblemContext::new(&self.specification);
+        let context = self.context();
         let feature_count = context.selection.names().len();
         for (index, step) in self.steps.iter().enumerate() {
             if step.step != index {

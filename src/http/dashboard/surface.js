@@ -27,8 +27,8 @@ function raw(atoms, order) {
   return atoms.reduce((sum, atom) => sum + atom ** order, 0) / atoms.length;
 }
 
-/** One named feature of a state `{wealth, atoms, radius, rate}`. */
-export function feature(name, { wealth, atoms, radius, rate }) {
+/** One named feature of a state `{wealth, atoms, radius, rate, riskAversion}`, the last relative. */
+export function feature(name, { wealth, atoms, radius, rate, riskAversion }) {
   const standardised = (order) => central(atoms, order) / central(atoms, 2) ** (order / 2);
   switch (name) {
     case "wealth":
@@ -47,6 +47,8 @@ export function feature(name, { wealth, atoms, radius, rate }) {
       return Math.log(Math.max(radius, 1e-12));
     case "robust_excess":
       return robustExcess(atoms, radius, rate);
+    case "robust_merton_ratio":
+      return Math.asinh(robustExcess(atoms, radius, rate) / (riskAversion * Math.max(central(atoms, 2), 1e-16)));
     case "radius_trend":
       // Takes the simulated bridges, which a policy does not carry: it stays at the centre of the design.
       return 0;
@@ -93,6 +95,7 @@ export function stepSurface(policy, step) {
     wealth,
     radius,
     rate: problem.rate_per_step,
+    riskAversion: relativeRiskAversion(problem),
     atoms: shape.map((z) => mean + deviation * z),
   });
   const base = features(names, state(middle));
@@ -105,6 +108,12 @@ export function stepSurface(policy, step) {
     );
   };
   return { at, middle, ranges: ranges(level, middle), dots: (axis) => designValues(axis, solution, names) };
+}
+
+/** At the initial wealth. */
+function relativeRiskAversion({ utility, initial_wealth }) {
+  if (utility.kind === "log") return 1;
+  return utility.kind === "exponential" ? utility.risk_aversion * initial_wealth : utility.risk_aversion;
 }
 
 const features = (names, state) => names.map((name) => feature(name, state));
