@@ -5,7 +5,7 @@
     benches/race.py --opponents FOLDER [--runs 3] [--horizon 3]
 
 FOLDER holds `python_reference.py` (a training: numba for the robust step, scikit-learn for the surrogates) and
-`gp_fit.py` (scikit-learn's fit and prediction on a CSV); this Python needs numpy, scipy, scikit-learn and numba. Both
+`gp_fit.py` (scikit-learn's fit and prediction on a CSV); the inner solve races HiGHS, and must agree with it; this Python needs numpy, scipy, scikit-learn and numba. Both
 sides train 1000 design points with a history each (20 draws of the paper's mixture) over the same number of steps.
 """
 import argparse
@@ -16,6 +16,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import time
 
 
 def output(*command):
@@ -24,6 +25,31 @@ def output(*command):
 
 def last_json(text):
     return json.loads(text.strip().splitlines()[-1])
+
+
+def inner_by_highs():
+    """Seconds and values, by radius, of the inner problem of `ballast bench kernels` as a linear program in HiGHS:
+    max over gamma >= 0 and phi of mean(phi) - gamma radius, phi_j <= payoff_k + gamma |z_k - z_j| for every k."""
+    import numpy as np
+    from scipy.optimize import linprog
+    from scipy.sparse import csr_matrix
+
+    support, atoms = np.linspace(-1.0, 0.6, 120), 30
+    centre = support[45:45 + atoms]
+    payoff = -np.exp(-2.0 * support)
+    atom, place = (index.ravel() for index in np.meshgrid(range(atoms), range(support.size), indexing="ij"))
+    rows = np.arange(atom.size)
+    distance = np.abs(support[place] - centre[atom])
+    matrix = csr_matrix((np.r_[np.ones(atom.size), -distance], (np.r_[rows, rows], np.r_[atom, np.full(atom.size, atoms)])))
+    seconds, values = [], {}
+    for radius in (0.01, 0.05, 0.1):
+        cost = np.r_[np.full(atoms, -1.0 / atoms), radius]
+        bounds = [(None, None)] * atoms + [(0.0, None)]
+        started = time.perf_counter()
+        solved = linprog(cost, A_ub=matrix, b_ub=payoff[place], bounds=bounds, method="highs")
+        seconds.append(time.perf_counter() - started)
+        values[radius] = -solved.fun
+    return statistics.median(seconds), values
 
 
 def main():
@@ -54,12 +80,17 @@ def main():
             fit = re.search(r"fit: ([\d.]+) s, log-likelihood per point ([-\d.]+)", ours)
             note("fit, 1000 rows, 6 inputs", float(fit[1]), theirs["fit_seconds"])
             note("mean, 1000 queries", float(re.search(r"queries: ([\d.]+) s", ours)[1]), theirs["predict_seconds"])
+            seconds, values = inner_by_highs()
+            note("inner solve", 1e-6 * float(re.search(r"support points: ([\d.]+) us", ours)[1]), seconds)
+            for radius, value in values.items():
+                found = float(re.search(rf"at radius {radius}: ([-\d.]+)", ours)[1])
+                assert abs(found - value) < 1e-7, f"HiGHS finds {value} at radius {radius}, Ballast {found}"
             note("log-likelihood per point", float(fit[2]), theirs["log_likelihood_per_point"], unit="")
     print(f"{'':<28} {'Ballast':>10} {'Python':>10} {'ratio':>8}   medians of {options.runs}")
     for name, (unit, ours, theirs) in rows.items():
         ours, theirs = statistics.median(ours), statistics.median(theirs)
         ratio = f"{theirs / ours:.1f}" if unit else ""
-        print(f"{name:<28} {ours:>10.4f} {theirs:>10.4f} {ratio:>8}")
+        print(f"{name:<28} {ours:>10.4g} {theirs:>10.4g} {ratio:>8}")
 
 
 if __name__ == "__main__":

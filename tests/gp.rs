@@ -1,9 +1,10 @@
 //! Gaussian process regression against scikit-learn (tests/data/gp.json) and against brute force.
 
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use ballast::numerics::gp::{GaussianProcess, GpMean, Hyperparameters};
-use ballast::numerics::gp_fit::{Bounds, fit, log_likelihood_and_gradient};
+use ballast::numerics::gp_fit::{self, Bounds, Fit, FitError, log_likelihood_and_gradient};
 use ballast::numerics::minimise::SearchOutcome;
 use nalgebra::DMatrix;
 use serde::Deserialize;
@@ -167,6 +168,23 @@ fn a_fit_climbs_to_a_point_where_the_projected_gradient_vanishes() {
             assert!(projected.abs() < 1e-3, "projected slope {projected} at {:?}", found.hyperparameters);
         }
     }
+}
+
+/// A fit that nobody stops.
+fn fit(
+    inputs: &DMatrix<f64>,
+    targets: &[f64],
+    bounds: &Bounds,
+    start: Option<&Hyperparameters>,
+) -> Result<Fit, FitError> {
+    gp_fit::fit(inputs, targets, bounds, start, 10, &AtomicBool::new(false))
+}
+
+#[test]
+fn a_fit_asked_to_stop_says_so() {
+    let (inputs, targets) = smooth_sample(50, 2);
+    let stopped = gp_fit::fit(&inputs, &targets, &wide_bounds(), None, 10, &AtomicBool::new(true));
+    assert_eq!(stopped, Err(FitError::Stopped));
 }
 
 #[test]

@@ -6,6 +6,7 @@ use clap::Subcommand;
 
 mod accuracy;
 mod action;
+mod horizons;
 mod kernels;
 pub mod paper;
 mod summary;
@@ -19,6 +20,8 @@ pub enum Bench {
     Kernels(kernels::KernelsBench),
     /// Compare the surrogates with direct solves at fresh states, in basis points of log certainty equivalent.
     Accuracy(accuracy::AccuracyBench),
+    /// Compare policies for one history with brute force, in basis points and in allocation.
+    Horizons(horizons::HorizonsBench),
     /// Time GET /action on loopback beside GET /livez.
     Action(action::ActionBench),
 }
@@ -27,6 +30,7 @@ pub async fn run(bench: Bench) -> Result<(), Box<dyn Error>> {
     match bench {
         Bench::Training(arguments) => tokio::task::block_in_place(|| training::run(&arguments)),
         Bench::Accuracy(arguments) => tokio::task::block_in_place(|| accuracy::run(&arguments)),
+        Bench::Horizons(arguments) => tokio::task::block_in_place(|| horizons::run(&arguments)),
         Bench::Kernels(arguments) => tokio::task::block_in_place(|| kernels::run(&arguments)),
         Bench::Action(arguments) => action::run(&arguments).await,
     }

@@ -25,10 +25,10 @@ const CURVATURE_RANGE: f64 = 4.0;
 /// How far past a bound the policy target may be extended.
 const LARGEST_EXTENSION: f64 = 2.0;
 /// Exact returns of the field across the atoms, and the ratio by which spacing grows outside them.
-const CORE_RETURNS: usize = 28;
+const CORE_RETURNS: usize = 24;
 const TAIL_RATIO: f64 = 1.3;
 /// First reach of the window below and above the atoms; doubled until certified, at most this often.
-const REACH: (f64, f64) = (1.5, 0.75);
+const REACH: (f64, f64) = (0.6, 0.3);
 const WINDOW_GROWTHS: usize = 4;
 /// Log-returns closer than this are one.
 const COINCIDENT: f64 = 1e-12;

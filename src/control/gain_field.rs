@@ -11,7 +11,7 @@ use super::surrogate::{NextValue, ValueSurrogate, wealth_is_active};
 use crate::numerics::chebyshev::{Chebyshev, local_cubic};
 
 /// Chebyshev nodes in the action.
-const ACTION_NODES: usize = 6;
+const ACTION_NODES: usize = 4;
 
 /// What of the problem the field needs.
 #[derive(Clone, Copy)]

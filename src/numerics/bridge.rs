@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::bridge_paths::{AbsoluteBridges, Times};
 use super::dispatch::dispatched;
 use super::empirical::EmpiricalDistribution;
-use super::harrell_davis::HarrellDavis;
+use super::harrell_davis::{HarrellDavis, LastEstimate};
 
 /// A statistic of a law of n values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,7 +59,7 @@ impl AbsoluteBridges {
 
     /// The quantile of a statistic of `law`.
     pub fn quantile(&self, law: &EmpiricalDistribution, which: Statistic, estimator: &UpperQuantile) -> f64 {
-        estimator.at.estimate(&mut self.statistic(law.atoms(), which))
+        estimator.at.estimate(&self.statistic(law.atoms(), which))
     }
 
     /// That of the law itself, with the standard error of its simulation: half the distance of the quantiles one standard
@@ -67,8 +67,7 @@ impl AbsoluteBridges {
     pub fn quantile_with_error(&self, law: &EmpiricalDistribution, estimator: &UpperQuantile) -> Quantile {
         let [below, above] = &estimator.beside;
         let all = [&estimator.at, below, above];
-        let mut statistic = self.statistic(law.atoms(), Statistic::Now);
-        let [value, below, above] = HarrellDavis::estimates(all, &mut statistic);
+        let [value, below, above] = HarrellDavis::estimates(all, &self.statistic(law.atoms(), Statistic::Now));
         Quantile { value, standard_error: 0.5 * (above - below) }
     }
 
@@ -90,6 +89,7 @@ impl AbsoluteBridges {
         weights.pour(&mut carried);
         let mut below = 0;
         let mut statistic = vec![0.0; self.paths];
+        let mut last = LastEstimate::default();
         let mut quantiles = Vec::with_capacity(values.len());
         for &value in values {
             while below < count && atoms[below] <= value {
@@ -111,7 +111,7 @@ impl AbsoluteBridges {
                 weights.place(below + 1, size, atoms[below] - value, which);
             }
             weights.pour(&mut statistic);
-            quantiles.push(estimator.at.estimate(&mut statistic));
+            quantiles.push(estimator.at.estimate_next(&statistic, &mut last));
         }
         quantiles
     }

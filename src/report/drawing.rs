@@ -32,11 +32,19 @@ pub trait Draw {
     fn draw(&self) -> Result<Drawing, ChartError>;
 }
 
+/// A name of the legend, in the order of the series.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct LegendEntry {
+    pub name: String,
+    /// Drawn as points alone.
+    pub dotted: bool,
+}
+
 /// A chart, drawn. The legend is not part of the SVG, so that it wraps with the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawing {
     pub(super) title: String,
-    pub(super) legend: Vec<String>,
+    pub(super) legend: Vec<LegendEntry>,
     pub(super) svg: Element,
 }
 

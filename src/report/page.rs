@@ -1,6 +1,6 @@
 //! A report as one HTML file.
 
-use super::drawing::{ChartError, Draw, Drawing};
+use super::drawing::{ChartError, Draw, Drawing, LegendEntry};
 use super::markup::Element;
 use super::table::Table;
 
@@ -94,8 +94,12 @@ impl Block {
 }
 
 fn figure(drawing: &Drawing, caption: &str) -> Element {
-    let entry = |(index, name): (usize, &String)| {
-        let sample = Element::new("path").with("d", "M0 5H32").class(format_args!("s{index} line"));
+    let entry = |(index, LegendEntry { name, dotted }): (usize, &LegendEntry)| {
+        let sample = if *dotted {
+            Element::new("circle").with("cx", 16).with("cy", 5).with("r", 4).class(format_args!("s{index} points"))
+        } else {
+            Element::new("path").with("d", "M0 5H32").class(format_args!("s{index} line"))
+        };
         let key = Element::new("svg").class("key").with("viewBox", "0 0 32 10").with("aria-hidden", true).child(sample);
         Element::new("li").child(key).text(name)
     };

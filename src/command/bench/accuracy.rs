@@ -47,7 +47,7 @@ pub struct AccuracyBench {
 
 /// Seed of the fresh states: another than the design's.
 const FRESH_SEED: u64 = 1_000_003;
-const BASIS_POINTS: f64 = 1e4;
+pub(super) const BASIS_POINTS: f64 = 1e4;
 
 /// A state with its direct solution.
 struct Truth {
@@ -111,7 +111,7 @@ fn last_truth(context: &ProblemContext, count: usize) -> Result<Vec<Truth>, Trai
 }
 
 /// The value of the last step, solved anew at every state asked.
-fn exact_last_value(specification: &Specification) -> NextValue {
+pub(super) fn exact_last_value(specification: &Specification) -> NextValue {
     let context = ProblemContext::new(specification);
     let last = specification.problem.horizon - 1;
     let gain = move |state: &State| {

@@ -23,6 +23,9 @@ pub struct TrainingBench {
     /// Returns of the history
     #[arg(long, default_value_t = 20)]
     sample_size: usize,
+    /// Moments of the law among the features
+    #[arg(long, default_value_t = 4)]
+    moments: usize,
     /// Give every design point a history of its own
     #[arg(long)]
     resampled: bool,
@@ -42,7 +45,8 @@ struct Spent {
 
 pub fn run(bench: &TrainingBench) -> Result<(), Box<dyn Error>> {
     let initial_laws = if bench.resampled { InitialLaws::Resampled } else { InitialLaws::Given };
-    let specification = paper::specification(bench.sample_size, bench.horizon, bench.count, initial_laws);
+    let mut specification = paper::specification(bench.sample_size, bench.horizon, bench.count, initial_laws);
+    specification.surrogate.moment_count = bench.moments;
     println!("threads  run  total s  solving s  fitting s  peak MB");
     for &threads in &bench.threads {
         let pool = TrainingPool::new(threads)?;
