@@ -165,7 +165,9 @@ test("the surface is what the service advises", async () => {
   const { wealth } = await call(ballast.url, `/sessions/${session}`);
   const document_ = await call(ballast.url, `/policies/${policy}/export`);
   const atoms = [...history.history, ...history.observations.map(({ log_return }) => log_return)];
-  const rate = document_.specification.problem.rate_per_step;
+  const { rate_per_step: rate, utility, initial_wealth } = document_.specification.problem;
+  assert.equal(utility.kind, "exponential");
+  const riskAversion = utility.risk_aversion * initial_wealth;
   const step = document_.steps[history.observations.length];
   const drawn = await page.evaluate(
     async ({ state, step }) => {
@@ -176,7 +178,7 @@ test("the surface is what the service advises", async () => {
         1,
       );
     },
-    { state: { wealth, atoms, rate, radius: action.radius }, step },
+    { state: { wealth, atoms, rate, riskAversion, radius: action.radius }, step },
   );
   assert.equal(action.source, "policy_surrogate", "the state must lie in the design for this comparison");
   assert.ok(Math.abs(drawn - action.allocation) < 1e-6, `${drawn} against ${action.allocation}`);
