@@ -2,8 +2,8 @@
 //!
 //! Every state is drawn anew from its streams when asked for, so a design of any size costs no memory. Where the law
 //! is part of the state, three times as many candidates as design points are simulated; a quarter of the design is taken as
-//! drawn and the rest from where the candidates lie farthest apart, so that its edges are inside. Where the floor gain
-//! promises to be large, candidates count as farther apart than they are: the errors of a surrogate grow with it.
+//! drawn and the rest from where the candidates lie farthest apart, so that its edges are inside. Where the points drawn
+//! say that a surrogate errs, candidates count as farther apart than they are.
 
 use std::ops::Range;
 

@@ -19,6 +19,7 @@ pub mod law_distance;
 pub mod matern;
 pub mod minimise;
 pub mod moments;
+pub mod quasi_newton;
 pub mod streams;
 pub mod student;
 pub mod summary;

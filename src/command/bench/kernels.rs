@@ -27,9 +27,6 @@ pub struct KernelsBench {
     /// Inputs of the Gaussian process
     #[arg(long, default_value_t = 6)]
     inputs: usize,
-    /// Iterations of the fit on all rows, after those on some
-    #[arg(long, default_value_t = 10)]
-    polishing: usize,
     #[arg(long, default_value_t = 3)]
     runs: usize,
     /// Write the rows there (inputs, target last, header line), for another program to fit
@@ -53,7 +50,7 @@ pub fn run(bench: &KernelsBench) -> Result<(), Box<dyn Error>> {
     let (inputs, targets) = standardized(&inputs, &targets);
     // Those of the scikit-learn program it is raced against.
     let bounds = Bounds { lengthscale: [0.1, 1e3], signal_variance: [1e-3, 1e3], noise_variance: [1e-8, 1.0] };
-    let fitted = || fit(&inputs, &targets, &bounds, None, bench.polishing, &AtomicBool::new(false));
+    let fitted = || fit(&inputs, &targets, &bounds, None, &AtomicBool::new(false));
     let found = fitted()?;
     let fit_seconds = timed(bench.runs, || drop(black_box(fitted())));
     println!(
