@@ -89,8 +89,8 @@ def main():
     print(f"{'':<28} {'Ballast':>10} {'Python':>10} {'ratio':>8}   medians of {options.runs}")
     for name, (unit, ours, theirs) in rows.items():
         ours, theirs = statistics.median(ours), statistics.median(theirs)
-        ratio = f"{theirs / ours:.1f}" if unit else ""
-        print(f"{name:<28} {ours:>10.4g} {theirs:>10.4g} {ratio:>8}")
+        ratio, digits = (f"{theirs / ours:.1f}", 4) if unit else ("", 7)
+        print(f"{name:<28} {ours:>10.{digits}g} {theirs:>10.{digits}g} {ratio:>8}")
 
 
 if __name__ == "__main__":

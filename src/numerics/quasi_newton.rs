@@ -64,41 +64,36 @@ pub fn minimise_from(
     let (lower, upper) = (DVector::from_column_slice(lower), DVector::from_column_slice(upper));
     let into_box = |point: DVector<f64>| point.sup(&lower).inf(&upper);
     let mut here = evaluate(into_box(DVector::from_column_slice(start)));
-    let mut outcome = SearchOutcome::IterationLimit;
-    for _ in 0..iteration_limit {
-        if !here.value.is_finite() {
-            outcome = SearchOutcome::Stalled;
-            break;
+    let outcome = 'search: {
+        for _ in 0..iteration_limit {
+            if !here.value.is_finite() {
+                break 'search SearchOutcome::Stalled;
+            }
+            let step = newton_step(&curvature, &here, &lower, &upper);
+            let mut share = 1.0;
+            let mut next = None;
+            for _ in 0..SHORTENINGS {
+                let trial = into_box(&here.point + share * &step);
+                // Of a whole step, twice the fall that the model promises.
+                let slope = here.gradient.dot(&(&trial - &here.point));
+                if -slope <= 2.0 * tolerance * share {
+                    break 'search SearchOutcome::Converged;
+                }
+                let there = evaluate(trial);
+                if there.value <= here.value + SUFFICIENT_SHARE * slope {
+                    next = Some(there);
+                    break;
+                }
+                // The vertex of the parabola through both values and the slope.
+                let vertex = -0.5 * slope / (there.value - here.value - slope);
+                share *= if vertex.is_finite() { vertex.clamp(LEAST_SHORTENING, 0.5) } else { LEAST_SHORTENING };
+            }
+            let Some(there) = next else { break 'search SearchOutcome::Stalled };
+            correct(&mut curvature, &(&there.point - &here.point), &(&there.gradient - &here.gradient));
+            here = there;
         }
-        let step = newton_step(&curvature, &here, &lower, &upper);
-        let mut share = 1.0;
-        let mut next = None;
-        for _ in 0..SHORTENINGS {
-            let trial = into_box(&here.point + share * &step);
-            // Twice the fall that the model promises of a whole step.
-            let slope = here.gradient.dot(&(&trial - &here.point));
-            if -slope <= 2.0 * tolerance * share {
-                outcome = SearchOutcome::Converged;
-                break;
-            }
-            let there = evaluate(trial);
-            if there.value <= here.value + SUFFICIENT_SHARE * slope {
-                next = Some(there);
-                break;
-            }
-            // The vertex of the parabola through both values and the slope.
-            let vertex = -0.5 * slope / (there.value - here.value - slope);
-            share *= if vertex.is_finite() { vertex.clamp(LEAST_SHORTENING, 0.5) } else { LEAST_SHORTENING };
-        }
-        let Some(there) = next else {
-            if outcome == SearchOutcome::IterationLimit {
-                outcome = SearchOutcome::Stalled;
-            }
-            break;
-        };
-        correct(&mut curvature, &(&there.point - &here.point), &(&there.gradient - &here.gradient));
-        here = there;
-    }
+        SearchOutcome::IterationLimit
+    };
     Minimum { point: here.point.as_slice().to_vec(), value: here.value, evaluations, outcome }
 }
 
