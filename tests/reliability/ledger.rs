@@ -75,8 +75,7 @@ impl Session {
             return Audit { acknowledged, lost: acknowledged, doubled: 0 };
         };
         let kept = |(index, (_, answer)): &(usize, &(Value, Value))| {
-            rows.get(*index)
-                .is_some_and(|row| ["period", "log_return", "wealth"].iter().all(|at| row[at] == answer[at]))
+            rows.get(*index).is_some_and(|row| says_the_same(row, answer))
         };
         let mut lost = self.reports.iter().enumerate().filter(|report| !kept(report)).count();
         for (report, answer) in &self.reports {
@@ -97,6 +96,11 @@ impl Session {
         let (status, mut history) = caller.get(&format!("/sessions/{}/history", self.name)).await?;
         (status == 200).then(|| history["observations"].as_array_mut().map(std::mem::take))?
     }
+}
+
+/// Whether a stored row is the fact that an answer acknowledged.
+pub fn says_the_same(row: &Value, answer: &Value) -> bool {
+    ["period", "log_return", "wealth"].iter().all(|at| row[at] == answer[at])
 }
 
 impl Training {

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
 use crate::caller::Caller;
-use crate::ledger::{Audit, Session};
+use crate::ledger::{Audit, Session, says_the_same};
 use crate::scene::{HORIZON, Outcome, Tally, import};
 use crate::server::Site;
 
@@ -38,9 +38,10 @@ pub async fn storm(trials: usize) -> Outcome {
         }
         tally.trials += 1;
         tally.faults += pests.iter().map(|pest| pest.sent).sum::<usize>() - PERIODS;
-        tally.audit += one_answer_each(&pests);
+        let rows = rows(&caller, &session).await?;
+        tally.audit += one_answer_each(&pests, &rows);
         let patient = caller.open(&policy).await.ok_or("no session")?;
-        if let Err(difference) = equals_replay(&caller, &session, &patient).await {
+        if let Err(difference) = equals_replay(&caller, &session, rows, &patient).await {
             tally.complain(difference);
         }
     }
@@ -94,23 +95,28 @@ impl Pest {
     }
 }
 
-/// Each period has one content and one answer, whoever got it.
-fn one_answer_each(pests: &[Pest]) -> Audit {
+/// Each period has one content and one answer, whoever got it, and a row that says the same. A period of which every
+/// client that reported its content hung up was acknowledged to nobody.
+fn one_answer_each(pests: &[Pest], rows: &[Value]) -> Audit {
     let mut answers: BTreeMap<usize, &Value> = BTreeMap::new();
     let mut doubled = 0;
     for (period, answer) in pests.iter().flat_map(|pest| &pest.answers) {
         doubled += usize::from(*answers.entry(*period).or_insert(answer) != answer);
     }
-    Audit { acknowledged: answers.len(), lost: PERIODS - answers.len(), doubled }
+    let kept =
+        |(period, answer): &(&usize, &&Value)| rows.get(*period - 1).is_some_and(|row| says_the_same(row, answer));
+    let lost = answers.iter().filter(|fact| !kept(fact)).count();
+    Audit { acknowledged: answers.len(), lost, doubled }
+}
+
+/// What the server has of a session.
+async fn rows(caller: &Caller, name: &str) -> Result<Vec<Value>, String> {
+    let session = Session { name: name.to_owned(), reports: Vec::new(), pending: None };
+    session.rows(caller).await.ok_or(format!("no rows of {name}"))
 }
 
 /// The stored returns, reported once each and in order, give the same rows and the same action, bit for bit.
-async fn equals_replay(caller: &Caller, session: &str, patient: &str) -> Result<(), String> {
-    let rows = async |name: &str| {
-        let session = Session { name: name.to_owned(), reports: Vec::new(), pending: None };
-        session.rows(caller).await.ok_or(format!("no rows of {name}"))
-    };
-    let stormed = rows(session).await?;
+async fn equals_replay(caller: &Caller, session: &str, stormed: Vec<Value>, patient: &str) -> Result<(), String> {
     for row in &stormed {
         let report = json!({ "session": patient, "period": row["period"], "log_return": row["log_return"] });
         caller
@@ -123,7 +129,7 @@ async fn equals_replay(caller: &Caller, session: &str, patient: &str) -> Result<
         rows.iter_mut().for_each(|row| row["observed_ms"] = Value::Null);
         rows
     };
-    let (stormed, replayed) = (without_time(stormed), without_time(rows(patient).await?));
+    let (stormed, replayed) = (without_time(stormed), without_time(rows(caller, patient).await?));
     if stormed.len() != PERIODS || stormed != replayed {
         return Err(format!("{} rows differ from their replay", stormed.len()));
     }
