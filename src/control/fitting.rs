@@ -113,9 +113,9 @@ impl Fitting<'_> {
         hyper: &Hyperparameters,
         inputs: &[Vec<f64>],
     ) -> Result<Vec<f64>, TrainError> {
+        let drawn = self.inputs(solved);
         let condition = |targets: &[f64], hyper: &Hyperparameters| {
-            GaussianProcess::condition(&self.inputs(solved), targets, hyper)
-                .map_err(|error| self.singular("value", error.jitter))
+            GaussianProcess::condition(&drawn, targets, hyper).map_err(|error| self.singular("value", error.jitter))
         };
         let gains: Vec<f64> = solved.iter().map(|point| point.solution.floor_gain).collect();
         let gains = Targets::new(&gains, Centre::Zero).scaled;
