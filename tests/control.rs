@@ -74,18 +74,22 @@ fn the_last_step_on_real_returns_agrees_with_a_direct_solve() {
 
 #[test]
 fn the_bridge_quantile_agrees_with_a_million_paths() {
-    use ballast::numerics::{bridge::UpperQuantile, bridge_paths::AbsoluteBridges, empirical::EmpiricalDistribution};
+    use ballast::numerics::bridge_paths::{AbsoluteBridges, Kept};
+    use ballast::numerics::{bridge::UpperQuantile, empirical::EmpiricalDistribution};
     let oracle: Value = serde_json::from_str(include_str!("data/bridge.json")).unwrap();
     let cases = oracle["cases"].as_array().unwrap();
     assert_eq!(cases.len(), 3);
     for case in cases {
         let sample: Vec<f64> = serde_json::from_value(case["sample"].clone()).unwrap();
         let law = EmpiricalDistribution::new(&sample);
-        let bridges = AbsoluteBridges::simulate(sample.len(), 50_000, 11);
-        for row in case["quantiles"].as_array().unwrap() {
-            let found = bridges.quantile_with_error(&law, &UpperQuantile::new(50_000, row["alpha"].as_f64().unwrap()));
-            let allowed = 4.0 * (found.standard_error + row["standard_error"].as_f64().unwrap());
-            assert!((found.value - row["quantile"].as_f64().unwrap()).abs() < allowed, "{row} {found:?}");
+        for kept in [Kept::Directions, Kept::Paths] {
+            let bridges = AbsoluteBridges::simulate(sample.len(), 50_000, 11, kept);
+            for row in case["quantiles"].as_array().unwrap() {
+                let estimator = UpperQuantile::new(50_000, row["alpha"].as_f64().unwrap(), kept);
+                let found = bridges.quantile_with_error(&law, &estimator);
+                let allowed = 4.0 * (found.standard_error + row["standard_error"].as_f64().unwrap());
+                assert!((found.value - row["quantile"].as_f64().unwrap()).abs() < allowed, "{row} {found:?}");
+            }
         }
     }
 }
@@ -281,7 +285,9 @@ fn anybody_can_evaluate_an_exported_policy() {
             let spent = z.iter().map(|z| (z - cap).max(0.0)).sum::<f64>() / n;
             if spent > 0.004 { low = cap } else { high = cap }
         }
-        let excess = z.iter().map(|z| z.min(low).exp()).sum::<f64>() / n / 1.002 - 1.0;
+        let capped: Vec<f64> = z.iter().map(|z| z.min(low).exp() / 1.002).collect();
+        let excess = capped.iter().sum::<f64>() / n - 1.0;
+        let capped_variance = capped.iter().map(|e| (e - 1.0 - excess).powi(2)).sum::<f64>() / n;
         let features = [
             state.wealth.ln(),
             mean,
@@ -290,6 +296,7 @@ fn anybody_can_evaluate_an_exported_policy() {
             (central(4) / deviation.powi(4)).ln(),
             // The risk aversion 0.01 at wealth 100.
             (excess / central(2)).asinh(),
+            (excess / capped_variance).asinh(),
         ];
         let stored = &document["steps"][step]["solution"];
         let advice = solved.advise(step, &state, AdviceMode::Surrogate);

@@ -25,7 +25,7 @@ const CURVATURE_RANGE: f64 = 4.0;
 /// How far past a bound the policy target may be extended.
 const LARGEST_EXTENSION: f64 = 2.0;
 /// Exact returns of the field across the atoms, and the ratio by which spacing grows outside them.
-const CORE_RETURNS: usize = 24;
+const CORE_RETURNS: usize = 20;
 const TAIL_RATIO: f64 = 1.3;
 /// First reach of the window below and above the atoms; doubled until certified, at most this often.
 const REACH: (f64, f64) = (0.6, 0.3);

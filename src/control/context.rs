@@ -13,13 +13,21 @@ use super::state::{State, floor};
 use super::surrogate::NextValue;
 use super::uncertainty::{Measure, Radii, UncertaintySets};
 use super::utility::RelativeUtility;
+use crate::numerics::bridge_paths::Kept;
 use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
 use crate::numerics::empirical::EmpiricalDistribution;
-use crate::numerics::exponential_mean::ExponentialMean;
+use crate::numerics::exponential_mean::{ExponentialMean, WorstExponential};
 use crate::numerics::moments::CentralMoments;
 
 /// Where the features do not depend on the ball.
 const NO_BALL: Radii = Radii { radius: 0.0, radius_ahead: 0.0 };
+
+/// What releases do differently: a policy is advised from as it was trained.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Conventions {
+    pub ball: BallFeature,
+    pub bridges: Kept,
+}
 
 /// The problem with everything that does not change from step to step.
 pub struct ProblemContext {
@@ -30,13 +38,13 @@ pub struct ProblemContext {
 
 impl ProblemContext {
     pub fn new(specification: &Specification) -> Self {
-        ProblemContext::with(specification, BallFeature::default())
+        ProblemContext::with(specification, Conventions::default())
     }
 
-    /// With the features of a policy whose ball is described by `ball_feature`.
-    pub fn with(specification: &Specification, ball_feature: BallFeature) -> Self {
-        let sets = UncertaintySets::new(specification);
-        let selection = FeatureSelection::new(specification, sets.varies(), ball_feature);
+    /// By the conventions that a policy was trained by.
+    pub fn with(specification: &Specification, conventions: Conventions) -> Self {
+        let sets = UncertaintySets::with(specification, conventions.bridges);
+        let selection = FeatureSelection::new(specification, sets.varies(), conventions.ball);
         ProblemContext { specification: specification.clone(), sets, selection }
     }
 
@@ -85,32 +93,37 @@ impl ProblemContext {
 
     /// The same where the radius of the state is known already.
     pub fn features_within(&self, state: &State, radius: f64) -> Vec<f64> {
-        let (mut radii, mut robust_excess) = (NO_BALL, 0.0);
-        if self.selection.has_ball() {
-            radii = self.sets.radii(&state.law, radius);
-            let worst = ExponentialMean::of(&state.law, self.lowest_return()).worst(radii.radius);
-            robust_excess = excess(worst, self.specification.problem.rate_per_step);
+        let moments = CentralMoments::of(&state.law);
+        if !self.selection.has_ball() {
+            return self.selection.of(state.wealth, &without_ball(moments));
         }
-        self.selection.of(state.wealth, &LawSummary { moments: CentralMoments::of(&state.law), radii, robust_excess })
+        let radii = self.sets.radii(&state.law, radius);
+        let worst = ExponentialMean::of(&state.law, self.lowest_return()).worst(radii.radius);
+        self.selection.of(state.wealth, &self.summary(moments, radii, worst))
     }
 
     /// Features of the laws that follow from `law` when each of `returns` (ascending) is learned, for one wealth.
     pub fn features_with(&self, law: &EmpiricalDistribution, wealth: f64, returns: &[f64]) -> Vec<Vec<f64>> {
         let before = CentralMoments::of(law);
         if !self.specification.problem.framework.learns() {
-            let summary = LawSummary { moments: before, radii: NO_BALL, robust_excess: 0.0 };
-            return vec![self.selection.of(wealth, &summary); returns.len()];
+            return vec![self.selection.of(wealth, &without_ball(before)); returns.len()];
         }
-        let rate = self.specification.problem.rate_per_step;
-        let has_ball = self.selection.has_ball();
-        let radii = if has_ball { self.sets.radii_with(law, returns) } else { vec![NO_BALL; returns.len()] };
+        if !self.selection.has_ball() {
+            let features = |&log_return: &f64| self.selection.of(wealth, &without_ball(before.with(log_return)));
+            return returns.iter().map(features).collect();
+        }
         let mean = ExponentialMean::of(law, self.lowest_return());
         let features = |(&log_return, radii): (&f64, Radii)| {
-            let worst = || excess(mean.worst_with(log_return, radii.radius), rate);
-            let robust_excess = if has_ball { worst() } else { 0.0 };
-            self.selection.of(wealth, &LawSummary { moments: before.with(log_return), radii, robust_excess })
+            let worst = mean.worst_with(log_return, radii.radius);
+            self.selection.of(wealth, &self.summary(before.with(log_return), radii, worst))
         };
-        returns.iter().zip(radii).map(features).collect()
+        returns.iter().zip(self.sets.radii_with(law, returns)).map(features).collect()
+    }
+
+    fn summary(&self, moments: CentralMoments, radii: Radii, worst: WorstExponential) -> LawSummary {
+        let bank = 1.0 + self.specification.problem.rate_per_step;
+        let WorstExponential { mean, variance } = worst;
+        LawSummary { moments, radii, robust_excess: mean / bank - 1.0, robust_variance: variance / (bank * bank) }
     }
 
     fn lowest_return(&self) -> f64 {
@@ -184,7 +197,6 @@ impl ProblemContext {
     }
 }
 
-/// What e^Z with mean `mean` earns beyond the bank, per unit held.
-fn excess(mean: f64, rate_per_step: f64) -> f64 {
-    mean / (1.0 + rate_per_step) - 1.0
+fn without_ball(moments: CentralMoments) -> LawSummary {
+    LawSummary { moments, radii: NO_BALL, robust_excess: 0.0, robust_variance: 0.0 }
 }

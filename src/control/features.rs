@@ -14,6 +14,8 @@ const SMALLEST_DEVIATION: f64 = 1e-8;
 const NORMAL_MOMENTS: usize = 2;
 /// Radii below this count as this.
 const SMALLEST_RADIUS: f64 = 1e-12;
+/// A worst law whose variance is below this share of the centre's counts as having it: nothing is held against it.
+const SMALLEST_VARIANCE_LEFT: f64 = 0.01;
 /// A feature whose spread over the design is below this share of its size carries no information.
 const SMALLEST_SPREAD: f64 = 1e-9;
 
@@ -36,9 +38,11 @@ pub enum BallFeature {
     RobustExcess,
     /// `asinh(robust_excess / (rho s^2))`, rho the relative risk aversion at the initial wealth, s^2 the variance: to
     /// second order the allocation of an investor who thinks of one period alone (Merton's ratio). What is held, and what
-    /// it earns, turn where it passes 0 and 1; its ends, which count for less, are drawn together.
-    #[default]
+    /// it earns, turn where it passes 0 and 1; its ends, which count for less, are drawn together. Policies of the second.
     RobustMertonRatio,
+    /// The same, and another with [`LawSummary::robust_variance`] in the place of s^2.
+    #[default]
+    RobustMertonRatios,
 }
 
 /// What of an empirical law and its ball the features are made of.
@@ -49,6 +53,8 @@ pub struct LawSummary {
     /// `min_F E_F[e^Z] / (1 + r) - 1` over the ball: the first unit of allocation earns this against the worst law,
     /// and its sign decides whether anything is held at the last step.
     pub robust_excess: f64,
+    /// The variance of `e^Z / (1 + r)` under that law.
+    pub robust_variance: f64,
 }
 
 impl FeatureSelection {
@@ -103,6 +109,9 @@ impl FeatureSelection {
         match self.ball {
             Some(BallFeature::RobustExcess) => names.push("robust_excess".to_owned()),
             Some(BallFeature::RobustMertonRatio) => names.push("robust_merton_ratio".to_owned()),
+            Some(BallFeature::RobustMertonRatios) => {
+                names.extend(["robust_merton_ratio", "worst_law_merton_ratio"].map(str::to_owned));
+            }
             None => {}
         }
         names
@@ -115,8 +124,8 @@ impl FeatureSelection {
 
     /// All features of a state, unscaled.
     pub fn of(&self, wealth: f64, law: &LawSummary) -> Vec<f64> {
-        let LawSummary { moments, radii, robust_excess } = law;
-        let mut features = Vec::with_capacity(self.moments + 4);
+        let LawSummary { moments, radii, robust_excess, robust_variance } = law;
+        let mut features = Vec::with_capacity(self.moments + 5);
         if self.wealth {
             features.push(self.wealth(wealth));
         }
@@ -131,11 +140,14 @@ impl FeatureSelection {
             features.push(log(radii.radius));
             features.push(log(radii.radius_ahead) - log(radii.radius));
         }
+        let variance = moments.variance().max(SMALLEST_DEVIATION * SMALLEST_DEVIATION);
+        let ratio = |variance: f64| (robust_excess / (self.risk_aversion * variance)).asinh();
         match self.ball {
             Some(BallFeature::RobustExcess) => features.push(*robust_excess),
-            Some(BallFeature::RobustMertonRatio) => {
-                let variance = moments.variance().max(SMALLEST_DEVIATION * SMALLEST_DEVIATION);
-                features.push((robust_excess / (self.risk_aversion * variance)).asinh());
+            Some(BallFeature::RobustMertonRatio) => features.push(ratio(variance)),
+            Some(BallFeature::RobustMertonRatios) => {
+                features.push(ratio(variance));
+                features.push(ratio(robust_variance.max(SMALLEST_VARIANCE_LEFT * variance)));
             }
             None => {}
         }

@@ -5,12 +5,13 @@ use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
 use super::backward::StepSolution;
-use super::context::ProblemContext;
+use super::context::{Conventions, ProblemContext};
 use super::error::{FieldError, PolicyError};
 use super::features::BallFeature;
 use super::limits;
 use super::specification::Specification;
 use super::surrogate::{SingleSolution, Solution, StepSurrogates};
+use crate::numerics::bridge_paths::Kept;
 
 /// The completed specification and the solution of every step, in ascending order of step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -61,9 +62,12 @@ pub struct SurrogateDiagnostics {
     pub search: String,
 }
 
-/// Name and version of the portable form, and the ball's feature in it: those of this release first.
-const FORMATS: [(&str, BallFeature); 2] =
-    [("ballast-policy-2", BallFeature::RobustMertonRatio), ("ballast-policy-1", BallFeature::RobustExcess)];
+/// Name and version of the portable form, and what its policies were trained by: those of this release first.
+const FORMATS: [(&str, Conventions); 3] = [
+    ("ballast-policy-3", Conventions { ball: BallFeature::RobustMertonRatios, bridges: Kept::Directions }),
+    ("ballast-policy-2", Conventions { ball: BallFeature::RobustMertonRatio, bridges: Kept::Paths }),
+    ("ballast-policy-1", Conventions { ball: BallFeature::RobustExcess, bridges: Kept::Paths }),
+];
 
 impl Policy {
     /// The policy of a completed specification from the solutions of all its steps, ascending.
@@ -86,10 +90,13 @@ impl Policy {
         self.steps.iter().map(|step| &step.diagnostics)
     }
 
-    /// The problem it solves, with the features its surrogates were fitted on.
+    /// The problem it solves, with the features its surrogates were fitted on and the radii of its training.
     pub fn context(&self) -> ProblemContext {
         let known = FORMATS.iter().find(|(format, _)| self.format == *format);
-        ProblemContext::with(&self.specification, known.map_or_else(BallFeature::default, |(_, ball)| *ball))
+        ProblemContext::with(
+            &self.specification,
+            known.map_or_else(Conventions::default, |(_, conventions)| *conventions),
+        )
     }
 
     /// The portable form: JSON whose numbers parse back to the same bits.
@@ -118,8 +125,8 @@ impl Policy {
 
     fn check(&self) -> Result<(), FieldError> {
         if !FORMATS.iter().any(|(format, _)| self.format == *format) {
-            let [(newest, _), (older, _)] = FORMATS;
-            return Err(FieldError::new("format", &self.format, format!("must be {newest} or {older}")));
+            let known = FORMATS.map(|(format, _)| format).join(" or ");
+            return Err(FieldError::new("format", &self.format, format!("must be {known}")));
         }
         if self.specification.clone().completed()? != self.specification {
             return Err(FieldError::new("specification", "an object with holes", "must be completed"));

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::specification::{Framework, RadiusRule, Specification};
 use crate::numerics::bridge::{Quantile, Statistic, UpperQuantile};
-use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
+use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM, Kept};
 use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
 
@@ -25,6 +25,7 @@ pub struct UncertaintySets {
     uncertain: bool,
     /// Sample size at the last step.
     last_size: usize,
+    kept_of_paths: Kept,
     /// The quantile under the bridge rule.
     estimator: UpperQuantile,
     /// The common random numbers by sample size; all large ones share those of [`GRADED_FROM`].
@@ -51,15 +52,21 @@ pub struct Radii {
 
 impl UncertaintySets {
     pub fn new(specification: &Specification) -> Self {
+        UncertaintySets::with(specification, Kept::default())
+    }
+
+    /// From bridges of which `kept` is kept.
+    pub fn with(specification: &Specification, kept: Kept) -> Self {
         let uncertain = !matches!(specification.problem.framework, Framework::KnownLaw | Framework::PlugIn);
         let rule = specification.problem.radius_rule();
         let estimator = match rule {
-            RadiusRule::Bridge { alpha, paths, .. } => UpperQuantile::new(paths, alpha),
-            _ => UpperQuantile::new(1, 0.5),
+            RadiusRule::Bridge { alpha, paths, .. } => UpperQuantile::new(paths, alpha, kept),
+            _ => UpperQuantile::new(1, 0.5, kept),
         };
         let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
         let bridges = Mutex::new(HashMap::new());
-        UncertaintySets { rule, seed: specification.seed, uncertain, last_size, estimator, bridges }
+        let seed = specification.seed;
+        UncertaintySets { rule, seed, uncertain, last_size, kept_of_paths: kept, estimator, bridges }
     }
 
     /// True where laws of one sample size have different radii.
@@ -80,8 +87,8 @@ impl UncertaintySets {
             Arc::clone(kept.entry(key).or_default())
         };
         let simulate = || match key {
-            GRADED_FROM => AbsoluteBridges::graded(paths, self.seed),
-            _ => AbsoluteBridges::simulate(sample_size, paths, self.seed),
+            GRADED_FROM => AbsoluteBridges::graded(paths, self.seed, self.kept_of_paths),
+            _ => AbsoluteBridges::simulate(sample_size, paths, self.seed, self.kept_of_paths),
         };
         Arc::clone(found.get_or_init(|| Arc::new(simulate())))
     }

@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
-use super::bridge_paths::{AbsoluteBridges, Times};
+use super::bridge_paths::{AbsoluteBridges, Kept, Times};
 use super::dispatch::dispatched;
 use super::empirical::EmpiricalDistribution;
 use super::harrell_davis::{HarrellDavis, LastEstimate};
+use super::scale_mixture::LastQuantile;
 
 /// A statistic of a law of n values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,27 +26,77 @@ pub struct Quantile {
     pub standard_error: f64,
 }
 
-/// The (1 - alpha)-quantile of a statistic over simulated paths.
+/// The (1 - alpha)-quantile of a statistic over simulated paths: of directions with the length integrated out, of whole
+/// paths from their order statistics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UpperQuantile {
+    alpha: f64,
+    order_statistics: Option<OrderStatistics>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct OrderStatistics {
     at: HarrellDavis,
     /// One standard deviation of the share of paths below and above.
     beside: [HarrellDavis; 2],
 }
 
+const MISMATCH: &str = "an estimator made for what the bridges keep";
+
+/// What one quantile leaves for the next of a similar law.
+#[derive(Default)]
+struct Last {
+    directions: LastQuantile,
+    paths: LastEstimate,
+}
+
 impl UpperQuantile {
-    /// `alpha` in (0, 1), `paths` at least 1. Cost O(paths).
-    pub fn new(paths: usize, alpha: f64) -> Self {
-        let deviation = (alpha * (1.0 - alpha) / paths as f64).sqrt();
-        let shares =
-            [(1.0 - alpha - deviation).max(0.5 * (1.0 - alpha)), (1.0 - alpha + deviation).min(1.0 - 0.5 * alpha)];
-        let at = HarrellDavis::new(paths, 1.0 - alpha);
-        UpperQuantile { at, beside: shares.map(|share| HarrellDavis::new(paths, share)) }
+    /// `alpha` in (0, 1), over `paths` >= 1 of which `kept` is kept. Cost O(paths).
+    pub fn new(paths: usize, alpha: f64, kept: Kept) -> Self {
+        let order_statistics = (kept == Kept::Paths).then(|| {
+            let deviation = (alpha * (1.0 - alpha) / paths as f64).sqrt();
+            let shares =
+                [(1.0 - alpha - deviation).max(0.5 * (1.0 - alpha)), (1.0 - alpha + deviation).min(1.0 - 0.5 * alpha)];
+            let at = HarrellDavis::new(paths, 1.0 - alpha);
+            OrderStatistics { at, beside: shares.map(|share| HarrellDavis::new(paths, share)) }
+        });
+        UpperQuantile { alpha, order_statistics }
+    }
+
+    fn alone(&self, bridges: &AbsoluteBridges, statistic: &[f64]) -> f64 {
+        match (&self.order_statistics, &bridges.lengths) {
+            (Some(order), None) => order.at.estimate(statistic),
+            (None, Some(lengths)) => lengths.quantile(1.0 - self.alpha, statistic),
+            _ => panic!("{MISMATCH}"),
+        }
+    }
+
+    fn next(&self, bridges: &AbsoluteBridges, statistic: &[f64], last: &mut Last) -> f64 {
+        match (&self.order_statistics, &bridges.lengths) {
+            (Some(order), None) => order.at.estimate_next(statistic, &mut last.paths),
+            (None, Some(lengths)) => lengths.quantile_next(1.0 - self.alpha, statistic, &mut last.directions),
+            _ => panic!("{MISMATCH}"),
+        }
+    }
+
+    fn with_error(&self, bridges: &AbsoluteBridges, statistic: &[f64]) -> Quantile {
+        match (&self.order_statistics, &bridges.lengths) {
+            (Some(OrderStatistics { at, beside: [below, above] }), None) => {
+                let [value, below, above] = HarrellDavis::estimates([at, below, above], statistic);
+                Quantile { value, standard_error: 0.5 * (above - below) }
+            }
+            (None, Some(lengths)) => {
+                let (value, standard_error) = lengths.quantile_with_error(1.0 - self.alpha, statistic);
+                Quantile { value, standard_error }
+            }
+            _ => panic!("{MISMATCH}"),
+        }
     }
 }
 
 impl AbsoluteBridges {
-    /// `H = sum_{i=1}^{n-1} |B(i/n)| (z_(i+1) - z_(i))` on every path, or what it becomes. `atoms` ascending, n of them.
+    /// `H = sum_{i=1}^{n-1} |B(i/n)| (z_(i+1) - z_(i))` on every path, or what it becomes; over the length of the path where
+    /// directions are kept. `atoms` ascending, n of them.
     /// Cost O(min(n, 540) paths). Source: the paper, section 2.1.
     pub fn statistic(&self, atoms: &[f64], which: Statistic) -> Vec<f64> {
         let mut weights = Weights::new(self);
@@ -59,16 +110,13 @@ impl AbsoluteBridges {
 
     /// The quantile of a statistic of `law`.
     pub fn quantile(&self, law: &EmpiricalDistribution, which: Statistic, estimator: &UpperQuantile) -> f64 {
-        estimator.at.estimate(&self.statistic(law.atoms(), which))
+        estimator.alone(self, &self.statistic(law.atoms(), which))
     }
 
-    /// That of the law itself, with the standard error of its simulation: half the distance of the quantiles one standard
-    /// deviation of the share of paths to either side.
+    /// That of the law itself, with the standard error of its simulation. Of order statistics it is half the distance of
+    /// the quantiles one standard deviation of the share of paths to either side.
     pub fn quantile_with_error(&self, law: &EmpiricalDistribution, estimator: &UpperQuantile) -> Quantile {
-        let [below, above] = &estimator.beside;
-        let all = [&estimator.at, below, above];
-        let [value, below, above] = HarrellDavis::estimates(all, &self.statistic(law.atoms(), Statistic::Now));
-        Quantile { value, standard_error: 0.5 * (above - below) }
+        estimator.with_error(self, &self.statistic(law.atoms(), Statistic::Now))
     }
 
     /// Quantiles of a statistic of the laws of `atoms` (m of them, ascending) with one more value, for every value in
@@ -89,7 +137,7 @@ impl AbsoluteBridges {
         weights.pour(&mut carried);
         let mut below = 0;
         let mut statistic = vec![0.0; self.paths];
-        let mut last = LastEstimate::default();
+        let mut last = Last::default();
         let mut quantiles = Vec::with_capacity(values.len());
         for &value in values {
             while below < count && atoms[below] <= value {
@@ -111,7 +159,7 @@ impl AbsoluteBridges {
                 weights.place(below + 1, size, atoms[below] - value, which);
             }
             weights.pour(&mut statistic);
-            quantiles.push(estimator.at.estimate_next(&statistic, &mut last));
+            quantiles.push(estimator.next(self, &statistic, &mut last));
         }
         quantiles
     }
@@ -214,22 +262,24 @@ mod tests {
     #[test]
     fn carrying_sums_equals_building_each_law() {
         let law = EmpiricalDistribution::new(&[0.02, -0.05, 0.11, 0.04, 0.04]);
-        let bridges = AbsoluteBridges::simulate(6, 300, 9);
         let values = [-0.4, -0.05, 0.0, 0.04, 0.05, 0.3];
-        let estimator = UpperQuantile::new(300, 0.1);
-        let carried = bridges.quantiles_with(law.atoms(), &values, Statistic::Now, &estimator);
-        for (value, quantile) in values.iter().zip(carried) {
-            let mut larger = law.clone();
-            larger.push(*value);
-            // Six additions and subtractions of numbers below 1.
-            assert!((bridges.quantile(&larger, Statistic::Now, &estimator) - quantile).abs() < 1e-14);
+        // The tolerance of one of many quantiles; six additions and subtractions of numbers below 1.
+        for (kept, allowed) in [(Kept::Directions, 1e-6), (Kept::Paths, 1e-14)] {
+            let bridges = AbsoluteBridges::simulate(6, 300, 9, kept);
+            let estimator = UpperQuantile::new(300, 0.1, kept);
+            let carried = bridges.quantiles_with(law.atoms(), &values, Statistic::Now, &estimator);
+            for (value, quantile) in values.iter().zip(carried) {
+                let mut larger = law.clone();
+                larger.push(*value);
+                assert!((bridges.quantile(&larger, Statistic::Now, &estimator) - quantile).abs() < allowed);
+            }
         }
     }
 
     #[test]
     fn the_statistic_is_the_plain_sum_to_the_last_bit() {
         for size in [2, 4, 5, 6, 9, 11] {
-            let bridges = AbsoluteBridges::simulate(size, 37, 4);
+            let bridges = AbsoluteBridges::simulate(size, 37, 4, Kept::Paths);
             let atoms: Vec<f64> = (0..size).map(|k| (k as f64).powf(1.3)).collect();
             let mut plain = vec![0.0; 37];
             for (pair, column) in atoms.windows(2).zip(bridges.values.chunks_exact(bridges.paths)) {
@@ -241,20 +291,44 @@ mod tests {
 
     #[test]
     fn the_quantile_is_continuous_in_the_law() {
-        let bridges = AbsoluteBridges::simulate(5, 2000, 1);
-        let estimator = UpperQuantile::new(2000, 0.1);
-        let quantile = |sample: &[f64]| bridges.quantile_with_error(&EmpiricalDistribution::new(sample), &estimator);
-        let before = quantile(&[0.02, -0.05, 0.11, 0.04, 0.07]);
-        let after = quantile(&[0.02, -0.05, 0.11 + 1e-9, 0.04, 0.07]);
-        // One gap grows by 1e-9 and |B| stays below 3 on 2000 paths.
-        assert!((before.value - after.value).abs() < 3e-9);
-        assert!(before.standard_error > 0.0);
+        for kept in [Kept::Directions, Kept::Paths] {
+            let bridges = AbsoluteBridges::simulate(5, 2000, 1, kept);
+            let estimator = UpperQuantile::new(2000, 0.1, kept);
+            let quantile =
+                |sample: &[f64]| bridges.quantile_with_error(&EmpiricalDistribution::new(sample), &estimator);
+            let before = quantile(&[0.02, -0.05, 0.11, 0.04, 0.07]);
+            let after = quantile(&[0.02, -0.05, 0.11 + 1e-9, 0.04, 0.07]);
+            // One gap grows by 1e-9 and |B| stays below 3 on 2000 paths.
+            assert!((before.value - after.value).abs() < 3e-9);
+            assert!(before.standard_error > 0.0);
+        }
+    }
+
+    /// Deviation, over many simulations, of an estimate.
+    fn deviation(estimates: &[f64]) -> f64 {
+        let mean = estimates.iter().sum::<f64>() / estimates.len() as f64;
+        (estimates.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (estimates.len() - 1) as f64).sqrt()
+    }
+
+    #[test]
+    fn directions_need_fewer_paths_and_say_how_far_they_are_off() {
+        let law = EmpiricalDistribution::new(&[0.02, -0.05, 0.11, 0.04, 0.07, -0.13, 0.005, 0.062, -0.02, 0.09]);
+        let [directions, paths] = [Kept::Directions, Kept::Paths].map(|kept| {
+            let estimator = UpperQuantile::new(200, 0.1, kept);
+            let found = (0..200)
+                .map(|seed| AbsoluteBridges::simulate(10, 200, seed, kept).quantile_with_error(&law, &estimator));
+            let (values, errors): (Vec<f64>, Vec<f64>) = found.map(|found| (found.value, found.standard_error)).unzip();
+            (deviation(&values), errors.iter().sum::<f64>() / 200.0)
+        });
+        assert!(directions.0 < 0.85 * paths.0, "{directions:?} against {paths:?}");
+        // A deviation over 200 simulations has a standard error of 5 %.
+        assert!((directions.1 / directions.0 - 1.0).abs() < 0.2, "{directions:?}");
     }
 
     #[test]
     fn one_later_is_the_mean_over_the_values_of_the_law() {
         let law = EmpiricalDistribution::new(&[0.02, -0.05, 0.11, 0.04, 0.07]);
-        let bridges = AbsoluteBridges::simulate(6, 20, 1);
+        let bridges = AbsoluteBridges::simulate(6, 20, 1, Kept::Directions);
         let mut mean = vec![0.0; 20];
         for &atom in law.atoms() {
             let mut doubled = law.clone();
@@ -273,31 +347,37 @@ mod tests {
         // A Student-like sample: its widest gaps lie where the grid is finest.
         let sample: Vec<f64> = (0..1500).map(|k| (f64::from(k) - 749.5) / (f64::from(k.min(1499 - k)) + 0.5)).collect();
         let law = EmpiricalDistribution::new(&sample);
-        let (exact, graded) = (AbsoluteBridges::simulate(1500, 2000, 4), AbsoluteBridges::graded(2000, 4));
-        let estimator = UpperQuantile::new(2000, 0.1);
-        let expected = exact.quantile_with_error(&law, &estimator);
-        let found = graded.quantile_with_error(&law, &estimator);
-        // Paths inside a cell are other draws: four standard deviations of the difference, were all of it so.
-        let allowed = 4.0 * expected.standard_error.hypot(found.standard_error);
-        assert!((found.value - expected.value).abs() < allowed, "{found:?} against {expected:?}");
-        let means = [&exact, &graded].map(|bridges| bridges.statistic(law.atoms(), Statistic::Now).iter().sum::<f64>());
-        // The statistic's deviation is about half its mean: four standard errors of the mean of 2000 are 5 %.
-        assert!((means[1] / means[0] - 1.0).abs() < 0.05, "{means:?}");
+        for kept in [Kept::Directions, Kept::Paths] {
+            let exact = AbsoluteBridges::simulate(1500, 2000, 4, kept);
+            let graded = AbsoluteBridges::graded(2000, 4, kept);
+            let estimator = UpperQuantile::new(2000, 0.1, kept);
+            let expected = exact.quantile_with_error(&law, &estimator);
+            let found = graded.quantile_with_error(&law, &estimator);
+            // Paths inside a cell are other draws: four standard deviations of the difference, were all of it so.
+            let allowed = 4.0 * expected.standard_error.hypot(found.standard_error);
+            assert!((found.value - expected.value).abs() < allowed, "{found:?} against {expected:?}");
+            if kept == Kept::Paths {
+                let sum =
+                    |bridges: &AbsoluteBridges| bridges.statistic(law.atoms(), Statistic::Now).iter().sum::<f64>();
+                // The statistic's deviation is about half its mean: four standard errors of the mean of 2000 are 5 %.
+                assert!((sum(&graded) / sum(&exact) - 1.0).abs() < 0.05);
+            }
+        }
     }
 
     #[test]
     fn graded_sums_are_carried_too() {
         let atoms: Vec<f64> = (0..3000).map(|k| (f64::from(k) / 1500.0 - 1.0).powi(3)).collect();
-        let bridges = AbsoluteBridges::graded(50, 2);
-        let estimator = UpperQuantile::new(50, 0.1);
+        let bridges = AbsoluteBridges::graded(50, 2, Kept::Directions);
+        let estimator = UpperQuantile::new(50, 0.1, Kept::Directions);
         let values = [-2.0, -0.7, 0.001, 0.4, 0.41, 3.0];
         for which in [Statistic::Now, Statistic::OneLater] {
             let carried = bridges.quantiles_with(&atoms, &values, which, &estimator);
             for (value, quantile) in values.iter().zip(carried) {
                 let mut larger = EmpiricalDistribution::new(&atoms);
                 larger.push(*value);
-                // Thousands of roundings of weights that sum to 5.
-                assert!((bridges.quantile(&larger, which, &estimator) - quantile).abs() < 1e-12);
+                // The tolerance of one of many quantiles, of numbers about 1.
+                assert!((bridges.quantile(&larger, which, &estimator) - quantile).abs() < 1e-6);
             }
         }
     }

@@ -1,11 +1,16 @@
 //! Paths of Brownian bridges, in absolute value, at the times that laws of one size or of all large sizes ask for.
+//!
+//! A bridge at m times is a direction times a length: `sum (dB)^2 / dt` over the m + 1 intervals is chi-square with m degrees
+//! of freedom and independent of the direction. A statistic that grows with the path as |B| does can therefore be simulated
+//! over directions alone, and its length be integrated out.
 
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
+use super::scale_mixture::ScaleMixture;
 use super::streams::stream;
 
-/// Simulated `|B(t)|` at ascending times: common random numbers for laws.
+/// Simulated `|B(t)|`, or `|B(t)|` over the length of the path, at ascending times: common random numbers for laws.
 ///
 /// Stored time by time (all paths of the first, then of the second, ...), because a statistic adds time after time.
 #[derive(Debug, Clone)]
@@ -13,6 +18,19 @@ pub struct AbsoluteBridges {
     pub(super) times: Times,
     pub(super) paths: usize,
     pub(super) values: Vec<f64>,
+    /// The law of the lengths the paths are divided by; `None` where they are whole.
+    pub(super) lengths: Option<ScaleMixture>,
+}
+
+/// What is kept of a path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Kept {
+    /// Its direction: `|B|` over the length of the path.
+    #[default]
+    Directions,
+    /// The path itself, interpolated and scaled to its variance where its nodes lie between those simulated: policies of
+    /// the first two formats.
+    Paths,
 }
 
 /// The times at which paths are kept.
@@ -50,29 +68,39 @@ fn refine(bridge: &mut [f64], generator: &mut impl Rng) {
     }
 }
 
-/// Where a node lies in the dyadic grid: between `left` and the next grid point, with these weights.
+/// Where a node lies in the dyadic grid: between `left` and the next grid point, with these weights. What they leave of the
+/// variance is that of a normal of this deviation, 0 where the weights are scaled to leave none.
 struct Place {
     left: usize,
     weights: [f64; 2],
+    deviation: f64,
 }
 
 impl Place {
-    /// Node i/n among `cells`; the weights are those of linear interpolation, scaled to the variance i/n (1 - i/n).
+    /// Node i/n among `cells`: given the grid's path, B is normal about the line between its neighbours.
     fn of(node: usize, sample_size: usize, cells: usize) -> Self {
-        let time = node as f64 / sample_size as f64;
-        let position = time * cells as f64;
+        let position = node as f64 / sample_size as f64 * cells as f64;
         let left = (position as usize).min(cells - 1);
         let share = position - left as f64;
-        let (start, end) = (left as f64 / cells as f64, (left + 1) as f64 / cells as f64);
-        let variance = (1.0 - share).powi(2) * start * (1.0 - start)
-            + share * share * end * (1.0 - end)
-            + 2.0 * share * (1.0 - share) * start * (1.0 - end);
-        let scale = (time * (1.0 - time) / variance).sqrt();
-        Place { left, weights: [scale * (1.0 - share), scale * share] }
+        let deviation = (share * (1.0 - share) / cells as f64).sqrt();
+        Place { left, weights: [1.0 - share, share], deviation }
     }
 
-    fn interpolate(&self, bridge: &[f64]) -> f64 {
-        self.weights[0] * bridge[self.left] + self.weights[1] * bridge[self.left + 1]
+    /// The same on the line alone, scaled to the variance i/n (1 - i/n).
+    fn on_the_line(node: usize, sample_size: usize, cells: usize) -> Self {
+        let place = Place::of(node, sample_size, cells);
+        let (time, left, [rest, share]) = (node as f64 / sample_size as f64, place.left, place.weights);
+        let (start, end) = (left as f64 / cells as f64, (left + 1) as f64 / cells as f64);
+        let variance = rest.powi(2) * start * (1.0 - start)
+            + share * share * end * (1.0 - end)
+            + 2.0 * share * rest * start * (1.0 - end);
+        let scale = (time * (1.0 - time) / variance).sqrt();
+        Place { left, weights: [scale * rest, scale * share], deviation: 0.0 }
+    }
+
+    fn value(&self, bridge: &[f64], generator: &mut impl Rng) -> f64 {
+        let line = self.weights[0] * bridge[self.left] + self.weights[1] * bridge[self.left + 1];
+        if self.deviation == 0.0 { line } else { line + self.deviation * generator.sample::<f64, _>(StandardNormal) }
     }
 }
 
@@ -81,54 +109,82 @@ impl AbsoluteBridges {
     ///
     /// Path p is the same path at every sample size, so that the quantile moves from one sample size to the next as the
     /// law does, and not as two simulations differ: the stream (seed, "bridge", 0, p) refines it by midpoints on 2^m
-    /// cells, m the least with at least 1024 and 4n of them, and B(i/n) is interpolated between their ends and scaled
-    /// to its exact variance i/n (1 - i/n). Covariances are off by less than the cell, 1/1024. Cost O(n paths) and a
-    /// few thousand normals a path.
-    pub fn simulate(sample_size: usize, paths: usize, seed: u64) -> Self {
+    /// cells, m the least with at least 1024 and 4n of them. B(i/n) is drawn given their ends from the stream (seed,
+    /// "bridge between cells", n, p); of `Kept::Paths` it is interpolated and scaled to its exact variance, and
+    /// covariances are off by less than the cell, 1/1024. Cost O(n paths) and a few thousand normals a path.
+    pub fn simulate(sample_size: usize, paths: usize, seed: u64, kept: Kept) -> Self {
         let nodes = sample_size.saturating_sub(1);
-        let mut values = vec![0.0; nodes * paths];
         let cells = LEAST_CELLS.max(4 * sample_size).next_power_of_two();
-        let places: Vec<Place> = (1..=nodes).map(|node| Place::of(node, sample_size, cells)).collect();
+        let place = |node: usize| match kept {
+            Kept::Directions => Place::of(node, sample_size, cells),
+            Kept::Paths => Place::on_the_line(node, sample_size, cells),
+        };
+        let places: Vec<Place> = (1..=nodes).map(place).collect();
+        let times: Vec<f64> = (1..=nodes).map(|node| node as f64 / sample_size as f64).collect();
         let mut bridge = vec![0.0; cells + 1];
-        for path in 0..paths {
-            refine(&mut bridge, &mut stream(seed, "bridge", 0, path));
-            for (node, place) in places.iter().enumerate() {
-                values[node * paths + path] = place.interpolate(&bridge).abs();
-            }
-        }
-        AbsoluteBridges { times: Times::Sample(sample_size), paths, values }
+        let path = |index: usize, path: &mut [f64]| {
+            refine(&mut bridge, &mut stream(seed, "bridge", 0, index));
+            let mut between = stream(seed, "bridge between cells", sample_size, index);
+            path.iter_mut().zip(&places).for_each(|(value, place)| *value = place.value(&bridge, &mut between));
+        };
+        AbsoluteBridges::gather(&times, Times::Sample(sample_size), paths, kept, path)
     }
 
     /// The same paths at times that serve every sample size from about [`GRADED_FROM`] on: 512 equal cells, of which the
     /// first and the last are halved 14 times towards the ends. Between two times `|B|` is interpolated and scaled to its
     /// exact mean; the product of two values within a cell is off by less than the cell.
-    pub fn graded(paths: usize, seed: u64) -> Self {
+    pub fn graded(paths: usize, seed: u64, kept: Kept) -> Self {
         let cell = 1.0 / GRADED_CELLS as f64;
         let halved = |power: u32| cell * 0.5_f64.powi(power as i32);
         let ends = (1..=HALVINGS).rev().map(halved);
         let inside = (1..GRADED_CELLS).map(|node| node as f64 * cell);
         let times: Vec<f64> = ends.clone().chain(inside).chain(ends.rev().map(|time| 1.0 - time)).collect();
-        let mut values = vec![0.0; times.len() * paths];
         let mut bridge = vec![0.0; GRADED_CELLS + 1];
         let halvings = HALVINGS as usize;
-        for path in 0..paths {
-            let mut generator = stream(seed, "bridge", 0, path);
+        let path = |index: usize, path: &mut [f64]| {
+            let mut generator = stream(seed, "bridge", 0, index);
             refine(&mut bridge, &mut generator);
-            let mut keep = |time: usize, value: f64| values[time * paths + path] = value.abs();
-            let last = times.len() - 1;
-            (1..GRADED_CELLS).for_each(|node| keep(halvings + node - 1, bridge[node]));
+            let last = path.len() - 1;
+            path[halvings..=last - halvings].copy_from_slice(&bridge[1..GRADED_CELLS]);
             let (mut low, mut high) = (bridge[1], bridge[GRADED_CELLS - 1]);
             for halving in 0..HALVINGS {
                 let deviation = 0.5 * halved(halving).sqrt();
                 low = 0.5 * low + deviation * generator.sample::<f64, _>(StandardNormal);
                 high = 0.5 * high + deviation * generator.sample::<f64, _>(StandardNormal);
                 let distance = halvings - 1 - halving as usize;
-                keep(distance, low);
-                keep(last - distance, high);
+                (path[distance], path[last - distance]) = (low, high);
+            }
+        };
+        AbsoluteBridges::gather(&times, Times::Graded(times.clone()), paths, kept, path)
+    }
+
+    /// All paths, each written by `draw` given its index.
+    fn gather(at: &[f64], times: Times, paths: usize, kept: Kept, mut draw: impl FnMut(usize, &mut [f64])) -> Self {
+        let mut values = vec![0.0; at.len() * paths];
+        let mut path = vec![0.0; at.len()];
+        for index in 0..paths {
+            draw(index, &mut path);
+            let unit = match kept {
+                Kept::Directions => length(at, &path),
+                Kept::Paths => 1.0,
+            };
+            for (time, value) in path.iter().enumerate() {
+                values[time * paths + index] = value.abs() / unit;
             }
         }
-        AbsoluteBridges { times: Times::Graded(times), paths, values }
+        let lengths = (kept == Kept::Directions).then(|| ScaleMixture::chi(at.len().max(1)));
+        AbsoluteBridges { times, paths, values, lengths }
     }
+}
+
+/// `sqrt(sum (dB)^2 / dt)` over the intervals between 0, `times` and 1, of a path that is 0 at both ends.
+fn length(times: &[f64], path: &[f64]) -> f64 {
+    let (mut time, mut value, mut sum) = (0.0, 0.0, 0.0);
+    for (&next_time, &next_value) in times.iter().chain(&[1.0]).zip(path.iter().chain(&[0.0])) {
+        sum += (next_value - value).powi(2) / (next_time - time);
+        (time, value) = (next_time, next_value);
+    }
+    sum.sqrt()
 }
 
 #[cfg(test)]
@@ -141,27 +197,53 @@ mod tests {
         for sample_size in [3, 10, 600] {
             let mut cells = vec![0.0; LEAST_CELLS.max(4 * sample_size).next_power_of_two() + 1];
             let nodes = [sample_size / 3, sample_size / 2, sample_size - 1].map(|node| node.max(1));
-            let places = nodes.map(|node| Place::of(node, sample_size, cells.len() - 1));
-            let mut sums = [[0.0; 3]; 3];
-            for path in 0..20_000 {
-                refine(&mut cells, &mut stream(5, "bridge", 0, path));
-                let values = places.each_ref().map(|place| place.interpolate(&cells));
-                for (row, left) in sums.iter_mut().zip(values) {
-                    row.iter_mut().zip(values).for_each(|(sum, right)| *sum += left * right / 20_000.0);
+            for place in [Place::of, Place::on_the_line] {
+                let places = nodes.map(|node| place(node, sample_size, cells.len() - 1));
+                let mut sums = [[0.0; 3]; 3];
+                for path in 0..20_000 {
+                    refine(&mut cells, &mut stream(5, "bridge", 0, path));
+                    let mut between = stream(5, "bridge between cells", sample_size, path);
+                    let values = places.each_ref().map(|place| place.value(&cells, &mut between));
+                    for (row, left) in sums.iter_mut().zip(values) {
+                        row.iter_mut().zip(values).for_each(|(sum, right)| *sum += left * right / 20_000.0);
+                    }
                 }
-            }
-            for (row, left) in sums.iter().zip(nodes) {
-                for (&found, right) in row.iter().zip(nodes) {
-                    let [s, t] = [left.min(right), left.max(right)].map(|node| node as f64 / sample_size as f64);
-                    assert!((found - s * (1.0 - t)).abs() < 0.01, "{sample_size}: {found} against {}", s * (1.0 - t));
+                for (row, left) in sums.iter().zip(nodes) {
+                    for (&found, right) in row.iter().zip(nodes) {
+                        let [s, t] = [left.min(right), left.max(right)].map(|node| node as f64 / sample_size as f64);
+                        let expected = s * (1.0 - t);
+                        assert!((found - expected).abs() < 0.01, "{sample_size}: {found} against {expected}");
+                    }
                 }
             }
         }
     }
 
     #[test]
+    fn the_length_of_a_path_is_chi() {
+        // The mean of m squares of a standard normal, and four standard errors of it over 2000 paths.
+        let chi_square = |squares: &[f64], freedom: f64| {
+            let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+            let allowed = 4.0 * (2.0 * freedom / squares.len() as f64).sqrt();
+            assert!((mean - freedom).abs() < allowed, "{freedom}: {mean}");
+        };
+        let middle = |whole: &AbsoluteBridges, unit: &AbsoluteBridges, node: usize| -> Vec<f64> {
+            let range = node * 2000..(node + 1) * 2000;
+            let ratios = whole.values[range.clone()].iter().zip(&unit.values[range]);
+            ratios.map(|(value, direction)| (value / direction).powi(2)).collect()
+        };
+        // The middle node of 16 lies on the grid: both kinds keep the same path there.
+        let [directions, paths] =
+            [Kept::Directions, Kept::Paths].map(|kept| AbsoluteBridges::simulate(16, 2000, 7, kept));
+        chi_square(&middle(&paths, &directions, 7), 15.0);
+        let [directions, paths] = [Kept::Directions, Kept::Paths].map(|kept| AbsoluteBridges::graded(2000, 7, kept));
+        chi_square(&middle(&paths, &directions, 270), (directions.values.len() / 2000) as f64);
+    }
+
+    #[test]
     fn a_path_is_the_same_at_every_sample_size() {
-        let (few, many) = (AbsoluteBridges::simulate(4, 50, 3), AbsoluteBridges::simulate(2048, 50, 3));
+        let (few, many) =
+            (AbsoluteBridges::simulate(4, 50, 3, Kept::Paths), AbsoluteBridges::simulate(2048, 50, 3, Kept::Paths));
         for path in 0..50 {
             // Node 2 of 4 and node 1024 of 2048 are both the middle.
             assert_eq!(few.values[50 + path], many.values[1023 * 50 + path]);

@@ -11,34 +11,41 @@ use super::empirical::EmpiricalDistribution;
 pub struct ExponentialMean<'a> {
     /// Ascending.
     atoms: &'a [f64],
-    /// `sums[j]`: sum of e^z over the first j atoms.
-    sums: Vec<f64>,
+    /// `sums[j]`: sums of e^z and of its square over the first j atoms.
+    sums: Vec<[f64; 2]>,
     lowest: f64,
+}
+
+/// Mean and variance of e^Z under the law with the worst mean.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WorstExponential {
+    pub mean: f64,
+    pub variance: f64,
 }
 
 impl<'a> ExponentialMean<'a> {
     /// `lowest` bounds the support from below; minus infinity where nothing does. Cost O(n).
     pub fn of(law: &'a EmpiricalDistribution, lowest: f64) -> Self {
-        let mut sums = vec![0.0];
-        let mut total = 0.0;
+        let mut sums = vec![[0.0; 2]];
+        let mut total = [0.0; 2];
         for atom in law.atoms() {
-            total += atom.exp();
+            total = added(total, atom.exp(), 1.0);
             sums.push(total);
         }
         ExponentialMean { atoms: law.atoms(), sums, lowest }
     }
 
-    /// The worst mean over the ball of the law itself. Cost O(values above the cap).
-    pub fn worst(&self, radius: f64) -> f64 {
+    /// Over the ball of the law itself. Cost O(values above the cap).
+    pub fn worst(&self, radius: f64) -> WorstExponential {
         self.capped(None, radius)
     }
 
-    /// The worst mean over the ball of the law with `value` added. Cost O(values above the cap).
-    pub fn worst_with(&self, value: f64, radius: f64) -> f64 {
+    /// Over the ball of the law with `value` added. Cost O(values above the cap).
+    pub fn worst_with(&self, value: f64, radius: f64) -> WorstExponential {
         self.capped(Some(value), radius)
     }
 
-    fn capped(&self, extra: Option<f64>, radius: f64) -> f64 {
+    fn capped(&self, extra: Option<f64>, radius: f64) -> WorstExponential {
         let size = (self.atoms.len() + usize::from(extra.is_some())) as f64;
         // Atoms left below the cap, and whether the extra value is among them.
         let (mut left, mut extra_left) = (self.atoms.len(), extra);
@@ -62,8 +69,15 @@ impl<'a> ExponentialMean<'a> {
             }
         }
         let cap = (cap - budget / above).max(self.lowest.min(cap));
-        (self.sums[left] + extra_left.map_or(0.0, f64::exp) + above * cap.exp()) / size
+        let below = extra_left.map_or(self.sums[left], |extra| added(self.sums[left], extra.exp(), 1.0));
+        let [mean, square] = added(below, cap.exp(), above).map(|sum| sum / size);
+        WorstExponential { mean, variance: (square - mean * mean).max(0.0) }
     }
+}
+
+/// The sums of a value and of its square, with `count` more of `value`.
+fn added([sum, squares]: [f64; 2], value: f64, count: f64) -> [f64; 2] {
+    [sum + count * value, squares + count * value * value]
 }
 
 #[cfg(test)]
@@ -87,11 +101,16 @@ mod tests {
                     |z: &f64| with.atoms().iter().filter(|atom| *atom == z).count() as f64 / with.sample_size() as f64;
                 let masses: Vec<f64> = support.iter().map(mass).collect();
                 let payoff: Vec<f64> = support.iter().map(|z| z.exp()).collect();
-                let expected =
-                    WassersteinBall { support: &support, masses: &masses, radius }.worst_expectation(&payoff).0;
+                let ball = WassersteinBall { support: &support, masses: &masses, radius };
+                let expected = ball.worst_expectation(&payoff).0;
                 let found = extra.map_or_else(|| mean.worst(radius), |value| mean.worst_with(value, radius));
                 // The grid misses the cap by at most its spacing, of which the chord of e^z is second order.
-                assert!((found - expected).abs() < 2e-9, "{radius} {extra:?}: {found} against {expected}");
+                assert!((found.mean - expected).abs() < 2e-9, "{radius} {extra:?}: {found:?} against {expected}");
+                let moves = ball.worst_law(&payoff).moves;
+                let square: f64 = moves.iter().map(|moved| moved.mass * payoff[moved.to].powi(2)).sum();
+                let variance = square - expected * expected;
+                // Likewise, but the square may put the cap's mass on either neighbour.
+                assert!((found.variance - variance).abs() < 1e-6, "{radius} {extra:?}: {found:?} against {variance}");
             }
         }
     }
@@ -100,7 +119,7 @@ mod tests {
     fn the_support_bounds_the_cap() {
         let law = EmpiricalDistribution::new(&[0.1, 0.3]);
         let mean = ExponentialMean::of(&law, 0.05);
-        assert_eq!(mean.worst(10.0), 0.05_f64.exp());
-        assert_eq!(mean.worst(0.0), (0.1_f64.exp() + 0.3_f64.exp()) / 2.0);
+        assert_eq!(mean.worst(10.0).mean, 0.05_f64.exp());
+        assert_eq!(mean.worst(0.0).mean, (0.1_f64.exp() + 0.3_f64.exp()) / 2.0);
     }
 }

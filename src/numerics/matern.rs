@@ -58,6 +58,22 @@ pub fn dot(left: &[f64], right: &[f64]) -> f64 {
     dispatched!(dot_inline(left, right))
 }
 
+/// sum_j values_j. Cost O(n).
+pub fn sum(values: &[f64]) -> f64 {
+    dispatched!({
+        let mut lanes = [0.0; LANES];
+        let blocks = values.chunks_exact(LANES);
+        let tail = blocks.remainder();
+        for block in blocks {
+            for lane in 0..LANES {
+                lanes[lane] += block[lane];
+            }
+        }
+        lanes.iter_mut().zip(tail).for_each(|(lane, value)| *lane += value);
+        total(&lanes)
+    })
+}
+
 /// sum_j w_j (1 + r_j + r_j^2/3) exp(-r_j) with r_j = sqrt(5 d2_j), without the signal variance.
 ///
 /// Shapes: one weight for each squared scaled distance. No allocation. Cost O(n).

@@ -20,6 +20,7 @@ pub mod matern;
 pub mod minimise;
 pub mod moments;
 pub mod quasi_newton;
+pub mod scale_mixture;
 pub mod streams;
 pub mod student;
 pub mod summary;

@@ -4,8 +4,8 @@
 // and stretched to another standard deviation. All features of it follow, the robust excess return among them; what the
 // history's shape does not settle (skewness, kurtosis, the level of the rest) stays at the centre of the step's design.
 
-/** `min E[e^Z] / (1 + r) - 1` over the ball: the c of the document by filling from the top. */
-export function robustExcess(atoms, radius, rate) {
+/** e^Z / (1 + r) under the law of the ball with the least mean: the c of the document by filling from the top. */
+function worstGrowths(atoms, radius, rate) {
   const sorted = [...atoms].sort((a, b) => b - a);
   const n = sorted.length;
   let [above, cut, used] = [0, sorted[0], 0];
@@ -14,8 +14,12 @@ export function robustExcess(atoms, radius, rate) {
     cut = (above - n * radius) / (used + 1);
     if (used + 1 === n || cut >= sorted[used + 1]) break;
   }
-  const mean = sorted.reduce((sum, atom) => sum + Math.exp(Math.min(atom, cut)), 0) / n;
-  return mean / (1 + rate) - 1;
+  return sorted.map((atom) => Math.exp(Math.min(atom, cut)) / (1 + rate));
+}
+
+/** `min E[e^Z] / (1 + r) - 1` over the ball. */
+export function robustExcess(atoms, radius, rate) {
+  return raw(worstGrowths(atoms, radius, rate), 1) - 1;
 }
 
 function central(atoms, order) {
@@ -30,6 +34,7 @@ function raw(atoms, order) {
 /** One named feature of a state `{wealth, atoms, radius, rate, riskAversion}`, the last relative. */
 export function feature(name, { wealth, atoms, radius, rate, riskAversion }) {
   const standardised = (order) => central(atoms, order) / central(atoms, 2) ** (order / 2);
+  const mertonRatio = (variance) => Math.asinh(robustExcess(atoms, radius, rate) / (riskAversion * variance));
   switch (name) {
     case "wealth":
       return wealth;
@@ -48,7 +53,9 @@ export function feature(name, { wealth, atoms, radius, rate, riskAversion }) {
     case "robust_excess":
       return robustExcess(atoms, radius, rate);
     case "robust_merton_ratio":
-      return Math.asinh(robustExcess(atoms, radius, rate) / (riskAversion * Math.max(central(atoms, 2), 1e-16)));
+      return mertonRatio(Math.max(central(atoms, 2), 1e-16));
+    case "worst_law_merton_ratio":
+      return mertonRatio(Math.max(central(worstGrowths(atoms, radius, rate), 2), central(atoms, 2) / 100, 1e-18));
     case "radius_trend":
       // Takes the simulated bridges, which a policy does not carry: it stays at the centre of the design.
       return 0;
