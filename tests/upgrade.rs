@@ -144,11 +144,10 @@ async fn every_schema_ever_released_is_opened_and_advises_as_it_did() {
 #[tokio::test]
 async fn a_policy_of_the_second_format_is_advised_from_as_it_was() {
     let recorded: Value = serde_json::from_str(include_str!("data/policy_2.json")).unwrap();
-    let export = serde_json::to_vec(&recorded["export"]).unwrap();
     let mut app = App::start().await;
-    let imported = app.client.post(format!("{}/policies/import", app.url)).body(export).send().await.unwrap();
-    let imported: Value = imported.json().await.unwrap();
-    app.policy = imported["policy"].as_str().unwrap_or_else(|| panic!("{imported}")).to_owned();
+    let (status, imported) = app.post("/policies/import", &recorded["export"]).await;
+    assert_eq!(status, 201, "{imported}");
+    app.policy = imported["policy"].as_str().unwrap().to_owned();
     app.open().await;
     for (observed, period) in recorded["observations"].as_array().unwrap().iter().zip(1..) {
         let (status, found) = app.observe(period, observed["log_return"].as_f64().unwrap()).await;

@@ -87,15 +87,6 @@ impl Training {
         self.context.specification.problem.horizon
     }
 
-    /// Whether a solution kept from an earlier run can be gone on from: its inputs are those of this release.
-    pub fn accepts(&self, kept: &StepSolution) -> bool {
-        let Solution::Surrogates(stored) = &kept.solution else { return true };
-        let names = self.context.selection.names();
-        let names: Option<Vec<&String>> = stored.scaling.active.iter().map(|&feature| names.get(feature)).collect();
-        let found = kept.diagnostics.value.as_ref().map(|value| value.features.iter().collect());
-        names.is_some() && names == found
-    }
-
     /// Solves one step given the step after it (`None` at `horizon - 1`), on the current rayon pool.
     /// The result depends on nothing but the specification and `after`.
     ///

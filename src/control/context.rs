@@ -13,7 +13,7 @@ use super::state::{State, floor};
 use super::surrogate::NextValue;
 use super::uncertainty::{Measure, Radii, UncertaintySets};
 use super::utility::RelativeUtility;
-use crate::numerics::bridge_paths::Kept;
+use crate::numerics::bridge_paths::BridgeForm;
 use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::exponential_mean::{ExponentialMean, WorstExponential};
@@ -22,11 +22,17 @@ use crate::numerics::moments::CentralMoments;
 /// Where the features do not depend on the ball.
 const NO_BALL: Radii = Radii { radius: 0.0, radius_ahead: 0.0 };
 
-/// What releases do differently: a policy is advised from as it was trained.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// What releases do differently: the features and radii of a policy are those it was trained with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Conventions {
     pub ball: BallFeature,
-    pub bridges: Kept,
+    pub bridges: BridgeForm,
+}
+
+impl Conventions {
+    /// Those of this release.
+    pub const CURRENT: Conventions =
+        Conventions { ball: BallFeature::RobustMertonRatios, bridges: BridgeForm::Directions };
 }
 
 /// The problem with everything that does not change from step to step.
@@ -38,12 +44,12 @@ pub struct ProblemContext {
 
 impl ProblemContext {
     pub fn new(specification: &Specification) -> Self {
-        ProblemContext::with(specification, Conventions::default())
+        ProblemContext::with(specification, Conventions::CURRENT)
     }
 
     /// By the conventions that a policy was trained by.
     pub fn with(specification: &Specification, conventions: Conventions) -> Self {
-        let sets = UncertaintySets::with(specification, conventions.bridges);
+        let sets = UncertaintySets::new(specification, conventions.bridges);
         let selection = FeatureSelection::new(specification, sets.varies(), conventions.ball);
         ProblemContext { specification: specification.clone(), sets, selection }
     }

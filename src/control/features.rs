@@ -14,7 +14,7 @@ const SMALLEST_DEVIATION: f64 = 1e-8;
 const NORMAL_MOMENTS: usize = 2;
 /// Radii below this count as this.
 const SMALLEST_RADIUS: f64 = 1e-12;
-/// A worst law whose variance is below this share of the centre's counts as having it: nothing is held against it.
+/// A worst law whose variance is below this share of the centre's counts as having it: the ratio stays finite.
 const SMALLEST_VARIANCE_LEFT: f64 = 0.01;
 /// A feature whose spread over the design is below this share of its size carries no information.
 const SMALLEST_SPREAD: f64 = 1e-9;
@@ -31,17 +31,17 @@ pub struct FeatureSelection {
     risk_aversion: f64,
 }
 
-/// What the last feature says of the worst law in the ball.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// What the last features say of the worst law in the ball.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BallFeature {
     /// [`LawSummary::robust_excess`] itself: policies of the first format.
     RobustExcess,
     /// `asinh(robust_excess / (rho s^2))`, rho the relative risk aversion at the initial wealth, s^2 the variance: to
     /// second order the allocation of an investor who thinks of one period alone (Merton's ratio). What is held, and what
-    /// it earns, turn where it passes 0 and 1; its ends, which count for less, are drawn together. Policies of the second.
+    /// it earns, turn where it passes 0 and 1; its ends, which count for less, are drawn together. Policies of the second
+    /// format.
     RobustMertonRatio,
     /// The same, and another with [`LawSummary::robust_variance`] in the place of s^2.
-    #[default]
     RobustMertonRatios,
 }
 

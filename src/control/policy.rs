@@ -11,7 +11,7 @@ use super::features::BallFeature;
 use super::limits;
 use super::specification::Specification;
 use super::surrogate::{SingleSolution, Solution, StepSurrogates};
-use crate::numerics::bridge_paths::Kept;
+use crate::numerics::bridge_paths::BridgeForm;
 
 /// The completed specification and the solution of every step, in ascending order of step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -64,10 +64,35 @@ pub struct SurrogateDiagnostics {
 
 /// Name and version of the portable form, and what its policies were trained by: those of this release first.
 const FORMATS: [(&str, Conventions); 3] = [
-    ("ballast-policy-3", Conventions { ball: BallFeature::RobustMertonRatios, bridges: Kept::Directions }),
-    ("ballast-policy-2", Conventions { ball: BallFeature::RobustMertonRatio, bridges: Kept::Paths }),
-    ("ballast-policy-1", Conventions { ball: BallFeature::RobustExcess, bridges: Kept::Paths }),
+    ("ballast-policy-3", Conventions::CURRENT),
+    ("ballast-policy-2", Conventions { ball: BallFeature::RobustMertonRatio, bridges: BridgeForm::WholePaths }),
+    ("ballast-policy-1", Conventions { ball: BallFeature::RobustExcess, bridges: BridgeForm::WholePaths }),
 ];
+
+/// A solved step as a training keeps it.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Checkpoint<F, S> {
+    format: F,
+    solution: S,
+}
+
+impl StepSolution {
+    /// JSON whose numbers parse back to the same bits, with the format of the policy it is to be part of.
+    ///
+    /// # Errors
+    /// None that plain structs of numbers and strings can make.
+    pub fn to_checkpoint(&self) -> serde_json::Result<Vec<u8>> {
+        serde_json::to_vec(&Checkpoint { format: FORMATS[0].0, solution: self })
+    }
+
+    /// `None` where the bytes are of a release with another format: its inputs or its radii are others, and steps of both
+    /// in one policy would be steps of neither.
+    pub fn from_checkpoint(bytes: &[u8]) -> Option<Self> {
+        let Checkpoint { format, solution } = serde_json::from_slice::<Checkpoint<String, StepSolution>>(bytes).ok()?;
+        (format == FORMATS[0].0).then_some(solution)
+    }
+}
 
 impl Policy {
     /// The policy of a completed specification from the solutions of all its steps, ascending.
@@ -93,10 +118,7 @@ impl Policy {
     /// The problem it solves, with the features its surrogates were fitted on and the radii of its training.
     pub fn context(&self) -> ProblemContext {
         let known = FORMATS.iter().find(|(format, _)| self.format == *format);
-        ProblemContext::with(
-            &self.specification,
-            known.map_or_else(Conventions::default, |(_, conventions)| *conventions),
-        )
+        ProblemContext::with(&self.specification, known.map_or(Conventions::CURRENT, |(_, conventions)| *conventions))
     }
 
     /// The portable form: JSON whose numbers parse back to the same bits.

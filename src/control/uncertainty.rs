@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::specification::{Framework, RadiusRule, Specification};
 use crate::numerics::bridge::{Quantile, Statistic, UpperQuantile};
-use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM, Kept};
+use crate::numerics::bridge_paths::{AbsoluteBridges, BridgeForm, GRADED_FROM};
 use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
 
@@ -25,7 +25,7 @@ pub struct UncertaintySets {
     uncertain: bool,
     /// Sample size at the last step.
     last_size: usize,
-    kept_of_paths: Kept,
+    form: BridgeForm,
     /// The quantile under the bridge rule.
     estimator: UpperQuantile,
     /// The common random numbers by sample size; all large ones share those of [`GRADED_FROM`].
@@ -51,22 +51,18 @@ pub struct Radii {
 }
 
 impl UncertaintySets {
-    pub fn new(specification: &Specification) -> Self {
-        UncertaintySets::with(specification, Kept::default())
-    }
-
-    /// From bridges of which `kept` is kept.
-    pub fn with(specification: &Specification, kept: Kept) -> Self {
+    /// Bridge radii are taken over paths of this form.
+    pub fn new(specification: &Specification, form: BridgeForm) -> Self {
         let uncertain = !matches!(specification.problem.framework, Framework::KnownLaw | Framework::PlugIn);
         let rule = specification.problem.radius_rule();
         let estimator = match rule {
-            RadiusRule::Bridge { alpha, paths, .. } => UpperQuantile::new(paths, alpha, kept),
-            _ => UpperQuantile::new(1, 0.5, kept),
+            RadiusRule::Bridge { alpha, paths, .. } => UpperQuantile::new(paths, alpha),
+            _ => UpperQuantile::new(1, 0.5),
         };
         let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
         let bridges = Mutex::new(HashMap::new());
         let seed = specification.seed;
-        UncertaintySets { rule, seed, uncertain, last_size, kept_of_paths: kept, estimator, bridges }
+        UncertaintySets { rule, seed, uncertain, last_size, form, estimator, bridges }
     }
 
     /// True where laws of one sample size have different radii.
@@ -87,8 +83,8 @@ impl UncertaintySets {
             Arc::clone(kept.entry(key).or_default())
         };
         let simulate = || match key {
-            GRADED_FROM => AbsoluteBridges::graded(paths, self.seed, self.kept_of_paths),
-            _ => AbsoluteBridges::simulate(sample_size, paths, self.seed, self.kept_of_paths),
+            GRADED_FROM => AbsoluteBridges::graded(paths, self.seed, self.form),
+            _ => AbsoluteBridges::simulate(sample_size, paths, self.seed, self.form),
         };
         Arc::clone(found.get_or_init(|| Arc::new(simulate())))
     }

@@ -1,8 +1,9 @@
 //! The bridge statistic: the limit law of the Wasserstein distance between an empirical law and the true one.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
-use super::bridge_paths::{AbsoluteBridges, Kept, Times};
+use super::bridge_paths::{AbsoluteBridges, Times};
 use super::dispatch::dispatched;
 use super::empirical::EmpiricalDistribution;
 use super::harrell_davis::{HarrellDavis, LastEstimate};
@@ -28,20 +29,20 @@ pub struct Quantile {
 
 /// The (1 - alpha)-quantile of a statistic over simulated paths: of directions with the length integrated out, of whole
 /// paths from their order statistics.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct UpperQuantile {
     alpha: f64,
-    order_statistics: Option<OrderStatistics>,
+    paths: usize,
+    /// Made when whole paths first ask for them.
+    order_statistics: OnceLock<OrderStatistics>,
 }
 
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 struct OrderStatistics {
     at: HarrellDavis,
     /// One standard deviation of the share of paths below and above.
     beside: [HarrellDavis; 2],
 }
-
-const MISMATCH: &str = "an estimator made for what the bridges keep";
 
 /// What one quantile leaves for the next of a similar law.
 #[derive(Default)]
@@ -51,46 +52,44 @@ struct Last {
 }
 
 impl UpperQuantile {
-    /// `alpha` in (0, 1), over `paths` >= 1 of which `kept` is kept. Cost O(paths).
-    pub fn new(paths: usize, alpha: f64, kept: Kept) -> Self {
-        let order_statistics = (kept == Kept::Paths).then(|| {
+    /// `alpha` in [0.001, 0.999], over `paths` >= 1.
+    pub fn new(paths: usize, alpha: f64) -> Self {
+        UpperQuantile { alpha, paths, order_statistics: OnceLock::new() }
+    }
+
+    fn order_statistics(&self) -> &OrderStatistics {
+        self.order_statistics.get_or_init(|| {
+            let (alpha, paths) = (self.alpha, self.paths);
             let deviation = (alpha * (1.0 - alpha) / paths as f64).sqrt();
             let shares =
                 [(1.0 - alpha - deviation).max(0.5 * (1.0 - alpha)), (1.0 - alpha + deviation).min(1.0 - 0.5 * alpha)];
             let at = HarrellDavis::new(paths, 1.0 - alpha);
             OrderStatistics { at, beside: shares.map(|share| HarrellDavis::new(paths, share)) }
-        });
-        UpperQuantile { alpha, order_statistics }
+        })
     }
 
     fn alone(&self, bridges: &AbsoluteBridges, statistic: &[f64]) -> f64 {
-        match (&self.order_statistics, &bridges.lengths) {
-            (Some(order), None) => order.at.estimate(statistic),
-            (None, Some(lengths)) => lengths.quantile(1.0 - self.alpha, statistic),
-            _ => panic!("{MISMATCH}"),
+        match &bridges.lengths {
+            Some(lengths) => lengths.quantile(1.0 - self.alpha, statistic),
+            None => self.order_statistics().at.estimate(statistic),
         }
     }
 
     fn next(&self, bridges: &AbsoluteBridges, statistic: &[f64], last: &mut Last) -> f64 {
-        match (&self.order_statistics, &bridges.lengths) {
-            (Some(order), None) => order.at.estimate_next(statistic, &mut last.paths),
-            (None, Some(lengths)) => lengths.quantile_next(1.0 - self.alpha, statistic, &mut last.directions),
-            _ => panic!("{MISMATCH}"),
+        match &bridges.lengths {
+            Some(lengths) => lengths.quantile_next(1.0 - self.alpha, statistic, &mut last.directions),
+            None => self.order_statistics().at.estimate_next(statistic, &mut last.paths),
         }
     }
 
     fn with_error(&self, bridges: &AbsoluteBridges, statistic: &[f64]) -> Quantile {
-        match (&self.order_statistics, &bridges.lengths) {
-            (Some(OrderStatistics { at, beside: [below, above] }), None) => {
-                let [value, below, above] = HarrellDavis::estimates([at, below, above], statistic);
-                Quantile { value, standard_error: 0.5 * (above - below) }
-            }
-            (None, Some(lengths)) => {
-                let (value, standard_error) = lengths.quantile_with_error(1.0 - self.alpha, statistic);
-                Quantile { value, standard_error }
-            }
-            _ => panic!("{MISMATCH}"),
-        }
+        let Some(lengths) = &bridges.lengths else {
+            let OrderStatistics { at, beside: [below, above] } = self.order_statistics();
+            let [value, below, above] = HarrellDavis::estimates([at, below, above], statistic);
+            return Quantile { value, standard_error: 0.5 * (above - below) };
+        };
+        let (value, standard_error) = lengths.quantile_with_error(1.0 - self.alpha, statistic);
+        Quantile { value, standard_error }
     }
 }
 
@@ -258,15 +257,16 @@ fn add_nodes(gaps: &[f64], nodes: &[f64], statistic: &mut [f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::bridge_paths::BridgeForm;
 
     #[test]
     fn carrying_sums_equals_building_each_law() {
         let law = EmpiricalDistribution::new(&[0.02, -0.05, 0.11, 0.04, 0.04]);
         let values = [-0.4, -0.05, 0.0, 0.04, 0.05, 0.3];
         // The tolerance of one of many quantiles; six additions and subtractions of numbers below 1.
-        for (kept, allowed) in [(Kept::Directions, 1e-6), (Kept::Paths, 1e-14)] {
-            let bridges = AbsoluteBridges::simulate(6, 300, 9, kept);
-            let estimator = UpperQuantile::new(300, 0.1, kept);
+        for (form, allowed) in [(BridgeForm::Directions, 1e-6), (BridgeForm::WholePaths, 1e-14)] {
+            let bridges = AbsoluteBridges::simulate(6, 300, 9, form);
+            let estimator = UpperQuantile::new(300, 0.1);
             let carried = bridges.quantiles_with(law.atoms(), &values, Statistic::Now, &estimator);
             for (value, quantile) in values.iter().zip(carried) {
                 let mut larger = law.clone();
@@ -279,7 +279,7 @@ mod tests {
     #[test]
     fn the_statistic_is_the_plain_sum_to_the_last_bit() {
         for size in [2, 4, 5, 6, 9, 11] {
-            let bridges = AbsoluteBridges::simulate(size, 37, 4, Kept::Paths);
+            let bridges = AbsoluteBridges::simulate(size, 37, 4, BridgeForm::WholePaths);
             let atoms: Vec<f64> = (0..size).map(|k| (k as f64).powf(1.3)).collect();
             let mut plain = vec![0.0; 37];
             for (pair, column) in atoms.windows(2).zip(bridges.values.chunks_exact(bridges.paths)) {
@@ -291,9 +291,9 @@ mod tests {
 
     #[test]
     fn the_quantile_is_continuous_in_the_law() {
-        for kept in [Kept::Directions, Kept::Paths] {
-            let bridges = AbsoluteBridges::simulate(5, 2000, 1, kept);
-            let estimator = UpperQuantile::new(2000, 0.1, kept);
+        for form in [BridgeForm::Directions, BridgeForm::WholePaths] {
+            let bridges = AbsoluteBridges::simulate(5, 2000, 1, form);
+            let estimator = UpperQuantile::new(2000, 0.1);
             let quantile =
                 |sample: &[f64]| bridges.quantile_with_error(&EmpiricalDistribution::new(sample), &estimator);
             let before = quantile(&[0.02, -0.05, 0.11, 0.04, 0.07]);
@@ -313,10 +313,10 @@ mod tests {
     #[test]
     fn directions_need_fewer_paths_and_say_how_far_they_are_off() {
         let law = EmpiricalDistribution::new(&[0.02, -0.05, 0.11, 0.04, 0.07, -0.13, 0.005, 0.062, -0.02, 0.09]);
-        let [directions, paths] = [Kept::Directions, Kept::Paths].map(|kept| {
-            let estimator = UpperQuantile::new(200, 0.1, kept);
+        let [directions, paths] = [BridgeForm::Directions, BridgeForm::WholePaths].map(|form| {
+            let estimator = UpperQuantile::new(200, 0.1);
             let found = (0..200)
-                .map(|seed| AbsoluteBridges::simulate(10, 200, seed, kept).quantile_with_error(&law, &estimator));
+                .map(|seed| AbsoluteBridges::simulate(10, 200, seed, form).quantile_with_error(&law, &estimator));
             let (values, errors): (Vec<f64>, Vec<f64>) = found.map(|found| (found.value, found.standard_error)).unzip();
             (deviation(&values), errors.iter().sum::<f64>() / 200.0)
         });
@@ -328,7 +328,7 @@ mod tests {
     #[test]
     fn one_later_is_the_mean_over_the_values_of_the_law() {
         let law = EmpiricalDistribution::new(&[0.02, -0.05, 0.11, 0.04, 0.07]);
-        let bridges = AbsoluteBridges::simulate(6, 20, 1, Kept::Directions);
+        let bridges = AbsoluteBridges::simulate(6, 20, 1, BridgeForm::Directions);
         let mut mean = vec![0.0; 20];
         for &atom in law.atoms() {
             let mut doubled = law.clone();
@@ -347,16 +347,16 @@ mod tests {
         // A Student-like sample: its widest gaps lie where the grid is finest.
         let sample: Vec<f64> = (0..1500).map(|k| (f64::from(k) - 749.5) / (f64::from(k.min(1499 - k)) + 0.5)).collect();
         let law = EmpiricalDistribution::new(&sample);
-        for kept in [Kept::Directions, Kept::Paths] {
-            let exact = AbsoluteBridges::simulate(1500, 2000, 4, kept);
-            let graded = AbsoluteBridges::graded(2000, 4, kept);
-            let estimator = UpperQuantile::new(2000, 0.1, kept);
+        for form in [BridgeForm::Directions, BridgeForm::WholePaths] {
+            let exact = AbsoluteBridges::simulate(1500, 2000, 4, form);
+            let graded = AbsoluteBridges::graded(2000, 4, form);
+            let estimator = UpperQuantile::new(2000, 0.1);
             let expected = exact.quantile_with_error(&law, &estimator);
             let found = graded.quantile_with_error(&law, &estimator);
             // Paths inside a cell are other draws: four standard deviations of the difference, were all of it so.
             let allowed = 4.0 * expected.standard_error.hypot(found.standard_error);
             assert!((found.value - expected.value).abs() < allowed, "{found:?} against {expected:?}");
-            if kept == Kept::Paths {
+            if form == BridgeForm::WholePaths {
                 let sum =
                     |bridges: &AbsoluteBridges| bridges.statistic(law.atoms(), Statistic::Now).iter().sum::<f64>();
                 // The statistic's deviation is about half its mean: four standard errors of the mean of 2000 are 5 %.
@@ -368,8 +368,8 @@ mod tests {
     #[test]
     fn graded_sums_are_carried_too() {
         let atoms: Vec<f64> = (0..3000).map(|k| (f64::from(k) / 1500.0 - 1.0).powi(3)).collect();
-        let bridges = AbsoluteBridges::graded(50, 2, Kept::Directions);
-        let estimator = UpperQuantile::new(50, 0.1, Kept::Directions);
+        let bridges = AbsoluteBridges::graded(50, 2, BridgeForm::Directions);
+        let estimator = UpperQuantile::new(50, 0.1);
         let values = [-2.0, -0.7, 0.001, 0.4, 0.41, 3.0];
         for which in [Statistic::Now, Statistic::OneLater] {
             let carried = bridges.quantiles_with(&atoms, &values, which, &estimator);

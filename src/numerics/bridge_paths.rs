@@ -1,8 +1,8 @@
 //! Paths of Brownian bridges, in absolute value, at the times that laws of one size or of all large sizes ask for.
 //!
-//! A bridge at m times is a direction times a length: `sum (dB)^2 / dt` over the m + 1 intervals is chi-square with m degrees
-//! of freedom and independent of the direction. A statistic that grows with the path as |B| does can therefore be simulated
-//! over directions alone, and its length be integrated out.
+//! A bridge at m times is a direction times a length: `sum (dB)^2 / dt` over the m + 1 intervals is chi-square with m
+//! degrees of freedom and independent of the direction. A statistic that grows with the path as |B| does can therefore
+//! be simulated over directions alone, and its length be integrated out.
 
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -22,15 +22,14 @@ pub struct AbsoluteBridges {
     pub(super) lengths: Option<ScaleMixture>,
 }
 
-/// What is kept of a path.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Kept {
+/// What of a path a statistic is taken over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BridgeForm {
     /// Its direction: `|B|` over the length of the path.
-    #[default]
     Directions,
     /// The path itself, interpolated and scaled to its variance where its nodes lie between those simulated: policies of
     /// the first two formats.
-    Paths,
+    WholePaths,
 }
 
 /// The times at which paths are kept.
@@ -68,8 +67,8 @@ fn refine(bridge: &mut [f64], generator: &mut impl Rng) {
     }
 }
 
-/// Where a node lies in the dyadic grid: between `left` and the next grid point, with these weights. What they leave of the
-/// variance is that of a normal of this deviation, 0 where the weights are scaled to leave none.
+/// Where a node lies in the dyadic grid: between `left` and the next grid point, with these weights. What they leave of
+/// the variance is that of a normal of this deviation, 0 where the weights are scaled to leave none.
 struct Place {
     left: usize,
     weights: [f64; 2],
@@ -107,33 +106,34 @@ impl Place {
 impl AbsoluteBridges {
     /// Simulates `paths` standard Brownian bridges at the times i/n.
     ///
-    /// Path p is the same path at every sample size, so that the quantile moves from one sample size to the next as the
-    /// law does, and not as two simulations differ: the stream (seed, "bridge", 0, p) refines it by midpoints on 2^m
+    /// Path p is the same path at every sample size, so that the quantile moves from one sample size to the next more as
+    /// the law does than as two simulations differ: the stream (seed, "bridge", 0, p) refines it by midpoints on 2^m
     /// cells, m the least with at least 1024 and 4n of them. B(i/n) is drawn given their ends from the stream (seed,
-    /// "bridge between cells", n, p); of `Kept::Paths` it is interpolated and scaled to its exact variance, and
-    /// covariances are off by less than the cell, 1/1024. Cost O(n paths) and a few thousand normals a path.
-    pub fn simulate(sample_size: usize, paths: usize, seed: u64, kept: Kept) -> Self {
+    /// "bridge in cells", n, p), and the length, of which neighbouring sizes share most but not all, is theirs; of
+    /// [`BridgeForm::WholePaths`] B(i/n) is interpolated and scaled to its exact variance, and covariances are off by
+    /// less than the cell, 1/1024. Cost O(n paths) and a few thousand normals a path.
+    pub fn simulate(sample_size: usize, paths: usize, seed: u64, form: BridgeForm) -> Self {
         let nodes = sample_size.saturating_sub(1);
         let cells = LEAST_CELLS.max(4 * sample_size).next_power_of_two();
-        let place = |node: usize| match kept {
-            Kept::Directions => Place::of(node, sample_size, cells),
-            Kept::Paths => Place::on_the_line(node, sample_size, cells),
+        let place = |node: usize| match form {
+            BridgeForm::Directions => Place::of(node, sample_size, cells),
+            BridgeForm::WholePaths => Place::on_the_line(node, sample_size, cells),
         };
         let places: Vec<Place> = (1..=nodes).map(place).collect();
         let times: Vec<f64> = (1..=nodes).map(|node| node as f64 / sample_size as f64).collect();
         let mut bridge = vec![0.0; cells + 1];
         let path = |index: usize, path: &mut [f64]| {
             refine(&mut bridge, &mut stream(seed, "bridge", 0, index));
-            let mut between = stream(seed, "bridge between cells", sample_size, index);
+            let mut between = stream(seed, "bridge in cells", sample_size, index);
             path.iter_mut().zip(&places).for_each(|(value, place)| *value = place.value(&bridge, &mut between));
         };
-        AbsoluteBridges::gather(&times, Times::Sample(sample_size), paths, kept, path)
+        AbsoluteBridges::gather(&times, Times::Sample(sample_size), paths, form, path)
     }
 
     /// The same paths at times that serve every sample size from about [`GRADED_FROM`] on: 512 equal cells, of which the
     /// first and the last are halved 14 times towards the ends. Between two times `|B|` is interpolated and scaled to its
     /// exact mean; the product of two values within a cell is off by less than the cell.
-    pub fn graded(paths: usize, seed: u64, kept: Kept) -> Self {
+    pub fn graded(paths: usize, seed: u64, form: BridgeForm) -> Self {
         let cell = 1.0 / GRADED_CELLS as f64;
         let halved = |power: u32| cell * 0.5_f64.powi(power as i32);
         let ends = (1..=HALVINGS).rev().map(halved);
@@ -155,24 +155,30 @@ impl AbsoluteBridges {
                 (path[distance], path[last - distance]) = (low, high);
             }
         };
-        AbsoluteBridges::gather(&times, Times::Graded(times.clone()), paths, kept, path)
+        AbsoluteBridges::gather(&times, Times::Graded(times.clone()), paths, form, path)
     }
 
     /// All paths, each written by `draw` given its index.
-    fn gather(at: &[f64], times: Times, paths: usize, kept: Kept, mut draw: impl FnMut(usize, &mut [f64])) -> Self {
+    fn gather(
+        at: &[f64],
+        times: Times,
+        paths: usize,
+        form: BridgeForm,
+        mut draw: impl FnMut(usize, &mut [f64]),
+    ) -> Self {
         let mut values = vec![0.0; at.len() * paths];
         let mut path = vec![0.0; at.len()];
         for index in 0..paths {
             draw(index, &mut path);
-            let unit = match kept {
-                Kept::Directions => length(at, &path),
-                Kept::Paths => 1.0,
+            let unit = match form {
+                BridgeForm::Directions => length(at, &path),
+                BridgeForm::WholePaths => 1.0,
             };
             for (time, value) in path.iter().enumerate() {
                 values[time * paths + index] = value.abs() / unit;
             }
         }
-        let lengths = (kept == Kept::Directions).then(|| ScaleMixture::chi(at.len().max(1)));
+        let lengths = (form == BridgeForm::Directions).then(|| ScaleMixture::chi(at.len().max(1)));
         AbsoluteBridges { times, paths, values, lengths }
     }
 }
@@ -202,7 +208,7 @@ mod tests {
                 let mut sums = [[0.0; 3]; 3];
                 for path in 0..20_000 {
                     refine(&mut cells, &mut stream(5, "bridge", 0, path));
-                    let mut between = stream(5, "bridge between cells", sample_size, path);
+                    let mut between = stream(5, "bridge in cells", sample_size, path);
                     let values = places.each_ref().map(|place| place.value(&cells, &mut between));
                     for (row, left) in sums.iter_mut().zip(values) {
                         row.iter_mut().zip(values).for_each(|(sum, right)| *sum += left * right / 20_000.0);
@@ -232,18 +238,21 @@ mod tests {
             let ratios = whole.values[range.clone()].iter().zip(&unit.values[range]);
             ratios.map(|(value, direction)| (value / direction).powi(2)).collect()
         };
-        // The middle node of 16 lies on the grid: both kinds keep the same path there.
+        // The middle of 10 lies on the grid, where both forms have the same path, and its other nodes between.
         let [directions, paths] =
-            [Kept::Directions, Kept::Paths].map(|kept| AbsoluteBridges::simulate(16, 2000, 7, kept));
-        chi_square(&middle(&paths, &directions, 7), 15.0);
-        let [directions, paths] = [Kept::Directions, Kept::Paths].map(|kept| AbsoluteBridges::graded(2000, 7, kept));
+            [BridgeForm::Directions, BridgeForm::WholePaths].map(|form| AbsoluteBridges::simulate(10, 2000, 7, form));
+        chi_square(&middle(&paths, &directions, 4), 9.0);
+        let [directions, paths] =
+            [BridgeForm::Directions, BridgeForm::WholePaths].map(|form| AbsoluteBridges::graded(2000, 7, form));
         chi_square(&middle(&paths, &directions, 270), (directions.values.len() / 2000) as f64);
     }
 
     #[test]
     fn a_path_is_the_same_at_every_sample_size() {
-        let (few, many) =
-            (AbsoluteBridges::simulate(4, 50, 3, Kept::Paths), AbsoluteBridges::simulate(2048, 50, 3, Kept::Paths));
+        let (few, many) = (
+            AbsoluteBridges::simulate(4, 50, 3, BridgeForm::WholePaths),
+            AbsoluteBridges::simulate(2048, 50, 3, BridgeForm::WholePaths),
+        );
         for path in 0..50 {
             // Node 2 of 4 and node 1024 of 2048 are both the middle.
             assert_eq!(few.values[50 + path], many.values[1023 * 50 + path]);

@@ -11,7 +11,7 @@ use super::empirical::EmpiricalDistribution;
 pub struct ExponentialMean<'a> {
     /// Ascending.
     atoms: &'a [f64],
-    /// `sums[j]`: sums of e^z and of its square over the first j atoms.
+    /// `sums[j]`: sums of e^z and of (e^z - 1)^2 over the first j atoms.
     sums: Vec<[f64; 2]>,
     lowest: f64,
 }
@@ -29,7 +29,7 @@ impl<'a> ExponentialMean<'a> {
         let mut sums = vec![[0.0; 2]];
         let mut total = [0.0; 2];
         for atom in law.atoms() {
-            total = added(total, atom.exp(), 1.0);
+            total = added(total, *atom, 1.0);
             sums.push(total);
         }
         ExponentialMean { atoms: law.atoms(), sums, lowest }
@@ -69,15 +69,15 @@ impl<'a> ExponentialMean<'a> {
             }
         }
         let cap = (cap - budget / above).max(self.lowest.min(cap));
-        let below = extra_left.map_or(self.sums[left], |extra| added(self.sums[left], extra.exp(), 1.0));
-        let [mean, square] = added(below, cap.exp(), above).map(|sum| sum / size);
-        WorstExponential { mean, variance: (square - mean * mean).max(0.0) }
+        let below = extra_left.map_or(self.sums[left], |extra| added(self.sums[left], extra, 1.0));
+        let [mean, square] = added(below, cap, above).map(|sum| sum / size);
+        WorstExponential { mean, variance: (square - (mean - 1.0).powi(2)).max(0.0) }
     }
 }
 
-/// The sums of a value and of its square, with `count` more of `value`.
-fn added([sum, squares]: [f64; 2], value: f64, count: f64) -> [f64; 2] {
-    [sum + count * value, squares + count * value * value]
+/// The sums with `count` more of one log-return.
+fn added([sum, squares]: [f64; 2], log_return: f64, count: f64) -> [f64; 2] {
+    [sum + count * log_return.exp(), squares + count * log_return.exp_m1().powi(2)]
 }
 
 #[cfg(test)]

@@ -2,13 +2,13 @@
 
 use std::error::Error;
 
+use ballast::control::context::ProblemContext;
 use ballast::control::design::continuous_law;
 use ballast::control::evaluate::{Evaluation, Follower, Outcomes};
 use ballast::control::evaluation::EvaluationRequest;
 use ballast::control::evaluation_report::EvaluationReport;
 use ballast::control::pool::TrainingPool;
 use ballast::control::specification::Framework;
-use ballast::control::uncertainty::UncertaintySets;
 use ballast::control::utility::utility;
 use ballast::numerics::empirical::EmpiricalDistribution;
 use ballast::numerics::streams::stream;
@@ -92,7 +92,7 @@ pub fn section(plan: &Plan, workshop: &Workshop) -> Result<Section, Box<dyn Erro
 /// Draws histories until each table has enough of its own, or patience ends; the quantiles of all, and the histories.
 fn seek(plan: &Plan, evaluation: &Evaluation) -> (Quantiles, [Vec<Vec<f64>>; 2]) {
     let request = &evaluation.request;
-    let sets = UncertaintySets::new(&request.specification(Framework::Adaptive, None));
+    let sets = ProblemContext::new(&request.specification(Framework::Adaptive, None)).sets;
     let law = continuous_law(&paper::mixture(), &[]);
     let draw = |index: usize| {
         let mut generator = stream(request.seed, "reproduce-seek", index, 0);

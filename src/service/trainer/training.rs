@@ -36,7 +36,7 @@ impl Worker {
             Err(error) => return Ok(Err(ended_training(&error))),
         };
         let checkpoints = self.runtime.block_on(self.store.checkpoints(job))?;
-        let mut steps = resumed(&training, first..first + training.horizon(), &checkpoints);
+        let mut steps = resumed(first..first + training.horizon(), &checkpoints);
         if first == 0 || !steps.is_empty() {
             self.board.resume(job, first + steps.len());
         }
@@ -48,7 +48,7 @@ impl Worker {
                 Err(error) => return Ok(Err(ended_training(&error))),
             };
             metrics::histogram!(names::TRAINING_STEP_SECONDS).record(started.elapsed().as_secs_f64());
-            let Ok(bytes) = serde_json::to_vec(&solution) else {
+            let Ok(bytes) = solution.to_checkpoint() else {
                 return Ok(Err(failed(format!("step {step}: the solution cannot be written as JSON"))));
             };
             let saving = self.store.save_checkpoint(job, claimed.attempt, first + step, &bytes);
@@ -64,12 +64,11 @@ impl Worker {
 }
 
 /// The solutions that need not be computed again: those of the checkpoints in `range`, from its end downwards without a
-/// gap and in the inputs of this release.
-fn resumed(training: &Training, range: Range<usize>, checkpoints: &[(usize, Vec<u8>)]) -> Vec<StepSolution> {
+/// gap and in the format of this release.
+fn resumed(range: Range<usize>, checkpoints: &[(usize, Vec<u8>)]) -> Vec<StepSolution> {
     let newest_first = checkpoints.iter().rev().filter(|(step, _)| range.contains(step));
     let in_order = newest_first.zip(range.clone().rev()).take_while(|((step, _), expected)| step == expected);
-    let solutions = in_order.map_while(|((_, bytes), _)| serde_json::from_slice(bytes).ok());
-    solutions.take_while(|solution| training.accepts(solution)).collect()
+    in_order.map_while(|((_, bytes), _)| StepSolution::from_checkpoint(bytes)).collect()
 }
 
 fn succeeded(policy: &Policy) -> JobOutcome {
