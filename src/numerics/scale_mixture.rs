@@ -66,8 +66,8 @@ impl ScaleMixture {
         ScaleMixture { coefficients: polynomial(share), rate, offset, typical }
     }
 
-    /// The `share`-quantile of R h from draws of h, none negative; `share` in [0.001, 0.999], where the polynomial stands
-    /// for F. Cost O(draws).
+    /// The `share`-quantile of R h from draws of h, none negative; `share` in [0.001, 0.999], where the polynomial
+    /// stands for F. Cost O(draws).
     pub fn quantile(&self, share: f64, draws: &[f64]) -> f64 {
         self.quantile_within(TOLERANCE, share, draws, &mut LastQuantile::default())
     }
@@ -143,8 +143,8 @@ impl ScaleMixture {
         self.mean(quantile, reciprocals, |share| share)
     }
 
-    /// The mean of a function of F(q / h). What is fused is written so, and the sum has fixed accumulators: the bits do not
-    /// depend on the processor.
+    /// The mean of a function of F(q / h). What is fused is written so, and the sum has fixed accumulators: the bits do
+    /// not depend on the processor.
     #[inline(always)]
     fn mean(&self, quantile: f64, reciprocals: &[f64], function: impl Fn(f64) -> f64) -> f64 {
         let mut staged = [0.0; BLOCK];
