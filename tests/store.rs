@@ -49,7 +49,6 @@ on_both_engines!(
     a_damaged_policy_is_detected,
     tenants_see_only_their_own,
     a_key_is_listed_and_revoked_beside_the_store,
-    what_was_there_before_keys_is_the_default_tenants,
     a_session_moved_to_another_tenant_is_damaged,
     a_session_needs_its_policy_and_a_free_name,
     a_restart_keeps_sessions_bit_for_bit,
@@ -702,19 +701,6 @@ async fn a_key_is_listed_and_revoked_beside_the_store(place: &Place) {
     ring.close().await;
     place.tamper("UPDATE access_keys SET roles = 'root' WHERE access_key = 'key_1'").await;
     assert!(matches!(place.open().await.keys().await, Err(StoreError::Corrupt { .. })));
-}
-
-/// A store of the release before: the first migration alone, with rows.
-async fn what_was_there_before_keys_is_the_default_tenants(place: &Place) {
-    place.create_of_schema_1(&content_hash(POLICY), POLICY).await;
-    let store = place.open().await;
-    let (policy, here) = (content_hash(POLICY), Tenant::default());
-    assert_eq!(store.policy(&here, &policy).await.unwrap().unwrap().created_ms, 1);
-    assert_eq!(store.policies(&here, 10, None).await.unwrap().len(), 1);
-    assert_eq!(store.jobs(&here, 10, None).await.unwrap()[0].job, "old");
-    let again = store.create_job(new_job("new", Some("old key"))).await.unwrap();
-    assert!(matches!(again, CreateJob::Repeated(row) if row.job == "old"));
-    assert_eq!(store.jobs(&tenant("north"), 10, None).await.unwrap(), []);
 }
 
 async fn a_session_moved_to_another_tenant_is_damaged(place: &Place) {

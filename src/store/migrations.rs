@@ -10,14 +10,8 @@ use super::error::{Failure, StoreError};
 /// Version, description, statements.
 type Step = (i64, &'static str, &'static str);
 
-const SQLITE: [Step; 2] = [
-    (1, "facts", include_str!("migrations/sqlite/0001_facts.sql")),
-    (2, "keys", include_str!("migrations/sqlite/0002_keys.sql")),
-];
-const POSTGRES: [Step; 2] = [
-    (1, "facts", include_str!("migrations/postgres/0001_facts.sql")),
-    (2, "keys", include_str!("migrations/postgres/0002_keys.sql")),
-];
+const SQLITE: [Step; 1] = [(1, "facts", include_str!("migrations/sqlite/0001_facts.sql"))];
+const POSTGRES: [Step; 1] = [(1, "facts", include_str!("migrations/postgres/0001_facts.sql"))];
 
 pub(super) fn sqlite() -> Migrator {
     migrator(&SQLITE)

@@ -180,15 +180,14 @@ impl SessionRow {
     }
 
     fn seal(&self) -> Seal {
-        let seal = Seal::of("session")
+        Seal::of("session")
             .text(&self.session)
+            .text(self.tenant.as_str())
             .text(&self.policy)
             .real(self.initial_wealth)
             .bytes(&encode_reals(&self.initial_history))
             .integer(to_sql(self.horizon))
-            .integer(self.created_ms);
-        // Sessions sealed before there were tenants are the default one's.
-        if self.tenant.is_default() { seal } else { seal.text(self.tenant.as_str()) }
+            .integer(self.created_ms)
     }
 
     pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {

@@ -3,10 +3,8 @@
 use std::path::Path;
 
 use ballast::store::{KeyRing, Store, StoreError};
-use sqlx::migrate::{Migration, MigrationType, Migrator};
-use sqlx::postgres::PgConnection;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
-use sqlx::{AssertSqlSafe, Connection, SqlSafeStr};
+use sqlx::{AssertSqlSafe, Connection};
 use tempfile::TempDir;
 
 use super::postgres;
@@ -43,47 +41,6 @@ impl Place {
             Place::Folder(folder) => KeyRing::open(&folder.path().join("data")).await,
             Place::Database(url) => KeyRing::connect(&url.parse().unwrap()).await,
         }
-    }
-
-    /// Makes what a release with the first migration alone left: a policy, and a job under an idempotency key.
-    pub async fn create_of_schema_1(&self, policy: &str, json: &[u8]) {
-        let migrator = |facts: &'static str| {
-            let kind = MigrationType::Simple;
-            Migrator::with_migrations(vec![Migration::new(1, "facts".into(), kind, facts.into_sql_str(), false)])
-        };
-        match self {
-            Place::Folder(folder) => {
-                std::fs::create_dir(folder.path().join("data")).unwrap();
-                let file = folder.path().join("data/ballast.sqlite");
-                let options = SqliteConnectOptions::new().filename(file).create_if_missing(true);
-                let mut connection = SqliteConnection::connect_with(&options).await.unwrap();
-                migrator(include_str!("../../src/store/migrations/sqlite/0001_facts.sql"))
-                    .run(&mut connection)
-                    .await
-                    .unwrap();
-                connection.close().await.unwrap();
-            }
-            Place::Database(url) => {
-                let mut connection = PgConnection::connect(url).await.unwrap();
-                migrator(include_str!("../../src/store/migrations/postgres/0001_facts.sql"))
-                    .run(&mut connection)
-                    .await
-                    .unwrap();
-                connection.close().await.unwrap();
-            }
-        }
-        let hex: String = json.iter().map(|byte| format!("{byte:02x}")).collect();
-        let bytes = match self {
-            Place::Folder(_) => format!("x'{hex}'"),
-            Place::Database(_) => format!("decode('{hex}', 'hex')"),
-        };
-        self.tamper(&format!("INSERT INTO policies (policy, created_ms, json) VALUES ('{policy}', 1, {bytes})")).await;
-        self.tamper(
-            "INSERT INTO jobs (job, kind, state, request_json, steps_total, created_ms)
-             VALUES ('old', 'train', 'queued', '{}', 1, 1)",
-        )
-        .await;
-        self.tamper("INSERT INTO idempotency_keys VALUES ('old key', 'hash', 'old')").await;
     }
 
     pub async fn reopen(&self, store: Store) -> Store {

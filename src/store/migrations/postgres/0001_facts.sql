@@ -3,6 +3,7 @@
 CREATE TABLE jobs (
     sequence         BIGINT GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
     job              TEXT NOT NULL UNIQUE,
+    tenant           TEXT NOT NULL,
     kind             TEXT NOT NULL,
     state            TEXT NOT NULL CHECK (state IN ('queued', 'running', 'succeeded', 'failed', 'cancelled')),
     request_json     TEXT NOT NULL,
@@ -22,11 +23,14 @@ CREATE TABLE jobs (
 );
 
 CREATE INDEX jobs_by_state ON jobs (state, sequence);
+CREATE INDEX jobs_by_tenant ON jobs (tenant, sequence);
 
 CREATE TABLE idempotency_keys (
-    idempotency_key TEXT PRIMARY KEY,
+    tenant          TEXT NOT NULL,
+    idempotency_key TEXT NOT NULL,
     request_hash    TEXT NOT NULL,
-    job             TEXT NOT NULL REFERENCES jobs (job)
+    job             TEXT NOT NULL REFERENCES jobs (job),
+    PRIMARY KEY (tenant, idempotency_key)
 );
 
 CREATE TABLE checkpoints (
@@ -44,9 +48,21 @@ CREATE TABLE policies (
     json       BYTEA NOT NULL
 );
 
+-- A policy is named by its content, so two tenants may have the same one; each sees, dates and deletes its own.
+CREATE TABLE policy_owners (
+    sequence   BIGINT GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
+    tenant     TEXT NOT NULL,
+    policy     TEXT NOT NULL REFERENCES policies (policy),
+    created_ms BIGINT NOT NULL,
+    UNIQUE (policy, tenant)
+);
+
+CREATE INDEX policy_owners_by_tenant ON policy_owners (tenant, sequence);
+
 CREATE TABLE sessions (
     sequence        BIGINT GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
     session         TEXT NOT NULL UNIQUE,
+    tenant          TEXT NOT NULL,
     policy          TEXT NOT NULL REFERENCES policies (policy) ON DELETE RESTRICT,
     initial_wealth  DOUBLE PRECISION NOT NULL,
     -- Doubles, little-endian, eight bytes each.
@@ -57,6 +73,7 @@ CREATE TABLE sessions (
 );
 
 CREATE INDEX sessions_by_policy ON sessions (policy);
+CREATE INDEX sessions_by_tenant ON sessions (tenant, sequence);
 
 CREATE TABLE observations (
     session             TEXT NOT NULL REFERENCES sessions (session) ON DELETE CASCADE,
@@ -70,4 +87,15 @@ CREATE TABLE observations (
     created_ms          BIGINT NOT NULL,
     seal                BYTEA NOT NULL,
     PRIMARY KEY (session, period)
+);
+
+-- Of a key the SHA-256 alone is kept. A revoked one stays: a store that ever had a key never again answers without one.
+CREATE TABLE access_keys (
+    sequence   BIGINT GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
+    access_key TEXT NOT NULL UNIQUE,
+    hash       BYTEA NOT NULL UNIQUE,
+    tenant     TEXT NOT NULL,
+    roles      TEXT NOT NULL,
+    created_ms BIGINT NOT NULL,
+    revoked_ms BIGINT
 );

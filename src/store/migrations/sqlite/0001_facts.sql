@@ -4,6 +4,7 @@
 CREATE TABLE jobs (
     sequence         INTEGER PRIMARY KEY AUTOINCREMENT,
     job              TEXT NOT NULL UNIQUE,
+    tenant           TEXT NOT NULL,
     kind             TEXT NOT NULL,
     state            TEXT NOT NULL CHECK (state IN ('queued', 'running', 'succeeded', 'failed', 'cancelled')),
     request_json     TEXT NOT NULL,
@@ -23,11 +24,14 @@ CREATE TABLE jobs (
 ) STRICT;
 
 CREATE INDEX jobs_by_state ON jobs (state, sequence);
+CREATE INDEX jobs_by_tenant ON jobs (tenant, sequence);
 
 CREATE TABLE idempotency_keys (
-    idempotency_key TEXT PRIMARY KEY,
+    tenant          TEXT NOT NULL,
+    idempotency_key TEXT NOT NULL,
     request_hash    TEXT NOT NULL,
-    job             TEXT NOT NULL REFERENCES jobs (job)
+    job             TEXT NOT NULL REFERENCES jobs (job),
+    PRIMARY KEY (tenant, idempotency_key)
 ) STRICT, WITHOUT ROWID;
 
 CREATE TABLE checkpoints (
@@ -45,9 +49,21 @@ CREATE TABLE policies (
     json       BLOB NOT NULL
 ) STRICT;
 
+-- A policy is named by its content, so two tenants may have the same one; each sees, dates and deletes its own.
+CREATE TABLE policy_owners (
+    sequence   INTEGER PRIMARY KEY AUTOINCREMENT,
+    tenant     TEXT NOT NULL,
+    policy     TEXT NOT NULL REFERENCES policies (policy),
+    created_ms INTEGER NOT NULL,
+    UNIQUE (policy, tenant)
+) STRICT;
+
+CREATE INDEX policy_owners_by_tenant ON policy_owners (tenant, sequence);
+
 CREATE TABLE sessions (
     sequence        INTEGER PRIMARY KEY AUTOINCREMENT,
     session         TEXT NOT NULL UNIQUE,
+    tenant          TEXT NOT NULL,
     policy          TEXT NOT NULL REFERENCES policies (policy) ON DELETE RESTRICT,
     initial_wealth  ANY NOT NULL,
     -- Doubles, little-endian, eight bytes each.
@@ -58,6 +74,7 @@ CREATE TABLE sessions (
 ) STRICT;
 
 CREATE INDEX sessions_by_policy ON sessions (policy);
+CREATE INDEX sessions_by_tenant ON sessions (tenant, sequence);
 
 CREATE TABLE observations (
     session             TEXT NOT NULL REFERENCES sessions (session) ON DELETE CASCADE,
@@ -71,4 +88,15 @@ CREATE TABLE observations (
     created_ms          INTEGER NOT NULL,
     seal                BLOB NOT NULL,
     PRIMARY KEY (session, period)
+) STRICT;
+
+-- Of a key the SHA-256 alone is kept. A revoked one stays: a store that ever had a key never again answers without one.
+CREATE TABLE access_keys (
+    sequence   INTEGER PRIMARY KEY AUTOINCREMENT,
+    access_key TEXT NOT NULL UNIQUE,
+    hash       BLOB NOT NULL UNIQUE,
+    tenant     TEXT NOT NULL,
+    roles      TEXT NOT NULL,
+    created_ms INTEGER NOT NULL,
+    revoked_ms INTEGER
 ) STRICT;
