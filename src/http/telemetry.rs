@@ -41,7 +41,7 @@ pub async fn keep_up() {
 }
 
 /// The metrics page, with the counts of the store as they are now.
-pub fn exposition(jobs: JobCounts, sessions: u64) -> String {
+pub fn exposition(jobs: JobCounts, sessions: u64, waiting: [(&'static str, usize); 2]) -> String {
     let by_state = [
         ("queued", jobs.queued),
         ("running", jobs.running),
@@ -53,6 +53,9 @@ pub fn exposition(jobs: JobCounts, sessions: u64) -> String {
         metrics::gauge!(names::JOBS, "state" => state).set(count as f64);
     }
     metrics::gauge!(names::SESSIONS).set(sessions as f64);
+    for (turn, requests) in waiting {
+        metrics::gauge!(names::TURNS_WAITING, "turn" => turn).set(requests as f64);
+    }
     RECORDER.get().and_then(Option::as_ref).map(PrometheusHandle::render).unwrap_or_default()
 }
 

@@ -1,22 +1,58 @@
-//! Work that requests cause, bounded: a burst waits its turn, and then is told to come back.
+//! Work that requests cause, bounded and taken in turn over tenants.
+//!
+//! There are common places, which anybody takes while they are free, and a few more for guests: tenants none of whose work
+//! is under way. Whoever finds no place waits in his tenant's queue, and a place that becomes free goes to the tenants in
+//! turn. So how much one tenant has queued changes nothing for another, and one that is alone with his question begins at
+//! once beside a long piece of another's: work cannot be interrupted, but the processors are shared by the system, which is
+//! the only fair turn there is with one common place and a piece of half a second in it.
+//!
+//! Who has waited too long is told to come back. Not done, and why: turns weighed by how long a tenant's pieces take (a
+//! tenant of long pieces gets more than his share of the common places, and delays nobody else's first piece).
 
-use std::sync::Arc;
+use std::collections::{HashMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use tokio::sync::Semaphore;
+use tokio::sync::oneshot;
 
 use super::error::ServiceError;
+use crate::store::Tenant;
 
 /// Runs blocking work, so much of it at a time.
 #[derive(Clone)]
 pub(super) struct Bounded {
-    permits: Arc<Semaphore>,
+    turns: Arc<Mutex<Turns>>,
     wait: Duration,
 }
 
+/// How many pieces of work may be under way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Size {
+    /// Of anybody.
+    pub common: usize,
+    /// Of tenants with nothing else under way, beyond the common ones.
+    pub guests: usize,
+}
+
+struct Turns {
+    size: Size,
+    /// Work under way, by tenant; none of them 0.
+    running: HashMap<Tenant, usize>,
+    /// Tenants that wait, whose turn is next first; each has a queue.
+    ring: VecDeque<Tenant>,
+    queues: HashMap<Tenant, VecDeque<oneshot::Sender<Place>>>,
+}
+
+/// The right to work, given up when dropped.
+struct Place {
+    bounded: Bounded,
+    tenant: Tenant,
+}
+
 impl Bounded {
-    pub(super) fn new(permits: usize, wait: Duration) -> Self {
-        Bounded { permits: Arc::new(Semaphore::new(permits)), wait }
+    pub(super) fn new(size: Size, wait: Duration) -> Self {
+        let turns = Turns { size, running: HashMap::new(), ring: VecDeque::new(), queues: HashMap::new() };
+        Bounded { turns: Arc::new(Mutex::new(turns)), wait }
     }
 
     /// Runs `work` on a thread that may block. Its place is taken until it ends, even where the caller goes away.
@@ -25,16 +61,123 @@ impl Bounded {
     /// [`ServiceError::Busy`] where no place became free in time; a panic of `work`.
     pub(super) async fn run<T: Send + 'static>(
         &self,
+        tenant: &Tenant,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let permit = tokio::time::timeout(self.wait, self.permits.clone().acquire_owned()).await;
-        let permit = permit.map_err(|_| ServiceError::Busy)?.map_err(ServiceError::internal)?;
+        let place = self.place(tenant).await?;
         let working = tokio::task::spawn_blocking(move || {
             let answer = work();
-            drop(permit);
+            drop(place);
             answer
         });
         working.await.map_err(ServiceError::internal)
+    }
+
+    /// Requests that wait for a place.
+    pub(super) fn waiting(&self) -> usize {
+        let turns = self.lock();
+        turns.queues.values().flatten().filter(|waiting| !waiting.is_closed()).count()
+    }
+
+    async fn place(&self, tenant: &Tenant) -> Result<Place, ServiceError> {
+        let granted = {
+            let mut turns = self.lock();
+            if turns.take(tenant) {
+                return Ok(Place { bounded: self.clone(), tenant: tenant.clone() });
+            }
+            turns.queue(tenant)
+        };
+        let granted = tokio::time::timeout(self.wait, granted).await;
+        granted.map_err(|_| ServiceError::Busy)?.map_err(ServiceError::internal)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Turns> {
+        // No code panics while holding the lock.
+        self.turns.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let granted = {
+            let mut turns = self.bounded.lock();
+            turns.give_up(&self.tenant);
+            turns.next()
+        };
+        if let Some((tenant, waiting)) = granted {
+            // Who stopped waiting in this instant drops it, and so hands it on.
+            drop(waiting.send(Place { bounded: self.bounded.clone(), tenant }));
+        }
+    }
+}
+
+impl Turns {
+    fn may(&self, tenant: &Tenant) -> bool {
+        let running: usize = self.running.values().sum();
+        let is_guest = !self.running.contains_key(tenant);
+        running < self.size.common || (is_guest && running < self.size.common + self.size.guests)
+    }
+
+    /// Takes a place where there is one, and nobody has waited longer for it.
+    fn take(&mut self, tenant: &Tenant) -> bool {
+        let free = self.may(tenant) && !self.queues.contains_key(tenant);
+        if free {
+            *self.running.entry(tenant.clone()).or_default() += 1;
+        }
+        free
+    }
+
+    fn queue(&mut self, tenant: &Tenant) -> oneshot::Receiver<Place> {
+        let (waiting, granted) = oneshot::channel();
+        let queue = self.queues.entry(tenant.clone()).or_default();
+        if queue.is_empty() {
+            self.ring.push_back(tenant.clone());
+        }
+        queue.retain(|waiting| !waiting.is_closed());
+        queue.push_back(waiting);
+        granted
+    }
+
+    fn give_up(&mut self, tenant: &Tenant) {
+        if let Some(running) = self.running.get_mut(tenant) {
+            *running -= 1;
+            if *running == 0 {
+                self.running.remove(tenant);
+            }
+        }
+    }
+
+    /// Takes the place that became free for whoever is next; the tenant goes to the end of the ring.
+    fn next(&mut self) -> Option<(Tenant, oneshot::Sender<Place>)> {
+        let mut skipped = VecDeque::new();
+        let mut found = None;
+        while let Some(tenant) = self.ring.pop_front() {
+            if !self.may(&tenant) {
+                skipped.push_back(tenant);
+                continue;
+            }
+            let Some(waiting) = self.first(&tenant) else { continue };
+            *self.running.entry(tenant.clone()).or_default() += 1;
+            if self.queues.contains_key(&tenant) {
+                self.ring.push_back(tenant.clone());
+            }
+            found = Some((tenant, waiting));
+            break;
+        }
+        skipped.append(&mut self.ring);
+        self.ring = skipped;
+        found
+    }
+
+    /// The first of a tenant who still waits; without anybody left the queue is gone.
+    fn first(&mut self, tenant: &Tenant) -> Option<oneshot::Sender<Place>> {
+        let queue = self.queues.get_mut(tenant)?;
+        queue.retain(|waiting| !waiting.is_closed());
+        let first = queue.pop_front();
+        if queue.is_empty() {
+            self.queues.remove(tenant);
+        }
+        first
     }
 }
 
@@ -44,20 +187,105 @@ mod tests {
 
     use super::*;
 
-    #[tokio::test]
-    async fn work_past_the_bound_is_refused_and_done_once_there_is_room() {
-        let bounded = Bounded::new(1, Duration::from_millis(20));
-        let (release, held) = mpsc::channel::<()>();
-        let first = tokio::spawn({
-            let bounded = bounded.clone();
-            async move { bounded.run(move || held.recv().is_ok()).await }
-        });
-        while bounded.permits.available_permits() > 0 {
+    fn tenant(name: &str) -> Tenant {
+        name.parse().unwrap()
+    }
+
+    fn bounded(common: usize, guests: usize) -> Bounded {
+        Bounded::new(Size { common, guests }, Duration::from_secs(60))
+    }
+
+    /// Work that ends when told to, and says what it is when it begins.
+    struct Held {
+        release: mpsc::Sender<()>,
+        done: tokio::task::JoinHandle<Result<bool, ServiceError>>,
+    }
+
+    fn hold(bounded: &Bounded, of: &str, begun: &mpsc::Sender<String>, name: &str) -> Held {
+        let ((release, held), bounded, of) = (mpsc::channel::<()>(), bounded.clone(), tenant(of));
+        let (begun, name) = (begun.clone(), name.to_owned());
+        let work = move || begun.send(name).is_ok() && held.recv().is_ok();
+        Held { release, done: tokio::spawn(async move { bounded.run(&of, work).await }) }
+    }
+
+    async fn until(reached: impl Fn() -> bool) {
+        while !reached() {
             tokio::task::yield_now().await;
         }
-        assert!(matches!(bounded.run(|| ()).await, Err(ServiceError::Busy)));
-        release.send(()).unwrap();
-        assert!(first.await.unwrap().unwrap());
-        assert_eq!(bounded.run(|| 7).await.unwrap(), 7);
+    }
+
+    #[tokio::test]
+    async fn work_past_the_bound_is_refused_and_done_once_there_is_room() {
+        let bounded = Bounded::new(Size { common: 1, guests: 0 }, Duration::from_millis(20));
+        let (begun, begins) = mpsc::channel();
+        let first = hold(&bounded, "north", &begun, "first");
+        until(|| begins.try_recv().is_ok()).await;
+        assert!(matches!(bounded.run(&tenant("north"), || ()).await, Err(ServiceError::Busy)));
+        assert_eq!(bounded.waiting(), 0);
+        first.release.send(()).unwrap();
+        assert!(first.done.await.unwrap().unwrap());
+        assert_eq!(bounded.run(&tenant("north"), || 7).await.unwrap(), 7);
+        assert!(bounded.lock().running.is_empty() && bounded.lock().queues.is_empty());
+    }
+
+    #[tokio::test]
+    async fn a_queue_of_one_tenant_puts_off_another_by_one_turn() {
+        let bounded = bounded(1, 0);
+        let (begun, begins) = mpsc::channel();
+        let mut held = HashMap::new();
+        for number in 0..5 {
+            let name = format!("north {number}");
+            held.insert(name.clone(), hold(&bounded, "north", &begun, &name));
+            until(|| bounded.waiting() == number).await;
+        }
+        for number in 0..2 {
+            let name = format!("south {number}");
+            held.insert(name.clone(), hold(&bounded, "south", &begun, &name));
+            until(|| bounded.waiting() == 5 + number).await;
+        }
+        let mut order: Vec<String> = Vec::new();
+        while !held.is_empty() {
+            match begins.try_recv() {
+                Ok(name) => {
+                    held.remove(&name).unwrap().release.send(()).unwrap();
+                    order.push(name);
+                }
+                Err(_) => tokio::task::yield_now().await,
+            }
+        }
+        assert_eq!(order, ["north 0", "north 1", "south 0", "north 2", "south 1", "north 3", "north 4"]);
+    }
+
+    #[tokio::test]
+    async fn a_tenant_alone_with_his_question_does_not_wait_for_anothers() {
+        let bounded = bounded(1, 1);
+        let (begun, begins) = mpsc::channel();
+        let held = [0, 1].map(|number| hold(&bounded, "north", &begun, &number.to_string()));
+        until(|| bounded.waiting() == 1).await;
+        assert_eq!(bounded.run(&tenant("south"), || 7).await.unwrap(), 7);
+        // The place of guests is not for those who have one.
+        assert_eq!((begins.try_recv().unwrap(), begins.try_recv().is_err(), bounded.waiting()), ("0".into(), true, 1));
+        held.iter().for_each(|held| held.release.send(()).unwrap());
+        for held in held {
+            assert!(held.done.await.unwrap().unwrap());
+        }
+    }
+
+    #[tokio::test]
+    async fn who_went_away_is_passed_over() {
+        let bounded = bounded(1, 0);
+        let (begun, begins) = mpsc::channel();
+        let first = hold(&bounded, "north", &begun, "first");
+        until(|| begins.try_recv().is_ok()).await;
+        let gone = hold(&bounded, "south", &begun, "gone");
+        until(|| bounded.waiting() == 1).await;
+        gone.done.abort();
+        until(|| bounded.waiting() == 0).await;
+        let last = hold(&bounded, "east", &begun, "last");
+        until(|| bounded.waiting() == 1).await;
+        first.release.send(()).unwrap();
+        last.release.send(()).unwrap();
+        assert!(first.done.await.unwrap().unwrap() && last.done.await.unwrap().unwrap());
+        assert!(bounded.lock().running.is_empty() && bounded.lock().queues.is_empty());
     }
 }

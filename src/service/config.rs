@@ -68,6 +68,8 @@ pub struct Config {
     pub resolve_limit: usize,
     /// Allocations and observations computed at a time; more wait.
     pub advice_limit: usize,
+    /// Either of them computed beyond that for tenants with nothing else under way.
+    pub guest_limit: usize,
     /// A request that has waited this long for its turn is told to come back.
     pub turn_wait: Duration,
     /// Time given to open requests once the service is asked to stop.
@@ -92,6 +94,8 @@ impl Config {
             request_timeout: Duration::from_secs(30),
             resolve_limit: cores.div_ceil(2),
             advice_limit: 2 * cores,
+            // With as many more on the processors a guest takes three times what it takes alone, no longer.
+            guest_limit: 2 * cores,
             turn_wait: Duration::from_secs(2),
             drain: Duration::from_secs(25),
             lease: Duration::from_secs(30),

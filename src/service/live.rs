@@ -58,7 +58,7 @@ impl Live {
             Some(advice) => advice,
             None => {
                 let (advisor, state) = (self.advisor.clone(), self.state.clone());
-                advising.run(move || advisor.advise(step, &state, AdviceMode::Surrogate)).await?
+                advising.run(&self.row.tenant, move || advisor.advise(step, &state, AdviceMode::Surrogate)).await?
             }
         };
         Ok(self.advice.insert(advice))
@@ -96,7 +96,7 @@ impl Live {
             return Ok((state, uncertainty));
         }
         let (advisor, step) = (self.advisor.clone(), self.observed() + 1);
-        let measured = advising.run(move || (advisor.uncertainty(&state), state)).await;
+        let measured = advising.run(&self.row.tenant, move || (advisor.uncertainty(&state), state)).await;
         let (uncertainty, state) = measured?;
         // The first session to get this far: the next advice finds its common random numbers simulated.
         let (advisor, reached) = (self.advisor.clone(), state.clone());

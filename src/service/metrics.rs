@@ -9,6 +9,7 @@ pub const HTTP_REQUEST_SECONDS: &str = "ballast_http_request_duration_seconds";
 pub const HTTP_REQUESTS: &str = "ballast_http_requests_total";
 pub const JOBS: &str = "ballast_jobs";
 pub const SESSIONS: &str = "ballast_sessions";
+pub const TURNS_WAITING: &str = "ballast_turns_waiting";
 
 /// Upper bounds of the buckets of training steps, in seconds: milliseconds to an hour.
 pub const STEP_BUCKETS: [f64; 10] = [0.01, 0.1, 0.5, 1.0, 5.0, 15.0, 60.0, 300.0, 900.0, 3600.0];
@@ -24,4 +25,5 @@ pub fn describe() {
     describe_counter!(HTTP_REQUESTS, "Requests answered, by method, route and status.");
     describe_gauge!(JOBS, "Jobs in the store, by state.");
     describe_gauge!(SESSIONS, "Sessions in the store.");
+    describe_gauge!(TURNS_WAITING, "Requests that wait for their turn to be advised, or to have a step solved.");
 }

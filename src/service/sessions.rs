@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::OwnedMutexGuard;
 
-use super::bounded::Bounded;
+use super::bounded::{Bounded, Size};
 use super::clock::Clock;
 use super::config::Config;
 use super::error::ServiceError;
@@ -54,8 +54,9 @@ pub struct Sessions {
 
 impl Sessions {
     pub(super) fn new(config: &Config, store: Store, clock: Clock, policies: Arc<Policies>) -> Self {
-        let advising = Bounded::new(config.advice_limit, config.turn_wait);
-        let resolving = Bounded::new(config.resolve_limit, config.turn_wait);
+        let size = |common| Size { common, guests: config.guest_limit };
+        let advising = Bounded::new(size(config.advice_limit), config.turn_wait);
+        let resolving = Bounded::new(size(config.resolve_limit), config.turn_wait);
         Sessions { store, clock, policies, slots: Arc::default(), advising, resolving }
     }
 
@@ -106,6 +107,11 @@ impl Sessions {
     pub async fn get(&self, tenant: &Tenant, session: &str) -> Result<Live, ServiceError> {
         let mut slot = self.slot(session).lock_owned().await;
         self.replayed(tenant, session, &mut slot).await.cloned()
+    }
+
+    /// Requests that wait for their turn to be advised, and to have a step solved.
+    pub fn waiting(&self) -> [(&'static str, usize); 2] {
+        [("advise", self.advising.waiting()), ("solve", self.resolving.waiting())]
     }
 
     /// At most `limit` sessions, newest first, after the session with sequence `after`.
@@ -231,7 +237,7 @@ impl Sessions {
         }
         let (advisor, state, step) = (live.advisor.clone(), live.state.clone(), live.observed());
         drop(slot);
-        let solving = self.resolving.run(move || match question {
+        let solving = self.resolving.run(tenant, move || match question {
             Question::Explain => {
                 let (advice, worst_case) = advisor.explain(step, &state);
                 (advice, Some(worst_case))

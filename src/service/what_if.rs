@@ -209,7 +209,7 @@ impl Sessions {
         for hypothesis in hypotheses {
             let (advisor, state, step) = (live.advisor.clone(), live.state.clone(), live.observed());
             let turns = if solves || hypothesis.radius.is_some() { &self.resolving } else { &self.advising };
-            let supposed = turns.run(move || advisor.suppose(step, &state, &hypothesis, mode)).await?;
+            let supposed = turns.run(tenant, move || advisor.suppose(step, &state, &hypothesis, mode)).await?;
             points.push(WhatIfPoint::new(
                 &hypothesis,
                 supposed.map_err(|error| request.renamed(error))?,
