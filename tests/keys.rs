@@ -325,7 +325,7 @@ async fn keys_are_made_and_revoked_while_the_service_runs() {
 
     let (_, listed, _) = ballast(&["keys", "list", "--data", &data]);
     let row: Vec<&str> = listed.lines().nth(1).unwrap().split('\t').collect();
-    assert_eq!((row[1], row[2], row.len()), ("north", "read,train", 5), "{listed}");
+    assert_eq!((row[1], row[2], row[4], row.len()), ("north", "read,train", "-", 6), "{listed}");
     assert!(!listed.contains(&key), "{listed}");
     let mut slow = specification(400);
     slow["design"] = json!({ "count": 40 });
@@ -343,6 +343,66 @@ async fn keys_are_made_and_revoked_while_the_service_runs() {
     assert!(code == Some(1) && said.contains("there is no key 'key_of_nobody'"), "{said}");
     let (code, _, said) = ballast(&["keys", "create", "--role", "read", "--tenant", "no spaces", "--data", &data]);
     assert!(code == Some(2) && said.contains("letters, digits"), "{said}");
+}
+
+/// What a key is told when it is shown: the status and the problem.
+async fn shown(app: &mut App, key: &str) -> (StatusCode, Value) {
+    app.hold(key);
+    app.get("/jobs").await
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn keys_expire_and_are_rotated_without_a_gap() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().to_str().unwrap().to_owned();
+    let (child, url) = process::serve(|command| {
+        command.args(["--data", &data]);
+    });
+    let (_process, mut app) = (Process(child), App::at(url, folder));
+    let create = |more: &[&str]| {
+        let (code, key, said) = ballast(&[&["keys", "create", "--role", "admin", "--data", &data], more].concat());
+        assert_eq!(code, Some(0), "{said}");
+        (key, said.split(',').next().unwrap().to_owned())
+    };
+    let (revoked, revoked_name) = create(&[]);
+    let (old, old_name) = create(&["--expires-in", "90d"]);
+    app.hold(&old);
+    until("the key to count", async || app.get("/no-such-path").await.0 == 404).await;
+    let mut slow = specification(400);
+    slow["design"] = json!({ "count": 40 });
+    let job = app.queue(&slow).await;
+    let following = app.client.get(format!("{}/jobs/{job}/events", app.url)).send().await.unwrap();
+
+    let (code, new, said) = ballast(&["keys", "rotate", &old_name, "--overlap", "6s", "--data", &data]);
+    assert!(code == Some(0) && said.matches("in force until").count() == 2, "{said}");
+    app.hold(&new);
+    // Never is there a moment in which neither of the two is answered.
+    until("the successor to count", async || {
+        let answered = app.client.get(format!("{}/jobs", app.url)).bearer_auth(&old).send().await.unwrap();
+        app.get("/jobs").await.0 == 200 || answered.status() != 200
+    })
+    .await;
+    assert_eq!(shown(&mut app, &new).await.0, 200, "the old key ended before the new one was known");
+    until("the old key to expire", async || shown(&mut app, &old).await.0 == 401).await;
+    assert_eq!(shown(&mut app, &new).await.0, 200);
+    let heard = tokio::time::timeout(PATIENCE, following.text()).await.expect("the stream ends").unwrap();
+    assert!(!heard.contains("succeeded"), "{heard}");
+    let (_, listed, _) = ballast(&["keys", "list", "--data", &data]);
+    let rows: Vec<Vec<&str>> = listed.lines().skip(1).map(|line| line.split('\t').collect()).collect();
+    assert_eq!(rows.len(), 3, "{listed}");
+    assert_eq!((rows[1][0], rows[1][5], &rows[1][1..3]), (old_name.as_str(), "-", &rows[2][1..3]), "{listed}");
+    assert!(rows[2][4] > rows[1][4] && rows[1][4] < "2100", "as long as the one before was made for: {listed}");
+
+    // What expired and what was revoked are told the same.
+    assert_eq!(ballast(&["keys", "revoke", &revoked_name, "--data", &data]).0, Some(0));
+    until("the key to be turned away", async || shown(&mut app, &revoked).await.0 == 401).await;
+    assert_eq!(shown(&mut app, &revoked).await, shown(&mut app, &old).await);
+    let (code, _, said) = ballast(&["keys", "rotate", &old_name, "--data", &data]);
+    assert!(code == Some(1) && said.contains("must be in force"), "{said}");
+    for wrong in [["--expires-in", "0d"], ["--expires-on", "tomorrow"], ["--expires-on", "2001-01-01"]] {
+        let (code, _, said) = ballast(&[&["keys", "create", "--role", "read", "--data", &data], &wrong[..]].concat());
+        assert!(code != Some(0) && said.contains("must"), "{said}");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -5,7 +5,7 @@ mod support;
 use ballast::control::policy::content_hash;
 use ballast::store::{
     Append, CreateJob, CreateSession, DeletePolicy, JobCounts, JobKind, JobOutcome, JobRow, JobState, NewJob, NewKey,
-    NewObservation, NewSession, Store, StoreError, Tenant,
+    NewObservation, NewSession, Rotate, Store, StoreError, Successor, Tenant,
 };
 use futures_util::future::join_all;
 use support::place::Place;
@@ -682,6 +682,7 @@ async fn a_key_is_listed_and_revoked_beside_the_store(place: &Place) {
         tenant: tenant("north"),
         roles: "operate,read".parse().unwrap(),
         created_ms: 3,
+        expires_ms: Some(103),
     };
     ring.create(new.clone()).await.unwrap();
     assert!(ring.create(NewKey { key: "key_2".into(), ..new.clone() }).await.is_err(), "two keys of one text");
@@ -689,7 +690,17 @@ async fn a_key_is_listed_and_revoked_beside_the_store(place: &Place) {
     assert_eq!(rows, ring.list().await.unwrap());
     assert_eq!((rows[0].hash, &rows[0].tenant, rows[0].revoked_ms), (new.hash, &new.tenant, None));
     assert_eq!(rows[0].roles.to_string(), "read,operate");
-    assert!(!ring.revoke("key_2", 4).await.unwrap());
+    let successor = Successor { key: "key_2".into(), hash: [8; 32], created_ms: 5, expires_ms: None };
+    let Rotate::Rotated { old, new } = ring.rotate("key_1", successor.clone(), 50).await.unwrap() else { panic!() };
+    assert_eq!((old.expires_ms, new.expires_ms), (Some(50), Some(105)), "as long as the one before was made for");
+    assert_eq!((&new.tenant, &new.roles), (&old.tenant, &old.roles));
+    assert_eq!(store.keys().await.unwrap(), [old, new]);
+    let again = |created_ms| Successor { key: format!("key_{created_ms}"), created_ms, ..successor.clone() };
+    assert!(ring.rotate("key_1", again(6), 60).await.is_err(), "two keys of one text");
+    assert_eq!(ring.list().await.unwrap()[0].expires_ms, Some(50), "all of a rotation or nothing");
+    assert_eq!(ring.rotate("key_1", again(50), 60).await.unwrap(), Rotate::Ended);
+    assert_eq!(ring.rotate("key_9", again(6), 60).await.unwrap(), Rotate::Absent);
+    assert!(!ring.revoke("key_3", 4).await.unwrap());
     assert!(ring.revoke("key_1", 4).await.unwrap() && ring.revoke("key_1", 5).await.unwrap());
     assert_eq!(store.keys().await.unwrap()[0].revoked_ms, Some(4));
     ring.close().await;
@@ -697,7 +708,7 @@ async fn a_key_is_listed_and_revoked_beside_the_store(place: &Place) {
     queued(&store, "j1").await;
     store.close().await;
     let ring = place.key_ring().await.unwrap();
-    assert_eq!(ring.list().await.unwrap().len(), 1);
+    assert_eq!(ring.list().await.unwrap().len(), 2);
     ring.close().await;
     place.tamper("UPDATE access_keys SET roles = 'root' WHERE access_key = 'key_1'").await;
     assert!(matches!(place.open().await.keys().await, Err(StoreError::Corrupt { .. })));

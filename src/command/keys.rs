@@ -1,20 +1,25 @@
 //! `ballast keys`: who may call a service, kept in its store, whether or not it runs.
 
 use std::io::Write;
+use std::time::Duration;
 
+use ballast::control::error::FieldError;
 use ballast::service::clock::Clock;
 use ballast::service::config::StoreLocation;
-use ballast::service::keys::{REFRESH, issue};
+use ballast::service::keys::{REFRESH, Secret, issue, rotate};
 use ballast::store::{KeyRing, KeyRole, KeyRoles, KeyRow, Tenant};
 use clap::{Args, Subcommand, ValueEnum};
 
+use super::moments;
 use super::store_location::StoreArgs;
 
 #[derive(Debug, Subcommand)]
 pub enum Keys {
     /// Make a key and print it, once.
     Create(Create),
-    /// List keys: name, tenant, roles, since when, and whether revoked.
+    /// Make a key in the place of another, which stays in force for a while, and print it, once.
+    Rotate(Rotate),
+    /// List keys: name, tenant, roles, since when, until when, and whether revoked.
     List(List),
     /// Revoke a key for good, by its name.
     Revoke(Revoke),
@@ -28,6 +33,45 @@ pub struct Create {
     /// What its holder may do; may be given several times.
     #[arg(long = "role", value_enum, required = true)]
     roles: Vec<RoleName>,
+    #[command(flatten)]
+    expiry: Expiry,
+    #[command(flatten)]
+    store: StoreArgs,
+}
+
+/// Until when a new key is in force.
+#[derive(Debug, Args)]
+#[group(multiple = false)]
+struct Expiry {
+    /// So long, as 90d or 12h.
+    #[arg(long, value_name = "TIME", value_parser = moments::length)]
+    expires_in: Option<Duration>,
+    /// Until the start of this day (UTC), as 2027-01-31, or until this moment, as 2027-01-31T12:00:00Z.
+    #[arg(long, value_name = "DAY", value_parser = moments::moment)]
+    expires_on: Option<i64>,
+}
+
+impl Expiry {
+    fn milliseconds(&self, now_ms: i64) -> Result<Option<i64>, FieldError> {
+        let after = |time: Duration| now_ms.saturating_add(i64::try_from(time.as_millis()).unwrap_or(i64::MAX));
+        let expires_ms = self.expires_on.or(self.expires_in.map(after));
+        match expires_ms.filter(|expires_ms| *expires_ms <= now_ms) {
+            Some(past) => Err(FieldError::new("--expires-on", moments::shown(Some(past)), "must lie ahead")),
+            None => Ok(expires_ms),
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub struct Rotate {
+    /// As `list` shows it: key_...
+    key: String,
+    /// The old key expires after this time.
+    #[arg(long, value_name = "TIME", default_value = "1d", value_parser = moments::length)]
+    overlap: Duration,
+    /// Unless given, the new key is in force for as long as the old one was made for.
+    #[command(flatten)]
+    expiry: Expiry,
     #[command(flatten)]
     store: StoreArgs,
 }
@@ -75,6 +119,7 @@ impl From<RoleName> for KeyRole {
 pub async fn run(keys: Keys) -> Result<(), Box<dyn std::error::Error>> {
     match keys {
         Keys::Create(arguments) => create(arguments).await,
+        Keys::Rotate(arguments) => replace(arguments).await,
         Keys::List(arguments) => list(arguments).await,
         Keys::Revoke(arguments) => revoke(arguments).await,
     }
@@ -90,10 +135,32 @@ async fn open(store: StoreArgs) -> Result<KeyRing, Box<dyn std::error::Error>> {
 async fn create(arguments: Create) -> Result<(), Box<dyn std::error::Error>> {
     let roles = KeyRoles::new(arguments.roles.into_iter().map(KeyRole::from).collect())?;
     let ring = open(arguments.store).await?;
-    let (key, secret) = issue(&ring, arguments.tenant.clone(), roles.clone(), &Clock::system()).await?;
+    let clock = Clock::system();
+    let expires_ms = arguments.expiry.milliseconds(clock.now_milliseconds())?;
+    let (key, secret) = issue(&ring, arguments.tenant.clone(), roles.clone(), expires_ms, &clock).await?;
     ring.close().await;
-    eprintln!("{key}, tenant {}, roles {roles}; this is the only time its text is shown:", arguments.tenant);
-    // Alone on standard output, so that a program can take it from there.
+    eprintln!("{key}, tenant {}, roles {roles}{}", arguments.tenant, until(expires_ms));
+    reveal(&secret)
+}
+
+async fn replace(arguments: Rotate) -> Result<(), Box<dyn std::error::Error>> {
+    let (ring, clock) = (open(arguments.store).await?, Clock::system());
+    let expires_ms = arguments.expiry.milliseconds(clock.now_milliseconds())?;
+    let rotated = rotate(&ring, &arguments.key, arguments.overlap, expires_ms, &clock).await?;
+    ring.close().await;
+    let (old, new, secret) = (&rotated.old, &rotated.new, &rotated.secret);
+    eprintln!("{}, tenant {}, roles {}{}", new.key, new.tenant, new.roles, until(new.expires_ms));
+    eprintln!("{}{}", old.key, until(old.expires_ms));
+    reveal(secret)
+}
+
+fn until(expires_ms: Option<i64>) -> String {
+    expires_ms.map_or(String::new(), |_| format!(", in force until {}", moments::shown(expires_ms)))
+}
+
+/// Alone on standard output, so that a program can take it from there.
+fn reveal(secret: &Secret) -> Result<(), Box<dyn std::error::Error>> {
+    eprintln!("this is the only time its text is shown:");
     writeln!(std::io::stdout(), "{}", secret.reveal())?;
     Ok(())
 }
@@ -103,10 +170,10 @@ async fn list(arguments: List) -> Result<(), Box<dyn std::error::Error>> {
     let rows = ring.list().await?;
     ring.close().await;
     let mut out = std::io::stdout().lock();
-    writeln!(out, "key\ttenant\troles\tcreated_ms\trevoked_ms")?;
-    for KeyRow { key, tenant, roles, created_ms, revoked_ms, .. } in rows {
-        let revoked = revoked_ms.map_or("-".to_owned(), |revoked| revoked.to_string());
-        writeln!(out, "{key}\t{tenant}\t{roles}\t{created_ms}\t{revoked}")?;
+    writeln!(out, "key\ttenant\troles\tcreated\texpires\trevoked")?;
+    for KeyRow { key, tenant, roles, created_ms, expires_ms, revoked_ms, .. } in rows {
+        let [created, expires, revoked] = [Some(created_ms), expires_ms, revoked_ms].map(moments::shown);
+        writeln!(out, "{key}\t{tenant}\t{roles}\t{created}\t{expires}\t{revoked}")?;
     }
     Ok(())
 }

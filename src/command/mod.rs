@@ -12,6 +12,7 @@ pub mod healthcheck;
 mod host;
 pub mod keys;
 pub mod loadtest;
+mod moments;
 mod monthly_returns;
 pub mod reproduce;
 pub mod serve;

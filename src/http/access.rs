@@ -153,9 +153,9 @@ fn bearer(headers: &HeaderMap) -> Option<&str> {
 fn unauthenticated(turned: Turned) -> Problem {
     let (detail, value) = match turned {
         Turned::NoKey => ("the call needs a key", "no key"),
-        Turned::WrongKey => ("the key is not one in force", "another key"),
+        Turned::WrongKey { .. } => ("the key is not one in force", "another key"),
     };
-    let rule = format!("must be `Bearer {PREFIX}...`, with a key that was made here and not revoked");
+    let rule = format!("must be `Bearer {PREFIX}...`, with a key that was made here, not revoked and not expired");
     Problem::new(ProblemKind::Unauthenticated, detail).naming("Authorization", value, rule)
 }
 

@@ -67,7 +67,7 @@ pub async fn follow(
 impl Follower {
     /// The next event that differs from the last; none once the job or the service ends, or the key is revoked.
     async fn next(mut self) -> Option<(Result<Event, Infallible>, Option<Self>)> {
-        while !self.caller.is_revoked() {
+        while !self.caller.has_ended() {
             self.changes.mark_unchanged();
             let job = wire::Job::from(self.service.jobs.get(&self.caller.tenant, &self.job).await.ok()?);
             let id = event_id(&job);

@@ -1,11 +1,18 @@
 //! Time, as an argument.
 
+use std::fmt;
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Where the service reads the time; tests put their own in.
 #[derive(Clone)]
 pub struct Clock(Arc<dyn Fn() -> i64 + Send + Sync>);
+
+impl fmt::Debug for Clock {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("Clock(..)")
+    }
+}
 
 impl Clock {
     /// A clock that answers milliseconds since 1970 from `read`.

@@ -5,11 +5,13 @@
 //!
 //! A request costs one hash and one look into memory. The store is asked every [`REFRESH`] instead, so a key made or
 //! revoked beside this process, or on another replica, counts within that time. While the store does not answer, what was
-//! known last holds; nothing else that needs the store answers then either.
+//! known last holds; nothing else that needs the store answers then either. A key that expires is turned away at that
+//! moment whatever the store does: when is known beforehand, and is told by this process's own clock, as that of a
+//! certificate is. A key is rotated without a gap: its successor is in force before it expires itself.
 
 use std::collections::HashMap;
 use std::fmt;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
 
@@ -22,7 +24,8 @@ use super::clock::Clock;
 use super::error::ServiceError;
 use super::identity;
 use super::shutdown::Shutdown;
-use crate::store::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Store, StoreError, Tenant};
+use crate::control::error::FieldError;
+use crate::store::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, Store, StoreError, Successor, Tenant};
 
 /// A key made or revoked elsewhere counts within this time.
 pub const REFRESH: Duration = Duration::from_millis(500);
@@ -58,7 +61,8 @@ fn hash(text: &str) -> [u8; 32] {
     Sha256::digest(text).into()
 }
 
-/// Makes a key for a tenant; its name, and its text, which is nowhere else.
+/// Makes a key for a tenant, in force until `expires_ms` where that is given; its name, and its text, which is nowhere
+/// else.
 ///
 /// # Errors
 /// The store does not take it, or there are no random bits.
@@ -66,12 +70,45 @@ pub async fn issue(
     ring: &KeyRing,
     tenant: Tenant,
     roles: KeyRoles,
+    expires_ms: Option<i64>,
     clock: &Clock,
 ) -> Result<(String, Secret), ServiceError> {
     let (key, secret) = (identity::new_id("key")?, Secret::new()?);
-    let created_ms = clock.now_milliseconds();
-    ring.create(NewKey { key: key.clone(), hash: hash(secret.reveal()), tenant, roles, created_ms }).await?;
+    let (name, hash, created_ms) = (key.clone(), hash(secret.reveal()), clock.now_milliseconds());
+    ring.create(NewKey { key: name, hash, tenant, roles, created_ms, expires_ms }).await?;
     Ok((key, secret))
+}
+
+/// A key and its successor.
+pub struct Rotated {
+    /// As it is now.
+    pub old: KeyRow,
+    pub new: KeyRow,
+    /// Of the new one.
+    pub secret: Secret,
+}
+
+/// Makes a key in the place of `old`, with its tenant and roles, and has `old` expire after `overlap`. The new one is in
+/// force until `expires_ms`; unless that is given, for as long as the old one was made for.
+///
+/// # Errors
+/// There is no such key, or it is no longer in force; the store does not take it, or there are no random bits.
+pub async fn rotate(
+    ring: &KeyRing,
+    old: &str,
+    overlap: Duration,
+    expires_ms: Option<i64>,
+    clock: &Clock,
+) -> Result<Rotated, ServiceError> {
+    let (key, secret) = (identity::new_id("key")?, Secret::new()?);
+    let (hash, created_ms) = (hash(secret.reveal()), clock.now_milliseconds());
+    let overlap_ms = i64::try_from(overlap.as_millis()).unwrap_or(i64::MAX);
+    let successor = Successor { key, hash, created_ms, expires_ms };
+    match ring.rotate(old, successor, created_ms.saturating_add(overlap_ms)).await? {
+        Rotate::Rotated { old, new } => Ok(Rotated { old, new, secret }),
+        Rotate::Absent => Err(ServiceError::unknown("key", old)),
+        Rotate::Ended => Err(FieldError::new("key", old, "must be in force; make a new one").into()),
+    }
 }
 
 /// Who a request is answered to.
@@ -82,12 +119,16 @@ pub struct Caller {
     key: Option<KeyRow>,
     /// Shared by everybody of the tenant.
     pub allowance: Arc<Allowance>,
+    clock: Clock,
     revoked: AtomicBool,
+    /// When it last called; 0 before.
+    used_ms: AtomicI64,
 }
 
 impl Caller {
-    fn new(tenant: Tenant, key: Option<KeyRow>, allowance: Arc<Allowance>) -> Arc<Self> {
-        Arc::new(Caller { tenant, key, allowance, revoked: AtomicBool::new(false) })
+    fn new(tenant: Tenant, key: Option<KeyRow>, allowance: Arc<Allowance>, clock: Clock) -> Arc<Self> {
+        let (revoked, used_ms) = (AtomicBool::new(false), AtomicI64::new(0));
+        Arc::new(Caller { tenant, key, allowance, clock, revoked, used_ms })
     }
 
     pub fn may(&self, role: KeyRole) -> bool {
@@ -100,24 +141,54 @@ impl Caller {
     }
 
     /// Whether it would be turned away by now: what goes on for long asks again.
-    pub fn is_revoked(&self) -> bool {
-        self.revoked.load(Ordering::Relaxed)
+    pub fn has_ended(&self) -> bool {
+        let now_ms = || self.clock.now_milliseconds();
+        self.revoked.load(Ordering::Relaxed) || self.expires_ms().is_some_and(|expires_ms| expires_ms <= now_ms())
+    }
+
+    fn expires_ms(&self) -> Option<i64> {
+        self.key.as_ref().and_then(|key| key.expires_ms)
+    }
+
+    fn note_use(&self) {
+        let (now_ms, used_ms) = (self.clock.now_milliseconds(), self.used_ms.load(Ordering::Relaxed));
+        // Threads that share a key would fight for the line of memory at every call.
+        if now_ms - used_ms >= USE_PRECISION_MS {
+            self.used_ms.store(now_ms, Ordering::Relaxed);
+        }
     }
 }
 
+/// When a key was last used is known to a second.
+const USE_PRECISION_MS: i64 = 1000;
+
+/// A key in force, as an operator watches it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KeyFigures {
+    pub tenant: Tenant,
+    pub key: String,
+    pub expires_ms: Option<i64>,
+    /// When it last called this process; `None` where it never did.
+    pub used_ms: Option<i64>,
+}
+
 /// Why nobody is admitted. What was shown is not repeated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Turned {
     /// No key was shown.
     NoKey,
     /// None that is in force.
-    WrongKey,
+    WrongKey {
+        /// Whose it was until it expired or was revoked; that is for the operator's eyes.
+        of: Option<Tenant>,
+    },
 }
 
 /// The keys in force, as of the last look into the store.
 pub struct Keys {
     store: Store,
     limits: Limits,
+    clock: Clock,
     known: RwLock<Known>,
 }
 
@@ -126,16 +197,18 @@ struct Known {
     anybody: Option<Arc<Caller>>,
     /// By the first eight bytes of the hash, which need not be compared in constant time to tell keys apart.
     by_hash: HashMap<[u8; 8], Arc<Caller>>,
+    /// Keys that expired or were revoked, likewise.
+    ended: HashMap<[u8; 8], KeyRow>,
     allowances: HashMap<Tenant, Arc<Allowance>>,
 }
 
 impl Keys {
-    pub(super) async fn load(store: Store, limits: Limits) -> Result<Self, StoreError> {
+    pub(super) async fn load(store: Store, limits: Limits, clock: Clock) -> Result<Self, StoreError> {
         let allowance = Arc::new(Allowance::new(&limits));
-        let anybody = Caller::new(Tenant::default(), None, allowance.clone());
+        let anybody = Some(Caller::new(Tenant::default(), None, allowance.clone(), clock.clone()));
         let allowances = HashMap::from([(Tenant::default(), allowance)]);
-        let known = Known { anybody: Some(anybody), by_hash: HashMap::new(), allowances };
-        let keys = Keys { store, limits, known: RwLock::new(known) };
+        let known = Known { anybody, by_hash: HashMap::new(), ended: HashMap::new(), allowances };
+        let keys = Keys { store, limits, clock, known: RwLock::new(known) };
         keys.refresh().await?;
         Ok(keys)
     }
@@ -155,15 +228,38 @@ impl Keys {
             return Ok(anybody.clone());
         }
         let shown = hash(text.ok_or(Turned::NoKey)?);
-        let found = known.by_hash.get(&start(&shown)).ok_or(Turned::WrongKey)?;
-        let stored = found.key.as_ref().ok_or(Turned::WrongKey)?.hash;
-        if is_equal(&stored, &shown) { Ok(found.clone()) } else { Err(Turned::WrongKey) }
+        let is_shown = |key: &&KeyRow| is_equal(&key.hash, &shown);
+        let found = known.by_hash.get(&start(&shown));
+        match found.filter(|caller| caller.key.as_ref().filter(is_shown).is_some()) {
+            Some(caller) if !caller.has_ended() => {
+                caller.note_use();
+                Ok(caller.clone())
+            }
+            Some(ended) => Err(Turned::WrongKey { of: Some(ended.tenant.clone()) }),
+            None => {
+                let ended = known.ended.get(&start(&shown)).filter(is_shown);
+                Err(Turned::WrongKey { of: ended.map(|key| key.tenant.clone()) })
+            }
+        }
+    }
+
+    /// Every key in force, as far as this process knows.
+    pub fn figures(&self) -> Vec<KeyFigures> {
+        let known = self.read();
+        let figures = known.by_hash.values().filter_map(|caller| {
+            let (key, used_ms) = (caller.key.as_ref()?, caller.used_ms.load(Ordering::Relaxed));
+            let used_ms = (used_ms > 0).then_some(used_ms);
+            Some(KeyFigures { tenant: key.tenant.clone(), key: key.key.clone(), expires_ms: key.expires_ms, used_ms })
+        });
+        let mut figures: Vec<_> = figures.collect();
+        figures.sort_by(|one, other| one.key.cmp(&other.key));
+        figures
     }
 
     /// Looks into the store.
     pub(super) async fn refresh(&self) -> Result<(), StoreError> {
         let rows = self.store.keys().await?;
-        self.known.write().unwrap_or_else(PoisonError::into_inner).become_those(rows, &self.limits);
+        self.known.write().unwrap_or_else(PoisonError::into_inner).become_those(rows, &self.limits, &self.clock);
         Ok(())
     }
 
@@ -174,20 +270,24 @@ impl Keys {
 }
 
 impl Known {
-    fn become_those(&mut self, rows: Vec<KeyRow>, limits: &Limits) {
+    fn become_those(&mut self, rows: Vec<KeyRow>, limits: &Limits, clock: &Clock) {
         if !rows.is_empty()
             && let Some(anybody) = self.anybody.take()
         {
             anybody.revoked.store(true, Ordering::Relaxed);
         }
         let mut before = std::mem::take(&mut self.by_hash);
-        for row in rows.into_iter().filter(|row| row.revoked_ms.is_none()) {
+        for row in rows {
             let start = start(&row.hash);
+            if row.has_ended(clock.now_milliseconds()) {
+                self.ended.insert(start, row);
+                continue;
+            }
             let kept = before.remove(&start).filter(|caller| caller.key.as_ref() == Some(&row));
             let caller = kept.unwrap_or_else(|| {
                 let allowance = self.allowances.entry(row.tenant.clone());
                 let allowance = allowance.or_insert_with(|| Arc::new(Allowance::new(limits))).clone();
-                Caller::new(row.tenant.clone(), Some(row), allowance)
+                Caller::new(row.tenant.clone(), Some(row), allowance, clock.clone())
             });
             self.by_hash.insert(start, caller);
         }
@@ -231,17 +331,18 @@ mod tests {
             roles: "read".parse().unwrap(),
             created_ms: 0,
             revoked_ms,
+            expires_ms: None,
         }
     }
 
     async fn keys() -> (tempfile::TempDir, Keys) {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(folder.path()).await.unwrap();
-        (folder, Keys::load(store, Limits::default()).await.unwrap())
+        (folder, Keys::load(store, Limits::default(), Clock::system()).await.unwrap())
     }
 
     fn known(keys: &Keys, rows: Vec<KeyRow>) {
-        keys.known.write().unwrap().become_those(rows, &keys.limits);
+        keys.known.write().unwrap().become_those(rows, &keys.limits, &keys.clock);
     }
 
     #[test]
@@ -268,16 +369,16 @@ mod tests {
     async fn the_first_key_closes_the_door_for_good() {
         let (_folder, keys) = keys().await;
         let anybody = keys.admit(None).unwrap();
-        assert!(anybody.tenant.is_default() && anybody.may(KeyRole::Admin) && !anybody.is_revoked());
+        assert!(anybody.tenant.is_default() && anybody.may(KeyRole::Admin) && !anybody.has_ended());
         known(&keys, vec![row("a", "north", None)]);
-        assert!(anybody.is_revoked());
+        assert!(anybody.has_ended());
         assert_eq!(keys.admit(None).unwrap_err(), Turned::NoKey);
-        assert_eq!(keys.admit(Some("b")).unwrap_err(), Turned::WrongKey);
+        assert_eq!(keys.admit(Some("b")).unwrap_err(), Turned::WrongKey { of: None });
         let holder = keys.admit(Some("a")).unwrap();
-        assert!(holder.may(KeyRole::Read) && !holder.may(KeyRole::Train) && !holder.is_revoked());
+        assert!(holder.may(KeyRole::Read) && !holder.may(KeyRole::Train) && !holder.has_ended());
         known(&keys, vec![row("a", "north", Some(1))]);
-        assert!(holder.is_revoked());
-        assert_eq!(keys.admit(Some("a")).unwrap_err(), Turned::WrongKey);
+        assert!(holder.has_ended());
+        assert_eq!(keys.admit(Some("a")).unwrap_err(), Turned::WrongKey { of: Some("north".parse().unwrap()) });
         assert_eq!(keys.admit(None).unwrap_err(), Turned::NoKey);
     }
 
@@ -288,6 +389,30 @@ mod tests {
         let [a, b, c] = ["a", "b", "c"].map(|text| keys.admit(Some(text)).unwrap());
         assert!(Arc::ptr_eq(&a.allowance, &b.allowance) && !Arc::ptr_eq(&a.allowance, &c.allowance));
         known(&keys, vec![row("a", "north", None), row("c", "south", None)]);
-        assert!(Arc::ptr_eq(&a, &keys.admit(Some("a")).unwrap()) && !a.is_revoked() && b.is_revoked());
+        assert!(Arc::ptr_eq(&a, &keys.admit(Some("a")).unwrap()) && !a.has_ended() && b.has_ended());
+    }
+
+    #[tokio::test]
+    async fn a_key_is_turned_away_from_the_moment_it_expires_whatever_the_store_does() {
+        let (_folder, mut keys) = keys().await;
+        let now = Arc::new(AtomicI64::new(0));
+        keys.clock = Clock::new({
+            let now = now.clone();
+            move || now.load(Ordering::Relaxed)
+        });
+        let expiring = |expires_ms| KeyRow { expires_ms, ..row("a", "north", None) };
+        known(&keys, vec![expiring(Some(10_000)), row("b", "north", None)]);
+        now.store(9_999, Ordering::Relaxed);
+        let holder = keys.admit(Some("a")).unwrap();
+        assert!(!holder.has_ended());
+        let figures = &keys.figures()[0];
+        assert_eq!((figures.expires_ms, figures.used_ms), (Some(10_000), Some(9_999)));
+        now.store(10_000, Ordering::Relaxed);
+        assert!(holder.has_ended());
+        let of_north = Turned::WrongKey { of: Some("north".parse().unwrap()) };
+        assert_eq!(keys.admit(Some("a")).unwrap_err(), of_north);
+        known(&keys, vec![expiring(Some(10_000)), row("b", "north", None)]);
+        assert_eq!(keys.admit(Some("a")).unwrap_err(), of_north);
+        assert!(keys.admit(Some("b")).is_ok() && keys.figures().len() == 1);
     }
 }

@@ -66,7 +66,7 @@ impl Service {
             StoreLocation::Postgres(url) => Store::connect(url).await?,
         };
         exit_on_fatal(store.clone());
-        let keys = Arc::new(Keys::load(store.clone(), config.limits.clone()).await?);
+        let keys = Arc::new(Keys::load(store.clone(), config.limits.clone(), clock.clone()).await?);
         if keys.are_absent() && !config.allow_anonymous && !config.listen.ip().to_canonical().is_loopback() {
             return Err(ServiceError::NobodyAsked { address: config.listen });
         }

@@ -38,6 +38,29 @@ pub struct NewKey {
     pub tenant: Tenant,
     pub roles: KeyRoles,
     pub created_ms: i64,
+    /// From then on it is none.
+    pub expires_ms: Option<i64>,
+}
+
+/// A key to store in the place of another, whose tenant and roles it takes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Successor {
+    pub key: String,
+    pub hash: [u8; 32],
+    pub created_ms: i64,
+    /// Where it is not given, the key is in force for as long as the one before was made for.
+    pub expires_ms: Option<i64>,
+}
+
+/// What became of a rotation.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Rotate {
+    /// Both are in force; the old one is shown as it is now.
+    Rotated { old: KeyRow, new: KeyRow },
+    /// There is no key of this name.
+    Absent,
+    /// It is no longer in force, so there is nothing to hand over.
+    Ended,
 }
 
 /// A key as stored.
@@ -49,6 +72,7 @@ pub struct KeyRow {
     pub roles: KeyRoles,
     pub created_ms: i64,
     pub revoked_ms: Option<i64>,
+    pub expires_ms: Option<i64>,
 }
 
 /// The keys of a store, held beside whoever serves it.
@@ -95,6 +119,13 @@ impl KeyRing {
             .await
     }
 
+    /// Stores a successor of `key`, and has `key` itself expire at `old_expires_ms` where it would not sooner; both or
+    /// neither, so that there is no moment without a key in force.
+    pub async fn rotate(&self, key: &str, new: Successor, old_expires_ms: i64) -> Result<Rotate, StoreError> {
+        let key = key.to_owned();
+        self.0.write("rotating a key", move |connection| rotate(connection, key, new, old_expires_ms).boxed()).await
+    }
+
     pub async fn close(&self) {
         self.0.close().await;
     }
@@ -109,18 +140,61 @@ impl Store {
 }
 
 async fn create(mut connection: Connection<'_>, new: NewKey) -> Result<(), Failure> {
-    let insert =
-        query("INSERT INTO access_keys (access_key, hash, tenant, roles, created_ms) VALUES ($1, $2, $3, $4, $5)");
+    insert(&mut connection, new).await
+}
+
+async fn insert(connection: &mut Connection<'_>, new: NewKey) -> Result<(), Failure> {
+    let insert = query(
+        "INSERT INTO access_keys (access_key, hash, tenant, roles, created_ms, expires_ms)
+         VALUES ($1, $2, $3, $4, $5, $6)",
+    );
     let insert = insert
         .bind(new.key)
         .bind(new.hash.to_vec())
         .bind(new.tenant.as_str())
         .bind(new.roles.to_string())
-        .bind(new.created_ms);
+        .bind(new.created_ms)
+        .bind(new.expires_ms);
     connection.execute(insert).await.map(|_| ())
 }
 
+async fn rotate(
+    mut connection: Connection<'_>,
+    key: String,
+    new: Successor,
+    old_expires_ms: i64,
+) -> Result<Rotate, Failure> {
+    let connection = &mut connection;
+    let find = query("SELECT * FROM access_keys WHERE access_key = $1").bind(key.as_str()).for_update();
+    let Some(row) = connection.row(find).await? else { return Ok(Rotate::Absent) };
+    let old = KeyRow::from_row(&row)?;
+    if old.has_ended(new.created_ms) {
+        return Ok(Rotate::Ended);
+    }
+    let life_ms = old.expires_ms.map(|expires_ms| expires_ms.saturating_sub(old.created_ms));
+    let expires_ms = new.expires_ms.or(life_ms.map(|life_ms| new.created_ms.saturating_add(life_ms)));
+    let Successor { key: name, hash, created_ms, .. } = new;
+    let new = KeyRow { key: name, hash, created_ms, expires_ms, ..old.clone() };
+    insert(connection, NewKey::from(new.clone())).await?;
+    let expires_ms = old.expires_ms.map_or(old_expires_ms, |sooner| sooner.min(old_expires_ms));
+    let expire = query("UPDATE access_keys SET expires_ms = $1 WHERE access_key = $2");
+    connection.execute(expire.bind(expires_ms).bind(key)).await?;
+    Ok(Rotate::Rotated { old: KeyRow { expires_ms: Some(expires_ms), ..old }, new })
+}
+
+impl From<KeyRow> for NewKey {
+    fn from(row: KeyRow) -> Self {
+        let KeyRow { key, hash, tenant, roles, created_ms, expires_ms, .. } = row;
+        NewKey { key, hash, tenant, roles, created_ms, expires_ms }
+    }
+}
+
 impl KeyRow {
+    /// Whether it was revoked, or has expired by `now_ms`.
+    pub fn has_ended(&self, now_ms: i64) -> bool {
+        self.revoked_ms.is_some() || self.expires_ms.is_some_and(|expires_ms| expires_ms <= now_ms)
+    }
+
     pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
         let key: String = row.get("access_key")?;
         let damaged = |column: &str| Failure::Corrupt(format!("the {column} of key {key}"));
@@ -131,6 +205,7 @@ impl KeyRow {
             roles: roles.parse().map_err(|_| damaged("roles"))?,
             created_ms: row.get("created_ms")?,
             revoked_ms: row.get("revoked_ms")?,
+            expires_ms: row.get("expires_ms")?,
             key,
         })
     }

@@ -47,7 +47,7 @@ pub use check::Inspection;
 pub use error::StoreError;
 pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, NewJob};
 pub use job_state::{IllegalTransition, JobEvent, JobState};
-pub use keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey};
+pub use keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, Successor};
 pub use observations::{Append, NewObservation, ObservationRow};
 pub use policies::{DeletePolicy, PolicyRow, PolicySummary};
 pub use postgres::{PostgresUrl, UrlError};

@@ -20,6 +20,8 @@ pub(super) struct Query {
 pub(super) enum Value {
     Text(String),
     Integer(i64),
+    /// An integer, or NULL.
+    Optional(Option<i64>),
     Real(f64),
     Bytes(Vec<u8>),
 }
@@ -69,12 +71,14 @@ fn bound<DB: Database>(
 where
     String: Encode<'static, DB> + Type<DB>,
     i64: Encode<'static, DB> + Type<DB>,
+    Option<i64>: Encode<'static, DB> + Type<DB>,
     f64: Encode<'static, DB> + Type<DB>,
     Vec<u8>: Encode<'static, DB> + Type<DB>,
 {
     values.into_iter().fold(statement, |statement, value| match value {
         Value::Text(text) => statement.bind(text),
         Value::Integer(integer) => statement.bind(integer),
+        Value::Optional(integer) => statement.bind(integer),
         Value::Real(real) => statement.bind(real),
         Value::Bytes(bytes) => statement.bind(bytes),
     })
@@ -105,6 +109,12 @@ impl From<String> for Value {
 impl From<i64> for Value {
     fn from(integer: i64) -> Self {
         Value::Integer(integer)
+    }
+}
+
+impl From<Option<i64>> for Value {
+    fn from(integer: Option<i64>) -> Self {
+        Value::Optional(integer)
     }
 }
 

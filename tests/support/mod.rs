@@ -85,7 +85,7 @@ pub async fn lock_out(folder: &Path, time: Duration) {
 /// Makes a key; its text.
 pub async fn issue_key(ring: &KeyRing, tenant: &str, roles: &str) -> String {
     let (tenant, roles) = (tenant.parse().expect("a tenant"), roles.parse().expect("roles"));
-    let (_, secret) = keys::issue(ring, tenant, roles, &Clock::system()).await.expect("a key");
+    let (_, secret) = keys::issue(ring, tenant, roles, None, &Clock::system()).await.expect("a key");
     ring.close().await;
     secret.reveal().to_owned()
 }

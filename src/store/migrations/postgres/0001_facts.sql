@@ -97,5 +97,6 @@ CREATE TABLE access_keys (
     tenant     TEXT NOT NULL,
     roles      TEXT NOT NULL,
     created_ms BIGINT NOT NULL,
-    revoked_ms BIGINT
+    revoked_ms BIGINT,
+    expires_ms BIGINT
 );

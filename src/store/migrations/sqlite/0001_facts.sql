@@ -98,5 +98,6 @@ CREATE TABLE access_keys (
     tenant     TEXT NOT NULL,
     roles      TEXT NOT NULL,
     created_ms INTEGER NOT NULL,
-    revoked_ms INTEGER
+    revoked_ms INTEGER,
+    expires_ms INTEGER
 ) STRICT;
