@@ -437,7 +437,7 @@ async fn documents_that_are_no_policies_are_refused() {
         document
     };
     for (document, field) in [
-        (json!({"format": "ballast-policy-3"}), "specification"),
+        (json!({"format": "ballast-policy-1"}), "specification"),
         (with("/format", json!("ballast-policy-9")), "format"),
         (with("/specification/problem/horizon", json!(3)), "steps"),
         (with("/specification/problem/horizon", json!(0)), "problem.horizon"),

@@ -7,9 +7,6 @@
 //! ```sh
 //! cargo test --test upgrade -- --ignored
 //! ```
-//!
-//! `tests/data/policy_2.json` is a policy of the second format with what its release answered about a session over it: `export`
-//! is what `GET /policies/{id}/export` said, `observations` what `POST /observe` did, `advice` what `GET /action` said.
 
 mod support;
 
@@ -136,26 +133,5 @@ async fn every_schema_is_opened_and_advises_as_it_did() {
         }
         let (status, job) = app.get("/jobs").await;
         assert_eq!((status, &job["jobs"][0]["policy"]), (reqwest::StatusCode::OK, &recorded["policy"]));
-    }
-}
-
-#[tokio::test]
-async fn a_policy_of_the_second_format_is_advised_from_as_it_was() {
-    let recorded: Value = serde_json::from_str(include_str!("data/policy_2.json")).unwrap();
-    let mut app = App::start().await;
-    let (status, imported) = app.post("/policies/import", &recorded["export"]).await;
-    assert_eq!(status, 201, "{imported}");
-    app.policy = imported["policy"].as_str().unwrap().to_owned();
-    app.open().await;
-    for (observed, period) in recorded["observations"].as_array().unwrap().iter().zip(1..) {
-        let (status, found) = app.observe(period, observed["log_return"].as_f64().unwrap()).await;
-        assert_eq!(status, 200, "{found}");
-        for field in ["quantile", "quantile_standard_error", "radius"] {
-            assert_alike(field, &found[field], &observed[field]);
-        }
-    }
-    let (_, found) = app.get(&format!("/action?session={}", app.session)).await;
-    for field in ["allocation", "certainty_equivalent", "surrogate_sd", "in_design", "source"] {
-        assert_alike(field, &found[field], &recorded["advice"][field]);
     }
 }

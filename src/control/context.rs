@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use super::bellman::{RobustSolution, RobustStep};
 use super::design::centre;
 use super::error::TrainError;
-use super::features::{BallFeature, FeatureSelection, LawSummary};
+use super::features::{FeatureSelection, LawSummary};
 use super::gain_field::FieldContext;
 use super::parametric::ParametricStep;
 use super::specification::Specification;
@@ -13,7 +13,6 @@ use super::state::{State, floor};
 use super::surrogate::NextValue;
 use super::uncertainty::{Measure, Radii, UncertaintySets};
 use super::utility::RelativeUtility;
-use crate::numerics::bridge_paths::BridgeForm;
 use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::exponential_mean::{ExponentialMean, WorstExponential};
@@ -21,19 +20,6 @@ use crate::numerics::moments::CentralMoments;
 
 /// Where the features do not depend on the ball.
 const NO_BALL: Radii = Radii { radius: 0.0, radius_ahead: 0.0 };
-
-/// What releases do differently: the features and radii of a policy are those it was trained with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Conventions {
-    pub ball: BallFeature,
-    pub bridges: BridgeForm,
-}
-
-impl Conventions {
-    /// Those of this release.
-    pub const CURRENT: Conventions =
-        Conventions { ball: BallFeature::RobustMertonRatios, bridges: BridgeForm::Directions };
-}
 
 /// The problem with everything that does not change from step to step.
 pub struct ProblemContext {
@@ -44,13 +30,8 @@ pub struct ProblemContext {
 
 impl ProblemContext {
     pub fn new(specification: &Specification) -> Self {
-        ProblemContext::with(specification, Conventions::CURRENT)
-    }
-
-    /// By the conventions that a policy was trained by.
-    pub fn with(specification: &Specification, conventions: Conventions) -> Self {
-        let sets = UncertaintySets::new(specification, conventions.bridges);
-        let selection = FeatureSelection::new(specification, sets.varies(), conventions.ball);
+        let sets = UncertaintySets::new(specification);
+        let selection = FeatureSelection::new(specification, sets.varies());
         ProblemContext { specification: specification.clone(), sets, selection }
     }
 

@@ -26,23 +26,9 @@ pub struct FeatureSelection {
     wealth: bool,
     moments: usize,
     radius: bool,
-    ball: Option<BallFeature>,
+    ball: bool,
     /// Relative risk aversion at the initial wealth.
     risk_aversion: f64,
-}
-
-/// What the last features say of the worst law in the ball.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BallFeature {
-    /// [`LawSummary::robust_excess`] itself: policies of the first format.
-    RobustExcess,
-    /// `asinh(robust_excess / (rho s^2))`, rho the relative risk aversion at the initial wealth, s^2 the variance: to
-    /// second order the allocation of an investor who thinks of one period alone (Merton's ratio). What is held, and what
-    /// it earns, turn where it passes 0 and 1; its ends, which count for less, are drawn together. Policies of the second
-    /// format.
-    RobustMertonRatio,
-    /// The same, and another with [`LawSummary::robust_variance`] in the place of s^2.
-    RobustMertonRatios,
 }
 
 /// What of an empirical law and its ball the features are made of.
@@ -59,7 +45,7 @@ pub struct LawSummary {
 
 impl FeatureSelection {
     /// `radius_varies`: whether laws of one sample size have different radii.
-    pub fn new(specification: &Specification, radius_varies: bool, ball: BallFeature) -> Self {
+    pub fn new(specification: &Specification, radius_varies: bool) -> Self {
         let problem = &specification.problem;
         let learns = problem.framework.learns();
         let parametric = problem.framework.is_parametric();
@@ -70,7 +56,7 @@ impl FeatureSelection {
             wealth: depends_on_wealth(problem.utility),
             moments: if learns { specification.surrogate.moment_count.min(most) } else { 0 },
             radius: learns && radius_varies && map == FeatureMap::Standardized,
-            ball: (learns && !parametric && map == FeatureMap::Standardized).then_some(ball),
+            ball: learns && !parametric && map == FeatureMap::Standardized,
             risk_aversion: RelativeUtility::new(problem.utility, problem.initial_wealth).relative_risk_aversion(),
         }
     }
@@ -82,7 +68,7 @@ impl FeatureSelection {
 
     /// True where the features depend on the ball and not on its centre alone.
     pub fn has_ball(&self) -> bool {
-        self.ball.is_some()
+        self.ball
     }
 
     /// Names, in order.
@@ -106,13 +92,8 @@ impl FeatureSelection {
             names.push("log_radius".to_owned());
             names.push("radius_trend".to_owned());
         }
-        match self.ball {
-            Some(BallFeature::RobustExcess) => names.push("robust_excess".to_owned()),
-            Some(BallFeature::RobustMertonRatio) => names.push("robust_merton_ratio".to_owned()),
-            Some(BallFeature::RobustMertonRatios) => {
-                names.extend(["robust_merton_ratio", "worst_law_merton_ratio"].map(str::to_owned));
-            }
-            None => {}
+        if self.ball {
+            names.extend(["robust_merton_ratio", "worst_law_merton_ratio"].map(str::to_owned));
         }
         names
     }
@@ -122,7 +103,13 @@ impl FeatureSelection {
         if self.map == FeatureMap::Standardized { wealth.ln() } else { wealth }
     }
 
-    /// All features of a state, unscaled.
+    /// All features of a state, unscaled. The last two are Merton's ratio against the worst law of the ball,
+    ///
+    ///   asinh(robust_excess / (rho v)),   rho the relative risk aversion at the initial wealth,
+    ///
+    /// v the law's own variance in the first and `robust_variance` in the second: to second order the allocation of an
+    /// investor who thinks of one period alone. The robust allocation and its value change most where the ratio passes 0
+    /// and 1; asinh draws its ends, which matter less, together.
     pub fn of(&self, wealth: f64, law: &LawSummary) -> Vec<f64> {
         let LawSummary { moments, radii, robust_excess, robust_variance } = law;
         let mut features = Vec::with_capacity(self.moments + 5);
@@ -142,14 +129,9 @@ impl FeatureSelection {
         }
         let variance = moments.variance().max(SMALLEST_DEVIATION * SMALLEST_DEVIATION);
         let ratio = |variance: f64| (robust_excess / (self.risk_aversion * variance)).asinh();
-        match self.ball {
-            Some(BallFeature::RobustExcess) => features.push(*robust_excess),
-            Some(BallFeature::RobustMertonRatio) => features.push(ratio(variance)),
-            Some(BallFeature::RobustMertonRatios) => {
-                features.push(ratio(variance));
-                features.push(ratio(robust_variance.max(SMALLEST_VARIANCE_LEFT * variance)));
-            }
-            None => {}
+        if self.ball {
+            features.push(ratio(variance));
+            features.push(ratio(robust_variance.max(SMALLEST_VARIANCE_LEFT * variance)));
         }
         features
     }

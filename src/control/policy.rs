@@ -5,13 +5,11 @@ use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
 use super::backward::StepSolution;
-use super::context::{Conventions, ProblemContext};
+use super::context::ProblemContext;
 use super::error::{FieldError, PolicyError};
-use super::features::BallFeature;
 use super::limits;
 use super::specification::Specification;
 use super::surrogate::{SingleSolution, Solution, StepSurrogates};
-use crate::numerics::bridge_paths::BridgeForm;
 
 /// The completed specification and the solution of every step, in ascending order of step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -62,12 +60,8 @@ pub struct SurrogateDiagnostics {
     pub search: String,
 }
 
-/// Name and version of the portable form, and what its policies were trained by: those of this release first.
-const FORMATS: [(&str, Conventions); 3] = [
-    ("ballast-policy-3", Conventions::CURRENT),
-    ("ballast-policy-2", Conventions { ball: BallFeature::RobustMertonRatio, bridges: BridgeForm::WholePaths }),
-    ("ballast-policy-1", Conventions { ball: BallFeature::RobustExcess, bridges: BridgeForm::WholePaths }),
-];
+/// Name and version of the portable form, which fixes the features and the radii that a policy was trained with.
+const FORMAT: &str = "ballast-policy-1";
 
 /// A solved step as a training keeps it.
 #[derive(Serialize, Deserialize)]
@@ -83,21 +77,20 @@ impl StepSolution {
     /// # Errors
     /// None that plain structs of numbers and strings can make.
     pub fn to_checkpoint(&self) -> serde_json::Result<Vec<u8>> {
-        serde_json::to_vec(&Checkpoint { format: FORMATS[0].0, solution: self })
+        serde_json::to_vec(&Checkpoint { format: FORMAT, solution: self })
     }
 
-    /// `None` where the bytes are of a release with another format: its inputs or its radii are others, and steps of both
-    /// in one policy would be steps of neither.
+    /// `None` where the bytes are of another format, whose features or radii differ: one policy has steps of one format.
     pub fn from_checkpoint(bytes: &[u8]) -> Option<Self> {
         let Checkpoint { format, solution } = serde_json::from_slice::<Checkpoint<String, StepSolution>>(bytes).ok()?;
-        (format == FORMATS[0].0).then_some(solution)
+        (format == FORMAT).then_some(solution)
     }
 }
 
 impl Policy {
     /// The policy of a completed specification from the solutions of all its steps, ascending.
     pub fn new(specification: Specification, steps: Vec<StepSolution>) -> Self {
-        Policy { format: FORMATS[0].0.to_owned(), specification, steps }
+        Policy { format: FORMAT.to_owned(), specification, steps }
     }
 
     /// The completed specification it was trained from.
@@ -115,10 +108,9 @@ impl Policy {
         self.steps.iter().map(|step| &step.diagnostics)
     }
 
-    /// The problem it solves, with the features its surrogates were fitted on and the radii of its training.
+    /// The problem it solves.
     pub fn context(&self) -> ProblemContext {
-        let known = FORMATS.iter().find(|(format, _)| self.format == *format);
-        ProblemContext::with(&self.specification, known.map_or(Conventions::CURRENT, |(_, conventions)| *conventions))
+        ProblemContext::new(&self.specification)
     }
 
     /// The portable form: JSON whose numbers parse back to the same bits.
@@ -146,9 +138,8 @@ impl Policy {
     }
 
     fn check(&self) -> Result<(), FieldError> {
-        if !FORMATS.iter().any(|(format, _)| self.format == *format) {
-            let known = FORMATS.map(|(format, _)| format).join(" or ");
-            return Err(FieldError::new("format", &self.format, format!("must be {known}")));
+        if self.format != FORMAT {
+            return Err(FieldError::new("format", &self.format, format!("must be {FORMAT}")));
         }
         if self.specification.clone().completed()? != self.specification {
             return Err(FieldError::new("specification", "an object with holes", "must be completed"));

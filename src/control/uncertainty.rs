@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::specification::{Framework, RadiusRule, Specification};
-use crate::numerics::bridge::{Quantile, Statistic, UpperQuantile};
-use crate::numerics::bridge_paths::{AbsoluteBridges, BridgeForm, GRADED_FROM};
+use crate::numerics::bridge::{Quantile, Statistic};
+use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
 use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
 
@@ -25,9 +25,6 @@ pub struct UncertaintySets {
     uncertain: bool,
     /// Sample size at the last step.
     last_size: usize,
-    form: BridgeForm,
-    /// The quantile under the bridge rule.
-    estimator: UpperQuantile,
     /// The common random numbers by sample size; all large ones share those of [`GRADED_FROM`].
     bridges: Mutex<HashMap<usize, Arc<Bridges>>>,
 }
@@ -51,18 +48,13 @@ pub struct Radii {
 }
 
 impl UncertaintySets {
-    /// Bridge radii are taken over paths of this form.
-    pub fn new(specification: &Specification, form: BridgeForm) -> Self {
+    pub fn new(specification: &Specification) -> Self {
         let uncertain = !matches!(specification.problem.framework, Framework::KnownLaw | Framework::PlugIn);
         let rule = specification.problem.radius_rule();
-        let estimator = match rule {
-            RadiusRule::Bridge { alpha, paths, .. } => UpperQuantile::new(paths, alpha),
-            _ => UpperQuantile::new(1, 0.5),
-        };
         let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
         let bridges = Mutex::new(HashMap::new());
         let seed = specification.seed;
-        UncertaintySets { rule, seed, uncertain, last_size, form, estimator, bridges }
+        UncertaintySets { rule, seed, uncertain, last_size, bridges }
     }
 
     /// True where laws of one sample size have different radii.
@@ -83,8 +75,8 @@ impl UncertaintySets {
             Arc::clone(kept.entry(key).or_default())
         };
         let simulate = || match key {
-            GRADED_FROM => AbsoluteBridges::graded(paths, self.seed, self.form),
-            _ => AbsoluteBridges::simulate(sample_size, paths, self.seed, self.form),
+            GRADED_FROM => AbsoluteBridges::graded(paths, self.seed),
+            _ => AbsoluteBridges::simulate(sample_size, paths, self.seed),
         };
         Arc::clone(found.get_or_init(|| Arc::new(simulate())))
     }
@@ -128,9 +120,9 @@ impl UncertaintySets {
     pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
         let size = law.sample_size();
         match self.rule {
-            RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
+            RadiusRule::Bridge { alpha, paths, scale } if self.uncertain => {
                 let bridges = self.bridges(size, paths);
-                radius(scale, bridges.quantile(law, Statistic::Now, &self.estimator), size)
+                radius(scale, bridges.bridge_quantile(law, Statistic::Now, alpha), size)
             }
             _ => self.radius_of_size(size),
         }
@@ -140,8 +132,8 @@ impl UncertaintySets {
     pub fn measure(&self, law: &EmpiricalDistribution) -> Measure {
         let size = law.sample_size();
         match self.rule {
-            RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
-                let quantile = self.bridges(size, paths).quantile_with_error(law, &self.estimator);
+            RadiusRule::Bridge { alpha, paths, scale } if self.uncertain => {
+                let quantile = self.bridges(size, paths).bridge_quantile_with_error(law, alpha);
                 Measure { radius: radius(scale, quantile.value, size), quantile: Some(quantile) }
             }
             _ => Measure { radius: self.radius_of_size(size), quantile: None },
@@ -153,9 +145,9 @@ impl UncertaintySets {
         let size = law.sample_size();
         let radius_ahead = match self.rule {
             RadiusRule::Bridge { .. } if self.uncertain && size >= self.last_size => known,
-            RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
+            RadiusRule::Bridge { alpha, paths, scale } if self.uncertain => {
                 let bridges = self.bridges(size + 1, paths);
-                radius(scale, bridges.quantile(law, Statistic::OneLater, &self.estimator), size + 1)
+                radius(scale, bridges.bridge_quantile(law, Statistic::OneLater, alpha), size + 1)
             }
             _ => self.radius_of_size(size),
         };
@@ -166,9 +158,9 @@ impl UncertaintySets {
     pub fn radii_with(&self, law: &EmpiricalDistribution, values: &[f64]) -> Vec<Radii> {
         let size = law.sample_size() + 1;
         match self.rule {
-            RadiusRule::Bridge { paths, scale, .. } if self.uncertain => {
+            RadiusRule::Bridge { alpha, paths, scale } if self.uncertain => {
                 let quantiles = |which, size| {
-                    let found = self.bridges(size, paths).quantiles_with(law.atoms(), values, which, &self.estimator);
+                    let found = self.bridges(size, paths).bridge_quantiles_with(law.atoms(), values, which, alpha);
                     found.into_iter().map(|quantile| radius(scale, quantile, size)).collect::<Vec<f64>>()
                 };
                 let now = quantiles(Statistic::Now, size);

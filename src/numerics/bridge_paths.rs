@@ -10,7 +10,7 @@ use rand_distr::StandardNormal;
 use super::scale_mixture::ScaleMixture;
 use super::streams::stream;
 
-/// Simulated `|B(t)|`, or `|B(t)|` over the length of the path, at ascending times: common random numbers for laws.
+/// Simulated `|B(t)|` over the length of the path, at ascending times: common random numbers for laws.
 ///
 /// Stored time by time (all paths of the first, then of the second, ...), because a statistic adds time after time.
 #[derive(Debug, Clone)]
@@ -18,18 +18,8 @@ pub struct AbsoluteBridges {
     pub(super) times: Times,
     pub(super) paths: usize,
     pub(super) values: Vec<f64>,
-    /// The law of the lengths the paths are divided by; `None` where they are whole.
-    pub(super) lengths: Option<ScaleMixture>,
-}
-
-/// What of a path a statistic is taken over.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BridgeForm {
-    /// Its direction: `|B|` over the length of the path.
-    Directions,
-    /// The path itself, interpolated and scaled to its variance where its nodes lie between those simulated: policies of
-    /// the first two formats.
-    WholePaths,
+    /// The law of the lengths that the paths are divided by.
+    pub(super) lengths: ScaleMixture,
 }
 
 /// The times at which paths are kept.
@@ -68,7 +58,7 @@ fn refine(bridge: &mut [f64], generator: &mut impl Rng) {
 }
 
 /// Where a node lies in the dyadic grid: between `left` and the next grid point, with these weights. What they leave of
-/// the variance is that of a normal of this deviation, 0 where the weights are scaled to leave none.
+/// the variance is that of a normal of this deviation, 0 at a grid point.
 struct Place {
     left: usize,
     weights: [f64; 2],
@@ -85,18 +75,6 @@ impl Place {
         Place { left, weights: [1.0 - share, share], deviation }
     }
 
-    /// The same on the line alone, scaled to the variance i/n (1 - i/n).
-    fn on_the_line(node: usize, sample_size: usize, cells: usize) -> Self {
-        let place = Place::of(node, sample_size, cells);
-        let (time, left, [rest, share]) = (node as f64 / sample_size as f64, place.left, place.weights);
-        let (start, end) = (left as f64 / cells as f64, (left + 1) as f64 / cells as f64);
-        let variance = rest.powi(2) * start * (1.0 - start)
-            + share * share * end * (1.0 - end)
-            + 2.0 * share * rest * start * (1.0 - end);
-        let scale = (time * (1.0 - time) / variance).sqrt();
-        Place { left, weights: [scale * rest, scale * share], deviation: 0.0 }
-    }
-
     fn value(&self, bridge: &[f64], generator: &mut impl Rng) -> f64 {
         let line = self.weights[0] * bridge[self.left] + self.weights[1] * bridge[self.left + 1];
         if self.deviation == 0.0 { line } else { line + self.deviation * generator.sample::<f64, _>(StandardNormal) }
@@ -104,22 +82,22 @@ impl Place {
 }
 
 impl AbsoluteBridges {
-    /// Simulates `paths` standard Brownian bridges at the times i/n.
+    /// The directions of `paths` standard Brownian bridges at the times i/n.
     ///
     /// Path p is the same path at every sample size, so that the quantile moves from one sample size to the next more as
     /// the law does than as two simulations differ: the stream (seed, "bridge", 0, p) refines it by midpoints on 2^m
     /// cells, m the least with at least 1024 and 4n of them. B(i/n) is drawn given their ends from the stream (seed,
-    /// "bridge in cells", n, p), and the length, of which neighbouring sizes share most but not all, is theirs; of
-    /// [`BridgeForm::WholePaths`] B(i/n) is interpolated and scaled to its exact variance, and covariances are off by
-    /// less than the cell, 1/1024. Cost O(n paths) and a few thousand normals a path.
-    pub fn simulate(sample_size: usize, paths: usize, seed: u64, form: BridgeForm) -> Self {
+    /// "bridge in cells", n, p), and the length, of which neighbouring sizes share most but not all, is theirs.
+    /// Cost O(n paths) and a few thousand normals a path.
+    pub fn simulate(sample_size: usize, paths: usize, seed: u64) -> Self {
+        AbsoluteBridges::simulated(sample_size, paths, seed, length)
+    }
+
+    /// [`Self::simulate`], with every path divided by its `unit`.
+    fn simulated(sample_size: usize, paths: usize, seed: u64, unit: Unit) -> Self {
         let nodes = sample_size.saturating_sub(1);
         let cells = LEAST_CELLS.max(4 * sample_size).next_power_of_two();
-        let place = |node: usize| match form {
-            BridgeForm::Directions => Place::of(node, sample_size, cells),
-            BridgeForm::WholePaths => Place::on_the_line(node, sample_size, cells),
-        };
-        let places: Vec<Place> = (1..=nodes).map(place).collect();
+        let places: Vec<Place> = (1..=nodes).map(|node| Place::of(node, sample_size, cells)).collect();
         let times: Vec<f64> = (1..=nodes).map(|node| node as f64 / sample_size as f64).collect();
         let mut bridge = vec![0.0; cells + 1];
         let path = |index: usize, path: &mut [f64]| {
@@ -127,13 +105,18 @@ impl AbsoluteBridges {
             let mut between = stream(seed, "bridge in cells", sample_size, index);
             path.iter_mut().zip(&places).for_each(|(value, place)| *value = place.value(&bridge, &mut between));
         };
-        AbsoluteBridges::gather(&times, Times::Sample(sample_size), paths, form, path)
+        AbsoluteBridges::gather(&times, Times::Sample(sample_size), paths, unit, path)
     }
 
     /// The same paths at times that serve every sample size from about [`GRADED_FROM`] on: 512 equal cells, of which the
     /// first and the last are halved 14 times towards the ends. Between two times `|B|` is interpolated and scaled to its
     /// exact mean; the product of two values within a cell is off by less than the cell.
-    pub fn graded(paths: usize, seed: u64, form: BridgeForm) -> Self {
+    pub fn graded(paths: usize, seed: u64) -> Self {
+        AbsoluteBridges::simulated_graded(paths, seed, length)
+    }
+
+    /// [`Self::graded`], with every path divided by its `unit`.
+    fn simulated_graded(paths: usize, seed: u64, unit: Unit) -> Self {
         let cell = 1.0 / GRADED_CELLS as f64;
         let halved = |power: u32| cell * 0.5_f64.powi(power as i32);
         let ends = (1..=HALVINGS).rev().map(halved);
@@ -155,33 +138,26 @@ impl AbsoluteBridges {
                 (path[distance], path[last - distance]) = (low, high);
             }
         };
-        AbsoluteBridges::gather(&times, Times::Graded(times.clone()), paths, form, path)
+        AbsoluteBridges::gather(&times, Times::Graded(times.clone()), paths, unit, path)
     }
 
-    /// All paths, each written by `draw` given its index.
-    fn gather(
-        at: &[f64],
-        times: Times,
-        paths: usize,
-        form: BridgeForm,
-        mut draw: impl FnMut(usize, &mut [f64]),
-    ) -> Self {
+    /// All paths, each written by `draw` given its index, over their `unit`.
+    fn gather(at: &[f64], times: Times, paths: usize, unit: Unit, mut draw: impl FnMut(usize, &mut [f64])) -> Self {
         let mut values = vec![0.0; at.len() * paths];
         let mut path = vec![0.0; at.len()];
         for index in 0..paths {
             draw(index, &mut path);
-            let unit = match form {
-                BridgeForm::Directions => length(at, &path),
-                BridgeForm::WholePaths => 1.0,
-            };
+            let unit = unit(at, &path);
             for (time, value) in path.iter().enumerate() {
                 values[time * paths + index] = value.abs() / unit;
             }
         }
-        let lengths = (form == BridgeForm::Directions).then(|| ScaleMixture::chi(at.len().max(1)));
-        AbsoluteBridges { times, paths, values, lengths }
+        AbsoluteBridges { times, paths, values, lengths: ScaleMixture::chi(at.len().max(1)) }
     }
 }
+
+/// What a path, at these times, is divided by.
+type Unit = fn(&[f64], &[f64]) -> f64;
 
 /// `sqrt(sum (dB)^2 / dt)` over the intervals between 0, `times` and 1, of a path that is 0 at both ends.
 fn length(times: &[f64], path: &[f64]) -> f64 {
@@ -191,6 +167,18 @@ fn length(times: &[f64], path: &[f64]) -> f64 {
         (time, value) = (next_time, next_value);
     }
     sum.sqrt()
+}
+
+/// Whole paths, whose statistic is H itself: the plain form that directions are checked against.
+#[cfg(test)]
+impl AbsoluteBridges {
+    pub(super) fn whole(sample_size: usize, paths: usize, seed: u64) -> Self {
+        AbsoluteBridges::simulated(sample_size, paths, seed, |_, _| 1.0)
+    }
+
+    pub(super) fn whole_graded(paths: usize, seed: u64) -> Self {
+        AbsoluteBridges::simulated_graded(paths, seed, |_, _| 1.0)
+    }
 }
 
 #[cfg(test)]
@@ -203,23 +191,21 @@ mod tests {
         for sample_size in [3, 10, 600] {
             let mut cells = vec![0.0; LEAST_CELLS.max(4 * sample_size).next_power_of_two() + 1];
             let nodes = [sample_size / 3, sample_size / 2, sample_size - 1].map(|node| node.max(1));
-            for place in [Place::of, Place::on_the_line] {
-                let places = nodes.map(|node| place(node, sample_size, cells.len() - 1));
-                let mut sums = [[0.0; 3]; 3];
-                for path in 0..20_000 {
-                    refine(&mut cells, &mut stream(5, "bridge", 0, path));
-                    let mut between = stream(5, "bridge in cells", sample_size, path);
-                    let values = places.each_ref().map(|place| place.value(&cells, &mut between));
-                    for (row, left) in sums.iter_mut().zip(values) {
-                        row.iter_mut().zip(values).for_each(|(sum, right)| *sum += left * right / 20_000.0);
-                    }
+            let places = nodes.map(|node| Place::of(node, sample_size, cells.len() - 1));
+            let mut sums = [[0.0; 3]; 3];
+            for path in 0..20_000 {
+                refine(&mut cells, &mut stream(5, "bridge", 0, path));
+                let mut between = stream(5, "bridge in cells", sample_size, path);
+                let values = places.each_ref().map(|place| place.value(&cells, &mut between));
+                for (row, left) in sums.iter_mut().zip(values) {
+                    row.iter_mut().zip(values).for_each(|(sum, right)| *sum += left * right / 20_000.0);
                 }
-                for (row, left) in sums.iter().zip(nodes) {
-                    for (&found, right) in row.iter().zip(nodes) {
-                        let [s, t] = [left.min(right), left.max(right)].map(|node| node as f64 / sample_size as f64);
-                        let expected = s * (1.0 - t);
-                        assert!((found - expected).abs() < 0.01, "{sample_size}: {found} against {expected}");
-                    }
+            }
+            for (row, left) in sums.iter().zip(nodes) {
+                for (&found, right) in row.iter().zip(nodes) {
+                    let [s, t] = [left.min(right), left.max(right)].map(|node| node as f64 / sample_size as f64);
+                    let expected = s * (1.0 - t);
+                    assert!((found - expected).abs() < 0.01, "{sample_size}: {found} against {expected}");
                 }
             }
         }
@@ -238,21 +224,15 @@ mod tests {
             let ratios = whole.values[range.clone()].iter().zip(&unit.values[range]);
             ratios.map(|(value, direction)| (value / direction).powi(2)).collect()
         };
-        // The middle of 10 lies on the grid, where both forms have the same path, and its other nodes between.
-        let [directions, paths] =
-            [BridgeForm::Directions, BridgeForm::WholePaths].map(|form| AbsoluteBridges::simulate(10, 2000, 7, form));
+        let (directions, paths) = (AbsoluteBridges::simulate(10, 2000, 7), AbsoluteBridges::whole(10, 2000, 7));
         chi_square(&middle(&paths, &directions, 4), 9.0);
-        let [directions, paths] =
-            [BridgeForm::Directions, BridgeForm::WholePaths].map(|form| AbsoluteBridges::graded(2000, 7, form));
+        let (directions, paths) = (AbsoluteBridges::graded(2000, 7), AbsoluteBridges::whole_graded(2000, 7));
         chi_square(&middle(&paths, &directions, 270), (directions.values.len() / 2000) as f64);
     }
 
     #[test]
     fn a_path_is_the_same_at_every_sample_size() {
-        let (few, many) = (
-            AbsoluteBridges::simulate(4, 50, 3, BridgeForm::WholePaths),
-            AbsoluteBridges::simulate(2048, 50, 3, BridgeForm::WholePaths),
-        );
+        let (few, many) = (AbsoluteBridges::whole(4, 50, 3), AbsoluteBridges::whole(2048, 50, 3));
         for path in 0..50 {
             // Node 2 of 4 and node 1024 of 2048 are both the middle.
             assert_eq!(few.values[50 + path], many.values[1023 * 50 + path]);

@@ -13,7 +13,6 @@ pub mod exponential_mean;
 pub mod farthest;
 pub mod gp;
 pub mod gp_fit;
-pub mod harrell_davis;
 pub mod law;
 pub mod law_distance;
 pub mod matern;

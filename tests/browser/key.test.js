@@ -48,7 +48,7 @@ test("with the key the page works, and its streams and files show it too", async
   const saving = page.waitForEvent("download");
   await page.getByRole("link", { name: "Export" }).click();
   const saved = JSON.parse(await readFile(await (await saving).path(), "utf8"));
-  assert.equal(saved.format, "ballast-policy-3");
+  assert.equal(saved.format, "ballast-policy-1");
 });
 
 test("a key that is given up is gone", async () => {
