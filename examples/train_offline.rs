@@ -6,8 +6,6 @@
 //! printed beside its formula; at the end the same problem goes to the library's own backward induction, and the three
 //! answers must agree. The utility is logarithmic, so wealth drops out of the state and the values are log gains.
 
-use std::sync::atomic::AtomicBool;
-
 use ballast::control::backward::{Training, Watch};
 use ballast::control::specification::Specification;
 use ballast::control::state::growth;
@@ -155,7 +153,7 @@ fn main() {
         "design": { "count": 400 }
     });
     let specification: Specification = serde_json::from_value(specification).expect("a specification");
-    let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+    let watch = Watch::unwatched();
     let policy = Training::new(&specification).and_then(|training| training.run(&watch)).expect("a policy");
     let Solution::Single(first) = policy.steps()[0].solution else { panic!("step 0 starts from one state") };
     let error = basis_points(first.floor_gain - exact.expectation);

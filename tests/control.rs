@@ -16,7 +16,7 @@ fn specification(value: Value) -> Specification {
 }
 
 fn train(value: Value) -> Policy {
-    let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+    let watch = Watch::unwatched();
     Training::new(&specification(value)).unwrap().run(&watch).unwrap()
 }
 
@@ -229,7 +229,7 @@ fn a_checkpoint_of_another_format_is_not_gone_on_from() {
     let specification = specification(json!({ "problem": { "horizon": 2, "history": twenty_returns() },
         "design": { "count": 12, "initial_laws": "resampled" } }));
     let training = Training::new(&specification).unwrap();
-    let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+    let watch = Watch::unwatched();
     let solved = training.solve_step(1, None, &watch).unwrap();
     let kept = solved.to_checkpoint().unwrap();
     assert_eq!(StepSolution::from_checkpoint(&kept), Some(solved.clone()));

@@ -48,7 +48,7 @@ const COSTS: Costs = Costs { training_seconds: 0.0, simulation_seconds: 0.0, res
 
 fn simulated(request: Value) -> (Evaluation, Vec<Follower>, Outcomes) {
     let evaluation = Evaluation::new(serde_json::from_value(request).unwrap()).unwrap();
-    let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+    let watch = Watch::unwatched();
     let followers = evaluation.train(&watch).unwrap();
     let outcomes = evaluation.simulate(&followers, &watch, &|| 0.0).unwrap();
     (evaluation, followers, outcomes)

@@ -2,8 +2,6 @@
 
 mod support;
 
-use std::sync::atomic::AtomicBool;
-
 use ballast::control::advisor::{AdviceMode, Advisor};
 use ballast::control::backward::{Training, Watch};
 use ballast::control::context::ProblemContext;
@@ -22,7 +20,7 @@ fn specification(value: Value) -> Specification {
 }
 
 fn train(value: Value) -> Policy {
-    let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+    let watch = Watch::unwatched();
     Training::new(&specification(value)).unwrap().run(&watch).unwrap()
 }
 

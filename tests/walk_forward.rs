@@ -20,7 +20,7 @@ fn periods(count: usize) -> Vec<Period> {
 }
 
 fn decide(walk: &WalkForward, strategies: &[Strategy], periods: &[Period], threads: usize) -> Vec<Vec<Decision>> {
-    let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+    let watch = Watch::unwatched();
     let trained = AtomicUsize::new(0);
     let pool = TrainingPool::new(threads).unwrap();
     let count = || {
@@ -41,7 +41,7 @@ fn a_year_equals_the_session_that_lives_it() {
     ] {
         let decisions = &decide(&WALK, &[strategy], &periods, 1)[0];
         let specification = WALK.specification(framework, alpha, &periods[..WALK.window]);
-        let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+        let watch = Watch::unwatched();
         let advisor = Advisor::new(Training::new(&specification).unwrap().run(&watch).unwrap());
         let returns: Vec<f64> = periods[WALK.window..].iter().map(|period| period.log_return).collect();
         let (advices, end) = advisor.simulate(advisor.initial_state(None, None).unwrap(), &returns);
@@ -83,7 +83,7 @@ fn a_stop_and_a_bad_past_are_errors() {
     let outcome = WALK.decide(&[Strategy::PlugIn], &periods(40), &stopped, &|| {});
     assert_eq!(outcome, Err(TrainError::Stopped));
     let constant = vec![Period { log_return: 0.01, bank_return: 0.0 }; 40];
-    let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+    let watch = Watch::unwatched();
     let refused = WALK.decide(&[Strategy::PlugIn], &constant, &watch, &|| {});
     assert!(
         matches!(&refused, Err(TrainError::Specification(field)) if field.field == "problem.history"),

@@ -4,7 +4,6 @@
 //! month is used for its allocation. What comes out is a page to read, and the same as JSON and CSV.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use ballast::control::backward::Watch;
@@ -159,7 +158,7 @@ fn walk(args: &BacktestArgs, months: &[Month]) -> Result<Backtest, BacktestError
     let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let pool = TrainingPool::new(threads)?;
     let bar = progress_bar(walk.trainings(&strategies, &periods));
-    let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+    let watch = Watch::unwatched();
     let decisions = pool.install(|| walk.decide(&strategies, &periods, &watch, &|| bar.inc(1)))?;
     bar.finish_and_clear();
     let lived = &periods[window..];

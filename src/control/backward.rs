@@ -4,67 +4,26 @@
 //! the specification and the step after it alone, so a checkpoint per step resumes to the same bits.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
+use super::bellman::RobustSolution;
 use super::context::ProblemContext;
 use super::design::Design;
 use super::error::TrainError;
 use super::features::Scaling;
 use super::fitting::{Fitting, Solved};
-use super::policy::{Policy, StepDiagnostics};
+use super::policy::Policy;
+pub use super::progress::{Phase, StepProgress, Watch};
+use super::solved_step::StepDiagnostics;
+pub use super::solved_step::StepSolution;
 use super::specification::Specification;
 use super::surrogate::{NextValue, SingleSolution, Solution};
 use crate::numerics::farthest::farthest_points;
 
 /// Progress is reported about this often a step.
 const REPORTS_PER_STEP: usize = 100;
-
-/// What a running step may be asked and told: the stop signal, and a callback for progress.
-pub struct Watch<'a> {
-    pub stop: &'a AtomicBool,
-    pub progress: &'a (dyn Fn(StepProgress) + Sync),
-}
-
-impl Watch<'_> {
-    /// # Errors
-    /// [`TrainError::Stopped`] once the stop signal is up.
-    pub fn go_on(&self) -> Result<(), TrainError> {
-        if self.stop.load(Ordering::Relaxed) { Err(TrainError::Stopped) } else { Ok(()) }
-    }
-}
-
-/// How far one backward step is. Reported from worker threads, possibly concurrently, about a hundred times a step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct StepProgress {
-    pub step: usize,
-    pub phase: Phase,
-    /// Design points solved, or paths simulated, so far in this step, of `total`.
-    pub done: usize,
-    pub total: usize,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Phase {
-    /// Solving the robust Bellman step at the design points.
-    Solving,
-    /// Fitting the surrogates.
-    Fitting,
-    /// Following strategies through simulated paths.
-    Simulating,
-}
-
-/// Everything kept of one solved step; a checkpoint.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StepSolution {
-    pub step: usize,
-    pub solution: Solution,
-    pub diagnostics: StepDiagnostics,
-}
 
 /// A prepared training job: the completed specification and its simulated design.
 pub struct Training {
@@ -103,10 +62,11 @@ impl Training {
         let crew = Crew { training: self, step, next: &next, watch };
         let count = self.design.count(step);
         if count == 1 {
-            let only = crew.solve(&[0], &[], Vec::new())?;
-            let found = only.first().map(|point| &point.solution).ok_or(TrainError::Stopped)?;
-            let solution = Solution::Single(SingleSolution { floor_gain: found.floor_gain, action: found.action });
-            return Ok(StepSolution { step, solution, diagnostics: diagnostics(step, &only) });
+            let only = crew.solve_point(0, Vec::new())?;
+            crew.report(1, 1);
+            let RobustSolution { floor_gain, action, .. } = only.solution;
+            let solution = Solution::Single(SingleSolution { floor_gain, action });
+            return Ok(StepSolution { step, solution, diagnostics: diagnostics(step, &[only]) });
         }
         let candidates = crew.features(0..self.design.candidate_count(step))?;
         let scaling = Scaling::of(&candidates);
@@ -168,30 +128,40 @@ impl Crew<'_> {
     }
 
     /// Solves the robust step at the design points named, after those solved before. `features` are those of all
-    /// candidates, empty where nothing will be fitted.
+    /// candidates.
     fn solve(&self, points: &[usize], features: &[Vec<f64>], before: Vec<Solved>) -> Result<Vec<Solved>, TrainError> {
-        let Crew { training, step, next, watch } = *self;
-        let (total, first) = (training.design.count(step), before.len());
+        let (total, first) = (self.training.design.count(self.step), before.len());
         let every = (total / REPORTS_PER_STEP).max(1);
         let done = AtomicUsize::new(first);
-        (watch.progress)(StepProgress { step, phase: Phase::Solving, done: first, total });
+        self.report(first, total);
         let solve = |&point: &usize| {
-            watch.go_on()?;
-            let state = training.design.state(step, point);
-            let solution = training.context.solve(step, &state, next)?;
-            if !solution.floor_gain.is_finite() || !solution.extended_action.is_finite() {
-                return Err(TrainError::NotFinite { step, point, value: solution.floor_gain });
-            }
+            let solved = self.solve_point(point, features[point].clone())?;
             let finished = done.fetch_add(1, Ordering::Relaxed) + 1;
             if finished.is_multiple_of(every) || finished == total {
-                (watch.progress)(StepProgress { step, phase: Phase::Solving, done: finished, total });
+                self.report(finished, total);
             }
-            Ok(Solved { wealth: state.wealth, features: features.get(point).cloned().unwrap_or_default(), solution })
+            Ok(solved)
         };
         let found: Result<Vec<Solved>, TrainError> = points.par_iter().map(solve).collect();
         let mut solved = before;
         solved.extend(found?);
         Ok(solved)
+    }
+
+    fn report(&self, done: usize, total: usize) {
+        (self.watch.progress)(StepProgress { step: self.step, phase: Phase::Solving, done, total });
+    }
+
+    /// Solves the robust step at one design point.
+    fn solve_point(&self, point: usize, features: Vec<f64>) -> Result<Solved, TrainError> {
+        self.watch.go_on()?;
+        let Crew { training, step, next, .. } = *self;
+        let state = training.design.state(step, point);
+        let solution = training.context.solve(step, &state, next)?;
+        if !solution.floor_gain.is_finite() || !solution.extended_action.is_finite() {
+            return Err(TrainError::NotFinite { step, point, value: solution.floor_gain });
+        }
+        Ok(Solved { wealth: state.wealth, features, solution })
     }
 }
 

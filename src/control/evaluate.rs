@@ -9,12 +9,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use super::advisor::{AdviceMode, AdviceSource, Advisor};
-use super::backward::{Phase, StepProgress, Training, Watch};
+use super::backward::Training;
 use super::design::{admissible, continuous_law};
 use super::error::{FieldError, TrainError};
 use super::evaluation::{EvaluationRequest, InitialHistories};
 use super::limits;
 use super::policy::Policy;
+use super::progress::{Phase, StepProgress, Watch};
 use super::specification::{Framework, SamplingLaw};
 use super::state::next_wealth;
 use crate::numerics::law::ContinuousLaw;

@@ -3,12 +3,12 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::backward::{Phase, StepProgress, Watch};
 use super::bellman::RobustSolution;
 use super::context::ProblemContext;
 use super::error::TrainError;
 use super::features::Scaling;
-use super::policy::{StepDiagnostics, SurrogateDiagnostics};
+use super::progress::{Phase, StepProgress, Watch};
+use super::solved_step::{StepDiagnostics, SurrogateDiagnostics};
 use super::surrogate::{Solution, StepSurrogates, StoredSurrogate, TargetMap};
 use crate::numerics::gp::{GaussianProcess, Hyperparameters, LeaveOneOut};
 use crate::numerics::gp_fit::{self, Bounds, FitError};

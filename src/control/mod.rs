@@ -1,6 +1,7 @@
 //! Floor 1: the paper, a file a section.
 
 pub mod account;
+pub mod advice;
 pub mod advisor;
 pub mod backward;
 pub mod bellman;
@@ -19,6 +20,8 @@ pub mod limits;
 pub mod parametric;
 pub mod policy;
 pub mod pool;
+pub mod progress;
+pub mod solved_step;
 pub mod specification;
 pub mod state;
 pub mod surrogate;

@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use utoipa::ToSchema;
 
-use super::backward::StepSolution;
 use super::context::ProblemContext;
 use super::error::{FieldError, PolicyError};
 use super::limits;
+use super::solved_step::FORMAT;
+pub use super::solved_step::{StepDiagnostics, StepSolution, SurrogateDiagnostics};
 use super::specification::Specification;
 use super::surrogate::{SingleSolution, Solution, StepSurrogates};
 
@@ -18,73 +18,6 @@ pub struct Policy {
     format: String,
     specification: Specification,
     steps: Vec<StepSolution>,
-}
-
-/// How well a step was solved.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct StepDiagnostics {
-    pub step: usize,
-    pub design_count: usize,
-    /// Share of the design points at which the robust allocation is zero.
-    pub all_bank_share: f64,
-    /// Share of the design points whose window could not be certified: mass might want to leave it.
-    pub uncertified_share: f64,
-    /// Largest difference between the primal and the dual value of a robust step, in log certainty equivalent; 0 in the
-    /// parametric frameworks, whose step has no dual.
-    pub duality_gap: f64,
-    /// Diagnostics of the value surrogate; absent where the step stores a single state's solution.
-    pub value: Option<SurrogateDiagnostics>,
-    /// Diagnostics of the policy surrogate; absent where the step stores a single state's solution.
-    pub policy: Option<SurrogateDiagnostics>,
-}
-
-/// A fitted surrogate in figures.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SurrogateDiagnostics {
-    /// Names of the inputs, in the order of the lengthscales.
-    pub features: Vec<String>,
-    /// Lengthscales in units of each input's standard deviation over the design.
-    pub lengthscales: Vec<f64>,
-    /// In units of the target's variance over the design.
-    pub signal_variance: f64,
-    /// In units of the target's variance over the design.
-    pub noise_variance: f64,
-    pub log_likelihood_per_point: f64,
-    /// Root mean square of the leave-one-out errors, in the target's own unit.
-    pub leave_one_out_error: f64,
-    /// Diagonal added to the covariance matrix to factorise it, relative to its diagonal.
-    pub jitter: f64,
-    /// How the maximum-likelihood search ended.
-    pub search: String,
-}
-
-/// Name and version of the portable form, which fixes the features and the radii that a policy was trained with.
-const FORMAT: &str = "ballast-policy-1";
-
-/// A solved step as a training keeps it.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Checkpoint<F, S> {
-    format: F,
-    solution: S,
-}
-
-impl StepSolution {
-    /// JSON whose numbers parse back to the same bits, with the format of the policy it is to be part of.
-    ///
-    /// # Errors
-    /// None that plain structs of numbers and strings can make.
-    pub fn to_checkpoint(&self) -> serde_json::Result<Vec<u8>> {
-        serde_json::to_vec(&Checkpoint { format: FORMAT, solution: self })
-    }
-
-    /// `None` where the bytes are of another format, whose features or radii differ: one policy has steps of one format.
-    pub fn from_checkpoint(bytes: &[u8]) -> Option<Self> {
-        let Checkpoint { format, solution } = serde_json::from_slice::<Checkpoint<String, StepSolution>>(bytes).ok()?;
-        (format == FORMAT).then_some(solution)
-    }
 }
 
 impl Policy {

@@ -4,9 +4,10 @@
 //! decided side by side, and what wealth became is counted afterwards ([`super::account`]).
 
 use super::advisor::{AdviceMode, AdviceSource, Advisor};
-use super::backward::{Training, Watch};
+use super::backward::Training;
 use super::error::TrainError;
 use super::pool::TrainingPool;
+use super::progress::Watch;
 use super::specification::{
     DesignSpecification, Framework, ProblemSpecification, RadiusRule, Specification, SurrogateSpecification,
     UtilitySpecification,

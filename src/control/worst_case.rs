@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::advisor::Advice;
+use super::advice::Advice;
 use super::bellman::{Adversary, RobustSolution};
 use crate::numerics::confidence_region::NormalLaw;
 use crate::numerics::wasserstein::Move;

@@ -5,7 +5,6 @@
 //! against the best one under the same worst-case criterion.
 
 use std::error::Error;
-use std::sync::atomic::AtomicBool;
 
 use ballast::control::advisor::{Advice, AdviceMode, Advisor};
 use ballast::control::backward::{StepSolution, Training, Watch};
@@ -128,7 +127,7 @@ fn nested_truth(context: &ProblemContext, count: usize) -> Result<Vec<Truth>, Tr
 /// A policy whose last `steps` steps are solved; the ones before are not asked and hold nothing.
 fn trained(specification: &Specification, steps: usize) -> Result<Advisor, TrainError> {
     let training = Training::new(specification)?;
-    let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+    let watch = Watch::unwatched();
     let mut solutions: Vec<StepSolution> = Vec::new();
     for step in (0..training.horizon()).rev() {
         let solution =

@@ -5,7 +5,6 @@
 
 use std::error::Error;
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
 
 use ballast::control::advisor::{AdviceMode, Advisor};
 use ballast::control::backward::{Training, Watch};
@@ -96,7 +95,7 @@ pub fn run(bench: &HorizonsBench) -> Result<(), Box<dyn Error>> {
 }
 
 fn trained(specification: &Specification) -> Result<Start, TrainError> {
-    let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+    let watch = Watch::unwatched();
     let advisor = Advisor::new(Training::new(specification)?.run(&watch)?);
     let advice = advisor.advise(0, &advisor.initial_state(None, None)?, AdviceMode::Surrogate);
     Ok(Start { gain: (advice.certainty_equivalent / advice.floor).ln(), allocation: advice.allocation })

@@ -2,7 +2,6 @@
 
 use std::error::Error;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 use ballast::control::backward::{Training, Watch};
 use ballast::control::policy::content_hash;
@@ -45,7 +44,7 @@ impl World {
         let LoadTest { horizon, count, .. } = *arguments;
         tell(&format!("training {horizon} steps of {count} design points"));
         let training = Training::new(&specification(horizon, count))?;
-        let watch = Watch { stop: &AtomicBool::new(false), progress: &|_| {} };
+        let watch = Watch::unwatched();
         let pool = TrainingPool::new(std::thread::available_parallelism().map_or(1, usize::from))?;
         let trained = pool.install(|| training.run(&watch))?;
         let import = post("/policies/import", &String::from_utf8(trained.to_json())?);

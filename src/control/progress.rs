@@ -1,0 +1,48 @@
+//! What long work tells while it runs, and how it is asked to stop.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::{Deserialize, Serialize};
+
+use super::error::TrainError;
+
+/// What a running step may be asked and told: the stop signal, and a callback for progress.
+pub struct Watch<'a> {
+    pub stop: &'a AtomicBool,
+    pub progress: &'a (dyn Fn(StepProgress) + Sync),
+}
+
+impl Watch<'_> {
+    /// Never stopped, and told to nobody.
+    pub fn unwatched() -> Watch<'static> {
+        static NEVER: AtomicBool = AtomicBool::new(false);
+        Watch { stop: &NEVER, progress: &|_| {} }
+    }
+
+    /// # Errors
+    /// [`TrainError::Stopped`] once the stop signal is up.
+    pub fn go_on(&self) -> Result<(), TrainError> {
+        if self.stop.load(Ordering::Relaxed) { Err(TrainError::Stopped) } else { Ok(()) }
+    }
+}
+
+/// How far one backward step is. Reported from worker threads, possibly concurrently, about a hundred times a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StepProgress {
+    pub step: usize,
+    pub phase: Phase,
+    /// Design points solved, or paths simulated, so far in this step, of `total`.
+    pub done: usize,
+    pub total: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Phase {
+    /// Solving the robust Bellman step at the design points.
+    Solving,
+    /// Fitting the surrogates.
+    Fitting,
+    /// Following strategies through simulated paths.
+    Simulating,
+}
