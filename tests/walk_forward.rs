@@ -6,8 +6,8 @@ use ballast::control::account::keep;
 use ballast::control::advisor::Advisor;
 use ballast::control::backward::{Training, Watch};
 use ballast::control::error::TrainError;
+use ballast::control::framework::Framework;
 use ballast::control::pool::TrainingPool;
-use ballast::control::specification::Framework;
 use ballast::control::walk_forward::{Decision, Period, Strategy, WalkForward};
 
 const YEAR: usize = 4;

@@ -96,7 +96,7 @@ impl Workshop {
     pub fn train(&self, evaluation: &Evaluation) -> Result<Vec<Follower>, TrainError> {
         let horizon = evaluation.request.problem.horizon;
         let frameworks = evaluation.request.frameworks.iter();
-        let follower = |framework: &ballast::control::specification::Framework| {
+        let follower = |framework: &ballast::control::framework::Framework| {
             let stage = format!("training {}", framework.name());
             self.run(&stage, horizon, |watch| evaluation.follower(*framework, watch))
         };

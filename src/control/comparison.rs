@@ -7,8 +7,8 @@ use super::evaluation_report::{
     Costs, Coverage, CoverageAtSize, Difference, EvaluationReport, FORMAT, HistoryReport, PeriodReport, RadiusSpread,
     Spread, StrategyReport, UtilityReport, WealthReport,
 };
+use super::framework::Framework;
 use super::policy::content_hash;
-use super::specification::Framework;
 use super::state::floor;
 use super::utility::{RelativeUtility, utility};
 use crate::numerics::summary::{Clustered, Estimate, interpolated_quantile};

@@ -10,8 +10,9 @@ use std::ops::Range;
 use rand::RngExt;
 
 use super::error::FieldError;
+use super::framework::Framework;
 use super::specification::{
-    Framework, InitialLaws, Interval, ProblemSpecification, RadiusRule, SamplingLaw, Specification,
+    DEFAULT_COUNT, InitialLaws, Interval, ProblemSpecification, RadiusRule, SamplingLaw, Specification,
 };
 use super::state::{State, next_wealth};
 use super::utility::depends_on_wealth;
@@ -60,7 +61,7 @@ pub fn continuous_law(law: &SamplingLaw, history: &[f64]) -> ContinuousLaw {
 
 /// A return the rest of the project accepts: within the support and the limit on log-returns.
 pub fn admissible(log_return: f64, problem: &ProblemSpecification) -> f64 {
-    let limit = super::limits::LOG_RETURN;
+    let limit = super::rules::LOG_RETURN;
     let Interval { min, max } = problem.support.unwrap_or(Interval { min: -limit, max: limit });
     log_return.clamp(min.max(-limit), max.min(limit))
 }
@@ -70,7 +71,7 @@ impl Design {
     pub fn new(specification: &Specification) -> Self {
         let problem = &specification.problem;
         let design = &specification.design;
-        let count = design.count.unwrap_or(super::limits::DEFAULT_COUNT);
+        let count = design.count.unwrap_or(DEFAULT_COUNT);
         let bootstrap = SamplingLaw::Bootstrap {};
         let start = design.wealth.unwrap_or(Interval { min: problem.initial_wealth, max: problem.initial_wealth });
         let learns = problem.framework.learns();

@@ -13,10 +13,11 @@ use super::backward::Training;
 use super::design::{admissible, continuous_law};
 use super::error::{FieldError, TrainError};
 use super::evaluation::{EvaluationRequest, InitialHistories};
-use super::limits;
+use super::framework::Framework;
 use super::policy::Policy;
 use super::progress::{Phase, StepProgress, Watch};
-use super::specification::{Framework, SamplingLaw};
+use super::rules;
+use super::specification::SamplingLaw;
 use super::state::next_wealth;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::law_distance::{LawDistance, Placed, insert};
@@ -97,7 +98,7 @@ impl Evaluation {
         request.histories = InitialHistories::Drawn { count: histories.len() };
         let request = request.completed()?;
         for (index, history) in histories.iter().enumerate() {
-            limits::history(&format!("histories[{index}]"), history)?;
+            rules::history(&format!("histories[{index}]"), history)?;
             if history.len() != request.problem.history.len() {
                 let value = format!("{} values", history.len());
                 return Err(FieldError::new(

@@ -6,10 +6,11 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::error::FieldError;
-use super::limits::{self, within};
+use super::framework::Framework;
+use super::rules::{self, within};
 use super::specification::{
-    DesignSpecification, Framework, InitialLaws, ProblemSpecification, RadiusRule, SamplingLaw, Specification,
-    SurrogateSpecification,
+    DEFAULT_COUNT_WEALTH_ALONE, DesignSpecification, InitialLaws, ProblemSpecification, RadiusRule, SamplingLaw,
+    Specification, SurrogateSpecification,
 };
 
 const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
@@ -145,9 +146,9 @@ impl EvaluationRequest {
     }
 
     fn check_sizes(&self) -> Result<(), FieldError> {
-        limits::whole("paths", self.paths, &PATHS)?;
+        rules::whole("paths", self.paths, &PATHS)?;
         if let InitialHistories::Drawn { count } = self.histories {
-            limits::whole("histories.count", count, &HISTORIES)?;
+            rules::whole("histories.count", count, &HISTORIES)?;
         }
         if self.history_count().saturating_mul(self.paths).saturating_mul(self.problem.horizon) > STEPS {
             let rule = format!("times histories.count and problem.horizon must be at most {STEPS}");
@@ -199,7 +200,7 @@ impl EvaluationRequest {
         }
         if !framework.learns() {
             // One input needs no more: the paper's count for a state that is wealth alone.
-            design.count = design.count.map(|count| count.min(limits::DEFAULT_COUNT_WEALTH_ALONE));
+            design.count = design.count.map(|count| count.min(DEFAULT_COUNT_WEALTH_ALONE));
         }
         if let Some(history) = history {
             problem.history = history.to_vec();

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::evaluation::EvaluationRequest;
-use super::specification::Framework;
+use super::framework::Framework;
 use crate::numerics::summary::Estimate;
 
 /// Name and version of the report's form.

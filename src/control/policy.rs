@@ -5,7 +5,7 @@ use sha2::{Digest, Sha256};
 
 use super::context::ProblemContext;
 use super::error::{FieldError, PolicyError};
-use super::limits;
+use super::rules;
 use super::solved_step::FORMAT;
 pub use super::solved_step::{StepDiagnostics, StepSolution, SurrogateDiagnostics};
 use super::specification::Specification;
@@ -99,8 +99,8 @@ impl Policy {
 
 fn check_single(field: &str, single: &SingleSolution, specification: &Specification) -> Result<(), FieldError> {
     let highest = specification.problem.action_interval[1];
-    limits::within(&format!("{field}.action"), single.action, 0.0, highest)?;
-    limits::within(&format!("{field}.floor_gain"), single.floor_gain, 0.0, LARGEST_GAIN)
+    rules::within(&format!("{field}.action"), single.action, 0.0, highest)?;
+    rules::within(&format!("{field}.floor_gain"), single.floor_gain, 0.0, LARGEST_GAIN)
 }
 
 /// Largest floor gain believed: a factor e^100.
@@ -124,7 +124,7 @@ fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) 
         ("value.hyperparameters.lengthscales", stored.value.hyperparameters.lengthscales.len(), inputs),
         ("policy.hyperparameters.lengthscales", stored.policy.hyperparameters.lengthscales.len(), inputs),
         ("policy.weights", stored.policy.weights.len(), points),
-        ("value.weights", points, points.clamp(2, limits::LARGEST_COUNT)),
+        ("value.weights", points, points.clamp(2, rules::LARGEST_COUNT)),
     ];
     let columns = stored.inputs.iter().map(|column| ("inputs", column.len(), points));
     for (name, found, expected) in shapes.into_iter().chain(columns) {
@@ -134,19 +134,19 @@ fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) 
     }
     let plain = scaling.centre.iter().chain(stored.inputs.iter().flatten());
     for &number in plain.chain(&stored.value.weights).chain(&stored.policy.weights) {
-        limits::within(field, number, -LARGEST_NUMBER, LARGEST_NUMBER)?;
+        rules::within(field, number, -LARGEST_NUMBER, LARGEST_NUMBER)?;
     }
     for surrogate in [&stored.value, &stored.policy] {
         let hyper = &surrogate.hyperparameters;
-        limits::within(&format!("{field}.offset"), surrogate.offset, -LARGEST_NUMBER, LARGEST_NUMBER)?;
+        rules::within(&format!("{field}.offset"), surrogate.offset, -LARGEST_NUMBER, LARGEST_NUMBER)?;
         let positive =
             hyper.lengthscales.iter().chain([&hyper.signal_variance, &hyper.noise_variance, &surrogate.scale]);
         for &number in positive.chain(&scaling.spread) {
-            limits::within(field, number, 1.0 / LARGEST_NUMBER, LARGEST_NUMBER)?;
+            rules::within(field, number, 1.0 / LARGEST_NUMBER, LARGEST_NUMBER)?;
         }
     }
-    limits::within(&format!("{field}.deviation_limit"), stored.deviation_limit, 0.0, LARGEST_NUMBER)?;
-    limits::within(&format!("{field}.largest_gain"), stored.largest_gain, 0.0, LARGEST_GAIN)
+    rules::within(&format!("{field}.deviation_limit"), stored.deviation_limit, 0.0, LARGEST_NUMBER)?;
+    rules::within(&format!("{field}.largest_gain"), stored.largest_gain, 0.0, LARGEST_GAIN)
 }
 
 /// SHA-256 of a policy's portable form, in lower-case hexadecimal: the policy's name.

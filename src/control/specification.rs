@@ -1,14 +1,12 @@
 //! The training request: every choice a user has, its default and its rule.
 //!
-//! A [`Specification`] arrives with holes; [`Specification::completed`] fills the defaults that depend on
-//! other fields and checks every rule. Only a completed one is stored, hashed and solved.
+//! A [`Specification`] arrives with holes; `Specification::completed` fills the defaults that depend on other fields and
+//! checks every rule (`rules.rs`). Only a completed one is stored, hashed and solved.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::error::FieldError;
-pub use super::framework::Framework;
-use super::limits;
+use super::framework::Framework;
 
 /// A whole training job: the problem, the design that samples its states, the surrogates, one seed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -170,6 +168,11 @@ pub struct MixtureComponent {
     pub variance: f64,
 }
 
+/// Design points per step where the law is part of the state: the paper's count.
+pub const DEFAULT_COUNT: usize = 1000;
+/// Design points per step where the state is wealth alone: the paper's count.
+pub const DEFAULT_COUNT_WEALTH_ALONE: usize = 200;
+
 /// Which states the surrogates are trained on.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -289,26 +292,5 @@ mod defaults {
     }
     pub fn moment_count() -> usize {
         4
-    }
-}
-
-impl Specification {
-    /// Fills the defaults that depend on other fields and checks every rule.
-    ///
-    /// # Errors
-    /// The first field, in the order of the request, that breaks its rule.
-    pub fn completed(mut self) -> Result<Self, FieldError> {
-        limits::check(&self)?;
-        let learns = self.problem.framework.learns();
-        self.problem.radius = Some(self.problem.radius_rule());
-        self.design.count.get_or_insert(if learns {
-            limits::DEFAULT_COUNT
-        } else {
-            limits::DEFAULT_COUNT_WEALTH_ALONE
-        });
-        self.design.sampling_law.get_or_insert(SamplingLaw::Bootstrap {});
-        let wealth = self.problem.initial_wealth;
-        self.design.wealth.get_or_insert(Interval { min: wealth, max: wealth });
-        Ok(self)
     }
 }

@@ -1,7 +1,7 @@
 //! The state y = (x, F^) and its dynamics.
 
 use super::error::FieldError;
-use super::limits;
+use super::rules;
 use crate::numerics::empirical::EmpiricalDistribution;
 
 /// Wealth and the empirical law of log-returns.
@@ -39,8 +39,8 @@ impl State {
     /// # Errors
     /// A history or a wealth that breaks its rule, under the names `history` and `wealth`.
     pub fn new(history: &[f64], wealth: f64) -> Result<Self, FieldError> {
-        limits::history("history", history)?;
-        limits::within("wealth", wealth, limits::WEALTH.0, limits::WEALTH.1)?;
+        rules::history("history", history)?;
+        rules::wealth("wealth", wealth)?;
         Ok(State { wealth, law: EmpiricalDistribution::new(history) })
     }
 }

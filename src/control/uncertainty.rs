@@ -4,7 +4,8 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use super::specification::{Framework, RadiusRule, Specification};
+use super::framework::Framework;
+use super::specification::{RadiusRule, Specification};
 use crate::numerics::bridge::{Quantile, Statistic};
 use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
 use crate::numerics::confidence_region;

@@ -6,11 +6,11 @@
 use super::advisor::{AdviceMode, AdviceSource, Advisor};
 use super::backward::Training;
 use super::error::TrainError;
+use super::framework::Framework;
 use super::pool::TrainingPool;
 use super::progress::Watch;
 use super::specification::{
-    DesignSpecification, Framework, ProblemSpecification, RadiusRule, Specification, SurrogateSpecification,
-    UtilitySpecification,
+    DesignSpecification, ProblemSpecification, RadiusRule, Specification, SurrogateSpecification, UtilitySpecification,
 };
 
 /// Simulated bridges behind every radius: the default of a specification.

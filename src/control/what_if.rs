@@ -2,13 +2,9 @@
 
 use super::advisor::{Advice, AdviceMode, Advisor};
 use super::error::FieldError;
-use super::limits;
+use super::rules;
 use super::state::State;
 use super::worst_case::WorstCase;
-
-/// Largest factor on, and largest value of, a hypothetical radius: those of a specification.
-const LARGEST_SCALE: f64 = 100.0;
-const LARGEST_RADIUS: f64 = 10.0;
 
 /// What is supposed; what is not stays as it is. The parts are taken in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -48,14 +44,18 @@ impl Hypothesis {
     /// The first field that breaks its rule.
     pub fn check(&self) -> Result<(), FieldError> {
         if let Some(wealth) = self.wealth {
-            limits::within("wealth", wealth, limits::WEALTH.0, limits::WEALTH.1)?;
+            rules::wealth("wealth", wealth)?;
         }
         if let Some(log_return) = self.log_return {
-            limits::log_return("log_return", log_return)?;
+            rules::log_return("log_return", log_return)?;
         }
         match self.radius {
-            Some(HypotheticalRadius::Scaled(scale)) => limits::within("radius_scale", scale, 0.0, LARGEST_SCALE),
-            Some(HypotheticalRadius::Fixed(radius)) => limits::within("radius", radius, 0.0, LARGEST_RADIUS),
+            Some(HypotheticalRadius::Scaled(scale)) => {
+                rules::within("radius_scale", scale, rules::RADIUS_SCALE.0, rules::RADIUS_SCALE.1)
+            }
+            Some(HypotheticalRadius::Fixed(radius)) => {
+                rules::within("radius", radius, rules::FIXED_RADIUS.0, rules::FIXED_RADIUS.1)
+            }
             None => Ok(()),
         }
     }
@@ -110,7 +110,7 @@ impl Advisor {
         }
         let advised = self.advise(step, &now, AdviceMode::Surrogate).allocation;
         let then = self.advance(&now, advised, log_return);
-        let (low, high) = limits::WEALTH;
+        let (low, high) = rules::WEALTH;
         if !(low..=high).contains(&then.wealth) {
             let rule = format!("must leave a wealth in [{low}, {high}]");
             return Err(FieldError::new("log_return", log_return, rule));

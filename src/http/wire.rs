@@ -5,8 +5,9 @@ use utoipa::ToSchema;
 
 use crate::control::advisor::Advice;
 use crate::control::backward::Phase;
+use crate::control::framework::Framework;
 use crate::control::policy::StepDiagnostics;
-use crate::control::specification::{Framework, Specification};
+use crate::control::specification::Specification;
 use crate::control::worst_case::WorstCase;
 use crate::service::error::ServiceError;
 use crate::service::jobs::Job as ServiceJob;

@@ -6,7 +6,7 @@ use super::bounded::Bounded;
 use super::error::ServiceError;
 use super::observation::{Observe, Observed};
 use crate::control::advisor::{Advice, AdviceMode, Advisor, Uncertainty};
-use crate::control::limits;
+use crate::control::rules as limits;
 use crate::control::state::State;
 use crate::store::{Head, SessionRow};
 

@@ -5,7 +5,7 @@ use utoipa::ToSchema;
 
 use crate::control::advisor::Uncertainty;
 use crate::control::error::FieldError;
-use crate::control::limits;
+use crate::control::rules as limits;
 use crate::control::policy::content_hash;
 
 /// Prices taken: any currency, any quantity.

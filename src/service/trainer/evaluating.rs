@@ -9,8 +9,8 @@ use crate::control::backward::Watch;
 use crate::control::error::TrainError;
 use crate::control::evaluate::{Evaluation, Follower};
 use crate::control::evaluation_report::{Costs, EvaluationReport};
+use crate::control::framework::Framework;
 use crate::control::policy::Policy;
-use crate::control::specification::Framework;
 use crate::store::{ClaimedJob, JobOutcome, StoreError};
 
 impl Worker {

@@ -1,15 +1,12 @@
 //! Every rule a specification must satisfy, checked before any work.
 
 use super::error::FieldError;
+use super::framework::Framework;
 use super::specification::{
-    Framework, InitialLaws, Interval, ProblemSpecification, RadiusRule, SamplingLaw, Specification,
-    SurrogateSpecification, UtilitySpecification,
+    DEFAULT_COUNT, DEFAULT_COUNT_WEALTH_ALONE, InitialLaws, Interval, ProblemSpecification, RadiusRule, SamplingLaw,
+    Specification, SurrogateSpecification, UtilitySpecification,
 };
 
-/// Design points per step where the law is part of the state: the paper's count.
-pub const DEFAULT_COUNT: usize = 1000;
-/// Design points per step where the state is wealth alone: the paper's count.
-pub const DEFAULT_COUNT_WEALTH_ALONE: usize = 200;
 /// The covariance matrix of 10,000 points takes 800 MB.
 pub const LARGEST_COUNT: usize = 10_000;
 const COUNT: std::ops::RangeInclusive<usize> = 10..=LARGEST_COUNT;
@@ -31,8 +28,29 @@ const EXPONENTIAL_SCALE: f64 = 300.0;
 pub const WEALTH: (f64, f64) = (1e-6, 1e15);
 const MOMENTS: std::ops::RangeInclusive<usize> = 1..=6;
 
-/// Checks every field; the first that breaks its rule is the error.
-pub fn check(specification: &Specification) -> Result<(), FieldError> {
+/// Factors on a bridge radius.
+pub const RADIUS_SCALE: (f64, f64) = (0.0, 100.0);
+/// Fixed radii, in log-return.
+pub const FIXED_RADIUS: (f64, f64) = (0.0, 10.0);
+
+impl Specification {
+    /// Fills the defaults that depend on other fields and checks every rule.
+    ///
+    /// # Errors
+    /// The first field, in the order of the request, that breaks its rule.
+    pub fn completed(mut self) -> Result<Self, FieldError> {
+        check(&self)?;
+        let learns = self.problem.framework.learns();
+        self.problem.radius = Some(self.problem.radius_rule());
+        self.design.count.get_or_insert(if learns { DEFAULT_COUNT } else { DEFAULT_COUNT_WEALTH_ALONE });
+        self.design.sampling_law.get_or_insert(SamplingLaw::Bootstrap {});
+        let wealth = self.problem.initial_wealth;
+        self.design.wealth.get_or_insert(Interval { min: wealth, max: wealth });
+        Ok(self)
+    }
+}
+
+fn check(specification: &Specification) -> Result<(), FieldError> {
     problem(&specification.problem)?;
     design(specification)?;
     surrogate(&specification.surrogate)
@@ -41,7 +59,7 @@ pub fn check(specification: &Specification) -> Result<(), FieldError> {
 fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
     whole("problem.horizon", problem.horizon, &HORIZON)?;
     within("problem.rate_per_step", problem.rate_per_step, -0.5, 0.5)?;
-    within("problem.initial_wealth", problem.initial_wealth, 1e-6, 1e15)?;
+    wealth("problem.initial_wealth", problem.initial_wealth)?;
     let [lowest, highest] = problem.action_interval;
     if lowest != 0.0 {
         return Err(FieldError::new(
@@ -131,7 +149,7 @@ fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), Field
         RadiusRule::Bridge { alpha, paths, scale } => {
             within("problem.radius.alpha", alpha, 1e-3, 0.999)?;
             whole("problem.radius.paths", paths, &PATHS)?;
-            within("problem.radius.scale", scale, 0.0, 100.0)?;
+            within("problem.radius.scale", scale, RADIUS_SCALE.0, RADIUS_SCALE.1)?;
             if paths.saturating_mul(problem.history.len() + problem.horizon) > BRIDGE_NUMBERS {
                 let rule = format!("times the final sample size must be at most {BRIDGE_NUMBERS}");
                 return Err(FieldError::new("problem.radius.paths", paths, rule));
@@ -144,7 +162,7 @@ fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), Field
             within("problem.radius.c", rate, 1e-9, 1e12)
         }
         RadiusRule::RootN { kappa } => within("problem.radius.kappa", kappa, 0.0, 100.0),
-        RadiusRule::Fixed { radius } => within("problem.radius.radius", radius, 0.0, 10.0),
+        RadiusRule::Fixed { radius } => within("problem.radius.radius", radius, FIXED_RADIUS.0, FIXED_RADIUS.1),
         RadiusRule::ChiSquare { alpha } => within("problem.radius.alpha", alpha, 1e-3, 1.0),
     }
 }
@@ -167,6 +185,11 @@ pub fn history(field: &str, values: &[f64]) -> Result<(), FieldError> {
     Ok(())
 }
 
+/// Checks a wealth, named `field` in messages.
+pub fn wealth(field: &str, value: f64) -> Result<(), FieldError> {
+    within(field, value, WEALTH.0, WEALTH.1)
+}
+
 /// Checks one log-return, named `field` in messages.
 pub fn log_return(field: &str, value: f64) -> Result<(), FieldError> {
     within(field, value, -LOG_RETURN, LOG_RETURN)
@@ -185,17 +208,17 @@ fn design(specification: &Specification) -> Result<(), FieldError> {
     if let Some(law) = &design.sampling_law {
         sampling_law("design.sampling_law", law)?;
     }
-    if let Some(wealth) = design.wealth {
-        within("design.wealth.min", wealth.min, 1e-6, 1e15)?;
-        within("design.wealth.max", wealth.max, 1e-6, 1e15)?;
-        if wealth.max < wealth.min {
-            return Err(FieldError::new("design.wealth.max", wealth.max, "must be at least design.wealth.min"));
+    if let Some(Interval { min, max }) = design.wealth {
+        wealth("design.wealth.min", min)?;
+        wealth("design.wealth.max", max)?;
+        if max < min {
+            return Err(FieldError::new("design.wealth.max", max, "must be at least design.wealth.min"));
         }
         if let UtilitySpecification::Exponential { risk_aversion } = specification.problem.utility
-            && risk_aversion * wealth.max > EXPONENTIAL_SCALE
+            && risk_aversion * max > EXPONENTIAL_SCALE
         {
             let rule = format!("times problem.utility.risk_aversion must be at most {EXPONENTIAL_SCALE}");
-            return Err(FieldError::new("design.wealth.max", wealth.max, rule));
+            return Err(FieldError::new("design.wealth.max", max, rule));
         }
     }
     Ok(())
