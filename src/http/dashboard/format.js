@@ -6,6 +6,7 @@ const MINUS = "\u2212";
 function grouped(value, digits) {
   return value
     .toLocaleString("en-GB", { minimumFractionDigits: digits, maximumFractionDigits: digits, useGrouping: "min2" })
+    .replace(/^-(?=[0.]*$)/, "")
     .replace("-", MINUS);
 }
 

@@ -3,7 +3,7 @@
 import { post } from "./api.js";
 import { announce, h } from "./dom.js";
 import { fieldset, input, select, showProblem } from "./form.js";
-import { historySource } from "./history_source.js";
+import { returnsField } from "./returns_field.js";
 import { isParametric } from "./specification.js";
 
 const UTILITIES = { exponential: "Exponential", power: "Power", log: "Log" };
@@ -46,9 +46,14 @@ export async function view(_, leaving) {
   const message = h("p", { class: "error", role: "alert", hidden: true });
   const json = h("textarea", { id: "json", rows: 18, spellcheck: "false", "aria-describedby": "json-note json-error" });
   const jsonError = h("p", { id: "json-error", class: "error", hidden: true });
-  const source = historySource((returns) => {
-    put(request, "problem.history", returns);
-    written();
+  const source = returnsField({
+    name: "problem.history",
+    label: "Returns or prices",
+    example: true,
+    changed: (returns) => {
+      put(request, "problem.history", returns);
+      written();
+    },
   });
   const fields = mainFields((path, value) => {
     if (path === "problem.utility.kind")
@@ -60,7 +65,9 @@ export async function view(_, leaving) {
     else put(request, path, value);
     if (path === "problem.framework") {
       const { alpha = 0.1 } = request.problem.radius ?? {};
-      request.problem.radius = isParametric(value) ? { rule: "chi_square", alpha } : { rule: "bridge", alpha, scale: 1 };
+      request.problem.radius = isParametric(value)
+        ? { rule: "chi_square", alpha }
+        : { rule: "bridge", alpha, scale: 1 };
     }
     if (path === "problem.utility.kind" || path === "problem.framework") fields.show(request);
     written();
@@ -74,7 +81,7 @@ export async function view(_, leaving) {
       request = JSON.parse(json.value);
       jsonError.hidden = true;
       fields.show(request);
-      source.show(request.problem?.history ?? []);
+      source.show([request.problem?.history ?? []].flat());
     } catch (error) {
       jsonError.textContent = error.message;
       jsonError.hidden = false;
@@ -99,7 +106,7 @@ export async function view(_, leaving) {
   const form = h(
     "form",
     { novalidate: true },
-    source.element,
+    h("fieldset", {}, h("legend", {}, "The returns seen so far"), source.element),
     fields.elements,
     advanced,
     message,
@@ -112,6 +119,8 @@ export async function view(_, leaving) {
   );
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
+    const trouble = source.trouble();
+    if (trouble) return showProblem(form, message, { field: "problem.history", message: trouble });
     send.disabled = true;
     try {
       const job = await post("/train", json.value);

@@ -1,0 +1,45 @@
+// Numbers as people and programs write them: either decimal mark, thousands apart or not, a percent sign, any minus.
+//
+// No number here starts with a zero before another digit: 012 is what is left of 0,012 when a comma was taken for something
+// else, and -0 likewise.
+
+const WHOLE = "(?:0|[1-9]\\d*)";
+const pattern = (mark, apart) =>
+  new RegExp(
+    `^[+-]?(?:(?:${WHOLE}|[1-9]\\d{0,2}(?:${apart}\\d{3})+)(?:${mark}\\d*)?|${mark}\\d+)(?:e[+-]?\\d+)?$`,
+    "i",
+  );
+const PATTERNS = {
+  point: pattern("\\.", "[,'\u2019\u00a0\u202f ]"),
+  comma: pattern(",", "[.'\u2019\u00a0\u202f ]"),
+};
+/** The mark itself and what stands between thousands. */
+const APART = { point: /[,'\u2019\u00a0\u202f ]/g, comma: /[.'\u2019\u00a0\u202f ]/g };
+
+const bare = (text) =>
+  text
+    .trim()
+    .replace(/^[\u2212\u2013]/, "-")
+    .replace(/\s*%$/, "");
+
+/** Whether `text` is a number by the decimal mark given, or by either. */
+export function isNumber(text, decimal) {
+  const plain = bare(text);
+  if (plain === "-0") return false;
+  return decimal ? PATTERNS[decimal].test(plain) : PATTERNS.point.test(plain) || PATTERNS.comma.test(plain);
+}
+
+/** Whether `text` is meant as a number, well formed or not: digits and marks alone. */
+export const looksNumeric = (text) =>
+  /\d/.test(text) && /^[+-]?[\d.,'\u2019\u00a0\u202f ]+(e[+-]?\d+)?$/i.test(bare(text));
+
+/** The number that `text` is; only where `isNumber` says that it is one. A percent sign does not divide it. */
+export function numberOf(text, decimal) {
+  const joined = bare(text).replace(APART[decimal], "");
+  return Number(decimal === "comma" ? joined.replace(",", ".") : joined);
+}
+
+/** `text` with its comma as a decimal point. */
+export const commaDecimal = (text) => bare(text).replaceAll(".", "").replace(",", ".");
+
+export const hasPercent = (text) => /%\s*$/.test(text);
