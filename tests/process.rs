@@ -124,6 +124,24 @@ async fn nothing_acknowledged_is_lost_by_a_kill() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_job_that_three_processes_died_under_fails_and_the_service_lives() {
+    let mut process = Process::start();
+    let mut slow = specification(2);
+    slow["design"]["count"] = json!(3000);
+    let job = process.app.queue(&slow).await;
+    for attempt in 1..=3 {
+        process.app.until(&job, |job| job["state"] == "running").await;
+        assert_eq!(support::attempts(process.app.folder()).await, attempt);
+        process.kill();
+        process.start_again();
+    }
+    let failed = process.app.until(&job, |job| job["finished_ms"].is_i64()).await;
+    assert_eq!(failed["state"], "failed", "{failed}");
+    assert!(failed["error"].as_str().unwrap().contains("ended 3 times while it ran"), "{failed}");
+    process.app.train(&specification(2)).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_terminated_process_exits_0_and_its_job_goes_on() {
     let mut process = Process::start();
     let job = process.app.queue(&specification(STEPS)).await;

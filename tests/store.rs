@@ -44,6 +44,7 @@ on_both_engines!(
     failures_and_reports_end_a_job,
     cancelling_ends_a_queued_job_and_flags_a_running_one,
     a_job_asked_to_stop_is_not_claimed_again,
+    a_job_under_which_three_workers_died_fails,
     a_released_job_resumes_from_its_checkpoints,
     a_policy_is_stored_once_listed_and_kept_while_in_use,
     a_damaged_policy_is_detected,
@@ -262,6 +263,28 @@ async fn a_job_asked_to_stop_is_not_claimed_again(place: &Place) {
     assert_eq!(store.claim_job("worker", 30, 50_000).await.unwrap(), None);
     let counts = store.count_jobs_by_state().await.unwrap();
     assert_eq!(counts, JobCounts { cancelled: 2, ..JobCounts::default() });
+}
+
+async fn a_job_under_which_three_workers_died_fails(place: &Place) {
+    let store = place.open().await;
+    queued(&store, "poison").await;
+    let mut now = 0;
+    // A worker that stops in order is no death, and neither is one that saved a step.
+    for life in ["released", "dies", "dies", "saves and dies", "dies", "dies"] {
+        let (_, attempt) = claimed(&store, now).await;
+        match life {
+            "released" => assert!(store.release_job("poison", attempt, now).await.unwrap()),
+            "saves and dies" => assert!(store.save_checkpoint("poison", attempt, 9, b"nine").await.unwrap()),
+            _ => {}
+        }
+        now += 50_000;
+    }
+    assert_eq!(store.claim_job("worker", 30, now).await.unwrap(), None);
+    let row = store.job("poison").await.unwrap().unwrap();
+    assert_eq!((row.state, row.attempt, row.finished_ms), (JobState::Failed, 6, Some(now)));
+    assert!(row.error.unwrap().contains("ended 3 times while it ran"));
+    assert_eq!(store.checkpoints("poison").await.unwrap(), []);
+    store.close().await;
 }
 
 async fn a_released_job_resumes_from_its_checkpoints(place: &Place) {

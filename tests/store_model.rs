@@ -69,6 +69,7 @@ struct Job {
     state: JobState,
     lease_until: i64,
     attempt: i64,
+    deaths: i64,
     cancel: bool,
     steps: BTreeMap<usize, u8>,
     steps_done: usize,
@@ -112,6 +113,11 @@ impl Model {
             })?;
             if row.cancel {
                 row.end(JobState::Cancelled, now);
+                continue;
+            }
+            row.deaths += i64::from(row.state == JobState::Running);
+            if row.deaths >= 3 {
+                row.end(JobState::Failed, now);
                 continue;
             }
             (row.state, row.lease_until, row.attempt) = (JobState::Running, now + LEASE_MS, row.attempt + 1);
@@ -188,7 +194,7 @@ async fn apply(store: &Store, model: &mut Model, operation: &Operation) {
             let saved = store.save_checkpoint(&job_name(job), attempt, step, &[byte; 9]).await.unwrap();
             let held = model.held(job, behind).map(|row| {
                 row.steps.insert(step, byte);
-                row.steps_done = row.steps.len();
+                (row.steps_done, row.deaths) = (row.steps.len(), 0);
             });
             assert_eq!(saved, held.is_some());
         }
@@ -256,6 +262,7 @@ async fn create_job(store: &Store, model: &mut Model, job: u8, key: Option<u8>, 
                 state: JobState::Queued,
                 lease_until: 0,
                 attempt: 0,
+                deaths: 0,
                 cancel: false,
                 steps: BTreeMap::new(),
                 steps_done: 0,

@@ -7,6 +7,7 @@ use std::time::Duration;
 use ballast::http;
 use ballast::service::allowance::Limits;
 use ballast::service::config::{Config, Role};
+use ballast::service::memory::{MemoryLimit, Size};
 use ballast::service::shutdown::Shutdown;
 use clap::builder::FalseyValueParser;
 use clap::{Args, ValueEnum};
@@ -34,6 +35,10 @@ pub struct Serve {
     /// Threads that train. Default: every core but one.
     #[arg(long, env = "BALLAST_TRAINING_THREADS", value_parser = clap::value_parser!(u16).range(1..=1024))]
     training_threads: Option<u16>,
+    /// The most memory to take, as in 4GB or 512MiB. Default: 80 % of the container's limit, of the address space's or of
+    /// the machine's memory, whichever is least.
+    #[arg(long, env = "BALLAST_MEMORY_LIMIT", value_parser = str::parse::<Size>)]
+    memory_limit: Option<Size>,
     #[command(flatten)]
     limits: LimitArgs,
 }
@@ -86,6 +91,7 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     config.role = arguments.role.into();
     config.lease = Duration::from_secs(arguments.lease_seconds.into());
     config.training_threads = arguments.training_threads.map_or(config.training_threads, usize::from);
+    config.memory_limit = arguments.memory_limit.map_or(config.memory_limit, |Size(bytes)| MemoryLimit::chosen(bytes));
     let shutdown = Shutdown::new();
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
     let running = http::serve(config, shutdown.clone()).await?;

@@ -1,22 +1,20 @@
 //! A policy made ready to answer: what to hold in a state, what the law and the radius are, where the next return leads.
 //! Live sessions and the simulator call these same functions.
 
-use std::sync::OnceLock;
-
 pub use super::advice::{Advice, AdviceSource, Uncertainty};
 use super::bellman::RobustSolution;
 use super::context::ProblemContext;
 use super::error::FieldError;
+use super::kept::Kept;
 use super::policy::Policy;
-use super::solved_step::StepSolution;
+use super::prepared::{PreparedStep, prepared_bytes};
 use super::specification::{Specification, UtilitySpecification};
 use super::state::{State, next_state};
-use super::surrogate::{NextValue, SingleSolution, Solution, StepSurrogates, TargetMap, ValueSurrogate};
+use super::surrogate::{NextValue, Solution};
 use super::uncertainty::Measure;
 use super::utility::depends_on_wealth;
 use super::worst_case::WorstCase;
 use crate::numerics::empirical::EmpiricalDistribution;
-use crate::numerics::gp::{GaussianProcess, GpMean};
 
 /// Numbers read in some hundreds of microseconds.
 const PROMPT_COST: usize = 1 << 20;
@@ -35,12 +33,7 @@ pub struct Advisor {
     policy: Policy,
     context: ProblemContext,
     steps: Vec<PreparedStep>,
-}
-
-/// One step ready for evaluation. The factor behind the predicted deviation is built on first use.
-enum PreparedStep {
-    Single(SingleSolution),
-    Surrogates { value: Box<ValueSurrogate>, policy: Box<GpMean>, deviation: Box<OnceLock<Option<GaussianProcess>>> },
+    kept: Kept,
 }
 
 /// What an advice is for.
@@ -59,27 +52,26 @@ struct Prediction {
     in_design: bool,
 }
 
-/// The process behind the predicted deviation, which does not depend on the targets.
-fn stored_process(stored: &StepSurrogates) -> Option<GaussianProcess> {
-    let zeros = vec![0.0; stored.value.weights.len()];
-    GaussianProcess::condition(&stored.matrix(), &zeros, &stored.value.hyperparameters).ok()
-}
-
 impl Advisor {
     pub fn new(policy: Policy) -> Self {
-        let context = policy.context();
-        let prepare = |step: &StepSolution| match &step.solution {
-            Solution::Single(single) => PreparedStep::Single(*single),
-            Solution::Surrogates(stored) => {
-                let policy =
-                    Box::new(GpMean::new(&stored.matrix(), &stored.policy.weights, &stored.policy.hyperparameters));
-                let target = TargetMap::new(&context.specification, step.step);
-                let value = Box::new(ValueSurrogate::new(stored, target));
-                PreparedStep::Surrogates { value, policy, deviation: Box::default() }
-            }
-        };
-        let steps = policy.steps().iter().map(prepare).collect();
-        Advisor { policy, context, steps }
+        Advisor::with(policy, Kept::default())
+    }
+
+    /// The same with what can be made again in `kept`.
+    pub fn with(policy: Policy, kept: Kept) -> Self {
+        let context = policy.context(kept.clone());
+        let steps = policy.steps().iter().map(|step| PreparedStep::new(&context.specification, step)).collect();
+        Advisor { policy, context, steps, kept }
+    }
+
+    /// Bytes it holds, without bridges and factors.
+    pub fn bytes(&self) -> usize {
+        prepared_bytes(&self.policy)
+    }
+
+    /// Bytes of the largest bridges that a session asks for which starts from `sample_size` returns.
+    pub fn heaviest_bridges(&self, sample_size: usize) -> usize {
+        self.context.sets.heaviest(sample_size, self.specification().problem.horizon)
     }
 
     pub fn policy(&self) -> &Policy {
@@ -133,7 +125,7 @@ impl Advisor {
             _ => 0,
         };
         let prepared = match self.steps.get(step) {
-            Some(PreparedStep::Surrogates { deviation, .. }) => deviation.get().is_some(),
+            Some(PreparedStep::Surrogates { factor, .. }) => factor.is_in(&self.kept),
             _ => true,
         };
         let cost = self.context.sets.cost(self.context.learned_size(state));
@@ -143,10 +135,10 @@ impl Advisor {
     /// Makes what [`Self::is_prompt`] asks for.
     pub fn prepare(&self, step: usize, state: &State) {
         self.context.sets.prepare(self.context.learned_size(state));
-        if let Some(PreparedStep::Surrogates { deviation, .. }) = self.steps.get(step)
+        if let Some(PreparedStep::Surrogates { factor, .. }) = self.steps.get(step)
             && let Some(Solution::Surrogates(stored)) = self.policy.steps().get(step).map(|step| &step.solution)
         {
-            deviation.get_or_init(|| stored_process(stored));
+            factor.process(&self.kept, stored);
         }
     }
 
@@ -211,25 +203,33 @@ impl Advisor {
 
     /// `radius` is that of the state.
     fn predict(&self, step: usize, state: &State, radius: f64) -> Prediction {
+        // An imported policy may claim anything.
+        let largest = self.context.largest_gain(step, state);
         match &self.steps[step] {
             PreparedStep::Single(single) => {
                 let in_design = self.is_single_state(step, state);
-                Prediction { action: single.action, floor_gain: single.floor_gain, deviation: 0.0, in_design }
+                Prediction {
+                    action: single.action,
+                    floor_gain: single.floor_gain.min(largest),
+                    deviation: 0.0,
+                    in_design,
+                }
             }
-            PreparedStep::Surrogates { value, policy, deviation } => {
+            PreparedStep::Surrogates { value, policy, factor } => {
                 let input = value.scaling.apply(&self.context.features_within(state, radius));
                 let Solution::Surrogates(stored) = &self.policy.steps()[step].solution else {
                     return Prediction { action: 0.0, floor_gain: 0.0, deviation: f64::INFINITY, in_design: false };
                 };
-                let process = deviation.get_or_init(|| stored_process(stored));
-                let deviation = process.as_ref().map_or(f64::INFINITY, |found| found.latent_variance(&input).sqrt());
+                let process = factor.process(&self.kept, stored);
+                let deviation =
+                    process.as_ref().as_ref().map_or(f64::INFINITY, |found| found.latent_variance(&input).sqrt());
                 let highest = self.specification().problem.action_interval[1];
                 let action = stored.policy.offset + stored.policy.scale * policy.mean(&input);
                 let prediction = value.offset + value.scale * value.mean.mean(&input);
                 Prediction {
                     action: action.clamp(0.0, highest),
-                    floor_gain: value.clamped_gain(prediction, state.wealth),
-                    deviation: value.gain_spread(prediction, deviation * value.scale, state.wealth),
+                    floor_gain: value.clamped_gain(prediction, state.wealth).min(largest),
+                    deviation: value.gain_spread(prediction, deviation * value.scale, state.wealth).min(largest),
                     in_design: deviation <= stored.deviation_limit && action.is_finite(),
                 }
             }

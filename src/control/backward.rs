@@ -14,6 +14,7 @@ use super::design::Design;
 use super::error::TrainError;
 use super::features::Scaling;
 use super::fitting::{Fitting, Solved};
+use super::kept::Kept;
 use super::policy::Policy;
 pub use super::progress::{Phase, StepProgress, Watch};
 use super::solved_step::StepDiagnostics;
@@ -37,8 +38,17 @@ impl Training {
     /// # Errors
     /// A specification that breaks a rule.
     pub fn new(specification: &Specification) -> Result<Self, TrainError> {
+        Training::with(specification, Kept::default())
+    }
+
+    /// The same with what can be made again in `kept`.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with(specification: &Specification, kept: Kept) -> Result<Self, TrainError> {
         let specification = specification.clone().completed()?;
-        Ok(Training { design: Design::new(&specification), context: ProblemContext::new(&specification) })
+        let context = ProblemContext::with(&specification, kept);
+        Ok(Training { design: Design::new(&specification), context })
     }
 
     /// Number of steps to solve: steps `horizon - 1` down to 0.
@@ -159,9 +169,10 @@ impl Crew<'_> {
         let state = training.design.state(step, point);
         let solution = training.context.solve(step, &state, next)?;
         if !solution.floor_gain.is_finite() || !solution.extended_action.is_finite() {
-            return Err(TrainError::NotFinite { step, point, value: solution.floor_gain });
+            let (gain, action) = (solution.floor_gain, solution.extended_action);
+            return Err(TrainError::NotFinite { step, point, gain, action });
         }
-        Ok(Solved { wealth: state.wealth, features, solution })
+        Ok(Solved { wealth: state.wealth, features, solution: solution.without_adversary() })
     }
 }
 

@@ -3,12 +3,15 @@
 use std::borrow::Cow;
 
 use super::bellman::{RobustSolution, RobustStep};
-use super::design::centre;
+use super::design::{centre, known_law};
 use super::error::TrainError;
 use super::features::{FeatureSelection, LawSummary};
+use super::framework::Framework;
 use super::gain_field::FieldContext;
+use super::kept::Kept;
 use super::parametric::ParametricStep;
-use super::specification::Specification;
+use super::rules;
+use super::specification::{ProblemSpecification, Specification};
 use super::state::{State, floor};
 use super::surrogate::NextValue;
 use super::uncertainty::{Measure, Radii, UncertaintySets};
@@ -26,13 +29,21 @@ pub struct ProblemContext {
     pub specification: Specification,
     pub sets: UncertaintySets,
     pub selection: FeatureSelection,
+    /// The best return of the known law; the best that is accepted where there is none.
+    best_known_return: f64,
 }
 
 impl ProblemContext {
     pub fn new(specification: &Specification) -> Self {
-        let sets = UncertaintySets::new(specification);
+        ProblemContext::with(specification, Kept::default())
+    }
+
+    /// The same with what can be made again in `kept`.
+    pub fn with(specification: &Specification, kept: Kept) -> Self {
+        let sets = UncertaintySets::new(specification, kept);
         let selection = FeatureSelection::new(specification, sets.varies());
-        ProblemContext { specification: specification.clone(), sets, selection }
+        let best_known_return = best_known_return(&specification.problem);
+        ProblemContext { specification: specification.clone(), sets, selection, best_known_return }
     }
 
     /// Radius of the uncertainty set at a state: of the history's law where that is frozen.
@@ -66,6 +77,26 @@ impl ProblemContext {
     pub fn floor(&self, step: usize, state: &State) -> f64 {
         let problem = &self.specification.problem;
         floor(state.wealth, problem.rate_per_step, problem.horizon - step)
+    }
+
+    /// The most that the floor gain of a state at `step` can be:
+    ///
+    ///   (T - t) ln(1 + a ((e^z / (1 + r)) - 1)),   a the highest allocation, z the best return of the centre
+    ///
+    /// The worst law of a ball is no better than its centre, which is worth at most its best return in every period, and
+    /// learning one of its own returns leaves the best as it is. Of a normal law that is not learned further, e^z is its mean.
+    pub fn largest_gain(&self, step: usize, state: &State) -> f64 {
+        let problem = &self.specification.problem;
+        let best = match problem.framework {
+            Framework::KnownLaw => self.best_known_return,
+            Framework::ParametricAdaptive => rules::LOG_RETURN,
+            Framework::ParametricStatic => {
+                let moments = CentralMoments::of(&self.learned_law(state));
+                moments.mean() + 0.5 * moments.variance()
+            }
+            _ => self.learned_law(state).atoms().last().copied().unwrap_or(rules::LOG_RETURN),
+        };
+        largest_gain(problem, step, best)
     }
 
     /// The radius of a state and what it is made of.
@@ -139,7 +170,8 @@ impl ProblemContext {
         let [lowest, highest] = self.specification.problem.action_interval;
         let solution = self.priced(step, state, next, (lowest, highest), radius)?;
         // All-bank is feasible and no law can hurt it.
-        Ok(RobustSolution { floor_gain: solution.floor_gain.max(0.0), ..solution })
+        let floor_gain = solution.floor_gain.max(0.0).min(self.largest_gain(step, state));
+        Ok(RobustSolution { floor_gain, ..solution })
     }
 
     /// The same with actions in `[lowest, highest]` alone: a single action is priced where they are equal.
@@ -182,6 +214,21 @@ impl ProblemContext {
             RobustStep { field, utility, support: problem.support, atoms: &atoms, masses: &masses, radius, variance };
         Ok(robust.solve(state, actions))
     }
+}
+
+/// The floor gain from `step` of the highest allocation where every period earns `best_return`.
+pub fn largest_gain(problem: &ProblemSpecification, step: usize, best_return: f64) -> f64 {
+    let bank = problem.rate_per_step.ln_1p();
+    let excess = (best_return - bank).exp_m1().max(0.0);
+    (problem.horizon - step) as f64 * (problem.action_interval[1] * excess).ln_1p()
+}
+
+fn best_known_return(problem: &ProblemSpecification) -> f64 {
+    match (&problem.law, problem.framework) {
+        (Some(law), Framework::KnownLaw) => known_law(problem, law).0.last().copied(),
+        _ => None,
+    }
+    .unwrap_or(rules::LOG_RETURN)
 }
 
 fn without_ball(moments: CentralMoments) -> LawSummary {

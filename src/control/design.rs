@@ -142,7 +142,7 @@ impl Design {
 /// to extrapolation.
 fn wealth_ladders(problem: &ProblemSpecification, start: Interval, count: usize) -> Vec<Vec<f64>> {
     let law = match (&problem.law, problem.framework) {
-        (Some(law), Framework::KnownLaw) => continuous_law(law, &problem.history).quadrature(),
+        (Some(law), Framework::KnownLaw) => known_law(problem, law),
         _ => merged(EmpiricalDistribution::new(&problem.history).atoms()),
     };
     let mean: f64 = law.0.iter().zip(&law.1).map(|(atom, mass)| atom * mass).sum();
@@ -168,13 +168,28 @@ const REACHED_DEVIATIONS: f64 = 5.0;
 /// The discrete law a framework centres on at a state: ascending distinct atoms and their masses.
 pub fn centre(problem: &ProblemSpecification, state: &State) -> Result<(Vec<f64>, Vec<f64>), FieldError> {
     match (problem.framework, &problem.law) {
-        (Framework::KnownLaw, Some(law)) => Ok(continuous_law(law, &problem.history).quadrature()),
+        (Framework::KnownLaw, Some(law)) => Ok(known_law(problem, law)),
         (Framework::KnownLaw, None) => {
             Err(FieldError::new("problem.law", "null", "must be given in the known_law framework"))
         }
         (framework, _) if framework.is_frozen() => Ok(merged(EmpiricalDistribution::new(&problem.history).atoms())),
         _ => Ok(merged(state.law.atoms())),
     }
+}
+
+/// The known law as discrete atoms and masses. What lies beyond the returns accepted is put at their bounds, as the
+/// simulated returns of the same law are: an exponential of a heavy tail has no mean.
+pub fn known_law(problem: &ProblemSpecification, law: &SamplingLaw) -> (Vec<f64>, Vec<f64>) {
+    let (atoms, masses) = continuous_law(law, &problem.history).quadrature();
+    let mut within: Vec<(f64, f64)> = Vec::with_capacity(atoms.len());
+    for (atom, mass) in atoms.into_iter().zip(masses) {
+        let atom = admissible(atom, problem);
+        match within.last_mut() {
+            Some((last, total)) if *last == atom => *total += mass,
+            _ => within.push((atom, mass)),
+        }
+    }
+    within.into_iter().unzip()
 }
 
 /// Ascending atoms without repetition, each with its share of the sample.

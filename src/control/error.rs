@@ -30,8 +30,10 @@ pub enum TrainError {
     Stopped,
     #[error("step {step}: the covariance matrix of the {surrogate} surrogate is singular even with jitter {jitter:e}")]
     Singular { step: usize, surrogate: &'static str, jitter: f64 },
-    #[error("step {step}, design point {point}: the robust step gave {value}, which is not finite")]
-    NotFinite { step: usize, point: usize, value: f64 },
+    #[error(
+        "step {step}, design point {point}: the robust step gave the gain {gain} for the action {action}: not both finite"
+    )]
+    NotFinite { step: usize, point: usize, gain: f64, action: f64 },
 }
 
 /// Why stored or imported policy bytes are not a policy.

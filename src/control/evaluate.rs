@@ -14,10 +14,10 @@ use super::design::{admissible, continuous_law};
 use super::error::{FieldError, TrainError};
 use super::evaluation::{EvaluationRequest, InitialHistories};
 use super::framework::Framework;
-use super::policy::Policy;
+use super::kept::Kept;
 use super::progress::{Phase, StepProgress, Watch};
 use super::rules;
-use super::specification::SamplingLaw;
+use super::specification::{SamplingLaw, Specification};
 use super::state::next_wealth;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::law_distance::{LawDistance, Placed, insert};
@@ -31,6 +31,7 @@ pub struct Evaluation {
     pub request: EvaluationRequest,
     pub histories: Vec<Vec<f64>>,
     law: ContinuousLaw,
+    kept: Kept,
 }
 
 /// One step of one path as a framework lived it.
@@ -87,7 +88,12 @@ impl Evaluation {
             InitialHistories::Given => vec![request.problem.history.clone()],
             InitialHistories::Drawn { count } => (0..count).map(|index| drawn_history(&request, &law, index)).collect(),
         };
-        Ok(Evaluation { request, histories, law })
+        Ok(Evaluation { request, histories, law, kept: Kept::default() })
+    }
+
+    /// The same with what can be made again in `kept`.
+    pub fn keeping(self, kept: Kept) -> Self {
+        Evaluation { kept, ..self }
     }
 
     /// As [`Self::new`], but from these histories, as if they had been drawn.
@@ -108,7 +114,7 @@ impl Evaluation {
                 ));
             }
         }
-        Ok(Evaluation { law: true_law(&request), request, histories })
+        Ok(Evaluation { law: true_law(&request), request, histories, kept: Kept::default() })
     }
 
     /// A framework with its policy, trained on the current pool; without one where each history has its own.
@@ -117,10 +123,15 @@ impl Evaluation {
     /// As [`Training::solve_step`].
     pub fn follower(&self, framework: Framework, watch: &Watch) -> Result<Follower, TrainError> {
         let advisor = match self.request.one_policy_for_all(framework) {
-            true => Some(Advisor::new(Training::new(&self.request.specification(framework, None))?.run(watch)?)),
+            true => Some(self.trained(&self.request.specification(framework, None), watch)?),
             false => None,
         };
         Ok(Follower { framework, advisor })
+    }
+
+    fn trained(&self, specification: &Specification, watch: &Watch) -> Result<Advisor, TrainError> {
+        let policy = Training::with(specification, self.kept.clone())?.run(watch)?;
+        Ok(Advisor::with(policy, self.kept.clone()))
     }
 
     /// Every framework of the request.
@@ -216,8 +227,7 @@ impl Crew<'_> {
                 return Ok(None);
             }
             let specification = self.evaluation.request.specification(follower.framework, Some(history));
-            let policy: Policy = Training::new(&specification)?.run(&silent)?;
-            Ok(Some(Advisor::new(policy)))
+            self.evaluation.trained(&specification, &silent).map(Some)
         };
         self.followers.iter().map(own).collect()
     }

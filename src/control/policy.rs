@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::context::ProblemContext;
+use super::context::{ProblemContext, largest_gain};
 use super::error::{FieldError, PolicyError};
+use super::kept::Kept;
 use super::rules;
 use super::solved_step::FORMAT;
 pub use super::solved_step::{StepDiagnostics, StepSolution, SurrogateDiagnostics};
@@ -41,9 +42,9 @@ impl Policy {
         self.steps.iter().map(|step| &step.diagnostics)
     }
 
-    /// The problem it solves.
-    pub fn context(&self) -> ProblemContext {
-        ProblemContext::new(&self.specification)
+    /// The problem it solves, what can be made again in `kept`.
+    pub fn context(&self, kept: Kept) -> ProblemContext {
+        ProblemContext::with(&self.specification, kept)
     }
 
     /// The portable form: JSON whose numbers parse back to the same bits.
@@ -81,7 +82,7 @@ impl Policy {
         if self.steps.len() != horizon {
             return Err(FieldError::new("steps", self.steps.len(), format!("must hold horizon = {horizon} steps")));
         }
-        let context = self.context();
+        let context = self.context(Kept::default());
         let feature_count = context.selection.names().len();
         for (index, step) in self.steps.iter().enumerate() {
             if step.step != index {
@@ -89,22 +90,37 @@ impl Policy {
             }
             let field = format!("steps[{index}].solution");
             match &step.solution {
-                Solution::Single(single) => check_single(&field, single, &self.specification)?,
-                Solution::Surrogates(stored) => check_surrogates(&field, stored, feature_count)?,
+                Solution::Single(single) => check_single(&field, index, single, &self.specification)?,
+                Solution::Surrogates(stored) => {
+                    check_surrogates(&field, stored, feature_count)?;
+                    let largest = credible_gain(&self.specification, index);
+                    rules::within(&format!("{field}.largest_gain"), stored.largest_gain, 0.0, largest)?;
+                }
             }
         }
         Ok(())
     }
 }
 
-fn check_single(field: &str, single: &SingleSolution, specification: &Specification) -> Result<(), FieldError> {
+fn check_single(
+    field: &str,
+    step: usize,
+    single: &SingleSolution,
+    specification: &Specification,
+) -> Result<(), FieldError> {
     let highest = specification.problem.action_interval[1];
     rules::within(&format!("{field}.action"), single.action, 0.0, highest)?;
-    rules::within(&format!("{field}.floor_gain"), single.floor_gain, 0.0, LARGEST_GAIN)
+    rules::within(&format!("{field}.floor_gain"), single.floor_gain, 0.0, credible_gain(specification, step))
 }
 
-/// Largest floor gain believed: a factor e^100.
-const LARGEST_GAIN: f64 = 100.0;
+/// Rounding forgiven to a gain at its bound.
+const ROUNDING: f64 = 1e-9;
+
+/// The floor gain of a step were every return the best that is accepted: no state is worth more.
+fn credible_gain(specification: &Specification, step: usize) -> f64 {
+    largest_gain(&specification.problem, step, rules::LOG_RETURN) * (1.0 + ROUNDING)
+}
+
 /// Bound on every other stored number.
 const LARGEST_NUMBER: f64 = 1e30;
 
@@ -145,8 +161,7 @@ fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) 
             rules::within(field, number, 1.0 / LARGEST_NUMBER, LARGEST_NUMBER)?;
         }
     }
-    rules::within(&format!("{field}.deviation_limit"), stored.deviation_limit, 0.0, LARGEST_NUMBER)?;
-    rules::within(&format!("{field}.largest_gain"), stored.largest_gain, 0.0, LARGEST_GAIN)
+    rules::within(&format!("{field}.deviation_limit"), stored.deviation_limit, 0.0, LARGEST_NUMBER)
 }
 
 /// SHA-256 of a policy's portable form, in lower-case hexadecimal: the policy's name.

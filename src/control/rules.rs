@@ -24,6 +24,8 @@ const BRIDGE_NUMBERS: usize = 30_000_000;
 const DESIGN_NUMBERS: usize = 100_000_000;
 /// Above this product of risk aversion and wealth, exponential utility is flat in double precision over the design.
 const EXPONENTIAL_SCALE: f64 = 300.0;
+/// Actions closer than 1e-7 are one to the search: an interval must be wider.
+const SMALLEST_HIGHEST_ACTION: f64 = 1e-4;
 /// Smallest and largest wealth.
 pub const WEALTH: (f64, f64) = (1e-6, 1e15);
 const MOMENTS: std::ops::RangeInclusive<usize> = 1..=6;
@@ -68,7 +70,7 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
             "must be 0: the all-bank floor must be feasible",
         ));
     }
-    open_above_zero("problem.action_interval[1]", highest, 1.0)?;
+    within("problem.action_interval[1]", highest, SMALLEST_HIGHEST_ACTION, 1.0)?;
     utility(problem)?;
     radius(&problem.radius_rule(), problem)?;
     if let Some(support) = problem.support {

@@ -1,22 +1,15 @@
 //! Uncertainty sets: the radius of the Wasserstein ball around an empirical law, or of the confidence region of a normal
 //! law's estimates, rule by rule.
 
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::Arc;
 
 use super::framework::Framework;
+use super::kept::{Kept, Key};
 use super::specification::{RadiusRule, Specification};
 use crate::numerics::bridge::{Quantile, Statistic};
 use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
 use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
-
-/// Sample sizes whose bridges are kept at once; live sessions of one policy pass through a horizon's worth of them.
-const KEPT_SIZES: usize = 128;
-/// Values in the bridges kept, where that many sizes have more: 256 MB, but [`FEWEST_SIZES`] in any case.
-const KEPT_VALUES: usize = 1 << 25;
-/// A robust step looks at its own sample size and the next.
-const FEWEST_SIZES: usize = 2;
 
 /// The radius rule of a specification, with its common random numbers.
 pub struct UncertaintySets {
@@ -26,12 +19,9 @@ pub struct UncertaintySets {
     uncertain: bool,
     /// Sample size at the last step.
     last_size: usize,
-    /// The common random numbers by sample size; all large ones share those of [`GRADED_FROM`].
-    bridges: Mutex<HashMap<usize, Arc<Bridges>>>,
+    /// Where the common random numbers are kept.
+    kept: Kept,
 }
-
-/// Common random numbers, simulated on first use.
-type Bridges = OnceLock<Arc<AbsoluteBridges>>;
 
 /// The uncertainty set of a law: its radius, and the quantile behind it under the bridge rule.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,13 +39,12 @@ pub struct Radii {
 }
 
 impl UncertaintySets {
-    pub fn new(specification: &Specification) -> Self {
+    pub fn new(specification: &Specification, kept: Kept) -> Self {
         let uncertain = !matches!(specification.problem.framework, Framework::KnownLaw | Framework::PlugIn);
         let rule = specification.problem.radius_rule();
         let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
-        let bridges = Mutex::new(HashMap::new());
         let seed = specification.seed;
-        UncertaintySets { rule, seed, uncertain, last_size, bridges }
+        UncertaintySets { rule, seed, uncertain, last_size, kept }
     }
 
     /// True where laws of one sample size have different radii.
@@ -63,27 +52,30 @@ impl UncertaintySets {
         self.uncertain && matches!(self.rule, RadiusRule::Bridge { scale, .. } if scale > 0.0)
     }
 
-    /// The bridges of sample size n. None is simulated under the lock: who asks for one size does not wait for another.
-    fn bridges(&self, sample_size: usize, paths: usize) -> Arc<AbsoluteBridges> {
-        let key = sample_size.min(GRADED_FROM);
-        let found = {
-            let mut kept = self.kept();
-            while kept.len() >= room(key, paths) && !kept.contains_key(&key) {
-                // Sessions go up and trainings go down, a size at a time.
-                let Some(farthest) = kept.keys().max_by_key(|size| size.abs_diff(key)).copied() else { break };
-                kept.remove(&farthest);
-            }
-            Arc::clone(kept.entry(key).or_default())
-        };
-        let simulate = || match key {
-            GRADED_FROM => AbsoluteBridges::graded(paths, self.seed),
-            _ => AbsoluteBridges::simulate(sample_size, paths, self.seed),
-        };
-        Arc::clone(found.get_or_init(|| Arc::new(simulate())))
+    /// The name of the bridges of sample size n; all large ones share those of [`GRADED_FROM`].
+    fn key(&self, sample_size: usize, paths: usize) -> Key {
+        Key::Bridges { sample_size: sample_size.min(GRADED_FROM), paths, seed: self.seed }
     }
 
-    fn kept(&self) -> MutexGuard<'_, HashMap<usize, Arc<Bridges>>> {
-        self.bridges.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The bridges of sample size n.
+    fn bridges(&self, sample_size: usize, paths: usize) -> Arc<AbsoluteBridges> {
+        let simulate = || match sample_size {
+            ..GRADED_FROM => AbsoluteBridges::simulate(sample_size, paths, self.seed),
+            _ => AbsoluteBridges::graded(paths, self.seed),
+        };
+        let bytes = AbsoluteBridges::bytes_of(sample_size, paths);
+        self.kept.get_or_make(&self.key(sample_size, paths), bytes, simulate)
+    }
+
+    /// Bytes of the largest bridges that a law of `sample_size` values asks for while it learns `steps` more.
+    pub fn heaviest(&self, sample_size: usize, steps: usize) -> usize {
+        match self.rule {
+            RadiusRule::Bridge { paths, .. } if self.uncertain => {
+                let largest_of_its_own = sample_size.max(GRADED_FROM - 1);
+                AbsoluteBridges::bytes_of((sample_size + steps).min(largest_of_its_own), paths)
+            }
+            _ => 0,
+        }
     }
 
     /// What measuring laws of `sample_size` reads: its bridges, and those of the next where a step comes after.
@@ -95,8 +87,7 @@ impl UncertaintySets {
     pub fn cost(&self, sample_size: usize) -> Option<usize> {
         match self.rule {
             RadiusRule::Bridge { paths, .. } if self.uncertain => {
-                let kept = self.kept();
-                let ready = |size: usize| kept.get(&size.min(GRADED_FROM)).is_some_and(|found| found.get().is_some());
+                let ready = |size: usize| self.kept.has(&self.key(size, paths));
                 self.sizes(sample_size).all(ready).then_some(2 * sample_size.min(GRADED_FROM) * paths)
             }
             _ => Some(sample_size),
@@ -187,11 +178,6 @@ impl UncertaintySets {
             RadiusRule::ChiSquare { alpha } => confidence_region::radius(alpha, sample_size),
         }
     }
-}
-
-/// Sample sizes kept where one of them is `sample_size`.
-fn room(sample_size: usize, paths: usize) -> usize {
-    (KEPT_VALUES / (sample_size * paths)).clamp(FEWEST_SIZES, KEPT_SIZES)
 }
 
 fn radius(scale: f64, quantile: f64, sample_size: usize) -> f64 {

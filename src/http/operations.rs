@@ -62,6 +62,7 @@ pub async fn health(State(service): State<Arc<Service>>) -> Result<Json<Health>,
     responses((status = 200, description = "Text exposition format.", body = String, content_type = "text/plain")))]
 pub async fn metrics(State(service): State<Arc<Service>>) -> Result<Response, Problem> {
     let (jobs, sessions) = service.counts().await?;
+    service.record_memory();
     let text = telemetry::exposition(jobs, sessions, service.sessions.waiting());
     Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response())
 }

@@ -141,6 +141,12 @@ impl AbsoluteBridges {
         AbsoluteBridges::gather(&times, Times::Graded(times.clone()), paths, unit, path)
     }
 
+    /// Bytes that the paths of laws of `sample_size` values take.
+    pub fn bytes_of(sample_size: usize, paths: usize) -> usize {
+        let times = if sample_size < GRADED_FROM { sample_size } else { GRADED_CELLS + 2 * HALVINGS as usize };
+        size_of::<f64>().saturating_mul(times).saturating_mul(paths)
+    }
+
     /// All paths, each written by `draw` given its index, over their `unit`.
     fn gather(at: &[f64], times: Times, paths: usize, unit: Unit, mut draw: impl FnMut(usize, &mut [f64])) -> Self {
         let mut values = vec![0.0; at.len() * paths];

@@ -156,10 +156,15 @@ impl GaussianProcess {
         assert_eq!(inputs.nrows(), targets.len(), "one target for each row");
         let mut kernel = DMatrix::zeros(targets.len(), targets.len());
         kernel_lower(&hyper.scale(inputs), hyper, &mut kernel);
-        let (cholesky, jitter) = factor_with_jitter(&kernel)?;
+        let (cholesky, jitter) = factor_with_jitter(kernel)?;
         let weights = cholesky.solve(targets);
         let mean = GpMean::new(inputs, &weights, hyper);
         Ok(GaussianProcess { hyper: hyper.clone(), cholesky, jitter, weights, mean })
+    }
+
+    /// Bytes that a process over `points` rows of `inputs` columns holds: the square factor above all.
+    pub fn bytes_of(points: usize, inputs: usize) -> usize {
+        size_of::<f64>().saturating_mul(points).saturating_mul(points + inputs + 2)
     }
 
     /// Posterior mean k^T (K + noise I)^-1 y at `query`. Cost O(n d).

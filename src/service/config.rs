@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::allowance::Limits;
+use super::memory::MemoryLimit;
 use crate::store::PostgresUrl;
 
 /// Where the durable facts are.
@@ -57,6 +58,8 @@ pub struct Config {
     pub limits: Limits,
     pub store: StoreLocation,
     pub role: Role,
+    /// The most memory the process should take; what cannot fit is refused.
+    pub memory_limit: MemoryLimit,
     /// Threads of the training pool.
     pub training_threads: usize,
     /// Connections served at a time, as far as there are descriptors; more wait in the kernel's queue.
@@ -88,6 +91,7 @@ impl Config {
             limits: Limits::default(),
             store: StoreLocation::Folder(data.into()),
             role: Role::All,
+            memory_limit: MemoryLimit::of_the_system(),
             training_threads: cores.saturating_sub(1).max(1),
             connection_limit: 4096,
             body_limit_bytes: 64 << 20,

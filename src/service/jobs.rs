@@ -7,8 +7,10 @@ use tokio::sync::watch;
 use super::clock::Clock;
 use super::error::ServiceError;
 use super::identity;
+use super::memory::Memory;
 use super::progress::{Progress, ProgressBoard};
 use crate::control::error::FieldError;
+use crate::control::estimate;
 use crate::control::evaluation::EvaluationRequest;
 use crate::control::policy::content_hash;
 use crate::control::specification::Specification;
@@ -29,11 +31,14 @@ pub struct Jobs {
     store: Store,
     clock: Clock,
     board: Arc<ProgressBoard>,
+    memory: Memory,
+    /// Threads that a job here runs on.
+    threads: usize,
 }
 
 impl Jobs {
-    pub(super) fn new(store: Store, clock: Clock) -> Self {
-        Jobs { store, clock, board: Arc::new(ProgressBoard::new()) }
+    pub(super) fn new(store: Store, clock: Clock, memory: Memory, threads: usize) -> Self {
+        Jobs { store, clock, board: Arc::new(ProgressBoard::new()), memory, threads }
     }
 
     pub(super) fn board(&self) -> Arc<ProgressBoard> {
@@ -43,7 +48,7 @@ impl Jobs {
     /// Queues a training. The same key and specification again give the same job.
     ///
     /// # Errors
-    /// A field that breaks its rule; a key used with another request.
+    /// A field that breaks its rule, or asks for more memory than there is; a key used with another request.
     pub async fn train(
         &self,
         tenant: &Tenant,
@@ -52,6 +57,8 @@ impl Jobs {
     ) -> Result<Job, ServiceError> {
         let sent = serde_json::to_vec(&specification).map_err(ServiceError::internal)?;
         let completed = specification.completed()?;
+        self.memory.admits(&estimate::training(&completed, self.threads))?;
+        self.memory.keeps(&estimate::advising(&completed))?;
         let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
         self.queue(tenant, JobKind::Train, &sent, request_json, completed.problem.horizon, key).await
     }
@@ -68,6 +75,7 @@ impl Jobs {
     ) -> Result<Job, ServiceError> {
         let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
         let completed = request.completed()?;
+        self.memory.admits(&estimate::evaluation(&completed, self.threads))?;
         let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
         self.queue(tenant, JobKind::Evaluate, &sent, request_json, completed.step_count(), key).await
     }

@@ -10,14 +10,13 @@ use crate::control::rules as limits;
 use crate::control::state::State;
 use crate::store::{Head, SessionRow};
 
-/// A session replayed from its rows.
+/// A session replayed from its rows. It holds no policy: what it is advised by is kept under its name, and may be dropped.
 #[derive(Clone)]
 pub struct Live {
     pub row: Arc<SessionRow>,
     pub state: State,
     /// Of the rows it was replayed from.
     pub(super) head: Head,
-    pub(super) advisor: Arc<Advisor>,
     /// Radius of the state, once computed.
     pub(super) radius: Option<f64>,
     /// Price reported for the last period.
@@ -34,8 +33,7 @@ impl Live {
 
     /// The session after an observation that left `state`, whose radius is `radius`.
     pub(super) fn taken_to(&self, head: Head, state: State, price: Option<f64>, radius: f64) -> Live {
-        let (row, advisor) = (self.row.clone(), self.advisor.clone());
-        Live { row, state, head, advisor, price, radius: Some(radius), advice: None }
+        Live { row: self.row.clone(), state, head, price, radius: Some(radius), advice: None }
     }
 
     pub(super) fn expects(&self, period: usize) -> Result<(), ServiceError> {
@@ -48,16 +46,20 @@ impl Live {
 
     /// The surrogate's advice for the coming period, computed once: here where that takes less than a thread would, else
     /// on a thread that may block.
-    pub(super) async fn surrogate_advice(&mut self, advising: &Bounded) -> Result<&Advice, ServiceError> {
+    pub(super) async fn surrogate_advice(
+        &mut self,
+        advisor: &Arc<Advisor>,
+        advising: &Bounded,
+    ) -> Result<&Advice, ServiceError> {
         let step = self.observed();
-        if self.advice.is_none() && self.advisor.is_prompt(step, &self.state) {
-            let radius = self.radius.unwrap_or_else(|| self.advisor.radius(&self.state));
-            self.advice = self.advisor.advise_from_surrogate(step, &self.state, radius);
+        if self.advice.is_none() && advisor.is_prompt(step, &self.state) {
+            let radius = self.radius.unwrap_or_else(|| advisor.radius(&self.state));
+            self.advice = advisor.advise_from_surrogate(step, &self.state, radius);
         }
         let advice = match self.advice.take() {
             Some(advice) => advice,
             None => {
-                let (advisor, state) = (self.advisor.clone(), self.state.clone());
+                let (advisor, state) = (advisor.clone(), self.state.clone());
                 advising.run(&self.row.tenant, move || advisor.advise(step, &state, AdviceMode::Surrogate)).await?
             }
         };
@@ -69,14 +71,15 @@ impl Live {
         &mut self,
         report: &Observe,
         log_return: f64,
+        advisor: &Arc<Advisor>,
         advising: &Bounded,
     ) -> Result<(State, Observed), ServiceError> {
-        let advised = self.surrogate_advice(advising).await?.allocation;
+        let advised = self.surrogate_advice(advisor, advising).await?.allocation;
         let executed_allocation = report.executed_allocation.unwrap_or(advised);
-        let mut state = self.advisor.advance(&self.state, executed_allocation, log_return);
+        let mut state = advisor.advance(&self.state, executed_allocation, log_return);
         state.wealth = report.wealth.unwrap_or(state.wealth);
         limits::within("wealth", state.wealth, limits::WEALTH.0, limits::WEALTH.1)?;
-        let (state, uncertainty) = self.measured(state, advising).await?;
+        let (state, uncertainty) = self.measured(state, advisor, advising).await?;
         let answer = Observed {
             session: report.session.clone(),
             period: report.period,
@@ -90,16 +93,22 @@ impl Live {
         Ok((state, answer))
     }
 
-    async fn measured(&self, state: State, advising: &Bounded) -> Result<(State, Uncertainty), ServiceError> {
-        if self.advisor.is_prompt(self.observed() + 1, &state) {
-            let uncertainty = self.advisor.uncertainty(&state);
+    async fn measured(
+        &self,
+        state: State,
+        advisor: &Arc<Advisor>,
+        advising: &Bounded,
+    ) -> Result<(State, Uncertainty), ServiceError> {
+        let step = self.observed() + 1;
+        if advisor.is_prompt(step, &state) {
+            let uncertainty = advisor.uncertainty(&state);
             return Ok((state, uncertainty));
         }
-        let (advisor, step) = (self.advisor.clone(), self.observed() + 1);
-        let measured = advising.run(&self.row.tenant, move || (advisor.uncertainty(&state), state)).await;
+        let measuring = advisor.clone();
+        let measured = advising.run(&self.row.tenant, move || (measuring.uncertainty(&state), state)).await;
         let (uncertainty, state) = measured?;
         // The first session to get this far: the next advice finds its common random numbers simulated.
-        let (advisor, reached) = (self.advisor.clone(), state.clone());
+        let (advisor, reached) = (advisor.clone(), state.clone());
         tokio::task::spawn_blocking(move || advisor.prepare(step, &reached));
         Ok((state, uncertainty))
     }

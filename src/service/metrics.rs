@@ -10,6 +10,8 @@ pub const HTTP_REQUESTS: &str = "ballast_http_requests_total";
 pub const JOBS: &str = "ballast_jobs";
 pub const SESSIONS: &str = "ballast_sessions";
 pub const TURNS_WAITING: &str = "ballast_turns_waiting";
+pub const MEMORY: &str = "ballast_memory_bytes";
+pub const MEMORY_LIMIT: &str = "ballast_memory_limit_bytes";
 
 /// Upper bounds of the buckets of training steps, in seconds: milliseconds to an hour.
 pub const STEP_BUCKETS: [f64; 10] = [0.01, 0.1, 0.5, 1.0, 5.0, 15.0, 60.0, 300.0, 900.0, 3600.0];
@@ -26,4 +28,10 @@ pub fn describe() {
     describe_gauge!(JOBS, "Jobs in the store, by state.");
     describe_gauge!(SESSIONS, "Sessions in the store.");
     describe_gauge!(TURNS_WAITING, "Requests that wait for their turn to be advised, or to have a step solved.");
+    describe_gauge!(
+        MEMORY,
+        Unit::Bytes,
+        "Memory by part: prepared policies, factors and bridges kept ready, live sessions, and what running jobs have reserved."
+    );
+    describe_gauge!(MEMORY_LIMIT, Unit::Bytes, "The memory limit, which the parts share.");
 }

@@ -12,6 +12,7 @@ mod identity;
 pub mod jobs;
 pub mod keys;
 pub mod live;
+pub mod memory;
 pub mod metrics;
 pub mod observation;
 pub mod policies;
@@ -29,6 +30,7 @@ use config::{Config, Role, StoreLocation};
 use error::ServiceError;
 use jobs::{Job, Jobs};
 use keys::Keys;
+use memory::Memory;
 use policies::Policies;
 use sessions::Sessions;
 use shutdown::Shutdown;
@@ -45,6 +47,7 @@ pub struct Service {
     pub policies: Arc<Policies>,
     pub sessions: Sessions,
     pub shutdown: Shutdown,
+    memory: Memory,
     store: Store,
     trainer: Option<Trainer>,
 }
@@ -71,12 +74,14 @@ impl Service {
             return Err(ServiceError::NobodyAsked { address: config.listen });
         }
         tokio::spawn(keys::keep_fresh(keys.clone(), shutdown.clone()));
-        let jobs = Jobs::new(store.clone(), clock.clone());
-        let policies = Arc::new(Policies::new(store.clone(), clock.clone()));
+        let memory = Memory::new(config.memory_limit);
+        tracing::info!(memory_limit_bytes = config.memory_limit.bytes, "memory: {memory}");
+        let jobs = Jobs::new(store.clone(), clock.clone(), memory.clone(), config.training_threads);
+        let policies = Arc::new(Policies::new(store.clone(), clock.clone(), memory.clone()));
         let sessions = Sessions::new(config, store.clone(), clock.clone(), policies.clone());
-        let start = || Trainer::start(config, store.clone(), clock, jobs.board(), shutdown.clone());
+        let start = || Trainer::start(config, store.clone(), clock, jobs.board(), memory.clone(), shutdown.clone());
         let trainer = config.role.runs_jobs().then(start).transpose()?;
-        Ok(Arc::new(Service { jobs, keys, policies, sessions, shutdown, store, trainer }))
+        Ok(Arc::new(Service { jobs, keys, policies, sessions, shutdown, memory, store, trainer }))
     }
 
     /// Queues an evaluation. The same key and request again give the same job.
@@ -120,6 +125,11 @@ impl Service {
     /// The store does not answer.
     pub async fn counts(&self) -> Result<(JobCounts, u64), ServiceError> {
         Ok((self.store.count_jobs_by_state().await?, self.store.count_sessions().await?))
+    }
+
+    /// Tells the recorder what takes memory now.
+    pub fn record_memory(&self) {
+        self.memory.record();
     }
 
     /// Waits for the running job to be requeued and closes the store. Call after the shutdown has begun.

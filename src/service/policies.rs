@@ -1,28 +1,35 @@
 //! Policies: listed, imported, and made ready to answer.
 
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+
+use tokio::sync::Semaphore;
 
 use super::clock::Clock;
 use super::error::ServiceError;
+use super::memory::Memory;
 use crate::control::advisor::Advisor;
+use crate::control::error::FieldError;
+use crate::control::estimate::{self, Estimate};
+use crate::control::kept::{Kept, Key};
 use crate::control::policy::{Policy, content_hash};
 use crate::store::{DeletePolicy, PolicyRow, PolicySummary, Store, Tenant};
 
-/// Policies kept ready; one of 1000 design points and 10 steps takes some tens of megabytes.
-const KEPT_READY: usize = 16;
+/// Policies read and prepared at a time: a document takes several times its bytes while it is read.
+const PREPARED_AT_A_TIME: usize = 2;
 
 /// The policies of the store.
 pub struct Policies {
     store: Store,
     clock: Clock,
-    /// By owner and name: what is here was looked up in the store for that tenant.
-    ready: Mutex<HashMap<(Tenant, String), Arc<Advisor>>>,
+    memory: Memory,
+    kept: Kept,
+    preparing: Semaphore,
 }
 
 impl Policies {
-    pub(super) fn new(store: Store, clock: Clock) -> Self {
-        Policies { store, clock, ready: Mutex::new(HashMap::new()) }
+    pub(super) fn new(store: Store, clock: Clock, memory: Memory) -> Self {
+        let kept = memory.kept();
+        Policies { store, clock, memory, kept, preparing: Semaphore::new(PREPARED_AT_A_TIME) }
     }
 
     /// # Errors
@@ -31,30 +38,31 @@ impl Policies {
         self.store.policy(tenant, policy).await?.ok_or_else(|| ServiceError::unknown("policy", policy))
     }
 
-    /// The policy with what its evaluation needs prepared.
+    /// The policy with what its evaluation needs prepared. Callers let go of it once they are answered: what is kept is
+    /// for the cache to say.
     ///
     /// # Errors
     /// There is no such policy, or it cannot be prepared.
     pub async fn advisor(&self, tenant: &Tenant, policy: &str) -> Result<Arc<Advisor>, ServiceError> {
-        let name = (tenant.clone(), policy.to_owned());
-        if let Some(advisor) = self.lock().get(&name) {
-            return Ok(advisor.clone());
-        }
+        self.kept.get_or_prepare(&key(tenant, policy), Advisor::bytes, self.prepared(tenant, policy)).await
+    }
+
+    async fn prepared(&self, tenant: &Tenant, policy: &str) -> Result<Advisor, ServiceError> {
+        let _turn = self.preparing.acquire().await.map_err(ServiceError::internal)?;
         let row = self.get(tenant, policy).await?;
-        // Equal names are equal policies, whoever had it prepared.
-        let prepared = self.lock().iter().find(|((_, ready), _)| ready == policy).map(|(_, advisor)| advisor.clone());
-        let advisor = match prepared {
-            Some(advisor) => advisor,
-            None => Arc::new(prepare(row).await?),
-        };
-        let mut ready = self.lock();
-        if ready.len() >= KEPT_READY {
-            // Live sessions hold their own reference, so dropping any entry costs at most one more preparation.
-            let evicted = ready.keys().next().cloned();
-            evicted.and_then(|name| ready.remove(&name));
-        }
-        ready.insert(name, advisor.clone());
-        Ok(advisor)
+        let kept = self.kept.clone();
+        let prepared =
+            tokio::task::spawn_blocking(move || Policy::from_json(&row.json).map(|policy| Advisor::with(policy, kept)));
+        // What was stored was checked: a fault in it is not the caller's.
+        prepared.await.map_err(ServiceError::internal)?.map_err(ServiceError::internal)
+    }
+
+    /// Whether sessions by a policy can start from so many returns.
+    ///
+    /// # Errors
+    /// The bridges that they would ask for are too large to be kept ready.
+    pub(super) fn starts_from(&self, advisor: &Advisor, returns: usize) -> Result<(), FieldError> {
+        self.memory.keeps(&[Estimate::of("history", returns, advisor.heaviest_bridges(returns))])
     }
 
     /// At most `limit` policies, newest first, after the policy with sequence `after`.
@@ -73,9 +81,14 @@ impl Policies {
     /// Checks a document as hostile input and stores it in canonical form; returns its name.
     ///
     /// # Errors
-    /// The document is not a usable policy.
+    /// The document is not a usable policy, or one that takes more memory than can be kept ready.
     pub async fn import(&self, tenant: &Tenant, document: Policy) -> Result<String, ServiceError> {
-        let checked = tokio::task::spawn_blocking(move || document.checked().map(|policy| policy.to_json()));
+        let memory = self.memory.clone();
+        let checked = tokio::task::spawn_blocking(move || {
+            let policy = document.checked()?;
+            memory.keeps(&estimate::advising_by(&policy))?;
+            Ok::<_, FieldError>(policy.to_json())
+        });
         let json = checked.await.map_err(ServiceError::internal)??;
         let policy = content_hash(&json);
         self.store.insert_policy(tenant, &policy, &json, self.clock.now_milliseconds()).await?;
@@ -87,22 +100,16 @@ impl Policies {
     pub async fn delete(&self, tenant: &Tenant, policy: &str) -> Result<(), ServiceError> {
         match self.store.delete_policy(tenant, policy).await? {
             DeletePolicy::Deleted => {
-                self.lock().remove(&(tenant.clone(), policy.to_owned()));
+                self.kept.forget(&key(tenant, policy));
                 Ok(())
             }
             DeletePolicy::Absent => Err(ServiceError::unknown("policy", policy)),
             DeletePolicy::InUse { sessions } => Err(ServiceError::PolicyInUse { policy: policy.to_owned(), sessions }),
         }
     }
-
-    fn lock(&self) -> std::sync::MutexGuard<'_, HashMap<(Tenant, String), Arc<Advisor>>> {
-        // No code panics while holding the lock.
-        self.ready.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
-async fn prepare(row: PolicyRow) -> Result<Advisor, ServiceError> {
-    let prepared = tokio::task::spawn_blocking(move || Policy::from_json(&row.json).map(Advisor::new));
-    // What was stored was checked: a fault in it is not the caller's.
-    prepared.await.map_err(ServiceError::internal)?.map_err(ServiceError::internal)
+/// What is here was looked up in the store for that tenant.
+fn key(tenant: &Tenant, policy: &str) -> Key {
+    Key::Policy(format!("{tenant}/{policy}").into())
 }

@@ -19,7 +19,7 @@ use super::live::Live;
 use super::observation::{Observe, Observed};
 use super::policies::Policies;
 use super::slots::{Slot, Slots};
-use crate::control::advisor::{Advice, AdviceMode};
+use crate::control::advisor::{Advice, AdviceMode, Advisor};
 use crate::control::error::FieldError;
 use crate::control::worst_case::WorstCase;
 use crate::store::{
@@ -73,6 +73,7 @@ impl Sessions {
     ) -> Result<Live, ServiceError> {
         let advisor = self.policies.advisor(tenant, policy).await?;
         let state = advisor.initial_state(history.as_deref(), wealth)?;
+        self.policies.starts_from(&advisor, state.law.sample_size())?;
         let problem = &advisor.specification().problem;
         let row = SessionRow {
             session: identity::new_id("session")?,
@@ -95,7 +96,7 @@ impl Sessions {
         match self.store.create_session(new).await? {
             CreateSession::Created => {
                 let head = row.head();
-                Ok(Live { row: Arc::new(row), state, head, advisor, price: None, radius: None, advice: None })
+                Ok(Live { row: Arc::new(row), state, head, price: None, radius: None, advice: None })
             }
             CreateSession::NoPolicy => Err(ServiceError::unknown("policy", policy)),
             CreateSession::Exists => Err(ServiceError::internal("a session of this random name exists")),
@@ -185,7 +186,8 @@ impl Sessions {
         }
         live.expects(report.period)?;
         let log_return = report.checked_log_return(live.price)?;
-        let (state, answer) = live.after(report, log_return, &self.advising).await?;
+        let advisor = self.advisor(tenant, live).await?;
+        let (state, answer) = live.after(report, log_return, &advisor, &self.advising).await?;
         let new = NewObservation {
             session: report.session.clone(),
             period: report.period,
@@ -231,11 +233,16 @@ impl Sessions {
             return Err(ServiceError::Completed { session: session.to_owned(), horizon: live.row.horizon });
         }
         let period = live.observed() + 1;
-        if question == Question::Advise(AdviceMode::Surrogate) {
-            let advice = live.surrogate_advice(&self.advising).await?.clone();
+        let surrogate = question == Question::Advise(AdviceMode::Surrogate);
+        if let Some(advice) = live.advice.clone().filter(|_| surrogate) {
             return Ok(Action { period, advice, worst_case: None });
         }
-        let (advisor, state, step) = (live.advisor.clone(), live.state.clone(), live.observed());
+        let advisor = self.advisor(tenant, live).await?;
+        if surrogate {
+            let advice = live.surrogate_advice(&advisor, &self.advising).await?.clone();
+            return Ok(Action { period, advice, worst_case: None });
+        }
+        let (state, step) = (live.state.clone(), live.observed());
         drop(slot);
         let solving = self.resolving.run(tenant, move || match question {
             Question::Explain => {
@@ -246,6 +253,11 @@ impl Sessions {
         });
         let (advice, worst_case) = solving.await?;
         Ok(Action { period, advice, worst_case })
+    }
+
+    /// The policy of a session, made ready.
+    pub(super) async fn advisor(&self, tenant: &Tenant, live: &Live) -> Result<Arc<Advisor>, ServiceError> {
+        self.policies.advisor(tenant, &live.row.policy).await
     }
 
     /// The session as its rows have it now, where it is the tenant's.
@@ -286,7 +298,7 @@ impl Sessions {
         let price = last.and_then(|answer| answer.price);
         self.lock().grow(state.law.sample_size() + row.initial_history.len());
         let head = observations.last().map_or_else(|| row.head(), |last| last.head(session));
-        Ok(Live { row: Arc::new(row), state, head, advisor, price, radius: None, advice: None })
+        Ok(Live { row: Arc::new(row), state, head, price, radius: None, advice: None })
     }
 
     fn slot(&self, session: &str) -> Slot {

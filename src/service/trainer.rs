@@ -18,9 +18,11 @@ use super::clock::Clock;
 use super::config::Config;
 use super::error::ServiceError;
 use super::identity;
+use super::memory::{Memory, Reserved};
 use super::progress::ProgressBoard;
 use super::shutdown::Shutdown;
 use crate::control::error::TrainError;
+use crate::control::estimate::Estimate;
 use crate::control::pool::TrainingPool;
 use crate::store::{ClaimedJob, JobKind, JobOutcome, Store, StoreError};
 
@@ -47,6 +49,8 @@ struct Worker {
     board: Arc<ProgressBoard>,
     shutdown: Shutdown,
     pool: TrainingPool,
+    threads: usize,
+    memory: Memory,
     lease: Duration,
     runtime: Handle,
 }
@@ -68,6 +72,7 @@ impl Trainer {
         store: Store,
         clock: Clock,
         board: Arc<ProgressBoard>,
+        memory: Memory,
         shutdown: Shutdown,
     ) -> Result<Self, ServiceError> {
         let pool = TrainingPool::new(config.training_threads).map_err(ServiceError::internal)?;
@@ -78,6 +83,8 @@ impl Trainer {
             board,
             shutdown,
             pool,
+            threads: config.training_threads,
+            memory,
             lease: config.lease,
             runtime: Handle::current(),
         };
@@ -170,6 +177,11 @@ impl Worker {
             JobKind::Train => self.train(claimed, stop),
             JobKind::Evaluate => self.evaluate(claimed, stop),
         }
+    }
+
+    /// Waits for the memory of a job; how it ends where it can never have it: whoever queued it has more than is here.
+    fn reserve(&self, estimate: &Estimate) -> Result<Reserved, Ended> {
+        self.runtime.block_on(self.memory.reserve(estimate)).map_err(|error| failed(error.to_string()))
     }
 
     fn close(&self, job: &str, attempt: i64, ended: &Ended) -> Result<(), StoreError> {

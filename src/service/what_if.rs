@@ -203,11 +203,12 @@ impl Sessions {
         if live.observed() >= live.row.horizon {
             return Err(ServiceError::Completed { session: request.session, horizon: live.row.horizon });
         }
+        let advisor = self.advisor(tenant, &live).await?;
         let solves = request.sweep.is_some() || request.explain.is_some();
         let mode = if solves { AdviceMode::Resolve } else { AdviceMode::Surrogate };
         let mut points = Vec::with_capacity(hypotheses.len());
         for hypothesis in hypotheses {
-            let (advisor, state, step) = (live.advisor.clone(), live.state.clone(), live.observed());
+            let (advisor, state, step) = (advisor.clone(), live.state.clone(), live.observed());
             let turns = if solves || hypothesis.radius.is_some() { &self.resolving } else { &self.advising };
             let supposed = turns.run(tenant, move || advisor.suppose(step, &state, &hypothesis, mode)).await?;
             points.push(WhatIfPoint::new(

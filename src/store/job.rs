@@ -63,6 +63,8 @@ pub struct JobRow {
     pub cancel_requested: bool,
     /// How often it was claimed: the fencing token of its present worker.
     pub attempt: i64,
+    /// How many workers died under it, or fell silent past their lease, since it last saved a checkpoint.
+    pub deaths: i64,
     /// The policy of a succeeded training, even where that policy was deleted since.
     pub policy: Option<String>,
     /// The report of a succeeded evaluation.
@@ -136,6 +138,7 @@ impl JobRow {
             steps_done: from_sql(row.get("steps_done")?)?,
             cancel_requested: row.get("cancel_requested")?,
             attempt: row.get("attempt")?,
+            deaths: row.get("deaths")?,
             policy: row.get("policy")?,
             report_json: row.get("report_json")?,
             error: row.get("error")?,

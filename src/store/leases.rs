@@ -3,6 +3,10 @@
 //! A worker holds a job until its lease runs out. Every claim raises `attempt`, and every write names the attempt it was
 //! claimed under: a worker that slept past its lease, and whose job another took, finds itself fenced, by `false`, and must
 //! drop the job.
+//!
+//! A job that is claimed while it runs has lost its worker: the process died, or was silent past the lease, which nobody
+//! can tell from dying. One that loses [`MOST_DEATHS`] workers between two checkpoints fails: what ends a process again
+//! and again must not take down one worker after another. A worker that stops in order releases its job, which is no death.
 
 use futures_util::FutureExt;
 
@@ -14,9 +18,13 @@ use super::jobs::{end, find};
 use super::query::{Connection, Query, Row, query};
 use super::{Store, StoreError, policies};
 
+/// Workers that may die under a job between two checkpoints.
+const MOST_DEATHS: i64 = 3;
+
 impl Store {
     /// Takes the oldest job that is queued, or whose worker's lease ran out, until `now_ms + 1000 lease_seconds`.
-    /// A job that was asked to stop is cancelled on the way rather than claimed.
+    /// A job that was asked to stop is cancelled on the way rather than claimed, and one under which too many workers died
+    /// fails.
     pub async fn claim_job(
         &self,
         worker: &str,
@@ -91,13 +99,27 @@ async fn claim(
             end(connection, &row, next, now_ms).await?;
             continue;
         }
+        let deaths = row.deaths + i64::from(row.state == JobState::Running);
+        if deaths >= MOST_DEATHS
+            && let Ok(next) = row.state.next(JobEvent::Fail)
+        {
+            end(connection, &row, next, now_ms).await?;
+            let reason = format!(
+                "the process of its worker ended {deaths} times while it ran, with no step finished in between; \
+                 it may take more memory than its machine has"
+            );
+            let fail = query("UPDATE jobs SET error = $1, deaths = $2 WHERE job = $3");
+            connection.execute(fail.bind(reason).bind(deaths).bind(row.job)).await?;
+            continue;
+        }
         let next = row.state.next(JobEvent::Claim).map_err(|error| Failure::Corrupt(error.to_string()))?;
         let take = query(
             "UPDATE jobs SET state = $1, worker = $2, lease_until_ms = $3, attempt = attempt + 1,
-                             started_ms = coalesce(started_ms, $4)
-             WHERE job = $5",
+                             started_ms = coalesce(started_ms, $4), deaths = $5
+             WHERE job = $6",
         );
-        let take = take.bind(next.as_str()).bind(worker).bind(until_ms).bind(now_ms).bind(row.job.as_str());
+        let take =
+            take.bind(next.as_str()).bind(worker).bind(until_ms).bind(now_ms).bind(deaths).bind(row.job.as_str());
         connection.execute(take).await?;
         let row = find(connection, &row.job).await?;
         return Ok(row.map(|row| ClaimedJob { attempt: row.attempt, row }));
@@ -145,7 +167,9 @@ async fn checkpoint(
          ON CONFLICT (job, step) DO UPDATE SET bytes = excluded.bytes, seal = excluded.seal",
     );
     connection.execute(save.bind(job.as_str()).bind(step).bind(bytes).bind(seal)).await?;
-    let count = query("UPDATE jobs SET steps_done = (SELECT count(*) FROM checkpoints WHERE job = $1) WHERE job = $1");
+    let count = query(
+        "UPDATE jobs SET steps_done = (SELECT count(*) FROM checkpoints WHERE job = $1), deaths = 0 WHERE job = $1",
+    );
     connection.execute(count.bind(job)).await?;
     Ok(true)
 }

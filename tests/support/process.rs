@@ -10,9 +10,23 @@ pub fn serve(configure: impl FnOnce(&mut Command)) -> (Child, String) {
 
 /// As [`serve`]; where it does not get as far as listening, the process and what it printed instead.
 pub fn try_serve(configure: impl FnOnce(&mut Command)) -> Result<(Child, String), (Child, String)> {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
-    command.arg("serve").env("BALLAST_LISTEN", "127.0.0.1:0").env("RUST_LOG", "warn").stdout(Stdio::piped());
+    let mut command = quiet(Command::new(env!("CARGO_BIN_EXE_ballast")));
+    command.arg("serve");
     configure(&mut command);
+    started(command)
+}
+
+/// As [`serve`], by a command that ends in the real binary.
+pub fn serve_by(command: Command) -> (Child, String) {
+    started(quiet(command)).unwrap_or_else(|(_, printed)| panic!("printed {printed:?}"))
+}
+
+fn quiet(mut command: Command) -> Command {
+    command.env("BALLAST_LISTEN", "127.0.0.1:0").env("RUST_LOG", "warn").stdout(Stdio::piped());
+    command
+}
+
+fn started(mut command: Command) -> Result<(Child, String), (Child, String)> {
     let mut child = command.spawn().unwrap();
     let mut line = String::new();
     BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();

@@ -7,9 +7,11 @@ use super::{Ended, Worker, ended_training, failed};
 use crate::control::advisor::Advisor;
 use crate::control::backward::Watch;
 use crate::control::error::TrainError;
+use crate::control::estimate;
 use crate::control::evaluate::{Evaluation, Follower};
 use crate::control::evaluation_report::{Costs, EvaluationReport};
 use crate::control::framework::Framework;
+use crate::control::kept::Kept;
 use crate::control::policy::Policy;
 use crate::store::{ClaimedJob, JobOutcome, StoreError};
 
@@ -23,11 +25,17 @@ impl Worker {
             Ok(evaluation) => evaluation,
             Err(error) => return Ok(failed(error.to_string())),
         };
+        let _reserved = match self.reserve(&estimate::evaluation(&evaluation.request, self.threads)) {
+            Ok(reserved) => reserved,
+            Err(ended) => return Ok(ended),
+        };
+        let kept = Kept::new(estimate::kept_by_evaluation(&evaluation.request));
+        let evaluation = evaluation.keeping(kept.clone());
         let started = Instant::now();
         let mut followers = Vec::new();
         let mut steps_done = 0;
         for &framework in &evaluation.request.frameworks {
-            match self.follower(claimed, &evaluation, framework, &mut steps_done, stop)? {
+            match self.follower(claimed, &evaluation, framework, (&mut steps_done, &kept), stop)? {
                 Ok(follower) => followers.push(follower),
                 Err(ended) => return Ok(ended),
             }
@@ -47,7 +55,7 @@ impl Worker {
         claimed: &ClaimedJob,
         evaluation: &Evaluation,
         framework: Framework,
-        steps_done: &mut usize,
+        (steps_done, kept): (&mut usize, &Kept),
         stop: &AtomicBool,
     ) -> Result<Result<Follower, Ended>, StoreError> {
         let request = &evaluation.request;
@@ -61,7 +69,7 @@ impl Worker {
             }
         } else if request.one_policy_for_all(framework) {
             let specification = request.specification(framework, None);
-            match self.trained(claimed, &specification, *steps_done, stop)? {
+            match self.trained(claimed, &specification, *steps_done, kept.clone(), stop)? {
                 Ok(policy) => {
                     *steps_done += request.problem.horizon;
                     Some(policy)
@@ -71,7 +79,7 @@ impl Worker {
         } else {
             None
         };
-        Ok(Ok(Follower { framework, advisor: policy.map(Advisor::new) }))
+        Ok(Ok(Follower { framework, advisor: policy.map(|policy| Advisor::with(policy, kept.clone())) }))
     }
 
     fn report(

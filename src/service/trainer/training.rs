@@ -7,6 +7,8 @@ use std::time::Instant;
 use super::super::metrics as names;
 use super::{Ended, Worker, ended_training, failed};
 use crate::control::backward::{StepSolution, Training, Watch};
+use crate::control::estimate;
+use crate::control::kept::Kept;
 use crate::control::policy::{Policy, content_hash};
 use crate::control::specification::Specification;
 use crate::store::{ClaimedJob, JobOutcome, StoreError};
@@ -17,7 +19,12 @@ impl Worker {
             Ok(specification) => specification,
             Err(error) => return Ok(failed(format!("the stored specification cannot be read: {error}"))),
         };
-        let trained = self.trained(claimed, &specification, 0, stop)?;
+        let _reserved = match self.reserve(&estimate::training(&specification, self.threads)) {
+            Ok(reserved) => reserved,
+            Err(ended) => return Ok(ended),
+        };
+        let kept = Kept::new(estimate::kept_by_training(&specification));
+        let trained = self.trained(claimed, &specification, 0, kept, stop)?;
         Ok(trained.map_or_else(|ended| ended, |policy| Ended::Finished(succeeded(&policy))))
     }
 
@@ -28,10 +35,11 @@ impl Worker {
         claimed: &ClaimedJob,
         specification: &Specification,
         first: usize,
+        kept: Kept,
         stop: &AtomicBool,
     ) -> Result<Result<Policy, Ended>, StoreError> {
         let job = claimed.row.job.as_str();
-        let training = match self.pool.install(|| Training::new(specification)) {
+        let training = match self.pool.install(|| Training::with(specification, kept)) {
             Ok(training) => training,
             Err(error) => return Ok(Err(ended_training(&error))),
         };

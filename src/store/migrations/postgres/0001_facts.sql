@@ -11,6 +11,8 @@ CREATE TABLE jobs (
     steps_done       BIGINT NOT NULL DEFAULT 0,
     cancel_requested BOOLEAN NOT NULL DEFAULT FALSE,
     attempt          BIGINT NOT NULL DEFAULT 0,
+    -- Workers that died under it, since it was queued or last saved a checkpoint.
+    deaths           BIGINT NOT NULL DEFAULT 0,
     worker           TEXT,
     lease_until_ms   BIGINT,
     -- No foreign key: a terminal job keeps the name of a policy deleted since.

@@ -12,6 +12,8 @@ CREATE TABLE jobs (
     steps_done       INTEGER NOT NULL DEFAULT 0,
     cancel_requested INTEGER NOT NULL DEFAULT 0,
     attempt          INTEGER NOT NULL DEFAULT 0,
+    -- Workers that died under it, since it was queued or last saved a checkpoint.
+    deaths           INTEGER NOT NULL DEFAULT 0,
     worker           TEXT,
     lease_until_ms   INTEGER,
     -- No foreign key: a terminal job keeps the name of a policy deleted since.

@@ -1,0 +1,217 @@
+//! How much memory a job or a policy takes, before it is begun.
+//!
+//! Upper estimates from the sizes in a request alone. Every large thing of a training is in one of a few classes, and
+//! the constants below are what one thing of each takes, found by counting what the allocator was asked for
+//! (`tests/memory.rs` holds the estimates to it).
+
+use super::context::ProblemContext;
+use super::evaluation::EvaluationRequest;
+use super::framework::Framework;
+use super::policy::Policy;
+use super::prepared::{factor_bytes, prepared_bytes};
+use super::specification::{DEFAULT_COUNT, RadiusRule, Specification};
+use super::surrogate::Solution;
+use super::utility::depends_on_wealth;
+use crate::numerics::gp::GaussianProcess;
+
+/// Bytes of a double.
+const NUMBER: usize = 8;
+/// Square matrices of the order of the design that stand at once while both surrogates are fitted side by side: the kernel,
+/// its inverse and the room to invert in, each twice.
+const FIT_MATRICES: usize = 6;
+/// Candidates and guards a design point, each with features, scaled inputs and their headers.
+const CANDIDATES: usize = 3;
+const GUARDS: usize = 1000;
+const CANDIDATE_BYTES: usize = 160;
+/// A number of a finished policy: itself, its digits as JSON, and the copies of those that the store is given.
+const POLICY_NUMBER_BYTES: usize = 80;
+/// Statistics over all paths that a thread holds at a time.
+const STATISTICS: usize = 8;
+/// Numbers a value of the history that a thread holds while it solves a robust step.
+const STEP_NUMBERS: usize = 64;
+/// A simulated path: wealth of a strategy, and a step as a framework lived it, with the copies that a report sorts.
+const WEALTH_BYTES: usize = 48;
+const LIVED_BYTES: usize = 48;
+const PATH_BYTES: usize = 256;
+/// What any job takes.
+const LEAST: usize = 8 << 20;
+
+/// Bytes by the field of the request that asks for them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    parts: Vec<Asked>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Asked {
+    field: &'static str,
+    value: usize,
+    bytes: usize,
+}
+
+impl Estimate {
+    /// That `field`, which holds `value`, asks for so many bytes.
+    pub fn of(field: &'static str, value: usize, bytes: usize) -> Self {
+        Estimate { parts: vec![Asked { field, value, bytes }] }
+    }
+
+    fn and(mut self, field: &'static str, value: usize, bytes: usize) -> Self {
+        self.parts.push(Asked { field, value, bytes });
+        self
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.parts.iter().fold(0, |sum, part| sum.saturating_add(part.bytes))
+    }
+
+    fn most(&self) -> Option<&Asked> {
+        self.parts.iter().max_by_key(|part| part.bytes)
+    }
+
+    /// The field that asks for most.
+    pub fn field(&self) -> &'static str {
+        self.most().map_or("", |part| part.field)
+    }
+
+    /// What that field holds.
+    pub fn value(&self) -> usize {
+        self.most().map_or(0, |part| part.value)
+    }
+}
+
+/// The sizes that a training's memory follows from.
+struct Sizes {
+    horizon: usize,
+    history: usize,
+    count: usize,
+    inputs: usize,
+    paths: usize,
+    /// Bytes of the largest bridges.
+    bridges: usize,
+}
+
+impl Sizes {
+    /// Of a completed specification.
+    fn of(specification: &Specification) -> Self {
+        let problem = &specification.problem;
+        let (horizon, history) = (problem.horizon, problem.history.len());
+        let single = !problem.framework.learns() && !depends_on_wealth(problem.utility);
+        let count = if single { 1 } else { specification.design.count.unwrap_or(DEFAULT_COUNT) };
+        let context = ProblemContext::new(specification);
+        let paths = match problem.radius_rule() {
+            RadiusRule::Bridge { paths, .. } => paths,
+            _ => 0,
+        };
+        let bridges = context.sets.heaviest(history, horizon);
+        Sizes { horizon, history, count, inputs: context.selection.names().len(), paths, bridges }
+    }
+
+    fn factor(&self) -> usize {
+        GaussianProcess::bytes_of(self.count, self.inputs)
+    }
+
+    /// Bytes of the finished policy and its documents.
+    fn policy(&self) -> usize {
+        product(&[self.horizon, self.count, self.inputs + 2, POLICY_NUMBER_BYTES])
+    }
+
+    /// Bytes while the surrogates of one step are fitted.
+    fn fit(&self) -> usize {
+        let candidate = 2 * self.inputs * NUMBER + CANDIDATE_BYTES;
+        let candidates = product(&[CANDIDATES * self.count + GUARDS, candidate]);
+        product(&[FIT_MATRICES, self.count, self.count, NUMBER]).saturating_add(candidates)
+    }
+
+    /// Bytes that threads hold while they solve robust steps.
+    fn solving(&self, threads: usize) -> usize {
+        product(&[threads, self.history + self.horizon, STEP_NUMBERS, NUMBER])
+    }
+
+    fn statistics(&self, threads: usize) -> usize {
+        product(&[threads, self.paths, STATISTICS, NUMBER])
+    }
+}
+
+/// What a training of a completed specification takes on so many threads.
+pub fn training(specification: &Specification, threads: usize) -> Estimate {
+    let sizes = Sizes::of(specification);
+    let solving = sizes.solving(threads).saturating_add(LEAST);
+    Estimate::of("design.count", sizes.count, sizes.fit())
+        .and("problem.horizon", sizes.horizon, sizes.policy())
+        .and("problem.radius.paths", sizes.paths, training_keeps(&sizes).saturating_add(sizes.statistics(threads)))
+        .and("problem.history", sizes.history, solving)
+}
+
+/// Bytes of the cache that such a training should have: the bridges of a sample size and of the next, each at most half.
+pub fn kept_by_training(specification: &Specification) -> usize {
+    training_keeps(&Sizes::of(specification))
+}
+
+fn training_keeps(sizes: &Sizes) -> usize {
+    sizes.bridges.saturating_mul(4)
+}
+
+/// What of a policy trained from a completed specification must be kept ready to advise by it.
+pub fn advising(specification: &Specification) -> [Estimate; 2] {
+    let sizes = Sizes::of(specification);
+    [
+        Estimate::of("design.count", sizes.count, sizes.factor()),
+        Estimate::of("problem.radius.paths", sizes.paths, sizes.bridges),
+    ]
+}
+
+/// The same of a policy as it is, with the policy itself.
+pub fn advising_by(policy: &Policy) -> [Estimate; 3] {
+    let problem = &policy.specification().problem;
+    let sizes = Sizes::of(policy.specification());
+    let design = |solution: &Solution| match solution {
+        Solution::Single(_) => (1, 0),
+        Solution::Surrogates(stored) => (stored.value.weights.len(), factor_bytes(stored)),
+    };
+    let designs = policy.steps().iter().map(|step| design(&step.solution));
+    let (points, factor) = designs.max_by_key(|(_, bytes)| *bytes).unwrap_or_default();
+    [
+        Estimate::of("steps", points, factor),
+        Estimate::of("specification.problem.radius.paths", sizes.paths, sizes.bridges),
+        Estimate::of("specification.problem.horizon", problem.horizon, prepared_bytes(policy)),
+    ]
+}
+
+/// What an evaluation of a completed request takes on so many threads.
+pub fn evaluation(request: &EvaluationRequest, threads: usize) -> Estimate {
+    let trainings = request.frameworks.iter().filter_map(|&framework| {
+        let specification = request.specification(framework, None).completed().ok()?;
+        Some((framework, Sizes::of(&specification), training(&specification, threads)))
+    });
+    let trainings: Vec<(Framework, Sizes, Estimate)> = trainings.collect();
+    let most = trainings.iter().map(|(.., estimate)| estimate).max_by_key(|estimate| estimate.bytes());
+    // Policies frozen at a history are trained on every thread at once.
+    let at_once = |framework: Framework| if request.one_policy_for_all(framework) { 1 } else { threads };
+    let policies = trainings.iter().map(|(framework, sizes, _)| sizes.policy().saturating_mul(at_once(*framework)));
+    let paths = request.history_count().saturating_mul(request.paths);
+    let strategies = request.frameworks.len() + request.mixes().len();
+    let lived = product(&[request.problem.horizon, request.frameworks.len(), LIVED_BYTES]);
+    let outcomes = product(&[paths, strategies * WEALTH_BYTES + lived + PATH_BYTES]);
+    most.cloned()
+        .unwrap_or_else(|| Estimate::of("paths", request.paths, LEAST))
+        .and("frameworks", request.frameworks.len(), policies.fold(kept_by_evaluation(request), usize::saturating_add))
+        .and("paths", request.paths, outcomes)
+}
+
+/// Bytes of the cache that such an evaluation should have: every path asks for the factors of all steps in turn.
+pub fn kept_by_evaluation(request: &EvaluationRequest) -> usize {
+    let followed = request.frameworks.iter().filter_map(|&framework| {
+        let sizes = Sizes::of(&request.specification(framework, None).completed().ok()?);
+        let sizes_asked_for = if framework.learns() { sizes.horizon + 1 } else { 1 };
+        Some((product(&[sizes.horizon, sizes.factor()]), product(&[sizes_asked_for, sizes.bridges])))
+    });
+    // Bridges are the same for all frameworks that learn.
+    let (factors, bridges) = followed
+        .fold((0usize, 0usize), |(factors, bridges), (more, own)| (factors.saturating_add(more), bridges.max(own)));
+    // Room for any of them to be half of all.
+    factors.saturating_add(bridges).saturating_mul(2)
+}
+
+fn product(factors: &[usize]) -> usize {
+    factors.iter().fold(1, |product, factor| product.saturating_mul(*factor))
+}

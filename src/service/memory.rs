@@ -1,0 +1,302 @@
+//! One budget in bytes for the process, and who may use which part of it.
+//!
+//! The limit is divided once, at the start: jobs, what is kept ready, what is being made ready, live sessions, and the
+//! process itself with its connections. No part takes another's, so that a training never drives out what sessions
+//! live by, and sessions never end a training.
+
+use std::fmt;
+use std::fs;
+use std::path::Path;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use metrics::gauge;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use super::error::ServiceError;
+use super::metrics as names;
+use crate::control::error::FieldError;
+use crate::control::estimate::Estimate;
+use crate::control::kept::{Kept, Part};
+
+/// Parts of the limit, in eighths. What is being made ready has half of what is kept, as [`Kept`] has it.
+const EIGHTHS_FOR_JOBS: usize = 3;
+const EIGHTHS_KEPT: usize = 2;
+const EIGHTHS_FOR_SESSIONS: usize = 1;
+/// Share of what the system gives that is taken where nobody chose: the rest is for the kernel's own and for others.
+const PERCENT_TAKEN: u64 = 80;
+/// Bytes that a permit of the jobs' semaphore stands for: its permits are counted in 32 bits.
+const UNIT: usize = 1 << 16;
+
+/// Where a limit comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Origin {
+    Chosen,
+    /// The limit of the control group the process is in.
+    Container,
+    /// The limit of its address space.
+    AddressSpace,
+    Machine,
+    /// The system does not tell.
+    Unknown,
+}
+
+/// The most memory the process should take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MemoryLimit {
+    pub bytes: usize,
+    pub origin: Origin,
+}
+
+/// Taken where the system does not tell how much there is.
+const UNKNOWN_BYTES: u64 = 2 << 30;
+
+impl MemoryLimit {
+    pub fn chosen(bytes: usize) -> Self {
+        MemoryLimit { bytes, origin: Origin::Chosen }
+    }
+
+    /// 80 % of the least that the container, the address space or the machine gives.
+    pub fn of_the_system() -> Self {
+        let found = [
+            (Origin::Container, container_limit()),
+            (Origin::AddressSpace, address_space_limit()),
+            (Origin::Machine, machine_memory()),
+        ];
+        let known = found.into_iter().filter_map(|(origin, bytes)| Some((origin, bytes?)));
+        let (origin, bytes) = known.min_by_key(|(_, bytes)| *bytes).unwrap_or((Origin::Unknown, UNKNOWN_BYTES));
+        let taken = bytes / 100 * PERCENT_TAKEN;
+        MemoryLimit { bytes: usize::try_from(taken).unwrap_or(usize::MAX), origin }
+    }
+}
+
+impl fmt::Display for MemoryLimit {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let share = |of: &str| format!("{PERCENT_TAKEN} % of {of}");
+        let origin = match self.origin {
+            Origin::Chosen => "as chosen".into(),
+            Origin::Container => share("the container's limit"),
+            Origin::AddressSpace => share("the limit of the address space"),
+            Origin::Machine => share("the machine's memory"),
+            Origin::Unknown => share("2 GB, since the system does not tell"),
+        };
+        write!(formatter, "{}, {origin}", Size(self.bytes))
+    }
+}
+
+/// A number of bytes, as people write it: `900MB`, `1.5GiB`, `4g`, or bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size(pub usize);
+
+impl fmt::Display for Size {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 as f64 {
+            bytes if bytes < 1e9 => write!(formatter, "{:.1} MB", bytes / 1e6),
+            bytes => write!(formatter, "{:.2} GB", bytes / 1e9),
+        }
+    }
+}
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let rule = || format!("'{text}' is not a size: write a number with B, kB, MB, GB, KiB, MiB or GiB");
+        let text_of_unit = text.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
+        let number: f64 = text[..text.len() - text_of_unit.len()].parse().map_err(|_| rule())?;
+        let unit = match text_of_unit.trim().to_ascii_lowercase().as_str() {
+            "" | "b" => 1.0,
+            "k" | "kb" => 1e3,
+            "m" | "mb" => 1e6,
+            "g" | "gb" => 1e9,
+            "kib" => 1024.0,
+            "mib" => 1024.0 * 1024.0,
+            "gib" => 1024.0 * 1024.0 * 1024.0,
+            _ => return Err(rule()),
+        };
+        Ok(Size((number * unit) as usize))
+    }
+}
+
+/// The budget; clones share it.
+#[derive(Clone)]
+pub struct Memory {
+    limit: MemoryLimit,
+    kept: Kept,
+    jobs: Arc<Semaphore>,
+}
+
+/// Bytes reserved by a job until this is dropped.
+pub(super) struct Reserved {
+    _permits: OwnedSemaphorePermit,
+    bytes: usize,
+}
+
+impl Memory {
+    pub fn new(limit: MemoryLimit) -> Self {
+        let permits = (eighths(limit, EIGHTHS_FOR_JOBS) / UNIT).min(Semaphore::MAX_PERMITS);
+        let kept = Kept::new(eighths(limit, EIGHTHS_KEPT));
+        gauge!(names::MEMORY_LIMIT).set(limit.bytes as f64);
+        Memory { limit, kept, jobs: Arc::new(Semaphore::new(permits)) }
+    }
+
+    /// What is kept ready for requests.
+    pub fn kept(&self) -> Kept {
+        self.kept.clone()
+    }
+
+    /// Bytes for the jobs under way.
+    pub fn for_jobs(&self) -> usize {
+        eighths(self.limit, EIGHTHS_FOR_JOBS)
+    }
+
+    /// Bytes for the sessions in memory.
+    pub fn for_sessions(&self) -> usize {
+        eighths(self.limit, EIGHTHS_FOR_SESSIONS)
+    }
+
+    /// Whether a job of this estimate can ever run here.
+    ///
+    /// # Errors
+    /// The field that asks for most, with the estimate and the limit.
+    pub fn admits(&self, estimate: &Estimate) -> Result<(), FieldError> {
+        refuse_above(self.for_jobs(), "the job", estimate)
+    }
+
+    /// Whether each of these can be kept ready for requests.
+    ///
+    /// # Errors
+    /// The field that asks for most, with the estimate and the limit.
+    pub fn keeps(&self, things: &[Estimate]) -> Result<(), FieldError> {
+        things.iter().try_for_each(|thing| refuse_above(self.kept.heaviest(), "one of its parts", thing))
+    }
+
+    /// Waits until the other jobs of this process leave room for a job.
+    pub(super) async fn reserve(&self, estimate: &Estimate) -> Result<Reserved, ServiceError> {
+        self.admits(estimate)?;
+        let bytes = estimate.bytes();
+        let permits = u32::try_from(bytes / UNIT).unwrap_or(u32::MAX);
+        let permits = self.jobs.clone().acquire_many_owned(permits).await.map_err(ServiceError::internal)?;
+        gauge!(names::MEMORY, "part" => "jobs_reserved").increment(bytes as f64);
+        Ok(Reserved { _permits: permits, bytes })
+    }
+
+    /// Tells the recorder how much each part takes now.
+    pub fn record(&self) {
+        for (part, bytes) in self.kept.bytes() {
+            let part = match part {
+                Part::Bridges => "bridges",
+                Part::Factors => "factors",
+                Part::Policies => "prepared_policies",
+            };
+            gauge!(names::MEMORY, "part" => part).set(bytes as f64);
+        }
+    }
+}
+
+impl fmt::Display for Memory {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (jobs, kept) = (Size(self.for_jobs()), Size(eighths(self.limit, EIGHTHS_KEPT)));
+        write!(formatter, "{}: {jobs} for jobs, {kept} kept ready, ", self.limit)?;
+        write!(formatter, "{} for live sessions", Size(self.for_sessions()))
+    }
+}
+
+impl Drop for Reserved {
+    fn drop(&mut self) {
+        gauge!(names::MEMORY, "part" => "jobs_reserved").decrement(self.bytes as f64);
+    }
+}
+
+fn eighths(limit: MemoryLimit, count: usize) -> usize {
+    limit.bytes / 8 * count
+}
+
+fn refuse_above(limit: usize, what: &str, estimate: &Estimate) -> Result<(), FieldError> {
+    if estimate.bytes() <= limit {
+        return Ok(());
+    }
+    let (estimated, limit) = (Size(estimate.bytes()), Size(limit));
+    let rule = format!("must be less: {what} would take about {estimated} of memory, and the limit here is {limit}");
+    Err(FieldError::new(estimate.field(), estimate.value(), rule))
+}
+
+/// The least limit of the control groups above the process, of the second version or the first.
+fn container_limit() -> Option<u64> {
+    let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
+    let limits = groups.lines().filter_map(|line| {
+        let mut fields = line.splitn(3, ':').skip(1);
+        let (controllers, path) = (fields.next()?, fields.next()?);
+        let (root, file) = match controllers {
+            "" => ("/sys/fs/cgroup", "memory.max"),
+            _ if controllers.split(',').any(|name| name == "memory") => {
+                ("/sys/fs/cgroup/memory", "memory.limit_in_bytes")
+            }
+            _ => return None,
+        };
+        // Within a container the path may be the host's, which is not there, and the root is the container's own.
+        let group = Path::new(root).join(path.trim_start_matches('/'));
+        group.ancestors().take_while(|above| above.starts_with(root)).filter_map(|at| number(&at.join(file))).min()
+    });
+    limits.min()
+}
+
+/// `max` where there is no limit, which is no number.
+fn number(file: &Path) -> Option<u64> {
+    fs::read_to_string(file).ok()?.trim().parse().ok()
+}
+
+/// The soft limit of `ulimit -v`.
+fn address_space_limit() -> Option<u64> {
+    let limits = fs::read_to_string("/proc/self/limits").ok()?;
+    let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    line.split_whitespace().next()?.parse().ok()
+}
+
+fn machine_memory() -> Option<u64> {
+    let memory = fs::read_to_string("/proc/meminfo").ok()?;
+    let line = memory.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
+    line.split_whitespace().next()?.parse::<u64>().ok().map(|kibibytes| kibibytes.saturating_mul(1024))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_read_as_people_write_them() {
+        for (text, bytes) in [
+            ("1024", 1024),
+            ("900MB", 900_000_000),
+            ("1.5 GiB", 3 << 29),
+            ("4g", 4_000_000_000),
+            ("512MiB", 512 << 20),
+            ("64kb", 64_000),
+        ] {
+            assert_eq!(text.parse(), Ok(Size(bytes)), "{text}");
+        }
+        for text in ["", "GB", "1 elephant", "-1", "1..2MB", "NaN"] {
+            assert!(text.parse::<Size>().unwrap_err().contains("is not a size"), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_system_tells_how_much_there_is() {
+        let limit = MemoryLimit::of_the_system();
+        assert!(limit.origin != Origin::Unknown && limit.bytes > 16 << 20, "{limit}");
+    }
+
+    #[tokio::test]
+    async fn what_cannot_fit_is_refused_by_name_and_what_fits_waits() {
+        let memory = Memory::new(MemoryLimit::chosen(8 << 30));
+        let job = |gigabytes: usize| Estimate::of("design.count", 7, gigabytes << 30);
+        let refused = memory.reserve(&job(4)).await.err().unwrap().to_string();
+        assert!(refused.starts_with("design.count is 7: must be less") && refused.contains("4.29 GB"), "{refused}");
+        let first = memory.reserve(&job(2)).await.unwrap();
+        let second = job(2);
+        let mut waiting = Box::pin(memory.reserve(&second));
+        assert!(futures_util::poll!(&mut waiting).is_pending());
+        drop(first);
+        assert!(futures_util::poll!(&mut waiting).is_ready());
+    }
+}

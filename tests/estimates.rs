@@ -1,0 +1,140 @@
+//! The estimates that jobs are admitted by, against what the allocator was asked for. One test, for the count is of the
+//! whole process.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use ballast::control::advisor::Advisor;
+use ballast::control::backward::{Training, Watch};
+use ballast::control::estimate;
+use ballast::control::evaluate::Evaluation;
+use ballast::control::evaluation::EvaluationRequest;
+use ballast::control::evaluation_report::{Costs, EvaluationReport};
+use ballast::control::kept::Kept;
+use ballast::control::policy::Policy;
+use ballast::control::pool::TrainingPool;
+use ballast::control::specification::Specification;
+use serde_json::{Value, json};
+
+/// An estimate may be this many times what is taken. More would refuse what fits; less leaves no room for what the
+/// sizes in a request do not tell, as how long a search goes on.
+const GENEROSITY: f64 = 3.0;
+/// What every job is granted whatever it asks, in bytes: small jobs may be as generous as they like.
+const GRANTED: usize = 16 << 20;
+const THREADS: usize = 2;
+
+/// Counts bytes in use, and the most since it was last asked.
+struct Counting;
+
+static NOW: AtomicUsize = AtomicUsize::new(0);
+static MOST: AtomicUsize = AtomicUsize::new(0);
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+// SAFETY: every call is the system allocator's own; only sizes are added up beside it.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let now = NOW.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
+        MOST.fetch_max(now, Ordering::Relaxed);
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        NOW.fetch_sub(layout.size(), Ordering::Relaxed);
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+/// The most bytes in use during `work`, beyond those before it.
+fn most_bytes<R>(work: impl FnOnce() -> R) -> (usize, R) {
+    let before = NOW.load(Ordering::Relaxed);
+    MOST.store(before, Ordering::Relaxed);
+    let result = work();
+    (MOST.load(Ordering::Relaxed).saturating_sub(before), result)
+}
+
+fn history(length: usize) -> Vec<f64> {
+    (0..length).map(|k| 0.004 + 0.03 * ((k * 7919 % 1013) as f64 / 506.5 - 1.0)).collect()
+}
+
+fn specification(horizon: usize, length: usize, paths: usize, count: usize) -> Specification {
+    let rule = match paths {
+        0 => json!({ "rule": "root_n", "kappa": 0.05 }),
+        paths => json!({ "rule": "bridge", "alpha": 0.1, "paths": paths }),
+    };
+    let problem = json!({ "horizon": horizon, "history": history(length), "radius": rule });
+    let value = json!({ "problem": problem, "design": { "count": count } });
+    serde_json::from_value::<Specification>(value).unwrap().completed().unwrap()
+}
+
+fn holds(what: &str, estimated: usize, taken: usize) {
+    println!("{what}: estimated {:.1} MB, taken {:.1} MB", estimated as f64 / 1e6, taken as f64 / 1e6);
+    assert!(taken <= estimated, "{what}: {taken} bytes taken, {estimated} estimated");
+    let generous = GENEROSITY * taken as f64 + GRANTED as f64;
+    assert!(estimated as f64 <= generous, "{what}: {estimated} bytes estimated, {taken} taken");
+}
+
+#[test]
+fn estimates_cover_what_is_taken_and_not_much_more() {
+    let pool = TrainingPool::new(THREADS).unwrap();
+    let stop = AtomicBool::new(false);
+    let watch = Watch { stop: &stop, progress: &|_| {} };
+    for (what, specification) in [
+        ("the design", specification(2, 12, 0, 900)),
+        ("the paths", specification(2, 60, 20_000, 40)),
+        ("the history", specification(2, 6000, 200, 40)),
+        ("the horizon", specification(60, 12, 0, 80)),
+    ] {
+        let (taken, policy) = most_bytes(|| {
+            let kept = Kept::new(estimate::kept_by_training(&specification));
+            let policy = pool.install(|| Training::with(&specification, kept).unwrap().run(&watch).unwrap());
+            // As a worker stores it.
+            let json = policy.to_json();
+            let copies = [json.clone(), json];
+            drop(copies);
+            policy
+        });
+        holds(what, estimate::training(&specification, THREADS).bytes(), taken);
+        prepared(what, policy);
+    }
+    for (what, request) in [
+        ("many paths", json!({ "frameworks": ["static"], "paths": 20_000 })),
+        ("frameworks", json!({ "frameworks": ["adaptive", "plug_in"], "paths": 100 })),
+    ] {
+        let request = evaluation(request);
+        let (taken, _) = most_bytes(|| {
+            let kept = Kept::new(estimate::kept_by_evaluation(&request));
+            let evaluation = Evaluation::new(request.clone()).unwrap().keeping(kept);
+            pool.install(|| {
+                let followers = evaluation.train(&watch).unwrap();
+                let outcomes = evaluation.simulate(&followers, &watch, &|| 0.0).unwrap();
+                let costs = Costs::new(0.0, 0.0, &outcomes);
+                serde_json::to_string(&EvaluationReport::new(&evaluation, &followers, &outcomes, costs)).unwrap()
+            })
+        });
+        holds(what, estimate::evaluation(&request, THREADS).bytes(), taken);
+    }
+}
+
+fn evaluation(mut request: Value) -> EvaluationRequest {
+    request["problem"] = json!({ "horizon": 5, "history": history(40), "radius": { "rule": "bridge", "paths": 2000 } });
+    request["design"] = json!({ "count": 300 });
+    serde_json::from_value::<EvaluationRequest>(request).unwrap().completed().unwrap()
+}
+
+/// What a prepared policy is weighed as, and a factor.
+fn prepared(what: &str, policy: Policy) {
+    let [factor, bridges, numbers] = estimate::advising_by(&policy).map(|part| part.bytes());
+    // Those of the sample size and of the next.
+    let weighed = factor + 2 * bridges + numbers;
+    let last = policy.specification().problem.horizon - 1;
+    let (taken, _) = most_bytes(|| {
+        let advisor = Advisor::with(policy, Kept::new(2 * weighed));
+        let state = advisor.initial_state(None, None).unwrap();
+        advisor.prepare(last, &state);
+        advisor
+    });
+    let unit = 1 << 20;
+    assert!(taken <= weighed + weighed / 4 + unit, "{what}: {taken} bytes kept, {weighed} weighed");
+}
