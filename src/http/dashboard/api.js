@@ -9,7 +9,8 @@ const RECONNECT = 1000;
 export class Problem extends Error {
   constructor(document) {
     super(document.detail || document.title);
-    Object.assign(this, { title: document.title, status: document.status, field: document.field, rule: document.rule });
+    const { title, status, field, value, rule } = document;
+    Object.assign(this, { title, status, field, value, rule });
   }
 
   /** Whether the request may have gone through unheard, or may do so later: sending it again is what to do. */
@@ -50,12 +51,6 @@ let described;
 export async function offers(path) {
   described ??= get("/openapi.json").then((description) => description.paths);
   return path in (await described.catch(() => ({})));
-}
-
-/** Every entry of a list, page after page, to at most `most`. */
-export async function list(path, name, signal, most = 200) {
-  const page = await get(`${path}?limit=${most}`, signal);
-  return { entries: page[name], more: page.next !== null };
 }
 
 /**

@@ -30,7 +30,7 @@ export async function view(id, leaving) {
 
 function waiting(job, leaving) {
   const again = (now) => isOver(now) && now.state === "succeeded" && dispatchEvent(new HashChangeEvent("hashchange"));
-  return jobList([job], leaving, again);
+  return jobList([job], leaving, again).element;
 }
 
 const named = ({ framework, constant_mix }) =>

@@ -1,103 +1,20 @@
-// Out-of-sample comparisons: those asked for, and the form that asks for one.
+// Out-of-sample comparisons: those asked for.
 
-import { get, list, post } from "./api.js";
-import { announce, h, section } from "./dom.js";
-import { fieldset, input, select, showProblem } from "./form.js";
-import { moment, short } from "./format.js";
+import { h } from "./dom.js";
 import { jobList } from "./jobs.js";
-import { FRAMEWORKS } from "./specification.js";
+import { foot, Pages } from "./pages.js";
 
-export async function view(query, leaving) {
-  const [jobs, policies] = await Promise.all([list("/jobs", "jobs", leaving), list("/policies", "policies", leaving)]);
-  const evaluations = jobs.entries.filter(({ kind }) => kind === "evaluate");
-  const asked = new URLSearchParams(query ?? "").get("policy");
-  const none = h(
-    "p",
-    { class: "lead" },
-    "No evaluation yet. One sends every framework, and simple constant mixes, through the same simulated returns, and says what each of them ended with.",
-  );
-  const form =
-    policies.entries.length > 0
-      ? asking(policies.entries, asked)
-      : h("p", {}, "An evaluation starts from a policy. ", h("a", { href: "#/train" }, "Train one"), ".");
-  return { title: "Evaluations", body: [evaluations.length > 0 ? jobList(evaluations, leaving) : none, form] };
+export async function view(_, leaving) {
+  const pages = new Pages("/jobs", "jobs", leaving, { keep: ({ kind }) => kind === "evaluate" });
+  const entries = await pages.next();
+  const actions = h("a", { class: "button", href: "#/evaluations/new" }, "Compare out of sample");
+  const lead =
+    "No evaluation yet. One sends every framework, and simple constant mixes, through the same simulated returns, and says what each of them ended with.";
+  if (entries.length === 0) return { title: "Evaluations", actions, body: h("p", { class: "lead" }, lead) };
+  const jobs = jobList(entries, leaving);
+  return {
+    title: "Evaluations",
+    actions,
+    body: [jobs.element, foot(pages, ["evaluation", "evaluations"], entries.length, jobs.add)],
+  };
 }
-
-function asking(policies, asked) {
-  const choices = Object.fromEntries(
-    policies.map(({ policy, created_ms }) => [policy, `${short(policy)}, stored ${moment(created_ms)}`]),
-  );
-  const policy = select({
-    name: "policy",
-    label: "Policy",
-    note: "Its problem, design and seed are used for every framework.",
-    choices,
-  });
-  if (asked in choices) policy.control.value = asked;
-  const paths = input({ name: "paths", label: "Paths per history", note: "100 to 100,000.", value: "1000" });
-  const histories = select({
-    name: "histories.kind",
-    label: "Histories",
-    note: "Drawn ones say how much the result depends on the history.",
-    choices: { given: "The policy\u2019s own", drawn: "Drawn from the law" },
-  });
-  const count = input({ name: "histories.count", label: "How many histories", note: "2 to 1,000.", value: "50" });
-  const frameworks = h(
-    "div",
-    { class: "field checks", role: "group", "aria-label": "Frameworks" },
-    Object.entries(FRAMEWORKS).map(([value, words]) =>
-      h("label", {}, h("input", { type: "checkbox", name: "frameworks", value, checked: true }), words),
-    ),
-  );
-  const drawn = () => (count.element.hidden = histories.control.value !== "drawn");
-  histories.control.addEventListener("change", drawn);
-  drawn();
-  const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
-  const send = h("button", { type: "submit" }, "Evaluate");
-  const form = h(
-    "form",
-    { novalidate: true },
-    fieldset("What to compare", [policy, histories, count, paths, frameworks]),
-    message,
-    h(
-      "p",
-      { class: "send" },
-      send,
-      h(
-        "span",
-        { class: "note" },
-        "Frameworks other than the policy\u2019s are trained first; all-bank and constant mixes take part by themselves.",
-      ),
-    ),
-  );
-  form.addEventListener("submit", async (event) => {
-    event.preventDefault();
-    send.disabled = true;
-    try {
-      const { specification } = await get(`/policies/${policy.control.value}`);
-      const request = composed(specification, policy.control.value, {
-        frameworks: [...frameworks.querySelectorAll(":checked")].map(({ value }) => value),
-        paths: read(paths.control.value),
-        histories:
-          histories.control.value === "drawn" ? { kind: "drawn", count: read(count.control.value) } : { kind: "given" },
-      });
-      const job = await post("/evaluate", request);
-      announce("The evaluation is queued.");
-      location.hash = `#/evaluations/${job.job}`;
-    } catch (error) {
-      showProblem(form, message, error);
-    }
-    send.disabled = false;
-  });
-  return section("Compare out of sample", form);
-}
-
-/** The request for a policy's problem. With drawn histories every learning policy must be one for any history. */
-function composed({ problem, design, surrogate, seed }, policy, choices) {
-  const { framework, ...rest } = problem;
-  const serves = choices.histories.kind === "given" || design.initial_laws === "resampled";
-  const policies = serves && choices.frameworks.includes(framework) ? { [framework]: policy } : {};
-  return { problem: rest, design, surrogate, seed, policies, ...choices };
-}
-
-const read = (text) => (text.trim() === "" || Number.isNaN(Number(text)) ? text : Number(text));

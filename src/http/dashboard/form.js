@@ -1,6 +1,7 @@
 // Fields with their labels, notes and errors; refusals shown at the field they name.
 
 import { h } from "./dom.js";
+import { problemWords } from "./problem_words.js";
 
 const identifier = (name) => `f-${name.replace(/[^a-z0-9]+/gi, "-")}`;
 
@@ -20,9 +21,15 @@ function field(name, label, note, control) {
   return { name, element, control };
 }
 
-/** A text field; `changed(text)` at every edit. */
-export function input({ name, label, note, changed, value = "", ...attributes }) {
-  const control = h("input", { type: "text", inputmode: "decimal", autocomplete: "off", ...attributes });
+/** A text field; `changed(text)` at every edit. `unit` is "percent" where it counts so and the request does not. */
+export function input({ name, label, note, changed, value = "", unit = null, ...attributes }) {
+  const control = h("input", {
+    type: "text",
+    inputmode: "decimal",
+    autocomplete: "off",
+    "data-unit": unit,
+    ...attributes,
+  });
   control.value = value;
   if (changed) control.addEventListener("input", () => changed(control.value));
   return field(name, label, note, control);
@@ -73,7 +80,9 @@ export function showProblem(form, message, problem, otherwise) {
     return;
   }
   control.closest("details")?.setAttribute("open", "");
-  const error = h("p", { class: "error", role: "alert", id: `${control.id}-error` }, problem.message);
+  const own = problem.rule && problem.field === control.name && control.labels.length > 0;
+  const words = own ? problemWords(problem, control.labels[0].textContent, control.dataset.unit) : problem.message;
+  const error = h("p", { class: "error", role: "alert", id: `${control.id}-error` }, words);
   control.setAttribute("aria-invalid", "true");
   control.dataset.described = control.getAttribute("aria-describedby") ?? "";
   control.setAttribute("aria-describedby", `${error.id} ${control.dataset.described}`.trim());

@@ -43,9 +43,17 @@ export function significant(value, digits = 3) {
 /** A number on an axis, with the digits that its `step` asks for. */
 export function tick(value, step) {
   const size = Math.max(Math.abs(value), Math.abs(step) || Math.abs(value));
-  if (size >= 1e7 || (size !== 0 && size < 1e-4)) return significant(value, 2);
-  return grouped(value, Math.min(6, decimals(step)));
+  if (size >= 1e7 || (size !== 0 && size < 1e-4)) return significant(value, apart(size, step));
+  return grouped(value, Math.min(FINEST, decimals(step)));
 }
+
+/** No axis needs more decimals. */
+const FINEST = 10;
+
+/** Significant digits that tell numbers of a size apart by steps. */
+const apart = (size, step) => (step > 0 ? Math.max(2, power(size) - power(step) + 1) : 2);
+
+const power = (value) => Math.floor(Math.log10(value) + 1e-9);
 
 /** A share on an axis. */
 export function percentTick(fraction, step) {
@@ -68,8 +76,8 @@ export function count(value) {
 }
 
 /** `count` things by name. */
-export function counted(value, noun) {
-  return `${count(value)} ${noun}${value === 1 ? "" : "s"}`;
+export function counted(value, noun, nouns = `${noun}s`) {
+  return `${count(value)} ${value === 1 ? noun : nouns}`;
 }
 
 /** Seconds, to the precision of an estimate. */

@@ -49,16 +49,12 @@ export function heatmap({ title, x, y, field, range, format, dots, note, name })
     ];
     place = { across, up };
     const [wide, high] = [across(2 * dx) - across(0), up(0) - up(2 * dy)];
-    const cells = field.flatMap((values, r) =>
-      values.map((value, c) =>
-        s("rect", {
-          class: `cell ${colour(value)}`,
-          x: across(x.values[c] - dx),
-          y: up(y.values[r] + dy),
-          width: wide + 0.6,
-          height: high + 0.6,
-        }),
-      ),
+    const cells = paths(
+      field,
+      colour,
+      (c, r) => [across(x.values[c] - dx), up(y.values[r] + dy)],
+      wide + 0.6,
+      high + 0.6,
     );
     cursor = s("rect", { class: "cursor", width: wide, height: high });
     mark();
@@ -118,6 +114,20 @@ export function heatmap({ title, x, y, field, range, format, dots, note, name })
   });
   read();
   return figure({ title, legend, holder, note, rows: () => fieldTable({ title, x, y, field, format }) });
+}
+
+/** One path a colour: a thousand elements would take a frame to make. */
+function paths(field, colour, corner, wide, high) {
+  const drawn = new Map();
+  const box = `h${wide.toFixed(2)}v${high.toFixed(2)}h${(-wide).toFixed(2)}z`;
+  for (const [r, values] of field.entries()) {
+    for (const [c, value] of values.entries()) {
+      const [left, top] = corner(c, r);
+      const name = colour(value);
+      drawn.set(name, `${drawn.get(name) ?? ""}M${left.toFixed(2)} ${top.toFixed(2)}${box}`);
+    }
+  }
+  return [...drawn].map(([name, d]) => s("path", { class: `cell ${name}`, d }));
 }
 
 function ramp(left, [low, high], format) {

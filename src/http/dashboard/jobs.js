@@ -1,8 +1,9 @@
 // Jobs: what is being computed, how far it is, and how to stop it.
 
-import { follow, get, isOver, list, Problem, remove } from "./api.js";
+import { follow, get, isOver, Problem, remove } from "./api.js";
 import { announce, h } from "./dom.js";
 import { count, duration, moment, short } from "./format.js";
+import { foot, Pages } from "./pages.js";
 
 /** Browsers keep six connections to one address: following two jobs leaves room for everything else. */
 const FOLLOWED = 2;
@@ -13,22 +14,27 @@ const WORDS = { train: "Training", evaluate: "Evaluation", walk_forward: "Walk-f
 const named = (kind) => WORDS[kind] ?? kind.replace(/_/g, " ");
 
 export async function view(_, leaving) {
-  const { entries, more } = await list("/jobs", "jobs", leaving);
+  const pages = new Pages("/jobs", "jobs", leaving);
+  const entries = await pages.next();
   const actions = h("a", { class: "button", href: "#/train" }, "Train a policy");
   if (entries.length === 0) return { title: "Jobs", body: welcome() };
-  const note = more ? h("p", { class: "note" }, `The newest ${count(entries.length)} jobs.`) : null;
-  return { title: "Jobs", actions, body: [jobList(entries, leaving), note].filter(Boolean) };
+  const jobs = jobList(entries, leaving);
+  return { title: "Jobs", actions, body: [jobs.element, foot(pages, ["job", "jobs"], entries.length, jobs.add)] };
 }
 
-/** Jobs that stay up to date until `leaving`; `changed(job)` hears of every change. */
+/** `{element, add(entries)}`: jobs that stay up to date until `leaving`; `changed(job)` hears of every change. */
 export function jobList(entries, leaving, changed = () => {}) {
-  const cards = entries.map((job) => card(job, changed));
-  watch(cards, leaving);
-  return h(
-    "ol",
-    { class: "cards" },
-    cards.map(({ element }) => element),
-  );
+  const element = h("ol", { class: "cards" });
+  const cards = [];
+  const wake = watch(cards, leaving);
+  const add = (more) => {
+    const added = more.map((job) => card(job, changed));
+    cards.push(...added);
+    element.append(...added.map((card) => card.element));
+    wake();
+  };
+  add(entries);
+  return { element, add };
 }
 
 function welcome() {
@@ -168,10 +174,12 @@ function links(card) {
   return stop;
 }
 
-/** Follows the first running jobs and asks for the others now and then. */
+/** Follows the first running jobs and asks for the others now and then; the function given looks for new ones. */
 function watch(cards, leaving) {
   const followed = new Set();
+  let awake = false;
   const turn = async () => {
+    awake = true;
     const pending = cards.filter(({ job }) => !isOver(job));
     for (const card of pending.filter(({ job }) => job.state === "running")) {
       const live = [...followed].filter((one) => !isOver(one.job)).length;
@@ -181,7 +189,8 @@ function watch(cards, leaving) {
     }
     const others = pending.filter((card) => !followed.has(card));
     await Promise.all(others.map((card) => get(`/jobs/${card.job.job}`, leaving).then(card.update, () => {})));
-    if (pending.length > 0 && !leaving.aborted) setTimeout(turn, POLL);
+    awake = pending.length > 0 && !leaving.aborted;
+    if (awake) setTimeout(turn, POLL);
   };
-  turn();
+  return () => awake || turn();
 }

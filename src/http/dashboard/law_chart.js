@@ -6,6 +6,8 @@ import { percent, percentTick } from "./format.js";
 
 const HEIGHT = 260;
 const BINS = 36;
+/** Pixels that a label takes with the room around it. */
+const LABEL = 56;
 
 const simple = (logReturn) => percent(Math.expm1(logReturn));
 
@@ -64,8 +66,10 @@ export function lawChart({ transport }) {
     x = scale(domain, [left, right]);
     const y = scale([0, tallest], [0, middle - 12]);
     const both = scale([-tallest, tallest], [HEIGHT - 36, 12]);
-    const levels = ticks(0, tallest, 2).filter((level) => level > 0);
-    const round = ticks(...domain.map(Math.expm1), width / 90);
+    const levels =
+      [2, 4].map((wanted) => ticks(0, tallest, wanted).filter((level) => level > 0)).find(({ length }) => length > 0) ??
+      [];
+    const round = ticks(...domain.map(Math.expm1), width / 90).filter(roomy((tick) => x(Math.log1p(tick))));
     const frame = axes({
       x,
       y: both,
@@ -123,6 +127,16 @@ export function lawChart({ transport }) {
     holder,
     rows: () => movesTable(transport),
   });
+}
+
+/** Keeps what stands clear of the label kept before it: equal returns lie ever closer as log-returns grow. */
+function roomy(place) {
+  let last = -Infinity;
+  return (value) => {
+    if (place(value) - last < LABEL) return false;
+    last = place(value);
+    return true;
+  };
 }
 
 function movesTable(transport) {

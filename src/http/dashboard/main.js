@@ -3,12 +3,14 @@
 import { offers, Problem } from "./api.js";
 import { announce, h } from "./dom.js";
 import * as evaluation from "./evaluation.js";
+import * as evaluationAsking from "./evaluation_asking.js";
 import * as evaluations from "./evaluations.js";
 import * as jobs from "./jobs.js";
 import { keyForm } from "./key.js";
 import * as policies from "./policies.js";
 import * as policy from "./policy.js";
 import * as session from "./session.js";
+import * as sessionOpening from "./session_opening.js";
 import * as sessions from "./sessions.js";
 import * as train from "./train.js";
 
@@ -18,9 +20,11 @@ const ROUTES = [
   [/^#\/train$/, train.view, "jobs"],
   [/^#\/policies$/, policies.view, "policies"],
   [/^#\/policies\/([^/]+)$/, policy.view, "policies"],
-  [/^#\/sessions(?:\?(.*))?$/, sessions.view, "sessions"],
+  [/^#\/sessions$/, sessions.view, "sessions"],
+  [/^#\/sessions\/new(?:\?(.*))?$/, sessionOpening.view, "sessions"],
   [/^#\/sessions\/([^/]+)$/, session.view, "sessions"],
-  [/^#\/evaluations(?:\?(.*))?$/, evaluations.view, "evaluations"],
+  [/^#\/evaluations$/, evaluations.view, "evaluations"],
+  [/^#\/evaluations\/new(?:\?(.*))?$/, evaluationAsking.view, "evaluations"],
   [/^#\/evaluations\/([^/]+)$/, evaluation.view, "evaluations"],
   [/^#\/key$/, key, "key"],
 ];
@@ -79,7 +83,8 @@ function missing(hash) {
 
 function failed(error) {
   if (!(error instanceof Problem)) console.error(error);
-  if (error.status === 401) return { title: "A key is needed", body: [h("p", { role: "alert" }, error.message), keyForm(show)] };
+  if (error.status === 401)
+    return { title: "A key is needed", body: [h("p", { role: "alert" }, error.message), keyForm(show)] };
   const again = h("button", { onclick: show }, "Try again");
   return { title: error.title ?? "This view failed", body: [h("p", { role: "alert" }, error.message), again] };
 }

@@ -43,3 +43,22 @@ export function numberOf(text, decimal) {
 export const commaDecimal = (text) => bare(text).replaceAll(".", "").replace(",", ".");
 
 export const hasPercent = (text) => /%\s*$/.test(text);
+
+/**
+ * A number typed by itself: null where nothing is, and the text as it is where it is no number or could be two, as 100,000
+ * could. `shares` takes 0.2 % for 0.002.
+ */
+export function typed(text, { shares = false } = {}) {
+  if (text.trim() === "") return null;
+  const values = ["point", "comma"]
+    .filter((decimal) => isNumber(text, decimal))
+    .map((decimal) => numberOf(text, decimal));
+  if (new Set(values).size !== 1 || (hasPercent(text) && !shares)) return text.trim();
+  return hasPercent(text) ? hundredth(values[0]) : values[0];
+}
+
+/** Percent to a fraction without a rounding of its own: the decimal point moves in the text. */
+export function hundredth(percent) {
+  const [digits, power = "0"] = String(percent).split("e");
+  return Number(`${digits}e${Number(power) - 2}`);
+}

@@ -4,23 +4,24 @@ import { get, post } from "./api.js";
 import { h } from "./dom.js";
 import { clear, input, select, showProblem } from "./form.js";
 import { allocation, significant, wealth } from "./format.js";
+import { hundredth, typed } from "./number_text.js";
 
 const KINDS = { simple_return: "Simple return", log_return: "Log-return" };
 
-/** Percent to a fraction without a rounding of its own: the decimal point moves in the text. */
+/** A number typed in percent, as a fraction; null where it is none. */
 function fraction(text) {
-  const plain = text.trim().replace("\u2212", "-").replace(/\s*%$/, "");
-  const [digits, power = "0"] = plain.toLowerCase().split("e");
-  const value = plain === "" ? NaN : Number(`${digits}e${Number(power) - 2}`);
-  return Number.isFinite(value) ? value : null;
+  const value = typed(text.replace(/\s*%$/, ""));
+  return typeof value === "number" ? hundredth(value) : null;
 }
 
+/** `{element, advise(allocation)}`: what is held where nothing else is said is the advice, or another that took its place. */
 export function observeForm(action, { id, session, policy, refresh }) {
   const { rate_per_step } = policy.specification.problem;
   const preview = h("output", { class: "note" });
+  let [advised, replaced] = [action.allocation, false];
   const read = () => {
     const value = fraction(given.control.value);
-    const executed = held.control.value.trim() === "" ? action.allocation : fraction(held.control.value);
+    const executed = held.control.value.trim() === "" ? advised : fraction(held.control.value);
     if (value === null || executed === null) return (preview.textContent = "");
     const growth = kind.control.value === "log_return" ? Math.exp(value) : 1 + value;
     const next = session.wealth * ((1 - executed) * (1 + rate_per_step) + executed * growth);
@@ -30,13 +31,15 @@ export function observeForm(action, { id, session, policy, refresh }) {
     name: "return",
     label: `Return in period ${action.period}, %`,
     note: "Of the risky asset: \u22122.5 is a loss of 2.5 %",
+    unit: "percent",
     changed: () => read(),
   });
   const kind = select({ name: "kind", label: "Given as", choices: KINDS, changed: () => read() });
   const held = input({
     name: "executed_allocation",
     label: "Share held, %",
-    note: `Blank: the ${allocation(action.allocation)} advised.`,
+    unit: "percent",
+    note: blankShare(advised),
     changed: () => read(),
   });
   const reached = input({ name: "wealth", label: "Wealth reached", note: "Blank: what return and share give." });
@@ -68,10 +71,9 @@ export function observeForm(action, { id, session, policy, refresh }) {
     const report = { session: id, period: action.period, [kind.control.value]: fraction(given.control.value) };
     if (held.control.value.trim() !== "")
       report.executed_allocation = fraction(held.control.value) ?? held.control.value;
-    if (reached.control.value.trim() !== "")
-      report.wealth = Number.isNaN(Number(reached.control.value))
-        ? reached.control.value
-        : Number(reached.control.value);
+    else if (replaced) report.executed_allocation = advised;
+    const worth = typed(reached.control.value);
+    if (worth !== null) report.wealth = worth;
     return report;
   };
   form.addEventListener("submit", async (event) => {
@@ -79,6 +81,7 @@ export function observeForm(action, { id, session, policy, refresh }) {
     if (button.disabled) return;
     clear(form);
     message.hidden = true;
+    if (fraction(given.control.value) === null) return unread();
     request ??= compose();
     button.disabled = true;
     try {
@@ -89,6 +92,11 @@ export function observeForm(action, { id, session, policy, refresh }) {
     }
     button.disabled = false;
   });
+  const unread = () => {
+    const text = given.control.value.trim();
+    const words = text === "" ? "The return is blank." : `\u201c${text}\u201d is not a number of percent.`;
+    showProblem(form, message, { message: words, field: "return" });
+  };
   const refused = async (error) => {
     if (error.passing) {
       button.textContent = "Send again";
@@ -101,7 +109,14 @@ export function observeForm(action, { id, session, policy, refresh }) {
       if (now && now.period !== action.period) await refresh();
     }
     const field = ["log_return", "simple_return"].includes(error.field) ? "return" : error.field;
-    showProblem(form, message, { message: error.message, field });
+    showProblem(form, message, { ...error, message: error.message, field });
   };
-  return form;
+  const advise = (allocation) => {
+    [advised, replaced] = [allocation, true];
+    held.element.querySelector(".note").textContent = blankShare(advised);
+    read();
+  };
+  return { element: form, advise };
 }
+
+const blankShare = (advised) => `Blank: the ${allocation(advised)} advised.`;

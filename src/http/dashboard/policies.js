@@ -1,24 +1,37 @@
 // Policies: what trainings gave, and what came in from elsewhere.
 
-import { get, list, post } from "./api.js";
+import { get, post } from "./api.js";
 import { announce, h, table } from "./dom.js";
 import { count, moment, percent, short, significant } from "./format.js";
+import { foot, Pages } from "./pages.js";
 import { FRAMEWORKS, hasBall, isParametric, radiusRule, utility } from "./specification.js";
 
+/** Fewer than of other things at a time: each is asked for by itself. */
+const PAGE = 50;
+
 export async function view(_, leaving) {
-  const { entries, more } = await list("/policies", "policies", leaving, 50);
-  const details = await Promise.all(
-    entries.map((entry) => get(`/policies/${entry.policy}`, leaving).catch(() => null)),
+  const pages = new Pages("/policies", "policies", leaving, { limit: PAGE });
+  const detailed = (entries) =>
+    Promise.all(
+      entries.map(async (entry) => ({
+        ...entry,
+        detail: await get(`/policies/${entry.policy}`, leaving).catch(() => null),
+      })),
+    );
+  const rows = await detailed(await pages.next());
+  const actions = h(
+    "div",
+    { class: "actions" },
+    importer(),
+    h("a", { class: "button", href: "#/train" }, "Train a policy"),
   );
-  const rows = entries.map((entry, index) => ({ ...entry, detail: details[index] }));
-  return {
-    title: "Policies",
-    actions: [importer(), h("a", { class: "button", href: "#/train" }, "Train a policy")],
-    body:
-      rows.length === 0
-        ? empty()
-        : [listed(rows), more ? h("p", { class: "note" }, `The newest ${count(rows.length)}.`) : ""],
+  if (rows.length === 0) return { title: "Policies", actions, body: empty() };
+  const holder = h("div", {}, listed(rows));
+  const add = async (older) => {
+    rows.push(...(await detailed(older)));
+    holder.replaceChildren(listed(rows));
   };
+  return { title: "Policies", actions, body: [holder, foot(pages, ["policy", "policies"], rows.length, add)] };
 }
 
 function empty() {

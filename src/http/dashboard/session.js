@@ -1,5 +1,6 @@
 // One session: what to hold now and why, the return to report, and how it went.
 
+import { adviceView } from "./advice.js";
 import { get, offers, remove } from "./api.js";
 import { lineChart } from "./chart.js";
 import { announce, disclosure, facts, h, section, table } from "./dom.js";
@@ -19,13 +20,6 @@ import { lawChart } from "./law_chart.js";
 import { observeForm } from "./observe.js";
 import { utility } from "./specification.js";
 import { conservatism } from "./what_if.js";
-
-const SOURCES = {
-  policy_surrogate: "read off the policy",
-  resolved: "solved anew on request",
-  resolved_other_radius: "solved anew for another radius",
-  resolved_outside_design: "solved anew, because this state lies outside the policy\u2019s design",
-};
 
 export async function view(id, leaving) {
   const session = await get(`/sessions/${id}`, leaving);
@@ -60,18 +54,26 @@ export async function view(id, leaving) {
 
 async function fill(holder, shown) {
   const { id, session, leaving } = shown;
-  const active = session.state === "active";
-  const action = active ? await get(`/action?session=${id}`, leaving) : null;
+  if (session.state !== "active") {
+    const ended = [h("div", {}, completed(shown)), h("div", {}, course(shown, null))];
+    return holder.replaceChildren(figures(shown, null), h("div", { class: "columns" }, ended), observed(shown));
+  }
+  const action = await get(`/action?session=${id}`, leaving);
+  const report = observeForm(action, shown);
+  const advice = adviceView(action, session.horizon, report.element);
+  const numbers = h("div", {}, figures(shown, action));
+  const sofar = h("div", {}, course(shown, action));
+  const settled = (stands) => {
+    if (!stands.replaced) return;
+    report.advise(stands.allocation);
+    numbers.replaceChildren(figures(shown, stands));
+    sofar.replaceChildren(course(shown, stands));
+  };
   holder.replaceChildren(
-    figures(shown, action),
-    h(
-      "div",
-      { class: "columns" },
-      h("div", {}, active ? advice(action, shown) : completed(shown)),
-      h("div", {}, course(shown, action)),
-    ),
-    active ? worstCase(shown, action) : "",
-    active && shown.canAsk ? conservatism(shown, action) : "",
+    numbers,
+    h("div", { class: "columns" }, h("div", {}, advice.element), sofar),
+    worstCase(shown, advice, settled),
+    shown.canAsk ? conservatism(shown, action) : "",
     observed(shown),
   );
 }
@@ -91,48 +93,6 @@ function figures({ session, history }, action) {
   ]);
 }
 
-function advice(action, shown) {
-  const sentence = h("p", { class: "sentence" }, ...why(action));
-  return section(
-    `Period ${action.period} of ${shown.session.horizon}`,
-    h(
-      "div",
-      { class: "advice", id: "advice", tabindex: -1 },
-      h(
-        "p",
-        { class: "big" },
-        h("span", {}, "Hold "),
-        h("strong", {}, allocation(action.allocation)),
-        h("span", {}, " in the risky asset"),
-      ),
-      sentence,
-      h(
-        "p",
-        { class: "note" },
-        `Allocation ${significant(action.allocation, 4)}, ${SOURCES[action.source]}${action.in_design && action.surrogate_sd > 0 ? `; predicted deviation of its worth ${significant(1e4 * action.surrogate_sd, 2)} bp` : ""}.`,
-      ),
-    ),
-    observeForm(action, shown),
-  );
-}
-
-function why(action) {
-  const { certainty_equivalent, floor } = action;
-  if (action.allocation === 0)
-    return [
-      "Against the worst law the returns seen cannot rule out, nothing beats the bank, which reaches ",
-      h("b", {}, wealth(floor)),
-      ".",
-    ];
-  return [
-    "Against the worst law the returns seen cannot rule out, this is worth ",
-    h("b", {}, wealth(certainty_equivalent)),
-    " for certain at the horizon, where the bank alone reaches ",
-    h("b", {}, wealth(floor)),
-    ".",
-  ];
-}
-
 function completed({ session, history, policy }) {
   const { rate_per_step, horizon } = policy.specification.problem;
   const bank = history.initial_wealth * (1 + rate_per_step) ** horizon;
@@ -143,7 +103,7 @@ function completed({ session, history, policy }) {
       { class: "advice", id: "advice", tabindex: -1 },
       h("p", { class: "big" }, h("span", {}, "It ended with "), h("strong", {}, wealth(session.wealth))),
       h("p", { class: "sentence" }, `The bank alone would have reached ${wealth(bank)}.`),
-      h("p", {}, h("a", { class: "button", href: `#/sessions?policy=${session.policy}` }, "Open another session")),
+      h("p", {}, h("a", { class: "button", href: `#/sessions/new?policy=${session.policy}` }, "Open another session")),
     ),
   );
 }
@@ -201,28 +161,38 @@ function course({ session, history, policy }, action) {
   );
 }
 
-/** The law behind the current advice; it takes a robust step, so it is asked for after the rest stands. */
-function worstCase({ id, leaving }, action) {
+/** The law behind the current advice, and the check of it; both take a robust step, so they come after the rest stands. */
+function worstCase({ id, leaving }, advice, settled) {
   const holder = h("div", { class: "later" }, h("p", { class: "note" }, "Solving the step for its worst law\u2026"));
   const told = async () => {
-    const { worst_case, allocation: anew } = await get(`/action?session=${id}&explain=worst_case`, leaving);
-    if (worst_case.transport.length === 0) return [h("p", {}, worst_case.sentence)];
-    const apart = Math.abs(anew - action.allocation) < 5e-4 ? "" : ` The step solved anew holds ${percent(anew)}.`;
-    return [
-      h("p", { class: "sentence" }, worst_case.sentence),
-      lawChart(worst_case),
-      h(
-        "p",
-        { class: "note" },
-        `Multiplier of the ball ${significant(worst_case.multiplier, 3)} (utility lost per unit of radius); duality gap ${significant(1e4 * Math.abs(worst_case.duality_gap), 2)} bp.${apart}`,
-      ),
-    ];
+    const anew = await get(`/action?session=${id}&explain=worst_case`, leaving);
+    settled(advice.checked(anew));
+    const { worst_case } = anew;
+    const sentence = h("p", { class: "sentence" }, worstWords(anew));
+    if (worst_case.transport.length === 0) return [sentence];
+    const told = `Multiplier of the ball ${significant(worst_case.multiplier, 3)} (utility lost per unit of radius); duality gap ${significant(1e4 * Math.abs(worst_case.duality_gap), 2)} bp.`;
+    return [sentence, lawChart(worst_case), h("p", { class: "note" }, told)];
   };
   told().then(
     (nodes) => holder.replaceChildren(...nodes),
-    (error) => leaving.aborted || holder.replaceChildren(h("p", { class: "error" }, error.message)),
+    (error) => {
+      if (leaving.aborted) return;
+      advice.unchecked(error.message);
+      holder.replaceChildren(h("p", { class: "error" }, error.message));
+    },
   );
   return section("Against what this is robust", holder);
+}
+
+/** What the worst law does to the advice that stands above it; its worth stands there too, and only there. */
+function worstWords({ worst_case: { transport, sentence }, radius, sample_size }) {
+  if (transport.length === 0) return sentence.replace(/^A(gains)?t an allocation of \S+ %,/, "Against this advice,");
+  const moves = transport.filter(({ atom, moved_to }) => atom !== moved_to);
+  const among = `within distance ${significant(radius, 3)} of the ${counted(sample_size, "return")} seen`;
+  if (moves.length === 0) return `No law ${among} does worse to this advice than the returns themselves.`;
+  const share = moves.reduce((sum, { mass }) => sum + mass, 0);
+  const lowest = Math.min(...moves.map(({ moved_to }) => moved_to));
+  return `Against this advice, the worst law ${among} moves ${percent(share)} of the probability, down to a return of ${percent(Math.expm1(lowest))} in one period.`;
 }
 
 function observed({ history }) {

@@ -4,65 +4,37 @@
 // and stretched to another standard deviation. All features of it follow, the robust excess return among them; what the
 // history's shape does not settle (skewness, kurtosis, the level of the rest) stays at the centre of the step's design.
 
-/** e^Z / (1 + r) under the law of the ball with the least mean: the c of the document by filling from the top. */
-function worstGrowths(atoms, radius, rate) {
-  const sorted = [...atoms].sort((a, b) => b - a);
-  const n = sorted.length;
-  let [above, cut, used] = [0, sorted[0], 0];
-  for (; used < n; used++) {
-    above += sorted[used];
-    cut = (above - n * radius) / (used + 1);
-    if (used + 1 === n || cut >= sorted[used + 1]) break;
-  }
-  return sorted.map((atom) => Math.exp(Math.min(atom, cut)) / (1 + rate));
-}
-
-/** `min E[e^Z] / (1 + r) - 1` over the ball. */
-export function robustExcess(atoms, radius, rate) {
-  return raw(worstGrowths(atoms, radius, rate), 1) - 1;
-}
-
-function central(atoms, order) {
-  const mean = raw(atoms, 1);
-  return atoms.reduce((sum, atom) => sum + (atom - mean) ** order, 0) / atoms.length;
-}
-
-function raw(atoms, order) {
-  return atoms.reduce((sum, atom) => sum + atom ** order, 0) / atoms.length;
-}
-
-/** One named feature of a state `{wealth, atoms, radius, rate, riskAversion}`, the last relative. */
-export function feature(name, { wealth, atoms, radius, rate, riskAversion }) {
-  const standardised = (order) => central(atoms, order) / central(atoms, 2) ** (order / 2);
-  const mertonRatio = (variance) => Math.asinh(robustExcess(atoms, radius, rate) / (riskAversion * variance));
+/** One named feature of a state `{wealth, law, radius, rate, riskAversion}`, the last relative. */
+export function feature(name, { wealth, law, radius, rate, riskAversion }) {
+  const mertonRatio = (excess, variance) => Math.asinh(excess / (riskAversion * variance));
   switch (name) {
     case "wealth":
       return wealth;
     case "log_wealth":
       return Math.log(wealth);
     case "mean":
-      return raw(atoms, 1);
+      return law.mean;
     case "log_standard_deviation":
-      return Math.log(central(atoms, 2)) / 2;
+      return Math.log(law.deviation);
     case "skewness":
-      return standardised(3);
+      return law.standardised(3);
     case "log_kurtosis":
-      return Math.log(standardised(4));
+      return Math.log(law.standardised(4));
     case "log_radius":
       return Math.log(Math.max(radius, 1e-12));
-    case "robust_excess":
-      return robustExcess(atoms, radius, rate);
     case "robust_merton_ratio":
-      return mertonRatio(Math.max(central(atoms, 2), 1e-16));
-    case "worst_law_merton_ratio":
-      return mertonRatio(Math.max(central(worstGrowths(atoms, radius, rate), 2), central(atoms, 2) / 100, 1e-18));
+      return mertonRatio(law.worst(radius, rate).mean - 1, Math.max(law.variance, 1e-16));
+    case "worst_law_merton_ratio": {
+      const { mean, variance } = law.worst(radius, rate);
+      return mertonRatio(mean - 1, Math.max(variance, law.variance / 100, 1e-18));
+    }
     case "radius_trend":
       // Takes the simulated bridges, which a policy does not carry: it stays at the centre of the design.
       return 0;
   }
   const order = Number(name.split("_")[1]);
-  if (name.startsWith("moment_")) return raw(atoms, order);
-  return order % 2 === 0 ? Math.log(standardised(order)) : standardised(order);
+  if (name.startsWith("moment_")) return law.raw(order);
+  return order % 2 === 0 ? Math.log(law.standardised(order)) : law.standardised(order);
 }
 
 /** The mean of a stored process at scaled inputs. */
@@ -85,8 +57,8 @@ export function allocation(solution, features, highest) {
   return Math.max(0, Math.min(highest, predicted(solution.policy, solution.inputs, x)));
 }
 
-/** One step of an exported policy over laws of the history's shape; null where the step holds a single state. */
-export function stepSurface(policy, step) {
+/** One step of an exported policy over laws of its history's `shape`; null where the step holds a single state. */
+export function stepSurface(policy, shape, step) {
   const { solution, diagnostics } = policy.steps[step];
   if (solution.kind === "single") return null;
   const { problem } = policy.specification;
@@ -95,15 +67,13 @@ export function stepSurface(policy, step) {
   const level = Object.fromEntries(
     names.map((name, index) => [name, { centre: centre[index], spread: spread[index] }]),
   );
-  const own = { mean: raw(problem.history, 1), deviation: Math.sqrt(central(problem.history, 2)) };
-  const middle = centres(level, problem, step, own);
-  const shape = problem.history.map((atom) => (atom - own.mean) / own.deviation);
+  const middle = centres(level, problem, step, shape);
   const state = ({ wealth, mean, deviation, radius }) => ({
     wealth,
     radius,
     rate: problem.rate_per_step,
     riskAversion: relativeRiskAversion(problem),
-    atoms: shape.map((z) => mean + deviation * z),
+    law: shape.law(mean, deviation),
   });
   const base = features(names, state(middle));
   const at = (place) => {

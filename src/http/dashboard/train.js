@@ -3,6 +3,7 @@
 import { post } from "./api.js";
 import { announce, h } from "./dom.js";
 import { fieldset, input, select, showProblem } from "./form.js";
+import { typed } from "./number_text.js";
 import { returnsField } from "./returns_field.js";
 import { isParametric } from "./specification.js";
 
@@ -16,6 +17,9 @@ const FRAMEWORKS = {
   parametric_adaptive: "Parametric adaptive",
   parametric_static: "Parametric static",
 };
+
+/** Fields that are parts of one, and may be given in percent. */
+const SHARES = ["problem.rate_per_step", "problem.radius.alpha"];
 
 /** What the form starts from. */
 const initial = () => ({
@@ -152,7 +156,7 @@ function mainFields(changed) {
       name: path,
       label,
       note,
-      changed: (text) => changed(path, text.trim() === "" ? null : Number.isNaN(Number(text)) ? text : Number(text)),
+      changed: (text) => changed(path, typed(text, { shares: SHARES.includes(path) })),
       ...options,
     });
   const parts = [
@@ -164,7 +168,7 @@ function mainFields(changed) {
       changed: (value) => changed("problem.framework", value),
     }),
     number("problem.horizon", "Decisions", "Periods to live through, 1 to 520."),
-    number("problem.rate_per_step", "Bank return per period", "As a fraction: 0.002 is 0.2 % a period."),
+    number("problem.rate_per_step", "Bank return per period", "0.002 or 0.2 % a period."),
     number("problem.initial_wealth", "Initial wealth", "In any unit."),
     select({
       name: "problem.utility.kind",

@@ -1,5 +1,6 @@
 // What the session's advice would be, were it guarded more or less.
 
+import { agrees } from "./advice.js";
 import { post } from "./api.js";
 import { lineChart } from "./chart.js";
 import { h, section } from "./dom.js";
@@ -18,10 +19,12 @@ export function conservatism({ id, leaving }, action) {
   return section("More or less guarded", holder);
 }
 
-function charts(points, { radius }) {
+function charts(points, { radius, allocation: advised }) {
   const times = (value) => `\u00d7 ${significant(value, 2)}`;
   const x = { values: points.map(({ radius_scale }) => radius_scale), label: "Radius", format: times, tick };
   const own = points.findIndex(({ radius_scale }) => Math.abs(radius_scale - 1) < 1e-9);
+  // One advice on the page: the step solved anew at its own radius is told by its check.
+  const held = (point, index) => (index === own && agrees(point.allocation, advised) ? advised : point.allocation);
   const line = (name, read, bare) => ({ name, kind: "line", bare, values: points.map(read) });
   return [
     h(
@@ -38,7 +41,7 @@ function charts(points, { radius }) {
         start: own,
         x,
         y: { format: allocation, tick: percentTick, also: [0] },
-        series: [line("", (point) => point.allocation)],
+        series: [line("", held)],
       }),
       lineChart({
         title: "Worth for certain by radius",

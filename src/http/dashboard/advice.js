@@ -1,0 +1,72 @@
+// The one advice of a session's page. It is read off the policy and stands at once; the step solved anew checks it, and
+// takes its place where the two differ by more than the page says.
+
+import { announce, h, section } from "./dom.js";
+import { allocation, percent, significant, wealth } from "./format.js";
+
+/** The advice is told to a tenth of a percent, so this far the policy and the step solved anew say the same. */
+const TOLERANCE = 0.001;
+
+const SOURCES = {
+  policy_surrogate: "read off the policy",
+  resolved: "solved anew on request",
+  resolved_other_radius: "solved anew for another radius",
+  resolved_outside_design: "solved anew, because this state lies outside the policy\u2019s design",
+};
+
+/** Whether two allocations are the same advice. */
+export const agrees = (one, other) => Math.abs(one - other) <= TOLERANCE;
+
+/**
+ * The advice of `action`, above `rest`. `checked(anew)` takes what `/action` says of the same state with the step solved
+ * anew, and gives the advice that stands; `unchecked(words)` says that it could not be.
+ */
+export function adviceView(action, horizon, rest) {
+  const amount = h("strong", {}, allocation(action.allocation));
+  const sentence = h("p", { class: "sentence" }, why(action));
+  const read = action.source === "policy_surrogate";
+  const note = h(
+    "p",
+    { class: "note", id: "check" },
+    read ? `${exactly(action)}. Being checked\u2026` : `${exactly(action)}.`,
+  );
+  const big = h("p", { class: "big" }, h("span", {}, "Hold "), amount, h("span", {}, " in the risky asset"));
+  const element = section(
+    `Period ${action.period} of ${horizon}`,
+    h("div", { class: "advice", id: "advice", tabindex: -1 }, big, sentence, note),
+    rest,
+  );
+  const checked = (anew) => {
+    if (!read) return action;
+    if (agrees(anew.allocation, action.allocation)) {
+      note.textContent = `${exactly(action)}. Checked: the step solved anew is within ${percent(TOLERANCE).replace("%", "points")} of it.`;
+      return action;
+    }
+    amount.textContent = allocation(anew.allocation);
+    sentence.replaceChildren(...why(anew));
+    const apart = percent(Math.abs(anew.allocation - action.allocation)).replace("%", "points");
+    note.textContent = `Solved anew: what was read off the policy, ${allocation(action.allocation)}, is ${apart} away from it.`;
+    announce(`The advice was solved anew: hold ${amount.textContent}.`);
+    return { ...anew, replaced: true };
+  };
+  const unchecked = (words) => (note.textContent = `${exactly(action)}. It could not be checked: ${words}`);
+  return { element, checked, unchecked };
+}
+
+const exactly = ({ allocation, source }) => `Allocation ${significant(allocation, 4)}, ${SOURCES[source]}`;
+
+function why({ allocation, certainty_equivalent, floor }) {
+  if (allocation === 0)
+    return [
+      "Against the worst law the returns seen cannot rule out, nothing beats the bank, which reaches ",
+      h("b", {}, wealth(floor)),
+      ".",
+    ];
+  return [
+    "Against the worst law the returns seen cannot rule out, this is worth ",
+    h("b", {}, wealth(certainty_equivalent)),
+    " for certain at the horizon, where the bank alone reaches ",
+    h("b", {}, wealth(floor)),
+    ".",
+  ];
+}

@@ -1,0 +1,94 @@
+// The form that asks for an out-of-sample comparison, on a page of its own.
+
+import { get, post } from "./api.js";
+import { announce, h } from "./dom.js";
+import { fieldset, input, select, showProblem } from "./form.js";
+import { typed } from "./number_text.js";
+import { all } from "./pages.js";
+import { policyChoices } from "./session_opening.js";
+import { FRAMEWORKS } from "./specification.js";
+
+export async function view(query, leaving) {
+  const policies = await all("/policies", "policies", leaving);
+  const asked = new URLSearchParams(query ?? "").get("policy");
+  const trail = h("p", { class: "trail" }, h("a", { href: "#/evaluations" }, "Evaluations"));
+  const none = h("p", {}, "An evaluation starts from a policy. ", h("a", { href: "#/train" }, "Train one"), ".");
+  return { title: "Compare out of sample", trail, body: policies.length > 0 ? asking(policies, asked) : none };
+}
+
+function asking(policies, asked) {
+  const choices = policyChoices(policies);
+  const policy = select({
+    name: "policy",
+    label: "Policy",
+    note: "Its problem, design and seed are used for every framework.",
+    choices,
+  });
+  if (asked in choices) policy.control.value = asked;
+  const paths = input({ name: "paths", label: "Paths per history", note: "100 to 100,000.", value: "1000" });
+  const histories = select({
+    name: "histories.kind",
+    label: "Histories",
+    note: "Drawn ones say how much the result depends on the history.",
+    choices: { given: "The policy\u2019s own", drawn: "Drawn from the law" },
+  });
+  const count = input({ name: "histories.count", label: "How many histories", note: "2 to 1,000.", value: "50" });
+  const frameworks = h(
+    "div",
+    { class: "field checks", role: "group", "aria-label": "Frameworks" },
+    Object.entries(FRAMEWORKS).map(([value, words]) =>
+      h("label", {}, h("input", { type: "checkbox", name: "frameworks", value, checked: true }), words),
+    ),
+  );
+  const drawn = () => (count.element.hidden = histories.control.value !== "drawn");
+  histories.control.addEventListener("change", drawn);
+  drawn();
+  const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
+  const send = h("button", { type: "submit" }, "Evaluate");
+  const form = h(
+    "form",
+    { novalidate: true },
+    fieldset("What to compare", [policy, histories, count, paths, frameworks]),
+    message,
+    h(
+      "p",
+      { class: "send" },
+      send,
+      h(
+        "span",
+        { class: "note" },
+        "Frameworks other than the policy\u2019s are trained first; all-bank and constant mixes take part by themselves.",
+      ),
+    ),
+  );
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    send.disabled = true;
+    try {
+      const { specification } = await get(`/policies/${policy.control.value}`);
+      const request = composed(specification, policy.control.value, {
+        frameworks: [...frameworks.querySelectorAll(":checked")].map(({ value }) => value),
+        paths: typed(paths.control.value),
+        histories:
+          histories.control.value === "drawn"
+            ? { kind: "drawn", count: typed(count.control.value) }
+            : { kind: "given" },
+      });
+      const job = await post("/evaluate", request);
+      announce("The evaluation is queued.");
+      location.hash = `#/evaluations/${job.job}`;
+    } catch (error) {
+      showProblem(form, message, error);
+    }
+    send.disabled = false;
+  });
+  return form;
+}
+
+/** The request for a policy's problem. With drawn histories every learning policy must be one for any history. */
+function composed({ problem, design, surrogate, seed }, policy, choices) {
+  const { framework, ...rest } = problem;
+  const serves = choices.histories.kind === "given" || design.initial_laws === "resampled";
+  const policies = serves && choices.frameworks.includes(framework) ? { [framework]: policy } : {};
+  return { problem: rest, design, surrogate, seed, policies, ...choices };
+}

@@ -1,0 +1,65 @@
+// Long lists: the newest first, more where asked for, and always a line that says whether this is all.
+
+import { get } from "./api.js";
+import { announce, h } from "./dom.js";
+import { count, counted } from "./format.js";
+
+/** Entries asked for at a time. */
+const PAGE = 100;
+/** The most that the service gives at a time, for lists to choose from. */
+const LARGEST = 1000;
+
+/** A list at `path`, page by page: `next()` gives the entries of the coming one, `more` says whether there may be one. */
+export class Pages {
+  constructor(path, name, signal, { limit = PAGE, keep = () => true } = {}) {
+    Object.assign(this, { path, name, signal, limit, keep, after: null, more: true });
+  }
+
+  /** At least one entry that is kept, unless there is none left; with `keep` as many pages are read as that takes. */
+  async next() {
+    const found = [];
+    while (this.more && found.length === 0) {
+      const after = this.after === null ? "" : `&after=${encodeURIComponent(this.after)}`;
+      const page = await get(`${this.path}?limit=${this.limit}${after}`, this.signal);
+      found.push(...page[this.name].filter(this.keep));
+      this.after = page.next;
+      this.more = page.next !== null;
+    }
+    return found;
+  }
+}
+
+/** Every entry of a list. */
+export async function all(path, name, signal) {
+  const pages = new Pages(path, name, signal, { limit: LARGEST });
+  const found = [];
+  while (pages.more) found.push(...(await pages.next()));
+  return found;
+}
+
+/** The line below a list of which `shown` entries stand, named by `nouns`, one and many: what is missing, and a button that `add`s it. */
+export function foot(pages, nouns, shown, add) {
+  const line = h("p", { class: "note" });
+  const button = h("button", { class: "quiet" }, "Show more");
+  const element = h("div", { class: "foot" }, line, button);
+  const tell = () => {
+    const these = counted(shown, ...nouns);
+    line.textContent = pages.more ? `The newest ${these}. There are older ones.` : `${these}, and no more.`;
+    button.hidden = !pages.more;
+  };
+  button.addEventListener("click", async () => {
+    button.disabled = true;
+    try {
+      const entries = await pages.next();
+      shown += entries.length;
+      await add(entries);
+      tell();
+      announce(`${count(entries.length)} more. ${line.textContent}`);
+    } catch (error) {
+      line.textContent = error.message;
+    }
+    button.disabled = false;
+  });
+  tell();
+  return element;
+}

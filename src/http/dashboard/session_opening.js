@@ -1,0 +1,67 @@
+// The form that opens a session: on a page of its own, so that whoever asks for it stands before it.
+
+import { post } from "./api.js";
+import { h } from "./dom.js";
+import { fieldset, input, select, showProblem } from "./form.js";
+import { moment, short } from "./format.js";
+import { typed } from "./number_text.js";
+import { all } from "./pages.js";
+import { returnsField } from "./returns_field.js";
+
+export async function view(query, leaving) {
+  const policies = await all("/policies", "policies", leaving);
+  const asked = new URLSearchParams(query ?? "").get("policy");
+  const trail = h("p", { class: "trail" }, h("a", { href: "#/sessions" }, "Sessions"));
+  const none = h("p", {}, "A session needs a policy first. ", h("a", { href: "#/train" }, "Train one"), ".");
+  return { title: "Open a session", trail, body: policies.length > 0 ? opening(policies, asked) : none };
+}
+
+function opening(policies, asked) {
+  const policy = select({ name: "policy", label: "Policy", choices: policyChoices(policies) });
+  if (policies.some(({ policy }) => policy === asked)) policy.control.value = asked;
+  const stake = input({ name: "wealth", label: "Wealth", note: "Blank: the policy\u2019s initial wealth." });
+  let known = [];
+  const history = returnsField({
+    name: "history",
+    label: "Returns or prices known",
+    blank: "Blank: the policy\u2019s own history.",
+    changed: (returns) => (known = returns),
+  });
+  const other = h(
+    "details",
+    {},
+    h("summary", {}, "Other returns are known than the policy\u2019s history"),
+    history.element,
+  );
+  const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
+  const form = h(
+    "form",
+    { novalidate: true },
+    fieldset("Whose session", [policy, stake]),
+    other,
+    message,
+    h("p", { class: "send" }, h("button", { type: "submit" }, "Open")),
+  );
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const trouble = history.trouble();
+    if (trouble) return showProblem(form, message, { field: "history", message: trouble });
+    const request = { policy: policy.control.value };
+    if (known.length > 0) request.history = known;
+    const wealth = typed(stake.control.value);
+    if (wealth !== null) request.wealth = wealth;
+    try {
+      const { session } = await post("/sessions", request);
+      location.hash = `#/sessions/${session}`;
+    } catch (error) {
+      showProblem(form, message, error);
+    }
+  });
+  return form;
+}
+
+/** Policies to choose from, by what tells them apart. */
+export const policyChoices = (policies) =>
+  Object.fromEntries(
+    policies.map(({ policy, created_ms }) => [policy, `${short(policy)}, stored ${moment(created_ms)}`]),
+  );

@@ -1,0 +1,59 @@
+// What one view of a policy's surface shows: a single state, a line along one feature, or a field over two.
+
+import { stepSurface } from "./surface.js";
+
+const [COLUMNS, ROWS, ALONG] = [41, 29, 61];
+/** More dots than this would hide the field. */
+const DOTS = 300;
+const AXES = ["wealth", "mean", "radius", "deviation"];
+
+/**
+ * The picture of `step`: `across` is the axis wanted beside the mean, `radius` a share of the way from the least radius of
+ * the design to the largest. `surfaces` keeps what is found of a step for the next picture.
+ */
+export function picture(policy, shape, surfaces, { step, across, radius }) {
+  if (!surfaces.has(step)) surfaces.set(step, stepSurface(policy, shape, step));
+  const found = surfaces.get(step);
+  if (found === null) {
+    const { action, floor_gain } = policy.steps[step].solution;
+    return { kind: "single", action, floor_gain };
+  }
+  const axes = AXES.filter((axis) => axis in found.ranges);
+  if (axes.length === 1) return along(found, axes[0]);
+  const choices = axes.filter((axis) => axis !== "mean");
+  return over(found, choices, choices.includes(across) ? across : choices[0], radius);
+}
+
+function along(found, axis) {
+  const values = spread(found.ranges[axis], ALONG);
+  return { kind: "line", axis, values, allocations: values.map((value) => found.at({ [axis]: value })) };
+}
+
+function over(found, choices, across, share) {
+  const range = across === "radius" ? undefined : found.ranges.radius;
+  const radius = range ? range[0] * (range[1] / range[0]) ** share : found.middle.radius;
+  const [xs, ys] = [spread(found.ranges[across], COLUMNS), spread(found.ranges.mean, ROWS)];
+  // Column by column, for all laws of a column have one standard deviation.
+  const columns = xs.map((value) => ys.map((mean) => found.at({ radius, mean, [across]: value })));
+  return {
+    kind: "field",
+    across,
+    choices,
+    xs,
+    ys,
+    cells: ys.map((_, row) => columns.map((column) => column[row])),
+    dots: thinned(found.dots(across), found.dots("mean")),
+    radius: range ? radius : null,
+    rest: ["wealth", "deviation", "radius"]
+      .filter((axis) => axis !== across && axis in found.ranges)
+      .map((axis) => [axis, axis === "radius" ? radius : found.middle[axis]]),
+  };
+}
+
+const spread = ([low, high], count) => Array.from({ length: count }, (_, k) => low + ((high - low) * k) / (count - 1));
+
+/** Pairs, evenly taken. */
+function thinned(xs, ys) {
+  const stride = Math.max(1, Math.ceil(xs.length / DOTS));
+  return xs.flatMap((x, index) => (index % stride === 0 ? [[x, ys[index]]] : []));
+}

@@ -1,0 +1,145 @@
+// A policy's surface to look at: period and radius to choose, and the allocation over two of the features.
+
+import { lineChart } from "./chart.js";
+import { h } from "./dom.js";
+import { basisPoints, percent, percentTick, significant, tick, wealth } from "./format.js";
+import { heatmap } from "./heatmap.js";
+import { shown } from "./key.js";
+
+const WORKER = "/dashboard/surface_worker.js";
+/** Radii to choose from the least of the design to the largest. */
+const RADII = 20;
+
+const AXES = {
+  wealth: { label: "Wealth", format: wealth, tick },
+  mean: { label: "Mean log-return", format: (value) => percent(value, 2), tick: percentTick },
+  radius: { label: "Radius", format: (value) => significant(value, 3), tick },
+  deviation: { label: "Standard deviation", format: (value) => percent(value, 2), tick: percentTick },
+};
+
+let trusted;
+
+/** The page's one worker script, as browsers with trusted types ask for it; no other address gets through. */
+function workerAddress() {
+  if (!globalThis.trustedTypes) return WORKER;
+  trusted ??= trustedTypes.createPolicy("ballast-worker", {
+    createScriptURL: (address) => {
+      if (address !== WORKER) throw new TypeError(`${address} is no worker of this page`);
+      return address;
+    },
+  });
+  return trusted.createScriptURL(WORKER);
+}
+
+/** The surface of policy `id`, computed in a worker that lives until `leaving`. */
+export function surfaceView({ id, horizon, leaving }) {
+  const status = h("p", { role: "status" }, "Reading the policy\u2026");
+  const holder = h("div", {}, status);
+  const worker = new Worker(workerAddress(), { type: "module" });
+  leaving.addEventListener("abort", () => worker.terminate());
+  const fail = (words) => holder.replaceChildren(h("p", { class: "error", role: "alert" }, words));
+  const { element, show, next } = explorer(horizon, (wish) => worker.postMessage(wish));
+  worker.addEventListener("error", () => fail("The surface could not be computed."));
+  worker.addEventListener("message", ({ data }) => {
+    if (data.failed) return fail(data.failed);
+    if (data.ready) return next();
+    if (holder.firstChild === status) holder.replaceChildren(element);
+    show(data.picture);
+  });
+  worker.postMessage({ address: `/policies/${id}/export`, headers: shown() });
+  return holder;
+}
+
+/** The controls and the drawing. One wish is out at a time; the latest of those made meanwhile follows it. */
+function explorer(horizon, ask) {
+  const step = h("input", { type: "range", id: "surface-step", min: 0, max: horizon - 1, value: horizon - 1, step: 1 });
+  const across = h("select", { id: "surface-across" });
+  const radius = h("input", { type: "range", id: "surface-radius", min: 0, max: RADII, value: RADII / 2, step: 1 });
+  const outputs = { step: h("output", { for: step.id }), radius: h("output", { for: radius.id }) };
+  const field = (label, control, output) =>
+    h("p", { class: "field" }, h("label", { for: control.id }, label), control, output);
+  const fields = {
+    step: field("Period", step, outputs.step),
+    across: field("Across", across, null),
+    radius: field("Radius", radius, outputs.radius),
+  };
+  const drawing = h("div", {});
+  let [out, stale] = [false, false];
+  const next = () => {
+    outputs.step.textContent = `${Number(step.value) + 1} of ${horizon}`;
+    step.setAttribute("aria-valuetext", `period ${outputs.step.textContent}`);
+    stale = out;
+    if (out) return;
+    out = true;
+    ask({ step: Number(step.value), across: across.value, radius: Number(radius.value) / RADII });
+  };
+  const show = (picture) => {
+    out = false;
+    offer(picture);
+    drawing.replaceChildren(DRAWN[picture.kind](picture));
+    if (stale) next();
+  };
+  const offer = ({ choices = [], across: chosen, radius: value = null }) => {
+    fields.across.hidden = choices.length < 2;
+    fields.radius.hidden = value === null;
+    if ([...across.options].map(({ value }) => value).join() !== choices.join()) {
+      across.replaceChildren(...choices.map((axis) => h("option", { value: axis }, AXES[axis].label)));
+    }
+    if (chosen) across.value = chosen;
+    if (value === null) return;
+    outputs.radius.textContent = AXES.radius.format(value);
+    radius.setAttribute("aria-valuetext", outputs.radius.textContent);
+  };
+  for (const control of [step, across, radius]) control.addEventListener("input", next);
+  const element = h("div", {}, h("div", { class: "controls" }, Object.values(fields)), drawing);
+  return { element, show, next };
+}
+
+const DRAWN = { single, line: alongOne, field: overTwo };
+
+function single({ action, floor_gain }) {
+  return h(
+    "p",
+    { class: "single" },
+    "At this step every session of this policy is in one and the same state: hold ",
+    h("strong", {}, percent(action)),
+    ", worth ",
+    h("strong", {}, basisPoints(floor_gain)),
+    " more than the bank.",
+  );
+}
+
+function alongOne({ axis, values, allocations }) {
+  const { label, format, tick } = AXES[axis];
+  return lineChart({
+    title: "Allocation",
+    x: { values, label, format, tick },
+    y: { format: percent, tick: percentTick, also: [0] },
+    series: [{ name: "Allocation", kind: "line", values: allocations }],
+  });
+}
+
+function overTwo({ across, xs, ys, cells, dots, rest }) {
+  const axis = (name, values) => ({ name: AXES[name].label, values, format: AXES[name].format, tick: AXES[name].tick });
+  const fixed = rest.map(([name, value]) => `${AXES[name].label.toLowerCase()} ${AXES[name].format(value)}`);
+  const stretched = across === "deviation" ? " and standard deviation" : "";
+  const note = `Each cell is the history, moved to that mean${stretched}${fixed.length > 0 ? `; ${fixed.join(", ")}` : ""}. Where no design point lies, Ballast solves the step anew instead of reading this surface.`;
+  return heatmap({
+    title: "Allocation",
+    name: "allocation",
+    x: axis(across, xs),
+    y: axis("mean", ys),
+    field: cells,
+    range: rounded(cells.flat()),
+    format: (value) => percent(value, 0),
+    dots,
+    note,
+  });
+}
+
+/** The range of the allocations shown, out to the next tenth, so that noise stays pale. */
+function rounded(values) {
+  const low = Math.floor(10 * Math.min(...values)) / 10;
+  const high = Math.ceil(10 * Math.max(...values)) / 10;
+  return high > low ? [low, high] : [Math.max(0, low - 0.1), low + 0.1];
+}

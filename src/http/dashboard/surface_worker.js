@@ -1,0 +1,30 @@
+// A policy's document read, and its surface computed, off the thread that the page lives on.
+//
+// First message: `{address, headers}`, answered by `{ready}`. Each one after it is a wish for a picture, answered by
+// `{picture}`. A failure of either is `{failed}`, in words.
+
+import { Shape } from "./laws.js";
+import { picture } from "./surface_picture.js";
+
+let policy;
+let shape;
+const surfaces = new Map();
+
+async function load({ address, headers }) {
+  const response = await fetch(address, { headers });
+  if (!response.ok) {
+    const problem = await response.json().catch(() => ({}));
+    throw new Error(problem.detail ?? `The service answered ${response.status}.`);
+  }
+  policy = await response.json();
+  shape = new Shape(policy.specification.problem.history);
+  return { ready: true };
+}
+
+addEventListener("message", async ({ data }) => {
+  try {
+    postMessage(data.address ? await load(data) : { picture: picture(policy, shape, surfaces, data) });
+  } catch (error) {
+    postMessage({ failed: error.message });
+  }
+});

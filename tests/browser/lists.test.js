@@ -1,0 +1,117 @@
+// Lists longer than a page: everything in them can be reached, and what does not stand there is said to be missing.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { browser, call, service } from "./ballast.js";
+
+const SESSIONS = 211;
+/** More than a page of every list that the dashboard asks for. */
+const JOBS = 205;
+const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
+
+let ballast, chromium, page, policy, oldest, evaluation;
+
+const ended = async (job) => {
+  for (;;) {
+    const now = await call(ballast.url, `/jobs/${job}`);
+    if (now.finished_ms !== null) return now;
+    await new Promise((resolve) => setTimeout(resolve, 100));
+  }
+};
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  page.setDefaultTimeout(20_000);
+  const problem = { horizon: 2, history: HISTORY };
+  const design = { count: 20 };
+  ({ policy } = await ended((await call(ballast.url, "/train", { problem, design })).job));
+  ({ job: evaluation } = await call(ballast.url, "/evaluate", {
+    problem,
+    design,
+    frameworks: ["plug_in"],
+    paths: 100,
+  }));
+  await ended(evaluation);
+  oldest = (await call(ballast.url, "/sessions", { policy })).session;
+  for (let k = 1; k < SESSIONS; k++) await call(ballast.url, "/sessions", { policy });
+  for (let k = 0; k < JOBS; k++) {
+    const { job } = await call(ballast.url, "/train", {
+      problem: { ...problem, horizon: 200 },
+      design: { count: 1000 },
+      seed: k,
+    });
+    await fetch(`${ballast.url}/jobs/${job}`, { method: "DELETE" });
+  }
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+async function go(hash) {
+  await page.goto("about:blank");
+  await page.goto(`${ballast.url}/${hash}`);
+  await page.locator("main:not([aria-busy]) h1").waitFor();
+}
+
+/** Asks for more until there is no more; how often that was. */
+async function unrolled() {
+  const button = page.getByRole("button", { name: "Show more" });
+  let times = 0;
+  while (await button.isVisible()) {
+    const line = await page.locator(".foot .note").textContent();
+    assert.match(line, /^The newest \d+ \w+\. There are older ones\.$/);
+    await button.click();
+    await page.waitForFunction((before) => document.querySelector(".foot .note").textContent !== before, line);
+    times++;
+  }
+  return times;
+}
+
+test("every session can be reached", async () => {
+  await go("#/sessions");
+  assert.equal(await page.locator(`a[href="#/sessions/${oldest}"]`).count(), 0);
+  await page.getByText("The newest 100 sessions. There are older ones.").waitFor();
+  assert.equal(await unrolled(), 2);
+  await page.getByText("211 sessions, and no more.", { exact: true }).waitFor();
+  await page.locator(`a[href="#/sessions/${oldest}"]`).click();
+  await page.getByRole("heading", { level: 1, name: /^Session / }).waitFor();
+});
+
+test("every job can be reached, the first of all too", async () => {
+  await go("#/jobs");
+  await unrolled();
+  await page.locator(`a[href="#/policies/${policy}"]`).waitFor();
+  assert.equal(await page.locator(".card.job").count(), JOBS + 2);
+});
+
+test("an evaluation older than many jobs stands in its list", async () => {
+  await go("#/evaluations");
+  await page.locator(`a[href="#/evaluations/${evaluation}"]`).waitFor();
+});
+
+test("whoever opens a session from a policy stands before the form", async () => {
+  await go(`#/policies/${policy}`);
+  await page.getByRole("link", { name: "Open a session" }).click();
+  await page.getByRole("heading", { level: 1, name: "Open a session" }).waitFor();
+  const field = page.getByLabel("Policy", { exact: true });
+  assert.equal(await field.inputValue(), policy);
+  const open = await page.getByRole("button", { name: "Open", exact: true }).boundingBox();
+  assert.ok(open.y + open.height < 900, `the button stands at ${open.y} pixels`);
+  await page.getByText("Other returns are known").click();
+  await page.getByLabel("Returns or prices known").fill("3.2 -1.4 2.1 0.4 -5");
+  await page.getByText("5 simple returns in percent").waitFor();
+  await page.getByRole("button", { name: "Open", exact: true }).click();
+  await page.getByRole("heading", { level: 1, name: /^Session / }).waitFor();
+  const { history } = await call(ballast.url, `/sessions/${page.url().split("/").pop()}/history`);
+  assert.ok(Math.abs(history[0] - Math.log(1.032)) < 1e-11, `${history}`);
+});
+
+test("the form of an evaluation stands before whoever asks from a policy", async () => {
+  await go(`#/policies/${policy}`);
+  await page.getByRole("link", { name: "Evaluate" }).click();
+  await page.getByRole("heading", { level: 1, name: "Compare out of sample" }).waitFor();
+  assert.equal(await page.getByLabel("Policy", { exact: true }).inputValue(), policy);
+});

@@ -1,0 +1,92 @@
+// A policy trained on 5,000 returns: its surface is drawn and redrawn while the page stays free.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { browser, call, service } from "./ballast.js";
+
+/** What the page does is long in every round; what other programs on the machine do, in some. */
+const ROUNDS = 8;
+const RETURNS = 5000;
+
+let ballast, chromium, page, policy;
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  page.setDefaultTimeout(60_000);
+  const history = Array.from(
+    { length: RETURNS },
+    (_, k) => 0.005 + 0.03 * Math.sin(7 * k) + 0.02 * Math.cos(3 * k) ** 3,
+  );
+  const { job } = await call(ballast.url, "/train", {
+    problem: { horizon: 3, history },
+    design: { count: 100 },
+  });
+  for (;;) {
+    const now = await call(ballast.url, `/jobs/${job}`);
+    if (now.state === "succeeded") {
+      policy = now.policy;
+      break;
+    }
+    assert.ok(["queued", "running"].includes(now.state), now.error);
+    await new Promise((resolve) => setTimeout(resolve, 200));
+  }
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+const map = () => page.getByRole("application", { name: /Allocation/ });
+
+/** Moves the sliders as a person does, each once the last picture stands; the long tasks of it, in milliseconds. */
+async function walk() {
+  await page.evaluate(() => (longTasks.length = 0));
+  const told = page.locator("output[for=surface-step]");
+  for (const key of ["ArrowLeft", "ArrowRight"]) {
+    const before = await told.textContent();
+    await page.getByLabel("Period").press(key);
+    await page.waitForFunction(
+      (text) => document.querySelector("output[for=surface-step]").textContent !== text,
+      before,
+    );
+    await map().waitFor();
+  }
+  for (let k = 0; k < 5; k++)
+    await page.getByLabel("Radius", { exact: true }).press(k % 2 ? "ArrowLeft" : "ArrowRight");
+  await page.waitForTimeout(300);
+  return page.evaluate(() => [...longTasks]);
+}
+
+test("no task is long while the surface is drawn and its sliders move", async (t) => {
+  await page.addInitScript(() => {
+    globalThis.longTasks = [];
+    const keep = (list) => longTasks.push(...list.getEntries().map(({ duration }) => Math.round(duration)));
+    new PerformanceObserver(keep).observe({ type: "longtask" });
+  });
+  await page.goto(`${ballast.url}/#/policies/${policy}`);
+  await map().waitFor();
+  const rounds = [];
+  while (rounds.length < ROUNDS && rounds.at(-1)?.length !== 0) {
+    const started = Date.now();
+    rounds.push(await walk());
+    t.diagnostic(`${Date.now() - started} ms, long tasks: ${rounds.at(-1).join(", ") || "none"}`);
+  }
+  assert.deepEqual(rounds.at(-1), []);
+});
+
+test("the radius that is told is the one that is drawn", async () => {
+  const radius = page.getByLabel("Radius", { exact: true });
+  const told = page.locator("output[for=surface-radius]");
+  await radius.press("Home");
+  await page.waitForFunction(() => document.querySelector("#surface-radius").value === "0");
+  await page.waitForTimeout(500);
+  const least = await told.textContent();
+  await radius.press("End");
+  await page.waitForFunction(
+    (text) => document.querySelector("output[for=surface-radius]").textContent !== text,
+    least,
+  );
+  await page.locator("figure .note", { hasText: `radius ${await told.textContent()}` }).waitFor();
+});

@@ -1,0 +1,37 @@
+// Numbers on axes, numbers typed by themselves, and refusals in the words of the form.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { dashboardModule } from "./modules.js";
+
+const { tick } = await dashboardModule("format.js");
+const { typed } = await dashboardModule("number_text.js");
+const { problemWords } = await dashboardModule("problem_words.js");
+
+test("neighbours on an axis have different labels", () => {
+  for (const [start, step] of [[0.000266, 2e-7], [0.00495, 0.00005], [2.66e-5, 1e-7], [1e7, 1e6], [0, 20]]) {
+    const labels = Array.from({ length: 5 }, (_, k) => tick(start + k * step, step));
+    assert.equal(new Set(labels).size, 5, labels.join(", "));
+    assert.ok(labels.every((label) => label.length <= 12), labels.join(", "));
+  }
+});
+
+test("a number typed is one number or none", () => {
+  const cases = [["100", 100], ["0,032", 0.032], ["3.2", 3.2], ["1,234.50", 1234.5], ["1.234,50", 1234.5], ["\u22125", -5], ["", null], ["100,000", "100,000"], ["ten", "ten"], ["5 %", "5 %"], ["012", "012"]];
+  for (const [text, value] of cases) assert.equal(typed(text), value, text);
+  assert.equal(typed("0.2 %", { shares: true }), 0.002);
+  assert.equal(typed("0.07%", { shares: true }), 0.0007);
+});
+
+test("a refusal names the field, the value and the rule in the unit of the field", () => {
+  const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
+  const cases = [
+    [{ value: 0, rule: "must lie in [1, 520]" }, "Decisions", null, "Decisions is 0; it must be from 1 to 520."],
+    [{ value: 0.5, rule: "must lie in (1, 100]; at 1 use the log utility" }, "Risk aversion", null, "Risk aversion is 0.5; it must be above 1 and at most 100; at 1 use the log utility."],
+    [{ value: "100,000", rule: 'invalid type: string "100,000", expected f64' }, "Initial wealth", null, "Initial wealth is \u201c100,000\u201d; it must be a number, with nothing between its thousands."],
+    [{ value: null, rule: "invalid type: null, expected f64" }, "Initial wealth", null, "Initial wealth is blank; it must be a number, with nothing between its thousands."],
+    [{ value: 1.5, rule: "invalid type: floating point `1.5`, expected u64" }, "Seed", null, "Seed is 1.5; it must be a whole number, zero or more."],
+    [{ value: -1, rule: "must be a number in [-0.9932620530009145, 147.4131591025766]" }, "Return in period 2, %", "percent", "Return in period 2 is -100 %; it must be from -99.32 % to 14,741.31 %."],
+  ];
+  for (const [problem, label, unit, words] of cases) assert.equal(plain(problemWords(problem, label, unit)), words);
+});
