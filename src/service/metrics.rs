@@ -1,6 +1,10 @@
 //! Names and meanings of the metrics; base units, `_total` for counters.
 
+use std::fmt::Write;
+
 use metrics::{Unit, describe_counter, describe_gauge, describe_histogram};
+
+use super::keys::KeyFigures;
 
 pub const TRAINING_STEP_SECONDS: &str = "ballast_training_step_duration_seconds";
 pub const OBSERVE_SECONDS: &str = "ballast_observe_duration_seconds";
@@ -12,11 +16,33 @@ pub const SESSIONS: &str = "ballast_sessions";
 pub const TURNS_WAITING: &str = "ballast_turns_waiting";
 pub const MEMORY: &str = "ballast_memory_bytes";
 pub const MEMORY_LIMIT: &str = "ballast_memory_limit_bytes";
+/// By tenant and status. Tenants are those that have or had a key; whoever shows none is of none.
+pub const REFUSALS: &str = "ballast_refusals_total";
+pub const PROBLEMS: &str = "ballast_problems_total";
+pub const STORE_FAILURES: &str = "ballast_store_failures_total";
+pub const KEY_EXPIRES: &str = "ballast_key_expiry_timestamp_seconds";
+pub const KEY_USED: &str = "ballast_key_last_use_timestamp_seconds";
 
 /// Upper bounds of the buckets of training steps, in seconds: milliseconds to an hour.
 pub const STEP_BUCKETS: [f64; 10] = [0.01, 0.1, 0.5, 1.0, 5.0, 15.0, 60.0, 300.0, 900.0, 3600.0];
 /// Upper bounds of the buckets of requests, in seconds: the target of `/action` is a millisecond.
 pub const REQUEST_BUCKETS: [f64; 11] = [1e-4, 2.5e-4, 5e-4, 1e-3, 2.5e-3, 5e-3, 1e-2, 5e-2, 0.25, 1.0, 10.0];
+
+/// The figures of keys in the text exposition format. Not by the recorder, which would show a key for ever after it ended.
+pub fn of_keys(keys: &[KeyFigures]) -> String {
+    let mut text = String::new();
+    let mut family = |name: &str, help: &str, figure: fn(&KeyFigures) -> Option<i64>| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "# HELP {name} {help}\n# TYPE {name} gauge\n");
+        for (key, milliseconds) in keys.iter().filter_map(|key| Some((key, figure(key)?))) {
+            let seconds = milliseconds as f64 / 1000.0;
+            let _ = writeln!(text, "{name}{{tenant=\"{}\",key=\"{}\"}} {seconds}", key.tenant, key.key);
+        }
+    };
+    family(KEY_EXPIRES, "When a key in force expires, in seconds since 1970.", |key| key.expires_ms);
+    family(KEY_USED, "When a key in force last called this replica, in seconds since 1970.", |key| key.used_ms);
+    text
+}
 
 /// Tells the recorder what each metric means.
 pub fn describe() {
@@ -27,6 +53,9 @@ pub fn describe() {
     describe_counter!(HTTP_REQUESTS, "Requests answered, by method, route and status.");
     describe_gauge!(JOBS, "Jobs in the store, by state.");
     describe_gauge!(SESSIONS, "Sessions in the store.");
+    describe_counter!(REFUSALS, "Calls answered 401, 403 or 429, by tenant and status; of a wrong key, whose it was.");
+    describe_counter!(PROBLEMS, "Problem documents answered, by kind.");
+    describe_counter!(STORE_FAILURES, "Failures of the store met by a request or a job, by cause.");
     describe_gauge!(TURNS_WAITING, "Requests that wait for their turn to be advised, or to have a step solved.");
     describe_gauge!(
         MEMORY,

@@ -16,6 +16,7 @@ pub mod memory;
 pub mod metrics;
 pub mod observation;
 pub mod policies;
+pub mod process;
 pub mod progress;
 pub mod sessions;
 pub mod shutdown;

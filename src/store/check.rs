@@ -11,6 +11,7 @@ use std::path::Path;
 use sqlx::SqliteConnection;
 use sqlx::postgres::PgConnection;
 
+use super::audit::{self, Chain};
 use super::error::{Failure, StoreError};
 use super::job::JobRow;
 use super::keys::KeyRow;
@@ -92,7 +93,23 @@ impl Inspection {
         let keys = self.read(query("SELECT * FROM access_keys ORDER BY sequence")).await?;
         let keys: Vec<_> = keys.iter().map(KeyRow::from_row).collect::<Result<_, _>>()?;
         tell(format!("keys: {}, each readable", keys.len()));
+        let (chains, entries) = self.audit().await?;
+        tell(format!("audit: {entries} entries in {chains} chains, as sealed and none missing"));
         Ok(())
+    }
+
+    async fn audit(&mut self) -> Result<(usize, usize), Failure> {
+        let (mut chains, mut entries) = (0, 0);
+        for row in self.read(audit::chains()).await? {
+            let mut chain = Chain::from_row(&row)?;
+            while !chain.is_whole() {
+                let page = self.read(chain.next(PAGE)).await?;
+                chain.follow(&page)?;
+                entries += page.len();
+            }
+            chains += 1;
+        }
+        Ok((chains, entries))
     }
 
     /// What SQLite knows of its file: the trees and indexes, and that no row refers to one that is not there.

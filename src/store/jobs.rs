@@ -2,6 +2,7 @@
 
 use futures_util::FutureExt;
 
+use super::audit::{self, Actor, Deed};
 use super::codec::to_sql;
 use super::error::Failure;
 use super::job::{CreateJob, JobCounts, JobRow, NewJob};
@@ -13,7 +14,8 @@ use super::{Store, StoreError};
 impl Store {
     /// Queues a job and records its idempotency key, both or neither.
     pub async fn create_job(&self, new: NewJob) -> Result<CreateJob, StoreError> {
-        self.write("creating a job", move |connection| create(connection, new).boxed()).await
+        let actor = self.actor.clone();
+        self.write("creating a job", move |connection| create(connection, new, actor).boxed()).await
     }
 
     pub async fn job(&self, job: &str) -> Result<Option<JobRow>, StoreError> {
@@ -33,8 +35,8 @@ impl Store {
     /// Cancels a queued job at once and flags a running one; a terminal job stays as it is. `None` where there is no such
     /// job, else the job as it is now.
     pub async fn request_cancel(&self, job: &str, now_ms: i64) -> Result<Option<JobRow>, StoreError> {
-        let job = job.to_owned();
-        self.write("cancelling a job", move |connection| cancel(connection, job, now_ms).boxed()).await
+        let (job, actor) = (job.to_owned(), self.actor.clone());
+        self.write("cancelling a job", move |connection| cancel(connection, job, actor, now_ms).boxed()).await
     }
 
     pub async fn count_jobs_by_state(&self) -> Result<JobCounts, StoreError> {
@@ -59,7 +61,7 @@ impl Store {
     }
 }
 
-async fn create(mut connection: Connection<'_>, new: NewJob) -> Result<CreateJob, Failure> {
+async fn create(mut connection: Connection<'_>, new: NewJob, actor: Actor) -> Result<CreateJob, Failure> {
     let connection = &mut connection;
     if let Some(key) = &new.idempotency_key
         && let Some(earlier) = repeated(connection, &new.tenant, key, &new.request_hash).await?
@@ -93,6 +95,8 @@ async fn create(mut connection: Connection<'_>, new: NewJob) -> Result<CreateJob
             return earlier.ok_or_else(|| Failure::Corrupt(format!("the idempotency key {key}")));
         }
     }
+    let outcome = format!("queued, {}", new.kind.as_str());
+    audit::record(connection, &actor, &new.tenant, Deed::QueueJob, &new.job, &outcome).await?;
     let row = find(connection, &new.job).await?;
     row.map(CreateJob::Created).ok_or_else(|| Failure::Corrupt(format!("the new job {}", new.job)))
 }
@@ -123,7 +127,12 @@ pub(super) async fn find(connection: &mut Connection<'_>, job: &str) -> Result<O
     connection.row(find).await?.as_ref().map(JobRow::from_row).transpose()
 }
 
-async fn cancel(mut connection: Connection<'_>, job: String, now_ms: i64) -> Result<Option<JobRow>, Failure> {
+async fn cancel(
+    mut connection: Connection<'_>,
+    job: String,
+    actor: Actor,
+    now_ms: i64,
+) -> Result<Option<JobRow>, Failure> {
     let connection = &mut connection;
     let Some(row) = find(connection, &job).await? else { return Ok(None) };
     let Ok(next) = row.state.next(JobEvent::RequestCancel) else { return Ok(Some(row)) };
@@ -132,6 +141,8 @@ async fn cancel(mut connection: Connection<'_>, job: String, now_ms: i64) -> Res
     } else {
         connection.execute(query("UPDATE jobs SET cancel_requested = TRUE WHERE job = $1").bind(job.as_str())).await?;
     }
+    let outcome = if next.is_terminal() { "cancelled" } else { "asked to stop" };
+    audit::record(connection, &actor, &row.tenant, Deed::CancelJob, &job, outcome).await?;
     find(connection, &job).await
 }
 

@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use futures_util::FutureExt;
 
+use super::audit::{self, Actor, AuditFilter, AuditRow, Deed};
 use super::error::Failure;
 use super::query::{Connection, Row, query};
 use super::tenant::Tenant;
@@ -86,7 +87,7 @@ impl KeyRing {
     /// [`StoreError::Locked`] where the schema is to be brought up to date and a process serves the folder, else as
     /// [`Store::open`].
     pub async fn open(dir: &Path) -> Result<KeyRing, StoreError> {
-        Ok(KeyRing(Store(Engine::Sqlite(sqlite::Folder::open_beside(dir).await?))))
+        Ok(KeyRing(Store::over(Engine::Sqlite(sqlite::Folder::open_beside(dir).await?))))
     }
 
     /// # Errors
@@ -96,7 +97,8 @@ impl KeyRing {
     }
 
     pub async fn create(&self, new: NewKey) -> Result<(), StoreError> {
-        self.0.write("creating a key", move |connection| create(connection, new).boxed()).await
+        let actor = Actor::operator(new.created_ms);
+        self.0.write("creating a key", move |connection| create(connection, new, actor).boxed()).await
     }
 
     /// Every key, revoked ones among them, oldest first.
@@ -107,16 +109,7 @@ impl KeyRing {
     /// Revokes a key for good; one revoked before stays as it is. False where there is none of this name.
     pub async fn revoke(&self, key: &str, now_ms: i64) -> Result<bool, StoreError> {
         let key = key.to_owned();
-        self.0
-            .write("revoking a key", move |mut connection| {
-                async move {
-                    let revoke =
-                        query("UPDATE access_keys SET revoked_ms = coalesce(revoked_ms, $1) WHERE access_key = $2");
-                    Ok(connection.execute(revoke.bind(now_ms).bind(key)).await? > 0)
-                }
-                .boxed()
-            })
-            .await
+        self.0.write("revoking a key", move |connection| revoke(connection, key, now_ms).boxed()).await
     }
 
     /// Stores a successor of `key`, and has `key` itself expire at `old_expires_ms` where it would not sooner; both or
@@ -124,6 +117,16 @@ impl KeyRing {
     pub async fn rotate(&self, key: &str, new: Successor, old_expires_ms: i64) -> Result<Rotate, StoreError> {
         let key = key.to_owned();
         self.0.write("rotating a key", move |connection| rotate(connection, key, new, old_expires_ms).boxed()).await
+    }
+
+    /// As [`Store::deeds`].
+    pub async fn deeds(
+        &self,
+        filter: &AuditFilter,
+        limit: usize,
+        after: Option<i64>,
+    ) -> Result<Vec<AuditRow>, StoreError> {
+        self.0.deeds(filter, limit, after).await
     }
 
     pub async fn close(&self) {
@@ -139,8 +142,28 @@ impl Store {
     }
 }
 
-async fn create(mut connection: Connection<'_>, new: NewKey) -> Result<(), Failure> {
-    insert(&mut connection, new).await
+async fn create(mut connection: Connection<'_>, new: NewKey, actor: Actor) -> Result<(), Failure> {
+    let (tenant, key, outcome) = (new.tenant.clone(), new.key.clone(), format!("in force, {}", new.roles));
+    insert(&mut connection, new).await?;
+    audit::record(&mut connection, &actor, &tenant, Deed::CreateKey, &key, &outcome).await
+}
+
+/// The key, to be changed by this transaction alone.
+async fn find(connection: &mut Connection<'_>, key: &str) -> Result<Option<KeyRow>, Failure> {
+    let find = query("SELECT * FROM access_keys WHERE access_key = $1").bind(key).for_update();
+    connection.row(find).await?.as_ref().map(KeyRow::from_row).transpose()
+}
+
+async fn revoke(mut connection: Connection<'_>, key: String, now_ms: i64) -> Result<bool, Failure> {
+    let connection = &mut connection;
+    let Some(row) = find(connection, &key).await? else { return Ok(false) };
+    if row.revoked_ms.is_none() {
+        let revoke = query("UPDATE access_keys SET revoked_ms = $1 WHERE access_key = $2");
+        connection.execute(revoke.bind(now_ms).bind(key.as_str())).await?;
+        let actor = Actor::operator(now_ms);
+        audit::record(connection, &actor, &row.tenant, Deed::RevokeKey, &key, "revoked").await?;
+    }
+    Ok(true)
 }
 
 async fn insert(connection: &mut Connection<'_>, new: NewKey) -> Result<(), Failure> {
@@ -165,9 +188,7 @@ async fn rotate(
     old_expires_ms: i64,
 ) -> Result<Rotate, Failure> {
     let connection = &mut connection;
-    let find = query("SELECT * FROM access_keys WHERE access_key = $1").bind(key.as_str()).for_update();
-    let Some(row) = connection.row(find).await? else { return Ok(Rotate::Absent) };
-    let old = KeyRow::from_row(&row)?;
+    let Some(old) = find(connection, &key).await? else { return Ok(Rotate::Absent) };
     if old.has_ended(new.created_ms) {
         return Ok(Rotate::Ended);
     }
@@ -178,7 +199,9 @@ async fn rotate(
     insert(connection, NewKey::from(new.clone())).await?;
     let expires_ms = old.expires_ms.map_or(old_expires_ms, |sooner| sooner.min(old_expires_ms));
     let expire = query("UPDATE access_keys SET expires_ms = $1 WHERE access_key = $2");
-    connection.execute(expire.bind(expires_ms).bind(key)).await?;
+    connection.execute(expire.bind(expires_ms).bind(key.as_str())).await?;
+    let (actor, outcome) = (Actor::operator(created_ms), format!("succeeded by {}", new.key));
+    audit::record(connection, &actor, &old.tenant, Deed::RotateKey, &key, &outcome).await?;
     Ok(Rotate::Rotated { old: KeyRow { expires_ms: Some(expires_ms), ..old }, new })
 }
 

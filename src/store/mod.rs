@@ -19,6 +19,7 @@
 //! Not done, and why: a digest over the end of a session's observations (a lost tail needs a lost file; a
 //! write-ahead log that damage cut short is refused at the start); deleting old jobs (they are small, and an idempotency key must outlive its request).
 
+mod audit;
 mod check;
 mod codec;
 mod error;
@@ -43,6 +44,7 @@ use futures_util::future::BoxFuture;
 use error::Failure;
 use query::{Connection, Query, Row};
 
+pub use audit::{Actor, AuditBounds, AuditFilter, AuditRow, Deed};
 pub use check::Inspection;
 pub use error::StoreError;
 pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, NewJob};
@@ -57,7 +59,11 @@ pub use tenant::Tenant;
 
 /// The durable facts of one folder or one database. Clones share the connections.
 #[derive(Clone)]
-pub struct Store(Engine);
+pub struct Store {
+    engine: Engine,
+    /// Whose changes are made through it, as the audit has them.
+    actor: Actor,
+}
 
 #[derive(Clone)]
 enum Engine {
@@ -73,7 +79,7 @@ impl Store {
     /// [`StoreError::Locked`] where another process holds the folder, [`StoreError::NewerSchema`] where a later release
     /// wrote it, [`StoreError::OldEngine`] where SQLite is older than 3.51.3, else what the disk answered.
     pub async fn open(dir: &Path) -> Result<Store, StoreError> {
-        Ok(Store(Engine::Sqlite(sqlite::Folder::open(dir).await?)))
+        Ok(Store::over(Engine::Sqlite(sqlite::Folder::open(dir).await?)))
     }
 
     /// Connects to a PostgreSQL database and brings its schema up to date. Other processes may use it at the same time:
@@ -82,12 +88,21 @@ impl Store {
     /// # Errors
     /// [`StoreError::NewerSchema`] where a later release wrote it, else what the server answered.
     pub async fn connect(url: &PostgresUrl) -> Result<Store, StoreError> {
-        Ok(Store(Engine::Postgres(postgres::Database::connect(url).await?)))
+        Ok(Store::over(Engine::Postgres(postgres::Database::connect(url).await?)))
+    }
+
+    fn over(engine: Engine) -> Store {
+        Store { engine, actor: Actor::service(0) }
+    }
+
+    /// The same store, changed by `actor`: each change is written into the audit as his.
+    pub fn by(&self, actor: Actor) -> Store {
+        Store { actor, ..self.clone() }
     }
 
     /// Whether other processes may write to it, so that what was read may be out of date by now.
     pub fn is_shared(&self) -> bool {
-        matches!(self.0, Engine::Postgres(_))
+        matches!(self.engine, Engine::Postgres(_))
     }
 
     /// The time by which leases are measured, in milliseconds, where the caller's own clock shows `local_ms`.
@@ -95,7 +110,7 @@ impl Store {
     /// PostgreSQL's clock, since those of its clients may differ; a SQLite folder has one process, and that its own.
     /// Time passes until the answer is used, which is safe: a lease then ends early, and one that ran out is seen late.
     pub async fn lease_time(&self, local_ms: i64) -> Result<i64, StoreError> {
-        match &self.0 {
+        match &self.engine {
             Engine::Sqlite(_) => Ok(local_ms),
             Engine::Postgres(database) => database.time().await,
         }
@@ -103,7 +118,7 @@ impl Store {
 
     /// Whether the store reads and writes.
     pub async fn ping(&self) -> Result<(), StoreError> {
-        match &self.0 {
+        match &self.engine {
             Engine::Sqlite(folder) => folder.ping().await,
             Engine::Postgres(database) => database.ping().await,
         }
@@ -112,7 +127,7 @@ impl Store {
     /// Completes once the store failed in a way after which the process must exit (fsync error, damaged file).
     /// Never completes while it is sound, nor over PostgreSQL, whose failures are not this process's.
     pub async fn until_fatal(&self) -> StoreError {
-        match &self.0 {
+        match &self.engine {
             Engine::Sqlite(folder) => folder.until_fatal().await,
             Engine::Postgres(_) => std::future::pending().await,
         }
@@ -120,7 +135,7 @@ impl Store {
 
     /// Commits what waits, closes every connection and gives up the folder. Later calls answer `Unavailable`.
     pub async fn close(&self) {
-        match &self.0 {
+        match &self.engine {
             Engine::Sqlite(folder) => folder.close().await,
             Engine::Postgres(database) => database.close().await,
         }
@@ -132,7 +147,7 @@ impl Store {
         T: Send + 'static,
         W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
-        match &self.0 {
+        match &self.engine {
             Engine::Sqlite(folder) => folder.write(doing, work).await,
             Engine::Postgres(database) => database.write(doing, work).await,
         }
@@ -145,7 +160,7 @@ impl Store {
         query: Query,
         decode: impl FnOnce(&[Row]) -> Result<T, Failure>,
     ) -> Result<T, StoreError> {
-        let rows = match &self.0 {
+        let rows = match &self.engine {
             Engine::Sqlite(folder) => folder.read(doing, query).await?,
             Engine::Postgres(database) => database.read(doing, query).await?,
         };

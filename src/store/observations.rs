@@ -59,7 +59,7 @@ pub enum Append {
 impl Store {
     /// Appends the period after the last, or says why not; decided and written in one transaction.
     pub async fn append_observation(&self, new: NewObservation) -> Result<Append, StoreError> {
-        match &self.0 {
+        match &self.engine {
             Engine::Sqlite(folder) => folder.append(new).await,
             Engine::Postgres(database) => {
                 database.write(APPENDING, move |connection| append(connection, new).boxed()).await

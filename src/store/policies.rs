@@ -3,6 +3,7 @@
 
 use futures_util::FutureExt;
 
+use super::audit::{self, Actor, Deed};
 use super::codec::to_sql;
 use super::error::Failure;
 use super::query::{Connection, Row, query};
@@ -54,9 +55,16 @@ impl Store {
     ) -> Result<bool, StoreError> {
         let doing = "inserting a policy";
         verify(id, json).map_err(|failure| failure.during(doing))?;
-        let (tenant, id, json) = (tenant.clone(), id.to_owned(), json.to_vec());
+        let (tenant, id, json, actor) = (tenant.clone(), id.to_owned(), json.to_vec(), self.actor.clone());
         self.write(doing, move |mut connection| {
-            async move { insert(&mut connection, &tenant, &id, json, created_ms).await }.boxed()
+            async move {
+                let is_new = insert(&mut connection, &tenant, &id, json, created_ms).await?;
+                if is_new {
+                    audit::record(&mut connection, &actor, &tenant, Deed::ImportPolicy, &id, "stored").await?;
+                }
+                Ok(is_new)
+            }
+            .boxed()
         })
         .await
     }
@@ -97,8 +105,8 @@ impl Store {
     }
 
     pub async fn delete_policy(&self, tenant: &Tenant, id: &str) -> Result<DeletePolicy, StoreError> {
-        let (tenant, id) = (tenant.clone(), id.to_owned());
-        self.write("deleting a policy", move |connection| delete(connection, tenant, id).boxed()).await
+        let (tenant, id, actor) = (tenant.clone(), id.to_owned(), self.actor.clone());
+        self.write("deleting a policy", move |connection| delete(connection, tenant, id, actor).boxed()).await
     }
 }
 
@@ -138,7 +146,12 @@ pub(super) async fn is_owned(connection: &mut Connection<'_>, tenant: &Tenant, i
 }
 
 /// The policy stays locked while its sessions are counted: none can be opened in between.
-async fn delete(mut connection: Connection<'_>, tenant: Tenant, id: String) -> Result<DeletePolicy, Failure> {
+async fn delete(
+    mut connection: Connection<'_>,
+    tenant: Tenant,
+    id: String,
+    actor: Actor,
+) -> Result<DeletePolicy, Failure> {
     let connection = &mut connection;
     let lock = query("SELECT sequence FROM policies WHERE policy = $1").bind(id.as_str()).for_update();
     if connection.row(lock).await?.is_none() || !is_owned(connection, &tenant, &id).await? {
@@ -156,7 +169,8 @@ async fn delete(mut connection: Connection<'_>, tenant: Tenant, id: String) -> R
         "DELETE FROM policies WHERE policy = $1
          AND NOT EXISTS (SELECT 1 FROM policy_owners WHERE policy_owners.policy = policies.policy)",
     );
-    connection.execute(unowned.bind(id)).await?;
+    connection.execute(unowned.bind(id.as_str())).await?;
+    audit::record(connection, &actor, &tenant, Deed::DeletePolicy, &id, "deleted").await?;
     Ok(DeletePolicy::Deleted)
 }
 

@@ -2,6 +2,7 @@
 
 use futures_util::FutureExt;
 
+use super::audit::{self, Actor, Deed};
 use super::codec::{Seal, decode_reals, encode_reals, from_sql, to_sql};
 use super::error::Failure;
 use super::query::{Connection, Row, query};
@@ -69,7 +70,8 @@ pub struct SessionSummary {
 
 impl Store {
     pub async fn create_session(&self, new: NewSession) -> Result<CreateSession, StoreError> {
-        self.write("creating a session", move |connection| create(connection, new).boxed()).await
+        let actor = self.actor.clone();
+        self.write("creating a session", move |connection| create(connection, new, actor).boxed()).await
     }
 
     /// # Errors
@@ -114,15 +116,8 @@ impl Store {
 
     /// Deletes a session of a tenant and its observations. False where there was none.
     pub async fn delete_session(&self, tenant: &Tenant, session: &str) -> Result<bool, StoreError> {
-        let (tenant, session) = (tenant.clone(), session.to_owned());
-        self.write("deleting a session", move |mut connection| {
-            async move {
-                let delete = query("DELETE FROM sessions WHERE session = $1 AND tenant = $2");
-                Ok(connection.execute(delete.bind(session).bind(tenant.as_str())).await? > 0)
-            }
-            .boxed()
-        })
-        .await
+        let (tenant, session, actor) = (tenant.clone(), session.to_owned(), self.actor.clone());
+        self.write("deleting a session", move |connection| delete(connection, tenant, session, actor).boxed()).await
     }
 
     pub async fn count_sessions(&self) -> Result<u64, StoreError> {
@@ -133,7 +128,7 @@ impl Store {
 }
 
 /// The policy stays locked until the session is there: it cannot be deleted in between.
-async fn create(mut connection: Connection<'_>, new: NewSession) -> Result<CreateSession, Failure> {
+async fn create(mut connection: Connection<'_>, new: NewSession, actor: Actor) -> Result<CreateSession, Failure> {
     let policy = query("SELECT sequence FROM policies WHERE policy = $1").bind(new.policy.as_str());
     if connection.row(policy.for_share()).await?.is_none()
         || !policies::is_owned(&mut connection, &new.tenant, &new.policy).await?
@@ -147,16 +142,39 @@ async fn create(mut connection: Connection<'_>, new: NewSession) -> Result<Creat
     );
     let seal = row.seal().finish();
     let insert = insert
-        .bind(row.session)
-        .bind(row.policy)
+        .bind(row.session.as_str())
+        .bind(row.policy.as_str())
         .bind(row.initial_wealth)
         .bind(encode_reals(&row.initial_history))
         .bind(to_sql(row.horizon))
         .bind(row.created_ms)
         .bind(seal)
         .bind(row.tenant.as_str());
-    let inserted = connection.execute(insert).await?;
-    Ok(if inserted > 0 { CreateSession::Created } else { CreateSession::Exists })
+    if connection.execute(insert).await? == 0 {
+        return Ok(CreateSession::Exists);
+    }
+    let outcome = format!("opened under policy {}", row.policy);
+    audit::record(&mut connection, &actor, &row.tenant, Deed::OpenSession, &row.session, &outcome).await?;
+    Ok(CreateSession::Created)
+}
+
+/// The entry says how many observations went with the session.
+async fn delete(
+    mut connection: Connection<'_>,
+    tenant: Tenant,
+    session: String,
+    actor: Actor,
+) -> Result<bool, Failure> {
+    let connection = &mut connection;
+    let count = query("SELECT count(*) AS observations FROM observations WHERE session = $1").bind(session.as_str());
+    let observations: i64 = connection.row(count).await?.map_or(Ok(0), |row| row.get("observations"))?;
+    let delete = query("DELETE FROM sessions WHERE session = $1 AND tenant = $2");
+    if connection.execute(delete.bind(session.as_str()).bind(tenant.as_str())).await? == 0 {
+        return Ok(false);
+    }
+    let outcome = format!("deleted, with {observations} observations");
+    audit::record(connection, &actor, &tenant, Deed::DeleteSession, &session, &outcome).await?;
+    Ok(true)
 }
 
 impl From<NewSession> for SessionRow {

@@ -102,3 +102,30 @@ CREATE TABLE access_keys (
     revoked_ms BIGINT,
     expires_ms BIGINT
 );
+
+-- Who did what. The entries of a tenant are a chain: each is sealed over the seal of the one before.
+CREATE TABLE audit (
+    sequence   BIGINT GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
+    tenant     TEXT NOT NULL,
+    number     BIGINT NOT NULL,
+    access_key TEXT NOT NULL,
+    roles      TEXT NOT NULL,
+    deed       TEXT NOT NULL,
+    object     TEXT NOT NULL,
+    outcome    TEXT NOT NULL,
+    at_ms      BIGINT NOT NULL,
+    previous   BYTEA NOT NULL,
+    seal       BYTEA NOT NULL,
+    UNIQUE (tenant, number)
+);
+CREATE INDEX audit_by_tenant ON audit (tenant, sequence);
+CREATE INDEX audit_by_object ON audit (object, sequence);
+
+-- Where a chain ends, and where its oldest entries were cut off.
+CREATE TABLE audit_chains (
+    tenant     TEXT PRIMARY KEY,
+    number     BIGINT NOT NULL,
+    seal       BYTEA NOT NULL,
+    cut_number BIGINT NOT NULL,
+    cut_seal   BYTEA NOT NULL
+);

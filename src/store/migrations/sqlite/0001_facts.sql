@@ -103,3 +103,30 @@ CREATE TABLE access_keys (
     revoked_ms INTEGER,
     expires_ms INTEGER
 ) STRICT;
+
+-- Who did what. The entries of a tenant are a chain: each is sealed over the seal of the one before.
+CREATE TABLE audit (
+    sequence   INTEGER PRIMARY KEY AUTOINCREMENT,
+    tenant     TEXT NOT NULL,
+    number     INTEGER NOT NULL,
+    access_key TEXT NOT NULL,
+    roles      TEXT NOT NULL,
+    deed       TEXT NOT NULL,
+    object     TEXT NOT NULL,
+    outcome    TEXT NOT NULL,
+    at_ms      INTEGER NOT NULL,
+    previous   BLOB NOT NULL,
+    seal       BLOB NOT NULL,
+    UNIQUE (tenant, number)
+) STRICT;
+CREATE INDEX audit_by_tenant ON audit (tenant, sequence);
+CREATE INDEX audit_by_object ON audit (object, sequence);
+
+-- Where a chain ends, and where its oldest entries were cut off.
+CREATE TABLE audit_chains (
+    tenant     TEXT PRIMARY KEY,
+    number     INTEGER NOT NULL,
+    seal       BLOB NOT NULL,
+    cut_number INTEGER NOT NULL,
+    cut_seal   BLOB NOT NULL
+) STRICT, WITHOUT ROWID;
