@@ -41,7 +41,7 @@ pub fn access(method: &str, route: Option<&str>) -> Access {
         ("POST", "/train" | "/evaluate" | "/policies/import") | ("DELETE", "/jobs/{id}" | "/policies/{id}") => {
             Access::Role(KeyRole::Train)
         }
-        (_, "/health" | "/metrics") => Access::Role(KeyRole::Admin),
+        (_, "/health" | "/metrics" | "/audit") => Access::Role(KeyRole::Admin),
         ("GET" | "HEAD", _) | ("POST", "/what-if") => Access::Role(KeyRole::Read),
         _ => Access::Role(KeyRole::Admin),
     }

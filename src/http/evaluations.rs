@@ -31,7 +31,7 @@ pub async fn evaluate(
     headers: HeaderMap,
     JsonBody(request): JsonBody<EvaluationRequest>,
 ) -> Result<Response, Problem> {
-    Ok(accepted(service.evaluate(&caller.tenant, request, idempotency_key(&headers)?).await?))
+    Ok(accepted(service.evaluate(&caller, request, idempotency_key(&headers)?).await?))
 }
 
 /// The report of a succeeded evaluation.

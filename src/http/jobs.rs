@@ -33,7 +33,7 @@ pub async fn train(
     headers: HeaderMap,
     JsonBody(specification): JsonBody<Specification>,
 ) -> Result<Response, Problem> {
-    Ok(accepted(service.jobs.train(&caller.tenant, specification, idempotency_key(&headers)?).await?))
+    Ok(accepted(service.jobs.train(&caller, specification, idempotency_key(&headers)?).await?))
 }
 
 /// The answer to a job that was queued.
@@ -84,6 +84,6 @@ pub async fn get(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id
         (status = 202, description = "The job as it is now.", body = wire::Job),
         (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json")))]
 pub async fn cancel(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<Response, Problem> {
-    let job = wire::Job::from(service.jobs.cancel(&caller.tenant, &id).await?);
+    let job = wire::Job::from(service.jobs.cancel(&caller, &id).await?);
     Ok((StatusCode::ACCEPTED, Json(job)).into_response())
 }

@@ -17,6 +17,10 @@ pub struct Page {
 }
 
 impl Page {
+    pub fn new(limit: Option<String>, after: Option<String>) -> Self {
+        Page { limit, after }
+    }
+
     /// The limit and the cursor.
     pub fn bounds(&self) -> Result<(usize, Option<i64>), Problem> {
         let refused = |field, value: &str, rule| {

@@ -81,7 +81,7 @@ pub async fn import(
 ) -> Result<Response, Problem> {
     // A document may hold 64 MB: too much to parse between two requests.
     let decoded = tokio::task::spawn_blocking(move || decode::json::<Policy>(&document));
-    let policy = service.policies.import(&caller.tenant, decoded.await.map_err(ServiceError::internal)??).await?;
+    let policy = service.policies.import(&caller, decoded.await.map_err(ServiceError::internal)??).await?;
     let location = [(header::LOCATION, format!("/policies/{policy}"))];
     Ok((StatusCode::CREATED, location, Json(wire::Imported { policy })).into_response())
 }
@@ -93,6 +93,6 @@ pub async fn import(
         (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json"),
         (status = 409, description = "Sessions live by it.", body = Problem, content_type = "application/problem+json")))]
 pub async fn delete(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<StatusCode, Problem> {
-    service.policies.delete(&caller.tenant, &id).await?;
+    service.policies.delete(&caller, &id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -16,7 +16,7 @@ use utoipa_axum::routes;
 use super::access::Gate;
 use super::problem::{Problem, ProblemKind};
 use super::{
-    access, dashboard, described, evaluations, events, jobs, operations, policies, sessions, telemetry, what_if,
+    access, audit, dashboard, described, evaluations, events, jobs, operations, policies, sessions, telemetry, what_if,
 };
 use crate::service::Service;
 use crate::service::config::Config;
@@ -65,6 +65,7 @@ fn operators() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(operations::readyz))
         .routes(routes!(operations::health))
         .routes(routes!(operations::metrics))
+        .routes(routes!(audit::list))
         .routes(routes!(operations::openapi))
         .routes(routes!(operations::docs))
 }

@@ -32,7 +32,7 @@ pub async fn open(
     By(caller): By,
     JsonBody(request): JsonBody<wire::OpenSession>,
 ) -> Result<Response, Problem> {
-    let live = service.sessions.open(&caller.tenant, &request.policy, request.history, request.wealth).await?;
+    let live = service.sessions.open(&caller, &request.policy, request.history, request.wealth).await?;
     let session = wire::Session::from(live);
     let location = [(header::LOCATION, format!("/sessions/{}", session.session))];
     Ok((StatusCode::CREATED, location, Json(session)).into_response())
@@ -95,7 +95,7 @@ pub async fn history(
         (status = 204, description = "Deleted."),
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json")))]
 pub async fn delete(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<StatusCode, Problem> {
-    service.sessions.delete(&caller.tenant, &id).await?;
+    service.sessions.delete(&caller, &id).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

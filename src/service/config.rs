@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use super::allowance::Limits;
 use super::memory::MemoryLimit;
+use super::audit::AuditKept;
 use crate::store::PostgresUrl;
 
 /// Where the durable facts are.
@@ -56,6 +57,7 @@ pub struct Config {
     /// Whether an address that others reach may be listened on while the store holds no key.
     pub allow_anonymous: bool,
     pub limits: Limits,
+    pub audit: AuditKept,
     pub store: StoreLocation,
     pub role: Role,
     /// The most memory the process should take; what cannot fit is refused.
@@ -89,6 +91,7 @@ impl Config {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
             allow_anonymous: false,
             limits: Limits::default(),
+            audit: AuditKept::default(),
             store: StoreLocation::Folder(data.into()),
             role: Role::All,
             memory_limit: MemoryLimit::of_the_system(),

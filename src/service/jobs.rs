@@ -8,6 +8,7 @@ use super::clock::Clock;
 use super::error::ServiceError;
 use super::identity;
 use super::memory::Memory;
+use super::keys::Caller;
 use super::progress::{Progress, ProgressBoard};
 use crate::control::error::FieldError;
 use crate::control::estimate;
@@ -51,7 +52,7 @@ impl Jobs {
     /// A field that breaks its rule, or asks for more memory than there is; a key used with another request.
     pub async fn train(
         &self,
-        tenant: &Tenant,
+        caller: &Caller,
         specification: Specification,
         key: Option<String>,
     ) -> Result<Job, ServiceError> {
@@ -60,7 +61,7 @@ impl Jobs {
         self.memory.admits(&estimate::training(&completed, self.threads))?;
         self.memory.keeps(&estimate::advising(&completed))?;
         let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
-        self.queue(tenant, JobKind::Train, &sent, request_json, completed.problem.horizon, key).await
+        self.queue(caller, JobKind::Train, &sent, request_json, completed.problem.horizon, key).await
     }
 
     /// Queues an evaluation, whose policies the caller has looked at. The same key and request again give the same job.
@@ -69,7 +70,7 @@ impl Jobs {
     /// As [`Self::train`].
     pub(super) async fn evaluate(
         &self,
-        tenant: &Tenant,
+        caller: &Caller,
         request: EvaluationRequest,
         key: Option<String>,
     ) -> Result<Job, ServiceError> {
@@ -77,12 +78,12 @@ impl Jobs {
         let completed = request.completed()?;
         self.memory.admits(&estimate::evaluation(&completed, self.threads))?;
         let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
-        self.queue(tenant, JobKind::Evaluate, &sent, request_json, completed.step_count(), key).await
+        self.queue(caller, JobKind::Evaluate, &sent, request_json, completed.step_count(), key).await
     }
 
     async fn queue(
         &self,
-        tenant: &Tenant,
+        caller: &Caller,
         kind: JobKind,
         sent: &[u8],
         request_json: String,
@@ -95,7 +96,7 @@ impl Jobs {
         }
         let new = NewJob {
             job: identity::new_id("job")?,
-            tenant: tenant.clone(),
+            tenant: caller.tenant.clone(),
             kind,
             request_json,
             request_hash: content_hash(sent),
@@ -103,7 +104,7 @@ impl Jobs {
             steps_total,
             created_ms: self.clock.now_milliseconds(),
         };
-        match self.store.create_job(new).await? {
+        match self.store.by(caller.actor()).create_job(new).await? {
             CreateJob::Created(row) => {
                 self.board.ring();
                 Ok(self.with_progress(row))
@@ -141,9 +142,11 @@ impl Jobs {
     ///
     /// # Errors
     /// There is no such job.
-    pub async fn cancel(&self, tenant: &Tenant, job: &str) -> Result<Job, ServiceError> {
-        self.of(tenant, job).await?;
-        let row = self.store.request_cancel(job, self.clock.now_milliseconds()).await?;
+    pub async fn cancel(&self, caller: &Caller, job: &str) -> Result<Job, ServiceError> {
+        self.of(&caller.tenant, job).await?;
+        let actor = caller.actor();
+        let asked_ms = actor.at_ms;
+        let row = self.store.by(actor).request_cancel(job, asked_ms).await?;
         let row = row.ok_or_else(|| ServiceError::unknown("job", job))?;
         self.board.stop(job);
         self.board.ring();

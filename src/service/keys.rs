@@ -25,7 +25,7 @@ use super::error::ServiceError;
 use super::identity;
 use super::shutdown::Shutdown;
 use crate::control::error::FieldError;
-use crate::store::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, Store, StoreError, Successor, Tenant};
+use crate::store::{Actor, KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, Store, StoreError, Successor, Tenant};
 
 /// A key made or revoked elsewhere counts within this time.
 pub const REFRESH: Duration = Duration::from_millis(500);
@@ -117,6 +117,8 @@ pub struct Caller {
     pub tenant: Tenant,
     /// `None` where no key is asked for: everything is allowed.
     key: Option<KeyRow>,
+    /// As the audit names it, but for the time.
+    actor: Actor,
     /// Shared by everybody of the tenant.
     pub allowance: Arc<Allowance>,
     clock: Clock,
@@ -128,7 +130,19 @@ pub struct Caller {
 impl Caller {
     fn new(tenant: Tenant, key: Option<KeyRow>, allowance: Arc<Allowance>, clock: Clock) -> Arc<Self> {
         let (revoked, used_ms) = (AtomicBool::new(false), AtomicI64::new(0));
-        Arc::new(Caller { tenant, key, allowance, clock, revoked, used_ms })
+        let (name, roles) = key.as_ref().map_or(("", "anybody".to_owned()), |key| (&key.key, key.roles.to_string()));
+        let actor = Actor { key: name.into(), roles: roles.into(), at_ms: 0 };
+        Arc::new(Caller { tenant, key, actor, allowance, clock, revoked, used_ms })
+    }
+
+    /// Who changes something now.
+    pub fn actor(&self) -> Actor {
+        Actor { at_ms: self.clock.now_milliseconds(), ..self.actor.clone() }
+    }
+
+    /// The name of the key, which is no secret; empty where none is asked for.
+    pub fn key(&self) -> &Arc<str> {
+        &self.actor.key
     }
 
     pub fn may(&self, role: KeyRole) -> bool {

@@ -4,6 +4,7 @@
 //! and the live sessions. Everything acknowledged is in the store first; memory only saves recomputing.
 
 pub mod allowance;
+pub mod audit;
 mod bounded;
 pub mod clock;
 pub mod config;
@@ -26,11 +27,12 @@ pub mod what_if;
 
 use std::sync::Arc;
 
+use audit::Audit;
 use clock::Clock;
 use config::{Config, Role, StoreLocation};
 use error::ServiceError;
 use jobs::{Job, Jobs};
-use keys::Keys;
+use keys::{Caller, Keys};
 use memory::Memory;
 use policies::Policies;
 use sessions::Sessions;
@@ -39,10 +41,11 @@ use trainer::Trainer;
 
 use crate::control::error::FieldError;
 use crate::control::evaluation::EvaluationRequest;
-use crate::store::{JobCounts, Store, Tenant};
+use crate::store::{JobCounts, Store};
 
 /// The use cases over one store.
 pub struct Service {
+    pub audit: Audit,
     pub jobs: Jobs,
     pub keys: Arc<Keys>,
     pub policies: Arc<Policies>,
@@ -78,11 +81,13 @@ impl Service {
         let memory = Memory::new(config.memory_limit);
         tracing::info!(memory_limit_bytes = config.memory_limit.bytes, "memory: {memory}");
         let jobs = Jobs::new(store.clone(), clock.clone(), memory.clone(), config.training_threads);
-        let policies = Arc::new(Policies::new(store.clone(), clock.clone(), memory.clone()));
+        let policies = Arc::new(Policies::new(store.clone(), memory.clone()));
         let sessions = Sessions::new(config, store.clone(), clock.clone(), policies.clone());
+        let audit = Audit::new(store.clone());
+        tokio::spawn(audit::keep_bounded(store.clone(), clock.clone(), config.audit, shutdown.clone()));
         let start = || Trainer::start(config, store.clone(), clock, jobs.board(), memory.clone(), shutdown.clone());
         let trainer = config.role.runs_jobs().then(start).transpose()?;
-        Ok(Arc::new(Service { jobs, keys, policies, sessions, shutdown, memory, store, trainer }))
+        Ok(Arc::new(Service { audit, jobs, keys, policies, sessions, shutdown, memory, store, trainer }))
     }
 
     /// Queues an evaluation. The same key and request again give the same job.
@@ -92,13 +97,13 @@ impl Service {
     /// with another request.
     pub async fn evaluate(
         &self,
-        tenant: &Tenant,
+        caller: &Caller,
         request: EvaluationRequest,
         key: Option<String>,
     ) -> Result<Job, ServiceError> {
         let completed = request.clone().completed()?;
         for (framework, policy) in &completed.policies {
-            let advisor = self.policies.advisor(tenant, policy).await.map_err(|error| match error {
+            let advisor = self.policies.advisor(&caller.tenant, policy).await.map_err(|error| match error {
                 ServiceError::Unknown { id, .. } => {
                     FieldError::new(format!("policies.{}", framework.name()), id, "must name a policy").into()
                 }
@@ -106,7 +111,7 @@ impl Service {
             })?;
             completed.accepts(*framework, advisor.specification())?;
         }
-        self.jobs.evaluate(tenant, request, key).await
+        self.jobs.evaluate(caller, request, key).await
     }
 
     /// Whether the store answers and the service is not draining.

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use tokio::sync::Semaphore;
 
-use super::clock::Clock;
 use super::error::ServiceError;
+use super::keys::Caller;
 use super::memory::Memory;
 use crate::control::advisor::Advisor;
 use crate::control::error::FieldError;
@@ -20,16 +20,15 @@ const PREPARED_AT_A_TIME: usize = 2;
 /// The policies of the store.
 pub struct Policies {
     store: Store,
-    clock: Clock,
     memory: Memory,
     kept: Kept,
     preparing: Semaphore,
 }
 
 impl Policies {
-    pub(super) fn new(store: Store, clock: Clock, memory: Memory) -> Self {
+    pub(super) fn new(store: Store, memory: Memory) -> Self {
         let kept = memory.kept();
-        Policies { store, clock, memory, kept, preparing: Semaphore::new(PREPARED_AT_A_TIME) }
+        Policies { store, memory, kept, preparing: Semaphore::new(PREPARED_AT_A_TIME) }
     }
 
     /// # Errors
@@ -82,7 +81,7 @@ impl Policies {
     ///
     /// # Errors
     /// The document is not a usable policy, or one that takes more memory than can be kept ready.
-    pub async fn import(&self, tenant: &Tenant, document: Policy) -> Result<String, ServiceError> {
+    pub async fn import(&self, caller: &Caller, document: Policy) -> Result<String, ServiceError> {
         let memory = self.memory.clone();
         let checked = tokio::task::spawn_blocking(move || {
             let policy = document.checked()?;
@@ -91,14 +90,17 @@ impl Policies {
         });
         let json = checked.await.map_err(ServiceError::internal)??;
         let policy = content_hash(&json);
-        self.store.insert_policy(tenant, &policy, &json, self.clock.now_milliseconds()).await?;
+        let actor = caller.actor();
+        let imported_ms = actor.at_ms;
+        self.store.by(actor).insert_policy(&caller.tenant, &policy, &json, imported_ms).await?;
         Ok(policy)
     }
 
     /// # Errors
     /// There is no such policy, or sessions live by it.
-    pub async fn delete(&self, tenant: &Tenant, policy: &str) -> Result<(), ServiceError> {
-        match self.store.delete_policy(tenant, policy).await? {
+    pub async fn delete(&self, caller: &Caller, policy: &str) -> Result<(), ServiceError> {
+        let tenant = &caller.tenant;
+        match self.store.by(caller.actor()).delete_policy(tenant, policy).await? {
             DeletePolicy::Deleted => {
                 self.kept.forget(&key(tenant, policy));
                 Ok(())

@@ -15,6 +15,7 @@ use super::clock::Clock;
 use super::config::Config;
 use super::error::ServiceError;
 use super::identity;
+use super::keys::Caller;
 use super::live::Live;
 use super::observation::{Observe, Observed};
 use super::policies::Policies;
@@ -66,11 +67,12 @@ impl Sessions {
     /// There is no such policy, or history or wealth breaks a rule.
     pub async fn open(
         &self,
-        tenant: &Tenant,
+        caller: &Caller,
         policy: &str,
         history: Option<Vec<f64>>,
         wealth: Option<f64>,
     ) -> Result<Live, ServiceError> {
+        let tenant = &caller.tenant;
         let advisor = self.policies.advisor(tenant, policy).await?;
         let state = advisor.initial_state(history.as_deref(), wealth)?;
         self.policies.starts_from(&advisor, state.law.sample_size())?;
@@ -93,7 +95,7 @@ impl Sessions {
             horizon: row.horizon,
             created_ms: row.created_ms,
         };
-        match self.store.create_session(new).await? {
+        match self.store.by(caller.actor()).create_session(new).await? {
             CreateSession::Created => {
                 let head = row.head();
                 Ok(Live { row: Arc::new(row), state, head, price: None, radius: None, advice: None })
@@ -144,10 +146,10 @@ impl Sessions {
 
     /// # Errors
     /// There is no such session.
-    pub async fn delete(&self, tenant: &Tenant, session: &str) -> Result<(), ServiceError> {
+    pub async fn delete(&self, caller: &Caller, session: &str) -> Result<(), ServiceError> {
         let mut slot = self.slot(session).lock_owned().await;
         *slot = None;
-        let deleted = self.store.delete_session(tenant, session).await?;
+        let deleted = self.store.by(caller.actor()).delete_session(&caller.tenant, session).await?;
         self.forget(session);
         if deleted { Ok(()) } else { Err(ServiceError::unknown("session", session)) }
     }

@@ -1,0 +1,89 @@
+//! Who did what, for admins: over all tenants, as `/health` and `/metrics` are.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::access::By;
+use super::extract::Parameters;
+use super::page::{self, Page};
+use super::problem::{Problem, ProblemKind};
+use crate::service::Service;
+use crate::store::{AuditFilter, AuditRow};
+
+/// Query parameters, as text.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ask {
+    limit: Option<String>,
+    after: Option<String>,
+    tenant: Option<String>,
+    object: Option<String>,
+}
+
+/// One thing that was done.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct AuditEntry {
+    /// When, in milliseconds since 1970.
+    pub at_ms: i64,
+    pub tenant: String,
+    /// The key's name; null where none was asked for, and of what was done by a command on the store.
+    pub key: Option<String>,
+    /// The key's roles, `anybody` where no key was asked for, `operator` of a command on the store, or `service`.
+    pub roles: String,
+    #[schema(example = "session.delete")]
+    pub action: String,
+    /// What it was done to.
+    pub object: String,
+    /// What came of it.
+    #[schema(example = "deleted, with 12 observations")]
+    pub outcome: String,
+}
+
+/// A page of the audit, newest first.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct AuditPage {
+    pub entries: Vec<AuditEntry>,
+    /// Give it as `after` for the next page; null on the last.
+    pub next: Option<i64>,
+}
+
+impl From<AuditRow> for AuditEntry {
+    fn from(row: AuditRow) -> Self {
+        AuditEntry {
+            at_ms: row.at_ms,
+            tenant: row.tenant.to_string(),
+            key: Some(row.key).filter(|key| !key.is_empty()),
+            roles: row.roles,
+            action: row.deed,
+            object: row.object,
+            outcome: row.outcome,
+        }
+    }
+}
+
+/// Who did what, newest first, over all tenants.
+#[utoipa::path(get, path = "/audit", tag = "operations",
+    params(("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
+           ("after" = Option<i64>, Query, description = "The `next` of the page before."),
+           ("tenant" = Option<String>, Query, description = "Of this tenant alone."),
+           ("object" = Option<String>, Query, description = "What was done to this session, job, policy or key alone; a session's observations are shown among it on the first page.")),
+    responses(
+        (status = 200, description = "A page of the audit.", body = AuditPage),
+        (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn list(
+    State(service): State<Arc<Service>>,
+    By(_): By,
+    Parameters(ask): Parameters<Ask>,
+) -> Result<Json<AuditPage>, Problem> {
+    let (limit, after) = Page::new(ask.limit, ask.after).bounds()?;
+    let tenant = ask.tenant.map(|name| name.parse()).transpose();
+    let tenant = tenant.map_err(|error| Problem::of_field(ProblemKind::InvalidQuery, error))?;
+    let rows = service.audit.list(&AuditFilter { tenant, object: ask.object }, limit, after).await?;
+    let entries = rows.iter().filter(|row| row.sequence > 0);
+    let next = page::next(entries.clone().count(), limit, entries.last().map(|row| row.sequence));
+    Ok(Json(AuditPage { entries: rows.into_iter().map(Into::into).collect(), next }))
+}
