@@ -5,7 +5,7 @@ mod command;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use command::{backtest, backup, bench, check, demo, evaluate, healthcheck, keys, loadtest, reproduce, serve};
+use command::{audit, backtest, backup, bench, check, demo, evaluate, healthcheck, keys, loadtest, reproduce, serve};
 
 /// Nonparametric adaptive robust control of an investor, as a service.
 #[derive(Debug, Parser)]
@@ -34,6 +34,8 @@ enum Command {
     /// Say who may call a service.
     #[command(subcommand)]
     Keys(keys::Keys),
+    /// Show who did what, newest first.
+    Audit(audit::Audit),
     /// Verify every row of a store by its seal or hash; reads only, beside a running service or without one.
     Check(check::Check),
     /// Copy the database of a data folder into one file, while the service runs, and verify the copy.
@@ -62,6 +64,7 @@ async fn main() -> ExitCode {
         Command::Loadtest(arguments) => tokio::task::block_in_place(|| loadtest::run(&arguments)),
         Command::Bench(bench) => bench::run(bench).await,
         Command::Keys(arguments) => keys::run(arguments).await,
+        Command::Audit(arguments) => audit::run(arguments).await,
         Command::Check(arguments) => check::run(arguments).await,
         Command::Backup(arguments) => backup::run(arguments).await,
         Command::Restore(arguments) => backup::restore(arguments).await,

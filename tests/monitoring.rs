@@ -3,6 +3,8 @@
 mod support;
 
 use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use serde_json::{Value, json};
 use support::{App, specification};
@@ -12,11 +14,12 @@ const ALERTS: &str = include_str!("../docker/alerts.yaml");
 const PROMETHEUS: &str = include_str!("../docker/prometheus.yaml");
 const CLUSTER: &str = include_str!("../docker/compose.cluster.yaml");
 
-/// Every `ballast_...` name with the labels asked of it, one each: `name` alone, or `name` and `label="value"`; of a status
+/// Every `ballast_...` and `process_...` name with the labels asked of it, one each: `name` alone, or `name` and `label="value"`; of a status
 /// the name alone, since the one asked for may never happen.
 fn metrics(expression: &str) -> Vec<(String, Option<String>)> {
     let mut found = Vec::new();
-    for (start, _) in expression.match_indices("ballast_") {
+    let starts = ["ballast_", "process_"].iter().flat_map(|start| expression.match_indices(start));
+    for (start, _) in starts {
         let rest = &expression[start..];
         let end = rest.find(|letter: char| !letter.is_ascii_alphanumeric() && letter != '_').unwrap_or(rest.len());
         let name = rest[..end].to_owned();
@@ -79,6 +82,34 @@ async fn every_metric_of_the_dashboard_and_the_alerts_exists_in_a_service_in_use
     for described in exposition.lines().filter_map(|line| line.strip_prefix("# HELP ")) {
         let name = described.split(' ').next().unwrap();
         assert!(panels.iter().any(|expression| expression.contains(name)), "no panel shows {name}");
+    }
+}
+
+/// Prometheus' own tool for rules; `None` where the machine has none, which is said loudly and fails in CI.
+fn promtool() -> Option<PathBuf> {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/promtool/usr/bin/promtool");
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let found = std::env::split_paths(&path).map(|folder| folder.join("promtool")).chain([own]);
+    let found = found.into_iter().find(|tool| tool.is_file());
+    let required = std::env::var_os("BALLAST_TEST_PROMTOOL").is_some_and(|value| value == "required");
+    assert!(found.is_some() || !required, "there is no promtool");
+    if found.is_none() {
+        eprintln!("SKIPPED: there is no promtool (Debian's package prometheus has it), so no alert was fired");
+    }
+    found
+}
+
+#[test]
+fn every_alert_is_fired_by_prometheus_own_rules() {
+    const FIRED: &str = include_str!("data/alerts_fired.yaml");
+    for alert in ALERTS.lines().filter_map(|line| line.trim().strip_prefix("- alert: ")) {
+        assert!(FIRED.contains(&format!("alertname=\"{alert}\"")), "{alert} is never fired");
+    }
+    let Some(promtool) = promtool() else { return };
+    for arguments in [["check", "rules", "docker/alerts.yaml"], ["test", "rules", "tests/data/alerts_fired.yaml"]] {
+        let output = Command::new(&promtool).args(arguments).current_dir(env!("CARGO_MANIFEST_DIR")).output().unwrap();
+        let said = [output.stdout, output.stderr].concat();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&said));
     }
 }
 

@@ -125,7 +125,7 @@ pub async fn run(keys: Keys) -> Result<(), Box<dyn std::error::Error>> {
     }
 }
 
-async fn open(store: StoreArgs) -> Result<KeyRing, Box<dyn std::error::Error>> {
+pub(super) async fn open(store: StoreArgs) -> Result<KeyRing, Box<dyn std::error::Error>> {
     Ok(match store.location()? {
         StoreLocation::Folder(folder) => KeyRing::open(&folder).await?,
         StoreLocation::Postgres(url) => KeyRing::connect(&url).await?,

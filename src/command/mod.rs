@@ -1,6 +1,7 @@
 //! What the binary can be asked to do.
 
 mod api_client;
+pub mod audit;
 pub mod backtest;
 pub mod backup;
 pub mod bench;
@@ -18,6 +19,7 @@ pub mod reproduce;
 pub mod serve;
 mod store_location;
 mod tables;
+mod traces;
 
 /// An error and its causes on one line.
 pub fn with_causes(error: &dyn std::error::Error) -> String {

@@ -1,20 +1,20 @@
 //! `ballast serve`: the service, until SIGTERM or SIGINT.
 
-use std::io::IsTerminal;
 use std::net::SocketAddr;
 use std::time::Duration;
 
 use ballast::http;
 use ballast::service::allowance::Limits;
+use ballast::service::audit::AuditKept;
 use ballast::service::config::{Config, Role};
 use ballast::service::memory::{MemoryLimit, Size};
 use ballast::service::shutdown::Shutdown;
 use clap::builder::FalseyValueParser;
 use clap::{Args, ValueEnum};
 use tokio::signal::unix::{SignalKind, signal};
-use tracing_subscriber::EnvFilter;
 
 use super::store_location::StoreArgs;
+use super::traces;
 
 #[derive(Debug, Args)]
 pub struct Serve {
@@ -41,6 +41,26 @@ pub struct Serve {
     memory_limit: Option<Size>,
     #[command(flatten)]
     limits: LimitArgs,
+    #[command(flatten)]
+    audit: AuditArgs,
+}
+
+/// What is kept of who did what.
+#[derive(Debug, Args)]
+struct AuditArgs {
+    /// Days that an entry of the audit is kept.
+    #[arg(long, env = "BALLAST_AUDIT_DAYS", default_value_t = 400, value_parser = clap::value_parser!(u16).range(1..))]
+    audit_days: u16,
+    /// Entries that are kept of one tenant; the oldest are dropped first.
+    #[arg(long, env = "BALLAST_AUDIT_ENTRIES", default_value_t = 250_000, value_parser = clap::value_parser!(u32).range(1..))]
+    audit_entries: u32,
+}
+
+impl From<AuditArgs> for AuditKept {
+    fn from(arguments: AuditArgs) -> Self {
+        let age = Duration::from_hours(24 * u64::from(arguments.audit_days));
+        AuditKept { age, entries: arguments.audit_entries }
+    }
 }
 
 /// What one tenant may ask.
@@ -82,12 +102,13 @@ impl From<RoleName> for Role {
 }
 
 pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
-    start_logging();
+    let traces = traces::start()?;
     let mut config = Config { listen: arguments.listen, ..Config::new("") };
     config.store = arguments.store.location()?;
     config.allow_anonymous = arguments.allow_anonymous;
     let limits = arguments.limits;
     config.limits = Limits::new([limits.rate_live, limits.rate_heavy, limits.rate_read], limits.heavy_calls.into());
+    config.audit = arguments.audit.into();
     config.role = arguments.role.into();
     config.lease = Duration::from_secs(arguments.lease_seconds.into());
     config.training_threads = arguments.training_threads.map_or(config.training_threads, usize::from);
@@ -104,16 +125,6 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
         shutdown.begin();
     });
     running.ended().await;
+    traces.end().await;
     Ok(())
-}
-
-/// Logs to standard error: for people on a terminal, as JSON elsewhere. `RUST_LOG` chooses what.
-fn start_logging() {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info,sqlx=warn"));
-    let logging = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
-    if std::io::stderr().is_terminal() {
-        logging.init();
-    } else {
-        logging.json().flatten_event(true).init();
-    }
 }

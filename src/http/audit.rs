@@ -76,7 +76,7 @@ impl From<AuditRow> for AuditEntry {
         (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn list(
     State(service): State<Arc<Service>>,
-    By(_): By,
+    By(_admin): By,
     Parameters(ask): Parameters<Ask>,
 ) -> Result<Json<AuditPage>, Problem> {
     let (limit, after) = Page::new(ask.limit, ask.after).bounds()?;

@@ -14,13 +14,17 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use tokio::sync::oneshot;
+use tracing::Instrument;
 
 use super::error::ServiceError;
+use super::spans;
 use crate::store::Tenant;
 
 /// Runs blocking work, so much of it at a time.
 #[derive(Clone)]
 pub(super) struct Bounded {
+    /// What the work is, in traces and metrics.
+    pub name: &'static str,
     turns: Arc<Mutex<Turns>>,
     wait: Duration,
 }
@@ -50,9 +54,9 @@ struct Place {
 }
 
 impl Bounded {
-    pub(super) fn new(size: Size, wait: Duration) -> Self {
+    pub(super) fn new(name: &'static str, size: Size, wait: Duration) -> Self {
         let turns = Turns { size, running: HashMap::new(), ring: VecDeque::new(), queues: HashMap::new() };
-        Bounded { turns: Arc::new(Mutex::new(turns)), wait }
+        Bounded { name, turns: Arc::new(Mutex::new(turns)), wait }
     }
 
     /// Runs `work` on a thread that may block. Its place is taken until it ends, even where the caller goes away.
@@ -64,13 +68,13 @@ impl Bounded {
         tenant: &Tenant,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let place = self.place(tenant).await?;
+        let place = self.place(tenant).instrument(spans::of_turn()).await?;
         let working = tokio::task::spawn_blocking(move || {
             let answer = work();
             drop(place);
             answer
         });
-        working.await.map_err(ServiceError::internal)
+        working.instrument(spans::of_work(self.name)).await.map_err(ServiceError::internal)
     }
 
     /// Requests that wait for a place.
@@ -192,7 +196,7 @@ mod tests {
     }
 
     fn bounded(common: usize, guests: usize) -> Bounded {
-        Bounded::new(Size { common, guests }, Duration::from_secs(60))
+        Bounded::new("work", Size { common, guests }, Duration::from_secs(60))
     }
 
     /// Work that ends when told to, and says what it is when it begins.
@@ -216,7 +220,7 @@ mod tests {
 
     #[tokio::test]
     async fn work_past_the_bound_is_refused_and_done_once_there_is_room() {
-        let bounded = Bounded::new(Size { common: 1, guests: 0 }, Duration::from_millis(20));
+        let bounded = Bounded::new("work", Size { common: 1, guests: 0 }, Duration::from_millis(20));
         let (begun, begins) = mpsc::channel();
         let first = hold(&bounded, "north", &begun, "first");
         until(|| begins.try_recv().is_ok()).await;

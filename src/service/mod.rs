@@ -22,6 +22,7 @@ pub mod progress;
 pub mod sessions;
 pub mod shutdown;
 mod slots;
+pub mod spans;
 mod trainer;
 pub mod what_if;
 

@@ -9,6 +9,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::OwnedMutexGuard;
+use tracing::Instrument;
 
 use super::bounded::{Bounded, Size};
 use super::clock::Clock;
@@ -20,6 +21,7 @@ use super::live::Live;
 use super::observation::{Observe, Observed};
 use super::policies::Policies;
 use super::slots::{Slot, Slots};
+use super::spans;
 use crate::control::advisor::{Advice, AdviceMode, Advisor};
 use crate::control::error::FieldError;
 use crate::control::worst_case::WorstCase;
@@ -56,8 +58,8 @@ pub struct Sessions {
 impl Sessions {
     pub(super) fn new(config: &Config, store: Store, clock: Clock, policies: Arc<Policies>) -> Self {
         let size = |common| Size { common, guests: config.guest_limit };
-        let advising = Bounded::new(size(config.advice_limit), config.turn_wait);
-        let resolving = Bounded::new(size(config.resolve_limit), config.turn_wait);
+        let advising = Bounded::new("advise", size(config.advice_limit), config.turn_wait);
+        let resolving = Bounded::new("solve", size(config.resolve_limit), config.turn_wait);
         Sessions { store, clock, policies, slots: Arc::default(), advising, resolving }
     }
 
@@ -95,7 +97,7 @@ impl Sessions {
             horizon: row.horizon,
             created_ms: row.created_ms,
         };
-        match self.store.by(caller.actor()).create_session(new).await? {
+        match self.store.by(caller.actor()).create_session(new).instrument(spans::of_write("open a session")).await? {
             CreateSession::Created => {
                 let head = row.head();
                 Ok(Live { row: Arc::new(row), state, head, price: None, radius: None, advice: None })
@@ -114,7 +116,7 @@ impl Sessions {
 
     /// Requests that wait for their turn to be advised, and to have a step solved.
     pub fn waiting(&self) -> [(&'static str, usize); 2] {
-        [("advise", self.advising.waiting()), ("solve", self.resolving.waiting())]
+        [&self.advising, &self.resolving].map(|turns| (turns.name, turns.waiting()))
     }
 
     /// At most `limit` sessions, newest first, after the session with sequence `after`.
@@ -149,7 +151,9 @@ impl Sessions {
     pub async fn delete(&self, caller: &Caller, session: &str) -> Result<(), ServiceError> {
         let mut slot = self.slot(session).lock_owned().await;
         *slot = None;
-        let deleted = self.store.by(caller.actor()).delete_session(&caller.tenant, session).await?;
+        let deleting = self.store.by(caller.actor());
+        let deleting = deleting.delete_session(&caller.tenant, session);
+        let deleted = deleting.instrument(spans::of_write("delete a session")).await?;
         self.forget(session);
         if deleted { Ok(()) } else { Err(ServiceError::unknown("session", session)) }
     }
@@ -161,14 +165,15 @@ impl Sessions {
     /// A field breaks a rule; the period was observed with other content, is not the next, or lies past the horizon.
     pub async fn observe(&self, tenant: &Tenant, report: Observe) -> Result<Observed, ServiceError> {
         let (sessions, tenant) = (self.clone(), tenant.clone());
-        let recording = tokio::spawn(async move {
+        let recording = async move {
             let mut slot = sessions.slot(&report.session).lock_owned().await;
             let outcome = sessions.record(&tenant, &report, &mut slot).await;
             if let Err(ServiceError::Store(_) | ServiceError::Internal(_)) = outcome {
                 *slot = None;
             }
             outcome
-        });
+        };
+        let recording = tokio::spawn(recording.in_current_span());
         recording.await.map_err(ServiceError::internal)?
     }
 
@@ -202,7 +207,7 @@ impl Sessions {
             created_ms: self.clock.now_milliseconds(),
         };
         let next = live.taken_to(new.head(), state, report.price, answer.uncertainty.radius);
-        match self.store.append_observation(new).await? {
+        match self.store.append_observation(new).instrument(spans::of_write("append an observation")).await? {
             Append::Appended => {
                 **slot = Some(next);
                 Ok(answer)

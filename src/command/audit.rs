@@ -1,0 +1,51 @@
+//! `ballast audit`: who did what, from the store itself, whether or not a service runs.
+
+use std::io::Write;
+
+use ballast::store::{AuditFilter, AuditRow, Tenant};
+use clap::Args;
+
+use super::store_location::StoreArgs;
+use super::{keys, moments};
+
+/// Entries read at a time.
+const PAGE: usize = 1000;
+
+#[derive(Debug, Args)]
+pub struct Audit {
+    /// Of this tenant alone.
+    #[arg(long)]
+    tenant: Option<Tenant>,
+    /// What was done to this session, job, policy or key alone; a session's observations are shown too.
+    #[arg(long)]
+    object: Option<String>,
+    /// Entries shown at most.
+    #[arg(long, default_value_t = 1000)]
+    limit: usize,
+    #[command(flatten)]
+    store: StoreArgs,
+}
+
+/// # Errors
+/// The store is not reached, or an entry is not what was written.
+pub async fn run(arguments: Audit) -> Result<(), Box<dyn std::error::Error>> {
+    let ring = keys::open(arguments.store).await?;
+    let filter = AuditFilter { tenant: arguments.tenant, object: arguments.object };
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "time\ttenant\tkey\troles\taction\tobject\toutcome")?;
+    let (mut left, mut after) = (arguments.limit, None);
+    while left > 0 {
+        let page = ring.deeds(&filter, PAGE.min(left), after).await?;
+        for AuditRow { tenant, key, roles, deed, object, outcome, at_ms, .. } in &page {
+            let (time, key) = (moments::shown(Some(*at_ms)), if key.is_empty() { "-" } else { key });
+            writeln!(out, "{time}\t{tenant}\t{key}\t{roles}\t{deed}\t{object}\t{outcome}")?;
+        }
+        after = page.iter().map(|row| row.sequence).filter(|sequence| *sequence > 0).min();
+        if after.is_none() || page.len() < PAGE.min(left) {
+            break;
+        }
+        left = left.saturating_sub(page.len());
+    }
+    ring.close().await;
+    Ok(())
+}
