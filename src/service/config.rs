@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::allowance::Limits;
-use super::memory::MemoryLimit;
 use super::audit::AuditKept;
+use super::memory::MemoryLimit;
 use crate::store::PostgresUrl;
 
 /// Where the durable facts are.
