@@ -21,7 +21,7 @@ use super::problem::{Problem, ProblemKind};
 use crate::service::Service;
 use crate::service::allowance::{Class, Places, TooMany};
 use crate::service::keys::{Caller, PREFIX, Turned};
-use crate::store::KeyRole;
+use crate::store::{KeyRole, Tenant};
 
 /// What an operation asks of who calls it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,6 +69,22 @@ pub struct Gate {
     pub body_bytes: usize,
 }
 
+/// Whose request was answered, for those who record it: an extension of the response.
+#[derive(Debug, Clone)]
+pub struct Asker {
+    /// Of the key shown, also where it is no longer in force; `None` where none is known.
+    pub tenant: Option<Tenant>,
+    /// The name of the key, which is no secret; empty where none was asked for.
+    pub key: Arc<str>,
+}
+
+impl Asker {
+    fn signed(tenant: Option<Tenant>, key: Arc<str>, mut response: Response) -> Response {
+        response.extensions_mut().insert(Asker { tenant, key });
+        response
+    }
+}
+
 /// Lets a request through to its handler, with its [`Caller`] and the size its body may have.
 pub async fn admit(State(gate): State<Gate>, mut request: Request, next: Next) -> Response {
     let (method, matched) = (request.method().as_str(), request.extensions().get::<MatchedPath>().cloned());
@@ -81,13 +97,14 @@ pub async fn admit(State(gate): State<Gate>, mut request: Request, next: Next) -
         Access::Open => None,
         access => match admitted(&gate.service, access, request.headers()) {
             Ok(caller) => Some(caller),
-            Err(problem) => return problem.into_response(),
+            Err((of, problem)) => return Asker::signed(of.tenant, of.key, problem.into_response()),
         },
     };
-    let mut turn = None;
+    let (mut turn, mut asker) = (None, None);
     if let Some(caller) = admitted {
+        asker = Some((caller.tenant.clone(), caller.key().clone()));
         if let Err(refused) = caller.allowance.take(class) {
-            return too_many(class, refused);
+            return Asker::signed(Some(caller.tenant.clone()), caller.key().clone(), too_many(class, refused));
         }
         if class == Class::Heavy {
             let own = turn.insert(Turn { caller: caller.clone(), places: Arc::default() });
@@ -103,7 +120,10 @@ pub async fn admit(State(gate): State<Gate>, mut request: Request, next: Next) -
     request.extensions_mut().insert(BodyLimit(limit));
     let response = next.run(request).await;
     drop(turn);
-    response
+    match asker {
+        Some((tenant, key)) => Asker::signed(Some(tenant), key, response),
+        None => response,
+    }
 }
 
 /// The places of a heavy call: taken once its body is there, so that whoever sends his slowly holds none; given up with
@@ -127,17 +147,21 @@ impl Turn {
     }
 }
 
-fn admitted(service: &Service, access: Access, headers: &HeaderMap) -> Result<Arc<Caller>, Problem> {
-    let caller = service.keys.admit(bearer(headers)).map_err(unauthenticated)?;
+fn admitted(service: &Service, access: Access, headers: &HeaderMap) -> Result<Arc<Caller>, (Asker, Problem)> {
+    let caller = service.keys.admit(bearer(headers)).map_err(|turned| {
+        let tenant = match &turned {
+            Turned::WrongKey { of } => of.clone(),
+            Turned::NoKey => None,
+        };
+        (Asker { tenant, key: "".into() }, unauthenticated(turned))
+    })?;
     match access {
         Access::Role(role) if !caller.may(role) => {
             let (role, detail) = (role.as_str(), format!("the call needs the role {}", role.as_str()));
             let rule = format!("must be a key with the role {role}");
-            Err(Problem::new(ProblemKind::Forbidden, detail).naming(
-                "Authorization",
-                format!("a key with {}", caller.roles()),
-                rule,
-            ))
+            let shown = format!("a key with {}", caller.roles());
+            let problem = Problem::new(ProblemKind::Forbidden, detail).naming("Authorization", shown, rule);
+            Err((Asker { tenant: Some(caller.tenant.clone()), key: caller.key().clone() }, problem))
         }
         _ => Ok(caller),
     }

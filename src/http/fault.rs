@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use super::problem::{Problem, ProblemKind};
 use crate::service::error::ServiceError;
+use crate::service::metrics as names;
 use crate::store::StoreError;
 
 impl From<ServiceError> for Problem {
@@ -57,6 +58,7 @@ impl From<ServiceError> for Problem {
 
 fn of_store(error: &StoreError) -> Problem {
     tracing::error!(error = error as &dyn Error, "the store failed");
+    names::count_failure(error);
     let kind = match error {
         StoreError::Full { .. } => ProblemKind::StorageFull,
         StoreError::Unavailable { .. } => ProblemKind::Overloaded,

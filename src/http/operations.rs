@@ -63,7 +63,7 @@ pub async fn health(State(service): State<Arc<Service>>) -> Result<Json<Health>,
 pub async fn metrics(State(service): State<Arc<Service>>) -> Result<Response, Problem> {
     let (jobs, sessions) = service.counts().await?;
     service.record_memory();
-    let text = telemetry::exposition(jobs, sessions, service.sessions.waiting());
+    let text = telemetry::exposition(jobs, sessions, service.sessions.waiting(), &service.keys.figures());
     Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response())
 }
 

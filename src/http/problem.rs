@@ -11,6 +11,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
+use crate::service::metrics::PROBLEMS;
 
 /// What went wrong, chosen by what the client should do next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -149,10 +150,24 @@ impl Problem {
     }
 }
 
+impl Problem {
+    fn slug(&self) -> &str {
+        self.kind.trim_start_matches("/problems/")
+    }
+}
+
+/// Shows every kind of problem as never met, so that the first one is seen as an increase.
+pub fn count_from_zero() {
+    for kind in ProblemKind::ALL {
+        metrics::counter!(PROBLEMS, "problem" => kind.entry().0).increment(0);
+    }
+}
+
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         const RETRY_AFTER_SECONDS: HeaderValue = HeaderValue::from_static("1");
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+        metrics::counter!(PROBLEMS, "problem" => self.slug().to_owned()).increment(1);
         let mut response = (status, Json(self)).into_response();
         let headers = response.headers_mut();
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));

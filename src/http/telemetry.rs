@@ -7,8 +7,12 @@ use axum::extract::{MatchedPath, Request};
 use axum::middleware::Next;
 use axum::response::Response;
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
+use tracing::Instrument;
 
-use crate::service::metrics as names;
+use super::access::Asker;
+use super::problem;
+use crate::service::keys::KeyFigures;
+use crate::service::{metrics as names, process, spans};
 use crate::store::JobCounts;
 
 /// The recorder is one per process, as the `metrics` crate has it.
@@ -23,6 +27,8 @@ pub fn install_recorder() {
             .and_then(|builder| builder.set_buckets_for_metric(step, &names::STEP_BUCKETS));
         let handle = builder.and_then(PrometheusBuilder::install_recorder);
         names::describe();
+        process::describe();
+        problem::count_from_zero();
         handle.inspect_err(|error| tracing::error!(%error, "no metrics")).ok()
     });
 }
@@ -41,7 +47,7 @@ pub async fn keep_up() {
 }
 
 /// The metrics page, with the counts of the store as they are now.
-pub fn exposition(jobs: JobCounts, sessions: u64, waiting: [(&'static str, usize); 2]) -> String {
+pub fn exposition(jobs: JobCounts, sessions: u64, waiting: [(&'static str, usize); 2], keys: &[KeyFigures]) -> String {
     let by_state = [
         ("queued", jobs.queued),
         ("running", jobs.running),
@@ -56,7 +62,8 @@ pub fn exposition(jobs: JobCounts, sessions: u64, waiting: [(&'static str, usize
     for (turn, requests) in waiting {
         metrics::gauge!(names::TURNS_WAITING, "turn" => turn).set(requests as f64);
     }
-    RECORDER.get().and_then(Option::as_ref).map(PrometheusHandle::render).unwrap_or_default()
+    process::record();
+    RECORDER.get().and_then(Option::as_ref).map(PrometheusHandle::render).unwrap_or_default() + &names::of_keys(keys)
 }
 
 /// Records one request.
@@ -66,7 +73,8 @@ pub async fn record(request: Request, next: Next) -> Response {
     let path = request.uri().path().to_owned();
     let route =
         request.extensions().get::<MatchedPath>().map_or("unmatched".to_owned(), |path| path.as_str().to_owned());
-    let response = next.run(request).await;
+    let span = spans::of_request(method.as_str(), &route);
+    let response = next.run(request).instrument(span.clone()).await;
     let (seconds, status) = (started.elapsed().as_secs_f64(), response.status().as_u16());
     // An unknown method would be a label of its own for every word a client can think of.
     let verb =
@@ -75,6 +83,13 @@ pub async fn record(request: Request, next: Next) -> Response {
         .record(seconds);
     metrics::counter!(names::HTTP_REQUESTS, "method" => verb, "route" => route, "status" => status.to_string())
         .increment(1);
-    tracing::info!(%method, path, status, seconds, "request");
+    let asker = response.extensions().get::<Asker>();
+    let tenant = asker.and_then(|asker| asker.tenant.as_ref()).map_or("", |tenant| tenant.as_str());
+    if matches!(status, 401 | 403 | 429) {
+        metrics::counter!(names::REFUSALS, "tenant" => tenant.to_owned(), "status" => status.to_string()).increment(1);
+    }
+    spans::answered(&span, status, asker.map(|_| tenant));
+    let key = asker.map_or("", |asker| &asker.key);
+    tracing::info!(%method, path, status, seconds, tenant, key, "request");
     response
 }

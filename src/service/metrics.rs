@@ -2,9 +2,10 @@
 
 use std::fmt::Write;
 
-use metrics::{Unit, describe_counter, describe_gauge, describe_histogram};
+use metrics::{Unit, counter, describe_counter, describe_gauge, describe_histogram};
 
 use super::keys::KeyFigures;
+use crate::store::StoreError;
 
 pub const TRAINING_STEP_SECONDS: &str = "ballast_training_step_duration_seconds";
 pub const OBSERVE_SECONDS: &str = "ballast_observe_duration_seconds";
@@ -44,8 +45,27 @@ pub fn of_keys(keys: &[KeyFigures]) -> String {
     text
 }
 
+/// Causes of [`STORE_FAILURES`]: rows that are not what was written, no room, not reached, and the rest, which are defects or
+/// end the process.
+const CAUSES: [&str; 4] = ["corrupt", "full", "unavailable", "other"];
+
+/// Counts a failure of the store by its cause.
+pub fn count_failure(error: &StoreError) {
+    let cause = match error {
+        StoreError::Corrupt { .. } => "corrupt",
+        StoreError::Full { .. } => "full",
+        StoreError::Unavailable { .. } => "unavailable",
+        _ => "other",
+    };
+    counter!(STORE_FAILURES, "cause" => cause).increment(1);
+}
+
 /// Tells the recorder what each metric means.
 pub fn describe() {
+    // Shown as never met, so that the first one is seen as an increase.
+    for cause in CAUSES {
+        counter!(STORE_FAILURES, "cause" => cause).increment(0);
+    }
     describe_histogram!(TRAINING_STEP_SECONDS, Unit::Seconds, "Duration of one backward step of a training.");
     describe_histogram!(OBSERVE_SECONDS, Unit::Seconds, "Duration of recording one observation, durably.");
     describe_histogram!(ACTION_SECONDS, Unit::Seconds, "Duration of finding one allocation, by mode.");
