@@ -10,6 +10,8 @@
 //!
 //! Beside them stands [`report`], a leaf that names no floor: charts, pages and tables from data, for people to read.
 
+#![forbid(unsafe_code)]
+
 pub mod control;
 pub mod http;
 pub mod numerics;

@@ -1,5 +1,7 @@
 //! Parses the command line and runs what it names.
 
+#![forbid(unsafe_code)]
+
 mod command;
 
 use std::process::ExitCode;

@@ -33,6 +33,7 @@ static MOST: AtomicUsize = AtomicUsize::new(0);
 static COUNTING: Counting = Counting;
 
 // SAFETY: every call is the system allocator's own; only sizes are added up beside it.
+#[expect(unsafe_code, reason = "an allocator is unsafe by its trait")]
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let now = NOW.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();

@@ -5,7 +5,11 @@ mod support;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
 
+use ballast::service::clock::Clock;
+use ballast::service::keys;
+use ballast::store::KeyRing;
 use serde_json::{Value, json};
 use support::{App, specification};
 
@@ -14,8 +18,8 @@ const ALERTS: &str = include_str!("../docker/alerts.yaml");
 const PROMETHEUS: &str = include_str!("../docker/prometheus.yaml");
 const CLUSTER: &str = include_str!("../docker/compose.cluster.yaml");
 
-/// Every `ballast_...` and `process_...` name with the labels asked of it, one each: `name` alone, or `name` and `label="value"`; of a status
-/// the name alone, since the one asked for may never happen.
+/// Every `ballast_...` and `process_...` name with the labels asked of it, one each: `name` alone, or `name` and
+/// `label="value"`; of a status the name alone, since the one asked for may never happen.
 fn metrics(expression: &str) -> Vec<(String, Option<String>)> {
     let mut found = Vec::new();
     let starts = ["ballast_", "process_"].iter().flat_map(|start| expression.match_indices(start));
@@ -26,7 +30,9 @@ fn metrics(expression: &str) -> Vec<(String, Option<String>)> {
         let braces = rest[end..].strip_prefix('{').and_then(|labels| labels.split('}').next());
         found.push((name.clone(), None));
         for label in braces.into_iter().flat_map(|labels| labels.split(',')).map(str::trim) {
-            if label.contains("=\"") {
+            // Prometheus itself says which job and instance it asked.
+            let is_own = label.contains("=\"") && !label.starts_with("job=") && !label.starts_with("instance=");
+            if is_own {
                 let label = if label.starts_with("status=") { "status=" } else { label };
                 found.push((name.clone(), Some(label.to_owned())));
             }
@@ -35,7 +41,11 @@ fn metrics(expression: &str) -> Vec<(String, Option<String>)> {
     found
 }
 
-/// What `/metrics` says after a training, an observation, an allocation and a refusal.
+async fn keyless(app: &App) -> u16 {
+    reqwest::get(format!("{}/jobs", app.url)).await.unwrap().status().as_u16()
+}
+
+/// What `/metrics` says after a training, an observation, an allocation and refusals, where a key is about to expire.
 async fn exposition() -> String {
     let mut app = App::start().await;
     app.train(&specification(2)).await;
@@ -44,6 +54,15 @@ async fn exposition() -> String {
     assert_eq!(app.action().await.0, 200);
     assert_eq!(app.get("/sessions/nobody").await.0, 404);
     assert_eq!(app.post("/what-if", &json!({ "session": app.session })).await.0, 200);
+    let ring = KeyRing::open(app.folder()).await.unwrap();
+    let (tenant, roles) = ("north".parse().unwrap(), "admin".parse().unwrap());
+    let expires_ms = Some(Clock::system().now_milliseconds() + 3_600_000);
+    let (_, secret) = keys::issue(&ring, tenant, roles, expires_ms, &Clock::system()).await.unwrap();
+    ring.close().await;
+    app.hold(secret.reveal());
+    while app.get("/no-such-path").await.0 != 404 || keyless(&app).await != 401 {
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
     app.client.get(format!("{}/metrics", app.url)).send().await.unwrap().text().await.unwrap()
 }
 

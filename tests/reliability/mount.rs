@@ -48,6 +48,7 @@ impl Mount {
         let root = File::open(self.path()).unwrap();
         let flags = NO_LOG_FLUSH;
         // SAFETY: the descriptor is open and the call reads one u32.
+        #[expect(unsafe_code, reason = "an ioctl of this file system alone")]
         let done = unsafe { libc::ioctl(root.as_raw_fd(), EXT4_IOC_SHUTDOWN, &raw const flags) };
         assert_eq!(done, 0, "{}", std::io::Error::last_os_error());
     }
