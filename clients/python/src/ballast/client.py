@@ -125,6 +125,10 @@ class Ballast:
         """All sessions, newest first."""
         return self._listed("/sessions", "sessions")
 
+    def audit(self, *, tenant: str | None = None, object: str | None = None) -> Iterator[wire.AuditEntry]:
+        """Who did what, newest first, of all tenants and things unless told; for keys with the role ``admin``."""
+        return self._listed("/audit", "entries", tenant=tenant, object=object)
+
     def health(self) -> wire.Health:
         """The service in a few words. Raises :class:`Overloaded` where it is draining."""
         return cast(wire.Health, self._transport.json("GET", "/health"))
@@ -138,10 +142,10 @@ class Ballast:
         headers = {"Idempotency-Key": str(uuid.uuid4()) if idempotency_key is None else idempotency_key}
         return cast(wire.Job, self._transport.json("POST", path, body=request, headers=headers))
 
-    def _listed(self, path: str, name: str) -> Iterator[Any]:
+    def _listed(self, path: str, name: str, **wanted: str | None) -> Iterator[Any]:
         after: int | None = None
         while True:
-            page = self._transport.json("GET", path, params={"after": after, "limit": _PAGE})
+            page = self._transport.json("GET", path, params={"after": after, "limit": _PAGE, **wanted})
             yield from page[name]
             after = page.get("next")
             if after is None:

@@ -10,6 +10,31 @@ AdviceSource: TypeAlias = Literal["policy_surrogate", "resolved", "resolved_outs
 """Where an advice came from."""
 
 
+class AuditEntry(TypedDict):
+    """One thing that was done."""
+
+    at_ms: int
+    """When, in milliseconds since 1970."""
+    tenant: str
+    key: NotRequired[str | None]
+    """The key's name; null where none was asked for, and of what was done by a command on the store."""
+    roles: str
+    """The key's roles, `anybody` where no key was asked for, `operator` of a command on the store, or `service`."""
+    action: str
+    object: str
+    """What it was done to."""
+    outcome: str
+    """What came of it."""
+
+
+class AuditPage(TypedDict):
+    """A page of the audit, newest first."""
+
+    entries: list[AuditEntry]
+    next: NotRequired[int | None]
+    """Give it as `after` for the next page; null on the last."""
+
+
 class Costs(TypedDict):
     """What the evaluation cost; the only part that differs between two runs."""
 
