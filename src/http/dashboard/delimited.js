@@ -91,12 +91,13 @@ function cellsOf(source, delimiter) {
   return delimiter === WHITESPACE ? words(source) : fields(source, delimiter);
 }
 
-/** A comma at the end of a word ends it; a percent sign belongs to the number before it. */
+/** A comma at the end of a word ends it, quotes around it are taken off, and a percent sign belongs to the number before it. */
 function words({ content, start, line }) {
   const found = [];
   for (const { 0: word, index } of content.matchAll(/\S+(?:[ \u00a0\u202f]+%)?/g)) {
-    const text = word.replace(/,$/, "");
-    if (text !== "") found.push({ text, line, column: found.length + 1, start: start + index });
+    const bare = word.replace(/,$/, "");
+    const text = bare.replace(/^"(.*)"$/, "$1");
+    if (text !== "") found.push({ text, line, column: found.length + 1, start: start + index + bare.indexOf(text) });
   }
   return found;
 }
