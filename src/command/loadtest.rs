@@ -17,6 +17,7 @@ mod load;
 mod populate;
 mod scenarios;
 mod server;
+mod stored;
 
 use figures::Report;
 use server::Server;
@@ -32,6 +33,9 @@ pub struct LoadTest {
     /// Start the service over this PostgreSQL database, which keeps what is written to it, instead of SQLite
     #[arg(long, conflicts_with = "url")]
     store: Option<String>,
+    /// Replicas over the PostgreSQL database, which share the clients
+    #[arg(long, default_value_t = 1, requires = "store", value_parser = clap::value_parser!(u8).range(1..=16))]
+    replicas: u8,
     /// Where the temporary data folder is made: the file system measured
     #[arg(long, default_value_os_t = std::env::temp_dir())]
     folder: PathBuf,
@@ -107,7 +111,7 @@ pub fn run(arguments: &LoadTest) -> Result<(), Box<dyn Error>> {
 async fn measure(arguments: &LoadTest) -> Result<Report, Box<dyn Error>> {
     let mut server = match &arguments.url {
         Some(url) => Server::at(url)?,
-        None => Server::start(&arguments.folder, arguments.store.as_deref()).await?,
+        None => Server::start(&arguments.folder, arguments.store.as_deref(), arguments.replicas.into()).await?,
     };
     let mut report = Report::default();
     scenarios::run(arguments, &mut server, &mut report).await?;

@@ -166,5 +166,6 @@ fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) 
 
 /// SHA-256 of a policy's portable form, in lower-case hexadecimal: the policy's name.
 pub fn content_hash(json: &[u8]) -> String {
-    Sha256::digest(json).iter().map(|byte| format!("{byte:02x}")).collect()
+    let digit = |value: u8| char::from(b"0123456789abcdef"[usize::from(value)]);
+    Sha256::digest(json).iter().flat_map(|byte| [digit(byte >> 4), digit(byte & 15)]).collect()
 }

@@ -1,5 +1,6 @@
 //! Every route, once: the router and its OpenAPI description come from the same list.
 
+use std::panic::AssertUnwindSafe;
 use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
@@ -8,7 +9,8 @@ use axum::extract::{Request, State};
 use axum::http::{Method, Uri};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
-use tower_http::catch_panic::CatchPanicLayer;
+use futures_util::FutureExt;
+use tracing::Instrument;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -99,13 +101,28 @@ pub fn application(service: Arc<Service>, config: &Config) -> Router {
     router
         .fallback(unknown_route)
         .method_not_allowed_fallback(wrong_method)
-        .layer(middleware::from_fn_with_state(gate, access::admit))
-        .layer(middleware::from_fn_with_state(config.request_timeout, within_time))
-        .layer(CatchPanicLayer::custom(|_| {
-            Problem::new(ProblemKind::Internal, "the cause is in the log").into_response()
-        }))
-        .layer(middleware::from_fn(telemetry::record))
+        .layer(middleware::from_fn_with_state(Surroundings { gate, limit: config.request_timeout }, answered))
         .with_state(service)
+}
+
+/// What every handler is run in.
+#[derive(Clone)]
+struct Surroundings {
+    gate: Gate,
+    limit: Duration,
+}
+
+/// Admits a request, bounds its time, answers where it panics, and records it. One layer, since each costs a request the
+/// clones and the allocations of all below it.
+async fn answered(State(around): State<Surroundings>, request: Request, next: Next) -> Response {
+    let recording = telemetry::Recording::start(&request);
+    let answering = within_time(around.limit, access::admit(State(around.gate), request, next));
+    let response = match AssertUnwindSafe(answering.instrument(recording.span())).catch_unwind().await {
+        Ok(response) => response,
+        Err(_) => Problem::new(ProblemKind::Internal, "the cause is in the log").into_response(),
+    };
+    recording.end(&response);
+    response
 }
 
 async fn unknown_route(uri: Uri) -> Problem {
@@ -119,8 +136,8 @@ async fn wrong_method(method: Method, uri: Uri) -> Problem {
 }
 
 /// Bounds the time to the head of the response, and so the time a slow body may take; event streams run on.
-async fn within_time(State(limit): State<Duration>, request: Request, next: Next) -> Response {
-    match tokio::time::timeout(limit, next.run(request)).await {
+async fn within_time(limit: Duration, answering: impl Future<Output = Response>) -> Response {
+    match tokio::time::timeout(limit, answering).await {
         Ok(response) => response,
         Err(_) => {
             let detail = format!("no answer within {} s", limit.as_secs());

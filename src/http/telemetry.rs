@@ -4,10 +4,10 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use axum::extract::{MatchedPath, Request};
-use axum::middleware::Next;
+use axum::http::Method;
 use axum::response::Response;
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
-use tracing::Instrument;
+use tracing::Span;
 
 use super::access::Asker;
 use super::problem;
@@ -66,30 +66,50 @@ pub fn exposition(jobs: JobCounts, sessions: u64, waiting: [(&'static str, usize
     RECORDER.get().and_then(Option::as_ref).map(PrometheusHandle::render).unwrap_or_default() + &names::of_keys(keys)
 }
 
-/// Records one request.
-pub async fn record(request: Request, next: Next) -> Response {
-    let started = Instant::now();
-    let method = request.method().clone();
-    let path = request.uri().path().to_owned();
-    let route =
-        request.extensions().get::<MatchedPath>().map_or("unmatched".to_owned(), |path| path.as_str().to_owned());
-    let span = spans::of_request(method.as_str(), &route);
-    let response = next.run(request).instrument(span.clone()).await;
-    let (seconds, status) = (started.elapsed().as_secs_f64(), response.status().as_u16());
-    // An unknown method would be a label of its own for every word a client can think of.
-    let verb =
-        if matches!(method.as_str(), "GET" | "POST" | "DELETE" | "HEAD") { method.to_string() } else { "other".into() };
-    metrics::histogram!(names::HTTP_REQUEST_SECONDS, "method" => verb.clone(), "route" => route.clone())
-        .record(seconds);
-    metrics::counter!(names::HTTP_REQUESTS, "method" => verb, "route" => route, "status" => status.to_string())
-        .increment(1);
-    let asker = response.extensions().get::<Asker>();
-    let tenant = asker.and_then(|asker| asker.tenant.as_ref()).map_or("", |tenant| tenant.as_str());
-    if matches!(status, 401 | 403 | 429) {
-        metrics::counter!(names::REFUSALS, "tenant" => tenant.to_owned(), "status" => status.to_string()).increment(1);
+/// A request under way, to be recorded when it is answered.
+pub struct Recording {
+    started: Instant,
+    method: Method,
+    path: String,
+    route: String,
+    span: Span,
+}
+
+impl Recording {
+    pub fn start(request: &Request) -> Self {
+        let method = request.method().clone();
+        let route = request.extensions().get::<MatchedPath>().map_or("unmatched", MatchedPath::as_str).to_owned();
+        let span = spans::of_request(method.as_str(), &route);
+        Recording { started: Instant::now(), method, path: request.uri().path().to_owned(), route, span }
     }
-    spans::answered(&span, status, asker.map(|_| tenant));
-    let key = asker.map_or("", |asker| &asker.key);
-    tracing::info!(%method, path, status, seconds, tenant, key, "request");
-    response
+
+    /// What is done for the request is done in it.
+    pub fn span(&self) -> Span {
+        self.span.clone()
+    }
+
+    pub fn end(self, response: &Response) {
+        let Recording { started, method, path, route, span } = self;
+        let (seconds, status) = (started.elapsed().as_secs_f64(), response.status().as_u16());
+        // An unknown method would be a label of its own for every word a client can think of.
+        let verb = match method {
+            Method::GET => "GET",
+            Method::POST => "POST",
+            Method::DELETE => "DELETE",
+            Method::HEAD => "HEAD",
+            _ => "other",
+        };
+        metrics::histogram!(names::HTTP_REQUEST_SECONDS, "method" => verb, "route" => route.clone()).record(seconds);
+        metrics::counter!(names::HTTP_REQUESTS, "method" => verb, "route" => route, "status" => status.to_string())
+            .increment(1);
+        let asker = response.extensions().get::<Asker>();
+        let tenant = asker.and_then(|asker| asker.tenant.as_ref()).map_or("", |tenant| tenant.as_str());
+        if matches!(status, 401 | 403 | 429) {
+            metrics::counter!(names::REFUSALS, "tenant" => tenant.to_owned(), "status" => status.to_string())
+                .increment(1);
+        }
+        spans::answered(&span, status, asker.map(|_| tenant));
+        let key = asker.map_or("", |asker| &asker.key);
+        tracing::info!(%method, path, status, seconds, tenant, key, "request");
+    }
 }

@@ -9,7 +9,7 @@
 use std::f64::consts::PI;
 
 use super::dispatch::dispatched;
-use super::matern::sum;
+use super::matern::{dot, sum};
 
 /// Coefficients of the polynomial that stands for F, and half the width of its interval. A chi law has a standard
 /// deviation below 0.71: outside lies at most 7e-5 of it, inside the polynomial is off by at most 3e-5. The share of 2000
@@ -18,17 +18,18 @@ const COEFFICIENTS: usize = 18;
 const HALF_WIDTH: f64 = 3.0;
 /// Shares staged on the stack between the two passes of a sum.
 const BLOCK: usize = 256;
-/// A search ends after a step of ln q below this; what is left is the step times the relative error of its slope.
-const TOLERANCE: f64 = 1e-9;
+/// What a search may leave in ln q. After a step that is the step times the relative error of its slope, and a slope
+/// measured over the step before is off by about the length of that.
+const TOLERANCE: f64 = 1e-12;
 /// The same for one of many sets of draws.
-const NEXT_TOLERANCE: f64 = 1e-4;
+const NEXT_TOLERANCE: f64 = 1e-6;
 const LONGEST_STEP: f64 = 0.5;
 const STEP_LIMIT: usize = 60;
-/// The slope of the share in ln q, before anything is known of it, and at least.
-const FIRST_SLOPE: f64 = 1.0;
+/// The slope of the share in ln q is at least this.
 const LEAST_SLOPE: f64 = 1e-6;
-/// Half the step of ln q over which that slope is measured for a standard error.
-const SLOPE_STEP: f64 = 1e-3;
+/// Relative error of the slope of a lognormal law in the place of the mixture, and of that of draws that are alike.
+const LOGNORMAL_SLOPE_ERROR: f64 = 0.1;
+const LAST_SLOPE_ERROR: f64 = 0.01;
 
 /// The law of R: chi, the length of a standard normal vector.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,6 +57,13 @@ struct Found {
     slope: f64,
 }
 
+/// Where a search starts: a quantile, the slope of the share in ln q there, and the relative error of that slope.
+struct Start {
+    quantile: f64,
+    slope: f64,
+    slope_error: f64,
+}
+
 impl ScaleMixture {
     /// R of `freedom` >= 1 dimensions. Cost O(freedom + 1000).
     pub fn chi(freedom: usize) -> Self {
@@ -72,7 +80,7 @@ impl ScaleMixture {
         self.quantile_within(TOLERANCE, share, draws, &mut LastQuantile::default())
     }
 
-    /// The same, to 1e-4 of itself at worst and mostly to 1e-6, for one of many sets of draws that are alike.
+    /// The same, to 1e-6 of itself, for one of many sets of draws that are alike.
     pub fn quantile_next(&self, share: f64, draws: &[f64], last: &mut LastQuantile) -> f64 {
         self.quantile_within(NEXT_TOLERANCE, share, draws, last)
     }
@@ -81,42 +89,60 @@ impl ScaleMixture {
     pub fn quantile_with_error(&self, share: f64, draws: &[f64]) -> (f64, f64) {
         let mut last = LastQuantile::default();
         let quantile = self.quantile_within(TOLERANCE, share, draws, &mut last);
-        if quantile <= 0.0 {
-            return (0.0, 0.0);
-        }
+        let Some(Found { slope, .. }) = last.found else { return (0.0, 0.0) };
         let square = self.mean(quantile, &last.reciprocals, |share| share * share);
         let variance = (square - share * share).max(0.0);
-        let [below, above] = [-SLOPE_STEP, SLOPE_STEP].map(|step| self.share(quantile * step.exp(), &last.reciprocals));
-        let density = ((above - below) / (2.0 * SLOPE_STEP)).max(LEAST_SLOPE) / quantile;
-        (quantile, (variance / draws.len() as f64).sqrt() / density)
+        (quantile, (variance / draws.len() as f64).sqrt() * quantile / slope)
     }
 
     fn quantile_within(&self, tolerance: f64, share: f64, draws: &[f64], last: &mut LastQuantile) -> f64 {
         let mean = sum(draws) / draws.len() as f64;
         if mean <= 0.0 {
+            last.found = None;
             return 0.0;
         }
         let LastQuantile { found, reciprocals } = last;
         reciprocals.resize(draws.len(), 0.0);
         dispatched!(reciprocals.iter_mut().zip(draws).for_each(|(reciprocal, draw)| *reciprocal = 1.0 / draw));
-        let start = found.unwrap_or(Found { ratio: self.typical, trend: 0.0, slope: FIRST_SLOPE });
-        let expected = (start.ratio + start.trend).max(0.5 * start.ratio);
-        let (quantile, slope) = self.search(tolerance, share, reciprocals, (mean * expected, start.slope));
+        let start = match found {
+            Some(last) => Start {
+                quantile: mean * (last.ratio + last.trend).max(0.5 * last.ratio),
+                slope: last.slope,
+                slope_error: LAST_SLOPE_ERROR,
+            },
+            None => self.lognormal(share, mean, draws),
+        };
+        let (quantile, slope) = self.search(tolerance, share, reciprocals, start);
         let ratio = quantile / mean;
         *found = Some(Found { ratio, trend: found.map_or(0.0, |before| ratio - before.ratio), slope });
         quantile
     }
 
+    /// The quantile and its slope were R h lognormal with the mean and the variance it has, nearly: ln R has a variance of
+    /// about 1/(2 m). Within 2 % from m = 20 on, which saves half of a search.
+    fn lognormal(&self, share: f64, mean: f64, draws: &[f64]) -> Start {
+        let square = dot(draws, draws) / draws.len() as f64;
+        let spread = (square / (mean * mean)).ln().max(0.0);
+        let deviation = (spread + 0.5 / (self.typical * self.typical)).sqrt();
+        let normal = normal_quantile(share);
+        Start {
+            quantile: mean * self.typical * (normal * deviation - 0.5 * spread).exp(),
+            slope: (-0.5 * normal * normal).exp() / ((2.0 * PI).sqrt() * deviation),
+            slope_error: LOGNORMAL_SLOPE_ERROR,
+        }
+    }
+
     /// The q with mean F(q / h) = `share`, and the slope there in ln q: secants from a start, and halves of the bracket
-    /// where they leave it, until a step of ln q is below the tolerance.
-    fn search(&self, tolerance: f64, share: f64, reciprocals: &[f64], start: (f64, f64)) -> (f64, f64) {
-        let (mut quantile, mut slope) = start;
+    /// where they leave it, until no more than the tolerance is left.
+    fn search(&self, tolerance: f64, share: f64, reciprocals: &[f64], start: Start) -> (f64, f64) {
+        let Start { mut quantile, mut slope, mut slope_error } = start;
         let (mut low, mut high) = (0.0, f64::INFINITY);
         let mut before: Option<(f64, f64)> = None;
         for _ in 0..STEP_LIMIT {
             let missing = share - self.share(quantile, reciprocals);
             if let Some((missed, step)) = before {
                 slope = ((missed - missing) / step).max(LEAST_SLOPE);
+                slope_error = step.abs();
             }
             if missing > 0.0 {
                 low = quantile
@@ -130,7 +156,7 @@ impl ScaleMixture {
                     - quantile.ln();
             }
             quantile *= step.exp();
-            if step.abs() < tolerance {
+            if step.abs() * slope_error < tolerance {
                 break;
             }
             before = Some((missing, step));
@@ -171,6 +197,14 @@ impl ScaleMixture {
         let [lower @ .., highest] = &self.coefficients;
         lower.iter().rev().fold(*highest, |sum, coefficient| sum.mul_add(position, *coefficient))
     }
+}
+
+/// Of the standard normal law, to 0.003 for shares in [0.001, 0.999]. Source: Shore (1982), Simple approximations for the
+/// inverse cumulative function, Applied Statistics 31.
+fn normal_quantile(share: f64) -> f64 {
+    let beyond = share.min(1.0 - share);
+    let size = 5.5556 * (1.0 - (beyond / (1.0 - beyond)).powf(0.1186));
+    if share < 0.5 { -size } else { size }
 }
 
 /// The coefficients, constant first, of the polynomial through `value` at the Chebyshev points of [-1, 1].

@@ -7,7 +7,8 @@
 //!    checks, so a damaged row is [`StoreError::Corrupt`], never an action.
 //! 3. A worker whose lease ran out changes nothing: every write of a job names the `attempt` it was claimed under.
 //! 4. Decisions about one thing follow each other, whoever makes them: over SQLite because one process holds the folder
-//!    and has one writer, over PostgreSQL because each decision first locks the row it rests on. Keys are the exception:
+//!    and has one writer, over PostgreSQL because each decision first locks the row it rests on, or, of an observation that
+//!    is appended, because the table's keys admit one. Keys are the exception:
 //!    a [`KeyRing`] adds and revokes them beside the process that holds the folder, one statement each.
 //!
 //! What is decided is written once, in `jobs`, `keys`, `leases`, `policies`, `sessions` and `observations`; how a statement is

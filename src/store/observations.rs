@@ -1,12 +1,12 @@
 //! Observations: append-only, numbered by period from 1, each stored exactly once.
 
-use std::fmt::Write;
 use std::sync::LazyLock;
 
 use futures_util::FutureExt;
 
 use super::codec::{Seal, from_sql, to_sql};
 use super::error::Failure;
+use super::postgres::Database;
 use super::query::{Connection, Query, Row, query};
 use super::sessions::Head;
 use super::{Engine, Store, StoreError};
@@ -61,9 +61,7 @@ impl Store {
     pub async fn append_observation(&self, new: NewObservation) -> Result<Append, StoreError> {
         match &self.engine {
             Engine::Sqlite(folder) => folder.append(new).await,
-            Engine::Postgres(database) => {
-                database.write(APPENDING, move |connection| append(connection, new).boxed()).await
-            }
+            Engine::Postgres(database) => append_shared(database, new).await,
         }
     }
 
@@ -94,6 +92,18 @@ pub(super) fn numbered(session: &str, rows: &[Row]) -> Result<Vec<ObservationRow
     match rows.iter().zip(1..).find(|(row, period)| row.period != *period) {
         None => Ok(rows),
         Some((_, period)) => Err(Failure::Corrupt(format!("period {period} of session {session}"))),
+    }
+}
+
+/// Appends by one statement, which commits by itself: two that append the same period, or one beside a deletion, meet at the
+/// table's keys. Why a period is not appended is found out under the lock of its session.
+async fn append_shared(database: &Database, new: NewObservation) -> Result<Append, StoreError> {
+    match database.execute(APPENDING, bind_row(query(INSERT_ONE.as_str()), &new)).await {
+        Ok(rows) if rows > 0 => Ok(Append::Appended),
+        Ok(_) | Err(StoreError::Refused { .. }) => {
+            database.write(APPENDING, move |connection| append(connection, new).boxed()).await
+        }
+        Err(error) => Err(error),
     }
 }
 
@@ -140,35 +150,58 @@ async fn repeated(connection: &mut Connection<'_>, new: &NewObservation) -> Resu
     })
 }
 
-/// Rows that one statement takes where many wait.
-pub(super) const ROWS_AT_ONCE: usize = 8;
+const NAMES: &str = "session, period, content_hash, log_return, executed_allocation, advised_allocation,
+                     wealth_after, answer_json, created_ms, seal";
 const COLUMNS: usize = 10;
+/// The period after the last that `new.session` has.
+const NEXT: &str = "(SELECT coalesce(max(period), 0) + 1 FROM observations WHERE observations.session = new.session)";
 
-static INSERT_ONE: LazyLock<String> = LazyLock::new(|| insert_statement(1));
-static INSERT_MANY: LazyLock<String> = LazyLock::new(|| insert_statement(ROWS_AT_ONCE));
-
-/// Inserts, of so many rows, each whose period is the one after the last of a session that exists.
-fn insert_statement(rows: usize) -> String {
-    const NAMES: &str = "session, period, content_hash, log_return, executed_allocation, advised_allocation,
-                         wealth_after, answer_json, created_ms, seal";
-    let mut values = String::new();
-    for row in 0..rows {
-        let numbers: Vec<String> = (1..=COLUMNS).map(|column| format!("${}", row * COLUMNS + column)).collect();
-        // Writing to a string cannot fail.
-        let _ = write!(values, "{}({})", if row == 0 { "" } else { ", " }, numbers.join(", "));
-    }
+/// Inserts a row whose period is the one after the last of a session that exists.
+static INSERT_ONE: LazyLock<String> = LazyLock::new(|| {
+    let numbers: Vec<String> = (1..=COLUMNS).map(|column| format!("${column}")).collect();
     format!(
-        "WITH new ({NAMES}) AS (VALUES {values})
+        "WITH new ({NAMES}) AS (VALUES ({}))
          INSERT INTO observations ({NAMES}) SELECT new.* FROM new CROSS JOIN sessions
-         WHERE sessions.session = new.session AND new.period =
-             (SELECT coalesce(max(period), 0) + 1 FROM observations WHERE observations.session = new.session)"
+         WHERE sessions.session = new.session AND new.period = {NEXT}",
+        numbers.join(", ")
+    )
+});
+
+/// Powers of two, so that any number of rows finds a statement of less than twice its size.
+const SIZES: usize = 7;
+/// Rows that one statement takes at most.
+pub(super) const ROWS_AT_ONCE: usize = 1 << (SIZES - 1);
+
+static INSERT_MANY: [LazyLock<String>; SIZES] = [
+    LazyLock::new(|| insert_all(1)),
+    LazyLock::new(|| insert_all(2)),
+    LazyLock::new(|| insert_all(4)),
+    LazyLock::new(|| insert_all(8)),
+    LazyLock::new(|| insert_all(16)),
+    LazyLock::new(|| insert_all(32)),
+    LazyLock::new(|| insert_all(64)),
+];
+
+/// Inserts so many rows of SQLite, or none: one that is not the next of its session has no seal, which the table refuses,
+/// and a session that does not exist is refused as what it refers to. Values not bound are NULL, a row of them is none.
+fn insert_all(rows: usize) -> String {
+    let sealed = NAMES.replace("seal", &format!("CASE period WHEN {NEXT} THEN seal END"));
+    let row = format!("({})", ["?"; COLUMNS].join(", "));
+    format!(
+        "INSERT INTO observations ({NAMES}) WITH new ({NAMES}) AS (VALUES {})
+         SELECT {sealed} FROM new WHERE session IS NOT NULL",
+        vec![row; rows].join(", ")
     )
 }
 
-/// Inserts [`ROWS_AT_ONCE`] rows. False where not all of them are the next ones of their sessions: some may be inserted.
-pub(super) async fn append_many(connection: &mut Connection<'_>, new: &[&NewObservation]) -> Result<bool, Failure> {
-    let insert = new.iter().fold(query(INSERT_MANY.as_str()), |insert, new| bind_row(insert, new));
-    Ok(connection.execute(insert).await? == new.len() as u64)
+/// Inserts up to [`ROWS_AT_ONCE`] rows, all of them or none, by one statement of SQLite.
+///
+/// # Errors
+/// Also where not all of them are the next ones of sessions that exist.
+pub(super) async fn append_all(connection: &mut Connection<'_>, new: &[&NewObservation]) -> Result<(), Failure> {
+    let size = new.len().next_power_of_two().trailing_zeros() as usize;
+    let insert = new.iter().fold(query(INSERT_MANY[size].as_str()), |insert, new| bind_row(insert, new));
+    connection.execute(insert).await.map(drop)
 }
 
 /// Inserts the period where it is the one after the last of a session that exists.

@@ -1,9 +1,14 @@
 //! What the machine itself does, whoever asks.
 
+use std::error::Error;
 use std::fs::File;
 use std::io::{self, Seek, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+
+use std::process::Command;
+
+use super::stored;
 
 /// A page of SQLite.
 const PAGE: [u8; 4096] = [7; 4096];
@@ -30,4 +35,45 @@ pub fn syncs_per_second(folder: &Path, time: Duration) -> io::Result<f64> {
     let rate = syncs as f64 / started.elapsed().as_secs_f64();
     std::fs::remove_file(path)?;
     Ok(rate)
+}
+
+/// Connections of one replica to its database, and of `pgbench` in its place.
+pub const CONNECTIONS: usize = 10;
+/// Rows of the size of an observation's, under a key as spread as a session's name.
+const TABLE: &str =
+    "CREATE TABLE ballast_loadtest (session TEXT, period BIGINT, row TEXT, PRIMARY KEY (session, period))";
+const INSERT: &str = "INSERT INTO ballast_loadtest VALUES (md5(random()::text), 1, repeat('x', 560));\n";
+const DROP: &str = "DROP TABLE IF EXISTS ballast_loadtest";
+
+/// Rows that `pgbench` inserts a second, each in a transaction of its own; `None` where it is not installed.
+///
+/// # Errors
+/// The database cannot be reached, or `pgbench` fails.
+pub async fn inserts_per_second(folder: &Path, store: &str, time: Duration) -> Result<Option<f64>, Box<dyn Error>> {
+    let Some(pgbench) = pgbench() else { return Ok(None) };
+    let script = folder.join("pgbench.sql");
+    std::fs::write(&script, INSERT)?;
+    stored::execute(store, DROP).await?;
+    stored::execute(store, TABLE).await?;
+    let (connections, seconds) = (CONNECTIONS.to_string(), time.as_secs().max(1).to_string());
+    let mut command = Command::new(pgbench);
+    command.args(["--no-vacuum", "--protocol=prepared", "--client", &connections, "--time", &seconds, "--file"]);
+    let output = command.arg(&script).arg(store).output()?;
+    stored::execute(store, DROP).await?;
+    let said = String::from_utf8_lossy(&output.stdout);
+    let rate = said.lines().find_map(|line| line.strip_prefix("tps = ")?.split_whitespace().next()?.parse().ok());
+    match rate {
+        Some(rate) => Ok(Some(rate)),
+        None => Err(format!("pgbench: {said}{}", String::from_utf8_lossy(&output.stderr)).into()),
+    }
+}
+
+/// Among the newest of Debian's, else on the path.
+fn pgbench() -> Option<PathBuf> {
+    let versions = std::fs::read_dir("/usr/lib/postgresql").into_iter().flatten();
+    let mut folders: Vec<PathBuf> = versions.filter_map(|entry| Some(entry.ok()?.path().join("bin"))).collect();
+    folders.sort();
+    folders.reverse();
+    folders.extend(std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()));
+    folders.into_iter().map(|folder| folder.join("pgbench")).find(|program| program.exists())
 }

@@ -61,13 +61,15 @@ impl Load {
     }
 }
 
-/// Each of `clients` connections sends its requests one after the other, the next once the last is answered.
+/// Each of `clients` connections, spread over the replicas at `addresses`, sends its requests one after the other, the next
+/// once the last is answered.
 pub async fn saturate<R: Iterator<Item = Vec<u8>>>(
-    address: SocketAddr,
+    addresses: &[SocketAddr],
     clients: usize,
     requests: impl Fn(usize) -> R,
 ) -> Result<Load, ConnectionError> {
-    let mut connections = try_join_all((0..clients).map(|_| Connection::open(address))).await?;
+    let connecting = addresses.iter().cycle().take(clients).map(|&address| Connection::open(address));
+    let mut connections = try_join_all(connecting).await?;
     let started = Instant::now();
     let clients = connections.iter_mut().zip(0..).map(|(connection, client)| one_by_one(connection, requests(client)));
     let milliseconds = try_join_all(clients).await?.concat();

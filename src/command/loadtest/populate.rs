@@ -48,7 +48,7 @@ impl World {
         let pool = TrainingPool::new(std::thread::available_parallelism().map_or(1, usize::from))?;
         let trained = pool.install(|| training.run(&watch))?;
         let import = post("/policies/import", &String::from_utf8(trained.to_json())?);
-        let imported = Connection::open(server.address).await?.exchange(&import).await?.to_vec();
+        let imported = Connection::open(server.addresses[0]).await?.exchange(&import).await?.to_vec();
         let policy = text(&serde_json::from_slice(&imported)?, "policy")?;
         let specification = trained.specification().clone();
         Ok(World { policy, horizon, specification, returns: paper::history(RETURNS, 2) })
@@ -58,7 +58,7 @@ impl World {
     pub async fn open(&self, server: &Server, clients: usize, count: u32) -> Result<Vec<String>, Box<dyn Error>> {
         tell(&format!("opening {count} sessions"));
         let request = post("/sessions", &format!(r#"{{"policy":"{}"}}"#, self.policy));
-        let opened = bodies(server.address, clients, &vec![request; count as usize]).await?;
+        let opened = bodies(server.addresses[0], clients, &vec![request; count as usize]).await?;
         opened.iter().map(|body| text(&serde_json::from_slice(body)?, "session")).collect()
     }
 
@@ -107,14 +107,14 @@ impl World {
 pub async fn long_training(server: &Server) -> Result<String, Box<dyn Error>> {
     let mut specification = specification(60, 1000);
     specification.seed = 2;
-    let job = ApiClient::new(server.address).post("/train", &serde_json::to_value(&specification)?).await?;
+    let job = ApiClient::new(server.addresses[0]).post("/train", &serde_json::to_value(&specification)?).await?;
     text(&job, "job")
 }
 
 /// The coming period of each session.
 pub async fn periods(server: &Server, clients: usize, sessions: &[String]) -> Result<Vec<u64>, Box<dyn Error>> {
     let requests: Vec<_> = sessions.iter().map(|session| get(&format!("/sessions/{session}"))).collect();
-    let answers = bodies(server.address, clients, &requests).await?;
+    let answers = bodies(server.addresses[0], clients, &requests).await?;
     answers
         .iter()
         .map(|body| {

@@ -8,6 +8,7 @@ use super::figures::{Bound, Must, Report};
 use super::load::{Load, paced, saturate};
 use super::populate::{World, long_training, periods};
 use super::server::Server;
+use super::stored::Growth;
 use super::{LoadTest, Scenario, limits, tell};
 use crate::command::api_client::ApiClient;
 
@@ -29,6 +30,15 @@ pub async fn run(arguments: &LoadTest, server: &mut Server, report: &mut Report)
         tell("syncing the disk");
         let rate = limits::syncs_per_second(folder, time / 3)?;
         report.rate("limit: pages written and synced, one by one", rate);
+    }
+    if let (Some(folder), Some(store)) = (server.folder(), server.store()) {
+        tell("inserting rows by pgbench");
+        match limits::inserts_per_second(folder, store, time).await? {
+            Some(rate) => {
+                report.rate(format!("limit: pgbench, a row a commit, {} connections", limits::CONNECTIONS), rate)
+            }
+            None => report.note("no pgbench here: what the database itself does is not known"),
+        }
     }
     let world = World::train(server, arguments).await?;
     let test = Test { arguments, world, clients: usize::from(arguments.clients), time };
@@ -69,16 +79,19 @@ impl Test<'_> {
         let report = |period: usize, (index, session): (usize, &String)| self.world.observation(session, index, period);
         let requests =
             |client: usize| periods.clone().flat_map(move |period| own(client).map(move |one| report(period, one)));
-        Ok(Load::on(server, saturate(server.address, self.clients, requests)).await?)
+        Ok(Load::on(server, saturate(&server.addresses, self.clients, requests)).await?)
     }
 
     async fn observe(&self, server: &Server, report: &mut Report) -> Result<(), Box<dyn Error>> {
         let (count, horizon) = (self.arguments.sessions, self.world.horizon);
-        let mut load = Load::default();
+        let (mut load, mut growth) = (Load::default(), Growth::default());
         for _ in 0..self.arguments.rounds {
+            growth.start(server).await?;
             let sessions = self.world.open(server, self.clients, count).await?;
+            growth.opened(server).await?;
             tell(&format!("{} observations from {} clients", sessions.len() * horizon, self.clients));
             load.add(self.observed(server, &sessions, 1..=horizon).await?);
+            growth.observed(server).await?;
             let coming = periods(server, self.clients, &sessions).await?;
             if let Some(period) = coming.iter().find(|&&period| period != horizon as u64 + 1) {
                 return Err(format!("a session is at period {period} after {horizon} observations").into());
@@ -86,6 +99,7 @@ impl Test<'_> {
         }
         let must = Must { rate: Some(OBSERVES_PER_SECOND), p99_ms: Some(OBSERVE_P99_MS) };
         report.load(format!("observe: {} clients, {count} sessions", self.clients), &load, must);
+        growth.tell(load.requests() / horizon, load.requests(), report);
         Ok(())
     }
 
@@ -104,7 +118,7 @@ impl Test<'_> {
             tell("the same while 1,000 design points are trained");
             let job = long_training(server).await?;
             let load = self.now_and_then(server, sessions).await?;
-            ApiClient::new(server.address).delete(&format!("/jobs/{job}")).await?;
+            ApiClient::new(server.addresses[0]).delete(&format!("/jobs/{job}")).await?;
             let must = Must { p99_ms: Some(TRAINING_P99_MS), ..Must::default() };
             report.load("action-while-training", &load, must);
         }
@@ -113,7 +127,7 @@ impl Test<'_> {
 
     async fn now_and_then(&self, server: &Server, sessions: &[String]) -> Result<Load, Box<dyn Error>> {
         let ask = |turn: usize| action(&sessions[turn % sessions.len()]);
-        Ok(Load::on(server, paced(server.address, LOW_RATE, self.time, ask)).await?)
+        Ok(Load::on(server, paced(server.addresses[0], LOW_RATE, self.time, ask)).await?)
     }
 
     /// In turns, so that what else the machine does meets both.
@@ -126,14 +140,14 @@ impl Test<'_> {
         tell("asking for advice and for life, in turns");
         let actions: Vec<_> = sessions.iter().map(|session| action(session)).collect();
         let own = |client: usize| actions.iter().skip(client).step_by(self.clients).cloned();
-        let first = Load::on(server, saturate(server.address, self.clients, own)).await?;
+        let first = Load::on(server, saturate(&server.addresses, self.clients, own)).await?;
         report.load("action: first asks, all clients", &first, Must::default());
         let (mut livez, mut asked) = (Load::default(), Load::default());
         for _ in 0..TURNS {
             let alive = |_| self.for_a_turn(std::iter::repeat(get("/livez")));
-            livez.add(Load::on(server, saturate(server.address, self.clients, alive)).await?);
+            livez.add(Load::on(server, saturate(&server.addresses, self.clients, alive)).await?);
             let advised = |client| self.for_a_turn(actions.iter().cycle().skip(17 * client).cloned());
-            asked.add(Load::on(server, saturate(server.address, self.clients, advised)).await?);
+            asked.add(Load::on(server, saturate(&server.addresses, self.clients, advised)).await?);
         }
         report.load(format!("limit: /livez, {} clients", self.clients), &livez, Must::default());
         report.load(format!("action: {} clients, in turns with /livez", self.clients), &asked, Must::default());

@@ -1,4 +1,5 @@
-//! The service under load: a process of its own over a data folder of its own, or one that runs already.
+//! The service under load: a process of its own over a data folder of its own, replicas over one database, or one that runs
+//! already.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader};
@@ -31,23 +32,38 @@ pub enum ServerError {
 }
 
 pub struct Server {
-    pub address: SocketAddr,
+    /// Of each replica.
+    pub addresses: Vec<SocketAddr>,
     own: Option<Own>,
 }
 
 /// What is ours to end.
 struct Own {
-    child: Child,
-    // After the child: the process lets go of the folder before the folder goes.
+    replicas: Vec<Child>,
+    // After the processes: they let go of the folder before the folder goes.
     folder: DataFolder,
     store: Option<String>,
 }
 
+impl Own {
+    fn start(&mut self, replicas: usize) -> Result<Vec<SocketAddr>, ServerError> {
+        let start = |_| {
+            let (child, address) = spawn(self.folder.path(), self.store.as_deref())?;
+            self.replicas.push(child);
+            Ok(address)
+        };
+        (0..replicas).map(start).collect()
+    }
+
+    fn end(&mut self) -> io::Result<()> {
+        self.replicas.drain(..).try_for_each(|mut child| child.kill().and_then(|()| child.wait()).map(drop))
+    }
+}
+
 impl Drop for Own {
     fn drop(&mut self) {
-        // An error means that it has ended already.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        // An error means that they have ended already.
+        let _ = self.end();
     }
 }
 
@@ -57,30 +73,29 @@ impl Server {
         let host = url.trim_start_matches("http://").trim_end_matches('/');
         let found = host.to_socket_addrs().ok().and_then(|mut addresses| addresses.next());
         let address = found.ok_or_else(|| ServerError::Url { url: url.to_owned() })?;
-        Ok(Server { address, own: None })
+        Ok(Server { addresses: vec![address], own: None })
     }
 
-    /// Runs `ballast serve` over a new folder in `parent` and waits until it is ready.
-    pub async fn start(parent: &Path, store: Option<&str>) -> Result<Self, ServerError> {
+    /// Runs `ballast serve` over a new folder in `parent`, or so many over one database, and waits until all are ready.
+    pub async fn start(parent: &Path, store: Option<&str>, replicas: usize) -> Result<Self, ServerError> {
         let folder = DataFolder::make_in(parent, "loadtest")?;
-        let (child, address) = spawn(folder.path(), store)?;
-        let server = Server { address, own: Some(Own { child, folder, store: store.map(str::to_owned) }) };
+        let mut own = Own { replicas: Vec::new(), folder, store: store.map(str::to_owned) };
+        let server = Server { addresses: own.start(replicas)?, own: Some(own) };
         server.until_ready().await?;
         Ok(server)
     }
 
-    /// Kills the process, does `meanwhile` to what it left, and starts another; the time from start to ready.
-    /// `None` where the process is not ours.
+    /// Kills the processes, does `meanwhile` to what they left, and starts others; the time from start to ready.
+    /// `None` where they are not ours.
     pub async fn restart<E: From<ServerError>>(
         &mut self,
         meanwhile: impl AsyncFnOnce(&Path, Option<&str>) -> Result<(), E>,
     ) -> Result<Option<Duration>, E> {
         let Some(own) = &mut self.own else { return Ok(None) };
-        let ended = own.child.kill().and_then(|()| own.child.wait());
-        ended.map_err(|source| ServerError::Process { doing: "ending the service", source })?;
+        own.end().map_err(|source| ServerError::Process { doing: "ending the service", source })?;
         meanwhile(own.folder.path(), own.store.as_deref()).await?;
         let started = Instant::now();
-        (own.child, self.address) = spawn(own.folder.path(), own.store.as_deref())?;
+        self.addresses = own.start(self.addresses.len())?;
         self.until_ready().await?;
         Ok(Some(started.elapsed()))
     }
@@ -89,35 +104,58 @@ impl Server {
         self.own.as_ref().map(|own| own.folder.path())
     }
 
-    /// Most resident memory so far, in MB; `None` where the process is not ours or the system does not tell.
-    pub fn peak_memory_mb(&self) -> Option<f64> {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", self.own.as_ref()?.child.id())).ok()?;
-        let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-        line.trim().strip_suffix(" kB")?.parse::<f64>().ok().map(|kb| kb / 1024.0)
+    /// The database that the service was started over, where it was one.
+    pub fn store(&self) -> Option<&str> {
+        self.own.as_ref()?.store.as_deref()
     }
 
-    /// Processor time it has taken, in seconds, to the hundredth that Linux counts in; `None` as above.
+    /// Bytes of the SQLite database without its log, which is emptied as it goes; `None` where there is none of ours.
+    pub fn database_bytes(&self) -> Option<u64> {
+        let own = self.own.as_ref().filter(|own| own.store.is_none())?;
+        Some(std::fs::metadata(own.folder.path().join("ballast.sqlite")).ok()?.len())
+    }
+
+    /// Most resident memory of one process so far, in MB; `None` where none is ours or the system does not tell.
+    pub fn peak_memory_mb(&self) -> Option<f64> {
+        let peak = |child: &Child| {
+            let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
+            let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+            line.trim().strip_suffix(" kB")?.parse::<f64>().ok().map(|kb| kb / 1024.0)
+        };
+        self.own.as_ref()?.replicas.iter().map(peak).try_fold(0.0, |most: f64, peak| Some(most.max(peak?)))
+    }
+
+    /// Processor time all of it has taken, in seconds, to the hundredth that Linux counts in; `None` as above.
     pub fn processor_seconds(&self) -> Option<f64> {
-        const TICKS_PER_SECOND: f64 = 100.0;
-        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.own.as_ref()?.child.id())).ok()?;
-        // Past the name, which may hold anything: the state is the first field, user and system time are 12th and 13th.
-        let mut fields = stat.rsplit_once(')')?.1.split_whitespace().skip(11);
-        let mut ticks = || fields.next()?.parse::<f64>().ok();
-        Some((ticks()? + ticks()?) / TICKS_PER_SECOND)
+        self.own.as_ref()?.replicas.iter().map(processor_seconds).sum()
     }
 
     async fn until_ready(&self) -> Result<(), ServerError> {
         let started = Instant::now();
-        while started.elapsed() < PATIENCE {
-            if let Ok(mut connection) = Connection::open(self.address).await
-                && connection.exchange(&get("/readyz")).await.is_ok()
-            {
-                return Ok(());
+        for &address in &self.addresses {
+            while !is_ready(address).await {
+                if started.elapsed() > PATIENCE {
+                    return Err(ServerError::NotReady);
+                }
+                tokio::time::sleep(POLL).await;
             }
-            tokio::time::sleep(POLL).await;
         }
-        Err(ServerError::NotReady)
+        Ok(())
     }
+}
+
+async fn is_ready(address: SocketAddr) -> bool {
+    let Ok(mut connection) = Connection::open(address).await else { return false };
+    connection.exchange(&get("/readyz")).await.is_ok()
+}
+
+fn processor_seconds(child: &Child) -> Option<f64> {
+    const TICKS_PER_SECOND: f64 = 100.0;
+    let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id())).ok()?;
+    // Past the name, which may hold anything: the state is the first field, user and system time are 12th and 13th.
+    let mut fields = stat.rsplit_once(')')?.1.split_whitespace().skip(11);
+    let mut ticks = || fields.next()?.parse::<f64>().ok();
+    Some((ticks()? + ticks()?) / TICKS_PER_SECOND)
 }
 
 /// Logs as it does in service, to a file of the folder.

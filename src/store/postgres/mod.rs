@@ -1,7 +1,8 @@
 //! A PostgreSQL database that any number of processes share.
 //!
 //! Isolation is `READ COMMITTED`: each decision locks the row it rests on, then reads what the decision needs by a
-//! statement of its own. One statement that locks and reads would not do: after waiting for the lock it would still read
+//! statement of its own. Only an observation is first tried without a lock, by one statement that the keys of its table
+//! refuse where another came before. One statement that locks and reads would not do: after waiting for the lock it would still read
 //! what was there when it began.
 //!
 //! Nothing waits without end: PostgreSQL bounds statements, waits for locks and transactions whose client fell silent
@@ -107,6 +108,12 @@ impl Database {
 
     pub(super) async fn read(&self, doing: &'static str, query: Query) -> Result<Vec<Row>, StoreError> {
         self.bounded(doing, |connection| async move { Connection::Postgres(connection).rows(query).await }.boxed())
+            .await
+    }
+
+    /// Runs one statement, a transaction of its own; the number of rows it changed.
+    pub(super) async fn execute(&self, doing: &'static str, query: Query) -> Result<u64, StoreError> {
+        self.bounded(doing, |connection| async move { Connection::Postgres(connection).execute(query).await }.boxed())
             .await
     }
 

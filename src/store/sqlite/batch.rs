@@ -1,13 +1,13 @@
-//! Observations that wait together go into the table together: one statement for many rows, since handing a statement to
-//! SQLite costs more than what it does to one row.
+//! Observations that wait together go into the table together: one statement for all of them, since handing a statement
+//! to SQLite, which has a thread of its own, costs more than what it does to one row.
 
 use futures_util::FutureExt;
 use sqlx::SqliteConnection;
 use tokio::sync::oneshot;
 
-use super::writer::{Answer, Operation, Undo, Waiting, execute};
+use super::writer::{Answer, Operation, Undo, Waiting};
 use crate::store::error::StoreError;
-use crate::store::observations::{APPENDING, Append, NewObservation, ROWS_AT_ONCE, append, append_many};
+use crate::store::observations::{self, APPENDING, Append, NewObservation, append};
 use crate::store::query::Connection;
 
 /// An observation to append, and where its answer goes.
@@ -34,8 +34,8 @@ impl Appending {
     }
 }
 
-/// Appends what waits, as far as it fills whole statements, at the start of a transaction. The rest is left to go alone,
-/// and so is everything where one of them cannot be appended.
+/// Appends what waits by one statement, which is a transaction of its own where none is open. Where one of them cannot be
+/// appended none is, and all are left to go alone: which of them it was is found out one by one.
 ///
 /// # Errors
 /// What ended the group; those that ran are among the answers.
@@ -44,31 +44,20 @@ pub(super) async fn append_all(
     waiting: &mut Waiting,
     answers: &mut Vec<Answer>,
 ) -> Result<(), StoreError> {
-    let whole = waiting.appends.len() / ROWS_AT_ONCE * ROWS_AT_ONCE;
-    let batch: Vec<_> = waiting.appends.drain(..whole).collect();
-    let end = append_rows(connection, &batch).await;
-    match end {
-        Ok(false) => waiting.operations.extend(batch.into_iter().map(Appending::alone)),
-        _ => answers.extend(batch.into_iter().map(Appending::appended)),
-    }
-    end.map(drop)
-}
-
-/// All of them, or none and false.
-async fn append_rows(connection: &mut SqliteConnection, batch: &[Appending]) -> Result<bool, StoreError> {
-    for rows in batch.chunks(ROWS_AT_ONCE) {
-        let rows: Vec<&NewObservation> = rows.iter().map(|appending| &appending.new).collect();
-        let appended = append_many(&mut Connection::Sqlite(connection), &rows).await;
-        match appended.map_err(|failure| failure.during(APPENDING)) {
-            Ok(true) => {}
-            Err(error) if error.ends_group() => return Err(error),
-            // Which of them it was is found out one by one.
-            _ => {
-                execute(connection, "ROLLBACK").await?;
-                execute(connection, "BEGIN IMMEDIATE").await?;
-                return Ok(false);
-            }
+    let batch = std::mem::take(&mut waiting.appends);
+    let rows: Vec<&NewObservation> = batch.iter().map(|appending| &appending.new).collect();
+    let end = match rows.as_slice() {
+        [] => Ok(()),
+        rows => observations::append_all(&mut Connection::Sqlite(connection), rows).await,
+    };
+    match end.map_err(|failure| failure.during(APPENDING)) {
+        Err(error) if !error.ends_group() => {
+            waiting.operations.extend(batch.into_iter().map(Appending::alone));
+            Ok(())
+        }
+        end => {
+            answers.extend(batch.into_iter().map(Appending::appended));
+            end
         }
     }
-    Ok(true)
 }

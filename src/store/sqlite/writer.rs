@@ -1,9 +1,10 @@
 //! The one writer: operations that wait together are committed together.
 //!
 //! A commit costs one fsync however much it holds, so each transaction takes every operation that waits, up to [`GROUP`].
-//! Each runs in a savepoint of its own, or changes rows by a single statement: one that fails is undone alone. Answers leave after the commit. Errors after which
-//! SQLite may have rolled back by itself (disk full, I/O) fail every operation that ran in the group; those that had not
-//! run yet go to the next one. After a fatal error the writer stops for good.
+//! Observations alone, which is what a busy service writes, are one statement and so a transaction of their own. Of other
+//! groups each operation runs in a savepoint, or changes rows by a single statement: one that fails is undone alone. Answers
+//! leave after the commit. Errors after which SQLite may have rolled back by itself (disk full, I/O) fail every operation
+//! that ran in the group; those that had not run yet go to the next one. After a fatal error the writer stops for good.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -15,9 +16,11 @@ use tokio::sync::{mpsc, oneshot, watch};
 
 use super::batch::{self, Appending};
 use crate::store::error::{Failure, StoreError};
+use crate::store::observations::ROWS_AT_ONCE;
 
-/// Operations in one transaction. At 64 a row costs a hundredth of what it costs alone; more only adds waiting.
-const GROUP: usize = 64;
+/// Operations in one transaction: the observations that one statement takes. A row then costs a hundredth of what it costs
+/// alone; more only adds waiting.
+const GROUP: usize = ROWS_AT_ONCE;
 /// Requests that may wait before callers do.
 pub(super) const QUEUE: usize = 1024;
 
@@ -178,6 +181,12 @@ async fn run_group(
     waiting: &mut Waiting,
     answers: &mut Vec<Answer>,
 ) -> Result<(), StoreError> {
+    if waiting.operations.is_empty() {
+        batch::append_all(connection, waiting, answers).await?;
+    }
+    if waiting.is_empty() {
+        return Ok(());
+    }
     let mut begun = execute(connection, "BEGIN IMMEDIATE").await;
     if begun.is_ok() {
         batch::append_all(connection, waiting, answers).await?;
