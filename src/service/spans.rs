@@ -20,7 +20,7 @@ pub fn of_request(method: &str, route: &str) -> Span {
         http.request.method = method,
         http.route = route,
         http.response.status_code = Empty,
-        ballast.tenant = Empty,
+        tenant = Empty,
     )
 }
 
@@ -31,7 +31,7 @@ pub fn answered(span: &Span, status: u16, tenant: Option<&str>) {
     }
     span.record("http.response.status_code", status);
     if let Some(tenant) = tenant {
-        span.record("ballast.tenant", tenant);
+        span.record("tenant", tenant);
     }
     if status >= 500 {
         span.record("otel.status_code", "ERROR");
