@@ -182,10 +182,39 @@ async fn a_session_keeps_its_own_history_and_wealth() {
     assert_eq!((&action["source"], &action["sample_size"]), (&json!("resolved_outside_design"), &json!(3)));
 }
 
+/// Opens a session of the policy under an idempotency key.
+async fn open_under(app: &App, key: &str, mut start: Value) -> (reqwest::StatusCode, Value) {
+    start["policy"] = json!(app.policy);
+    let request = app.client.post(format!("{}/sessions", app.url)).header("Idempotency-Key", key).json(&start);
+    support::read(request.send().await.unwrap()).await
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_opening_repeated_under_its_key_opens_one_session() {
+    let mut app = trained(&specification(2)).await;
+    let first = open_under(&app, "mine", json!({ "wealth": 50.0 })).await;
+    assert_eq!((first.0.as_u16(), &first.1["wealth"]), (201, &json!(50.0)));
+    assert_eq!(open_under(&app, "mine", json!({ "wealth": 50.0 })).await, first);
+    app.session = first.1["session"].as_str().unwrap().to_owned();
+    assert_eq!(app.observe(1, 0.01).await.0, 200);
+    app.restart().await;
+    assert_eq!(open_under(&app, "mine", json!({ "wealth": 50.0 })).await, first, "the first answer, though it went on");
+    let other = open_under(&app, "mine", json!({ "wealth": 51.0 })).await;
+    assert_refused(&other, 409, "Idempotency-Key", "mine");
+    assert_eq!(other.1["type"], "/problems/idempotency-conflict");
+    assert_refused(&open_under(&app, "", json!({})).await, 422, "Idempotency-Key", "0 bytes");
+    assert_eq!(app.get("/sessions").await.1["sessions"].as_array().unwrap().len(), 1);
+    assert_ne!(open_under(&app, "another", json!({ "wealth": 50.0 })).await.1["session"], first.1["session"]);
+    assert_eq!(app.delete(&format!("/sessions/{}", app.session)).await, 204);
+    let anew = open_under(&app, "mine", json!({ "wealth": 50.0 })).await;
+    assert_eq!(anew.0, 201, "the key went with its session");
+    assert_ne!(anew.1["session"], first.1["session"]);
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_burst_of_resolves_is_told_to_come_back_and_starves_nobody() {
     let mut app = App::configured(|config| {
-        (config.resolve_limit, config.turn_wait) = (0, Duration::from_millis(50));
+        (config.resolve_limit, config.guest_limit, config.turn_wait) = (0, 0, Duration::from_millis(50));
     })
     .await;
     app.train(&specification(2)).await;

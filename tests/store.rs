@@ -2,10 +2,12 @@
 
 mod support;
 
+use std::time::Duration;
+
 use ballast::control::policy::content_hash;
 use ballast::store::{
     Append, CreateJob, CreateSession, DeletePolicy, JobCounts, JobKind, JobOutcome, JobRow, JobState, NewJob, NewKey,
-    NewObservation, NewSession, Rotate, Store, StoreError, Successor, Tenant,
+    ObservationRow, RequestKey, Rotate, SessionRow, Store, StoreError, Successor, Tenant,
 };
 use futures_util::future::join_all;
 use support::place::Place;
@@ -36,6 +38,7 @@ on_both_engines!(
     a_closed_store_answers_unavailable,
     a_newer_schema_is_refused,
     an_idempotency_key_makes_one_job,
+    an_idempotency_key_opens_one_session,
     a_refused_operation_leaves_its_neighbours_alone,
     jobs_are_listed_newest_first_by_cursor,
     the_oldest_job_is_claimed_and_a_lease_that_ran_out_is_taken_over,
@@ -53,6 +56,7 @@ on_both_engines!(
     a_session_moved_to_another_tenant_is_damaged,
     a_session_needs_its_policy_and_a_free_name,
     a_restart_keeps_sessions_bit_for_bit,
+    what_was_seen_is_current_until_somebody_writes,
     every_observation_is_stored_once_and_in_order,
     sixteen_reports_of_each_period_have_one_winner,
     many_sessions_commit_in_groups,
@@ -91,20 +95,20 @@ async fn claimed(store: &Store, now_ms: i64) -> (String, i64) {
 async fn with_session(store: &Store, session: &str, history: &[f64]) {
     let policy = content_hash(POLICY);
     store.insert_policy(&Tenant::default(), &policy, POLICY, 1).await.unwrap();
-    let new = NewSession {
+    let new = SessionRow {
         session: session.into(),
         tenant: Tenant::default(),
         policy,
-        wealth: 100.0,
-        history: history.into(),
+        initial_wealth: 100.0,
+        initial_history: history.into(),
         horizon: 3,
         created_ms: 5,
     };
-    assert_eq!(store.create_session(new).await.unwrap(), CreateSession::Created);
+    assert_eq!(store.create_session(new, None).await.unwrap(), CreateSession::Created);
 }
 
-fn observation(session: &str, period: usize, content: &str) -> NewObservation {
-    NewObservation {
+fn observation(session: &str, period: usize, content: &str) -> ObservationRow {
+    ObservationRow {
         session: session.into(),
         period,
         content_hash: content.into(),
@@ -149,6 +153,42 @@ async fn an_idempotency_key_makes_one_job(place: &Place) {
     let other = NewJob { request_hash: "other".into(), ..new_job("j3", Some("key")) };
     assert_eq!(store.create_job(other).await.unwrap(), CreateJob::KeyConflict);
     assert_eq!(store.jobs(&Tenant::default(), 10, None).await.unwrap(), [first]);
+}
+
+async fn an_idempotency_key_opens_one_session(place: &Place) {
+    let store = place.open().await;
+    let second = place.second(&store).await;
+    let key = |request: &str| Some(RequestKey { key: "key".into(), request_hash: request.into() });
+    let new = |session: &str| session_of("default", session);
+    assert_eq!(store.create_session(new("s0"), key("a")).await.unwrap(), CreateSession::NoPolicy);
+    store.insert_policy(&Tenant::default(), &content_hash(POLICY), POLICY, 1).await.unwrap();
+    let opened = join_all((1..=8).map(|n| {
+        let store = if n % 2 == 0 { store.clone() } else { second.clone() };
+        tokio::spawn(async move { store.create_session(new(&format!("s{n}")), key("a")).await.unwrap() })
+    }));
+    let opened: Vec<_> = opened.await.into_iter().map(Result::unwrap).collect();
+    let listed = store.sessions(&Tenant::default(), 10, None).await.unwrap();
+    let [one] = &listed[..] else { panic!("{listed:?}") };
+    assert_eq!(opened.iter().filter(|outcome| **outcome == CreateSession::Created).count(), 1, "{opened:?}");
+    let repeated = CreateSession::Repeated(new(&one.session));
+    assert_eq!(opened.iter().filter(|outcome| **outcome == repeated).count(), 7, "{opened:?}");
+
+    store.append_observation(observation(&one.session, 1, "c")).await.unwrap();
+    let store = place.reopen(store).await;
+    assert_eq!(store.create_session(new("s9"), key("a")).await.unwrap(), repeated, "as it started");
+    assert_eq!(store.create_session(new("s9"), key("b")).await.unwrap(), CreateSession::KeyConflict);
+    let job = store.create_job(new_job("j", Some("key"))).await.unwrap();
+    assert_eq!(job, CreateJob::KeyConflict, "a session has the key");
+    store.create_job(new_job("j", Some("job"))).await.unwrap();
+    let of_the_job = Some(RequestKey { key: "job".into(), request_hash: "a".into() });
+    assert_eq!(store.create_session(new("s9"), of_the_job).await.unwrap(), CreateSession::KeyConflict);
+    store.insert_policy(&tenant("south"), &content_hash(POLICY), POLICY, 1).await.unwrap();
+    let southern = store.create_session(session_of("south", "south"), key("b")).await.unwrap();
+    assert_eq!(southern, CreateSession::Created, "keys are a tenant's own");
+
+    assert!(store.delete_session(&Tenant::default(), &one.session).await.unwrap());
+    let anew = store.create_session(new("s9"), key("b")).await.unwrap();
+    assert_eq!(anew, CreateSession::Created, "the key went with its session");
 }
 
 async fn a_refused_operation_leaves_its_neighbours_alone(place: &Place) {
@@ -338,21 +378,21 @@ async fn a_damaged_policy_is_detected(place: &Place) {
 
 async fn a_session_needs_its_policy_and_a_free_name(place: &Place) {
     let store = place.open().await;
-    let new = NewSession {
+    let new = SessionRow {
         session: "s".into(),
         tenant: Tenant::default(),
         policy: "none".into(),
-        wealth: 1.0,
-        history: vec![],
+        initial_wealth: 1.0,
+        initial_history: vec![],
         horizon: 1,
         created_ms: 1,
     };
-    assert_eq!(store.create_session(new.clone()).await.unwrap(), CreateSession::NoPolicy);
+    assert_eq!(store.create_session(new.clone(), None).await.unwrap(), CreateSession::NoPolicy);
     with_session(&store, "s", &[0.1, 0.2]).await;
-    let again = NewSession { policy: content_hash(POLICY), ..new };
-    assert_eq!(store.create_session(again).await.unwrap(), CreateSession::Exists);
-    assert_eq!(store.session("s").await.unwrap().unwrap().initial_wealth, 100.0);
-    assert_eq!(store.session("nobody").await.unwrap(), None);
+    let again = SessionRow { policy: content_hash(POLICY), ..new };
+    assert_eq!(store.create_session(again, None).await.unwrap(), CreateSession::Exists);
+    assert_eq!(store.session(&Tenant::default(), "s").await.unwrap().unwrap().initial_wealth, 100.0);
+    assert_eq!(store.session(&Tenant::default(), "nobody").await.unwrap(), None);
     assert!(!store.delete_session(&Tenant::default(), "nobody").await.unwrap());
     assert_eq!(store.count_sessions().await.unwrap(), 1);
 }
@@ -366,9 +406,9 @@ async fn a_restart_keeps_sessions_bit_for_bit(place: &Place) {
         assert_eq!(appended, Append::Appended);
     }
     let store = place.reopen(store).await;
-    let row = store.session("s").await.unwrap().unwrap();
+    let row = store.session(&Tenant::default(), "s").await.unwrap().unwrap();
     assert_eq!(bits(&row.initial_history), bits(&history));
-    let read = store.observations("s").await.unwrap();
+    let read = store.observations("s").await.unwrap().unwrap();
     assert_eq!(read.iter().map(|row| row.period).collect::<Vec<_>>(), [1, 2, 3]);
     let (wrote, read) = (observation("s", 2, "c"), &read[1]);
     assert_eq!(
@@ -377,6 +417,45 @@ async fn a_restart_keeps_sessions_bit_for_bit(place: &Place) {
     );
     assert_eq!(store.observation("s", 2).await.unwrap().as_ref(), Some(read));
     assert_eq!(store.sessions(&Tenant::default(), 10, None).await.unwrap()[0].observations, 3);
+}
+
+async fn what_was_seen_is_current_until_somebody_writes(place: &Place) {
+    let here = Tenant::default();
+    let store = place.open().await;
+    let second = place.second(&store).await;
+    with_session(&store, "s", &[0.1, 0.2]).await;
+    with_session(&store, "other", &[0.1, 0.2]).await;
+    assert!(store.session_facts(&tenant("south"), "s").await.unwrap().is_none());
+    let facts = store.session_facts(&here, "s").await.unwrap().unwrap();
+    let (mut seen, mut opened) = (facts.seen, facts.row.as_opened());
+    assert!(facts.observations.is_empty());
+    let own = observation("s", 1, "c");
+    let mut next = seen.followed_by(&own);
+    store.append_observation(own).await.unwrap();
+    store.append_observation(observation("other", 1, "c")).await.unwrap();
+    for (seen, is_current) in [(&mut seen, false), (&mut opened, false), (&mut next, true)] {
+        assert_eq!(store.is_as_seen("s", seen).await.unwrap(), is_current, "{seen:?}");
+        assert_eq!(store.is_as_seen("s", seen).await.unwrap(), is_current, "{seen:?}, asked again");
+    }
+    // A refused write changes nothing, though it might have.
+    assert!(!second.delete_session(&tenant("south"), "s").await.unwrap());
+    assert_eq!(second.append_observation(observation("s", 1, "d")).await.unwrap(), Append::Conflict);
+    assert!(store.is_as_seen("s", &mut next).await.unwrap());
+    second.append_observation(observation("s", 2, "c")).await.unwrap();
+    assert!(!store.is_as_seen("s", &mut next).await.unwrap());
+    let facts = store.session_facts(&here, "s").await.unwrap().unwrap();
+    let mut seen = facts.seen;
+    assert_eq!((facts.observations.len(), seen.observed()), (2, 2));
+    assert!(second.delete_session(&here, "s").await.unwrap());
+    assert!(!store.is_as_seen("s", &mut seen).await.unwrap());
+    assert!(store.session_facts(&here, "s").await.unwrap().is_none());
+    // Nobody waits for the answer, and still the write shows, once one that came after it is answered.
+    with_session(&store, "later", &[0.1, 0.2]).await;
+    let mut seen = store.session_facts(&here, "other").await.unwrap().unwrap().seen;
+    drop(tokio::time::timeout(Duration::ZERO, store.append_observation(observation("other", 2, "c"))).await);
+    assert_eq!(store.append_observation(observation("later", 1, "c")).await.unwrap(), Append::Appended);
+    let is_written = store.observation("other", 2).await.unwrap().is_some();
+    assert_eq!(store.is_as_seen("other", &mut seen).await.unwrap(), !is_written);
 }
 
 async fn every_observation_is_stored_once_and_in_order(place: &Place) {
@@ -391,7 +470,7 @@ async fn every_observation_is_stored_once_and_in_order(place: &Place) {
     assert_eq!(append(1, "b").await, Append::Conflict);
     assert_eq!(append(3, "a").await, Append::OutOfOrder { expected: 2 });
     assert!(store.delete_session(&Tenant::default(), "s").await.unwrap());
-    assert_eq!(store.observations("s").await.unwrap(), []);
+    assert_eq!(store.observations("s").await.unwrap(), None);
 }
 
 async fn sixteen_reports_of_each_period_have_one_winner(place: &Place) {
@@ -409,7 +488,7 @@ async fn sixteen_reports_of_each_period_have_one_winner(place: &Place) {
         let count = |wanted: Append| outcomes.iter().filter(|outcome| **outcome == wanted).count();
         assert_eq!((count(Append::Appended), count(Append::Conflict)), (1, 15), "{outcomes:?}");
     }
-    assert_eq!(store.observations("s").await.unwrap().len(), PERIODS);
+    assert_eq!(store.observations("s").await.unwrap().unwrap().len(), PERIODS);
 }
 
 async fn many_sessions_commit_in_groups(place: &Place) {
@@ -451,7 +530,7 @@ async fn damage_to_what_an_action_rests_on_is_detected(place: &Place) {
         place.tamper(damage).await;
         let store = place.open().await;
         let damaged = match damage.contains("sessions") {
-            true => store.session("s").await.err(),
+            true => store.session(&Tenant::default(), "s").await.err(),
             false => store.observations("s").await.err(),
         };
         assert!(matches!(damaged, Some(StoreError::Corrupt { .. })), "{damage}: {damaged:?}");
@@ -471,7 +550,7 @@ async fn reads_run_on_any_thread(place: &Place) {
         store.jobs(&Tenant::default(), 1, None).await?;
         store.observations("s").await?;
         store.sessions(&Tenant::default(), 1, None).await?;
-        store.session("s").await
+        store.session(&Tenant::default(), "s").await
     });
     assert_eq!(read.await.unwrap().unwrap().unwrap().session, "s");
 }
@@ -516,17 +595,17 @@ async fn two_replicas_meet(place: &Place) {
     for round in 0..10 {
         store.insert_policy(&Tenant::default(), &policy, POLICY, 1).await.unwrap();
         let session = format!("s{round}");
-        let new = NewSession {
+        let new = SessionRow {
             session: session.clone(),
             tenant: Tenant::default(),
             policy: policy.clone(),
-            wealth: 1.0,
-            history: vec![0.1],
+            initial_wealth: 1.0,
+            initial_history: vec![0.1],
             horizon: 1,
             created_ms: 1,
         };
         let tenant = Tenant::default();
-        match tokio::join!(store.create_session(new), second.delete_policy(&tenant, &policy)) {
+        match tokio::join!(store.create_session(new, None), second.delete_policy(&tenant, &policy)) {
             (Ok(CreateSession::Created), Ok(DeletePolicy::InUse { sessions: 1 })) => {
                 assert!(second.delete_session(&Tenant::default(), &session).await.unwrap());
             }
@@ -541,7 +620,7 @@ async fn a_head_follows_the_rows(place: &Place) {
     let second = place.second(&store).await;
     assert_eq!(store.head("s").await.unwrap(), None);
     with_session(&store, "s", &[0.1, 0.2]).await;
-    let mut heads = vec![store.session("s").await.unwrap().unwrap().head()];
+    let mut heads = vec![store.session(&Tenant::default(), "s").await.unwrap().unwrap().head()];
     assert_eq!(second.head("s").await.unwrap().as_ref(), heads.last());
     for period in 1..=3 {
         let new = observation("s", period, "c");
@@ -549,9 +628,9 @@ async fn a_head_follows_the_rows(place: &Place) {
         store.append_observation(new).await.unwrap();
         let head = second.head("s").await.unwrap();
         assert_eq!((head.as_ref(), head.as_ref().map(|head| head.observed)), (heads.last(), Some(period)));
-        assert_eq!(store.observations("s").await.unwrap()[period - 1].head("s"), heads[period]);
+        assert_eq!(store.observations("s").await.unwrap().unwrap()[period - 1].head(), heads[period]);
     }
-    let other = NewObservation { created_ms: 8, ..observation("s", 3, "c") };
+    let other = ObservationRow { created_ms: 8, ..observation("s", 3, "c") };
     assert_ne!(other.head(), heads[3], "the same report at another time");
     assert!(second.delete_session(&Tenant::default(), "s").await.unwrap());
     assert_eq!(store.head("s").await.unwrap(), None);
@@ -564,7 +643,7 @@ async fn a_name_nobody_can_have_finds_nothing(place: &Place) {
         assert_eq!(store.request_cancel(name, 1).await.unwrap(), None);
         assert_eq!(store.policy(&Tenant::default(), name).await.unwrap(), None);
         assert_eq!(store.delete_policy(&Tenant::default(), name).await.unwrap(), DeletePolicy::Absent);
-        assert_eq!(store.session(name).await.unwrap(), None);
+        assert_eq!(store.session(&Tenant::default(), name).await.unwrap(), None);
         assert_eq!(store.append_observation(observation(name, 1, "c")).await.unwrap(), Append::NoSession);
     }
 }
@@ -642,13 +721,13 @@ fn tenant(name: &str) -> Tenant {
     name.parse().unwrap()
 }
 
-fn session_of(owner: &str, session: &str) -> NewSession {
-    NewSession {
+fn session_of(owner: &str, session: &str) -> SessionRow {
+    SessionRow {
         session: session.into(),
         tenant: tenant(owner),
         policy: content_hash(POLICY),
-        wealth: 100.0,
-        history: vec![0.01, -0.02],
+        initial_wealth: 100.0,
+        initial_history: vec![0.01, -0.02],
         horizon: 3,
         created_ms: 5,
     }
@@ -659,7 +738,7 @@ async fn tenants_see_only_their_own(place: &Place) {
     let (north, south) = (tenant("north"), tenant("south"));
     let policy = content_hash(POLICY);
     assert!(store.insert_policy(&north, &policy, POLICY, 1).await.unwrap());
-    assert_eq!(store.create_session(session_of("south", "s1")).await.unwrap(), CreateSession::NoPolicy);
+    assert_eq!(store.create_session(session_of("south", "s1"), None).await.unwrap(), CreateSession::NoPolicy);
     assert_eq!(store.policy(&south, &policy).await.unwrap(), None);
     assert_eq!(store.delete_policy(&south, &policy).await.unwrap(), DeletePolicy::Absent);
     assert!(store.insert_policy(&south, &policy, POLICY, 2).await.unwrap());
@@ -668,7 +747,7 @@ async fn tenants_see_only_their_own(place: &Place) {
         assert_eq!((row.created_ms, row.json.as_slice()), (created_ms, POLICY));
         assert_eq!(store.policies(owner, 10, None).await.unwrap()[0].created_ms, created_ms);
     }
-    assert_eq!(store.create_session(session_of("south", "s1")).await.unwrap(), CreateSession::Created);
+    assert_eq!(store.create_session(session_of("south", "s1"), None).await.unwrap(), CreateSession::Created);
     assert_eq!(store.sessions(&north, 10, None).await.unwrap(), []);
     assert_eq!(store.sessions(&south, 10, None).await.unwrap().len(), 1);
     assert!(!store.delete_session(&north, "s1").await.unwrap());
@@ -742,12 +821,12 @@ async fn a_session_moved_to_another_tenant_is_damaged(place: &Place) {
         let store = place.open().await;
         let session = format!("{from}_{to}");
         store.insert_policy(&tenant(from), &content_hash(POLICY), POLICY, 1).await.unwrap();
-        store.create_session(session_of(from, &session)).await.unwrap();
-        assert_eq!(store.session(&session).await.unwrap().unwrap().tenant, tenant(from));
+        store.create_session(session_of(from, &session), None).await.unwrap();
+        assert_eq!(store.session(&tenant(from), &session).await.unwrap().unwrap().tenant, tenant(from));
         store.close().await;
         place.tamper(&format!("UPDATE sessions SET tenant = '{to}' WHERE session = '{session}'")).await;
         let store = place.open().await;
-        assert!(matches!(store.session(&session).await, Err(StoreError::Corrupt { .. })));
+        assert!(matches!(store.session(&tenant(to), &session).await, Err(StoreError::Corrupt { .. })));
         store.close().await;
     }
 }

@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 
 use ballast::control::policy::content_hash;
 use ballast::store::{
-    Append, CreateJob, CreateSession, DeletePolicy, JobKind, JobOutcome, JobRow, JobState, NewJob, NewObservation,
-    NewSession, Store, Tenant,
+    Append, CreateJob, CreateSession, DeletePolicy, JobKind, JobOutcome, JobRow, JobState, NewJob, ObservationRow,
+    SessionRow, Store, Tenant,
 };
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
@@ -159,8 +159,8 @@ fn outcome(number: u8) -> JobOutcome {
     }
 }
 
-fn observation(session: u8, period: usize, content: u8) -> NewObservation {
-    NewObservation {
+fn observation(session: u8, period: usize, content: u8) -> ObservationRow {
+    ObservationRow {
         session: session_name(session),
         period,
         content_hash: format!("content_{content}"),
@@ -318,12 +318,12 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
             model.policies.retain(|&kept| kept != policy || expected != DeletePolicy::Deleted);
         }
         Operation::CreateSession { session, policy } => {
-            let new = NewSession {
+            let new = SessionRow {
                 session: session_name(session),
                 tenant: Tenant::default(),
                 policy: policy_name(policy),
-                wealth: 100.0,
-                history: vec![0.1, -0.0],
+                initial_wealth: 100.0,
+                initial_history: vec![0.1, -0.0],
                 horizon: 3,
                 created_ms: model.now,
             };
@@ -333,7 +333,7 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
                 (true, true) => CreateSession::Exists,
                 (true, false) => CreateSession::Created,
             };
-            assert_eq!(store.create_session(new).await.unwrap(), expected);
+            assert_eq!(store.create_session(new, None).await.unwrap(), expected);
             if expected == CreateSession::Created {
                 model.sessions.push((session, policy, Vec::new()));
             }
@@ -388,11 +388,11 @@ async fn compare(store: &Store, model: &Model) {
     assert_eq!(sessions.len(), model.sessions.len());
     for (row, (session, policy, periods)) in sessions.iter().rev().zip(&model.sessions) {
         assert_eq!((&row.session, &row.policy), (&session_name(*session), &policy_name(*policy)));
-        let observations = store.observations(&row.session).await.unwrap();
+        let observations = store.observations(&row.session).await.unwrap().expect("the session listed");
         assert_eq!(observations.len(), periods.len());
         for (read, &content) in observations.iter().zip(periods) {
             let wrote = observation(*session, read.period, content);
-            assert_eq!(read.head(&row.session), wrote.head());
+            assert_eq!(read.head(), wrote.head());
             assert_eq!(read.log_return.to_bits(), wrote.log_return.to_bits());
         }
     }

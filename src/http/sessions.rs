@@ -5,13 +5,14 @@ use std::time::Instant;
 
 use axum::Json;
 use axum::extract::State;
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::access::By;
 use super::extract::{Id, JsonBody, Parameters};
+use super::jobs::idempotency_key;
 use super::page::{self, Page};
 use super::problem::Problem;
 use super::wire;
@@ -19,20 +20,25 @@ use crate::control::advisor::AdviceMode;
 use crate::service::Service;
 use crate::service::metrics::{ACTION_SECONDS, OBSERVE_SECONDS};
 use crate::service::observation::{Observe, Observed};
-use crate::service::sessions::Question;
+use crate::service::sessions::{Question, Start};
 
 /// Open a session.
 #[utoipa::path(post, path = "/sessions", tag = "sessions", request_body = wire::OpenSession,
+    params(("Idempotency-Key" = Option<String>, Header,
+            description = "The same key and body again give the same session and answer, until it is deleted.")),
     responses(
         (status = 201, description = "Opened.", body = wire::Session, headers(("Location" = String, description = "The session."))),
         (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "The key was used with another body.", body = Problem, content_type = "application/problem+json"),
         (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn open(
     State(service): State<Arc<Service>>,
     By(caller): By,
+    headers: HeaderMap,
     JsonBody(request): JsonBody<wire::OpenSession>,
 ) -> Result<Response, Problem> {
-    let live = service.sessions.open(&caller, &request.policy, request.history, request.wealth).await?;
+    let start = Start { policy: request.policy, history: request.history, wealth: request.wealth };
+    let live = service.sessions.open(&caller, start, idempotency_key(&headers)?).await?;
     let session = wire::Session::from(live);
     let location = [(header::LOCATION, format!("/sessions/{}", session.session))];
     Ok((StatusCode::CREATED, location, Json(session)).into_response())

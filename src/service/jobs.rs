@@ -6,19 +6,16 @@ use tokio::sync::watch;
 
 use super::clock::Clock;
 use super::error::ServiceError;
+use super::idempotency;
 use super::identity;
 use super::keys::Caller;
 use super::memory::Memory;
 use super::progress::{Progress, ProgressBoard};
-use crate::control::error::FieldError;
 use crate::control::estimate;
 use crate::control::evaluation::EvaluationRequest;
 use crate::control::policy::content_hash;
 use crate::control::specification::Specification;
 use crate::store::{CreateJob, JobKind, JobRow, NewJob, Store, Tenant};
-
-/// Longest idempotency key taken, in bytes.
-const KEY_LENGTH: usize = 255;
 
 /// A job as stored, and how far it is where it runs in this process.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,10 +87,7 @@ impl Jobs {
         steps_total: usize,
         key: Option<String>,
     ) -> Result<Job, ServiceError> {
-        if let Some(key) = key.as_deref().filter(|key| key.is_empty() || key.len() > KEY_LENGTH) {
-            let value = format!("{} bytes", key.len());
-            return Err(FieldError::new("Idempotency-Key", value, "must hold 1 to 255 characters").into());
-        }
+        key.as_deref().map_or(Ok(()), idempotency::check)?;
         let new = NewJob {
             job: identity::new_id("job")?,
             tenant: caller.tenant.clone(),

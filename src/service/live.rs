@@ -8,15 +8,15 @@ use super::observation::{Observe, Observed};
 use crate::control::advisor::{Advice, AdviceMode, Advisor, Uncertainty};
 use crate::control::rules as limits;
 use crate::control::state::State;
-use crate::store::{Head, SessionRow};
+use crate::store::{Seen, SessionRow};
 
 /// A session replayed from its rows. It holds no policy: what it is advised by is kept under its name, and may be dropped.
 #[derive(Clone)]
 pub struct Live {
     pub row: Arc<SessionRow>,
     pub state: State,
-    /// Of the rows it was replayed from.
-    pub(super) head: Head,
+    /// The rows it was replayed from.
+    pub(super) seen: Seen,
     /// Radius of the state, once computed.
     pub(super) radius: Option<f64>,
     /// Price reported for the last period.
@@ -28,12 +28,12 @@ pub struct Live {
 impl Live {
     /// Periods observed.
     pub fn observed(&self) -> usize {
-        self.head.observed
+        self.seen.observed()
     }
 
     /// The session after an observation that left `state`, whose radius is `radius`.
-    pub(super) fn taken_to(&self, head: Head, state: State, price: Option<f64>, radius: f64) -> Live {
-        Live { row: self.row.clone(), state, head, price, radius: Some(radius), advice: None }
+    pub(super) fn taken_to(&self, seen: Seen, state: State, price: Option<f64>, radius: f64) -> Live {
+        Live { row: self.row.clone(), state, seen, price, radius: Some(radius), advice: None }
     }
 
     pub(super) fn expects(&self, period: usize) -> Result<(), ServiceError> {

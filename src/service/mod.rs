@@ -9,6 +9,7 @@ mod bounded;
 pub mod clock;
 pub mod config;
 pub mod error;
+mod idempotency;
 mod identity;
 pub mod jobs;
 pub mod keys;
@@ -23,6 +24,7 @@ pub mod sessions;
 pub mod shutdown;
 mod slots;
 pub mod spans;
+mod sync;
 mod trainer;
 pub mod what_if;
 

@@ -1,33 +1,43 @@
 //! Live sessions: an investor's wealth and the law learned so far.
 //!
-//! A session is its rows: the state in memory is a replay of them and is dropped whenever a write fails, so memory
-//! never runs ahead of the disk. One lock per session orders its observations in this process. Where other processes
-//! write to the same store, the rows' head is read before every use, and a state replayed from other rows is dropped:
-//! no replica advises from a law that another has taken further, or that a restored database never had. A session is its
-//! tenant's: to everybody else it does not exist.
+//! A session is its rows: the state in memory is a replay of them, out of memory while a write is under way, so memory
+//! never runs ahead of the disk. Before every use it is held against the store, and a state replayed from other rows is
+//! dropped: no process advises from a law that has been taken further, or that a restored database never had. One lock
+//! per session orders its observations in this process (see [`super::slots`]).
+//!
+//! A session is its tenant's: to everybody else it does not exist. Slots are named by tenant and session, so nobody's
+//! call waits for, fills or empties the slot of another tenant.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
-use tokio::sync::OwnedMutexGuard;
+use serde::Serialize;
 use tracing::Instrument;
 
 use super::bounded::{Bounded, Size};
 use super::clock::Clock;
 use super::config::Config;
 use super::error::ServiceError;
+use super::idempotency;
 use super::identity;
 use super::keys::Caller;
 use super::live::Live;
 use super::observation::{Observe, Observed};
 use super::policies::Policies;
-use super::slots::{Slot, Slots};
+use super::slots::{Generation, Held, Slots, Source};
 use super::spans;
 use crate::control::advisor::{Advice, AdviceMode, Advisor};
 use crate::control::error::FieldError;
+use crate::control::policy::content_hash;
 use crate::control::worst_case::WorstCase;
 use crate::store::{
-    Append, CreateSession, NewObservation, NewSession, ObservationRow, SessionRow, SessionSummary, Store, Tenant,
+    Append, CreateSession, ObservationRow, RequestKey, SessionFacts, SessionRow, SessionSummary, Store, Tenant,
 };
+
+/// Two of these are kept: 100,000 sessions, 128 MB of returns in laws and histories.
+const GENERATION: Generation = Generation { slots: 100_000, weight: 1 << 24 };
+
+/// Whose session it is, and its name.
+type Name = (Tenant, String);
 
 /// What [`Sessions::action`] found.
 pub struct Action {
@@ -44,13 +54,30 @@ pub enum Question {
     Explain,
 }
 
+/// What a session starts from; history and wealth default to the policy's.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Start {
+    pub policy: String,
+    pub history: Option<Vec<f64>>,
+    pub wealth: Option<f64>,
+}
+
+impl Start {
+    /// The request for it under a key. Its hash is that of no job's request, which has other fields.
+    fn under(&self, key: String) -> Result<RequestKey, ServiceError> {
+        idempotency::check(&key)?;
+        let sent = serde_json::to_vec(self).map_err(ServiceError::internal)?;
+        Ok(RequestKey { key, request_hash: content_hash(&sent) })
+    }
+}
+
 /// The sessions of the store.
 #[derive(Clone)]
 pub struct Sessions {
     store: Store,
     clock: Clock,
     policies: Arc<Policies>,
-    slots: Arc<Mutex<Slots>>,
+    slots: Arc<Slots<Name, Live>>,
     pub(super) advising: Bounded,
     pub(super) resolving: Bounded,
 }
@@ -60,58 +87,57 @@ impl Sessions {
         let size = |common| Size { common, guests: config.guest_limit };
         let advising = Bounded::new("advise", size(config.advice_limit), config.turn_wait);
         let resolving = Bounded::new("solve", size(config.resolve_limit), config.turn_wait);
-        Sessions { store, clock, policies, slots: Arc::default(), advising, resolving }
+        let slots = Arc::new(Slots::new(GENERATION));
+        Sessions { store, clock, policies, slots, advising, resolving }
     }
 
-    /// Opens a session; history and wealth default to the policy's.
+    /// Opens a session. The same key and start again give the same session as it was opened.
     ///
     /// # Errors
-    /// There is no such policy, or history or wealth breaks a rule.
-    pub async fn open(
-        &self,
-        caller: &Caller,
-        policy: &str,
-        history: Option<Vec<f64>>,
-        wealth: Option<f64>,
-    ) -> Result<Live, ServiceError> {
+    /// There is no such policy, or history or wealth breaks a rule; a key used with another request.
+    pub async fn open(&self, caller: &Caller, start: Start, key: Option<String>) -> Result<Live, ServiceError> {
         let tenant = &caller.tenant;
-        let advisor = self.policies.advisor(tenant, policy).await?;
+        let key = key.map(|key| start.under(key)).transpose()?;
+        let Start { policy, history, wealth } = start;
+        let advisor = self.policies.advisor(tenant, &policy).await?;
         let state = advisor.initial_state(history.as_deref(), wealth)?;
         self.policies.starts_from(&advisor, state.law.sample_size())?;
         let problem = &advisor.specification().problem;
         let row = SessionRow {
             session: identity::new_id("session")?,
             tenant: tenant.clone(),
-            policy: policy.to_owned(),
+            policy,
             initial_wealth: state.wealth,
             initial_history: history.unwrap_or_else(|| problem.history.clone()),
             horizon: problem.horizon,
             created_ms: self.clock.now_milliseconds(),
         };
-        let new = NewSession {
-            session: row.session.clone(),
-            tenant: tenant.clone(),
-            policy: row.policy.clone(),
-            wealth: row.initial_wealth,
-            history: row.initial_history.clone(),
-            horizon: row.horizon,
-            created_ms: row.created_ms,
-        };
-        match self.store.by(caller.actor()).create_session(new).instrument(spans::of_write("open a session")).await? {
-            CreateSession::Created => {
-                let head = row.head();
-                Ok(Live { row: Arc::new(row), state, head, price: None, radius: None, advice: None })
+        let opening = self.store.by(caller.actor());
+        let opening = opening.create_session(row.clone(), key.clone());
+        let row = match opening.instrument(spans::of_write("open a session")).await? {
+            CreateSession::Created => row,
+            // Of the same start: the state is the one above.
+            CreateSession::Repeated(earlier) => earlier,
+            CreateSession::KeyConflict => {
+                return Err(ServiceError::KeyConflict { key: key.map_or_else(String::new, |key| key.key) });
             }
-            CreateSession::NoPolicy => Err(ServiceError::unknown("policy", policy)),
-            CreateSession::Exists => Err(ServiceError::internal("a session of this random name exists")),
-        }
+            CreateSession::NoPolicy => return Err(ServiceError::unknown("policy", &row.policy)),
+            CreateSession::Exists => return Err(ServiceError::internal("a session of this random name exists")),
+        };
+        let seen = row.as_opened();
+        Ok(Live { row: Arc::new(row), state, seen, price: None, radius: None, advice: None })
+    }
+
+    /// Number of sessions in memory.
+    pub fn in_memory(&self) -> usize {
+        self.slots.count()
     }
 
     /// # Errors
     /// There is no such session.
     pub async fn get(&self, tenant: &Tenant, session: &str) -> Result<Live, ServiceError> {
-        let mut slot = self.slot(session).lock_owned().await;
-        self.replayed(tenant, session, &mut slot).await.cloned()
+        let mut held = self.hold(tenant, session).await;
+        held.current(&Rows { sessions: self, tenant, session }).await.cloned()
     }
 
     /// Requests that wait for their turn to be advised, and to have a step solved.
@@ -141,20 +167,19 @@ impl Sessions {
         tenant: &Tenant,
         session: &str,
     ) -> Result<(SessionRow, Vec<ObservationRow>), ServiceError> {
-        let row = self.store.session(session).await?.filter(|row| row.tenant == *tenant);
-        let row = row.ok_or_else(|| ServiceError::unknown("session", session))?;
-        Ok((row, self.store.observations(session).await?))
+        let SessionFacts { row, observations, .. } = self.facts(tenant, session).await?;
+        Ok((row, observations))
     }
 
     /// # Errors
     /// There is no such session.
     pub async fn delete(&self, caller: &Caller, session: &str) -> Result<(), ServiceError> {
-        let mut slot = self.slot(session).lock_owned().await;
-        *slot = None;
+        // Once nobody uses it any more.
+        let mut held = self.hold(&caller.tenant, session).await;
+        held.clear();
         let deleting = self.store.by(caller.actor());
         let deleting = deleting.delete_session(&caller.tenant, session);
         let deleted = deleting.instrument(spans::of_write("delete a session")).await?;
-        self.forget(session);
         if deleted { Ok(()) } else { Err(ServiceError::unknown("session", session)) }
     }
 
@@ -166,12 +191,8 @@ impl Sessions {
     pub async fn observe(&self, tenant: &Tenant, report: Observe) -> Result<Observed, ServiceError> {
         let (sessions, tenant) = (self.clone(), tenant.clone());
         let recording = async move {
-            let mut slot = sessions.slot(&report.session).lock_owned().await;
-            let outcome = sessions.record(&tenant, &report, &mut slot).await;
-            if let Err(ServiceError::Store(_) | ServiceError::Internal(_)) = outcome {
-                *slot = None;
-            }
-            outcome
+            let mut held = sessions.hold(&tenant, &report.session).await;
+            sessions.record(&tenant, &report, &mut held).await
         };
         let recording = tokio::spawn(recording.in_current_span());
         recording.await.map_err(ServiceError::internal)?
@@ -181,9 +202,9 @@ impl Sessions {
         &self,
         tenant: &Tenant,
         report: &Observe,
-        slot: &mut OwnedMutexGuard<Option<Live>>,
+        held: &mut Held<Name, Live>,
     ) -> Result<Observed, ServiceError> {
-        let live = self.replayed(tenant, &report.session, slot).await?;
+        let live = held.current(&Rows { sessions: self, tenant, session: &report.session }).await?;
         let content_hash = report.content_hash().map_err(ServiceError::internal)?;
         if report.period == 0 {
             return Err(FieldError::new("period", 0, "must be at least 1").into());
@@ -195,7 +216,7 @@ impl Sessions {
         let log_return = report.checked_log_return(live.price)?;
         let advisor = self.advisor(tenant, live).await?;
         let (state, answer) = live.after(report, log_return, &advisor, &self.advising).await?;
-        let new = NewObservation {
+        let new = ObservationRow {
             session: report.session.clone(),
             period: report.period,
             content_hash,
@@ -206,10 +227,11 @@ impl Sessions {
             answer_json: serde_json::to_string(&answer).map_err(ServiceError::internal)?,
             created_ms: self.clock.now_milliseconds(),
         };
-        let next = live.taken_to(new.head(), state, report.price, answer.uncertainty.radius);
+        let next = live.taken_to(live.seen.followed_by(&new), state, report.price, answer.uncertainty.radius);
+        held.clear();
         match self.store.append_observation(new).instrument(spans::of_write("append an observation")).await? {
             Append::Appended => {
-                **slot = Some(next);
+                held.put(next);
                 Ok(answer)
             }
             Append::Repeated { answer_json } => serde_json::from_str(&answer_json).map_err(ServiceError::internal),
@@ -234,8 +256,8 @@ impl Sessions {
     /// # Errors
     /// There is no such session, or it has reached its horizon.
     pub async fn action(&self, tenant: &Tenant, session: &str, question: Question) -> Result<Action, ServiceError> {
-        let mut slot = self.slot(session).lock_owned().await;
-        let live = self.replayed(tenant, session, &mut slot).await?;
+        let mut held = self.hold(tenant, session).await;
+        let live = held.current(&Rows { sessions: self, tenant, session }).await?;
         if live.observed() >= live.row.horizon {
             return Err(ServiceError::Completed { session: session.to_owned(), horizon: live.row.horizon });
         }
@@ -250,7 +272,7 @@ impl Sessions {
             return Ok(Action { period, advice, worst_case: None });
         }
         let (state, step) = (live.state.clone(), live.observed());
-        drop(slot);
+        drop(held);
         let solving = self.resolving.run(tenant, move || match question {
             Question::Explain => {
                 let (advice, worst_case) = advisor.explain(step, &state);
@@ -267,35 +289,33 @@ impl Sessions {
         self.policies.advisor(tenant, &live.row.policy).await
     }
 
-    /// The session as its rows have it now, where it is the tenant's.
-    async fn replayed<'a>(
-        &self,
-        tenant: &Tenant,
-        session: &str,
-        slot: &'a mut OwnedMutexGuard<Option<Live>>,
-    ) -> Result<&'a mut Live, ServiceError> {
-        if self.store.is_shared()
-            && let Some(live) = slot.as_ref()
-            && self.store.head(session).await?.as_ref() != Some(&live.head)
-        {
-            **slot = None;
-        }
-        if slot.is_none() {
-            match self.replay(tenant, session).await {
-                Ok(live) => **slot = Some(live),
-                Err(error) => {
-                    self.forget(session);
-                    return Err(error);
-                }
-            }
-        }
-        let live = slot.as_mut().ok_or_else(|| ServiceError::internal("a session vanished while it was locked"))?;
-        if live.row.tenant == *tenant { Ok(live) } else { Err(ServiceError::unknown("session", session)) }
+    async fn hold(&self, tenant: &Tenant, session: &str) -> Held<Name, Live> {
+        self.slots.hold((tenant.clone(), session.to_owned())).await
     }
 
-    async fn replay(&self, tenant: &Tenant, session: &str) -> Result<Live, ServiceError> {
-        let (row, observations) = self.history(tenant, session).await?;
-        let advisor = self.policies.advisor(tenant, &row.policy).await?;
+    async fn facts(&self, tenant: &Tenant, session: &str) -> Result<SessionFacts, ServiceError> {
+        let facts = self.store.session_facts(tenant, session).await?;
+        facts.ok_or_else(|| ServiceError::unknown("session", session))
+    }
+}
+
+/// The rows of a tenant's session.
+struct Rows<'a> {
+    sessions: &'a Sessions,
+    tenant: &'a Tenant,
+    session: &'a str,
+}
+
+impl Source<Live> for Rows<'_> {
+    type Error = ServiceError;
+
+    async fn is_current(&self, live: &mut Live) -> Result<bool, ServiceError> {
+        Ok(self.sessions.store.is_as_seen(self.session, &mut live.seen).await?)
+    }
+
+    async fn read(&self) -> Result<Live, ServiceError> {
+        let SessionFacts { row, observations, seen } = self.sessions.facts(self.tenant, self.session).await?;
+        let advisor = self.sessions.policies.advisor(self.tenant, &row.policy).await?;
         let mut state = advisor.initial_state(Some(&row.initial_history), Some(row.initial_wealth))?;
         for observation in &observations {
             state = advisor.advance(&state, observation.executed_allocation, observation.log_return);
@@ -303,21 +323,7 @@ impl Sessions {
         }
         let last = observations.last().and_then(|row| serde_json::from_str::<Observed>(&row.answer_json).ok());
         let price = last.and_then(|answer| answer.price);
-        self.lock().grow(state.law.sample_size() + row.initial_history.len());
-        let head = observations.last().map_or_else(|| row.head(), |last| last.head(session));
-        Ok(Live { row: Arc::new(row), state, head, price, radius: None, advice: None })
-    }
-
-    fn slot(&self, session: &str) -> Slot {
-        self.lock().of(session)
-    }
-
-    fn forget(&self, session: &str) {
-        self.lock().forget(session);
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Slots> {
-        // No code panics while holding the lock.
-        self.slots.lock().unwrap_or_else(PoisonError::into_inner)
+        self.sessions.slots.grow(state.law.sample_size() + row.initial_history.len());
+        Ok(Live { row: Arc::new(row), state, seen, price, radius: None, advice: None })
     }
 }

@@ -1,92 +1,188 @@
-//! Which live sessions stay in memory.
+//! Which states stay in memory, and who may touch one.
 //!
-//! Two generations: a session that is asked for joins the young one; when that is full it becomes the old one, and what
-//! was old and has not been asked for since is dropped, to be replayed from its rows should it be. Nothing is held for
-//! sessions that nobody asks for.
+//! A state is a copy of what the store holds, and each name has one slot for it. A slot is
+//!
+//! - absent, until somebody holds the name;
+//! - held, by whoever has its lock and by all who wait for it; it has a state or it is empty;
+//! - kept, once nobody holds it, where it has a state; an empty one is absent at once.
+//!
+//! What keeps a stale state from being used, in this order:
+//!
+//! 1. No slot that is held leaves the map, so those who come later wait for the same lock as those who wait already.
+//! 2. [`Held::current`] is the only way to a state, and asks its [`Source`] before every use whether it is out of date.
+//!    Where the source does not answer there is an error and no state.
+//! 3. A state is out of its slot while the source decides on what follows it; it is followed or read anew, never kept.
+//!
+//! Either of the first two would do alone. `tests/slots.rs` has a checker of concurrency show that, and that it finds the
+//! fault where neither holds.
+//!
+//! What is kept is bounded by two generations: a slot that is held joins the young one; when that is full it becomes the
+//! old one, and what was old and has not been held since is dropped, to be read anew should it be asked for.
 
 use std::collections::HashMap;
+use std::future::Future;
+use std::hash::Hash;
 use std::mem;
-use std::sync::Arc;
 
-use tokio::sync::Mutex as AsyncMutex;
+use super::sync::{Arc, AsyncMutex, Mutex, MutexGuard, OwnedMutexGuard, PoisonError};
 
-use super::live::Live;
+/// Where states are read from.
+pub(super) trait Source<S> {
+    type Error;
 
-/// Sessions of one generation.
-const SESSIONS: usize = 100_000;
-/// Returns in the laws and histories of one generation: 128 MB.
-const RETURNS: usize = 1 << 24;
+    /// Whether `state` is what [`Source::read`] would give now.
+    fn is_current(&self, state: &mut S) -> impl Future<Output = Result<bool, Self::Error>> + Send;
 
-/// A session's place: its lock orders what is done to the session in this process.
-pub(super) type Slot = Arc<AsyncMutex<Option<Live>>>;
-
-#[derive(Default)]
-pub(super) struct Slots {
-    young: HashMap<String, Slot>,
-    old: HashMap<String, Slot>,
-    /// Returns read into memory since the young generation began.
-    returns: usize,
+    fn read(&self) -> impl Future<Output = Result<S, Self::Error>> + Send;
 }
 
-impl Slots {
-    /// The one slot of `session`.
-    pub(super) fn of(&mut self, session: &str) -> Slot {
-        if let Some(slot) = self.young.get(session) {
-            return slot.clone();
-        }
-        let slot = self.old.remove(session).unwrap_or_default();
-        if self.young.len() >= SESSIONS || self.returns >= RETURNS {
-            self.age();
-        }
-        self.young.insert(session.to_owned(), slot.clone());
-        slot
+/// What one generation holds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Generation {
+    pub slots: usize,
+    /// Sum of what [`Slots::grow`] was told.
+    pub weight: usize,
+}
+
+/// The slots of states `S` by their names `N`.
+pub(super) struct Slots<N: Eq + Hash + Clone, S> {
+    largest: Generation,
+    map: Mutex<Map<N, S>>,
+}
+
+struct Slot<S> {
+    state: Arc<AsyncMutex<Option<S>>>,
+    /// Those who have its lock or wait for it. Changed under the lock of the map alone.
+    holders: usize,
+}
+
+struct Map<N, S> {
+    young: HashMap<N, Slot<S>>,
+    old: HashMap<N, Slot<S>>,
+    /// Read into memory since the young generation began.
+    weight: usize,
+}
+
+impl<N: Eq + Hash + Clone, S> Slots<N, S> {
+    pub(super) fn new(largest: Generation) -> Self {
+        Slots { largest, map: Mutex::new(Map { young: HashMap::new(), old: HashMap::new(), weight: 0 }) }
     }
 
-    fn age(&mut self) {
-        let dropped = mem::replace(&mut self.old, mem::take(&mut self.young));
-        // A slot in use must stay the only one of its session.
-        self.young.extend(dropped.into_iter().filter(|(_, slot)| Arc::strong_count(slot) > 1));
-        self.returns = 0;
+    /// Waits until nobody before holds the slot of `name`.
+    pub(super) async fn hold(self: &Arc<Self>, name: N) -> Held<N, S> {
+        let (state, dropped) = self.lock().enter(&name, self.largest);
+        // After the lock of the map: a generation takes a while.
+        drop(dropped);
+        // Counted from here on, even where the caller stops waiting.
+        let place = Place { slots: self.clone(), name };
+        Held { state: state.lock_owned().await, _place: place }
     }
 
-    /// So many returns more are in memory.
-    pub(super) fn grow(&mut self, returns: usize) {
-        self.returns += returns;
+    /// So much more is in memory.
+    pub(super) fn grow(&self, weight: usize) {
+        self.lock().weight += weight;
     }
 
-    pub(super) fn forget(&mut self, session: &str) {
-        self.young.remove(session);
-        self.old.remove(session);
+    /// Number of slots, held or kept.
+    pub(super) fn count(&self) -> usize {
+        let map = self.lock();
+        map.young.len() + map.old.len()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Map<N, S>> {
+        // No code panics while holding the lock.
+        self.map.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn who_is_asked_for_stays_and_who_is_in_use_keeps_the_one_slot() {
-        let mut slots = Slots::default();
-        let used = slots.of("used");
-        let kept = Arc::downgrade(&slots.of("asked for"));
-        let dropped = Arc::downgrade(&slots.of("left alone"));
-        for round in 0..3 {
-            slots.grow(RETURNS);
-            slots.of(&format!("new {round}"));
-            assert!(kept.ptr_eq(&Arc::downgrade(&slots.of("asked for"))));
+impl<N: Eq + Hash + Clone, S> Map<N, S> {
+    /// The slot of `name`, with one holder more, and what had to go for it.
+    fn enter(&mut self, name: &N, largest: Generation) -> (Arc<AsyncMutex<Option<S>>>, HashMap<N, Slot<S>>) {
+        let mut dropped = HashMap::new();
+        if !self.young.contains_key(name) {
+            let slot = self.old.remove(name).unwrap_or_else(Slot::empty);
+            if self.young.len() >= largest.slots || self.weight >= largest.weight {
+                dropped = self.age();
+            }
+            self.young.insert(name.clone(), slot);
         }
-        assert_eq!(dropped.strong_count(), 0);
-        assert!(Arc::ptr_eq(&used, &slots.of("used")));
-        slots.forget("used");
-        assert!(!Arc::ptr_eq(&used, &slots.of("used")));
+        let slot = self.young.entry(name.clone()).or_insert_with(Slot::empty);
+        slot.holders += 1;
+        (slot.state.clone(), dropped)
     }
 
-    #[test]
-    fn what_is_kept_is_bounded() {
-        let mut slots = Slots::default();
-        for index in 0..3 * SESSIONS {
-            slots.of(&index.to_string());
+    /// The young become the old; those of the old whom nobody holds are returned, to be dropped.
+    fn age(&mut self) -> HashMap<N, Slot<S>> {
+        let old = mem::replace(&mut self.old, mem::take(&mut self.young));
+        let (held, dropped) = old.into_iter().partition(|(_, slot)| slot.holders > 0);
+        self.young = held;
+        self.weight = 0;
+        dropped
+    }
+
+    /// One holder less; an empty slot whose last holder leaves is gone.
+    fn leave(&mut self, name: &N) {
+        for generation in [&mut self.young, &mut self.old] {
+            let Some(slot) = generation.get_mut(name) else { continue };
+            slot.holders -= 1;
+            if slot.holders == 0 && slot.state.try_lock().is_ok_and(|state| state.is_none()) {
+                generation.remove(name);
+            }
+            return;
         }
-        assert!(slots.young.len() + slots.old.len() <= 2 * SESSIONS);
+    }
+}
+
+impl<S> Slot<S> {
+    fn empty() -> Self {
+        Slot { state: Arc::new(AsyncMutex::new(None)), holders: 0 }
+    }
+}
+
+/// A slot whose lock is held until this is dropped.
+pub(super) struct Held<N: Eq + Hash + Clone, S> {
+    // Dropped first: when the last holder leaves, nobody has the lock.
+    state: OwnedMutexGuard<Option<S>>,
+    _place: Place<N, S>,
+}
+
+impl<N: Eq + Hash + Clone, S> Held<N, S> {
+    /// The state as `source` has it now: the one in memory where it is current, else read anew.
+    ///
+    /// # Errors
+    /// The source does not answer, or has no such state.
+    pub(super) async fn current<R: Source<S>>(&mut self, source: &R) -> Result<&mut S, R::Error> {
+        if let Some(state) = self.state.as_mut()
+            && !source.is_current(state).await?
+        {
+            self.clear();
+        }
+        let state = match self.state.take() {
+            Some(state) => state,
+            None => source.read().await?,
+        };
+        Ok(self.state.insert(state))
+    }
+
+    /// Empties the slot: before the source is asked for a change, whose outcome may stay unknown.
+    pub(super) fn clear(&mut self) {
+        *self.state = None;
+    }
+
+    /// What the source has from now on.
+    pub(super) fn put(&mut self, state: S) {
+        *self.state = Some(state);
+    }
+}
+
+/// One of the holders of a slot.
+struct Place<N: Eq + Hash + Clone, S> {
+    slots: Arc<Slots<N, S>>,
+    name: N,
+}
+
+impl<N: Eq + Hash + Clone, S> Drop for Place<N, S> {
+    fn drop(&mut self) {
+        self.slots.lock().leave(&self.name);
     }
 }

@@ -166,7 +166,7 @@ impl Inspection {
             for row in &page {
                 let session = SessionRow::from_row(row)?.session;
                 let rows = self.read(observations::all_of(&session)).await?;
-                observed += observations::numbered(&session, &rows)?.len();
+                observed += observations::numbered(&session, &rows)?.map_or(0, |rows| rows.len());
             }
             sessions += page.len();
         }

@@ -24,6 +24,7 @@ mod audit;
 mod check;
 mod codec;
 mod error;
+mod idempotency;
 mod job;
 mod job_state;
 mod jobs;
@@ -48,13 +49,14 @@ use query::{Connection, Query, Row};
 pub use audit::{Actor, AuditBounds, AuditFilter, AuditRow, Deed};
 pub use check::Inspection;
 pub use error::StoreError;
+pub use idempotency::RequestKey;
 pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, NewJob};
 pub use job_state::{IllegalTransition, JobEvent, JobState};
 pub use keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, Successor};
-pub use observations::{Append, NewObservation, ObservationRow};
+pub use observations::{Append, ObservationRow};
 pub use policies::{DeletePolicy, PolicyRow, PolicySummary};
 pub use postgres::{PostgresUrl, UrlError};
-pub use sessions::{CreateSession, Head, NewSession, SessionRow, SessionSummary};
+pub use sessions::{CreateSession, Head, Seen, SessionFacts, SessionRow, SessionSummary};
 pub use sqlite::{backup, restore};
 pub use tenant::Tenant;
 
@@ -101,11 +103,6 @@ impl Store {
         Store { actor, ..self.clone() }
     }
 
-    /// Whether other processes may write to it, so that what was read may be out of date by now.
-    pub fn is_shared(&self) -> bool {
-        matches!(self.engine, Engine::Postgres(_))
-    }
-
     /// The time by which leases are measured, in milliseconds, where the caller's own clock shows `local_ms`.
     ///
     /// PostgreSQL's clock, since those of its clients may differ; a SQLite folder has one process, and that its own.
@@ -150,6 +147,18 @@ impl Store {
     {
         match &self.engine {
             Engine::Sqlite(folder) => folder.write(doing, work).await,
+            Engine::Postgres(database) => database.write(doing, work).await,
+        }
+    }
+
+    /// As [`Self::write`], where `work` may change rows of `session`.
+    async fn write_to<T, W>(&self, session: &str, doing: &'static str, work: W) -> Result<T, StoreError>
+    where
+        T: Send + 'static,
+        W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
+    {
+        match &self.engine {
+            Engine::Sqlite(folder) => folder.write_to(session, doing, work).await,
             Engine::Postgres(database) => database.write(doing, work).await,
         }
     }

@@ -11,9 +11,9 @@ use super::query::{Connection, Query, Row, query};
 use super::sessions::Head;
 use super::{Engine, Store, StoreError};
 
-/// One period's return and what was answered to it.
+/// One period's return and what was answered to it; as read, verified against its seal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct NewObservation {
+pub struct ObservationRow {
     pub session: String,
     pub period: usize,
     /// Hash of what the user reported: tells a repeat from other content under the same period.
@@ -26,20 +26,7 @@ pub struct NewObservation {
     pub created_ms: i64,
 }
 
-/// An observation as stored, verified against its digest.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ObservationRow {
-    pub period: usize,
-    pub content_hash: String,
-    pub log_return: f64,
-    pub executed_allocation: f64,
-    pub advised_allocation: f64,
-    pub wealth_after: f64,
-    pub answer_json: String,
-    pub created_ms: i64,
-}
-
-/// What became of a [`NewObservation`].
+/// What became of an observation to append.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Append {
     Appended,
@@ -58,7 +45,7 @@ pub enum Append {
 
 impl Store {
     /// Appends the period after the last, or says why not; decided and written in one transaction.
-    pub async fn append_observation(&self, new: NewObservation) -> Result<Append, StoreError> {
+    pub async fn append_observation(&self, new: ObservationRow) -> Result<Append, StoreError> {
         match &self.engine {
             Engine::Sqlite(folder) => folder.append(new).await,
             Engine::Postgres(database) => append_shared(database, new).await,
@@ -73,31 +60,40 @@ impl Store {
         self.read("reading an observation", find, |rows| rows.first().map(ObservationRow::from_row).transpose()).await
     }
 
-    /// Every observation of the session, ascending by period; empty where there is no such session.
+    /// Every observation of the session, ascending by period. `None` where there is no such session, by the same
+    /// statement: a session that is deleted meanwhile is never one without observations.
     ///
     /// # Errors
     /// [`StoreError::Corrupt`] where a row is not what was written or a period is missing.
-    pub async fn observations(&self, session: &str) -> Result<Vec<ObservationRow>, StoreError> {
+    pub async fn observations(&self, session: &str) -> Result<Option<Vec<ObservationRow>>, StoreError> {
         self.read("reading observations", all_of(session), |rows| numbered(session, rows)).await
     }
 }
 
 pub(super) fn all_of(session: &str) -> Query {
-    query("SELECT * FROM observations WHERE session = $1 ORDER BY period").bind(session)
+    let all = query(
+        "SELECT observations.* FROM sessions LEFT JOIN observations ON observations.session = sessions.session
+         WHERE sessions.session = $1 ORDER BY observations.period",
+    );
+    all.bind(session)
 }
 
 /// What [`all_of`] finds, each row verified and none missing before the last.
-pub(super) fn numbered(session: &str, rows: &[Row]) -> Result<Vec<ObservationRow>, Failure> {
+pub(super) fn numbered(session: &str, rows: &[Row]) -> Result<Option<Vec<ObservationRow>>, Failure> {
+    let Some(first) = rows.first() else { return Ok(None) };
+    if first.get::<Option<i64>>("period")?.is_none() {
+        return Ok(Some(Vec::new()));
+    }
     let rows: Vec<_> = rows.iter().map(ObservationRow::from_row).collect::<Result<_, Failure>>()?;
     match rows.iter().zip(1..).find(|(row, period)| row.period != *period) {
-        None => Ok(rows),
+        None => Ok(Some(rows)),
         Some((_, period)) => Err(Failure::Corrupt(format!("period {period} of session {session}"))),
     }
 }
 
 /// Appends by one statement, which commits by itself: two that append the same period, or one beside a deletion, meet at the
 /// table's keys. Why a period is not appended is found out under the lock of its session.
-async fn append_shared(database: &Database, new: NewObservation) -> Result<Append, StoreError> {
+async fn append_shared(database: &Database, new: ObservationRow) -> Result<Append, StoreError> {
     match database.execute(APPENDING, bind_row(query(INSERT_ONE.as_str()), &new)).await {
         Ok(rows) if rows > 0 => Ok(Append::Appended),
         Ok(_) | Err(StoreError::Refused { .. }) => {
@@ -112,7 +108,7 @@ pub(super) const APPENDING: &str = "appending an observation";
 
 /// The row is inserted by a statement that decides itself whether it is the next one; why it was not is found out after.
 /// It changes rows by that statement only.
-pub(super) async fn append(mut connection: Connection<'_>, new: NewObservation) -> Result<Append, Failure> {
+pub(super) async fn append(mut connection: Connection<'_>, new: ObservationRow) -> Result<Append, Failure> {
     let connection = &mut connection;
     let session = query("SELECT sequence FROM sessions WHERE session = $1").bind(new.session.as_str());
     connection.lock(session.for_update()).await?;
@@ -123,7 +119,7 @@ pub(super) async fn append(mut connection: Connection<'_>, new: NewObservation) 
 }
 
 /// Why a period was not inserted.
-async fn refused(connection: &mut Connection<'_>, new: &NewObservation) -> Result<Append, Failure> {
+async fn refused(connection: &mut Connection<'_>, new: &ObservationRow) -> Result<Append, Failure> {
     let session = query("SELECT sequence FROM sessions WHERE session = $1").bind(new.session.as_str());
     if connection.row(session).await?.is_none() {
         return Ok(Append::NoSession);
@@ -138,7 +134,7 @@ async fn refused(connection: &mut Connection<'_>, new: &NewObservation) -> Resul
 }
 
 /// What a period reported before answers.
-async fn repeated(connection: &mut Connection<'_>, new: &NewObservation) -> Result<Append, Failure> {
+async fn repeated(connection: &mut Connection<'_>, new: &ObservationRow) -> Result<Append, Failure> {
     let earlier = query("SELECT * FROM observations WHERE session = $1 AND period = $2");
     let earlier = connection.row(earlier.bind(new.session.as_str()).bind(to_sql(new.period))).await?;
     let missing = || Failure::Corrupt(format!("period {} of session {}", new.period, new.session));
@@ -198,64 +194,40 @@ fn insert_all(rows: usize) -> String {
 ///
 /// # Errors
 /// Also where not all of them are the next ones of sessions that exist.
-pub(super) async fn append_all(connection: &mut Connection<'_>, new: &[&NewObservation]) -> Result<(), Failure> {
+pub(super) async fn append_all(connection: &mut Connection<'_>, new: &[&ObservationRow]) -> Result<(), Failure> {
     let size = new.len().next_power_of_two().trailing_zeros() as usize;
     let insert = new.iter().fold(query(INSERT_MANY[size].as_str()), |insert, new| bind_row(insert, new));
     connection.execute(insert).await.map(drop)
 }
 
 /// Inserts the period where it is the one after the last of a session that exists.
-async fn insert_next(connection: &mut Connection<'_>, new: &NewObservation) -> Result<bool, Failure> {
+async fn insert_next(connection: &mut Connection<'_>, new: &ObservationRow) -> Result<bool, Failure> {
     Ok(connection.execute(bind_row(query(INSERT_ONE.as_str()), new)).await? > 0)
 }
 
-fn bind_row(insert: Query, new: &NewObservation) -> Query {
-    let row = ObservationRow::from(new.clone());
-    let seal = row.seal(&new.session).finish();
+fn bind_row(insert: Query, new: &ObservationRow) -> Query {
     insert
         .bind(new.session.as_str())
-        .bind(to_sql(row.period))
-        .bind(row.content_hash)
-        .bind(row.log_return)
-        .bind(row.executed_allocation)
-        .bind(row.advised_allocation)
-        .bind(row.wealth_after)
-        .bind(row.answer_json)
-        .bind(row.created_ms)
-        .bind(seal)
-}
-
-impl NewObservation {
-    /// The head of its session once it is appended.
-    pub fn head(&self) -> Head {
-        ObservationRow::from(self.clone()).head(&self.session)
-    }
-}
-
-impl From<NewObservation> for ObservationRow {
-    fn from(new: NewObservation) -> Self {
-        ObservationRow {
-            period: new.period,
-            content_hash: new.content_hash,
-            log_return: new.log_return,
-            executed_allocation: new.executed_allocation,
-            advised_allocation: new.advised_allocation,
-            wealth_after: new.wealth_after,
-            answer_json: new.answer_json,
-            created_ms: new.created_ms,
-        }
-    }
+        .bind(to_sql(new.period))
+        .bind(new.content_hash.as_str())
+        .bind(new.log_return)
+        .bind(new.executed_allocation)
+        .bind(new.advised_allocation)
+        .bind(new.wealth_after)
+        .bind(new.answer_json.as_str())
+        .bind(new.created_ms)
+        .bind(new.seal().finish())
 }
 
 impl ObservationRow {
-    /// The head of `session` where this is its last observation.
-    pub fn head(&self, session: &str) -> Head {
-        Head { observed: self.period, seal: self.seal(session).finish() }
+    /// The head of its session where this is the last observation.
+    pub fn head(&self) -> Head {
+        Head { observed: self.period, seal: self.seal().finish() }
     }
 
-    fn seal(&self, session: &str) -> Seal {
+    fn seal(&self) -> Seal {
         Seal::of("observation")
-            .text(session)
+            .text(&self.session)
             .integer(to_sql(self.period))
             .text(&self.content_hash)
             .real(self.log_return)
@@ -267,8 +239,8 @@ impl ObservationRow {
     }
 
     fn from_row(row: &Row) -> Result<Self, Failure> {
-        let session: String = row.get("session")?;
         let read = ObservationRow {
+            session: row.get("session")?,
             period: from_sql(row.get("period")?)?,
             content_hash: row.get("content_hash")?,
             log_return: row.get("log_return")?,
@@ -279,7 +251,7 @@ impl ObservationRow {
             created_ms: row.get("created_ms")?,
         };
         let seal: Vec<u8> = row.get("seal")?;
-        read.seal(&session).verify(&seal, || format!("period {} of session {session}", read.period))?;
+        read.seal().verify(&seal, || format!("period {} of session {}", read.period, read.session))?;
         Ok(read)
     }
 }

@@ -5,40 +5,34 @@ use futures_util::FutureExt;
 use super::audit::{self, Actor, Deed};
 use super::codec::{Seal, decode_reals, encode_reals, from_sql, to_sql};
 use super::error::Failure;
+use super::idempotency::{self, RequestKey};
+use super::observations::ObservationRow;
 use super::query::{Connection, Row, query};
 use super::tenant::Tenant;
-use super::{Store, StoreError, policies};
+use super::{Engine, Store, StoreError, policies};
 
-/// A session to open.
+/// What became of a session to open.
 #[derive(Debug, Clone, PartialEq)]
-pub struct NewSession {
-    pub session: String,
-    pub tenant: Tenant,
-    pub policy: String,
-    pub wealth: f64,
-    /// The log-returns known at the start.
-    pub history: Vec<f64>,
-    pub horizon: usize,
-    pub created_ms: i64,
-}
-
-/// What became of a [`NewSession`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CreateSession {
     Created,
+    /// The tenant used the idempotency key with the same request: the session it opened, as it started.
+    Repeated(SessionRow),
+    /// The tenant used the idempotency key with another request.
+    KeyConflict,
     /// The tenant has no such policy.
     NoPolicy,
     /// The identifier is taken.
     Exists,
 }
 
-/// The start of a session, verified against its digest.
+/// The start of a session; as read, verified against its seal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionRow {
     pub session: String,
     pub tenant: Tenant,
     pub policy: String,
     pub initial_wealth: f64,
+    /// The log-returns known at the start.
     pub initial_history: Vec<f64>,
     pub horizon: usize,
     pub created_ms: i64,
@@ -52,6 +46,36 @@ pub struct SessionRow {
 pub struct Head {
     pub observed: usize,
     pub(super) seal: Vec<u8>,
+}
+
+/// A session as it was read: its start and every observation.
+#[derive(Debug, Clone)]
+pub struct SessionFacts {
+    pub row: SessionRow,
+    /// Ascending by period.
+    pub observations: Vec<ObservationRow>,
+    pub seen: Seen,
+}
+
+/// What tells later whether a session is still what was read of it.
+#[derive(Debug, Clone)]
+pub struct Seen {
+    head: Head,
+    /// Of a folder: the number of the session's changes that all are in `head`.
+    change: Option<u64>,
+}
+
+impl Seen {
+    /// Number of periods observed.
+    pub fn observed(&self) -> usize {
+        self.head.observed
+    }
+
+    /// The session as the caller knows it once `appended` is answered with [`Append::Appended`](super::Append).
+    pub fn followed_by(&self, appended: &ObservationRow) -> Seen {
+        // Whoever else wrote meanwhile raised the number too, so that it is not this one.
+        Seen { head: appended.head(), change: self.change.map(|change| change + 1) }
+    }
 }
 
 /// A session without its history.
@@ -69,19 +93,57 @@ pub struct SessionSummary {
 }
 
 impl Store {
-    pub async fn create_session(&self, new: NewSession) -> Result<CreateSession, StoreError> {
+    /// Opens a session and records its idempotency key, both or neither.
+    pub async fn create_session(&self, new: SessionRow, key: Option<RequestKey>) -> Result<CreateSession, StoreError> {
         let actor = self.actor.clone();
-        self.write("creating a session", move |connection| create(connection, new, actor).boxed()).await
+        self.write("creating a session", move |connection| create(connection, new, key, actor).boxed()).await
     }
 
+    /// A session of a tenant.
+    ///
     /// # Errors
     /// [`StoreError::Corrupt`] where the row is not what was written.
-    pub async fn session(&self, session: &str) -> Result<Option<SessionRow>, StoreError> {
-        let find = query("SELECT * FROM sessions WHERE session = $1").bind(session);
+    pub async fn session(&self, tenant: &Tenant, session: &str) -> Result<Option<SessionRow>, StoreError> {
+        let find = query("SELECT * FROM sessions WHERE session = $1 AND tenant = $2");
+        let find = find.bind(session).bind(tenant.as_str());
         self.read("reading a session", find, |rows| rows.first().map(SessionRow::from_row).transpose()).await
     }
 
-    /// The head of a session: where it is the one a replay gave, that replay is still the session.
+    /// A session of a tenant with all its observations.
+    ///
+    /// # Errors
+    /// [`StoreError::Corrupt`] where a row is not what was written or a period is missing.
+    pub async fn session_facts(&self, tenant: &Tenant, session: &str) -> Result<Option<SessionFacts>, StoreError> {
+        // Before the rows: what is written from here on shows.
+        let change = self.change(session);
+        let Some(row) = self.session(tenant, session).await? else { return Ok(None) };
+        let Some(observations) = self.observations(session).await? else { return Ok(None) };
+        let head = observations.last().map_or_else(|| row.head(), ObservationRow::head);
+        Ok(Some(SessionFacts { row, observations, seen: Seen { head, change } }))
+    }
+
+    /// Whether a session is still as it was `seen`: known without a read where a folder's session was not written to.
+    pub async fn is_as_seen(&self, session: &str, seen: &mut Seen) -> Result<bool, StoreError> {
+        let change = self.change(session);
+        if change.is_some() && change == seen.change {
+            return Ok(true);
+        }
+        let is_as_seen = self.head(session).await?.as_ref() == Some(&seen.head);
+        if is_as_seen {
+            seen.change = change;
+        }
+        Ok(is_as_seen)
+    }
+
+    /// A number that is another after every write to `session`, where this process makes all of them.
+    fn change(&self, session: &str) -> Option<u64> {
+        match &self.engine {
+            Engine::Sqlite(folder) => Some(folder.change(session)),
+            Engine::Postgres(_) => None,
+        }
+    }
+
+    /// The head of a session: where it is the one of what was read, that is still the session.
     pub async fn head(&self, session: &str) -> Result<Option<Head>, StoreError> {
         let last = query(
             "SELECT sessions.seal AS start_seal, observations.period, observations.seal
@@ -116,8 +178,9 @@ impl Store {
 
     /// Deletes a session of a tenant and its observations. False where there was none.
     pub async fn delete_session(&self, tenant: &Tenant, session: &str) -> Result<bool, StoreError> {
-        let (tenant, session, actor) = (tenant.clone(), session.to_owned(), self.actor.clone());
-        self.write("deleting a session", move |connection| delete(connection, tenant, session, actor).boxed()).await
+        let (tenant, name, actor) = (tenant.clone(), session.to_owned(), self.actor.clone());
+        self.write_to(session, "deleting a session", move |connection| delete(connection, tenant, name, actor).boxed())
+            .await
     }
 
     pub async fn count_sessions(&self) -> Result<u64, StoreError> {
@@ -127,20 +190,46 @@ impl Store {
     }
 }
 
+async fn create(
+    mut connection: Connection<'_>,
+    row: SessionRow,
+    key: Option<RequestKey>,
+    actor: Actor,
+) -> Result<CreateSession, Failure> {
+    let connection = &mut connection;
+    if let Some(key) = &key
+        && let Some(earlier) = idempotency::repeated(connection, &row.tenant, key).await?
+    {
+        return Ok(earlier);
+    }
+    let created = insert(connection, &row).await?;
+    if created != CreateSession::Created {
+        return Ok(created);
+    }
+    if let Some(key) = &key
+        && !idempotency::take(connection, &row.tenant, key, &row.session).await?
+    {
+        connection.execute(query("DELETE FROM sessions WHERE session = $1").bind(row.session)).await?;
+        let earlier = idempotency::repeated(connection, &row.tenant, key).await?;
+        return earlier.ok_or_else(|| Failure::Corrupt(format!("the idempotency key {}", key.key)));
+    }
+    let outcome = format!("opened under policy {}", row.policy);
+    audit::record(connection, &actor, &row.tenant, Deed::OpenSession, &row.session, &outcome).await?;
+    Ok(created)
+}
+
 /// The policy stays locked until the session is there: it cannot be deleted in between.
-async fn create(mut connection: Connection<'_>, new: NewSession, actor: Actor) -> Result<CreateSession, Failure> {
-    let policy = query("SELECT sequence FROM policies WHERE policy = $1").bind(new.policy.as_str());
+async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<CreateSession, Failure> {
+    let policy = query("SELECT sequence FROM policies WHERE policy = $1").bind(row.policy.as_str());
     if connection.row(policy.for_share()).await?.is_none()
-        || !policies::is_owned(&mut connection, &new.tenant, &new.policy).await?
+        || !policies::is_owned(connection, &row.tenant, &row.policy).await?
     {
         return Ok(CreateSession::NoPolicy);
     }
-    let row = SessionRow::from(new);
     let insert = query(
         "INSERT INTO sessions (session, policy, initial_wealth, initial_history, horizon, created_ms, seal, tenant)
          VALUES ($1, $2, $3, $4, $5, $6, $7, $8) ON CONFLICT (session) DO NOTHING",
     );
-    let seal = row.seal().finish();
     let insert = insert
         .bind(row.session.as_str())
         .bind(row.policy.as_str())
@@ -148,14 +237,10 @@ async fn create(mut connection: Connection<'_>, new: NewSession, actor: Actor) -
         .bind(encode_reals(&row.initial_history))
         .bind(to_sql(row.horizon))
         .bind(row.created_ms)
-        .bind(seal)
+        .bind(row.seal().finish())
         .bind(row.tenant.as_str());
-    if connection.execute(insert).await? == 0 {
-        return Ok(CreateSession::Exists);
-    }
-    let outcome = format!("opened under policy {}", row.policy);
-    audit::record(&mut connection, &actor, &row.tenant, Deed::OpenSession, &row.session, &outcome).await?;
-    Ok(CreateSession::Created)
+    let inserted = connection.execute(insert).await?;
+    Ok(if inserted > 0 { CreateSession::Created } else { CreateSession::Exists })
 }
 
 /// The entry says how many observations went with the session.
@@ -177,24 +262,15 @@ async fn delete(
     Ok(true)
 }
 
-impl From<NewSession> for SessionRow {
-    fn from(new: NewSession) -> Self {
-        SessionRow {
-            session: new.session,
-            tenant: new.tenant,
-            policy: new.policy,
-            initial_wealth: new.wealth,
-            initial_history: new.history,
-            horizon: new.horizon,
-            created_ms: new.created_ms,
-        }
-    }
-}
-
 impl SessionRow {
     /// The head of the session before its first observation.
     pub fn head(&self) -> Head {
         Head { observed: 0, seal: self.seal().finish() }
+    }
+
+    /// The session before its first observation; whether it still is that is found out by a read.
+    pub fn as_opened(&self) -> Seen {
+        Seen { head: self.head(), change: None }
     }
 
     fn seal(&self) -> Seal {

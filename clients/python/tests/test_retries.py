@@ -8,7 +8,7 @@ from email.utils import formatdate
 import pytest
 from conftest import Network, Service, train
 
-from ballast import Ballast, Overloaded, ProblemError, Session, StorageFull, Unreachable
+from ballast import Ballast, IdempotencyConflict, Overloaded, ProblemError, Session, StorageFull, Unreachable
 
 
 def test_a_lost_answer_to_observe_is_given_again_and_counts_once(
@@ -57,13 +57,18 @@ def test_a_session_is_not_opened_twice(
 
     policy, before = ballast.policy(session.policy), count()
     network.lose_answers(1)
-    with pytest.raises(Unreachable):
-        policy.session()
-    assert count() == before + 1 and pauses == []
+    opened = policy.session()
+    assert opened.period == 1 and count() == before + 1 and len(pauses) == 1
     network.refuse(2)
     network.answer(503, {"retry-after": "1"})
-    assert policy.session().period == 1
-    assert count() == before + 2 and len(pauses) == 3
+    assert policy.session().id != opened.id
+    assert count() == before + 2 and len(pauses) == 4
+    mine = policy.session(wealth=50.0, idempotency_key="mine")
+    mine.observe(log_return=0.01)
+    again = policy.session(wealth=50.0, idempotency_key="mine")
+    assert (again.id, again.period, again.refresh().period) == (mine.id, 1, 2)
+    with pytest.raises(IdempotencyConflict):
+        policy.session(wealth=51.0, idempotency_key="mine")
 
 
 def test_a_deletion_whose_answer_was_lost_is_one(session: Session, network: Network, pauses: list[float]) -> None:

@@ -7,7 +7,7 @@ use ballast::control::backward::{Training, Watch};
 use ballast::control::policy::content_hash;
 use ballast::control::pool::TrainingPool;
 use ballast::control::specification::{InitialLaws, Specification};
-use ballast::store::{CreateSession, NewSession, Store, Tenant};
+use ballast::store::{CreateSession, SessionRow, Store, Tenant};
 use futures_util::{StreamExt, stream};
 use serde_json::Value;
 
@@ -77,7 +77,7 @@ impl World {
         };
         let creating = stream::iter(0..count).map(|index| {
             let (store, new) = (store.clone(), self.session(index));
-            async move { store.create_session(new.clone()).await.map(|outcome| (outcome, new.session)) }
+            async move { store.create_session(new.clone(), None).await.map(|outcome| (outcome, new.session)) }
         });
         let created: Vec<_> = creating.buffered(IN_FLIGHT).collect().await;
         store.close().await;
@@ -88,15 +88,15 @@ impl World {
         created.into_iter().map(session).collect()
     }
 
-    fn session(&self, index: u32) -> NewSession {
+    fn session(&self, index: u32) -> SessionRow {
         let problem = &self.specification.problem;
-        NewSession {
+        SessionRow {
             tenant: Tenant::default(),
             // As spread as the service's own, which are random.
             session: format!("session_{}", &content_hash(&index.to_le_bytes())[..32]),
             policy: self.policy.clone(),
-            wealth: problem.initial_wealth,
-            history: problem.history.clone(),
+            initial_wealth: problem.initial_wealth,
+            initial_history: problem.history.clone(),
             horizon: self.horizon,
             created_ms: 0,
         }

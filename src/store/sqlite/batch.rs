@@ -3,34 +3,33 @@
 
 use futures_util::FutureExt;
 use sqlx::SqliteConnection;
-use tokio::sync::oneshot;
 
-use super::writer::{Answer, Operation, Undo, Waiting};
+use super::writer::{Answer, Operation, Reply, Undo, Waiting};
 use crate::store::error::StoreError;
-use crate::store::observations::{self, APPENDING, Append, NewObservation, append};
+use crate::store::observations::{self, APPENDING, Append, ObservationRow, append};
 use crate::store::query::Connection;
 
 /// An observation to append, and where its answer goes.
 pub(super) struct Appending {
-    pub new: NewObservation,
-    pub answer: oneshot::Sender<Result<Append, StoreError>>,
+    pub new: ObservationRow,
+    pub reply: Reply<Append>,
 }
 
 impl Appending {
     /// As an operation like every other, which finds out why it is refused where it is.
     pub(super) fn alone(self) -> Operation {
-        let Appending { new, answer } = self;
+        let Appending { new, reply } = self;
         Operation::new(
             APPENDING,
             Undo::Statement,
             move |connection| append(Connection::Sqlite(connection), new).boxed(),
-            answer,
+            reply,
         )
     }
 
     /// How to answer it once it is appended and its group's end is known.
     fn appended(self) -> Answer {
-        Box::new(move |group: Result<(), StoreError>| drop(self.answer.send(group.map(|()| Append::Appended))))
+        Box::new(move |group: Result<(), StoreError>| self.reply.send(group.map(|()| Append::Appended)))
     }
 }
 
@@ -45,7 +44,7 @@ pub(super) async fn append_all(
     answers: &mut Vec<Answer>,
 ) -> Result<(), StoreError> {
     let batch = std::mem::take(&mut waiting.appends);
-    let rows: Vec<&NewObservation> = batch.iter().map(|appending| &appending.new).collect();
+    let rows: Vec<&ObservationRow> = batch.iter().map(|appending| &appending.new).collect();
     let end = match rows.as_slice() {
         [] => Ok(()),
         rows => observations::append_all(&mut Connection::Sqlite(connection), rows).await,

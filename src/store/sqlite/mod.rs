@@ -1,13 +1,16 @@
 //! SQLite in a folder that one process holds: read connections beside one writer, which commits in groups.
 
 mod batch;
+mod changes;
 mod classify;
 mod copy;
 mod opening;
+mod sync;
 mod write_ahead_log;
 mod writer;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
@@ -15,10 +18,11 @@ use sqlx::sqlite::SqlitePool;
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::error::{Failure, StoreError};
-use super::observations::{APPENDING, Append, NewObservation};
+use super::observations::{APPENDING, Append, ObservationRow};
 use super::query::{Connection, Query, Row, query};
 use batch::Appending;
-use writer::{Operation, Request, Undo};
+use changes::Changes;
+use writer::{Operation, Reply, Request, Undo};
 
 pub(super) use classify::classify;
 pub use copy::{backup, restore};
@@ -29,6 +33,7 @@ pub(super) use opening::{inspect, inspect_file, version};
 pub(super) struct Folder {
     readers: SqlitePool,
     requests: mpsc::Sender<Request>,
+    changes: Arc<Changes>,
     /// The first fatal error, from whichever side met it.
     fatal: watch::Sender<Option<StoreError>>,
 }
@@ -47,7 +52,7 @@ impl Folder {
         let (requests, receiver) = mpsc::channel(writer::QUEUE);
         let fatal = watch::Sender::new(None);
         writer::start(writer, receiver, fatal.clone(), lock)?;
-        Ok(Folder { readers, requests, fatal })
+        Ok(Folder { readers, requests, changes: Changes::new(changes::NUMBERS), fatal })
     }
 
     pub(super) async fn ping(&self) -> Result<(), StoreError> {
@@ -86,31 +91,40 @@ impl Folder {
         T: Send + 'static,
         W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
-        let request = |answer| {
-            Request::Write(Operation::new(
-                doing,
-                Undo::Savepoint,
-                move |connection| work(Connection::Sqlite(connection)).boxed(),
-                answer,
-            ))
-        };
-        self.request(doing, request).await
+        let (reply, answer) = Reply::new(None);
+        self.request(doing, writing(doing, work, reply), answer).await
+    }
+
+    /// As [`Self::write`], where `work` may change rows of `session`.
+    pub(super) async fn write_to<T, W>(&self, session: &str, doing: &'static str, work: W) -> Result<T, StoreError>
+    where
+        T: Send + 'static,
+        W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
+    {
+        let (reply, answer) = Reply::new(Some(self.changes.of(session)));
+        self.request(doing, writing(doing, work, reply), answer).await
     }
 
     /// Appends in the writer, many observations to a statement, and answers after the commit.
-    pub(super) async fn append(&self, new: NewObservation) -> Result<Append, StoreError> {
-        self.request(APPENDING, |answer| Request::Append(Appending { new, answer })).await
+    pub(super) async fn append(&self, new: ObservationRow) -> Result<Append, StoreError> {
+        let (reply, answer) = Reply::new(Some(self.changes.of(&new.session)));
+        self.request(APPENDING, Request::Append(Appending { new, reply }), answer).await
+    }
+
+    /// A number that is another after every write to `session`.
+    pub(super) fn change(&self, session: &str) -> u64 {
+        self.changes.number(session)
     }
 
     async fn request<T>(
         &self,
         doing: &'static str,
-        request: impl FnOnce(oneshot::Sender<Result<T, StoreError>>) -> Request,
+        request: Request,
+        answer: oneshot::Receiver<Result<T, StoreError>>,
     ) -> Result<T, StoreError> {
         self.refuse_after_fatal()?;
-        let (sender, answer) = oneshot::channel();
         // A writer that ended drops the request, and the answer with it.
-        let _ = self.requests.send(request(sender)).await;
+        let _ = self.requests.send(request).await;
         match answer.await {
             Ok(result) => result,
             Err(_) => self.refuse_after_fatal().and(Err(StoreError::Unavailable { doing, source: None })),
@@ -135,4 +149,17 @@ impl Folder {
     fn refuse_after_fatal(&self) -> Result<(), StoreError> {
         self.fatal.borrow().clone().map_or(Ok(()), Err)
     }
+}
+
+fn writing<T, W>(doing: &'static str, work: W, reply: Reply<T>) -> Request
+where
+    T: Send + 'static,
+    W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
+{
+    Request::Write(Operation::new(
+        doing,
+        Undo::Savepoint,
+        move |connection| work(Connection::Sqlite(connection)).boxed(),
+        reply,
+    ))
 }

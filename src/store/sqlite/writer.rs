@@ -15,6 +15,7 @@ use sqlx::{Connection, SqliteConnection};
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::batch::{self, Appending};
+use super::changes::Change;
 use crate::store::error::{Failure, StoreError};
 use crate::store::observations::ROWS_AT_ONCE;
 
@@ -57,14 +58,29 @@ struct Ran {
 /// Tells a caller how its group ended.
 pub(super) type Answer = Box<dyn FnOnce(Result<(), StoreError>) + Send>;
 
+/// Where the outcome of a write goes, and the change it may be.
+pub(super) struct Reply<T> {
+    change: Option<Change>,
+    sender: oneshot::Sender<Result<T, StoreError>>,
+}
+
+impl<T> Reply<T> {
+    pub(super) fn new(change: Option<Change>) -> (Self, oneshot::Receiver<Result<T, StoreError>>) {
+        let (sender, answer) = oneshot::channel();
+        (Reply { change, sender }, answer)
+    }
+
+    /// Call after the end of the transaction.
+    pub(super) fn send(self, outcome: Result<T, StoreError>) {
+        drop(self.change);
+        // A caller that stopped waiting needs no answer.
+        let _ = self.sender.send(outcome);
+    }
+}
+
 impl Operation {
-    /// `work` as an operation, answered to `sender`.
-    pub(super) fn new<T, W>(
-        doing: &'static str,
-        undo: Undo,
-        work: W,
-        sender: oneshot::Sender<Result<T, StoreError>>,
-    ) -> Self
+    /// `work` as an operation, answered to `reply`.
+    pub(super) fn new<T, W>(doing: &'static str, undo: Undo, work: W, reply: Reply<T>) -> Self
     where
         T: Send + 'static,
         W: for<'c> FnOnce(&'c mut SqliteConnection) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
@@ -76,8 +92,7 @@ impl Operation {
                     Err(error) => Err(error),
                 };
                 let end = result.as_ref().map(|_| ()).map_err(StoreError::clone);
-                // A caller that stopped waiting needs no answer.
-                let answer = Box::new(move |group: Result<(), StoreError>| drop(sender.send(group.and(result))));
+                let answer = Box::new(move |group: Result<(), StoreError>| reply.send(group.and(result)));
                 Ran { end, answer }
             }
             .boxed()

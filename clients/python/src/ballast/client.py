@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import Any, cast
@@ -16,7 +15,7 @@ from .policy import Policy
 from .returns import Kind, Returns, log_returns
 from .session import Session
 from .training import Evaluation, Training
-from .transport import Transport
+from .transport import Transport, idempotent
 
 
 class Ballast:
@@ -138,9 +137,7 @@ class Ballast:
         self._transport.http.close()
 
     def _queued(self, path: str, request: Mapping[str, Any], idempotency_key: str | None) -> wire.Job:
-        # Without a key of the caller's, one of this call's own: a repetition after a lost answer finds the same job.
-        headers = {"Idempotency-Key": str(uuid.uuid4()) if idempotency_key is None else idempotency_key}
-        return cast(wire.Job, self._transport.json("POST", path, body=request, headers=headers))
+        return cast(wire.Job, self._transport.json("POST", path, body=request, headers=idempotent(idempotency_key)))
 
     def _listed(self, path: str, name: str, **wanted: str | None) -> Iterator[Any]:
         after: int | None = None

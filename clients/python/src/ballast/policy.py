@@ -10,7 +10,7 @@ from . import wire
 from .errors import DamagedPolicy
 from .returns import Kind, Returns, log_returns
 from .session import Session
-from .transport import Transport
+from .transport import Transport, idempotent
 
 
 class Policy:
@@ -33,16 +33,25 @@ class Policy:
             raise DamagedPolicy(f"the exported bytes hash to {found}: must be {self.id}")
         return document
 
-    def session(self, *, history: Returns | None = None, kind: Kind = "log", wealth: float | None = None) -> Session:
+    def session(
+        self,
+        *,
+        history: Returns | None = None,
+        kind: Kind = "log",
+        wealth: float | None = None,
+        idempotency_key: str | None = None,
+    ) -> Session:
         """Opens a session of an investor.
 
-        ``history`` is what the investor has seen, ``wealth`` what he has; by default both are the policy's own. An
-        answer that is lost raises :class:`Unreachable` and may leave a session behind that nobody uses.
+        ``history`` is what the investor has seen, ``wealth`` what he has; by default both are the policy's own. The
+        same ``idempotency_key`` and arguments again, even from another process, give the same session, at its first
+        period; ``Session.refresh`` tells how far it is.
         """
         request: wire.OpenSession = {"policy": self.id, "wealth": wealth}
         if history is not None:
             request["history"] = log_returns(history, kind)
-        return Session(self._transport, self._transport.json("POST", "/sessions", body=request, repeatable=False))
+        headers = idempotent(idempotency_key)
+        return Session(self._transport, self._transport.json("POST", "/sessions", body=request, headers=headers))
 
     def delete(self) -> None:
         """Deletes it. Raises :class:`InUse` while sessions live by it, and :class:`NotFound` where there is none."""

@@ -1,9 +1,8 @@
 """Requests over one pool of connections, repeated where that is safe.
 
 Every call of this client can be repeated without harm, for one of four reasons: it reads; it deletes; its content names
-it (an imported policy); or the service knows the request again (the idempotency key of a training, the period of an
-observation). Opening a session is the exception: a repetition after a lost answer would open a second one. It is
-repeated only where the service cannot have acted, which is when no connection was made or the service said so.
+it (an imported policy); or the service knows the request again (the idempotency key of a job or a session, the period
+of an observation).
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ from __future__ import annotations
 import json
 import random
 import time
+import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from email.utils import parsedate_to_datetime
@@ -29,8 +29,15 @@ STREAM_SILENCE = 60.0
 
 #: Refusals for the moment.
 RETRIED_STATUS = (429, 503)
-_NO_CONNECTION = (httpx.ConnectError, httpx.ConnectTimeout, httpx.PoolTimeout)
 _LOST = (httpx.TimeoutException, httpx.NetworkError, httpx.RemoteProtocolError)
+
+
+def idempotent(key: str | None) -> dict[str, str]:
+    """The header of a request that may be sent twice and is done once.
+
+    Without a key of the caller's, one of this call's own: a repetition after a lost answer finds what the first made.
+    """
+    return {"Idempotency-Key": str(uuid.uuid4()) if key is None else key}
 
 
 class Transport:
@@ -48,7 +55,6 @@ class Transport:
         body: Mapping[str, Any] | bytes | None = None,
         params: Mapping[str, str | int | None] | None = None,
         headers: Mapping[str, str] | None = None,
-        repeatable: bool = True,
     ) -> httpx.Response:
         """A successful answer.
 
@@ -66,7 +72,7 @@ class Transport:
             try:
                 response = self.http.send(request)
             except httpx.RequestError as error:
-                if last or not isinstance(error, _LOST if repeatable else _NO_CONNECTION):
+                if last or not isinstance(error, _LOST):
                     raise Unreachable(f"no answer to {method} {request.url}: {error!r}") from error
                 lost, pause = True, growing_pause(attempt)
             else:
@@ -89,10 +95,9 @@ class Transport:
         body: Mapping[str, Any] | bytes | None = None,
         params: Mapping[str, str | int | None] | None = None,
         headers: Mapping[str, str] | None = None,
-        repeatable: bool = True,
     ) -> Any:
         """What a successful answer holds; as :meth:`call` otherwise."""
-        response = self.call(method, path, body=body, params=params, headers=headers, repeatable=repeatable)
+        response = self.call(method, path, body=body, params=params, headers=headers)
         try:
             return response.json()
         except ValueError as error:

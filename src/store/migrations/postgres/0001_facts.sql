@@ -27,14 +27,6 @@ CREATE TABLE jobs (
 CREATE INDEX jobs_by_state ON jobs (state, sequence);
 CREATE INDEX jobs_by_tenant ON jobs (tenant, sequence);
 
-CREATE TABLE idempotency_keys (
-    tenant          TEXT NOT NULL,
-    idempotency_key TEXT NOT NULL,
-    request_hash    TEXT NOT NULL,
-    job             TEXT NOT NULL REFERENCES jobs (job),
-    PRIMARY KEY (tenant, idempotency_key)
-);
-
 CREATE TABLE checkpoints (
     job   TEXT NOT NULL REFERENCES jobs (job) ON DELETE CASCADE,
     step  BIGINT NOT NULL,
@@ -76,6 +68,20 @@ CREATE TABLE sessions (
 
 CREATE INDEX sessions_by_policy ON sessions (policy);
 CREATE INDEX sessions_by_tenant ON sessions (tenant, sequence);
+
+-- A key lives as long as what it made.
+CREATE TABLE idempotency_keys (
+    tenant          TEXT NOT NULL,
+    idempotency_key TEXT NOT NULL,
+    request_hash    TEXT NOT NULL,
+    job             TEXT REFERENCES jobs (job) ON DELETE CASCADE,
+    session         TEXT REFERENCES sessions (session) ON DELETE CASCADE,
+    PRIMARY KEY (tenant, idempotency_key),
+    CHECK ((job IS NULL) <> (session IS NULL))
+);
+
+CREATE INDEX idempotency_keys_by_job ON idempotency_keys (job);
+CREATE INDEX idempotency_keys_by_session ON idempotency_keys (session);
 
 CREATE TABLE observations (
     session             TEXT NOT NULL REFERENCES sessions (session) ON DELETE CASCADE,

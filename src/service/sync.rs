@@ -1,0 +1,5 @@
+//! What the slots lock with. `tests/slots.rs` compiles the same slots over a checker's primitives instead.
+
+pub(super) use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+pub(super) use tokio::sync::{Mutex as AsyncMutex, OwnedMutexGuard};
