@@ -6,10 +6,11 @@
 //! printed beside its formula; at the end the same problem goes to the library's own backward induction, and the three
 //! answers must agree. The utility is logarithmic, so wealth drops out of the state and the values are log gains.
 
-use ballast::control::backward::{Training, Watch};
-use ballast::control::specification::Specification;
-use ballast::control::state::growth;
-use ballast::control::surrogate::Solution;
+use ballast::control::problem::state::growth;
+use ballast::control::progress::Watch;
+use ballast::control::request::specification::Specification;
+use ballast::control::surrogate::stored::Solution;
+use ballast::control::training::Training;
 use ballast::numerics::empirical::EmpiricalDistribution;
 use ballast::numerics::gp::{GaussianProcess, Hyperparameters};
 use ballast::numerics::minimise::maximise_concave_scalar;

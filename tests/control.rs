@@ -2,13 +2,15 @@
 
 use std::sync::atomic::AtomicBool;
 
-use ballast::control::advisor::{AdviceMode, Advisor};
-use ballast::control::backward::{StepSolution, Training, Watch};
 use ballast::control::error::TrainError;
 use ballast::control::policy::Policy;
-use ballast::control::specification::Specification;
-use ballast::control::state::State;
-use ballast::control::utility::utility;
+use ballast::control::policy::advisor::{AdviceMode, Advisor};
+use ballast::control::problem::state::State;
+use ballast::control::problem::utility::utility;
+use ballast::control::progress::Watch;
+use ballast::control::request::specification::Specification;
+use ballast::control::solved_step::StepSolution;
+use ballast::control::training::Training;
 use serde_json::{Value, json};
 
 fn specification(value: Value) -> Specification {

@@ -2,14 +2,16 @@
 
 mod support;
 
-use ballast::control::advisor::{AdviceMode, Advisor};
-use ballast::control::backward::{Training, Watch};
-use ballast::control::context::ProblemContext;
+use ballast::control::bellman::BellmanStep;
+use ballast::control::bellman::next_value::NextValue;
+use ballast::control::bellman::problem::Problem;
 use ballast::control::policy::Policy;
-use ballast::control::specification::Specification;
-use ballast::control::state::State;
-use ballast::control::surrogate::NextValue;
-use ballast::control::what_if::{Hypothesis, HypotheticalRadius};
+use ballast::control::policy::advisor::{AdviceMode, Advisor};
+use ballast::control::policy::what_if::{Hypothesis, HypotheticalRadius};
+use ballast::control::problem::state::State;
+use ballast::control::progress::Watch;
+use ballast::control::request::specification::Specification;
+use ballast::control::training::Training;
 use serde_json::{Value, json};
 use support::App;
 
@@ -109,12 +111,14 @@ fn two_frozen_steps_agree_with_nested_grids() {
 /// The step before the last over the exact value of the last, without a surrogate.
 fn exact_first_of_two(request: Value) -> (f64, f64) {
     let specification = specification(request);
-    let context = ProblemContext::new(&specification);
-    let last = ProblemContext::new(&specification);
-    let gain =
-        move |state: &State| last.solve(1, state, &NextValue::Terminal).map_or(f64::NAN, |found| found.floor_gain);
+    let problem = Problem::new(&specification);
+    let last = Problem::new(&specification);
+    let gain = move |state: &State| {
+        BellmanStep { problem: &last, step: 1, next: &NextValue::Terminal }.solve(state).floor_gain
+    };
     let state = State::new(&specification.problem.history, specification.problem.initial_wealth).unwrap();
-    let found = context.solve(0, &state, &NextValue::Exact(Box::new(gain))).unwrap();
+    let next = NextValue::Exact(Box::new(gain));
+    let found = BellmanStep { problem: &problem, step: 0, next: &next }.solve(&state);
     (found.floor_gain, found.action)
 }
 

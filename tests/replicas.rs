@@ -5,8 +5,8 @@ mod support;
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
-use ballast::control::advisor::Advisor;
 use ballast::control::policy::Policy;
+use ballast::control::policy::advisor::Advisor;
 use ballast::store::{JobRow, Store};
 use futures_util::future::join_all;
 use reqwest::{Client, StatusCode};

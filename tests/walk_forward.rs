@@ -2,13 +2,14 @@
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use ballast::control::account::keep;
-use ballast::control::advisor::Advisor;
-use ballast::control::backward::{Training, Watch};
 use ballast::control::error::TrainError;
-use ballast::control::framework::Framework;
+use ballast::control::evaluation::account::keep;
+use ballast::control::evaluation::rolling::{Decision, Period, Strategy, WalkForward};
+use ballast::control::policy::advisor::Advisor;
 use ballast::control::pool::TrainingPool;
-use ballast::control::walk_forward::{Decision, Period, Strategy, WalkForward};
+use ballast::control::progress::Watch;
+use ballast::control::request::framework::Framework;
+use ballast::control::training::Training;
 
 const YEAR: usize = 4;
 const WALK: WalkForward = WalkForward { window: 24, year: YEAR, risk_aversion: 3.0, count: 20, seed: 5 };

@@ -2,9 +2,9 @@
 
 mod support;
 
-use ballast::control::advisor::{AdviceMode, Advisor};
 use ballast::control::policy::Policy;
-use ballast::control::what_if::{Hypothesis, HypotheticalRadius};
+use ballast::control::policy::advisor::{AdviceMode, Advisor};
+use ballast::control::policy::what_if::{Hypothesis, HypotheticalRadius};
 use serde_json::{Value, json};
 use support::{App, specification};
 

@@ -1,7 +1,7 @@
 //! The body of `POST /policies/import`: refused, or a policy that is written as it was read and gives a sane advice.
 #![no_main]
 
-use ballast::control::advisor::{AdviceMode, Advisor};
+use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::policy::Policy;
 use ballast::http::decode;
 use libfuzzer_sys::fuzz_target;

@@ -1,7 +1,7 @@
 //! The body of `POST /train`: refused, or a specification that completing and writing out do not change.
 #![no_main]
 
-use ballast::control::specification::Specification;
+use ballast::control::request::specification::Specification;
 use ballast::http::decode;
 use libfuzzer_sys::fuzz_target;
 

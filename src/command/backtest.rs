@@ -6,10 +6,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use ballast::control::backward::Watch;
 use ballast::control::error::TrainError;
+use ballast::control::evaluation::rolling::{Period, Strategy, WalkForward};
 use ballast::control::pool::{PoolError, TrainingPool};
-use ballast::control::walk_forward::{Period, Strategy, WalkForward};
+use ballast::control::progress::Watch;
 use ballast::report::ChartError;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};

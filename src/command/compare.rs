@@ -6,11 +6,11 @@ use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use ballast::control::backward::{Phase, StepProgress, Watch};
 use ballast::control::error::TrainError;
-use ballast::control::evaluate::{Evaluation, Follower, Outcomes};
-use ballast::control::evaluation_report::{Costs, EvaluationReport};
+use ballast::control::evaluation::paths::{Evaluation, Follower, Outcomes};
+use ballast::control::evaluation::report::{Costs, EvaluationReport};
 use ballast::control::pool::TrainingPool;
+use ballast::control::progress::{Phase, StepProgress, Watch};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Positions of the bar.
@@ -96,7 +96,7 @@ impl Workshop {
     pub fn train(&self, evaluation: &Evaluation) -> Result<Vec<Follower>, TrainError> {
         let horizon = evaluation.request.problem.horizon;
         let frameworks = evaluation.request.frameworks.iter();
-        let follower = |framework: &ballast::control::framework::Framework| {
+        let follower = |framework: &ballast::control::request::framework::Framework| {
             let stage = format!("training {}", framework.name());
             self.run(&stage, horizon, |watch| evaluation.follower(*framework, watch))
         };

@@ -4,8 +4,8 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use ballast::control::error::FieldError;
-use ballast::control::evaluate::Evaluation;
-use ballast::control::evaluation::EvaluationRequest;
+use ballast::control::evaluation::paths::Evaluation;
+use ballast::control::request::evaluation::EvaluationRequest;
 use clap::Args;
 use serde_json::json;
 

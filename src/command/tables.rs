@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use ballast::control::evaluation_report::{EvaluationReport, StrategyReport};
+use ballast::control::evaluation::report::{EvaluationReport, StrategyReport};
 use ballast::numerics::summary::Estimate;
 use ballast::report::Csv;
 

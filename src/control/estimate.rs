@@ -4,14 +4,14 @@
 //! the constants below are what one thing of each takes, found by counting what the allocator was asked for
 //! (`tests/memory.rs` holds the estimates to it).
 
-use super::context::ProblemContext;
-use super::evaluation::EvaluationRequest;
-use super::framework::Framework;
+use super::bellman::problem::Problem;
 use super::policy::Policy;
-use super::prepared::{factor_bytes, prepared_bytes};
-use super::specification::{DEFAULT_COUNT, RadiusRule, Specification};
-use super::surrogate::Solution;
-use super::utility::depends_on_wealth;
+use super::policy::prepared::{factor_bytes, prepared_bytes};
+use super::problem::utility::depends_on_wealth;
+use super::request::evaluation::EvaluationRequest;
+use super::request::framework::Framework;
+use super::request::specification::{DEFAULT_COUNT, RadiusRule, Specification};
+use super::surrogate::stored::Solution;
 use crate::numerics::gp::GaussianProcess;
 
 /// Bytes of a double.
@@ -97,13 +97,13 @@ impl Sizes {
         let (horizon, history) = (problem.horizon, problem.history.len());
         let single = !problem.framework.learns() && !depends_on_wealth(problem.utility);
         let count = if single { 1 } else { specification.design.count.unwrap_or(DEFAULT_COUNT) };
-        let context = ProblemContext::new(specification);
+        let framed = Problem::new(specification);
         let paths = match problem.radius_rule() {
             RadiusRule::Bridge { paths, .. } => paths,
             _ => 0,
         };
-        let bridges = context.sets.heaviest(history, horizon);
-        Sizes { horizon, history, count, inputs: context.selection.names().len(), paths, bridges }
+        let bridges = framed.sets.heaviest(history, horizon);
+        Sizes { horizon, history, count, inputs: framed.selection.names().len(), paths, bridges }
     }
 
     fn factor(&self) -> usize {

@@ -1,35 +1,32 @@
-//! Floor 1: the paper, a file a section.
+//! Floor 1: the paper.
 
-pub mod account;
-pub mod advice;
-pub mod advisor;
-pub mod backward;
 pub mod bellman;
-pub mod comparison;
-pub mod context;
-pub mod design;
 pub mod error;
 pub mod estimate;
-pub mod evaluate;
 pub mod evaluation;
-pub mod evaluation_report;
-pub mod features;
-pub mod fitting;
-pub mod framework;
-pub mod gain_field;
 pub mod kept;
-pub mod parametric;
 pub mod policy;
 pub mod pool;
-pub mod prepared;
+pub mod problem;
 pub mod progress;
-pub mod rules;
+pub mod request;
 pub mod solved_step;
-pub mod specification;
-pub mod state;
 pub mod surrogate;
+pub mod training;
 pub mod uncertainty;
-pub mod utility;
-pub mod walk_forward;
-pub mod what_if;
-pub mod worst_case;
+
+pub use evaluation::{paths as evaluate, report as evaluation_report};
+pub use policy::{what_if, worst_case};
+pub use problem::{state, utility};
+pub use request::{framework, rules, specification};
+
+pub mod advisor {
+    pub use super::policy::advice::{Advice, AdviceSource, Uncertainty};
+    pub use super::policy::advisor::{AdviceMode, Advisor};
+}
+
+pub mod backward {
+    pub use super::progress::{Phase, StepProgress, Watch};
+    pub use super::solved_step::StepSolution;
+    pub use super::training::Training;
+}

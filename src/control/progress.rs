@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::{Deserialize, Serialize};
 
-use super::error::TrainError;
+use crate::control::error::TrainError;
 
 /// What a running step may be asked and told: the stop signal, and a callback for progress.
 pub struct Watch<'a> {

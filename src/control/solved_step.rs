@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::surrogate::Solution;
+use crate::control::surrogate::stored::Solution;
 
 /// Name and version of the portable form, which fixes the features and the radii that a policy was trained with.
 pub const FORMAT: &str = "ballast-policy-1";

@@ -3,12 +3,12 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::control::advisor::Advice;
-use crate::control::backward::Phase;
-use crate::control::framework::Framework;
-use crate::control::policy::StepDiagnostics;
-use crate::control::specification::Specification;
-use crate::control::worst_case::WorstCase;
+use crate::control::policy::advice::Advice;
+use crate::control::policy::worst_case::WorstCase;
+use crate::control::progress::Phase;
+use crate::control::request::framework::Framework;
+use crate::control::request::specification::Specification;
+use crate::control::solved_step::StepDiagnostics;
 use crate::service::error::ServiceError;
 use crate::service::jobs::Job as ServiceJob;
 use crate::service::live::Live;

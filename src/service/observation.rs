@@ -3,10 +3,10 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::control::advisor::Uncertainty;
 use crate::control::error::FieldError;
+use crate::control::policy::advice::Uncertainty;
 use crate::control::policy::content_hash;
-use crate::control::rules as limits;
+use crate::control::request::rules as limits;
 
 /// Prices taken: any currency, any quantity.
 const PRICE: (f64, f64) = (1e-12, 1e15);

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
-use crate::control::backward::{Phase, StepProgress};
+use crate::control::progress::{Phase, StepProgress};
 
 /// Watchers are woken at most this often for progress inside a step.
 const SHORTEST_PAUSE: Duration = Duration::from_millis(50);

@@ -1,7 +1,7 @@
 //! The books in figures, each with an interval where a resample of the months has a meaning.
 
-use ballast::control::account::{Account, Annual, keep, yearly_certainty_equivalent};
-use ballast::control::walk_forward::{Decision, Period, WalkForward};
+use ballast::control::evaluation::account::{Account, Annual, keep, yearly_certainty_equivalent};
+use ballast::control::evaluation::rolling::{Decision, Period, WalkForward};
 use ballast::numerics::block_bootstrap::circular_blocks;
 use ballast::numerics::streams::stream;
 use ballast::numerics::summary::quantile;

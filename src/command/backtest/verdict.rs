@@ -1,6 +1,6 @@
 //! What the figures say, flattering or not: every sentence follows from them by a rule that is blind to the strategy.
 
-use ballast::control::advisor::AdviceSource;
+use ballast::control::policy::advice::AdviceSource;
 
 use super::Backtest;
 use super::analysis::{Estimate, Figures, main_line};

@@ -6,16 +6,22 @@
 
 use std::error::Error;
 
-use ballast::control::advisor::{Advice, AdviceMode, Advisor};
-use ballast::control::backward::{StepSolution, Training, Watch};
-use ballast::control::context::ProblemContext;
-use ballast::control::design::Design;
+use ballast::control::bellman::BellmanStep;
+use ballast::control::bellman::next_value::NextValue;
+use ballast::control::bellman::problem::Problem;
 use ballast::control::error::TrainError;
-use ballast::control::policy::{Policy, StepDiagnostics};
+use ballast::control::policy::Policy;
+use ballast::control::policy::advice::Advice;
+use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::pool::TrainingPool;
-use ballast::control::specification::{FeatureMap, InitialLaws, RadiusRule, Specification, SurrogateTarget};
-use ballast::control::state::State;
-use ballast::control::surrogate::{NextValue, SingleSolution, Solution};
+use ballast::control::problem::state::State;
+use ballast::control::progress::Watch;
+use ballast::control::request::specification::{FeatureMap, InitialLaws, RadiusRule, Specification, SurrogateTarget};
+use ballast::control::solved_step::StepDiagnostics;
+use ballast::control::solved_step::StepSolution;
+use ballast::control::surrogate::design::Design;
+use ballast::control::surrogate::stored::{SingleSolution, Solution};
+use ballast::control::training::Training;
 use ballast::numerics::summary::quantile;
 use clap::Args;
 
@@ -63,11 +69,11 @@ fn compare(bench: &AccuracyBench) -> Result<(), TrainError> {
     let mut base = paper::specification(bench.sample_size, bench.horizon, 1000, InitialLaws::Resampled).completed()?;
     base.problem.radius = Some(RadiusRule::Bridge { alpha: bench.alpha, paths: 2000, scale: 1.0 });
     println!("paper's mixture, t0 = {}, T = {}, alpha = {}", bench.sample_size, bench.horizon, bench.alpha);
-    let context = ProblemContext::new(&base);
+    let problem = Problem::new(&base);
     let last = bench.horizon - 1;
-    let mut truths = vec![(last, last_truth(&context, bench.states)?)];
+    let mut truths = vec![(last, last_truth(&problem, bench.states))];
     if bench.nested_states > 0 {
-        truths.push((last - 1, nested_truth(&context, bench.nested_states)?));
+        truths.push((last - 1, nested_truth(&problem, bench.nested_states)));
     }
     heading();
     for &count in &bench.counts {
@@ -83,7 +89,7 @@ fn compare(bench: &AccuracyBench) -> Result<(), TrainError> {
             specification.surrogate.features = features;
             let advisor = trained(&specification, truths.len())?;
             for (step, truths) in &truths {
-                report(&context, &advisor, *step, truths)?;
+                report(&problem, &advisor, *step, truths);
             }
         }
     }
@@ -91,37 +97,37 @@ fn compare(bench: &AccuracyBench) -> Result<(), TrainError> {
 }
 
 /// States of the design's own law, under another seed.
-fn fresh_states(specification: &Specification, step: usize, count: usize) -> Result<Vec<State>, TrainError> {
+fn fresh_states(specification: &Specification, step: usize, count: usize) -> Vec<State> {
     let mut fresh = specification.clone();
     fresh.seed = FRESH_SEED;
     fresh.design.count = Some(count);
     let design = Design::new(&fresh);
-    Ok((0..count).map(|point| design.state(step, point)).collect())
+    (0..count).map(|point| design.state(step, point)).collect()
 }
 
-fn solved(context: &ProblemContext, step: usize, next: &NextValue, count: usize) -> Result<Vec<Truth>, TrainError> {
-    let states = fresh_states(&context.specification, step, count)?;
-    let solve = |state: State| Ok(Truth { floor_gain: context.solve(step, &state, next)?.floor_gain, state });
-    TrainingPool::map(states, solve).into_iter().collect()
+fn solved(problem: &Problem, step: usize, next: &NextValue, count: usize) -> Vec<Truth> {
+    let states = fresh_states(&problem.specification, step, count);
+    let solver = BellmanStep { problem, step, next };
+    TrainingPool::map(states, |state: State| Truth { floor_gain: solver.solve(&state).floor_gain, state })
 }
 
-fn last_truth(context: &ProblemContext, count: usize) -> Result<Vec<Truth>, TrainError> {
-    solved(context, context.specification.problem.horizon - 1, &NextValue::Terminal, count)
+fn last_truth(problem: &Problem, count: usize) -> Vec<Truth> {
+    solved(problem, problem.specification.problem.horizon - 1, &NextValue::Terminal, count)
 }
 
 /// The value of the last step, solved anew at every state asked.
 pub(super) fn exact_last_value(specification: &Specification) -> NextValue {
-    let context = ProblemContext::new(specification);
-    let last = specification.problem.horizon - 1;
+    let problem = Problem::new(specification);
+    let step = specification.problem.horizon - 1;
     let gain = move |state: &State| {
-        context.solve(last, state, &NextValue::Terminal).map_or(f64::NAN, |solution| solution.floor_gain)
+        BellmanStep { problem: &problem, step, next: &NextValue::Terminal }.solve(state).floor_gain
     };
     NextValue::Exact(Box::new(gain))
 }
 
-fn nested_truth(context: &ProblemContext, count: usize) -> Result<Vec<Truth>, TrainError> {
-    let next = exact_last_value(&context.specification);
-    solved(context, context.specification.problem.horizon - 2, &next, count)
+fn nested_truth(problem: &Problem, count: usize) -> Vec<Truth> {
+    let next = exact_last_value(&problem.specification);
+    solved(problem, problem.specification.problem.horizon - 2, &next, count)
 }
 
 /// A policy whose last `steps` steps are solved; the ones before are not asked and hold nothing.
@@ -162,16 +168,14 @@ fn heading() {
     );
 }
 
-fn report(context: &ProblemContext, advisor: &Advisor, step: usize, truths: &[Truth]) -> Result<(), TrainError> {
+fn report(problem: &Problem, advisor: &Advisor, step: usize, truths: &[Truth]) {
     let specification = advisor.specification();
     let next = match step + 1 < specification.problem.horizon {
-        true => exact_last_value(&context.specification),
+        true => exact_last_value(&problem.specification),
         false => NextValue::Terminal,
     };
-    let judged: Vec<Judged> =
-        TrainingPool::map(truths.iter().collect(), |truth: &Truth| judge(context, advisor, step, &next, truth))
-            .into_iter()
-            .collect::<Result<_, _>>()?;
+    let solver = BellmanStep { problem, step, next: &next };
+    let judged = TrainingPool::map(truths.iter().collect(), |truth: &Truth| judge(advisor, solver, truth));
     let inside: Vec<&Judged> = judged.iter().filter(|one| one.in_design).collect();
     let errors: Vec<f64> = inside.iter().map(|one| one.error.abs()).collect();
     let regrets: Vec<f64> = judged.iter().map(|one| one.regret).collect();
@@ -197,7 +201,6 @@ fn report(context: &ProblemContext, advisor: &Advisor, step: usize, truths: &[Tr
         share(inside.len()),
         share(within),
     );
-    Ok(())
 }
 
 /// What an advice is off by at one state.
@@ -211,21 +214,16 @@ struct Judged {
     in_design: bool,
 }
 
-fn judge(
-    context: &ProblemContext,
-    advisor: &Advisor,
-    step: usize,
-    next: &NextValue,
-    truth: &Truth,
-) -> Result<Judged, TrainError> {
+fn judge(advisor: &Advisor, solver: BellmanStep, truth: &Truth) -> Judged {
+    let step = solver.step;
     let Advice { allocation, surrogate_sd, in_design, .. } = advisor.advise(step, &truth.state, AdviceMode::Surrogate);
-    let served = context.solve_between(step, &truth.state, next, (allocation, allocation))?.floor_gain;
-    Ok(Judged {
+    let served = solver.price(&truth.state, allocation).floor_gain;
+    Judged {
         error: BASIS_POINTS * (advisor.surrogate_gain(step, &truth.state) - truth.floor_gain),
         regret: BASIS_POINTS * (truth.floor_gain - served).max(0.0),
         deviation: surrogate_sd,
         in_design,
-    })
+    }
 }
 
 fn root_mean_square(values: &[f64]) -> f64 {

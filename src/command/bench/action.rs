@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::time::Instant;
 
-use ballast::control::specification::InitialLaws;
+use ballast::control::request::specification::InitialLaws;
 use ballast::numerics::summary::quantile;
 use clap::Args;
 use serde_json::{Value, json};

@@ -6,13 +6,15 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use ballast::control::advisor::{AdviceMode, Advisor};
-use ballast::control::backward::{Training, Watch};
-use ballast::control::context::ProblemContext;
+use ballast::control::bellman::BellmanStep;
+use ballast::control::bellman::problem::Problem;
 use ballast::control::error::TrainError;
+use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::pool::TrainingPool;
-use ballast::control::specification::{InitialLaws, RadiusRule, Specification, UtilitySpecification};
-use ballast::control::state::State;
+use ballast::control::problem::state::State;
+use ballast::control::progress::Watch;
+use ballast::control::request::specification::{InitialLaws, RadiusRule, Specification, UtilitySpecification};
+use ballast::control::training::Training;
 use clap::Args;
 use serde_json::{Value, json};
 
@@ -103,10 +105,10 @@ fn trained(specification: &Specification) -> Result<Start, TrainError> {
 
 /// The first of two steps by brute force.
 fn nested(specification: &Specification) -> Result<Start, TrainError> {
-    let context = ProblemContext::new(specification);
     let problem = &specification.problem;
     let state = State::new(&problem.history, problem.initial_wealth)?;
-    let solution = context.solve(0, &state, &exact_last_value(specification))?;
+    let next = exact_last_value(specification);
+    let solution = BellmanStep { problem: &Problem::new(specification), step: 0, next: &next }.solve(&state);
     Ok(Start { gain: solution.floor_gain, allocation: solution.action })
 }
 

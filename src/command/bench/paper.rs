@@ -1,7 +1,7 @@
 //! The paper's configuration: its mixture, 20 returns drawn from it, ten steps.
 
-use ballast::control::design::continuous_law;
-use ballast::control::specification::{
+use ballast::control::problem::sampling_law::continuous_law;
+use ballast::control::request::specification::{
     InitialLaws, MixtureComponent, ProblemSpecification, SamplingLaw, Specification,
 };
 use ballast::numerics::law::ContinuousLaw;

@@ -5,9 +5,10 @@ use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use ballast::control::backward::{Phase, StepProgress, Training, Watch};
 use ballast::control::pool::TrainingPool;
-use ballast::control::specification::InitialLaws;
+use ballast::control::progress::{Phase, StepProgress, Watch};
+use ballast::control::request::specification::InitialLaws;
+use ballast::control::training::Training;
 use clap::Args;
 
 use super::paper;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use ballast::control::evaluation_report::StrategyReport;
+use ballast::control::evaluation::report::StrategyReport;
 use ballast::numerics::summary::Estimate;
 use serde::Serialize;
 

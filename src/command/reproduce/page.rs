@@ -1,6 +1,6 @@
 //! The reproduction as a page.
 
-use ballast::control::evaluation_report::{EvaluationReport, StrategyReport};
+use ballast::control::evaluation::report::{EvaluationReport, StrategyReport};
 use ballast::numerics::summary::Estimate;
 use ballast::report::{Axis, Cell, Chart, Page, Table, interval, number};
 
@@ -145,7 +145,7 @@ fn allocations(report: &EvaluationReport) -> Chart {
     for strategy in &report.strategies {
         let Some(periods) = &strategy.periods else { continue };
         if strategy.strategy == "adaptive" {
-            let band = |of: &ballast::control::evaluation_report::PeriodReport| {
+            let band = |of: &ballast::control::evaluation::report::PeriodReport| {
                 (of.period as f64, [of.allocation.quantile_10, of.allocation.quantile_90])
             };
             chart = chart.band("adaptive", periods.iter().map(band));

@@ -2,14 +2,14 @@
 
 use std::error::Error;
 
-use ballast::control::context::ProblemContext;
-use ballast::control::design::continuous_law;
-use ballast::control::evaluate::{Evaluation, Follower, Outcomes};
-use ballast::control::evaluation::EvaluationRequest;
-use ballast::control::evaluation_report::EvaluationReport;
-use ballast::control::framework::Framework;
+use ballast::control::bellman::problem::Problem;
+use ballast::control::evaluation::paths::{Evaluation, Follower, Outcomes};
+use ballast::control::evaluation::report::EvaluationReport;
 use ballast::control::pool::TrainingPool;
-use ballast::control::utility::utility;
+use ballast::control::problem::sampling_law::continuous_law;
+use ballast::control::problem::utility::utility;
+use ballast::control::request::evaluation::EvaluationRequest;
+use ballast::control::request::framework::Framework;
 use ballast::numerics::empirical::EmpiricalDistribution;
 use ballast::numerics::streams::stream;
 use ballast::numerics::summary::{Clustered, Estimate};
@@ -92,7 +92,7 @@ pub fn section(plan: &Plan, workshop: &Workshop) -> Result<Section, Box<dyn Erro
 /// Draws histories until each table has enough of its own, or patience ends; the quantiles of all, and the histories.
 fn seek(plan: &Plan, evaluation: &Evaluation) -> (Quantiles, [Vec<Vec<f64>>; 2]) {
     let request = &evaluation.request;
-    let sets = ProblemContext::new(&request.specification(Framework::Adaptive, None)).sets;
+    let sets = Problem::new(&request.specification(Framework::Adaptive, None)).sets;
     let law = continuous_law(&paper::mixture(), &[]);
     let draw = |index: usize| {
         let mut generator = stream(request.seed, "reproduce-seek", index, 0);
@@ -210,7 +210,8 @@ fn study_size(plan: &Plan, workshop: &Workshop, sample_size: usize) -> Result<Ve
         request.design.count = Some(count);
         request.constant_mixes = Some(Vec::new());
         request.paths = plan.study_paths;
-        request.histories = ballast::control::evaluation::InitialHistories::Drawn { count: plan.study_histories };
+        request.histories =
+            ballast::control::request::evaluation::InitialHistories::Drawn { count: plan.study_histories };
         let evaluation = Evaluation::new(request)?;
         let followers = workshop.train(&evaluation)?;
         let stage = format!("simulating histories of {sample_size} returns");
@@ -222,7 +223,7 @@ fn study_size(plan: &Plan, workshop: &Workshop, sample_size: usize) -> Result<Ve
     let row = |report: &EvaluationReport| {
         let sample = Clustered::new(1, report.histories.len(), report.request.level);
         let kind = report.request.problem.utility;
-        let gap = |history: &ballast::control::evaluation_report::HistoryReport| {
+        let gap = |history: &ballast::control::evaluation::report::HistoryReport| {
             utility(kind, history.promised[0]) - utility(kind, history.promised[1])
         };
         let value: Vec<f64> = report.histories.iter().map(gap).collect();

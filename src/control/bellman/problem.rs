@@ -1,0 +1,197 @@
+//! The problem with everything that does not change from step to step: what a state is, to the step and to the surrogates.
+
+use std::borrow::Cow;
+use std::sync::OnceLock;
+
+use crate::control::kept::Kept;
+use crate::control::problem::actions::ActionInterval;
+use crate::control::problem::state::{State, floor};
+use crate::control::request::rules::LOG_RETURN;
+use crate::control::request::specification::{ProblemSpecification, Specification};
+use crate::control::surrogate::features::{FeatureSelection, Features, LawSummary};
+use crate::control::uncertainty::UncertaintySet;
+use crate::control::uncertainty::centre::Centre;
+use crate::control::uncertainty::radius::{Measure, Radii, UncertaintySets};
+use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
+use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::exponential_mean::{ExponentialMean, WorstExponential};
+use crate::numerics::moments::CentralMoments;
+
+/// Where the features do not depend on the ball.
+const NO_BALL: Radii = Radii { radius: 0.0, radius_ahead: 0.0 };
+
+/// The problem of a completed specification.
+pub struct Problem {
+    pub specification: Specification,
+    pub sets: UncertaintySets,
+    pub selection: FeatureSelection,
+    /// The uncertainty set of every state, where nothing is learned; computed once.
+    frozen: OnceLock<Frozen>,
+}
+
+struct Frozen {
+    set: UncertaintySet,
+    measure: Measure,
+}
+
+impl Problem {
+    pub fn new(specification: &Specification) -> Self {
+        Problem::with(specification, Kept::default())
+    }
+
+    /// The same with what can be made again in `kept`.
+    pub fn with(specification: &Specification, kept: Kept) -> Self {
+        let sets = UncertaintySets::new(specification, kept);
+        let selection = FeatureSelection::new(specification, sets.varies());
+        Problem { specification: specification.clone(), sets, selection, frozen: OnceLock::new() }
+    }
+
+    /// A, the shares of wealth that may be held.
+    pub fn actions(&self) -> ActionInterval {
+        let [lowest, highest] = self.specification.problem.action_interval;
+        ActionInterval { lowest, highest }
+    }
+
+    /// Terminal all-bank wealth from a state at `step`.
+    pub fn floor(&self, step: usize, state: &State) -> f64 {
+        let problem = &self.specification.problem;
+        floor(state.wealth, problem.rate_per_step, problem.horizon - step)
+    }
+
+    /// The most that the floor gain of a state at `step` can be: that of the best return of its centre in every period. The
+    /// worst law of a ball is no better than its centre, and learning one of its own returns leaves the best as it is. Of
+    /// estimates that are learned further nothing better is known than the best return accepted.
+    pub fn largest_gain(&self, step: usize, state: &State) -> f64 {
+        let problem = &self.specification.problem;
+        let best = match (self.learns(), problem.framework.is_parametric()) {
+            (false, _) => self.frozen().set.best_return(),
+            (true, true) => LOG_RETURN,
+            (true, false) => state.law.atoms().last().copied().unwrap_or(LOG_RETURN),
+        };
+        largest_gain(problem, step, best)
+    }
+
+    /// The uncertainty set at a state: of the state's law where the framework learns.
+    pub fn uncertainty_set(&self, state: &State) -> Cow<'_, UncertaintySet> {
+        match self.learns() {
+            true => Cow::Owned(self.learned_set(&state.law, self.sets.radius(&state.law))),
+            false => Cow::Borrowed(&self.frozen().set),
+        }
+    }
+
+    /// The same with another radius, in the same unit.
+    pub fn uncertainty_set_within(&self, state: &State, radius: f64) -> UncertaintySet {
+        match self.learns() {
+            true => self.learned_set(&state.law, radius),
+            false => self.frozen().set.clone().with_radius(radius, self.specification.problem.support),
+        }
+    }
+
+    /// Radius of the uncertainty set at a state.
+    pub fn radius(&self, state: &State) -> f64 {
+        if self.learns() { self.sets.radius(&state.law) } else { self.frozen().measure.radius }
+    }
+
+    /// The radius of a state and what it is made of.
+    pub fn measure(&self, state: &State) -> Measure {
+        if self.learns() { self.sets.measure(&state.law) } else { self.frozen().measure }
+    }
+
+    /// Numbers read to measure a state, or `None` where what is read is yet to be made.
+    pub fn cost(&self, state: &State) -> Option<usize> {
+        if self.learns() { self.sets.cost(state.law.sample_size()) } else { self.frozen.get().map(|_| 0) }
+    }
+
+    /// Makes what measuring a state reads.
+    pub fn prepare(&self, state: &State) {
+        match self.learns() {
+            true => self.sets.prepare(state.law.sample_size()),
+            false => _ = self.frozen(),
+        }
+    }
+
+    fn learns(&self) -> bool {
+        self.specification.problem.framework.learns()
+    }
+
+    fn frozen(&self) -> &Frozen {
+        self.frozen.get_or_init(|| {
+            let problem = &self.specification.problem;
+            let history = EmpiricalDistribution::new(&problem.history);
+            let measure = self.sets.measure(&history);
+            let set = match problem.framework.is_parametric() {
+                true => self.learned_set(&history, measure.radius),
+                false => UncertaintySet::around(Centre::frozen(problem), measure.radius, problem.support),
+            };
+            Frozen { set, measure }
+        })
+    }
+
+    /// The set of the framework around an empirical law.
+    fn learned_set(&self, law: &EmpiricalDistribution, radius: f64) -> UncertaintySet {
+        let problem = &self.specification.problem;
+        if !problem.framework.is_parametric() {
+            return UncertaintySet::around(Centre::empirical(law), radius, problem.support);
+        }
+        let moments = CentralMoments::of(law);
+        let estimate = NormalLaw { mean: moments.mean(), variance: moments.variance() };
+        UncertaintySet::Region(ConfidenceRegion { estimate, radius })
+    }
+
+    /// The features of a state, unscaled.
+    pub fn features(&self, state: &State) -> Features {
+        self.features_within(state, if self.selection.has_ball() { self.radius(state) } else { 0.0 })
+    }
+
+    /// The same where the radius of the state is known already.
+    pub fn features_within(&self, state: &State, radius: f64) -> Features {
+        let moments = CentralMoments::of(&state.law);
+        if !self.selection.has_ball() {
+            return self.selection.of(state.wealth, &without_ball(moments));
+        }
+        let radii = self.sets.radii(&state.law, radius);
+        let worst = ExponentialMean::of(&state.law, self.lowest_return()).worst(radii.radius);
+        self.selection.of(state.wealth, &self.summary(moments, radii, worst))
+    }
+
+    /// Features of the laws that follow from `law` when each of `returns` (ascending) is learned, for one wealth.
+    pub fn features_with(&self, law: &EmpiricalDistribution, wealth: f64, returns: &[f64]) -> Vec<Features> {
+        let before = CentralMoments::of(law);
+        if !self.learns() {
+            return vec![self.selection.of(wealth, &without_ball(before)); returns.len()];
+        }
+        if !self.selection.has_ball() {
+            let features = |&log_return: &f64| self.selection.of(wealth, &without_ball(before.with(log_return)));
+            return returns.iter().map(features).collect();
+        }
+        let mean = ExponentialMean::of(law, self.lowest_return());
+        let features = |(&log_return, radii): (&f64, Radii)| {
+            let worst = mean.worst_with(log_return, radii.radius);
+            self.selection.of(wealth, &self.summary(before.with(log_return), radii, worst))
+        };
+        returns.iter().zip(self.sets.radii_with(law, returns)).map(features).collect()
+    }
+
+    fn summary(&self, moments: CentralMoments, radii: Radii, worst: WorstExponential) -> LawSummary {
+        let bank = 1.0 + self.specification.problem.rate_per_step;
+        let WorstExponential { mean, variance } = worst;
+        LawSummary { moments, radii, robust_excess: mean / bank - 1.0, robust_variance: variance / (bank * bank) }
+    }
+
+    fn lowest_return(&self) -> f64 {
+        self.specification.problem.support.map_or(f64::NEG_INFINITY, |support| support.min)
+    }
+}
+
+/// The floor gain from `step` of the highest allocation where every period earns `best_return`:
+///
+///   (T - t) ln(1 + a ((e^z / (1 + r)) - 1)),   a the highest allocation, z the best return
+pub fn largest_gain(problem: &ProblemSpecification, step: usize, best_return: f64) -> f64 {
+    let bank = problem.rate_per_step.ln_1p();
+    let excess = (best_return - bank).exp_m1().max(0.0);
+    (problem.horizon - step) as f64 * (problem.action_interval[1] * excess).ln_1p()
+}
+
+fn without_ball(moments: CentralMoments) -> LawSummary {
+    LawSummary { moments, radii: NO_BALL, robust_excess: 0.0, robust_variance: 0.0 }
+}

@@ -1,0 +1,9 @@
+//! Strategies compared on simulated paths and on real returns (paper, section 3.2).
+
+pub mod account;
+pub mod paths;
+pub mod report;
+pub mod rolling;
+pub mod statistics;
+
+pub use super::request::evaluation::EvaluationRequest;

@@ -1,0 +1,326 @@
+//! Strategies side by side on common random numbers.
+//!
+//! Path p of history h has the same returns under every strategy: the stream ("evaluate-path", h, p) of the seed, as the
+//! drawn histories are the streams ("evaluate-history", h, 0). Strategies act through the calls that live sessions make.
+//! Whatever the threads, outcomes are collected in the order of histories and paths.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+
+use crate::control::error::{FieldError, TrainError};
+use crate::control::kept::Kept;
+use crate::control::policy::advice::AdviceSource;
+use crate::control::policy::advisor::{AdviceMode, Advisor};
+use crate::control::problem::sampling_law::{admissible, continuous_law};
+use crate::control::problem::state::next_wealth;
+use crate::control::progress::{Phase, StepProgress, Watch};
+use crate::control::request::evaluation::{EvaluationRequest, InitialHistories};
+use crate::control::request::framework::Framework;
+use crate::control::request::rules;
+use crate::control::request::specification::{SamplingLaw, Specification};
+use crate::control::training::Training;
+use crate::numerics::law::ContinuousLaw;
+use crate::numerics::law_distance::{LawDistance, Placed, insert};
+use crate::numerics::streams::stream;
+
+/// Progress is reported about this often.
+const REPORTS: usize = 100;
+
+/// A prepared comparison: the completed request, the true law, the initial histories.
+pub struct Evaluation {
+    pub request: EvaluationRequest,
+    pub histories: Vec<Vec<f64>>,
+    law: ContinuousLaw,
+    kept: Kept,
+}
+
+/// One step of one path as a framework lived it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lived {
+    pub allocation: f64,
+    pub radius: f64,
+    /// Distance of the centre of its ball to the true law.
+    pub distance: f64,
+    pub resolved: bool,
+}
+
+/// One path: terminal wealth of every strategy, and every step of every framework, framework by framework.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    pub wealth: Vec<f64>,
+    pub lived: Vec<Lived>,
+}
+
+/// Where the paths of one history start.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Start {
+    /// The bridge quantile there, under that radius rule.
+    pub quantile: Option<f64>,
+    pub radius: f64,
+    /// Certainty equivalent of each framework's first advice.
+    pub promised: Vec<f64>,
+}
+
+/// Everything simulated: `outcomes` holds the paths of the first history, then those of the second, and so on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcomes {
+    pub starts: Vec<Start>,
+    pub outcomes: Vec<Outcome>,
+    /// Seconds spent on re-solved steps; all else is the same for the same request.
+    pub resolve_seconds: f64,
+}
+
+/// A framework and the policy that serves every history, where one does.
+pub struct Follower {
+    pub framework: Framework,
+    pub advisor: Option<Advisor>,
+}
+
+impl Evaluation {
+    /// Completes and checks the request, and draws the histories.
+    ///
+    /// # Errors
+    /// A field that breaks its rule.
+    pub fn new(request: EvaluationRequest) -> Result<Self, FieldError> {
+        let request = request.completed()?;
+        let law = true_law(&request);
+        let histories = match request.histories {
+            InitialHistories::Given => vec![request.problem.history.clone()],
+            InitialHistories::Drawn { count } => (0..count).map(|index| drawn_history(&request, &law, index)).collect(),
+        };
+        Ok(Evaluation { request, histories, law, kept: Kept::default() })
+    }
+
+    /// The same with what can be made again in `kept`.
+    pub fn keeping(self, kept: Kept) -> Self {
+        Evaluation { kept, ..self }
+    }
+
+    /// As [`Self::new`], but from these histories, as if they had been drawn.
+    ///
+    /// # Errors
+    /// A field or a history that breaks its rule.
+    pub fn starting_at(mut request: EvaluationRequest, histories: Vec<Vec<f64>>) -> Result<Self, FieldError> {
+        request.histories = InitialHistories::Drawn { count: histories.len() };
+        let request = request.completed()?;
+        for (index, history) in histories.iter().enumerate() {
+            rules::history(&format!("histories[{index}]"), history)?;
+            if history.len() != request.problem.history.len() {
+                let value = format!("{} values", history.len());
+                return Err(FieldError::new(
+                    format!("histories[{index}]"),
+                    value,
+                    "must be as long as problem.history",
+                ));
+            }
+        }
+        Ok(Evaluation { law: true_law(&request), request, histories, kept: Kept::default() })
+    }
+
+    /// A framework with its policy, trained on the current pool; without one where each history has its own.
+    ///
+    /// # Errors
+    /// As [`Training::solve_step`].
+    pub fn follower(&self, framework: Framework, watch: &Watch) -> Result<Follower, TrainError> {
+        let advisor = match self.request.one_policy_for_all(framework) {
+            true => Some(self.trained(&self.request.specification(framework, None), watch)?),
+            false => None,
+        };
+        Ok(Follower { framework, advisor })
+    }
+
+    fn trained(&self, specification: &Specification, watch: &Watch) -> Result<Advisor, TrainError> {
+        let policy = Training::with(specification, self.kept.clone())?.run(watch)?;
+        Ok(Advisor::with(policy, self.kept.clone()))
+    }
+
+    /// Every framework of the request.
+    ///
+    /// # Errors
+    /// As [`Self::follower`].
+    pub fn train(&self, watch: &Watch) -> Result<Vec<Follower>, TrainError> {
+        self.request.frameworks.iter().map(|&framework| self.follower(framework, watch)).collect()
+    }
+
+    /// The returns of a path.
+    pub fn returns(&self, history: usize, path: usize) -> Vec<f64> {
+        let problem = &self.request.problem;
+        let mut generator = stream(self.request.seed, "evaluate-path", history, path);
+        (0..problem.horizon).map(|_| admissible(self.law.draw(&mut generator), problem)).collect()
+    }
+
+    /// Sends every strategy through every path, on the current pool. `followers` are in the order of the request's
+    /// frameworks; `clock` tells seconds.
+    ///
+    /// # Errors
+    /// [`TrainError::Stopped`] soon after the stop signal; what the training of a frozen framework can fail with.
+    pub fn simulate(
+        &self,
+        followers: &[Follower],
+        watch: &Watch,
+        clock: &(dyn Fn() -> f64 + Sync),
+    ) -> Result<Outcomes, TrainError> {
+        let first = self.request.problem.history.len();
+        let distances = LawDistance::new(self.law.clone(), first..first + self.request.problem.horizon);
+        let crew = Crew { evaluation: self, followers, watch, clock, distances, done: AtomicUsize::new(0) };
+        let found: Result<Vec<_>, TrainError> =
+            (0..self.histories.len()).into_par_iter().map(|history| crew.history(history)).collect();
+        let mut all = Outcomes { starts: Vec::new(), outcomes: Vec::new(), resolve_seconds: 0.0 };
+        for (start, outcomes) in found? {
+            all.starts.push(start);
+            for (outcome, seconds) in outcomes {
+                all.resolve_seconds += seconds;
+                all.outcomes.push(outcome);
+            }
+        }
+        Ok(all)
+    }
+}
+
+fn true_law(request: &EvaluationRequest) -> ContinuousLaw {
+    let law = request.problem.law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
+    continuous_law(law, &request.problem.history)
+}
+
+/// The history `index` of those drawn from the true law of a completed request.
+pub fn drawn_history(request: &EvaluationRequest, law: &ContinuousLaw, index: usize) -> Vec<f64> {
+    let mut generator = stream(request.seed, "evaluate-history", index, 0);
+    request.problem.history.iter().map(|_| admissible(law.draw(&mut generator), &request.problem)).collect()
+}
+
+/// What it takes to simulate.
+struct Crew<'a> {
+    evaluation: &'a Evaluation,
+    followers: &'a [Follower],
+    watch: &'a Watch<'a>,
+    clock: &'a (dyn Fn() -> f64 + Sync),
+    distances: LawDistance,
+    done: AtomicUsize,
+}
+
+/// The paths of one history, with the seconds each spent on re-solved steps.
+type Paths = Vec<(Outcome, f64)>;
+
+impl Crew<'_> {
+    fn history(&self, index: usize) -> Result<(Start, Paths), TrainError> {
+        let history = self.evaluation.histories[index].as_slice();
+        let own = self.own_advisors(history)?;
+        let advisors: Vec<&Advisor> = self
+            .followers
+            .iter()
+            .zip(&own)
+            .filter_map(|(follower, own)| follower.advisor.as_ref().or(own.as_ref()))
+            .collect();
+        let mut sample = Vec::with_capacity(history.len() + self.evaluation.request.problem.horizon);
+        history.iter().for_each(|&value| insert(&mut sample, self.distances.place(value)));
+        let paths = 0..self.evaluation.request.paths;
+        let outcomes: Result<Paths, TrainError> =
+            paths.into_par_iter().map(|path| self.path(index, path, &advisors, &sample)).collect();
+        Ok((start(&advisors, history)?, outcomes?))
+    }
+
+    /// The policies of the frameworks frozen at this history.
+    fn own_advisors(&self, history: &[f64]) -> Result<Vec<Option<Advisor>>, TrainError> {
+        let silent = Watch { stop: self.watch.stop, progress: &|_| {} };
+        let own = |follower: &Follower| {
+            if follower.advisor.is_some() {
+                return Ok(None);
+            }
+            let specification = self.evaluation.request.specification(follower.framework, Some(history));
+            self.evaluation.trained(&specification, &silent).map(Some)
+        };
+        self.followers.iter().map(own).collect()
+    }
+
+    fn path(
+        &self,
+        history: usize,
+        path: usize,
+        advisors: &[&Advisor],
+        sample: &[Placed],
+    ) -> Result<(Outcome, f64), TrainError> {
+        self.watch.go_on()?;
+        let problem = &self.evaluation.request.problem;
+        let returns = self.evaluation.returns(history, path);
+        let distances = self.distances_along(sample, &returns);
+        let mut outcome = Outcome { wealth: Vec::new(), lived: Vec::with_capacity(advisors.len() * returns.len()) };
+        let mut seconds = 0.0;
+        for advisor in advisors {
+            outcome.wealth.push(self.follow(
+                advisor,
+                history,
+                &returns,
+                &distances,
+                &mut outcome.lived,
+                &mut seconds,
+            )?);
+        }
+        for &mix in self.evaluation.request.mixes() {
+            let step = |wealth: f64, &log_return: &f64| next_wealth(wealth, mix, log_return, problem.rate_per_step);
+            outcome.wealth.push(returns.iter().fold(problem.initial_wealth, step));
+        }
+        self.report_path();
+        Ok((outcome, seconds))
+    }
+
+    /// Distances of the empirical law to the true one before each return.
+    fn distances_along(&self, sample: &[Placed], returns: &[f64]) -> Vec<f64> {
+        let mut sample = sample.to_vec();
+        let before = |&log_return: &f64| {
+            let distance = self.distances.distance(&sample);
+            insert(&mut sample, self.distances.place(log_return));
+            distance
+        };
+        returns.iter().map(before).collect()
+    }
+
+    /// Terminal wealth of one framework.
+    fn follow(
+        &self,
+        advisor: &Advisor,
+        history: usize,
+        returns: &[f64],
+        distances: &[f64],
+        lived: &mut Vec<Lived>,
+        seconds: &mut f64,
+    ) -> Result<f64, TrainError> {
+        let mut state = advisor.initial_state(Some(&self.evaluation.histories[history]), None)?;
+        let moves = advisor.specification().problem.framework.learns();
+        for (step, &log_return) in returns.iter().enumerate() {
+            self.watch.go_on()?;
+            let started = (self.clock)();
+            let advice = advisor.advise(step, &state, AdviceMode::Surrogate);
+            let resolved = advice.source != AdviceSource::PolicySurrogate;
+            if resolved {
+                *seconds += (self.clock)() - started;
+            }
+            let distance = distances[if moves { step } else { 0 }];
+            lived.push(Lived { allocation: advice.allocation, radius: advice.radius, distance, resolved });
+            state = advisor.advance(&state, advice.allocation, log_return);
+        }
+        Ok(state.wealth)
+    }
+
+    fn report_path(&self) {
+        let total = self.evaluation.histories.len() * self.evaluation.request.paths;
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        if done.is_multiple_of((total / REPORTS).max(1)) || done == total {
+            (self.watch.progress)(StepProgress { step: 0, phase: Phase::Simulating, done, total });
+        }
+    }
+}
+
+/// Quantile and radius at a history, those of the first framework with a ball, and what the frameworks promise there.
+fn start(advisors: &[&Advisor], history: &[f64]) -> Result<Start, TrainError> {
+    let mut start = Start { quantile: None, radius: 0.0, promised: Vec::with_capacity(advisors.len()) };
+    for advisor in advisors {
+        let state = advisor.initial_state(Some(history), None)?;
+        start.promised.push(advisor.advise(0, &state, AdviceMode::Surrogate).certainty_equivalent);
+        let uncertainty = advisor.uncertainty(&state);
+        if start.radius <= 0.0 {
+            (start.quantile, start.radius) = (uncertainty.quantile, uncertainty.radius);
+        }
+    }
+    Ok(start)
+}

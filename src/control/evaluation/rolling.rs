@@ -1,0 +1,169 @@
+//! Walk-forward: every year a policy is trained on the window of returns before it, and lived by through the year.
+//!
+//! Decisions and accounts are apart: under power and log utility no advice depends on wealth, so the years can be
+//! decided side by side, and what wealth became is counted afterwards ([`crate::control::evaluation::account`]).
+
+use crate::control::error::TrainError;
+use crate::control::policy::advice::AdviceSource;
+use crate::control::policy::advisor::{AdviceMode, Advisor};
+use crate::control::pool::TrainingPool;
+use crate::control::progress::Watch;
+use crate::control::request::framework::Framework;
+use crate::control::request::specification::{
+    DesignSpecification, ProblemSpecification, RadiusRule, Specification, SurrogateSpecification, UtilitySpecification,
+};
+use crate::control::training::Training;
+
+/// Simulated bridges behind every radius: the default of a specification.
+const PATHS: usize = 2000;
+
+/// One period of the real world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Period {
+    pub log_return: f64,
+    /// Simple return of the bank.
+    pub bank_return: f64,
+}
+
+/// How allocations are found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Strategy {
+    Adaptive {
+        alpha: f64,
+    },
+    Static {
+        alpha: f64,
+    },
+    PlugIn,
+    /// The same share always.
+    Mix {
+        share: f64,
+    },
+}
+
+/// What was held through one period, and why.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Decision {
+    pub allocation: f64,
+    /// Radius of the ball then; 0 where there is none.
+    pub radius: f64,
+    /// Absent where nothing was trained.
+    pub source: Option<AdviceSource>,
+}
+
+/// The choices that all years share.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WalkForward {
+    /// Periods of history before each year.
+    pub window: usize,
+    /// Periods a policy is lived by: its horizon.
+    pub year: usize,
+    /// Relative risk aversion: log utility at 1, power utility above.
+    pub risk_aversion: f64,
+    /// Design points a step.
+    pub count: usize,
+    pub seed: u64,
+}
+
+impl Strategy {
+    fn framework(self) -> Option<(Framework, f64)> {
+        match self {
+            Strategy::Adaptive { alpha } => Some((Framework::Adaptive, alpha)),
+            Strategy::Static { alpha } => Some((Framework::Static, alpha)),
+            // Its radius is zero whatever the rule says.
+            Strategy::PlugIn => Some((Framework::PlugIn, 0.1)),
+            Strategy::Mix { .. } => None,
+        }
+    }
+}
+
+impl WalkForward {
+    pub fn utility(&self) -> UtilitySpecification {
+        match self.risk_aversion {
+            1.0 => UtilitySpecification::Log {},
+            risk_aversion => UtilitySpecification::Power { risk_aversion },
+        }
+    }
+
+    /// Trainings that [`Self::decide`] takes: one a strategy that needs it and a year.
+    pub fn trainings(&self, strategies: &[Strategy], periods: &[Period]) -> usize {
+        let years = periods.len().saturating_sub(self.window).div_ceil(self.year);
+        years * strategies.iter().filter(|strategy| strategy.framework().is_some()).count()
+    }
+
+    /// The training request of one year from the periods before it. The bank is taken to go on paying what it paid last.
+    pub fn specification(&self, framework: Framework, alpha: f64, past: &[Period]) -> Specification {
+        Specification {
+            problem: ProblemSpecification {
+                framework,
+                horizon: self.year,
+                rate_per_step: past.last().map_or(0.0, |last| last.bank_return),
+                initial_wealth: 100.0,
+                action_interval: [0.0, 1.0],
+                utility: self.utility(),
+                radius: Some(RadiusRule::Bridge { alpha, paths: PATHS, scale: 1.0 }),
+                support: None,
+                law: None,
+                history: past.iter().map(|period| period.log_return).collect(),
+            },
+            design: DesignSpecification { count: Some(self.count), ..DesignSpecification::default() },
+            surrogate: SurrogateSpecification::default(),
+            seed: self.seed,
+        }
+    }
+
+    /// What each strategy holds through every period after the first window, on the current pool of threads.
+    /// The last year may be cut short. `trained` hears of every training done, in no order.
+    ///
+    /// # Errors
+    /// Returns or choices that break a rule of the specification; a training that fails; the stop signal.
+    pub fn decide(
+        &self,
+        strategies: &[Strategy],
+        periods: &[Period],
+        watch: &Watch,
+        trained: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Vec<Decision>>, TrainError> {
+        let starts = (self.window..periods.len()).step_by(self.year);
+        // Years outermost, so that years done stay done together.
+        let jobs: Vec<(usize, Strategy)> =
+            starts.flat_map(|start| strategies.iter().map(move |&strategy| (start, strategy))).collect();
+        let found = TrainingPool::map(jobs, |(start, strategy)| {
+            let decided = self.decide_year(strategy, periods, start, watch);
+            if strategy.framework().is_some() {
+                trained();
+            }
+            decided
+        });
+        let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); strategies.len()];
+        for (job, year) in found.into_iter().enumerate() {
+            decisions[job % strategies.len()].extend(year?);
+        }
+        Ok(decisions)
+    }
+
+    fn decide_year(
+        &self,
+        strategy: Strategy,
+        periods: &[Period],
+        start: usize,
+        watch: &Watch,
+    ) -> Result<Vec<Decision>, TrainError> {
+        let year = &periods[start..periods.len().min(start + self.year)];
+        let Some((framework, alpha)) = strategy.framework() else {
+            let Strategy::Mix { share } = strategy else { return Ok(Vec::new()) };
+            return Ok(vec![Decision { allocation: share, radius: 0.0, source: None }; year.len()]);
+        };
+        let specification = self.specification(framework, alpha, &periods[start - self.window..start]);
+        let advisor = Advisor::new(Training::new(&specification)?.run(watch)?);
+        let mut state = advisor.initial_state(None, None)?;
+        let mut decisions = Vec::with_capacity(year.len());
+        for (step, period) in year.iter().enumerate() {
+            let advice = advisor.advise(step, &state, AdviceMode::Surrogate);
+            state = advisor.advance(&state, advice.allocation, period.log_return);
+            let source = Some(advice.source);
+            decisions.push(Decision { allocation: advice.allocation, radius: advice.radius, source });
+        }
+        Ok(decisions)
+    }
+}

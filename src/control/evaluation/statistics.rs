@@ -1,0 +1,272 @@
+//! From simulated paths to the report: what each strategy ended with, each figure with its interval.
+
+use rayon::prelude::*;
+
+use crate::control::evaluation::paths::{Evaluation, Follower, Lived, Outcomes, Start};
+use crate::control::evaluation::report::{
+    Costs, Coverage, CoverageAtSize, Difference, EvaluationReport, FORMAT, HistoryReport, PeriodReport, RadiusSpread,
+    Spread, StrategyReport, UtilityReport, WealthReport,
+};
+use crate::control::policy::document::content_hash;
+use crate::control::problem::state::floor;
+use crate::control::problem::utility::{RelativeUtility, utility};
+use crate::control::request::framework::Framework;
+use crate::numerics::summary::{Clustered, Estimate, interpolated_quantile};
+
+/// Bins of the histograms.
+const BINS: usize = 40;
+
+impl EvaluationReport {
+    /// The report of what was simulated, on the current pool. Cost O(strategies paths ln paths).
+    pub fn new(evaluation: &Evaluation, followers: &[Follower], outcomes: &Outcomes, costs: Costs) -> Self {
+        let request = &evaluation.request;
+        let sample = Clustered::new(evaluation.histories.len(), request.paths, request.level);
+        let count = request.frameworks.len() + request.mixes().len();
+        let wealth: Vec<Vec<f64>> =
+            (0..count).map(|index| outcomes.outcomes.iter().map(|outcome| outcome.wealth[index]).collect()).collect();
+        let kind = request.problem.utility;
+        let utilities: Vec<Vec<f64>> =
+            wealth.iter().map(|wealth| wealth.iter().map(|&wealth| utility(kind, wealth)).collect()).collect();
+        let edges = edges(&utilities);
+        let reference = request.frameworks.iter().position(|&framework| framework == Framework::Adaptive).unwrap_or(0);
+        let table = Table {
+            evaluation,
+            followers,
+            outcomes,
+            sample,
+            wealth: &wealth,
+            utilities: &utilities,
+            edges: &edges,
+            reference,
+        };
+        let strategies: Vec<StrategyReport> = (0..count).into_par_iter().map(|index| table.strategy(index)).collect();
+        EvaluationReport {
+            format: FORMAT.to_owned(),
+            reference: strategies.get(reference).map_or(String::new(), |strategy| strategy.strategy.clone()),
+            histories: table.histories(),
+            strategies,
+            request: request.clone(),
+            costs,
+            histogram_edges: edges,
+        }
+    }
+}
+
+impl Costs {
+    /// From the seconds of the two stages, and what re-solving took in all.
+    pub fn new(training_seconds: f64, simulation_seconds: f64, outcomes: &Outcomes) -> Self {
+        let resolved =
+            outcomes.outcomes.iter().flat_map(|outcome| &outcome.lived).filter(|lived| lived.resolved).count();
+        let resolve_seconds = (resolved > 0).then(|| outcomes.resolve_seconds / resolved as f64);
+        Costs { training_seconds, simulation_seconds, resolve_seconds }
+    }
+}
+
+fn edges(utilities: &[Vec<f64>]) -> Vec<f64> {
+    let all = || utilities.iter().flatten().copied();
+    let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
+    (0..=BINS).map(|bin| low + (high - low) * bin as f64 / BINS as f64).collect()
+}
+
+/// Everything simulated, strategy by strategy.
+struct Table<'a> {
+    evaluation: &'a Evaluation,
+    followers: &'a [Follower],
+    outcomes: &'a Outcomes,
+    sample: Clustered,
+    wealth: &'a [Vec<f64>],
+    utilities: &'a [Vec<f64>],
+    edges: &'a [f64],
+    reference: usize,
+}
+
+impl Table<'_> {
+    fn strategy(&self, index: usize) -> StrategyReport {
+        let request = &self.evaluation.request;
+        let follower = self.followers.get(index);
+        let mix = index.checked_sub(self.followers.len()).and_then(|mix| request.mixes().get(mix)).copied();
+        let advisor = follower.and_then(|follower| follower.advisor.as_ref());
+        let utilities = self.utilities[index].as_slice();
+        StrategyReport {
+            strategy: follower.map_or_else(|| mix_name(mix.unwrap_or_default()), |follower| follower.framework.name()),
+            framework: follower.map(|follower| follower.framework),
+            constant_mix: mix,
+            policy: advisor.map(|advisor| content_hash(&advisor.policy().to_json())),
+            utility: self.utility(utilities),
+            certainty_equivalent: self.certainty_equivalent(index),
+            wealth: WealthReport { mean: self.sample.mean(&self.wealth[index]) },
+            difference: (index != self.reference).then(|| self.difference(index)),
+            histogram: self.histogram(utilities),
+            periods: follower.map(|_| self.periods(index)),
+            coverage: follower.filter(|follower| has_ball(follower.framework)).map(|_| self.coverage(index)),
+            resolved_share: follower.map(|_| share(self.lived(index), |lived| lived.resolved)),
+        }
+    }
+
+    fn utility(&self, utilities: &[f64]) -> UtilityReport {
+        let mut sorted = utilities.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        UtilityReport {
+            mean: self.sample.mean(utilities),
+            variance: self.sample.variance(utilities),
+            quantile_20: self.sample.quantile(utilities, &sorted, 0.2),
+            quantile_90: self.sample.quantile(utilities, &sorted, 0.9),
+            max: self.sample.largest(utilities),
+            min: self.sample.smallest(utilities),
+        }
+    }
+
+    /// The mean in units of the floor, where nothing saturates, taken back to wealth; no further than wealths seen.
+    fn certainty_equivalent(&self, index: usize) -> Estimate {
+        let (relative, floor) = self.relative_utility();
+        let extreme = |pick: fn(f64, f64) -> f64, start: f64| self.wealth[index].iter().copied().fold(start, pick);
+        let (lowest, highest) = (extreme(f64::min, f64::INFINITY), extreme(f64::max, f64::NEG_INFINITY));
+        let [least, most] = [lowest, highest].map(|wealth| relative.value((wealth / floor).ln()));
+        let mean = self.sample.mean(&self.relative_utilities(index));
+        mean.mapped(|value| floor * relative.inverse(value.clamp(least, most)).exp())
+    }
+
+    /// Certainty equivalents by the delta method: each utility weighs as U^{-1} is steep at its strategy's mean.
+    fn difference(&self, index: usize) -> Difference {
+        let (relative, floor) = self.relative_utility();
+        let linear = |index: usize| {
+            let values = self.relative_utilities(index);
+            let mean = self.sample.mean(&values).value;
+            let slope = floor * inverse_slope(relative, mean);
+            let found = self.certainty_equivalent(index).value;
+            values.into_iter().map(move |value| found + slope * (value - mean))
+        };
+        let apart: Vec<f64> = linear(index).zip(linear(self.reference)).map(|(own, other)| own - other).collect();
+        let pairs = self.utilities[index].iter().zip(&self.utilities[self.reference]);
+        let utility: Vec<f64> = pairs.map(|(own, other)| own - other).collect();
+        Difference { utility: self.sample.mean(&utility), certainty_equivalent: self.sample.mean(&apart) }
+    }
+
+    /// Utility in units of the terminal wealth of all-bank, and that wealth.
+    fn relative_utility(&self) -> (RelativeUtility, f64) {
+        let problem = &self.evaluation.request.problem;
+        let floor = floor(problem.initial_wealth, problem.rate_per_step, problem.horizon);
+        (RelativeUtility::new(problem.utility, floor), floor)
+    }
+
+    fn relative_utilities(&self, index: usize) -> Vec<f64> {
+        let (relative, floor) = self.relative_utility();
+        self.wealth[index].iter().map(|wealth| relative.value((wealth / floor).ln())).collect()
+    }
+
+    fn histogram(&self, utilities: &[f64]) -> Vec<usize> {
+        let (low, high) = (self.edges[0], self.edges[BINS]);
+        let mut counts = vec![0; BINS];
+        for value in utilities {
+            let position = if high > low { (value - low) / (high - low) * BINS as f64 } else { 0.0 };
+            counts[(position as usize).min(BINS - 1)] += 1;
+        }
+        counts
+    }
+
+    /// Every step of a framework, path by path.
+    fn lived(&self, index: usize) -> impl Iterator<Item = &Lived> {
+        let horizon = self.evaluation.request.problem.horizon;
+        self.outcomes.outcomes.iter().flat_map(move |outcome| &outcome.lived[index * horizon..(index + 1) * horizon])
+    }
+
+    /// What `of` says of one period of a framework, on every path.
+    fn at(&self, index: usize, step: usize, of: impl Fn(&Lived) -> f64) -> Vec<f64> {
+        let position = index * self.evaluation.request.problem.horizon + step;
+        self.outcomes.outcomes.iter().map(|outcome| of(&outcome.lived[position])).collect()
+    }
+
+    fn periods(&self, index: usize) -> Vec<PeriodReport> {
+        let problem = &self.evaluation.request.problem;
+        let period = |step: usize| {
+            let allocations = self.at(index, step, |lived| lived.allocation);
+            let radii = self.at(index, step, |lived| lived.radius);
+            let banked = allocations.iter().filter(|&&allocation| allocation <= 0.0).count();
+            PeriodReport {
+                period: step + 1,
+                sample_size: problem.history.len() + step,
+                all_bank_share: banked as f64 / allocations.len() as f64,
+                allocation: spread(allocations),
+                radius: has_ball(self.followers[index].framework).then(|| radius_spread(radii)),
+            }
+        };
+        (0..problem.horizon).map(period).collect()
+    }
+
+    fn coverage(&self, index: usize) -> Coverage {
+        let problem = &self.evaluation.request.problem;
+        let horizon = problem.horizon;
+        let left = |lived: &Lived| lived.distance > lived.radius;
+        let outcomes = &self.outcomes.outcomes;
+        let at_size = |step: usize| CoverageAtSize {
+            sample_size: problem.history.len() + step,
+            covered: self.sample.share(outcomes, |outcome| !left(&outcome.lived[index * horizon + step])),
+        };
+        // A frozen ball is the same in all periods.
+        let steps = if self.followers[index].framework.learns() { problem.horizon } else { 1 };
+        Coverage {
+            target: problem.radius_rule().alpha().map(|alpha| 1.0 - alpha),
+            by_sample_size: (0..steps).map(at_size).collect(),
+            ever_left: self
+                .sample
+                .share(outcomes, |outcome| outcome.lived[index * horizon..(index + 1) * horizon].iter().any(left)),
+        }
+    }
+
+    fn histories(&self) -> Vec<HistoryReport> {
+        let paths = self.evaluation.request.paths;
+        let mean = |history: usize, utilities: &Vec<f64>| {
+            utilities[history * paths..(history + 1) * paths].iter().sum::<f64>() / paths as f64
+        };
+        let starts = self.outcomes.starts.iter().enumerate();
+        let report = |(history, start): (usize, &Start)| HistoryReport {
+            quantile: start.quantile,
+            radius: start.radius,
+            promised: start.promised.clone(),
+            mean_utility: self.utilities.iter().map(|utilities| mean(history, utilities)).collect(),
+        };
+        starts.map(report).collect()
+    }
+}
+
+/// True where the framework's uncertainty set is a Wasserstein ball.
+fn has_ball(framework: Framework) -> bool {
+    matches!(framework, Framework::Adaptive | Framework::Static)
+}
+
+fn mix_name(mix: f64) -> String {
+    if mix == 0.0 { "all_bank".to_owned() } else { format!("mix_{mix}") }
+}
+
+/// The derivative at `value` of wealth over the floor, exp(u^{-1}).
+fn inverse_slope(relative: RelativeUtility, value: f64) -> f64 {
+    match relative {
+        RelativeUtility::Exponential { k } => 1.0 / (1.0 - k * value),
+        RelativeUtility::Power { eta } => (eta * relative.inverse(value)).exp(),
+        RelativeUtility::Log => value.exp(),
+    }
+}
+
+fn share<'a>(steps: impl Iterator<Item = &'a Lived>, holds: impl Fn(&Lived) -> bool) -> f64 {
+    let (held, all) = steps.fold((0, 0), |(held, all), lived| (held + usize::from(holds(lived)), all + 1));
+    held as f64 / f64::max(f64::from(all), 1.0)
+}
+
+fn sorted_with_mean(mut values: Vec<f64>) -> (Vec<f64>, f64) {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.sort_by(f64::total_cmp);
+    (values, mean)
+}
+
+fn spread(values: Vec<f64>) -> Spread {
+    let (sorted, mean) = sorted_with_mean(values);
+    let at = |share| interpolated_quantile(&sorted, share);
+    Spread { mean, quantile_10: at(0.1), quantile_90: at(0.9) }
+}
+
+fn radius_spread(values: Vec<f64>) -> RadiusSpread {
+    let first_path = values[0];
+    let (sorted, mean) = sorted_with_mean(values);
+    let at = |share| interpolated_quantile(&sorted, share);
+    RadiusSpread { mean, quantile_10: at(0.1), quantile_50: at(0.5), quantile_90: at(0.9), first_path }
+}

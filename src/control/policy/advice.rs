@@ -1,0 +1,54 @@
+//! What a policy answers: an advice, and the uncertainty set behind it.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Where an advice came from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AdviceSource {
+    /// The policy surrogate (or the stored solution of a single-state design).
+    PolicySurrogate,
+    /// Re-solved on request.
+    Resolved,
+    /// Re-solved because the state lies outside the design.
+    ResolvedOutsideDesign,
+    /// Re-solved for a hypothetical radius, which the policy surrogate was not trained for.
+    ResolvedOtherRadius,
+    /// The robust step has no finite solution at the state: all wealth stays in the bank, which no law can hurt.
+    Unsolved,
+}
+
+/// The robust allocation for the coming period and what it is worth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Advice {
+    /// Share of wealth to hold in the risky asset.
+    pub allocation: f64,
+    /// Certainty equivalent of the robust value, in terminal wealth.
+    pub certainty_equivalent: f64,
+    /// Terminal wealth of all-bank: no law can take it away.
+    pub floor: f64,
+    /// Radius of the uncertainty set: of the Wasserstein ball, in log-return; in the parametric frameworks half the width
+    /// of the confidence region in the mean, in estimated standard deviations of a return.
+    pub radius: f64,
+    pub sample_size: usize,
+    /// Predicted standard deviation of the log certainty equivalent.
+    pub surrogate_sd: f64,
+    /// Whether the state lies where the surrogates were trained.
+    pub in_design: bool,
+    pub source: AdviceSource,
+}
+
+/// The uncertainty set of a state, in figures.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Uncertainty {
+    pub sample_size: usize,
+    /// Raw moments of the empirical law, first to the specification's count.
+    pub moments: Vec<f64>,
+    /// (1 - alpha)-quantile of the bridge statistic; absent under other radius rules.
+    pub quantile: Option<f64>,
+    /// Simulation standard error of the quantile.
+    pub quantile_standard_error: Option<f64>,
+    /// As in an advice.
+    pub radius: f64,
+}

@@ -1,0 +1,286 @@
+//! A policy made ready to answer: what to hold in a state, what the law and the radius are, where the next return leads.
+//! Live sessions and the simulator call these same functions.
+
+use super::advice::{Advice, AdviceSource, Uncertainty};
+use super::document::Policy;
+use super::prepared::{PreparedStep, prepared_bytes};
+use crate::control::bellman::BellmanStep;
+use crate::control::bellman::next_value::NextValue;
+use crate::control::bellman::problem::Problem;
+use crate::control::bellman::solution::RobustSolution;
+use crate::control::error::FieldError;
+use crate::control::kept::Kept;
+use crate::control::policy::worst_case::WorstCase;
+use crate::control::problem::state::{State, next_state};
+use crate::control::problem::utility::depends_on_wealth;
+use crate::control::request::specification::{Specification, UtilitySpecification};
+use crate::control::surrogate::stored::Solution;
+use crate::control::uncertainty::radius::Measure;
+use crate::numerics::empirical::EmpiricalDistribution;
+
+/// Numbers read in some hundreds of microseconds.
+const PROMPT_COST: usize = 1 << 20;
+
+/// How an allocation is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AdviceMode {
+    /// From the policy surrogate; by re-solving where the state lies outside the design.
+    Surrogate,
+    /// By solving the robust step at the exact state with the value surrogate of the step after.
+    Resolve,
+}
+
+/// A policy with what its evaluation needs prepared. Cheap to share behind an `Arc`; all methods are pure.
+pub struct Advisor {
+    policy: Policy,
+    problem: Problem,
+    steps: Vec<PreparedStep>,
+    kept: Kept,
+}
+
+/// What an advice is for.
+struct Asked<'a> {
+    step: usize,
+    state: &'a State,
+    radius: f64,
+    source: AdviceSource,
+}
+
+/// What the surrogates say of a state.
+struct Prediction {
+    action: f64,
+    floor_gain: f64,
+    deviation: f64,
+    in_design: bool,
+}
+
+impl Advisor {
+    pub fn new(policy: Policy) -> Self {
+        Advisor::with(policy, Kept::default())
+    }
+
+    /// The same with what can be made again in `kept`.
+    pub fn with(policy: Policy, kept: Kept) -> Self {
+        let problem = policy.problem(kept.clone());
+        let steps = policy.steps().iter().map(|step| PreparedStep::new(&problem.specification, step)).collect();
+        Advisor { policy, problem, steps, kept }
+    }
+
+    /// Bytes it holds, without bridges and factors.
+    pub fn bytes(&self) -> usize {
+        prepared_bytes(&self.policy)
+    }
+
+    /// Bytes of the largest bridges that a session asks for which starts from `sample_size` returns.
+    pub fn heaviest_bridges(&self, sample_size: usize) -> usize {
+        self.problem.sets.heaviest(sample_size, self.specification().problem.horizon)
+    }
+
+    pub fn policy(&self) -> &Policy {
+        &self.policy
+    }
+
+    pub fn specification(&self) -> &Specification {
+        self.policy.specification()
+    }
+
+    /// The state a session starts from: `history` and `wealth` default to the specification's.
+    ///
+    /// # Errors
+    /// A history or wealth that breaks a rule; a history other than the policy's own under a static framework, whose
+    /// uncertainty set is frozen at it.
+    pub fn initial_state(&self, history: Option<&[f64]>, wealth: Option<f64>) -> Result<State, FieldError> {
+        let problem = &self.specification().problem;
+        let own = &problem.history;
+        let history = history.unwrap_or(own);
+        if problem.framework.is_frozen() && history != own {
+            let value = format!("{} values", history.len());
+            return Err(FieldError::new("history", value, "must be the policy's own under a static framework"));
+        }
+        State::new(history, wealth.unwrap_or(problem.initial_wealth))
+    }
+
+    /// The advice for the period after `step` observed periods. `step` must be below the horizon.
+    /// Cost: two kernel sums and one triangular solve; a robust step where it re-solves.
+    pub fn advise(&self, step: usize, state: &State, mode: AdviceMode) -> Advice {
+        let radius = self.radius(state);
+        let predicted = self.predict(step, state, radius);
+        let source = match mode {
+            AdviceMode::Resolve => AdviceSource::Resolved,
+            AdviceMode::Surrogate if predicted.in_design => return self.predicted(step, state, radius, &predicted),
+            AdviceMode::Surrogate => AdviceSource::ResolvedOutsideDesign,
+        };
+        self.resolved(&Asked { step, state, radius, source }, &predicted).0
+    }
+
+    /// [`Self::advise`] from the policy surrogate where the radius of the state is known; `None` outside the design.
+    pub fn advise_from_surrogate(&self, step: usize, state: &State, radius: f64) -> Option<Advice> {
+        let predicted = self.predict(step, state, radius);
+        predicted.in_design.then(|| self.predicted(step, state, radius, &predicted))
+    }
+
+    /// Whether [`Self::advise_from_surrogate`] and [`Self::uncertainty`] take well below a millisecond: what they need is
+    /// prepared, and small.
+    pub fn is_prompt(&self, step: usize, state: &State) -> bool {
+        let points = match self.policy.steps().get(step).map(|step| &step.solution) {
+            Some(Solution::Surrogates(stored)) => stored.value.weights.len(),
+            _ => 0,
+        };
+        let prepared = match self.steps.get(step) {
+            Some(PreparedStep::Surrogates { factor, .. }) => factor.is_in(&self.kept),
+            _ => true,
+        };
+        let cost = self.problem.cost(state);
+        prepared && cost.is_some_and(|cost| cost + points * points / 2 <= PROMPT_COST)
+    }
+
+    /// Makes what [`Self::is_prompt`] asks for.
+    pub fn prepare(&self, step: usize, state: &State) {
+        self.problem.prepare(state);
+        if let Some(PreparedStep::Surrogates { factor, .. }) = self.steps.get(step)
+            && let Some(Solution::Surrogates(stored)) = self.policy.steps().get(step).map(|step| &step.solution)
+        {
+            factor.process(&self.kept, stored);
+        }
+    }
+
+    fn predicted(&self, step: usize, state: &State, radius: f64, predicted: &Prediction) -> Advice {
+        let asked = Asked { step, state, radius, source: AdviceSource::PolicySurrogate };
+        self.advice(&asked, predicted.action, predicted.floor_gain, predicted)
+    }
+
+    /// The re-solved advice and the worst-case law behind it.
+    pub fn explain(&self, step: usize, state: &State) -> (Advice, WorstCase) {
+        self.explain_within(step, state, self.radius(state))
+    }
+
+    /// The same were the radius of the coming period `radius`, whatever the law says; later periods keep their own.
+    pub fn explain_within(&self, step: usize, state: &State, radius: f64) -> (Advice, WorstCase) {
+        let own = self.radius(state);
+        let source = if radius == own { AdviceSource::Resolved } else { AdviceSource::ResolvedOtherRadius };
+        let predicted = self.predict(step, state, own);
+        let (advice, solution) = self.resolved(&Asked { step, state, radius, source }, &predicted);
+        let worst = match solution {
+            Some(solution) => WorstCase::of(&solution, &advice, self.utility_per_radius(step, state)),
+            None => WorstCase::unknown(),
+        };
+        (advice, worst)
+    }
+
+    /// Radius of the uncertainty set at a state, as in an advice.
+    pub fn radius(&self, state: &State) -> f64 {
+        self.problem.radius(state)
+    }
+
+    /// The floor gain that the value surrogate predicts, wherever the state lies.
+    pub fn surrogate_gain(&self, step: usize, state: &State) -> f64 {
+        self.predict(step, state, self.radius(state)).floor_gain
+    }
+
+    fn resolved(&self, asked: &Asked, predicted: &Prediction) -> (Advice, Option<RobustSolution>) {
+        let after = self.policy.steps().get(asked.step + 1).map(|after| &after.solution);
+        let next = NextValue::new(self.specification(), asked.step + 1, after);
+        let step = BellmanStep { problem: &self.problem, step: asked.step, next: &next };
+        let solution = step.solve_within(asked.state, asked.radius);
+        if solution.action.is_finite() && solution.floor_gain.is_finite() {
+            return (self.advice(asked, solution.action, solution.floor_gain, predicted), Some(solution));
+        }
+        // All-bank is feasible and no law can hurt it.
+        let unsolved = Asked { source: AdviceSource::Unsolved, ..*asked };
+        (self.advice(&unsolved, 0.0, 0.0, predicted), None)
+    }
+
+    fn advice(&self, asked: &Asked, allocation: f64, floor_gain: f64, predicted: &Prediction) -> Advice {
+        let floor = self.problem.floor(asked.step, asked.state);
+        Advice {
+            allocation,
+            certainty_equivalent: floor * floor_gain.exp(),
+            floor,
+            radius: asked.radius,
+            sample_size: asked.state.law.sample_size(),
+            surrogate_sd: predicted.deviation,
+            in_design: predicted.in_design,
+            source: asked.source,
+        }
+    }
+
+    /// `radius` is that of the state.
+    fn predict(&self, step: usize, state: &State, radius: f64) -> Prediction {
+        // An imported policy may claim anything.
+        let largest = self.problem.largest_gain(step, state);
+        match &self.steps[step] {
+            PreparedStep::Single(single) => {
+                let in_design = self.is_single_state(step, state);
+                let floor_gain = single.floor_gain.min(largest);
+                Prediction { action: single.action, floor_gain, deviation: 0.0, in_design }
+            }
+            PreparedStep::Surrogates { value, policy, factor } => {
+                let input = value.scaling.apply(&self.problem.features_within(state, radius));
+                let Solution::Surrogates(stored) = &self.policy.steps()[step].solution else {
+                    return Prediction { action: 0.0, floor_gain: 0.0, deviation: f64::INFINITY, in_design: false };
+                };
+                let process = factor.process(&self.kept, stored);
+                let deviation =
+                    process.as_ref().as_ref().map_or(f64::INFINITY, |found| found.latent_variance(&input).sqrt());
+                let highest = self.specification().problem.action_interval[1];
+                let (action, prediction) = (policy.at(&input), value.surrogate.at(&input));
+                Prediction {
+                    action: action.clamp(0.0, highest),
+                    floor_gain: value.clamped_gain(prediction, state.wealth).min(largest),
+                    deviation: value.gain_spread(prediction, deviation * stored.value.scale, state.wealth).min(largest),
+                    in_design: deviation <= stored.deviation_limit && action.is_finite(),
+                }
+            }
+        }
+    }
+
+    /// Whether `state` is the one state that a single-state step was solved at.
+    fn is_single_state(&self, step: usize, state: &State) -> bool {
+        let problem = &self.specification().problem;
+        let start = EmpiricalDistribution::new(&problem.history);
+        let same_law = !problem.framework.learns() || (step == 0 && state.law == start);
+        let trained = self.specification().design.wealth.map_or(problem.initial_wealth, |wealth| wealth.min);
+        let same_wealth = !depends_on_wealth(problem.utility) || state.wealth == trained;
+        same_law && same_wealth
+    }
+
+    /// Relative utility to utility: the derivative of U at the floor times the floor.
+    fn utility_per_radius(&self, step: usize, state: &State) -> f64 {
+        let floor = self.problem.floor(step, state);
+        match self.specification().problem.utility {
+            UtilitySpecification::Exponential { risk_aversion } => floor * (-risk_aversion * floor).exp(),
+            UtilitySpecification::Power { risk_aversion } => floor.powf(1.0 - risk_aversion),
+            UtilitySpecification::Log {} => 1.0,
+        }
+    }
+
+    /// Sample size, moments, quantile and radius of a state.
+    pub fn uncertainty(&self, state: &State) -> Uncertainty {
+        let Measure { radius, quantile } = self.problem.measure(state);
+        Uncertainty {
+            sample_size: state.law.sample_size(),
+            moments: state.law.raw_moments(self.specification().surrogate.moment_count),
+            quantile: quantile.map(|found| found.value),
+            quantile_standard_error: quantile.map(|found| found.standard_error),
+            radius,
+        }
+    }
+
+    /// The state after holding `allocation` through `log_return`.
+    pub fn advance(&self, state: &State, allocation: f64, log_return: f64) -> State {
+        next_state(state, allocation, log_return, self.specification().problem.rate_per_step)
+    }
+
+    /// Follows the policy through `returns` from `start`: the advice before each return, and the state after the last.
+    /// At most `horizon` returns are used.
+    pub fn simulate(&self, start: State, returns: &[f64]) -> (Vec<Advice>, State) {
+        let mut state = start;
+        let mut advices = Vec::with_capacity(returns.len());
+        for (step, &log_return) in returns.iter().take(self.specification().problem.horizon).enumerate() {
+            let advice = self.advise(step, &state, AdviceMode::Surrogate);
+            state = self.advance(&state, advice.allocation, log_return);
+            advices.push(advice);
+        }
+        (advices, state)
+    }
+}

@@ -1,0 +1,169 @@
+//! A trained policy: immutable, portable, named by the hash of its bytes.
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::control::bellman::problem::{Problem, largest_gain};
+use crate::control::error::{FieldError, PolicyError};
+use crate::control::kept::Kept;
+use crate::control::request::rules;
+use crate::control::request::specification::Specification;
+use crate::control::solved_step::{FORMAT, StepDiagnostics, StepSolution};
+use crate::control::surrogate::stored::{SingleSolution, Solution, StepSurrogates};
+
+/// The completed specification and the solution of every step, in ascending order of step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Policy {
+    format: String,
+    specification: Specification,
+    steps: Vec<StepSolution>,
+}
+
+impl Policy {
+    /// The policy of a completed specification from the solutions of all its steps, ascending.
+    pub fn new(specification: Specification, steps: Vec<StepSolution>) -> Self {
+        Policy { format: FORMAT.to_owned(), specification, steps }
+    }
+
+    /// The completed specification it was trained from.
+    pub fn specification(&self) -> &Specification {
+        &self.specification
+    }
+
+    /// The solutions of all steps, ascending.
+    pub fn steps(&self) -> &[StepSolution] {
+        &self.steps
+    }
+
+    /// Diagnostics of every step, ascending.
+    pub fn diagnostics(&self) -> impl Iterator<Item = &StepDiagnostics> {
+        self.steps.iter().map(|step| &step.diagnostics)
+    }
+
+    /// The problem it solves, what can be made again in `kept`.
+    pub fn problem(&self, kept: Kept) -> Problem {
+        Problem::with(&self.specification, kept)
+    }
+
+    /// The portable form: JSON whose numbers parse back to the same bits.
+    pub fn to_json(&self) -> Vec<u8> {
+        // Serialising plain structs of numbers and strings into memory cannot fail.
+        serde_json::to_vec(self).unwrap_or_default()
+    }
+
+    /// Reads and checks the portable form as hostile input: format, shapes, finite numbers, the specification's rules.
+    ///
+    /// # Errors
+    /// What is wrong, naming the field.
+    pub fn from_json(bytes: &[u8]) -> Result<Self, PolicyError> {
+        let policy: Policy = serde_json::from_slice(bytes).map_err(|error| PolicyError::Format(error.to_string()))?;
+        Ok(policy.checked()?)
+    }
+
+    /// This policy, where its parts fit together and its specification keeps the rules.
+    ///
+    /// # Errors
+    /// The first field that breaks a rule.
+    pub fn checked(self) -> Result<Self, FieldError> {
+        self.check()?;
+        Ok(self)
+    }
+
+    fn check(&self) -> Result<(), FieldError> {
+        if self.format != FORMAT {
+            return Err(FieldError::new("format", &self.format, format!("must be {FORMAT}")));
+        }
+        if self.specification.clone().completed()? != self.specification {
+            return Err(FieldError::new("specification", "an object with holes", "must be completed"));
+        }
+        let horizon = self.specification.problem.horizon;
+        if self.steps.len() != horizon {
+            return Err(FieldError::new("steps", self.steps.len(), format!("must hold horizon = {horizon} steps")));
+        }
+        let feature_count = self.problem(Kept::default()).selection.names().len();
+        for (index, step) in self.steps.iter().enumerate() {
+            if step.step != index {
+                return Err(FieldError::new(format!("steps[{index}].step"), step.step, format!("must be {index}")));
+            }
+            let field = format!("steps[{index}].solution");
+            match &step.solution {
+                Solution::Single(single) => check_single(&field, index, single, &self.specification)?,
+                Solution::Surrogates(stored) => {
+                    check_surrogates(&field, stored, feature_count)?;
+                    let largest = credible_gain(&self.specification, index);
+                    rules::within(&format!("{field}.largest_gain"), stored.largest_gain, 0.0, largest)?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_single(
+    field: &str,
+    step: usize,
+    single: &SingleSolution,
+    specification: &Specification,
+) -> Result<(), FieldError> {
+    let highest = specification.problem.action_interval[1];
+    rules::within(&format!("{field}.action"), single.action, 0.0, highest)?;
+    rules::within(&format!("{field}.floor_gain"), single.floor_gain, 0.0, credible_gain(specification, step))
+}
+
+/// Rounding forgiven to a gain at its bound.
+const ROUNDING: f64 = 1e-9;
+
+/// The floor gain of a step were every return the best that is accepted: no state is worth more.
+fn credible_gain(specification: &Specification, step: usize) -> f64 {
+    largest_gain(&specification.problem, step, rules::LOG_RETURN) * (1.0 + ROUNDING)
+}
+
+/// Bound on every other stored number.
+const LARGEST_NUMBER: f64 = 1e30;
+
+fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) -> Result<(), FieldError> {
+    let scaling = &stored.scaling;
+    let inputs = scaling.active.len();
+    let ascending = scaling.active.windows(2).all(|pair| pair[0] < pair[1]);
+    if inputs == 0 || !ascending || scaling.active.iter().any(|&feature| feature >= feature_count) {
+        let rule = format!("must name distinct features below {feature_count}, ascending");
+        return Err(FieldError::new(format!("{field}.scaling.active"), format!("{:?}", scaling.active), rule));
+    }
+    let points = stored.value.weights.len();
+    let shapes = [
+        ("scaling.centre", scaling.centre.len(), inputs),
+        ("scaling.spread", scaling.spread.len(), inputs),
+        ("inputs", stored.inputs.len(), inputs),
+        ("value.hyperparameters.lengthscales", stored.value.hyperparameters.lengthscales.len(), inputs),
+        ("policy.hyperparameters.lengthscales", stored.policy.hyperparameters.lengthscales.len(), inputs),
+        ("policy.weights", stored.policy.weights.len(), points),
+        ("value.weights", points, points.clamp(2, rules::LARGEST_COUNT)),
+    ];
+    let columns = stored.inputs.iter().map(|column| ("inputs", column.len(), points));
+    for (name, found, expected) in shapes.into_iter().chain(columns) {
+        if found != expected {
+            return Err(FieldError::new(format!("{field}.{name}"), found, format!("must have {expected} entries")));
+        }
+    }
+    let plain = scaling.centre.iter().chain(stored.inputs.iter().flatten());
+    for &number in plain.chain(&stored.value.weights).chain(&stored.policy.weights) {
+        rules::within(field, number, -LARGEST_NUMBER, LARGEST_NUMBER)?;
+    }
+    for surrogate in [&stored.value, &stored.policy] {
+        let hyper = &surrogate.hyperparameters;
+        rules::within(&format!("{field}.offset"), surrogate.offset, -LARGEST_NUMBER, LARGEST_NUMBER)?;
+        let positive =
+            hyper.lengthscales.iter().chain([&hyper.signal_variance, &hyper.noise_variance, &surrogate.scale]);
+        for &number in positive.chain(&scaling.spread) {
+            rules::within(field, number, 1.0 / LARGEST_NUMBER, LARGEST_NUMBER)?;
+        }
+    }
+    rules::within(&format!("{field}.deviation_limit"), stored.deviation_limit, 0.0, LARGEST_NUMBER)
+}
+
+/// SHA-256 of a policy's portable form, in lower-case hexadecimal: the policy's name.
+pub fn content_hash(json: &[u8]) -> String {
+    let digit = |value: u8| char::from(b"0123456789abcdef"[usize::from(value)]);
+    Sha256::digest(json).iter().flat_map(|byte| [digit(byte >> 4), digit(byte & 15)]).collect()
+}

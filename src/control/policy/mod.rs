@@ -1,0 +1,10 @@
+//! A trained policy: the document, and how it answers.
+
+pub mod advice;
+pub mod advisor;
+pub mod document;
+pub mod prepared;
+pub mod what_if;
+pub mod worst_case;
+
+pub use document::{Policy, content_hash};

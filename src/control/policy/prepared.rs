@@ -1,0 +1,83 @@
+//! A policy's steps made ready to evaluate, and what that takes of memory.
+
+use std::sync::Arc;
+
+use sha2::{Digest, Sha256};
+
+use super::document::Policy;
+use crate::control::kept::{Kept, Key};
+use crate::control::request::specification::Specification;
+use crate::control::solved_step::StepSolution;
+use crate::control::surrogate::fitted::{Surrogate, ValueSurrogate};
+use crate::control::surrogate::stored::{SingleSolution, Solution, StepSurrogates};
+use crate::control::surrogate::target::TargetMap;
+use crate::numerics::gp::GaussianProcess;
+
+/// Bytes of a prepared policy without its numbers, and of each of its steps: names, diagnostics, scales.
+const POLICY_BYTES: usize = 4096;
+const STEP_BYTES: usize = 4096;
+
+/// One step ready for evaluation. The factor behind the predicted deviation is made on first use, and kept elsewhere.
+pub enum PreparedStep {
+    Single(SingleSolution),
+    Surrogates { value: Box<ValueSurrogate>, policy: Box<Surrogate>, factor: Factor },
+}
+
+/// The process behind the predicted deviation, which does not depend on the targets: the name it is kept under.
+pub struct Factor(Key);
+
+impl PreparedStep {
+    pub fn new(specification: &Specification, step: &StepSolution) -> Self {
+        match &step.solution {
+            Solution::Single(single) => PreparedStep::Single(*single),
+            Solution::Surrogates(stored) => {
+                let policy = Box::new(Surrogate::new(stored, &stored.policy));
+                let value = Box::new(ValueSurrogate::new(stored, TargetMap::new(specification, step.step)));
+                PreparedStep::Surrogates { value, policy, factor: Factor::of(stored) }
+            }
+        }
+    }
+}
+
+impl Factor {
+    /// Named by the hash of all that it is made of.
+    fn of(stored: &StepSurrogates) -> Self {
+        let scales = &stored.value.hyperparameters;
+        let numbers = stored.inputs.iter().flatten().chain(&scales.lengthscales);
+        let mut hash = Sha256::new_with_prefix((stored.value.weights.len() as u64).to_le_bytes());
+        for number in numbers.chain([&scales.signal_variance, &scales.noise_variance]) {
+            hash.update(number.to_le_bytes());
+        }
+        Factor(Key::Factor(hash.finalize().into()))
+    }
+
+    /// Whether it could be had at once.
+    pub fn is_in(&self, kept: &Kept) -> bool {
+        kept.has(&self.0)
+    }
+
+    /// `None` where the matrix does not factor.
+    pub fn process(&self, kept: &Kept, stored: &StepSurrogates) -> Arc<Option<GaussianProcess>> {
+        kept.get_or_make(&self.0, factor_bytes(stored), || {
+            let zeros = vec![0.0; stored.value.weights.len()];
+            GaussianProcess::condition(&stored.matrix(), &zeros, &stored.value.hyperparameters).ok()
+        })
+    }
+}
+
+/// Bytes of the process of a step.
+pub fn factor_bytes(stored: &StepSurrogates) -> usize {
+    GaussianProcess::bytes_of(stored.value.weights.len(), stored.inputs.len())
+}
+
+/// Bytes of a prepared policy, without bridges and factors: its numbers, and the inputs twice more, ready to evaluate.
+pub fn prepared_bytes(policy: &Policy) -> usize {
+    let numbers = |step: &StepSolution| match &step.solution {
+        Solution::Single(_) => 0,
+        Solution::Surrogates(stored) => {
+            3 * stored.inputs.iter().map(Vec::len).sum::<usize>() + 4 * stored.value.weights.len()
+        }
+    };
+    let steps = policy.steps();
+    size_of::<f64>() * steps.iter().map(numbers).sum::<usize>() + POLICY_BYTES + STEP_BYTES * steps.len()
+}

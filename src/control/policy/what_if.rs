@@ -1,0 +1,121 @@
+//! What a policy would advise were something else the case: another wealth, another radius, another return.
+
+use super::advice::Advice;
+use super::advisor::{AdviceMode, Advisor};
+use crate::control::error::FieldError;
+use crate::control::policy::worst_case::WorstCase;
+use crate::control::problem::state::State;
+use crate::control::request::rules;
+
+/// What is supposed; what is not stays as it is. The parts are taken in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Hypothesis {
+    /// Wealth now.
+    pub wealth: Option<f64>,
+    /// Return of the coming period, through which the advised allocation is held; the advice is for the period after.
+    pub log_return: Option<f64>,
+    /// The uncertainty set of the period advised; later ones keep their own.
+    pub radius: Option<HypotheticalRadius>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum HypotheticalRadius {
+    /// So many times the state's own.
+    Scaled(f64),
+    /// In the unit of an advice's radius.
+    Fixed(f64),
+}
+
+/// The advice under a hypothesis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Supposed {
+    /// Periods observed by then.
+    pub step: usize,
+    /// Wealth by then.
+    pub wealth: f64,
+    pub advice: Advice,
+    /// Where the step was solved, not read off a surrogate.
+    pub worst_case: Option<WorstCase>,
+}
+
+impl Hypothesis {
+    /// Checks what can be checked without a state; fields are named as on the wire.
+    ///
+    /// # Errors
+    /// The first field that breaks its rule.
+    pub fn check(&self) -> Result<(), FieldError> {
+        if let Some(wealth) = self.wealth {
+            rules::wealth("wealth", wealth)?;
+        }
+        if let Some(log_return) = self.log_return {
+            rules::log_return("log_return", log_return)?;
+        }
+        match self.radius {
+            Some(HypotheticalRadius::Scaled(scale)) => {
+                rules::within("radius_scale", scale, rules::RADIUS_SCALE.0, rules::RADIUS_SCALE.1)
+            }
+            Some(HypotheticalRadius::Fixed(radius)) => {
+                rules::within("radius", radius, rules::FIXED_RADIUS.0, rules::FIXED_RADIUS.1)
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+impl Advisor {
+    /// The advice for `state` after `step` observed periods, were `hypothesis` so. A radius other than the state's
+    /// own is beyond the policy surrogate: the robust step is solved over the value surrogate of the step after, as it
+    /// always is under [`AdviceMode::Resolve`]. Cost: as [`Advisor::advise`], twice where a return is supposed.
+    ///
+    /// # Errors
+    /// A field out of its range; a return that leads past the horizon or out of the wealth taken.
+    pub fn suppose(
+        &self,
+        step: usize,
+        state: &State,
+        hypothesis: &Hypothesis,
+        mode: AdviceMode,
+    ) -> Result<Supposed, FieldError> {
+        hypothesis.check()?;
+        let (step, state) = self.supposed_state(step, state, hypothesis)?;
+        let wealth = state.wealth;
+        let radius = match hypothesis.radius {
+            Some(HypotheticalRadius::Fixed(radius)) => Some(radius),
+            Some(HypotheticalRadius::Scaled(scale)) => Some(scale * self.radius(&state)),
+            None if mode == AdviceMode::Resolve => Some(self.radius(&state)),
+            None => None,
+        };
+        let (advice, worst_case) = match radius {
+            Some(radius) => {
+                let (advice, worst_case) = self.explain_within(step, &state, radius);
+                (advice, Some(worst_case))
+            }
+            None => (self.advise(step, &state, AdviceMode::Surrogate), None),
+        };
+        Ok(Supposed { step, wealth, advice, worst_case })
+    }
+
+    /// The state with the wealth supposed, and after the return supposed.
+    fn supposed_state(
+        &self,
+        step: usize,
+        state: &State,
+        hypothesis: &Hypothesis,
+    ) -> Result<(usize, State), FieldError> {
+        let now = State { wealth: hypothesis.wealth.unwrap_or(state.wealth), law: state.law.clone() };
+        let Some(log_return) = hypothesis.log_return else { return Ok((step, now)) };
+        let horizon = self.specification().problem.horizon;
+        if step + 1 >= horizon {
+            let rule = format!("must be absent: period {horizon} is the last, and none is left to advise after it");
+            return Err(FieldError::new("log_return", log_return, rule));
+        }
+        let advised = self.advise(step, &now, AdviceMode::Surrogate).allocation;
+        let then = self.advance(&now, advised, log_return);
+        let (low, high) = rules::WEALTH;
+        if !(low..=high).contains(&then.wealth) {
+            let rule = format!("must leave a wealth in [{low}, {high}]");
+            return Err(FieldError::new("log_return", log_return, rule));
+        }
+        Ok((step + 1, then))
+    }
+}

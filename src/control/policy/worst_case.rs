@@ -1,0 +1,160 @@
+//! The worst case behind an advice, in figures and in one sentence.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::control::bellman::solution::{Adversary, RobustSolution};
+use crate::control::policy::advice::Advice;
+use crate::numerics::confidence_region::NormalLaw;
+use crate::numerics::wasserstein::Move;
+
+/// The law that is worst for the advised allocation: a transport of the empirical law, or, in the parametric frameworks, a
+/// normal law.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct WorstCase {
+    /// Lagrange multiplier of the uncertainty set: utility lost per unit of extra radius.
+    pub multiplier: f64,
+    /// Empty in the parametric frameworks.
+    pub transport: Vec<TransportedMass>,
+    /// The worst normal law and the estimated one; absent in the other frameworks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal: Option<WorstNormalLaw>,
+    /// Difference between primal and dual value, in log certainty equivalent; 0 in the parametric frameworks.
+    pub duality_gap: f64,
+    /// The worst case in one plain sentence.
+    pub sentence: String,
+}
+
+/// The worst mean and variance of the log-return of one period, within the confidence region of the estimates.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct WorstNormalLaw {
+    pub mean: f64,
+    pub variance: f64,
+    pub estimated_mean: f64,
+    pub estimated_variance: f64,
+}
+
+/// Mass of one atom and where the adversary puts it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct TransportedMass {
+    /// Observed log-return.
+    pub atom: f64,
+    /// Log-return in the worst case; equal to `atom` where the mass stays.
+    pub moved_to: f64,
+    pub mass: f64,
+}
+
+/// The worst-case law in figures, of log-returns.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct WorstLawSummary {
+    pub mean: f64,
+    pub standard_deviation: f64,
+    /// Share of the probability that moves; absent where laws are normal, and none is a transport of what was seen.
+    pub share_moved: Option<f64>,
+    /// Lowest log-return that mass moves to; absent where none moves.
+    pub lowest_destination: Option<f64>,
+}
+
+impl WorstCase {
+    /// The worst law in figures; `None` where the robust step has no solution.
+    pub fn summary(&self) -> Option<WorstLawSummary> {
+        if let Some(normal) = self.normal {
+            let (mean, standard_deviation) = (normal.mean, normal.variance.sqrt());
+            return Some(WorstLawSummary { mean, standard_deviation, share_moved: None, lowest_destination: None });
+        }
+        if self.transport.is_empty() {
+            return None;
+        }
+        let expectation =
+            |of: &dyn Fn(f64) -> f64| self.transport.iter().map(|mass| mass.mass * of(mass.moved_to)).sum::<f64>();
+        let mean = expectation(&|z| z);
+        let moved = || self.transport.iter().filter(|mass| mass.atom != mass.moved_to);
+        Some(WorstLawSummary {
+            mean,
+            standard_deviation: expectation(&|z| (z - mean).powi(2)).sqrt(),
+            share_moved: Some(moved().map(|mass| mass.mass).sum()),
+            lowest_destination: moved().map(|mass| mass.moved_to).reduce(f64::min),
+        })
+    }
+
+    /// Where the robust step has no finite solution.
+    pub fn unknown() -> Self {
+        let sentence =
+            "The robust step has no finite solution at this state, so all wealth stays in the bank.".to_owned();
+        WorstCase { multiplier: 0.0, transport: Vec::new(), normal: None, duality_gap: 0.0, sentence }
+    }
+
+    /// The worst law of a solved step. `utility_scale` turns relative utility into utility.
+    pub fn of(solution: &RobustSolution, advice: &Advice, utility_scale: f64) -> WorstCase {
+        let (transport, normal, sentence) = match &solution.adversary {
+            Adversary::Transport { support, moves } => {
+                let mass = |m: &Move| TransportedMass { atom: support[m.from], moved_to: support[m.to], mass: m.mass };
+                let transport: Vec<TransportedMass> = moves.iter().map(mass).collect();
+                let sentence = transport_sentence(&transport, advice);
+                (transport, None, sentence)
+            }
+            Adversary::Normal { worst, estimate } => {
+                let normal = WorstNormalLaw {
+                    mean: worst.mean,
+                    variance: worst.variance,
+                    estimated_mean: estimate.mean,
+                    estimated_variance: estimate.variance,
+                };
+                (Vec::new(), Some(normal), normal_sentence(*worst, *estimate, advice))
+            }
+        };
+        let multiplier = solution.multiplier * utility_scale;
+        WorstCase { multiplier, transport, normal, duality_gap: solution.duality_gap, sentence }
+    }
+}
+
+fn transport_sentence(transport: &[TransportedMass], advice: &Advice) -> String {
+    let moved = transport.iter().filter(|mass| mass.atom != mass.moved_to);
+    let share: f64 = moved.clone().map(|mass| mass.mass).sum();
+    let lowest = moved.clone().map(|mass| mass.moved_to).fold(f64::INFINITY, f64::min);
+    if share > 0.0 {
+        format!(
+            "Against an allocation of {:.1} %, the worst law within distance {:.4} of the {} returns seen moves {:.1} % of \
+             the probability, down to a return of {:.1} % in one period; against that law the allocation is still worth \
+             {:.2} for certain at the horizon, and all-bank {:.2}.",
+            100.0 * advice.allocation,
+            advice.radius,
+            advice.sample_size,
+            100.0 * share,
+            100.0 * lowest.exp_m1(),
+            advice.certainty_equivalent,
+            advice.floor
+        )
+    } else {
+        format!(
+            "At an allocation of {:.1} % no law within distance {:.4} of the {} returns seen does worse than the empirical one.",
+            100.0 * advice.allocation,
+            advice.radius,
+            advice.sample_size
+        )
+    }
+}
+
+fn normal_sentence(worst: NormalLaw, estimate: NormalLaw, advice: &Advice) -> String {
+    if worst == estimate {
+        return format!(
+            "At an allocation of {:.1} % no normal law in the confidence region does worse than the estimated one, of mean \
+             log-return {:.2} % and variance {:.2e} a period.",
+            100.0 * advice.allocation,
+            100.0 * estimate.mean,
+            estimate.variance
+        );
+    }
+    format!(
+        "Against an allocation of {:.1} %, the worst normal law in the confidence region has a mean log-return of {:.2} % \
+         and a variance of {:.2e} a period, where {:.2} % and {:.2e} are estimated; against that law the allocation is still \
+         worth {:.2} for certain at the horizon, and all-bank {:.2}.",
+        100.0 * advice.allocation,
+        100.0 * worst.mean,
+        worst.variance,
+        100.0 * estimate.mean,
+        estimate.variance,
+        advice.certainty_equivalent,
+        advice.floor
+    )
+}

@@ -1,0 +1,6 @@
+//! The controlled problem (paper, section 2 and the head of section 3): state, dynamics, actions, utility, return laws.
+
+pub mod actions;
+pub mod sampling_law;
+pub mod state;
+pub mod utility;

@@ -1,0 +1,27 @@
+//! The laws that returns are drawn from.
+
+use crate::control::request::rules::LOG_RETURN;
+use crate::control::request::specification::{Interval, MixtureComponent, ProblemSpecification, SamplingLaw};
+use crate::numerics::law::ContinuousLaw;
+
+/// The law behind a specification's name for it.
+pub fn continuous_law(law: &SamplingLaw, history: &[f64]) -> ContinuousLaw {
+    match law {
+        SamplingLaw::Bootstrap {} => ContinuousLaw::smoothed_bootstrap(history),
+        SamplingLaw::StudentT { location, scale, degrees_of_freedom } => {
+            let (location, scale, degrees_of_freedom) = (*location, *scale, *degrees_of_freedom);
+            ContinuousLaw::StudentT { location, scale, degrees_of_freedom }
+        }
+        SamplingLaw::GaussianMixture { components } => {
+            let component = |c: &MixtureComponent| (c.weight, c.mean, c.variance.sqrt());
+            ContinuousLaw::GaussianMixture(components.iter().map(component).collect())
+        }
+    }
+}
+
+/// A return the rest of the project accepts: within the support and the limit on log-returns.
+pub fn admissible(log_return: f64, problem: &ProblemSpecification) -> f64 {
+    let limit = LOG_RETURN;
+    let Interval { min, max } = problem.support.unwrap_or(Interval { min: -limit, max: limit });
+    log_return.clamp(min.max(-limit), max.min(limit))
+}

@@ -1,0 +1,158 @@
+//! Utilities, in units of the all-bank floor.
+//!
+//! A utility enters the Bellman step only up to a positive affine map, so it is taken relative to the terminal
+//! wealth L of all-bank: with `w = ln(x_T / L)`, `u(0) = 0` and `u'(0) = 1`. Rounding is then relative to the gain
+//! the investor cares about, at any wealth and risk aversion.
+
+use crate::control::request::specification::UtilitySpecification;
+use crate::numerics::dispatch::dispatched;
+use crate::numerics::elementary::{exp_m1, ln};
+
+/// Largest exponent taken: exp(600) is finite, and a loss that deep is never chosen.
+const LARGEST_EXPONENT: f64 = 600.0;
+
+/// Utility of the log gain over the floor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RelativeUtility {
+    /// `u(w) = (1 - exp(-k (e^w - 1))) / k`, k the risk aversion times the floor.
+    Exponential { k: f64 },
+    /// `u(w) = (e^((1 - eta) w) - 1) / (1 - eta)`, eta the risk aversion.
+    Power { eta: f64 },
+    /// `u(w) = w`.
+    Log,
+}
+
+impl RelativeUtility {
+    /// The utility seen from a floor of terminal wealth `floor`.
+    pub fn new(utility: UtilitySpecification, floor: f64) -> Self {
+        match utility {
+            UtilitySpecification::Exponential { risk_aversion } => {
+                RelativeUtility::Exponential { k: risk_aversion * floor }
+            }
+            UtilitySpecification::Power { risk_aversion } => RelativeUtility::Power { eta: risk_aversion },
+            UtilitySpecification::Log {} => RelativeUtility::Log,
+        }
+    }
+
+    /// u(w).
+    pub fn value(self, log_gain: f64) -> f64 {
+        match self {
+            RelativeUtility::Exponential { k } => -(-k * log_gain.exp_m1()).min(LARGEST_EXPONENT).exp_m1() / k,
+            RelativeUtility::Power { eta } => ((1.0 - eta) * log_gain).min(LARGEST_EXPONENT).exp_m1() / (1.0 - eta),
+            RelativeUtility::Log => log_gain.max(-LARGEST_EXPONENT),
+        }
+    }
+
+    /// u(ln(relative_j) + gains_j) for all j, in place of `relative`: wealth over all-bank wealth, positive.
+    pub fn values(self, mut relative: Vec<f64>, gains: &[f64]) -> Vec<f64> {
+        dispatched!(match self {
+            RelativeUtility::Exponential { k } => {
+                for (value, gain) in relative.iter_mut().zip(gains) {
+                    let excess = (*value - 1.0) + *value * exp_m1(*gain);
+                    let loss = -k * excess;
+                    *value = -exp_m1(if loss < LARGEST_EXPONENT { loss } else { LARGEST_EXPONENT }) / k;
+                }
+            }
+            RelativeUtility::Power { eta } => {
+                for (value, gain) in relative.iter_mut().zip(gains) {
+                    let power = (1.0 - eta) * (ln(*value) + gain);
+                    let power = if power < LARGEST_EXPONENT { power } else { LARGEST_EXPONENT };
+                    *value = exp_m1(power) / (1.0 - eta);
+                }
+            }
+            RelativeUtility::Log => {
+                for (value, gain) in relative.iter_mut().zip(gains) {
+                    *value = ln(*value) + gain;
+                }
+            }
+        });
+        relative
+    }
+
+    /// The log gain whose utility is `value`: the log certainty equivalent over the floor.
+    pub fn inverse(self, value: f64) -> f64 {
+        match self {
+            RelativeUtility::Exponential { k } => (-(-k * value).ln_1p() / k).ln_1p(),
+            RelativeUtility::Power { eta } => ((1.0 - eta) * value).ln_1p() / (1.0 - eta),
+            RelativeUtility::Log => value,
+        }
+    }
+
+    /// Relative risk aversion at the floor, `-u''(0) + 1` in log wealth.
+    pub fn relative_risk_aversion(self) -> f64 {
+        match self {
+            RelativeUtility::Exponential { k } => k,
+            RelativeUtility::Power { eta } => eta,
+            RelativeUtility::Log => 1.0,
+        }
+    }
+}
+
+/// U(x), as the request defines it.
+pub fn utility(utility: UtilitySpecification, wealth: f64) -> f64 {
+    match utility {
+        UtilitySpecification::Exponential { risk_aversion } => -(-risk_aversion * wealth).exp_m1() / risk_aversion,
+        UtilitySpecification::Power { risk_aversion } => {
+            ((1.0 - risk_aversion) * wealth.ln()).exp_m1() / (1.0 - risk_aversion)
+        }
+        UtilitySpecification::Log {} => wealth.ln(),
+    }
+}
+
+/// U^{-1}(v): the certainty equivalent of the value v.
+pub fn certainty_equivalent(utility: UtilitySpecification, value: f64) -> f64 {
+    match utility {
+        UtilitySpecification::Exponential { risk_aversion } => -(-risk_aversion * value).ln_1p() / risk_aversion,
+        UtilitySpecification::Power { risk_aversion } => {
+            (((1.0 - risk_aversion) * value).ln_1p() / (1.0 - risk_aversion)).exp()
+        }
+        UtilitySpecification::Log {} => value.exp(),
+    }
+}
+
+/// True where the floor gain depends on wealth: power and log utility are homogeneous.
+pub fn depends_on_wealth(utility: UtilitySpecification) -> bool {
+    matches!(utility, UtilitySpecification::Exponential { .. })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_values_equal_one_by_one() {
+        let (relative, gains): (Vec<f64>, [f64; 5]) = (vec![0.01, 0.7, 1.0, 1.2, 3.0], [0.0, 0.01, 0.0, 0.2, 0.5]);
+        for utility in
+            [RelativeUtility::Exponential { k: 1.2 }, RelativeUtility::Power { eta: 3.0 }, RelativeUtility::Log]
+        {
+            let expected = relative.iter().zip(gains).map(|(relative, gain)| utility.value(relative.ln() + gain));
+            for (found, expected) in utility.values(relative.clone(), &gains).iter().zip(expected) {
+                // Relative error of two exponentials, and the rounding of 1.
+                assert!(
+                    (found - expected).abs() < 4e-14 * expected.abs() + 2e-16,
+                    "{utility:?}: {found} against {expected}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn relative_utility_is_an_affine_map_of_the_utility() {
+        let floor = 120.0_f64;
+        for (kind, slope) in [
+            (UtilitySpecification::Exponential { risk_aversion: 0.02 }, floor * (-0.02 * floor).exp()),
+            (UtilitySpecification::Power { risk_aversion: 3.0 }, floor.powi(-2)),
+            (UtilitySpecification::Log {}, 1.0),
+        ] {
+            let relative = RelativeUtility::new(kind, floor);
+            for gain in [-1.5, -0.1, 0.0, 0.02, 0.7_f64] {
+                let direct = (utility(kind, floor * gain.exp()) - utility(kind, floor)) / slope;
+                // Power utility cancels from 0.5 to 1e-5: eleven digits are left, of which the test asks eight.
+                assert!((relative.value(gain) - direct).abs() < 1e-8 * (1.0 + direct.abs()), "{kind:?} {gain}");
+                assert!((relative.inverse(relative.value(gain)) - gain).abs() < 1e-12);
+                let back = certainty_equivalent(kind, utility(kind, floor * gain.exp()));
+                assert!((back / (floor * gain.exp()) - 1.0).abs() < 1e-9);
+            }
+        }
+    }
+}

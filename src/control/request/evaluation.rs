@@ -1,0 +1,236 @@
+//! The evaluation request: which strategies to compare, on which returns, from which histories.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::control::error::FieldError;
+use crate::control::request::framework::Framework;
+use crate::control::request::rules::{self, within};
+use crate::control::request::specification::{
+    DEFAULT_COUNT_WEALTH_ALONE, DesignSpecification, InitialLaws, ProblemSpecification, RadiusRule, SamplingLaw,
+    Specification, SurrogateSpecification,
+};
+
+const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
+const HISTORIES: std::ops::RangeInclusive<usize> = 2..=1000;
+/// Simulated steps of one strategy; each keeps its advice.
+const STEPS: usize = 5_000_000;
+const MOST_MIXES: usize = 101;
+
+/// A comparison of strategies on common simulated returns.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EvaluationRequest {
+    /// As in a training; `framework` is left out, and `law` is the true law that returns are drawn from (default: the
+    /// design's sampling law).
+    pub problem: ProblemSpecification,
+    #[serde(default)]
+    pub design: DesignSpecification,
+    #[serde(default)]
+    pub surrogate: SurrogateSpecification,
+    #[serde(default = "defaults::seed")]
+    pub seed: u64,
+    /// Frameworks to compare.
+    #[serde(default = "defaults::frameworks")]
+    pub frameworks: Vec<Framework>,
+    /// Constant allocations to compare; 0 is all-bank. Default: 0 to 1 by 0.1, as far as the actions go.
+    #[serde(default)]
+    pub constant_mixes: Option<Vec<f64>>,
+    /// A trained policy for a framework; the others are trained inside the job.
+    #[serde(default)]
+    #[schema(value_type = std::collections::HashMap<String, String>)]
+    pub policies: BTreeMap<Framework, String>,
+    /// Simulated paths per initial history.
+    #[serde(default = "defaults::paths")]
+    pub paths: usize,
+    #[serde(default)]
+    pub histories: InitialHistories,
+    /// Confidence of the intervals.
+    #[serde(default = "defaults::level")]
+    pub level: f64,
+}
+
+/// Which histories paths start from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum InitialHistories {
+    /// The problem's own.
+    #[default]
+    Given,
+    /// So many draws from the true law, each as long as the problem's own.
+    Drawn { count: usize },
+}
+
+mod defaults {
+    use super::Framework;
+
+    pub fn seed() -> u64 {
+        1
+    }
+    pub fn frameworks() -> Vec<Framework> {
+        use Framework::*;
+        vec![Adaptive, Static, KnownLaw, PlugIn, ParametricStatic, ParametricAdaptive]
+    }
+    pub fn paths() -> usize {
+        1000
+    }
+    pub fn level() -> f64 {
+        0.95
+    }
+}
+
+impl EvaluationRequest {
+    /// Fills the defaults that depend on other fields and checks every rule, those of every training in it among them.
+    ///
+    /// # Errors
+    /// The first field that breaks its rule.
+    pub fn completed(mut self) -> Result<Self, FieldError> {
+        if self.problem.framework != Framework::Adaptive {
+            let value = self.problem.framework.name();
+            return Err(FieldError::new("problem.framework", value, "must be left out: frameworks names them"));
+        }
+        let sampling_law = self.design.sampling_law.get_or_insert(SamplingLaw::Bootstrap {}).clone();
+        self.problem.law.get_or_insert(sampling_law);
+        self.specification(Framework::KnownLaw, None).completed()?;
+        self.check_frameworks()?;
+        self.complete_mixes()?;
+        if self.frameworks.is_empty() && self.mixes().is_empty() {
+            return Err(FieldError::new("frameworks", "[]", "must name a framework where there are no constant_mixes"));
+        }
+        self.check_sizes()?;
+        Ok(self)
+    }
+
+    fn check_frameworks(&self) -> Result<(), FieldError> {
+        for (index, framework) in self.frameworks.iter().enumerate() {
+            if self.frameworks[..index].contains(framework) {
+                let field = format!("frameworks[{index}]");
+                return Err(FieldError::new(field, framework.name(), "must not be named twice"));
+            }
+            self.specification(*framework, None).completed()?;
+        }
+        for (framework, policy) in &self.policies {
+            let refused = |rule: &str| Err(FieldError::new(format!("policies.{}", framework.name()), policy, rule));
+            if !self.frameworks.contains(framework) {
+                return refused("must be for one of the frameworks");
+            }
+            if !self.one_policy_for_all(*framework) {
+                return refused("must be left out where histories are drawn: the framework is frozen at its history");
+            }
+        }
+        Ok(())
+    }
+
+    fn complete_mixes(&mut self) -> Result<(), FieldError> {
+        let highest = self.problem.action_interval[1];
+        let tenths = || (0..=10).map(|tenth| f64::from(tenth) / 10.0).filter(|mix| *mix <= highest).collect();
+        let mixes: &Vec<f64> = self.constant_mixes.get_or_insert_with(tenths);
+        if mixes.len() > MOST_MIXES {
+            let value = format!("{} values", mixes.len());
+            return Err(FieldError::new(
+                "constant_mixes",
+                value,
+                format!("must hold at most {MOST_MIXES} allocations"),
+            ));
+        }
+        for (index, mix) in mixes.iter().enumerate() {
+            let field = format!("constant_mixes[{index}]");
+            within(&field, *mix, 0.0, highest)?;
+            if mixes[..index].contains(mix) {
+                return Err(FieldError::new(field, mix, "must not be named twice"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_sizes(&self) -> Result<(), FieldError> {
+        rules::whole("paths", self.paths, &PATHS)?;
+        if let InitialHistories::Drawn { count } = self.histories {
+            rules::whole("histories.count", count, &HISTORIES)?;
+        }
+        if self.history_count().saturating_mul(self.paths).saturating_mul(self.problem.horizon) > STEPS {
+            let rule = format!("times histories.count and problem.horizon must be at most {STEPS}");
+            return Err(FieldError::new("paths", self.paths, rule));
+        }
+        within("level", self.level, 0.5, 0.999)
+    }
+
+    /// Number of initial histories.
+    pub fn history_count(&self) -> usize {
+        match self.histories {
+            InitialHistories::Given => 1,
+            InitialHistories::Drawn { count } => count,
+        }
+    }
+
+    /// The constant allocations; none before completion.
+    pub fn mixes(&self) -> &[f64] {
+        self.constant_mixes.as_deref().unwrap_or_default()
+    }
+
+    /// True where a single policy serves every initial history: a framework frozen at its history has one a history.
+    pub fn one_policy_for_all(&self, framework: Framework) -> bool {
+        self.histories == InitialHistories::Given || !framework.is_frozen()
+    }
+
+    /// The frameworks that are trained once, before the simulation.
+    pub fn trainings(&self) -> impl Iterator<Item = Framework> {
+        let trained =
+            |framework: &Framework| self.one_policy_for_all(*framework) && !self.policies.contains_key(framework);
+        self.frameworks.iter().copied().filter(trained)
+    }
+
+    /// Steps of the job: every backward step of every training, and the simulation.
+    pub fn step_count(&self) -> usize {
+        self.trainings().count() * self.problem.horizon + 1
+    }
+
+    /// The training of a framework, at `history` where it is frozen at one other than the problem's.
+    pub fn specification(&self, framework: Framework, history: Option<&[f64]>) -> Specification {
+        let mut problem = ProblemSpecification { framework, ..self.problem.clone() };
+        let mut design = self.design.clone();
+        if framework != Framework::KnownLaw {
+            problem.law = None;
+        }
+        if framework.is_parametric() {
+            // The region of the same level.
+            problem.radius = self.problem.radius_rule().alpha().map(|alpha| RadiusRule::ChiSquare { alpha });
+        }
+        if !framework.learns() {
+            // One input needs no more: the paper's count for a state that is wealth alone.
+            design.count = design.count.map(|count| count.min(DEFAULT_COUNT_WEALTH_ALONE));
+        }
+        if let Some(history) = history {
+            problem.history = history.to_vec();
+        }
+        if self.histories != InitialHistories::Given && framework.learns() {
+            design.initial_laws = InitialLaws::Resampled;
+        }
+        Specification { problem, design, surrogate: self.surrogate.clone(), seed: self.seed }
+    }
+
+    /// Whether a policy trained from `found` may stand in for the training of `framework`.
+    ///
+    /// # Errors
+    /// The first part of the problem that differs, under `policies.<framework>`.
+    pub fn accepts(&self, framework: Framework, found: &Specification) -> Result<(), FieldError> {
+        let mut wanted = self.specification(framework, None).completed()?.problem;
+        if !framework.is_frozen() {
+            wanted.history.clone_from(&found.problem.history);
+        }
+        let parts = |problem: &ProblemSpecification| serde_json::to_value(problem).unwrap_or_default();
+        let (wanted, found) = (parts(&wanted), parts(&found.problem));
+        let keys = wanted.as_object().into_iter().chain(found.as_object()).flat_map(|parts| parts.keys());
+        for key in keys {
+            if wanted.get(key) != found.get(key) {
+                let shown = found.get(key).map_or("absent".into(), |value| format!("{value:.60}"));
+                let rule = format!("must have been trained for this problem.{key}");
+                let field = format!("policies.{}", framework.name());
+                return Err(FieldError::new(field, format!("trained for problem.{key} {shown}"), rule));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,6 @@
+//! What may be asked: the requests, their defaults, and every rule they must keep. No mathematics.
+
+pub mod evaluation;
+pub mod framework;
+pub mod rules;
+pub mod specification;

@@ -1,0 +1,304 @@
+//! Every rule a specification must satisfy, checked before any work.
+
+use crate::control::error::FieldError;
+use crate::control::request::framework::Framework;
+use crate::control::request::specification::{
+    DEFAULT_COUNT, DEFAULT_COUNT_WEALTH_ALONE, InitialLaws, Interval, ProblemSpecification, RadiusRule, SamplingLaw,
+    Specification, SurrogateSpecification, UtilitySpecification,
+};
+
+/// The covariance matrix of 10,000 points takes 800 MB.
+pub const LARGEST_COUNT: usize = 10_000;
+const COUNT: std::ops::RangeInclusive<usize> = 10..=LARGEST_COUNT;
+/// Ten years of weeks.
+const HORIZON: std::ops::RangeInclusive<usize> = 1..=520;
+const HISTORY_LENGTH: std::ops::RangeInclusive<usize> = 2..=20_000;
+/// Largest log-return in absolute value: a factor of 148 in one step.
+pub const LOG_RETURN: f64 = 5.0;
+/// Two observations closer than this are one value: the standard deviation must exceed it.
+const SMALLEST_DEVIATION: f64 = 1e-7;
+const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
+/// Bridge matrix of 30 million numbers: 240 MB.
+const BRIDGE_NUMBERS: usize = 30_000_000;
+/// Simulated returns of the design: 800 MB.
+const DESIGN_NUMBERS: usize = 100_000_000;
+/// Above this product of risk aversion and wealth, exponential utility is flat in double precision over the design.
+const EXPONENTIAL_SCALE: f64 = 300.0;
+/// Actions closer than 1e-7 are one to the search: an interval must be wider.
+const SMALLEST_HIGHEST_ACTION: f64 = 1e-4;
+/// Smallest and largest wealth.
+pub const WEALTH: (f64, f64) = (1e-6, 1e15);
+const MOMENTS: std::ops::RangeInclusive<usize> = 1..=6;
+
+/// Factors on a bridge radius.
+pub const RADIUS_SCALE: (f64, f64) = (0.0, 100.0);
+/// Fixed radii, in log-return.
+pub const FIXED_RADIUS: (f64, f64) = (0.0, 10.0);
+
+impl Specification {
+    /// Fills the defaults that depend on other fields and checks every rule.
+    ///
+    /// # Errors
+    /// The first field, in the order of the request, that breaks its rule.
+    pub fn completed(mut self) -> Result<Self, FieldError> {
+        check(&self)?;
+        let learns = self.problem.framework.learns();
+        self.problem.radius = Some(self.problem.radius_rule());
+        self.design.count.get_or_insert(if learns { DEFAULT_COUNT } else { DEFAULT_COUNT_WEALTH_ALONE });
+        self.design.sampling_law.get_or_insert(SamplingLaw::Bootstrap {});
+        let wealth = self.problem.initial_wealth;
+        self.design.wealth.get_or_insert(Interval { min: wealth, max: wealth });
+        Ok(self)
+    }
+}
+
+fn check(specification: &Specification) -> Result<(), FieldError> {
+    problem(&specification.problem)?;
+    design(specification)?;
+    surrogate(&specification.surrogate)
+}
+
+fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
+    whole("problem.horizon", problem.horizon, &HORIZON)?;
+    within("problem.rate_per_step", problem.rate_per_step, -0.5, 0.5)?;
+    wealth("problem.initial_wealth", problem.initial_wealth)?;
+    let [lowest, highest] = problem.action_interval;
+    if lowest != 0.0 {
+        return Err(FieldError::new(
+            "problem.action_interval[0]",
+            lowest,
+            "must be 0: the all-bank floor must be feasible",
+        ));
+    }
+    within("problem.action_interval[1]", highest, SMALLEST_HIGHEST_ACTION, 1.0)?;
+    utility(problem)?;
+    radius(&problem.radius_rule(), problem)?;
+    if let Some(support) = problem.support {
+        if problem.framework.is_parametric() {
+            let rule = "must be absent in the parametric frameworks: a normal law has no bounds";
+            return Err(FieldError::new("problem.support", "an object", rule));
+        }
+        interval("problem.support", support, -20.0, 20.0)?;
+    }
+    match (&problem.law, problem.framework) {
+        (None, Framework::KnownLaw) => {
+            return Err(FieldError::new("problem.law", "null", "must be given in the known_law framework"));
+        }
+        (Some(_), framework) if framework != Framework::KnownLaw => {
+            return Err(FieldError::new(
+                "problem.law",
+                "an object",
+                "must be absent unless the framework is known_law",
+            ));
+        }
+        (Some(law), _) => sampling_law("problem.law", law)?,
+        (None, _) => {}
+    }
+    history("problem.history", &problem.history)?;
+    if let (Some(support), Some((index, value))) = (problem.support, outside(&problem.history, problem.support)) {
+        let rule = format!("must lie in problem.support, [{}, {}]", support.min, support.max);
+        return Err(FieldError::new(format!("problem.history[{index}]"), value, rule));
+    }
+    Ok(())
+}
+
+fn outside(history: &[f64], support: Option<Interval>) -> Option<(usize, f64)> {
+    let support = support?;
+    history.iter().copied().enumerate().find(|&(_, z)| z < support.min || z > support.max)
+}
+
+fn utility(problem: &ProblemSpecification) -> Result<(), FieldError> {
+    const FIELD: &str = "problem.utility.risk_aversion";
+    match problem.utility {
+        UtilitySpecification::Exponential { risk_aversion } => {
+            within(FIELD, risk_aversion, 1e-12, 1e9)?;
+            if risk_aversion * problem.initial_wealth > EXPONENTIAL_SCALE {
+                let rule = format!("times problem.initial_wealth must be at most {EXPONENTIAL_SCALE}");
+                return Err(FieldError::new(FIELD, risk_aversion, rule));
+            }
+            Ok(())
+        }
+        UtilitySpecification::Power { risk_aversion } if !(risk_aversion > 1.0 && risk_aversion <= 100.0) => {
+            Err(FieldError::new(FIELD, risk_aversion, "must lie in (1, 100]; at 1 use the log utility"))
+        }
+        UtilitySpecification::Power { .. } | UtilitySpecification::Log {} => Ok(()),
+    }
+}
+
+fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), FieldError> {
+    let name = match rule {
+        RadiusRule::Bridge { .. } => "bridge",
+        RadiusRule::Concentration { .. } => "concentration",
+        RadiusRule::RootN { .. } => "root_n",
+        RadiusRule::Fixed { .. } => "fixed",
+        RadiusRule::ChiSquare { .. } => "chi_square",
+    };
+    match (problem.framework.is_parametric(), name == "chi_square") {
+        (true, false) => {
+            return Err(FieldError::new(
+                "problem.radius.rule",
+                name,
+                "must be chi_square in the parametric frameworks",
+            ));
+        }
+        (false, true) => {
+            let rule = "must be another unless the framework is parametric_static or parametric_adaptive";
+            return Err(FieldError::new("problem.radius.rule", name, rule));
+        }
+        _ => {}
+    }
+    match *rule {
+        RadiusRule::Bridge { alpha, paths, scale } => {
+            within("problem.radius.alpha", alpha, 1e-3, 0.999)?;
+            whole("problem.radius.paths", paths, &PATHS)?;
+            within("problem.radius.scale", scale, RADIUS_SCALE.0, RADIUS_SCALE.1)?;
+            if paths.saturating_mul(problem.history.len() + problem.horizon) > BRIDGE_NUMBERS {
+                let rule = format!("times the final sample size must be at most {BRIDGE_NUMBERS}");
+                return Err(FieldError::new("problem.radius.paths", paths, rule));
+            }
+            Ok(())
+        }
+        RadiusRule::Concentration { alpha, numerator, rate } => {
+            within("problem.radius.alpha", alpha, 1e-3, 0.999)?;
+            within("problem.radius.C", numerator, alpha, 1e9)?;
+            within("problem.radius.c", rate, 1e-9, 1e12)
+        }
+        RadiusRule::RootN { kappa } => within("problem.radius.kappa", kappa, 0.0, 100.0),
+        RadiusRule::Fixed { radius } => within("problem.radius.radius", radius, FIXED_RADIUS.0, FIXED_RADIUS.1),
+        RadiusRule::ChiSquare { alpha } => within("problem.radius.alpha", alpha, 1e-3, 1.0),
+    }
+}
+
+/// Checks a history of log-returns, named `field` in messages.
+pub fn history(field: &str, values: &[f64]) -> Result<(), FieldError> {
+    if !HISTORY_LENGTH.contains(&values.len()) {
+        let rule = format!("must hold {} to {} log-returns", HISTORY_LENGTH.start(), HISTORY_LENGTH.end());
+        return Err(FieldError::new(field, format!("{} values", values.len()), rule));
+    }
+    for (index, &value) in values.iter().enumerate() {
+        log_return(&format!("{field}[{index}]"), value)?;
+    }
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let variance = values.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / values.len() as f64;
+    if variance.sqrt() < SMALLEST_DEVIATION {
+        let rule = format!("must vary: its standard deviation must be at least {SMALLEST_DEVIATION:e}");
+        return Err(FieldError::new(field, format!("{} values near {mean}", values.len()), rule));
+    }
+    Ok(())
+}
+
+/// Checks a wealth, named `field` in messages.
+pub fn wealth(field: &str, value: f64) -> Result<(), FieldError> {
+    within(field, value, WEALTH.0, WEALTH.1)
+}
+
+/// Checks one log-return, named `field` in messages.
+pub fn log_return(field: &str, value: f64) -> Result<(), FieldError> {
+    within(field, value, -LOG_RETURN, LOG_RETURN)
+}
+
+fn design(specification: &Specification) -> Result<(), FieldError> {
+    let design = &specification.design;
+    if let Some(count) = design.count {
+        whole("design.count", count, &COUNT)?;
+        let numbers = count.saturating_mul(specification.problem.history.len() + specification.problem.horizon);
+        if design.initial_laws == InitialLaws::Resampled && numbers > DESIGN_NUMBERS {
+            let rule = format!("times the final sample size must be at most {DESIGN_NUMBERS}");
+            return Err(FieldError::new("design.count", count, rule));
+        }
+    }
+    if let Some(law) = &design.sampling_law {
+        sampling_law("design.sampling_law", law)?;
+    }
+    if let Some(Interval { min, max }) = design.wealth {
+        wealth("design.wealth.min", min)?;
+        wealth("design.wealth.max", max)?;
+        if max < min {
+            return Err(FieldError::new("design.wealth.max", max, "must be at least design.wealth.min"));
+        }
+        if let UtilitySpecification::Exponential { risk_aversion } = specification.problem.utility
+            && risk_aversion * max > EXPONENTIAL_SCALE
+        {
+            let rule = format!("times problem.utility.risk_aversion must be at most {EXPONENTIAL_SCALE}");
+            return Err(FieldError::new("design.wealth.max", max, rule));
+        }
+    }
+    Ok(())
+}
+
+fn sampling_law(field: &str, law: &SamplingLaw) -> Result<(), FieldError> {
+    match law {
+        SamplingLaw::Bootstrap {} => Ok(()),
+        SamplingLaw::StudentT { location, scale, degrees_of_freedom } => {
+            within(&format!("{field}.location"), *location, -1.0, 1.0)?;
+            within(&format!("{field}.scale"), *scale, 1e-6, 1.0)?;
+            within(&format!("{field}.degrees_of_freedom"), *degrees_of_freedom, 2.1, 1e6)
+        }
+        SamplingLaw::GaussianMixture { components } => {
+            if components.is_empty() || components.len() > 32 {
+                let value = format!("{} components", components.len());
+                return Err(FieldError::new(format!("{field}.components"), value, "must hold 1 to 32 components"));
+            }
+            for (index, component) in components.iter().enumerate() {
+                open_above_zero(&format!("{field}.components[{index}].weight"), component.weight, 1.0)?;
+                within(&format!("{field}.components[{index}].mean"), component.mean, -1.0, 1.0)?;
+                within(&format!("{field}.components[{index}].variance"), component.variance, 1e-12, 1.0)?;
+            }
+            let total: f64 = components.iter().map(|component| component.weight).sum();
+            if (total - 1.0).abs() > 1e-9 {
+                return Err(FieldError::new(
+                    format!("{field}.components"),
+                    format!("weights summing to {total}"),
+                    "must sum to 1",
+                ));
+            }
+            Ok(())
+        }
+    }
+}
+
+fn surrogate(surrogate: &SurrogateSpecification) -> Result<(), FieldError> {
+    whole("surrogate.moment_count", surrogate.moment_count, &MOMENTS)?;
+    let bounds = &surrogate.bounds;
+    for (name, [low, high]) in [
+        ("lengthscale", bounds.lengthscale),
+        ("signal_variance", bounds.signal_variance),
+        ("noise_variance", bounds.noise_variance),
+    ] {
+        within(&format!("surrogate.bounds.{name}[0]"), low, 1e-12, 1e12)?;
+        within(&format!("surrogate.bounds.{name}[1]"), high, low, 1e12)?;
+    }
+    Ok(())
+}
+
+/// Checks that a count is allowed.
+pub fn whole(field: &str, value: usize, allowed: &std::ops::RangeInclusive<usize>) -> Result<(), FieldError> {
+    if allowed.contains(&value) {
+        return Ok(());
+    }
+    Err(FieldError::new(field, value, format!("must lie in [{}, {}]", allowed.start(), allowed.end())))
+}
+
+/// Checks that `value` is finite and lies in `[low, high]`.
+pub fn within(field: &str, value: f64, low: f64, high: f64) -> Result<(), FieldError> {
+    if value >= low && value <= high {
+        return Ok(());
+    }
+    Err(FieldError::new(field, value, format!("must be a number in [{low}, {high}]")))
+}
+
+fn open_above_zero(field: &str, value: f64, high: f64) -> Result<(), FieldError> {
+    if value > 0.0 && value <= high {
+        return Ok(());
+    }
+    Err(FieldError::new(field, value, format!("must be a number in (0, {high}]")))
+}
+
+fn interval(field: &str, interval: Interval, low: f64, high: f64) -> Result<(), FieldError> {
+    within(&format!("{field}.min"), interval.min, low, high)?;
+    within(&format!("{field}.max"), interval.max, low, high)?;
+    if interval.max > interval.min {
+        return Ok(());
+    }
+    Err(FieldError::new(format!("{field}.max"), interval.max, format!("must exceed {field}.min, {}", interval.min)))
+}

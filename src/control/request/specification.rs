@@ -1,0 +1,296 @@
+//! The training request: every choice a user has, its default and its rule.
+//!
+//! A [`Specification`] arrives with holes; `Specification::completed` fills the defaults that depend on other fields and
+//! checks every rule (`rules.rs`). Only a completed one is stored, hashed and solved.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::control::request::framework::Framework;
+
+/// A whole training job: the problem, the design that samples its states, the surrogates, one seed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Specification {
+    pub problem: ProblemSpecification,
+    #[serde(default)]
+    pub design: DesignSpecification,
+    #[serde(default)]
+    pub surrogate: SurrogateSpecification,
+    /// The same specification and seed give the same policy, bit for bit.
+    #[serde(default = "defaults::seed")]
+    pub seed: u64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProblemSpecification {
+    #[serde(default)]
+    pub framework: Framework,
+    /// Number of allocation decisions, T.
+    #[serde(default = "defaults::horizon")]
+    pub horizon: usize,
+    /// Bank return per step, r: wealth in the bank grows by the factor 1 + r.
+    #[serde(default = "defaults::rate_per_step")]
+    pub rate_per_step: f64,
+    #[serde(default = "defaults::initial_wealth")]
+    pub initial_wealth: f64,
+    /// Share of wealth that may be held in the risky asset: `[0, highest]`.
+    #[serde(default = "defaults::action_interval")]
+    pub action_interval: [f64; 2],
+    #[serde(default)]
+    pub utility: UtilitySpecification,
+    /// Default: `bridge`; `chi_square` in the parametric frameworks, which take no other.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius: Option<RadiusRule>,
+    /// Bounds on the log-returns the adversary may use; without it the certified window decides. Refused by the
+    /// parametric frameworks: a normal law has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub support: Option<Interval>,
+    /// The return law of the `known_law` framework; refused by the others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law: Option<SamplingLaw>,
+    /// The log-returns observed before the start, at least two of them distinct.
+    pub history: Vec<f64>,
+}
+
+/// Utility of terminal wealth, always maximised.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum UtilitySpecification {
+    /// `(1 - exp(-risk_aversion x)) / risk_aversion`, risk aversion per unit of wealth.
+    Exponential { risk_aversion: f64 },
+    /// `(x^(1 - risk_aversion) - 1) / (1 - risk_aversion)`, risk aversion above 1.
+    Power { risk_aversion: f64 },
+    /// `ln x`.
+    Log {},
+}
+
+impl Default for UtilitySpecification {
+    fn default() -> Self {
+        UtilitySpecification::Exponential { risk_aversion: 0.01 }
+    }
+}
+
+/// How the radius of the uncertainty set follows from the sample of size n: `chi_square` of the parametric frameworks'
+/// confidence region, every other of the Wasserstein ball.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "rule", rename_all = "snake_case", deny_unknown_fields)]
+pub enum RadiusRule {
+    /// `scale Q / sqrt(n)`, Q the (1 - alpha)-quantile of the bridge statistic over simulated paths.
+    Bridge {
+        #[serde(default = "defaults::alpha")]
+        alpha: f64,
+        #[serde(default = "defaults::paths")]
+        paths: usize,
+        #[serde(default = "defaults::scale")]
+        scale: f64,
+    },
+    /// `sqrt(ln(C / alpha) / (c n))`, the concentration inequality of Fournier and Guillin.
+    Concentration {
+        #[serde(default = "defaults::alpha")]
+        alpha: f64,
+        #[serde(rename = "C")]
+        numerator: f64,
+        #[serde(rename = "c")]
+        rate: f64,
+    },
+    /// `kappa / sqrt(n)`.
+    RootN { kappa: f64 },
+    /// The same radius at every sample size.
+    Fixed { radius: f64 },
+    /// `sqrt(kappa / n)` estimated standard deviations, kappa the (1 - alpha)-quantile of chi-square with two degrees
+    /// of freedom: `n (mu - m)^2 / v + n (s2 - v)^2 / (2 v^2) <= kappa`, m and v the sample's mean and variance.
+    ChiSquare {
+        #[serde(default = "defaults::alpha")]
+        alpha: f64,
+    },
+}
+
+impl Default for RadiusRule {
+    fn default() -> Self {
+        RadiusRule::Bridge { alpha: defaults::alpha(), paths: defaults::paths(), scale: defaults::scale() }
+    }
+}
+
+impl RadiusRule {
+    /// The level of the rules that have one.
+    pub fn alpha(&self) -> Option<f64> {
+        match *self {
+            RadiusRule::Bridge { alpha, .. }
+            | RadiusRule::Concentration { alpha, .. }
+            | RadiusRule::ChiSquare { alpha } => Some(alpha),
+            RadiusRule::RootN { .. } | RadiusRule::Fixed { .. } => None,
+        }
+    }
+}
+
+impl ProblemSpecification {
+    /// The radius rule given, or the framework's default.
+    pub fn radius_rule(&self) -> RadiusRule {
+        let default = || match self.framework.is_parametric() {
+            true => RadiusRule::ChiSquare { alpha: defaults::alpha() },
+            false => RadiusRule::default(),
+        };
+        self.radius.unwrap_or_else(default)
+    }
+}
+
+/// A closed interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Interval {
+    pub min: f64,
+    pub max: f64,
+}
+
+/// A law of log-returns that can be drawn from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum SamplingLaw {
+    GaussianMixture {
+        components: Vec<MixtureComponent>,
+    },
+    /// Smoothed bootstrap of the history, with the history's own mean and variance.
+    Bootstrap {},
+    StudentT {
+        location: f64,
+        scale: f64,
+        degrees_of_freedom: f64,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MixtureComponent {
+    pub weight: f64,
+    pub mean: f64,
+    pub variance: f64,
+}
+
+/// Design points per step where the law is part of the state: the paper's count.
+pub const DEFAULT_COUNT: usize = 1000;
+/// Design points per step where the state is wealth alone: the paper's count.
+pub const DEFAULT_COUNT_WEALTH_ALONE: usize = 200;
+
+/// Which states the surrogates are trained on.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DesignSpecification {
+    /// Design points per step, N. Default 1000; 200 where the state is wealth alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub count: Option<usize>,
+    #[serde(default)]
+    pub initial_laws: InitialLaws,
+    /// The law that moves the design forward. Default: `bootstrap`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampling_law: Option<SamplingLaw>,
+    /// Initial wealths of the design. Default: the initial wealth alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wealth: Option<Interval>,
+}
+
+/// Where the design's empirical laws start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum InitialLaws {
+    /// Every design point starts at the history.
+    #[default]
+    Given,
+    /// Each design point starts at as many fresh draws of the sampling law as the history has.
+    Resampled,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SurrogateSpecification {
+    #[serde(default)]
+    pub target: SurrogateTarget,
+    #[serde(default)]
+    pub features: FeatureMap,
+    /// Number of moments of the law that enter the features; at most two in the parametric frameworks, whose law has no more.
+    #[serde(default = "defaults::moment_count")]
+    pub moment_count: usize,
+    #[serde(default)]
+    pub bounds: HyperparameterBounds,
+}
+
+impl Default for SurrogateSpecification {
+    fn default() -> Self {
+        SurrogateSpecification {
+            target: SurrogateTarget::default(),
+            features: FeatureMap::default(),
+            moment_count: defaults::moment_count(),
+            bounds: HyperparameterBounds::default(),
+        }
+    }
+}
+
+/// What the value surrogate regresses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SurrogateTarget {
+    /// `ln(certainty equivalent / all-bank wealth)`: its zero prior mean is a valid lower bound.
+    #[default]
+    FloorGain,
+    /// The value itself (the paper), around its mean over the design.
+    Value,
+}
+
+/// How a state becomes the inputs of a surrogate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FeatureMap {
+    /// Log wealth; mean, log standard deviation, skewness, log kurtosis; log radius where it varies; the worst-case
+    /// excess return over the ball.
+    #[default]
+    Standardized,
+    /// Wealth and the raw moments (the paper).
+    RawMoments,
+}
+
+/// Box of the maximum-likelihood search, for inputs and targets scaled to unit variance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct HyperparameterBounds {
+    pub lengthscale: [f64; 2],
+    pub signal_variance: [f64; 2],
+    pub noise_variance: [f64; 2],
+}
+
+impl Default for HyperparameterBounds {
+    fn default() -> Self {
+        HyperparameterBounds { lengthscale: [0.05, 1e3], signal_variance: [1e-3, 1e5], noise_variance: [1e-10, 1.0] }
+    }
+}
+
+/// Defaults that do not depend on other fields: the paper's configuration.
+mod defaults {
+    pub fn seed() -> u64 {
+        1
+    }
+    pub fn horizon() -> usize {
+        10
+    }
+    pub fn rate_per_step() -> f64 {
+        0.002
+    }
+    pub fn initial_wealth() -> f64 {
+        100.0
+    }
+    pub fn action_interval() -> [f64; 2] {
+        [0.0, 1.0]
+    }
+    pub fn alpha() -> f64 {
+        0.1
+    }
+    pub fn paths() -> usize {
+        2000
+    }
+    pub fn scale() -> f64 {
+        1.0
+    }
+    pub fn moment_count() -> usize {
+        4
+    }
+}

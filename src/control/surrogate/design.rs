@@ -1,0 +1,140 @@
+//! The design: simulated states, step by step, under randomised actions and the sampling law.
+//!
+//! Every state is drawn anew from its streams when asked for, so a design of any size costs no memory. Where the law
+//! is part of the state, three times as many candidates as design points are simulated; a quarter of the design is taken as
+//! drawn and the rest from where the candidates lie farthest apart, so that its edges are inside. Where the points drawn
+//! say that a surrogate errs, candidates count as farther apart than they are.
+
+use std::ops::Range;
+
+use rand::RngExt;
+
+use crate::control::problem::sampling_law::{admissible, continuous_law};
+use crate::control::problem::state::{State, next_wealth};
+use crate::control::problem::utility::depends_on_wealth;
+use crate::control::request::specification::{
+    DEFAULT_COUNT, InitialLaws, Interval, ProblemSpecification, RadiusRule, SamplingLaw, Specification,
+};
+use crate::control::uncertainty::centre::Centre;
+use crate::numerics::confidence_region::{self, ConfidenceRegion, NormalLaw};
+use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::law::ContinuousLaw;
+use crate::numerics::streams::stream;
+
+/// Candidates simulated for each design point.
+const CANDIDATES_PER_POINT: usize = 3;
+/// States that set the guard: 10 of them lie beyond a guard that 99 % pass.
+const GUARDS: usize = 1000;
+/// One design point in this many is taken as drawn.
+const AS_DRAWN: usize = 4;
+
+/// The states that a training may be asked to solve.
+pub struct Design {
+    problem: ProblemSpecification,
+    law: ContinuousLaw,
+    seed: u64,
+    count: usize,
+    /// Initial wealths.
+    start: Interval,
+    resampled: bool,
+    /// `ladder[i][t]`: wealths where the state is wealth alone; empty where the law is part of it.
+    ladder: Vec<Vec<f64>>,
+    /// True where all states of a step are one: no learning and no wealth in the state.
+    constant: bool,
+    start_is_single: bool,
+}
+
+impl Design {
+    /// The design of a completed specification.
+    pub fn new(specification: &Specification) -> Self {
+        let problem = &specification.problem;
+        let design = &specification.design;
+        let count = design.count.unwrap_or(DEFAULT_COUNT);
+        let bootstrap = SamplingLaw::Bootstrap {};
+        let start = design.wealth.unwrap_or(Interval { min: problem.initial_wealth, max: problem.initial_wealth });
+        let learns = problem.framework.learns();
+        let resampled = learns && design.initial_laws == InitialLaws::Resampled;
+        let wealth_matters = depends_on_wealth(problem.utility);
+        Design {
+            law: continuous_law(design.sampling_law.as_ref().unwrap_or(&bootstrap), &problem.history),
+            seed: specification.seed,
+            count,
+            start,
+            resampled,
+            ladder: if learns { Vec::new() } else { wealth_ladders(problem, start, count) },
+            constant: !learns && !wealth_matters,
+            start_is_single: !resampled && (start.min == start.max || !wealth_matters),
+            problem: problem.clone(),
+        }
+    }
+
+    /// Number of distinct design points of a step: 1 where they are all the same state.
+    pub fn count(&self, step: usize) -> usize {
+        if self.constant || (step == 0 && self.start_is_single) { 1 } else { self.count }
+    }
+
+    /// Candidates from which the design points of a step are chosen: as many as those where there is no choice.
+    pub fn candidate_count(&self, step: usize) -> usize {
+        let count = self.count(step);
+        if count == 1 || !self.ladder.is_empty() { count } else { CANDIDATES_PER_POINT * count }
+    }
+
+    /// The first so many candidates are design points as they are.
+    pub fn as_drawn_count(&self, step: usize) -> usize {
+        let count = self.count(step);
+        if self.candidate_count(step) == count { count } else { count.div_ceil(AS_DRAWN) }
+    }
+
+    /// Independent draws of the design's law, to judge the surrogates by; none where the state is wealth alone.
+    pub fn guards(&self, step: usize) -> Range<usize> {
+        let candidates = self.candidate_count(step);
+        if self.ladder.is_empty() { candidates..candidates + GUARDS } else { 0..0 }
+    }
+
+    /// State `index` of `step`; those beyond the candidates are independent draws of the same law. Streams:
+    /// ("initial", 0, index) for the start, ("design", t, index) for each step. Cost O((history + step) ln(..)).
+    pub fn state(&self, step: usize, index: usize) -> State {
+        let problem = &self.problem;
+        if let Some(wealths) = self.ladder.get(index) {
+            return State { wealth: wealths[step], law: EmpiricalDistribution::new(&problem.history) };
+        }
+        let mut generator = stream(self.seed, "initial", 0, index);
+        let mut wealth = self.start.min * (self.start.max / self.start.min).powf(generator.random::<f64>());
+        let mut sample = problem.history.clone();
+        if self.resampled {
+            sample.fill_with(|| admissible(self.law.draw(&mut generator), problem));
+        }
+        for earlier in 0..step {
+            let mut generator = stream(self.seed, "design", earlier, index);
+            let action = problem.action_interval[1] * generator.random::<f64>();
+            let log_return = admissible(self.law.draw(&mut generator), problem);
+            wealth = next_wealth(wealth, action, log_return, problem.rate_per_step);
+            sample.push(log_return);
+        }
+        State { wealth, law: EmpiricalDistribution::new(&sample) }
+    }
+}
+
+/// Wealths of a design whose state is wealth alone: evenly in log wealth, over what holding any allocation can reach
+/// within [`REACHED_DEVIATIONS`] of the centre. A simulated design would leave its edges, which the robust step visits,
+/// to extrapolation.
+fn wealth_ladders(problem: &ProblemSpecification, start: Interval, count: usize) -> Vec<Vec<f64>> {
+    let centre = Centre::frozen(problem);
+    let (mean, mut variance) = (centre.mean(), centre.variance());
+    if let RadiusRule::ChiSquare { alpha } = problem.radius_rule() {
+        let radius = confidence_region::radius(alpha, problem.history.len());
+        variance = ConfidenceRegion { estimate: NormalLaw { mean, variance }, radius }.largest_variance();
+    }
+    let ladder = |point: usize, step: usize| {
+        let elapsed = step as f64;
+        let spread = REACHED_DEVIATIONS * problem.action_interval[1] * (elapsed * variance).sqrt();
+        let bank = elapsed * problem.rate_per_step.ln_1p();
+        let low = start.min.ln() + bank.min(elapsed * mean) - spread;
+        let high = start.max.ln() + bank.max(elapsed * mean) + spread;
+        (low + (high - low) * point as f64 / (count - 1) as f64).exp()
+    };
+    (0..count).map(|point| (0..problem.horizon).map(|step| ladder(point, step)).collect()).collect()
+}
+
+/// Standard deviations of log wealth that the design covers where the state is wealth alone.
+const REACHED_DEVIATIONS: f64 = 5.0;

@@ -1,0 +1,137 @@
+//! From a state to the inputs of a surrogate.
+
+use crate::control::problem::utility::{RelativeUtility, depends_on_wealth};
+use crate::control::request::specification::{FeatureMap, Specification};
+use crate::control::uncertainty::radius::Radii;
+use crate::numerics::moments::CentralMoments;
+
+/// Standard deviations below this count as this: the log stays finite.
+const SMALLEST_DEVIATION: f64 = 1e-8;
+/// Mean and variance say everything of a normal law, and of its confidence region at one sample size.
+const NORMAL_MOMENTS: usize = 2;
+/// Radii below this count as this.
+const SMALLEST_RADIUS: f64 = 1e-12;
+/// A worst law whose variance is below this share of the centre's counts as having it: the ratio stays finite.
+const SMALLEST_VARIANCE_LEFT: f64 = 0.01;
+
+/// Which features a specification has, in order: wealth first, then the law, then its uncertainty set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FeatureSelection {
+    map: FeatureMap,
+    wealth: bool,
+    moments: usize,
+    radius: bool,
+    ball: bool,
+    /// Relative risk aversion at the initial wealth.
+    risk_aversion: f64,
+}
+
+/// The features of a state, unscaled, in the order of [`FeatureSelection::names`]: y-check of the paper.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Features(pub(super) Vec<f64>);
+
+/// What of an empirical law and its ball the features are made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LawSummary {
+    pub moments: CentralMoments,
+    pub radii: Radii,
+    /// `min_F E_F[e^Z] / (1 + r) - 1` over the ball: the first unit of allocation earns this against the worst law,
+    /// and its sign decides whether anything is held at the last step.
+    pub robust_excess: f64,
+    /// The variance of `e^Z / (1 + r)` under that law.
+    pub robust_variance: f64,
+}
+
+impl FeatureSelection {
+    /// `radius_varies`: whether laws of one sample size have different radii.
+    pub fn new(specification: &Specification, radius_varies: bool) -> Self {
+        let problem = &specification.problem;
+        let learns = problem.framework.learns();
+        let parametric = problem.framework.is_parametric();
+        let most = if parametric { NORMAL_MOMENTS } else { usize::MAX };
+        let map = specification.surrogate.features;
+        FeatureSelection {
+            map,
+            wealth: depends_on_wealth(problem.utility),
+            moments: if learns { specification.surrogate.moment_count.min(most) } else { 0 },
+            radius: learns && radius_varies && map == FeatureMap::Standardized,
+            ball: learns && !parametric && map == FeatureMap::Standardized,
+            risk_aversion: RelativeUtility::new(problem.utility, problem.initial_wealth).relative_risk_aversion(),
+        }
+    }
+
+    /// True where wealth is the first feature.
+    pub fn has_wealth(&self) -> bool {
+        self.wealth
+    }
+
+    /// True where the features depend on the ball and not on its centre alone.
+    pub fn has_ball(&self) -> bool {
+        self.ball
+    }
+
+    /// Names, in order.
+    pub fn names(&self) -> Vec<String> {
+        let standardized = self.map == FeatureMap::Standardized;
+        let mut names = Vec::new();
+        if self.wealth {
+            names.push(if standardized { "log_wealth" } else { "wealth" }.to_owned());
+        }
+        for order in 1..=self.moments {
+            names.push(match (standardized, order) {
+                (false, _) => format!("moment_{order}"),
+                (true, 1) => "mean".to_owned(),
+                (true, 2) => "log_standard_deviation".to_owned(),
+                (true, 3) => "skewness".to_owned(),
+                (true, 4) => "log_kurtosis".to_owned(),
+                (true, _) => format!("shape_{order}"),
+            });
+        }
+        if self.radius {
+            names.push("log_radius".to_owned());
+            names.push("radius_trend".to_owned());
+        }
+        if self.ball {
+            names.extend(["robust_merton_ratio", "worst_law_merton_ratio"].map(str::to_owned));
+        }
+        names
+    }
+
+    /// The wealth feature.
+    pub fn wealth(&self, wealth: f64) -> f64 {
+        if self.map == FeatureMap::Standardized { wealth.ln() } else { wealth }
+    }
+
+    /// All features of a state, unscaled. The last two are Merton's ratio against the worst law of the ball,
+    ///
+    ///   asinh(robust_excess / (rho v)),   rho the relative risk aversion at the initial wealth,
+    ///
+    /// v the law's own variance in the first and `robust_variance` in the second: to second order the allocation of an
+    /// investor who thinks of one period alone. The robust allocation and its value change most where the ratio passes 0
+    /// and 1; asinh draws its ends, which matter less, together.
+    pub fn of(&self, wealth: f64, law: &LawSummary) -> Features {
+        let LawSummary { moments, radii, robust_excess, robust_variance } = law;
+        let mut features = Vec::with_capacity(self.moments + 5);
+        if self.wealth {
+            features.push(self.wealth(wealth));
+        }
+        for order in 1..=self.moments {
+            features.push(match self.map {
+                FeatureMap::Standardized => moments.shape(order, SMALLEST_DEVIATION),
+                FeatureMap::RawMoments => moments.raw(order),
+            });
+        }
+        if self.radius {
+            let log = |radius: f64| radius.max(SMALLEST_RADIUS).ln();
+            features.push(log(radii.radius));
+            features.push(log(radii.radius_ahead) - log(radii.radius));
+        }
+        let variance = moments.variance().max(SMALLEST_DEVIATION * SMALLEST_DEVIATION);
+        let ratio = |variance: f64| (robust_excess / (self.risk_aversion * variance)).asinh();
+        if self.ball {
+            features.push(ratio(variance));
+            features.push(ratio(robust_variance.max(SMALLEST_VARIANCE_LEFT * variance)));
+        }
+        Features(features)
+    }
+}

@@ -1,0 +1,84 @@
+//! Surrogates ready to be evaluated.
+
+use super::features::Features;
+use super::scaling::Scaling;
+use super::stored::{StepSurrogates, StoredSurrogate};
+use super::target::TargetMap;
+use crate::numerics::gp::GpMean;
+
+/// A Gaussian process whose prediction at scaled input x is
+///
+///   offset + scale k(x)^T K^-1 targets.
+pub struct Surrogate {
+    mean: GpMean,
+    offset: f64,
+    scale: f64,
+}
+
+impl Surrogate {
+    /// `own` is one of the two surrogates of the step.
+    pub fn new(step: &StepSurrogates, own: &StoredSurrogate) -> Self {
+        let mean = GpMean::new(&step.matrix(), &own.weights, &own.hyperparameters);
+        Surrogate { mean, offset: own.offset, scale: own.scale }
+    }
+
+    /// The prediction at a scaled input. Cost O(N d).
+    pub fn at(&self, input: &[f64]) -> f64 {
+        self.offset + self.scale * self.mean.mean(input)
+    }
+}
+
+/// The value surrogate of one step.
+pub struct ValueSurrogate {
+    pub scaling: Scaling,
+    pub surrogate: Surrogate,
+    /// Predictions are clamped to it.
+    pub largest_gain: f64,
+    pub target: TargetMap,
+}
+
+impl ValueSurrogate {
+    pub fn new(stored: &StepSurrogates, target: TargetMap) -> Self {
+        ValueSurrogate {
+            scaling: stored.scaling.clone(),
+            surrogate: Surrogate::new(stored, &stored.value),
+            largest_gain: stored.largest_gain,
+            target,
+        }
+    }
+
+    /// The predicted target at `features`. Cost O(N d).
+    pub fn prediction(&self, features: &Features) -> f64 {
+        self.surrogate.at(&self.scaling.apply(features))
+    }
+
+    /// Predictions that differ from `features` in the first feature alone, wealth, which must be an input. Cost O(N) each:
+    /// what the law is away from the design points is computed once.
+    pub fn predictions(&self, features: &Features, wealths: impl Iterator<Item = f64>) -> Vec<f64> {
+        let Surrogate { mean, offset, scale } = &self.surrogate;
+        let mut input = self.scaling.apply(features);
+        let mut from_law = vec![0.0; mean.input_count()];
+        mean.squared_distances(&input, 1..input.len(), &mut from_law);
+        let mut squared = from_law.clone();
+        let at = |wealth: f64| {
+            input[0] = (wealth - self.scaling.centre[0]) / self.scaling.spread[0];
+            mean.squared_distances(&input, 0..1, &mut squared);
+            squared.iter_mut().zip(&from_law).for_each(|(total, law)| *total += law);
+            offset + scale * mean.mean_from_squared(&squared)
+        };
+        wealths.map(at).collect()
+    }
+
+    /// The deviation of the floor gain that a deviation of the target makes, around `prediction` at `wealth`; the
+    /// largest gain where it leads out of the target's range.
+    pub fn gain_spread(&self, prediction: f64, deviation: f64, wealth: f64) -> f64 {
+        let gain = |target| self.target.gain(target, wealth);
+        let spread = 0.5 * (gain(prediction + deviation) - gain(prediction - deviation)).abs();
+        if spread.is_finite() { spread } else { self.largest_gain }
+    }
+
+    /// The floor gain of a predicted target at `wealth`, clamped to what is true (0) and seen (the largest).
+    pub fn clamped_gain(&self, prediction: f64, wealth: f64) -> f64 {
+        self.target.gain(prediction, wealth).clamp(0.0, self.largest_gain)
+    }
+}

@@ -1,0 +1,10 @@
+//! The regression behind the value and the action (paper, section 3.1): features of a state, the design, the fits.
+
+pub mod design;
+pub mod features;
+pub mod fitted;
+pub mod fitting;
+pub mod policy_target;
+pub mod scaling;
+pub mod stored;
+pub mod target;

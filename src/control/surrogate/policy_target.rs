@@ -1,0 +1,35 @@
+//! What the policy surrogate regresses: the action, continued past the bounds of the interval.
+//!
+//! Actions stick to a bound over whole regions of states, and a surrogate of them would be wrong on either side of the edge
+//! of the region. Continued, they cross the bound without a kink, and a prediction is moved into the interval afterwards.
+
+/// Step of the one-sided derivatives at a bound, in action: wide enough to see past the error of the value surrogate.
+const DERIVATIVE_STEP: f64 = 5e-2;
+/// The curvature there is taken to lie within this factor of relative risk aversion times variance.
+const CURVATURE_RANGE: f64 = 4.0;
+/// How far past a bound the target may go, in action: far enough for the surrogate to see a slope.
+const LARGEST_EXTENSION: f64 = 2.0;
+
+/// An action at a bound, or so near that the value of the step after may have put it there by its own error, moved past
+/// the bound by the Newton step that the one-sided derivatives there suggest: the optimum of the parabola that touches the
+/// robust gain at the bound, so that the target crosses the bound without a kink. `gain` is the robust gain of `action`,
+/// `reference` is the curvature expected: relative risk aversion times variance.
+pub fn policy_target(action: f64, highest: f64, gain: f64, reference: f64, gain_at: impl Fn(f64) -> f64) -> f64 {
+    let (bound, inward) = if action < DERIVATIVE_STEP {
+        (0.0, 1.0)
+    } else if action > highest - DERIVATIVE_STEP {
+        (highest, -1.0)
+    } else {
+        return action;
+    };
+    let gain = if action == bound { gain } else { gain_at(bound) };
+    let [near, far] = [1.0, 2.0].map(|steps| gain_at(bound + inward * steps * DERIVATIVE_STEP));
+    let slope = (4.0 * near - far - 3.0 * gain) / (2.0 * DERIVATIVE_STEP);
+    if slope > 0.0 {
+        return action;
+    }
+    let curvature = (2.0 * near - far - gain) / (DERIVATIVE_STEP * DERIVATIVE_STEP);
+    let curvature = curvature.clamp(reference / CURVATURE_RANGE, reference * CURVATURE_RANGE);
+    // Far beyond the bound the target levels off, smoothly, for what is never wanted needs no resolution.
+    bound + inward * LARGEST_EXTENSION * (slope / curvature / LARGEST_EXTENSION).tanh()
+}

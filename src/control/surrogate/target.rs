@@ -1,0 +1,55 @@
+//! What the value surrogate regresses, and the way back to the floor gain.
+
+use crate::control::problem::state::floor;
+use crate::control::problem::utility::{certainty_equivalent, depends_on_wealth, utility};
+use crate::control::request::specification::{Specification, SurrogateTarget, UtilitySpecification};
+
+/// How the value target of a step maps to and from the floor gain.
+#[derive(Debug, Clone, Copy)]
+pub struct TargetMap {
+    target: SurrogateTarget,
+    utility: UtilitySpecification,
+    rate_per_step: f64,
+    steps_left: usize,
+}
+
+impl TargetMap {
+    pub fn new(specification: &Specification, step: usize) -> Self {
+        TargetMap {
+            target: specification.surrogate.target,
+            utility: specification.problem.utility,
+            rate_per_step: specification.problem.rate_per_step,
+            steps_left: specification.problem.horizon - step,
+        }
+    }
+
+    /// Terminal all-bank wealth in whose units the value is taken: of unit wealth where wealth does not matter.
+    fn floor(&self, wealth: f64) -> f64 {
+        let wealth = if depends_on_wealth(self.utility) { wealth } else { 1.0 };
+        floor(wealth, self.rate_per_step, self.steps_left)
+    }
+
+    pub fn is_value(&self) -> bool {
+        self.target == SurrogateTarget::Value
+    }
+
+    /// The regression target at a state with `wealth` and this floor gain.
+    pub fn target(&self, gain: f64, wealth: f64) -> f64 {
+        match self.target {
+            SurrogateTarget::FloorGain => gain,
+            SurrogateTarget::Value => utility(self.utility, self.floor(wealth) * gain.exp()),
+        }
+    }
+
+    /// The floor gain behind a predicted target, not clamped.
+    pub fn gain(&self, target: f64, wealth: f64) -> f64 {
+        match self.target {
+            SurrogateTarget::FloorGain => target,
+            SurrogateTarget::Value => {
+                let gain = (certainty_equivalent(self.utility, target) / self.floor(wealth)).ln();
+                // A prediction beyond the utility's range has no certainty equivalent.
+                if gain.is_nan() { f64::INFINITY } else { gain }
+            }
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! Backward induction: one robust Bellman step after another, from the horizon to the start.
+//!
+//! optimise (the robust step at every design point), train (both surrogates), go one step back. A step depends on
+//! the specification and the step after it alone, so a checkpoint per step resumes to the same bits.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+
+use crate::control::bellman::BellmanStep;
+use crate::control::bellman::next_value::NextValue;
+use crate::control::bellman::problem::Problem;
+use crate::control::bellman::solution::RobustSolution;
+use crate::control::error::TrainError;
+use crate::control::kept::Kept;
+use crate::control::policy::document::Policy;
+use crate::control::problem::state::State;
+use crate::control::progress::{Phase, StepProgress, Watch};
+use crate::control::request::specification::Specification;
+use crate::control::solved_step::{StepDiagnostics, StepSolution};
+use crate::control::surrogate::design::Design;
+use crate::control::surrogate::features::Features;
+use crate::control::surrogate::fitting::{DesignPoint, Fitting};
+use crate::control::surrogate::scaling::Scaling;
+use crate::control::surrogate::stored::{SingleSolution, Solution};
+use crate::numerics::farthest::farthest_points;
+
+/// Progress is reported about this often a step.
+const REPORTS_PER_STEP: usize = 100;
+
+/// A prepared training job: the completed specification and its simulated design.
+pub struct Training {
+    problem: Problem,
+    design: Design,
+}
+
+impl Training {
+    /// Completes and checks the specification.
+    ///
+    /// # Errors
+    /// A specification that breaks a rule.
+    pub fn new(specification: &Specification) -> Result<Self, TrainError> {
+        Training::with(specification, Kept::default())
+    }
+
+    /// The same with what can be made again in `kept`.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with(specification: &Specification, kept: Kept) -> Result<Self, TrainError> {
+        let specification = specification.clone().completed()?;
+        Ok(Training { design: Design::new(&specification), problem: Problem::with(&specification, kept) })
+    }
+
+    /// Number of steps to solve: steps `horizon - 1` down to 0.
+    pub fn horizon(&self) -> usize {
+        self.problem.specification.problem.horizon
+    }
+
+    /// Solves one step given the step after it (`None` at `horizon - 1`), on the current rayon pool.
+    /// The result depends on nothing but the specification and `after`.
+    ///
+    /// # Errors
+    /// [`TrainError::Stopped`] soon after the stop signal; a robust step that is not finite; a covariance matrix that
+    /// stays singular.
+    pub fn solve_step(
+        &self,
+        step: usize,
+        after: Option<&StepSolution>,
+        watch: &Watch,
+    ) -> Result<StepSolution, TrainError> {
+        let next = NextValue::new(&self.problem.specification, step + 1, after.map(|after| &after.solution));
+        let bellman = BellmanStep { problem: &self.problem, step, next: &next };
+        let crew = Crew { bellman, design: &self.design, watch };
+        let count = self.design.count(step);
+        if count == 1 {
+            let only = crew.solve_point(0, self.problem.features(&self.design.state(step, 0)))?;
+            crew.report(1, 1);
+            let solution = Solution::Single(SingleSolution { floor_gain: only.floor_gain, action: only.action });
+            return Ok(StepSolution { step, solution, diagnostics: diagnostics(step, &[only]) });
+        }
+        let candidates = crew.features(0..self.design.candidate_count(step))?;
+        let scaling = Scaling::of(&candidates);
+        let names = self.problem.selection.names();
+        let specification = &self.problem.specification;
+        let fitting = Fitting { specification, names: &names, step, scaling: &scaling, watch };
+        let as_drawn: Vec<usize> = (0..self.design.as_drawn_count(step)).collect();
+        let mut solved = crew.solve(&as_drawn, &candidates, Vec::new())?;
+        let start = match after.and_then(|after| fitting.start_from(&after.solution)) {
+            Some(start) => start,
+            None => fitting.coarse(&solved)?,
+        };
+        if count > as_drawn.len() {
+            let inputs: Vec<Vec<f64>> = candidates.iter().map(|features| scaling.apply(features)).collect();
+            let weights = fitting.weights(&solved, &start.value, &inputs)?;
+            let chosen = farthest_points(&inputs, &start.value.lengthscales, &weights, as_drawn.len(), count);
+            solved = crew.solve(&chosen[as_drawn.len()..], &candidates, solved)?;
+        }
+        let guards = crew.features(self.design.guards(step))?;
+        let mut diagnostics = diagnostics(step, &solved);
+        let solution = fitting.surrogates(&solved, &start, &guards, &mut diagnostics)?;
+        Ok(StepSolution { step, solution, diagnostics })
+    }
+
+    /// The policy made of all steps, in ascending order of step.
+    pub fn into_policy(self, steps: Vec<StepSolution>) -> Policy {
+        Policy::new(self.problem.specification, steps)
+    }
+
+    /// Solves every step on the current rayon pool.
+    ///
+    /// # Errors
+    /// As [`Self::solve_step`].
+    pub fn run(self, watch: &Watch) -> Result<Policy, TrainError> {
+        let mut steps: Vec<StepSolution> = Vec::with_capacity(self.horizon());
+        for step in (0..self.horizon()).rev() {
+            let solution = self.solve_step(step, steps.last(), watch)?;
+            steps.push(solution);
+        }
+        steps.reverse();
+        Ok(self.into_policy(steps))
+    }
+}
+
+/// What it takes to solve design points of one step.
+struct Crew<'a> {
+    bellman: BellmanStep<'a>,
+    design: &'a Design,
+    watch: &'a Watch<'a>,
+}
+
+impl Crew<'_> {
+    /// The unscaled features of some states.
+    fn features(&self, states: Range<usize>) -> Result<Vec<Features>, TrainError> {
+        let features = |index| {
+            self.watch.go_on()?;
+            Ok(self.bellman.problem.features(&self.state(index)))
+        };
+        states.into_par_iter().map(features).collect()
+    }
+
+    /// Solves the robust step at the design points named, after those solved before. `features` are those of all
+    /// candidates.
+    fn solve(
+        &self,
+        points: &[usize],
+        features: &[Features],
+        before: Vec<DesignPoint>,
+    ) -> Result<Vec<DesignPoint>, TrainError> {
+        let (total, first) = (self.design.count(self.bellman.step), before.len());
+        let every = (total / REPORTS_PER_STEP).max(1);
+        let done = AtomicUsize::new(first);
+        self.report(first, total);
+        let solve = |&point: &usize| {
+            let solved = self.solve_point(point, features[point].clone())?;
+            let finished = done.fetch_add(1, Ordering::Relaxed) + 1;
+            if finished.is_multiple_of(every) || finished == total {
+                self.report(finished, total);
+            }
+            Ok(solved)
+        };
+        let found: Result<Vec<DesignPoint>, TrainError> = points.par_iter().map(solve).collect();
+        let mut solved = before;
+        solved.extend(found?);
+        Ok(solved)
+    }
+
+    fn report(&self, done: usize, total: usize) {
+        (self.watch.progress)(StepProgress { step: self.bellman.step, phase: Phase::Solving, done, total });
+    }
+
+    /// Solves the robust step at one design point.
+    fn solve_point(&self, point: usize, features: Features) -> Result<DesignPoint, TrainError> {
+        self.watch.go_on()?;
+        let state = self.state(point);
+        let (solution, policy_target) = self.bellman.solve_for_design(&state);
+        let RobustSolution { action, floor_gain, duality_gap, certified, .. } = solution;
+        if !floor_gain.is_finite() || !policy_target.is_finite() {
+            let step = self.bellman.step;
+            return Err(TrainError::NotFinite { step, point, gain: floor_gain, action: policy_target });
+        }
+        let wealth = state.wealth;
+        Ok(DesignPoint { wealth, features, action, floor_gain, policy_target, duality_gap, certified })
+    }
+
+    fn state(&self, index: usize) -> State {
+        self.design.state(self.bellman.step, index)
+    }
+}
+
+fn diagnostics(step: usize, solved: &[DesignPoint]) -> StepDiagnostics {
+    let share = |holds: &dyn Fn(&DesignPoint) -> bool| {
+        solved.iter().filter(|point| holds(point)).count() as f64 / solved.len() as f64
+    };
+    StepDiagnostics {
+        step,
+        design_count: solved.len(),
+        all_bank_share: share(&|point| point.action <= 0.0),
+        uncertified_share: share(&|point| !point.certified),
+        duality_gap: solved.iter().map(|point| point.duality_gap.abs()).fold(0.0, f64::max),
+        value: None,
+        policy: None,
+    }
+}

@@ -1,0 +1,145 @@
+//! The uncertainty set C of a state: the laws of the coming return that the investor is robust against.
+//!
+//!   C = { F : W1(F, centre) <= radius }        paper (2.5)
+//!
+//! or, where returns are taken as normal, the joint confidence region of mean and variance.
+
+pub mod centre;
+pub mod radius;
+
+use self::centre::Centre;
+use crate::control::request::specification::Interval;
+use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
+
+/// Log-returns closer than this are one.
+pub const COINCIDENT: f64 = 1e-12;
+/// Exact returns across the atoms of a centre: intervals of a twentieth, between which local cubics are good to 1e-7.
+const CORE_RETURNS: usize = 20;
+/// Atoms may all but coincide: exact returns lie no closer than a hundredth of a percent.
+const SMALLEST_SPACING: f64 = 1e-4;
+/// Spacing of exact returns around an estimated mean, in estimated standard deviations, and how far that goes.
+const CORE_SPACING: f64 = 0.25;
+const CORE_REACH: f64 = 5.0;
+/// Ratio by which the spacing grows outside: what the field does there is smoother, and weighs less.
+const TAIL_RATIO: f64 = 1.3;
+
+/// The laws that the investor is robust against in one state.
+#[derive(Debug, Clone, PartialEq)]
+pub enum UncertaintySet {
+    /// One law, taken as true.
+    Point(Centre),
+    /// The laws within `radius` > 0 of the centre, in log-return, on the `support` where one is given.
+    Ball { centre: Centre, radius: f64, support: Option<Interval> },
+    /// The normal laws that the estimates do not reject.
+    Region(ConfidenceRegion),
+}
+
+/// How far the window of returns reaches below and above the atoms, in log-return.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reach {
+    below: f64,
+    above: f64,
+}
+
+impl Reach {
+    /// Enough for monthly returns; the certificate of the step says where it is not.
+    pub const FIRST: Reach = Reach { below: 0.6, above: 0.3 };
+
+    pub fn doubled(self) -> Self {
+        Reach { below: 2.0 * self.below, above: 2.0 * self.above }
+    }
+}
+
+impl UncertaintySet {
+    /// The ball around `centre`; the centre alone without a radius.
+    pub fn around(centre: Centre, radius: f64, support: Option<Interval>) -> Self {
+        if radius > 0.0 { UncertaintySet::Ball { centre, radius, support } } else { UncertaintySet::Point(centre) }
+    }
+
+    /// The set of the same centre with another radius, in the same unit.
+    pub fn with_radius(self, radius: f64, support: Option<Interval>) -> Self {
+        match self {
+            UncertaintySet::Point(centre) | UncertaintySet::Ball { centre, .. } => {
+                UncertaintySet::around(centre, radius, support)
+            }
+            UncertaintySet::Region(region) => UncertaintySet::Region(ConfidenceRegion { radius, ..region }),
+        }
+    }
+
+    /// Variance of the law in the middle, per step.
+    pub fn variance(&self) -> f64 {
+        match self {
+            UncertaintySet::Point(centre) | UncertaintySet::Ball { centre, .. } => centre.variance(),
+            UncertaintySet::Region(region) => region.estimate.variance,
+        }
+    }
+
+    /// The best log-return of the law in the middle; of a normal law, the log of the mean of e^Z.
+    pub fn best_return(&self) -> f64 {
+        match self {
+            UncertaintySet::Point(centre) | UncertaintySet::Ball { centre, .. } => centre.highest(),
+            UncertaintySet::Region(region) => region.estimate.mean + 0.5 * region.estimate.variance,
+        }
+    }
+
+    /// True where the window of returns is a choice: a ball on the whole line.
+    pub fn has_window(&self) -> bool {
+        matches!(self, UncertaintySet::Ball { support: None, .. })
+    }
+
+    /// Returns at which the value of the next state must be exact, ascending and distinct: evenly across what is likely,
+    /// then with growing gaps as far as the adversary goes.
+    pub fn exact_returns(&self, reach: Reach) -> Vec<f64> {
+        match self {
+            UncertaintySet::Point(centre) => core_returns(centre.lowest(), centre.highest()).0,
+            UncertaintySet::Ball { centre, support, .. } => ball_returns(centre, *support, reach),
+            UncertaintySet::Region(region) => region_returns(region),
+        }
+    }
+}
+
+/// Evenly from the lowest to the highest atom, and the spacing.
+fn core_returns(lowest: f64, highest: f64) -> (Vec<f64>, f64) {
+    let gap = ((highest - lowest) / CORE_RETURNS as f64).max(SMALLEST_SPACING);
+    ((0..=CORE_RETURNS).map(|index| lowest + index as f64 * gap).collect(), gap)
+}
+
+fn ball_returns(centre: &Centre, support: Option<Interval>, reach: Reach) -> Vec<f64> {
+    let (lowest, highest) = (centre.lowest(), centre.highest());
+    let (mut returns, gap) = core_returns(lowest, highest);
+    let (low, high) = match support {
+        Some(Interval { min, max }) => (min, max),
+        None => (lowest - reach.below, highest + reach.above),
+    };
+    for (start, limit, sign) in [(lowest, low, -1.0), (returns[CORE_RETURNS], high, 1.0)] {
+        let (mut at, mut step) = (start, gap);
+        while sign * (limit - at) > COINCIDENT {
+            at = if sign * (limit - at) > 1.5 * step { at + sign * step } else { limit };
+            returns.push(at);
+            step *= TAIL_RATIO;
+        }
+    }
+    returns.retain(|&z| z >= low && z <= high);
+    returns.sort_by(f64::total_cmp);
+    returns.dedup();
+    returns
+}
+
+/// As far as any law of the region has nodes.
+fn region_returns(region: &ConfidenceRegion) -> Vec<f64> {
+    let NormalLaw { mean, variance } = region.estimate;
+    let gap = CORE_SPACING * variance.sqrt();
+    let core = (CORE_REACH / CORE_SPACING) as i32;
+    let mut returns: Vec<f64> = (-core..=core).map(|index| mean + f64::from(index) * gap).collect();
+    let (low, high) = region.window();
+    for (start, limit, sign) in [(returns[0], low, -1.0), (returns[returns.len() - 1], high, 1.0)] {
+        let (mut at, mut step) = (start, gap);
+        while sign * (limit - at) > 0.0 {
+            step *= TAIL_RATIO;
+            at += sign * step;
+            returns.push(at);
+        }
+    }
+    returns.sort_by(f64::total_cmp);
+    returns
+}

@@ -1,0 +1,185 @@
+//! Uncertainty sets: the radius of the Wasserstein ball around an empirical law, or of the confidence region of a normal
+//! law's estimates, rule by rule.
+
+use std::sync::Arc;
+
+use crate::control::kept::{Kept, Key};
+use crate::control::request::framework::Framework;
+use crate::control::request::specification::{RadiusRule, Specification};
+use crate::numerics::bridge::{Quantile, Statistic};
+use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
+use crate::numerics::confidence_region;
+use crate::numerics::empirical::EmpiricalDistribution;
+
+/// The radius rule of a specification, with its common random numbers.
+pub struct UncertaintySets {
+    rule: RadiusRule,
+    seed: u64,
+    /// False where the framework has no uncertainty (known law, plug-in).
+    uncertain: bool,
+    /// Sample size at the last step.
+    last_size: usize,
+    /// Where the common random numbers are kept.
+    kept: Kept,
+}
+
+/// The uncertainty set of a law: its radius, and the quantile behind it under the bridge rule.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measure {
+    pub radius: f64,
+    pub quantile: Option<Quantile>,
+}
+
+/// The radius of a law and what it tends to be one return later.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Radii {
+    pub radius: f64,
+    /// Of the mean statistic over the laws with one value of this law twice; the radius itself where no step comes after.
+    pub radius_ahead: f64,
+}
+
+impl UncertaintySets {
+    pub fn new(specification: &Specification, kept: Kept) -> Self {
+        let uncertain = !matches!(specification.problem.framework, Framework::KnownLaw | Framework::PlugIn);
+        let rule = specification.problem.radius_rule();
+        let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
+        let seed = specification.seed;
+        UncertaintySets { rule, seed, uncertain, last_size, kept }
+    }
+
+    /// True where laws of one sample size have different radii.
+    pub fn varies(&self) -> bool {
+        self.uncertain && matches!(self.rule, RadiusRule::Bridge { scale, .. } if scale > 0.0)
+    }
+
+    /// The name of the bridges of sample size n; all large ones share those of [`GRADED_FROM`].
+    fn key(&self, sample_size: usize, paths: usize) -> Key {
+        Key::Bridges { sample_size: sample_size.min(GRADED_FROM), paths, seed: self.seed }
+    }
+
+    /// The bridges of sample size n.
+    fn bridges(&self, sample_size: usize, paths: usize) -> Arc<AbsoluteBridges> {
+        let simulate = || match sample_size {
+            ..GRADED_FROM => AbsoluteBridges::simulate(sample_size, paths, self.seed),
+            _ => AbsoluteBridges::graded(paths, self.seed),
+        };
+        let bytes = AbsoluteBridges::bytes_of(sample_size, paths);
+        self.kept.get_or_make(&self.key(sample_size, paths), bytes, simulate)
+    }
+
+    /// Bytes of the largest bridges that a law of `sample_size` values asks for while it learns `steps` more.
+    pub fn heaviest(&self, sample_size: usize, steps: usize) -> usize {
+        match self.rule {
+            RadiusRule::Bridge { paths, .. } if self.uncertain => {
+                let largest_of_its_own = sample_size.max(GRADED_FROM - 1);
+                AbsoluteBridges::bytes_of((sample_size + steps).min(largest_of_its_own), paths)
+            }
+            _ => 0,
+        }
+    }
+
+    /// What measuring laws of `sample_size` reads: its bridges, and those of the next where a step comes after.
+    fn sizes(&self, sample_size: usize) -> impl Iterator<Item = usize> {
+        [sample_size, sample_size + 1].into_iter().take(if sample_size < self.last_size { 2 } else { 1 })
+    }
+
+    /// Numbers read to measure a law of this size, or `None` where its bridges are yet to be simulated.
+    pub fn cost(&self, sample_size: usize) -> Option<usize> {
+        match self.rule {
+            RadiusRule::Bridge { paths, .. } if self.uncertain => {
+                let ready = |size: usize| self.kept.has(&self.key(size, paths));
+                self.sizes(sample_size).all(ready).then_some(2 * sample_size.min(GRADED_FROM) * paths)
+            }
+            _ => Some(sample_size),
+        }
+    }
+
+    /// Simulates what measuring laws of this size takes, where that is yet to be done.
+    pub fn prepare(&self, sample_size: usize) {
+        if let RadiusRule::Bridge { paths, .. } = self.rule
+            && self.uncertain
+        {
+            self.sizes(sample_size).for_each(|size| drop(self.bridges(size, paths)));
+        }
+    }
+
+    /// The bridge quantile of a law; `None` under other rules and frameworks.
+    pub fn quantile(&self, law: &EmpiricalDistribution) -> Option<Quantile> {
+        self.measure(law).quantile
+    }
+
+    /// Radius of the ball around `law`, in log-return; of the confidence region, in standard deviations of `law`.
+    pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
+        let size = law.sample_size();
+        match self.rule {
+            RadiusRule::Bridge { alpha, paths, scale } if self.uncertain => {
+                let bridges = self.bridges(size, paths);
+                radius(scale, bridges.bridge_quantile(law, Statistic::Now, alpha), size)
+            }
+            _ => self.radius_of_size(size),
+        }
+    }
+
+    /// The radius of `law` and what it is made of.
+    pub fn measure(&self, law: &EmpiricalDistribution) -> Measure {
+        let size = law.sample_size();
+        match self.rule {
+            RadiusRule::Bridge { alpha, paths, scale } if self.uncertain => {
+                let quantile = self.bridges(size, paths).bridge_quantile_with_error(law, alpha);
+                Measure { radius: radius(scale, quantile.value, size), quantile: Some(quantile) }
+            }
+            _ => Measure { radius: self.radius_of_size(size), quantile: None },
+        }
+    }
+
+    /// The radius of `law`, which is known, and what it tends to be one return later.
+    pub fn radii(&self, law: &EmpiricalDistribution, known: f64) -> Radii {
+        let size = law.sample_size();
+        let radius_ahead = match self.rule {
+            RadiusRule::Bridge { .. } if self.uncertain && size >= self.last_size => known,
+            RadiusRule::Bridge { alpha, paths, scale } if self.uncertain => {
+                let bridges = self.bridges(size + 1, paths);
+                radius(scale, bridges.bridge_quantile(law, Statistic::OneLater, alpha), size + 1)
+            }
+            _ => self.radius_of_size(size),
+        };
+        Radii { radius: known, radius_ahead }
+    }
+
+    /// The same for `law` with one more value, for every value in ascending `values`.
+    pub fn radii_with(&self, law: &EmpiricalDistribution, values: &[f64]) -> Vec<Radii> {
+        let size = law.sample_size() + 1;
+        match self.rule {
+            RadiusRule::Bridge { alpha, paths, scale } if self.uncertain => {
+                let quantiles = |which, size| {
+                    let found = self.bridges(size, paths).bridge_quantiles_with(law.atoms(), values, which, alpha);
+                    found.into_iter().map(|quantile| radius(scale, quantile, size)).collect::<Vec<f64>>()
+                };
+                let now = quantiles(Statistic::Now, size);
+                let later = if size < self.last_size { quantiles(Statistic::OneLater, size + 1) } else { now.clone() };
+                now.into_iter().zip(later).map(|(radius, radius_ahead)| Radii { radius, radius_ahead }).collect()
+            }
+            _ => {
+                let radius = self.radius_of_size(size);
+                vec![Radii { radius, radius_ahead: radius }; values.len()]
+            }
+        }
+    }
+
+    /// The radius under the rules that look at the sample size alone.
+    fn radius_of_size(&self, sample_size: usize) -> f64 {
+        let size = sample_size as f64;
+        match self.rule {
+            RadiusRule::Bridge { .. } => 0.0,
+            _ if !self.uncertain => 0.0,
+            RadiusRule::Concentration { alpha, numerator, rate } => ((numerator / alpha).ln() / (rate * size)).sqrt(),
+            RadiusRule::RootN { kappa } => kappa / size.sqrt(),
+            RadiusRule::Fixed { radius } => radius,
+            RadiusRule::ChiSquare { alpha } => confidence_region::radius(alpha, sample_size),
+        }
+    }
+}
+
+fn radius(scale: f64, quantile: f64, sample_size: usize) -> f64 {
+    scale * quantile / (sample_size as f64).sqrt()
+}
