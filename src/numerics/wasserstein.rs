@@ -1,5 +1,8 @@
 //! Worst expectation over a Wasserstein-1 ball on a finite support, solved exactly.
 //!
+//! The paper maximises a dual over the multiplier gamma, (3.3). Here the primal is solved instead, and gamma falls out of
+//! it; the dual at that gamma bounds the value from below, and the difference of the two is reported as the duality gap.
+//!
 //! Transporting the mass of one atom over a distance d buys, at best, the lower convex envelope of the payoff as a
 //! function of distance. Spending the radius on the steepest envelope segments of all atoms first is therefore
 //! optimal, the slope at which the radius runs out is the Lagrange multiplier, and the moves are the worst law.
@@ -117,7 +120,7 @@ impl WassersteinBall<'_> {
     ///   D(gamma) = sum_k p_k min_l { v(s_l) + gamma |s_l - s_k| } - gamma radius
     ///
     /// Concave in gamma >= 0, and a lower bound at each gamma. Radius 0 and a large gamma give the mean of v.
-    /// Cost O(K): the inner minimum is a distance transform. Source: paper eqs. (max2), (max3), with V taken at z'.
+    /// Cost O(K): the inner minimum is a distance transform. Source: paper (3.3), (3.4), with V taken at z'.
     pub fn dual(&self, payoff: &[f64], multiplier: f64) -> f64 {
         let envelope = self.envelope(payoff, multiplier);
         let mean: f64 = envelope.iter().zip(self.masses).map(|(value, mass)| value * mass).sum();

@@ -97,7 +97,7 @@ impl BellmanStep<'_> {
 
     /// All-bank is feasible and no law can hurt it; and no law of the set is better in every period than its best return.
     fn bounded(&self, state: &State, solution: RobustSolution) -> RobustSolution {
-        let floor_gain = solution.floor_gain.max(0.0).min(self.problem.largest_gain(self.step, state));
+        let floor_gain = solution.floor_gain.clamp(0.0, self.problem.largest_gain(self.step, state));
         RobustSolution { floor_gain, ..solution }
     }
 

@@ -11,7 +11,7 @@ use crate::control::request::specification::{ProblemSpecification, Specification
 use crate::control::surrogate::features::{FeatureSelection, Features, LawSummary};
 use crate::control::uncertainty::UncertaintySet;
 use crate::control::uncertainty::centre::Centre;
-use crate::control::uncertainty::radius::{Measure, Radii, UncertaintySets};
+use crate::control::uncertainty::radius::{Measure, Radii, RadiusEstimator};
 use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::exponential_mean::{ExponentialMean, WorstExponential};
@@ -23,7 +23,7 @@ const NO_BALL: Radii = Radii { radius: 0.0, radius_ahead: 0.0 };
 /// The problem of a completed specification.
 pub struct Problem {
     pub specification: Specification,
-    pub sets: UncertaintySets,
+    pub sets: RadiusEstimator,
     pub selection: FeatureSelection,
     /// The uncertainty set of every state, where nothing is learned; computed once.
     frozen: OnceLock<Frozen>,
@@ -41,7 +41,7 @@ impl Problem {
 
     /// The same with what can be made again in `kept`.
     pub fn with(specification: &Specification, kept: Kept) -> Self {
-        let sets = UncertaintySets::new(specification, kept);
+        let sets = RadiusEstimator::new(specification, kept);
         let selection = FeatureSelection::new(specification, sets.varies());
         Problem { specification: specification.clone(), sets, selection, frozen: OnceLock::new() }
     }

@@ -33,3 +33,41 @@ pub fn policy_target(action: f64, highest: f64, gain: f64, reference: f64, gain_
     // Far beyond the bound the target levels off, smoothly, for what is never wanted needs no resolution.
     bound + inward * LARGEST_EXTENSION * (slope / curvature / LARGEST_EXTENSION).tanh()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A gain of curvature -1.6 with its optimum at `best`.
+    fn parabola(best: f64) -> impl Fn(f64) -> f64 {
+        move |action: f64| 0.3 - 0.8 * (action - best).powi(2)
+    }
+
+    fn target(action: f64, best: f64) -> f64 {
+        let gain = parabola(best);
+        policy_target(action, 1.0, gain(action), 1.6, &gain)
+    }
+
+    #[test]
+    fn a_parabola_is_continued_to_its_optimum() {
+        // tanh turns a step of 0.1 into 0.0999.
+        assert!((target(0.0, -0.1) + 0.1).abs() < 2e-4, "{}", target(0.0, -0.1));
+        assert!((target(1.0, 1.1) - 1.1).abs() < 2e-4, "{}", target(1.0, 1.1));
+    }
+
+    #[test]
+    fn inside_and_at_a_bound_that_is_no_corner_the_action_is_its_own_target() {
+        assert_eq!(target(0.4, 0.4), 0.4);
+        assert_eq!(target(0.01, 0.01), 0.01);
+    }
+
+    #[test]
+    fn far_beyond_a_bound_the_target_levels_off() {
+        for best in [-3.0, -30.0, -3000.0] {
+            let found = target(0.0, best);
+            assert!((-LARGEST_EXTENSION..-1.5).contains(&found) || found == -LARGEST_EXTENSION, "{best}: {found}");
+        }
+        // A curvature that the value's error makes is held to a factor of the one expected.
+        assert!(policy_target(0.0, 1.0, 0.0, 1.6, |action| -action) >= -LARGEST_EXTENSION);
+    }
+}

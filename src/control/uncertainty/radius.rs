@@ -1,5 +1,5 @@
-//! Uncertainty sets: the radius of the Wasserstein ball around an empirical law, or of the confidence region of a normal
-//! law's estimates, rule by rule.
+//! The radius of the Wasserstein ball around an empirical law, or of the confidence region of a normal law's estimates, rule by
+//! rule.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
 
 /// The radius rule of a specification, with its common random numbers.
-pub struct UncertaintySets {
+pub struct RadiusEstimator {
     rule: RadiusRule,
     seed: u64,
     /// False where the framework has no uncertainty (known law, plug-in).
@@ -38,13 +38,13 @@ pub struct Radii {
     pub radius_ahead: f64,
 }
 
-impl UncertaintySets {
+impl RadiusEstimator {
     pub fn new(specification: &Specification, kept: Kept) -> Self {
         let uncertain = !matches!(specification.problem.framework, Framework::KnownLaw | Framework::PlugIn);
         let rule = specification.problem.radius_rule();
         let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
         let seed = specification.seed;
-        UncertaintySets { rule, seed, uncertain, last_size, kept }
+        RadiusEstimator { rule, seed, uncertain, last_size, kept }
     }
 
     /// True where laws of one sample size have different radii.
@@ -182,4 +182,58 @@ impl UncertaintySets {
 
 fn radius(scale: f64, quantile: f64, sample_size: usize) -> f64 {
     scale * quantile / (sample_size as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+
+    fn estimator(framework: &str, rule: Value) -> RadiusEstimator {
+        let history = [0.01, -0.02, 0.03, 0.005];
+        let request =
+            json!({ "problem": { "framework": framework, "horizon": 3, "radius": rule, "history": history } });
+        let specification = serde_json::from_value::<Specification>(request).unwrap();
+        RadiusEstimator::new(&specification, Kept::default())
+    }
+
+    fn radius_of(framework: &str, rule: Value) -> f64 {
+        estimator(framework, rule).radius(&EmpiricalDistribution::new(&[0.02, -0.01, 0.04, 0.01, 0.0]))
+    }
+
+    #[test]
+    fn every_rule_of_the_sample_size_has_its_formula() {
+        // By hand, at n = 5: sqrt(ln(2 / 0.1) / (3 * 5)), 0.4 / sqrt(5), 0.25, sqrt(-2 ln(0.1) / 5), and none where the law is taken as true.
+        let rules = [
+            ("adaptive", json!({ "rule": "concentration", "alpha": 0.1, "C": 2.0, "c": 3.0 }), 0.446_895_4),
+            ("adaptive", json!({ "rule": "root_n", "kappa": 0.4 }), 0.178_885_4),
+            ("adaptive", json!({ "rule": "fixed", "radius": 0.25 }), 0.25),
+            ("parametric_adaptive", json!({ "rule": "chi_square", "alpha": 0.1 }), 0.959_705_2),
+            ("plug_in", json!({ "rule": "fixed", "radius": 0.25 }), 0.0),
+        ];
+        for (framework, rule, expected) in rules {
+            let found = radius_of(framework, rule.clone());
+            assert!((found - expected).abs() < 1e-7, "{framework} {rule}: {found}");
+        }
+    }
+
+    #[test]
+    fn a_bridge_radius_is_scale_times_quantile_over_root_n_whichever_way_it_is_asked_for() {
+        let bridge = |scale: f64| json!({ "rule": "bridge", "alpha": 0.2, "paths": 500, "scale": scale });
+        let sets = estimator("adaptive", bridge(0.7));
+        let law = EmpiricalDistribution::new(&[0.02, -0.01, 0.04, 0.01]);
+        let Measure { radius, quantile } = sets.measure(&law);
+        assert!((radius - 0.7 * quantile.unwrap().value / 2.0).abs() < 1e-15);
+        assert_eq!(sets.radius(&law), radius);
+        let mut larger = law.clone();
+        larger.push(0.03);
+        let carried = sets.radii_with(&law, &[0.03])[0];
+        let direct = sets.radii(&larger, sets.radius(&larger));
+        for (found, expected) in [(carried.radius, direct.radius), (carried.radius_ahead, direct.radius_ahead)] {
+            // The tolerance of one of many quantiles.
+            assert!((found / expected - 1.0).abs() < 1e-4, "{carried:?} {direct:?}");
+        }
+        assert!((radius_of("adaptive", bridge(1.4)) / radius_of("adaptive", bridge(0.7)) - 2.0).abs() < 1e-9);
+    }
 }
