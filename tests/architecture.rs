@@ -352,20 +352,22 @@ fn imports(sources: &[Source]) -> BTreeMap<&str, BTreeSet<&str>> {
 
 /// Groups of files of which each leads to each of the others.
 fn circles(imports: &BTreeMap<&str, BTreeSet<&str>>) -> BTreeSet<String> {
-    let reached_from = |start: &str| {
-        let (mut reached, mut open) = (BTreeSet::new(), vec![start]);
-        while let Some(file) = open.pop() {
-            let next = imports.get(file).into_iter().flatten();
-            open.extend(next.filter(|next| reached.insert(**next)).copied());
-        }
-        reached
-    };
-    let reached: BTreeMap<&str, BTreeSet<&str>> = imports.keys().map(|file| (*file, reached_from(file))).collect();
+    let reached: BTreeMap<&str, BTreeSet<&str>> = imports.keys().map(|file| (*file, reached(file, imports))).collect();
     let together = |file: &str| {
         let group = reached[file].iter().filter(|other| reached[**other].contains(file));
         group.copied().collect::<Vec<&str>>().join(" ")
     };
     reached.keys().filter(|file| reached[**file].contains(**file)).map(|file| together(file)).collect()
+}
+
+/// The files that `start` leads to.
+fn reached<'a>(start: &'a str, imports: &BTreeMap<&str, BTreeSet<&'a str>>) -> BTreeSet<&'a str> {
+    let (mut reached, mut open) = (BTreeSet::new(), vec![start]);
+    while let Some(file) = open.pop() {
+        let next = imports.get(file).into_iter().flatten();
+        open.extend(next.filter(|next| reached.insert(**next)).copied());
+    }
+    reached
 }
 
 /// Every broken rule of one file, as `file:line: what`.
