@@ -6,7 +6,7 @@ from typing import Any, Literal, TypeAlias, TypedDict
 
 from typing_extensions import NotRequired
 
-AdviceSource: TypeAlias = Literal["policy_surrogate", "resolved", "resolved_outside_design", "resolved_other_radius"]
+AdviceSource: TypeAlias = Literal["policy_surrogate", "resolved", "resolved_outside_design", "resolved_other_radius", "unsolved"]
 """Where an advice came from."""
 
 
