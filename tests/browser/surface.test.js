@@ -5,7 +5,7 @@ import { after, before, test } from "node:test";
 import { browser, call, service } from "./ballast.js";
 
 /** What the page does is long in every round; what other programs on the machine do, in some. */
-const ROUNDS = 8;
+const ROUNDS = 20;
 const RETURNS = 5000;
 
 let ballast, chromium, page, policy;
