@@ -1,11 +1,13 @@
 // Numbers on axes, numbers typed by themselves, and refusals in the words of the form.
 
 import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
 import { test } from "node:test";
 import { dashboardModule } from "./modules.js";
 
 const { tick } = await dashboardModule("format.js");
 const { typed } = await dashboardModule("number_text.js");
+const { SOURCES } = await dashboardModule("advice.js");
 const { problemWords } = await dashboardModule("problem_words.js");
 
 test("neighbours on an axis have different labels", () => {
@@ -34,4 +36,9 @@ test("a refusal names the field, the value and the rule in the unit of the field
     [{ value: -1, rule: "must be a number in [-0.9932620530009145, 147.4131591025766]" }, "Return in period 2, %", "percent", "Return in period 2 is -100 %; it must be from -99.32 % to 14,741.31 %."],
   ];
   for (const [problem, label, unit, words] of cases) assert.equal(plain(problemWords(problem, label, unit)), words);
+});
+
+test("every source of an advice has words", async () => {
+  const description = JSON.parse(await readFile(new URL("../../api/openapi.json", import.meta.url), "utf8"));
+  assert.deepEqual(Object.keys(SOURCES).sort(), [...description.components.schemas.AdviceSource.enum].sort());
 });

@@ -7,12 +7,14 @@ import { allocation, percent, significant, wealth } from "./format.js";
 /** The advice is told to a tenth of a percent, so this far the policy and the step solved anew say the same. */
 const TOLERANCE = 0.001;
 
-const SOURCES = {
+/** Where an advice comes from, in words: every source that the service names. */
+export const SOURCES = {
   policy_surrogate: "read off the policy",
   resolved: "solved anew on request",
   resolved_other_radius: "solved anew for another radius",
   unsolved: "the step has no finite solution: all in the bank",
   resolved_outside_design: "solved anew, because this state lies outside the policy\u2019s design",
+  unsolved: "because the step has no finite solution here: all stays in the bank, which no law can hurt",
 };
 
 /** Whether two allocations are the same advice. */
@@ -46,7 +48,8 @@ export function adviceView(action, horizon, rest) {
     amount.textContent = allocation(anew.allocation);
     sentence.replaceChildren(...why(anew));
     const apart = percent(Math.abs(anew.allocation - action.allocation)).replace("%", "points");
-    note.textContent = `Solved anew: what was read off the policy, ${allocation(action.allocation)}, is ${apart} away from it.`;
+    const found = anew.source === "unsolved" ? exactly(anew) : "Solved anew";
+    note.textContent = `${found}: what was read off the policy, ${allocation(action.allocation)}, is ${apart} away from it.`;
     announce(`The advice was solved anew: hold ${amount.textContent}.`);
     return { ...anew, replaced: true };
   };
