@@ -313,5 +313,5 @@ async fn a_key_makes_one_evaluation() {
     assert_eq!((first.0.as_u16(), &first.1["job"]), (202, &again.1["job"]));
     assert_eq!((other.0.as_u16(), &other.1["type"]), (409, &json!("/problems/idempotency-conflict")));
     let location = first.1["job"].as_str().unwrap();
-    assert_eq!(app.send(Method::DELETE, &format!("/jobs/{location}"), None).await.0, 202);
+    assert_eq!(app.send(Method::POST, &format!("/jobs/{location}/cancel"), None).await.0, 202);
 }

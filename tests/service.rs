@@ -79,7 +79,7 @@ async fn a_cancel_takes_less_than_a_second() {
     let job = app.queue(&specification(100)).await;
     app.until(&job, |job| job["state"] == "running").await;
     let asked = Instant::now();
-    let (status, _) = app.send(Method::DELETE, &format!("/jobs/{job}"), None).await;
+    let (status, _) = app.send(Method::POST, &format!("/jobs/{job}/cancel"), None).await;
     assert_eq!(status, 202);
     app.until(&job, |job| job["state"] == "cancelled").await;
     assert!(asked.elapsed() < Duration::from_secs(1), "{:?}", asked.elapsed());

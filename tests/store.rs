@@ -271,7 +271,7 @@ async fn failures_and_reports_end_a_job(place: &Place) {
     let report = JobOutcome::Reported { report_json: "{}".into() };
     assert!(store.finish_job("reports", attempt, report, 4).await.unwrap());
     assert_eq!(store.job("fails").await.unwrap().unwrap().error.as_deref(), Some("singular"));
-    assert_eq!(store.job("reports").await.unwrap().unwrap().report_json.as_deref(), Some("{}"));
+    assert_eq!(store.report(&Tenant::default(), "reports").await.unwrap().as_deref(), Some("{}"));
     let counts = store.count_jobs_by_state().await.unwrap();
     assert_eq!(counts, JobCounts { failed: 1, succeeded: 1, ..JobCounts::default() });
 }

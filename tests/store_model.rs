@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 
 use ballast::control::policy::content_hash;
 use ballast::store::{
-    Append, CreateJob, CreateSession, DeletePolicy, JobKind, JobOutcome, JobRow, JobState, NewJob, ObservationRow,
-    SessionRow, Store, Tenant,
+    Append, CreateJob, CreateSession, DeleteJob, DeletePolicy, JobKind, JobOutcome, JobRow, JobState, NewJob,
+    ObservationRow, OverQuota, Quota, Quotas, SessionRow, Store, StoreError, Tenant, Usage,
 };
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
@@ -19,17 +19,24 @@ use tokio::runtime::Runtime;
 const CASES: u32 = 24;
 const LENGTH: usize = 60;
 const LEASE_MS: i64 = 10_000;
+const QUOTAS: Quotas = Quotas { queued_jobs: 2, sessions: 2, bytes: 0 };
+const TENANTS: u8 = 3;
+/// What a row takes beside what it holds, and what an observation takes.
+const ROW: i64 = 1024;
+const OBSERVATION: i64 = 1024;
 
 /// Names are drawn from so few that operations meet.
 #[derive(Debug, Clone)]
 enum Operation {
-    CreateJob { job: u8, key: Option<u8>, hash: u8 },
+    CreateJob { tenant: u8, job: u8, key: Option<u8>, hash: u8 },
     Claim,
     Renew { job: u8, behind: i64 },
     Checkpoint { job: u8, behind: i64, step: usize, byte: u8 },
     Finish { job: u8, behind: i64, outcome: u8 },
     Release { job: u8, behind: i64 },
     Cancel { job: u8 },
+    DeleteJob { tenant: u8, job: u8 },
+    ExpireJobs { seconds: i64 },
     InsertPolicy { policy: u8 },
     DeletePolicy { policy: u8 },
     CreateSession { session: u8, policy: u8 },
@@ -41,18 +48,21 @@ enum Operation {
 
 fn operation() -> impl Strategy<Value = Operation> {
     use Operation as O;
-    let (job, policy, session) = (0..6u8, 0..3u8, 0..3u8);
+    let (job, policy, session) = (0..12u8, 0..3u8, 0..3u8);
     // Zero is the attempt that holds the job, one the attempt before.
     let behind = prop_oneof![3 => Just(0i64), 1 => Just(1i64)];
     prop_oneof![
-        3 => (job.clone(), proptest::option::of(0..2u8), 0..2u8).prop_map(|(job, key, hash)| O::CreateJob { job, key, hash }),
+        8 => (0..TENANTS, job.clone(), proptest::option::of(0..2u8), 0..2u8)
+            .prop_map(|(tenant, job, key, hash)| O::CreateJob { tenant, job, key, hash }),
         4 => Just(O::Claim),
         1 => (job.clone(), behind.clone()).prop_map(|(job, behind)| O::Renew { job, behind }),
         4 => (job.clone(), behind.clone(), 0..3usize, any::<u8>())
             .prop_map(|(job, behind, step, byte)| O::Checkpoint { job, behind, step, byte }),
         3 => (job.clone(), behind.clone(), 0..4u8).prop_map(|(job, behind, outcome)| O::Finish { job, behind, outcome }),
         2 => (job.clone(), behind).prop_map(|(job, behind)| O::Release { job, behind }),
-        2 => job.prop_map(|job| O::Cancel { job }),
+        2 => job.clone().prop_map(|job| O::Cancel { job }),
+        2 => (0..TENANTS, job).prop_map(|(tenant, job)| O::DeleteJob { tenant, job }),
+        1 => (0..20i64).prop_map(|seconds| O::ExpireJobs { seconds }),
         2 => policy.clone().prop_map(|policy| O::InsertPolicy { policy }),
         1 => policy.clone().prop_map(|policy| O::DeletePolicy { policy }),
         3 => (session.clone(), policy).prop_map(|(session, policy)| O::CreateSession { session, policy }),
@@ -65,6 +75,7 @@ fn operation() -> impl Strategy<Value = Operation> {
 
 #[derive(Debug, Clone, PartialEq)]
 struct Job {
+    tenant: u8,
     name: String,
     state: JobState,
     lease_until: i64,
@@ -82,9 +93,13 @@ struct Job {
 struct Model {
     now: i64,
     jobs: Vec<Job>,
-    /// Hash and job of each key.
-    keys: BTreeMap<u8, (u8, String)>,
-    policies: Vec<u8>,
+    /// When each tenant was last served: by the how-manieth claim.
+    served: [usize; TENANTS as usize],
+    claims: usize,
+    /// Hash and job of each tenant's key.
+    keys: BTreeMap<(u8, u8), (u8, String)>,
+    /// Owner and content.
+    policies: Vec<(u8, u8)>,
     /// Name, policy and the contents of the periods from 1 on.
     sessions: Vec<(u8, u8, Vec<u8>)>,
 }
@@ -106,11 +121,12 @@ impl Model {
     fn claim(&mut self) -> Option<String> {
         let now = self.now;
         loop {
-            let row = self.jobs.iter_mut().find(|row| match row.state {
-                JobState::Queued => true,
-                JobState::Running => row.lease_until <= now,
-                _ => false,
-            })?;
+            let left = |row: &Job| row.state == JobState::Running && row.lease_until <= now;
+            let name = match self.jobs.iter().find(|row| left(row)) {
+                Some(row) => row.name.clone(),
+                None => self.next_in_turn()?,
+            };
+            let row = self.jobs.iter_mut().find(|row| row.name == name)?;
             if row.cancel {
                 row.end(JobState::Cancelled, now);
                 continue;
@@ -127,10 +143,62 @@ impl Model {
     }
 }
 
+impl Model {
+    /// The oldest queued job of the tenant that was served longest ago.
+    fn next_in_turn(&mut self) -> Option<String> {
+        let queued = |tenant: u8| self.jobs.iter().find(|row| row.tenant == tenant && row.state == JobState::Queued);
+        let waiting = (0..TENANTS).filter(|&tenant| queued(tenant).is_some());
+        let tenant = waiting.min_by_key(|&tenant| self.served[usize::from(tenant)])?;
+        let name = queued(tenant)?.name.clone();
+        self.claims += 1;
+        self.served[usize::from(tenant)] = self.claims;
+        Some(name)
+    }
+
+    fn queued(&self, tenant: u8) -> u64 {
+        self.jobs.iter().filter(|row| row.tenant == tenant && row.state == JobState::Queued).count() as u64
+    }
+
+    /// Takes away an ended job, and the keys that name it.
+    fn forget(&mut self, gone: impl Fn(&Job) -> bool) -> usize {
+        let before = self.jobs.len();
+        self.jobs.retain(|row| !(row.finished.is_some() && gone(row)));
+        self.keys.retain(|_, (_, job)| self.jobs.iter().any(|row| row.name == *job));
+        before - self.jobs.len()
+    }
+
+    fn usage(&self, tenant: u8) -> Usage {
+        let jobs = self.jobs.iter().filter(|row| row.tenant == tenant).map(|row| {
+            let request = if row.finished.is_none() { 2 } else { 0 };
+            let report = if row.result.as_deref() == Some("{}") { 2 } else { 0 };
+            ROW + request + report
+        });
+        let mut usage = Usage { sessions: 0, bytes: jobs.sum() };
+        let policies = self.policies.iter().filter(|policy| policy.0 == tenant);
+        usage.bytes += policies.map(|policy| ROW + policy_json(policy.1).len() as i64).sum::<i64>();
+        if tenant == 0 {
+            usage.sessions = self.sessions.len() as i64;
+            usage.bytes += usage.sessions * (ROW + 16 + 3 * OBSERVATION);
+        }
+        usage
+    }
+}
+
 impl Job {
     fn end(&mut self, state: JobState, now: i64) {
         (self.state, self.cancel, self.finished) = (state, false, Some(now));
         self.steps.clear();
+    }
+}
+
+fn tenant_of(tenant: u8) -> Tenant {
+    if tenant == 0 { Tenant::default() } else { format!("other_{tenant}").parse().unwrap() }
+}
+
+fn over<T: std::fmt::Debug>(answer: Result<T, StoreError>) -> OverQuota {
+    match answer {
+        Err(StoreError::OverQuota(over)) => over,
+        other => panic!("{other:?}"),
     }
 }
 
@@ -178,7 +246,22 @@ async fn apply(store: &Store, model: &mut Model, operation: &Operation) {
     use Operation as O;
     let now = model.now;
     match *operation {
-        O::CreateJob { job, key, hash } => create_job(store, model, job, key, hash).await,
+        O::CreateJob { tenant, job, key, hash } => create_job(store, model, tenant, job, key, hash).await,
+        O::DeleteJob { tenant, job } => {
+            let row = model.job(job).filter(|row| row.tenant == tenant);
+            let expected = match row.map(|row| row.finished.is_some()) {
+                None => DeleteJob::Absent,
+                Some(false) => DeleteJob::NotEnded,
+                Some(true) => DeleteJob::Deleted,
+            };
+            assert_eq!(store.delete_job(&tenant_of(tenant), &job_name(job)).await.unwrap(), expected);
+            model.forget(|row| row.tenant == tenant && row.name == job_name(job));
+        }
+        O::ExpireJobs { seconds } => {
+            let before = now - 1000 * seconds;
+            let expired = store.expire_jobs(before, 100).await.unwrap();
+            assert_eq!(expired, model.forget(|row| row.finished.is_some_and(|finished| finished < before)));
+        }
         O::Claim => {
             let claimed = store.claim_job("worker", (LEASE_MS / 1000) as u32, now).await.unwrap();
             let expected = model.claim();
@@ -234,10 +317,10 @@ async fn apply(store: &Store, model: &mut Model, operation: &Operation) {
     }
 }
 
-async fn create_job(store: &Store, model: &mut Model, job: u8, key: Option<u8>, hash: u8) {
+async fn create_job(store: &Store, model: &mut Model, tenant: u8, job: u8, key: Option<u8>, hash: u8) {
     let new = NewJob {
         job: job_name(job),
-        tenant: Tenant::default(),
+        tenant: tenant_of(tenant),
         kind: JobKind::Train,
         request_json: "{}".into(),
         request_hash: hash.to_string(),
@@ -246,18 +329,25 @@ async fn create_job(store: &Store, model: &mut Model, job: u8, key: Option<u8>, 
         created_ms: model.now,
     };
     let answer = store.create_job(new).await;
-    match key.and_then(|key| model.keys.get(&key).cloned()) {
+    let queued = model.queued(tenant);
+    match key.and_then(|key| model.keys.get(&(tenant, key)).cloned()) {
         Some((used, _)) if used != hash => assert_eq!(answer.unwrap(), CreateJob::KeyConflict),
         Some((_, earlier)) => {
             assert!(matches!(answer.unwrap(), CreateJob::Repeated(row) if row.job == earlier));
+        }
+        None if queued >= u64::from(QUOTAS.queued_jobs) => {
+            let limit = QUOTAS.queued_jobs.into();
+            let expected = OverQuota { quota: Quota::QueuedJobs, kept: queued, wanted: 1, limit };
+            assert_eq!(over(answer), expected);
         }
         None if model.job(job).is_some() => assert!(answer.is_err(), "a name taken twice"),
         None => {
             assert!(matches!(answer.unwrap(), CreateJob::Created(row) if row.state == JobState::Queued));
             if let Some(key) = key {
-                model.keys.insert(key, (hash, job_name(job)));
+                model.keys.insert((tenant, key), (hash, job_name(job)));
             }
             model.jobs.push(Job {
+                tenant,
                 name: job_name(job),
                 state: JobState::Queued,
                 lease_until: 0,
@@ -288,8 +378,9 @@ fn finish(model: &mut Model, job: u8, behind: i64, number: u8) -> bool {
     if state == JobState::Succeeded {
         row.steps_done = 3;
     }
-    if number == 0 && !model.policies.contains(&0) {
-        model.policies.push(0);
+    let owned = (row.tenant, 0);
+    if number == 0 && !model.policies.contains(&owned) {
+        model.policies.push(owned);
     }
     true
 }
@@ -302,20 +393,20 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
                 .insert_policy(&Tenant::default(), &policy_name(policy), &policy_json(policy), model.now)
                 .await
                 .unwrap();
-            assert_eq!(inserted, !model.policies.contains(&policy));
+            assert_eq!(inserted, !model.policies.contains(&(0, policy)));
             if inserted {
-                model.policies.push(policy);
+                model.policies.push((0, policy));
             }
         }
         Operation::DeletePolicy { policy } => {
             let users = model.sessions.iter().filter(|session| session.1 == policy).count() as u64;
-            let expected = match (model.policies.contains(&policy), users) {
+            let expected = match (model.policies.contains(&(0, policy)), users) {
                 (false, _) => DeletePolicy::Absent,
                 (true, 0) => DeletePolicy::Deleted,
                 (true, sessions) => DeletePolicy::InUse { sessions },
             };
             assert_eq!(store.delete_policy(&Tenant::default(), &policy_name(policy)).await.unwrap(), expected);
-            model.policies.retain(|&kept| kept != policy || expected != DeletePolicy::Deleted);
+            model.policies.retain(|&kept| kept != (0, policy) || expected != DeletePolicy::Deleted);
         }
         Operation::CreateSession { session, policy } => {
             let new = SessionRow {
@@ -328,9 +419,14 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
                 created_ms: model.now,
             };
             let taken = model.sessions.iter().any(|row| row.0 == session);
-            let expected = match (model.policies.contains(&policy), taken) {
+            let (kept, limit) = (model.sessions.len() as u64, QUOTAS.sessions.into());
+            let expected = match (model.policies.contains(&(0, policy)), taken) {
                 (false, _) => CreateSession::NoPolicy,
                 (true, true) => CreateSession::Exists,
+                (true, false) if kept >= limit => {
+                    let expected = OverQuota { quota: Quota::Sessions, kept, wanted: 1, limit };
+                    return assert_eq!(over(store.create_session(new, None).await), expected);
+                }
                 (true, false) => CreateSession::Created,
             };
             assert_eq!(store.create_session(new, None).await.unwrap(), expected);
@@ -368,22 +464,29 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
 
 /// Everything the store can be asked for is what the model has.
 async fn compare(store: &Store, model: &Model) {
-    let mut rows = store.jobs(&Tenant::default(), 1000, None).await.unwrap();
-    rows.reverse();
+    let mut rows = Vec::new();
+    for tenant in 0..TENANTS {
+        rows.extend(store.jobs(&tenant_of(tenant), 1000, None).await.unwrap());
+        assert_eq!(store.usage(&tenant_of(tenant)).await.unwrap(), model.usage(tenant), "tenant {tenant}");
+    }
+    rows.sort_by_key(|row| row.sequence);
     assert_eq!(rows.len(), model.jobs.len());
     for (row, expected) in rows.iter().zip(&model.jobs) {
         let of = |row: &JobRow| (row.job.clone(), row.state, row.attempt, row.cancel_requested, row.steps_done);
         let (name, state) = (expected.name.clone(), expected.state);
         assert_eq!(of(row), (name, state, expected.attempt, expected.cancel, expected.steps_done));
         assert_eq!((row.started_ms, row.finished_ms), (expected.started, expected.finished));
-        let results = [&row.policy, &row.report_json, &row.error];
+        assert_eq!(row.tenant, tenant_of(expected.tenant));
+        let report = store.report(&row.tenant, &row.job).await.unwrap();
+        let results = [&row.policy, &report, &row.error];
         assert_eq!(results.into_iter().flatten().next(), expected.result.as_ref());
         let steps: Vec<_> = expected.steps.iter().map(|(&step, &byte)| (step, vec![byte; 9])).collect();
         assert_eq!(store.checkpoints(&row.job).await.unwrap(), steps);
     }
     let policies = store.policies(&Tenant::default(), 1000, None).await.unwrap();
     let policies: Vec<_> = policies.into_iter().rev().map(|row| row.policy).collect();
-    assert_eq!(policies, model.policies.iter().map(|&policy| policy_name(policy)).collect::<Vec<_>>());
+    let owned = model.policies.iter().filter(|policy| policy.0 == 0);
+    assert_eq!(policies, owned.map(|policy| policy_name(policy.1)).collect::<Vec<_>>());
     let sessions = store.sessions(&Tenant::default(), 1000, None).await.unwrap();
     assert_eq!(sessions.len(), model.sessions.len());
     for (row, (session, policy, periods)) in sessions.iter().rev().zip(&model.sessions) {
@@ -399,10 +502,10 @@ async fn compare(store: &Store, model: &Model) {
 }
 
 async fn replay(place: &Place, operations: &[Operation]) {
-    let (mut store, mut model) = (place.open().await, Model::default());
+    let (mut store, mut model) = (place.open().await.with_quotas(QUOTAS), Model::default());
     for operation in operations {
         if let Operation::Reopen = operation {
-            store = place.reopen(store).await;
+            store = place.reopen(store).await.with_quotas(QUOTAS);
             // A folder has no other process: whoever ran a job is gone.
             if let Place::Folder(_) = place {
                 model.jobs.iter_mut().for_each(|row| row.lease_until = i64::MIN);
@@ -438,7 +541,9 @@ fn postgresql_does_what_the_model_does() {
         runtime.block_on(async {
             let place = Place::Database(url.clone());
             place.open().await.close().await;
-            let empty = "TRUNCATE jobs, idempotency_keys, checkpoints, policies, policy_owners, sessions, observations";
+            let empty =
+                "TRUNCATE jobs, job_requests, job_reports, idempotency_keys, checkpoints, turns, usage, policies,
+                         policy_owners, sessions, observations";
             support::postgres::execute(&url, empty).await;
             place
         })

@@ -6,9 +6,10 @@ use std::time::Duration;
 use ballast::http;
 use ballast::service::allowance::Limits;
 use ballast::service::audit::AuditKept;
-use ballast::service::config::{Config, Role};
+use ballast::service::config::{Config, DAY, Role};
 use ballast::service::memory::{MemoryLimit, Size};
 use ballast::service::shutdown::Shutdown;
+use ballast::store::Quotas;
 use clap::builder::FalseyValueParser;
 use clap::{Args, ValueEnum};
 use tokio::signal::unix::{SignalKind, signal};
@@ -43,6 +44,8 @@ pub struct Serve {
     limits: LimitArgs,
     #[command(flatten)]
     audit: AuditArgs,
+    #[command(flatten)]
+    quotas: QuotaArgs,
 }
 
 /// What is kept of who did what.
@@ -61,6 +64,23 @@ impl From<AuditArgs> for AuditKept {
         let age = Duration::from_hours(24 * u64::from(arguments.audit_days));
         AuditKept { age, entries: arguments.audit_entries }
     }
+}
+
+/// What one tenant may keep, and for how long.
+#[derive(Debug, Args)]
+struct QuotaArgs {
+    /// Jobs of one tenant that wait; 0: any number.
+    #[arg(long, env = "BALLAST_QUOTA_QUEUED_JOBS", default_value_t = Quotas::default().queued_jobs)]
+    quota_queued_jobs: u32,
+    /// Sessions of one tenant; 0: any number.
+    #[arg(long, env = "BALLAST_QUOTA_SESSIONS", default_value_t = Quotas::default().sessions)]
+    quota_sessions: u32,
+    /// Bytes that one tenant's requests, reports, policies and sessions take; 0: any number.
+    #[arg(long, env = "BALLAST_QUOTA_BYTES", default_value_t = Quotas::default().bytes)]
+    quota_bytes: u64,
+    /// Ended jobs are deleted after so many days, with their reports and idempotency keys; 0: never.
+    #[arg(long, env = "BALLAST_RETAIN_JOBS_DAYS", default_value_t = 30)]
+    retain_jobs_days: u16,
 }
 
 /// What one tenant may ask.
@@ -109,6 +129,10 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     let limits = arguments.limits;
     config.limits = Limits::new([limits.rate_live, limits.rate_heavy, limits.rate_read], limits.heavy_calls.into());
     config.audit = arguments.audit.into();
+    let quotas = arguments.quotas;
+    config.quotas =
+        Quotas { queued_jobs: quotas.quota_queued_jobs, sessions: quotas.quota_sessions, bytes: quotas.quota_bytes };
+    config.retain_jobs = (quotas.retain_jobs_days > 0).then(|| DAY * quotas.retain_jobs_days.into());
     config.role = arguments.role.into();
     config.lease = Duration::from_secs(arguments.lease_seconds.into());
     config.training_threads = arguments.training_threads.map_or(config.training_threads, usize::from);

@@ -38,9 +38,8 @@ pub fn access(method: &str, route: Option<&str>) -> Access {
     match (method, route) {
         (_, "/livez" | "/readyz" | "/" | "/dashboard/{file}" | "/openapi.json" | "/docs") => Access::Open,
         ("POST", "/sessions" | "/observe") | ("DELETE", "/sessions/{id}") => Access::Role(KeyRole::Operate),
-        ("POST", "/train" | "/evaluate" | "/policies/import") | ("DELETE", "/jobs/{id}" | "/policies/{id}") => {
-            Access::Role(KeyRole::Train)
-        }
+        ("POST", "/train" | "/evaluate" | "/jobs/{id}/cancel" | "/policies/import")
+        | ("DELETE", "/jobs/{id}" | "/policies/{id}") => Access::Role(KeyRole::Train),
         (_, "/health" | "/metrics" | "/audit") => Access::Role(KeyRole::Admin),
         ("GET" | "HEAD", _) | ("POST", "/what-if") => Access::Role(KeyRole::Read),
         _ => Access::Role(KeyRole::Admin),
@@ -50,7 +49,7 @@ pub fn access(method: &str, route: Option<&str>) -> Access {
 fn class(method: &str, route: Option<&str>, query: &str) -> Class {
     match (method, route.unwrap_or_default()) {
         (_, "/action") if query.contains("resolve") || query.contains("explain") => Class::Heavy,
-        (_, "/action" | "/observe") | ("POST", "/sessions") | ("DELETE", _) => Class::Live,
+        (_, "/action" | "/observe") | ("POST", "/sessions" | "/jobs/{id}/cancel") | ("DELETE", _) => Class::Live,
         ("POST", _) => Class::Heavy,
         _ => Class::Read,
     }

@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::problem::{Problem, ProblemKind};
 use crate::service::error::ServiceError;
 use crate::service::metrics as names;
-use crate::store::StoreError;
+use crate::store::{OverQuota, Quota, StoreError};
 
 impl From<ServiceError> for Problem {
     fn from(error: ServiceError) -> Self {
@@ -47,6 +47,10 @@ impl From<ServiceError> for Problem {
             ServiceError::Draining | ServiceError::Busy => problem(Kind::Overloaded),
             // Said at the start, before anybody asks.
             error @ ServiceError::NobodyAsked { .. } => Problem::new(Kind::Internal, error.to_string()),
+            ServiceError::JobNotEnded { job } => {
+                problem(Kind::JobNotEnded).naming("job", job, "must name a job that has ended")
+            }
+            ServiceError::Store(StoreError::OverQuota(over)) => of_quota(over),
             ServiceError::Store(error) => of_store(&error),
             ServiceError::Internal(reason) => {
                 tracing::error!(reason, "a request failed");
@@ -65,4 +69,15 @@ fn of_store(error: &StoreError) -> Problem {
         _ => ProblemKind::Internal,
     };
     Problem::new(kind, error.to_string())
+}
+
+fn of_quota(over: OverQuota) -> Problem {
+    let (kind, remedy) = match over.quota {
+        Quota::QueuedJobs => (ProblemKind::QueueFull, "wait for queued jobs, or cancel some"),
+        Quota::Sessions => (ProblemKind::QuotaExceeded, "delete sessions"),
+        Quota::Bytes => (ProblemKind::QuotaExceeded, "delete ended jobs, sessions or policies"),
+    };
+    let option = over.quota.option();
+    let rule = format!("must be at most {}, over all keys of the tenant: {remedy}, or raise --{option}", over.limit);
+    Problem::new(kind, format!("{over}: {remedy}")).naming(option, over.kept + over.wanted, rule)
 }

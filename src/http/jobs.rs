@@ -78,12 +78,23 @@ pub async fn get(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id
     Ok(Json(service.jobs.get(&caller.tenant, &id).await?.into()))
 }
 
-/// Cancel a job: always accepted; it stops within a second. A finished job stays as it is.
-#[utoipa::path(delete, path = "/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "The job.")),
+/// Cancel a job: always accepted; it stops within a second. An ended job stays as it is.
+#[utoipa::path(post, path = "/jobs/{id}/cancel", tag = "jobs", params(("id" = String, Path, description = "The job.")),
     responses(
         (status = 202, description = "The job as it is now.", body = wire::Job),
         (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json")))]
 pub async fn cancel(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<Response, Problem> {
     let job = wire::Job::from(service.jobs.cancel(&caller, &id).await?);
     Ok((StatusCode::ACCEPTED, Json(job)).into_response())
+}
+
+/// Delete an ended job, its report and its idempotency key; a policy that it made stays.
+#[utoipa::path(delete, path = "/jobs/{id}", tag = "jobs", params(("id" = String, Path, description = "The job.")),
+    responses(
+        (status = 204, description = "Deleted."),
+        (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "It is queued or runs: cancel it first.", body = Problem, content_type = "application/problem+json")))]
+pub async fn delete(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<StatusCode, Problem> {
+    service.jobs.delete(&caller, &id).await?;
+    Ok(StatusCode::NO_CONTENT)
 }

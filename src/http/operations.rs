@@ -61,6 +61,7 @@ pub async fn health(State(service): State<Arc<Service>>) -> Result<Json<Health>,
 #[utoipa::path(get, path = "/metrics", tag = "operations",
     responses((status = 200, description = "Text exposition format.", body = String, content_type = "text/plain")))]
 pub async fn metrics(State(service): State<Arc<Service>>) -> Result<Response, Problem> {
+    service.record_store().await?;
     let (jobs, sessions) = service.counts().await?;
     service.record_memory();
     let text = telemetry::exposition(jobs, sessions, service.sessions.waiting(), &service.keys.figures());

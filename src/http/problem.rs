@@ -25,14 +25,17 @@ pub enum ProblemKind {
     WrongMethod,
     IdempotencyConflict,
     InUse,
+    JobNotEnded,
     PeriodConflict,
     PeriodGap,
     SessionCompleted,
     BodyTooLarge,
+    QuotaExceeded,
     UnsupportedMediaType,
     InvalidField,
     InvalidPolicy,
     TooManyRequests,
+    QueueFull,
     Internal,
     Overloaded,
     StorageFull,
@@ -40,7 +43,7 @@ pub enum ProblemKind {
 
 impl ProblemKind {
     /// In ascending order of status.
-    pub const ALL: [ProblemKind; 20] = [
+    pub const ALL: [ProblemKind; 23] = [
         ProblemKind::MalformedJson,
         ProblemKind::InvalidQuery,
         ProblemKind::Unauthenticated,
@@ -50,14 +53,17 @@ impl ProblemKind {
         ProblemKind::WrongMethod,
         ProblemKind::IdempotencyConflict,
         ProblemKind::InUse,
+        ProblemKind::JobNotEnded,
         ProblemKind::PeriodConflict,
         ProblemKind::PeriodGap,
         ProblemKind::SessionCompleted,
         ProblemKind::BodyTooLarge,
+        ProblemKind::QuotaExceeded,
         ProblemKind::UnsupportedMediaType,
         ProblemKind::InvalidField,
         ProblemKind::InvalidPolicy,
         ProblemKind::TooManyRequests,
+        ProblemKind::QueueFull,
         ProblemKind::Internal,
         ProblemKind::Overloaded,
         ProblemKind::StorageFull,
@@ -78,16 +84,19 @@ impl ProblemKind {
                 ("idempotency-conflict", S::CONFLICT, "The idempotency key was used with another body")
             }
             Self::InUse => ("in-use", S::CONFLICT, "Something else depends on it"),
+            Self::JobNotEnded => ("job-not-ended", S::CONFLICT, "The job is queued or runs"),
             Self::PeriodConflict => ("period-conflict", S::CONFLICT, "The period was observed with other content"),
             Self::PeriodGap => ("period-gap", S::CONFLICT, "The period is not the one expected"),
             Self::SessionCompleted => ("session-completed", S::CONFLICT, "The session has reached its horizon"),
             Self::BodyTooLarge => ("body-too-large", S::PAYLOAD_TOO_LARGE, "The body is too large"),
+            Self::QuotaExceeded => ("quota-exceeded", S::PAYLOAD_TOO_LARGE, "The tenant keeps as much as it may"),
             Self::UnsupportedMediaType => {
                 ("unsupported-media-type", S::UNSUPPORTED_MEDIA_TYPE, "The body must be application/json")
             }
             Self::InvalidField => ("invalid-field", S::UNPROCESSABLE_ENTITY, "A field breaks a rule"),
             Self::InvalidPolicy => ("invalid-policy", S::UNPROCESSABLE_ENTITY, "The document is not a usable policy"),
             Self::TooManyRequests => ("too-many-requests", S::TOO_MANY_REQUESTS, "The tenant calls too often"),
+            Self::QueueFull => ("queue-full", S::TOO_MANY_REQUESTS, "The tenant has as many jobs queued as it may"),
             Self::Internal => ("internal", S::INTERNAL_SERVER_ERROR, "The service failed"),
             Self::Overloaded => ("overloaded", S::SERVICE_UNAVAILABLE, "The service cannot answer now"),
             Self::StorageFull => ("storage-full", S::INSUFFICIENT_STORAGE, "The data folder is full"),
@@ -174,7 +183,8 @@ impl IntoResponse for Problem {
         if status == StatusCode::UNAUTHORIZED {
             headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
         }
-        if status == StatusCode::SERVICE_UNAVAILABLE || status == StatusCode::INSUFFICIENT_STORAGE {
+        let passes = [StatusCode::TOO_MANY_REQUESTS, StatusCode::SERVICE_UNAVAILABLE, StatusCode::INSUFFICIENT_STORAGE];
+        if passes.contains(&status) {
             headers.insert(header::RETRY_AFTER, RETRY_AFTER_SECONDS);
         }
         response

@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::allowance::Limits;
 use super::audit::AuditKept;
 use super::memory::MemoryLimit;
-use crate::store::PostgresUrl;
+use crate::store::{PostgresUrl, Quotas};
 
 /// Where the durable facts are.
 #[derive(Debug, Clone)]
@@ -58,6 +58,10 @@ pub struct Config {
     pub allow_anonymous: bool,
     pub limits: Limits,
     pub audit: AuditKept,
+    /// What every tenant may keep.
+    pub quotas: Quotas,
+    /// Ended jobs are deleted after this time; never where there is none.
+    pub retain_jobs: Option<Duration>,
     pub store: StoreLocation,
     pub role: Role,
     /// The most memory the process should take; what cannot fit is refused.
@@ -83,6 +87,9 @@ pub struct Config {
     pub lease: Duration,
 }
 
+/// A day, by the clock.
+pub const DAY: Duration = Duration::from_secs(24 * 60 * 60);
+
 impl Config {
     /// The defaults over a folder: loopback, every core but one for training.
     pub fn new(data: impl Into<PathBuf>) -> Self {
@@ -92,6 +99,8 @@ impl Config {
             allow_anonymous: false,
             limits: Limits::default(),
             audit: AuditKept::default(),
+            quotas: Quotas::default(),
+            retain_jobs: Some(30 * DAY),
             store: StoreLocation::Folder(data.into()),
             role: Role::All,
             memory_limit: MemoryLimit::of_the_system(),

@@ -17,6 +17,8 @@ pub enum ServiceError {
     KeyConflict { key: String },
     #[error("{sessions} sessions live by the policy '{policy}'; delete them first")]
     PolicyInUse { policy: String, sessions: u64 },
+    #[error("the job '{job}' has not ended; cancel it first")]
+    JobNotEnded { job: String },
     #[error("period {period} was observed with other content")]
     PeriodConflict { period: usize },
     #[error("period {given} is not the one expected: report period {expected}")]

@@ -15,7 +15,7 @@ use crate::control::estimate;
 use crate::control::evaluation::EvaluationRequest;
 use crate::control::policy::content_hash;
 use crate::control::specification::Specification;
-use crate::store::{CreateJob, JobKind, JobRow, NewJob, Store, Tenant};
+use crate::store::{CreateJob, DeleteJob, JobKind, JobRow, NewJob, Store, Tenant};
 
 /// A job as stored, and how far it is where it runs in this process.
 #[derive(Debug, Clone, PartialEq)]
@@ -113,8 +113,7 @@ impl Jobs {
     /// # Errors
     /// There is no such job, or it has no report (yet).
     pub async fn report(&self, tenant: &Tenant, job: &str) -> Result<String, ServiceError> {
-        let row = self.of(tenant, job).await?;
-        row.report_json.ok_or_else(|| ServiceError::unknown("report", job))
+        self.store.report(tenant, job).await?.ok_or_else(|| ServiceError::unknown("report", job))
     }
 
     /// # Errors
@@ -145,6 +144,18 @@ impl Jobs {
         self.board.stop(job);
         self.board.ring();
         Ok(self.with_progress(row))
+    }
+
+    /// Deletes an ended job, its report and its idempotency key. A policy that it made stays.
+    ///
+    /// # Errors
+    /// There is no such job, or it is queued or runs.
+    pub async fn delete(&self, caller: &Caller, job: &str) -> Result<(), ServiceError> {
+        match self.store.by(caller.actor()).delete_job(&caller.tenant, job).await? {
+            DeleteJob::Deleted => Ok(()),
+            DeleteJob::Absent => Err(ServiceError::unknown("job", job)),
+            DeleteJob::NotEnded => Err(ServiceError::JobNotEnded { job: job.to_owned() }),
+        }
     }
 
     /// Changes whenever a job's state or progress may have changed.

@@ -7,6 +7,8 @@ use metrics::{Unit, counter, describe_counter, describe_gauge, describe_histogra
 use super::keys::KeyFigures;
 use crate::store::StoreError;
 
+use crate::store::{OldestJobs, Room};
+
 pub const TRAINING_STEP_SECONDS: &str = "ballast_training_step_duration_seconds";
 pub const OBSERVE_SECONDS: &str = "ballast_observe_duration_seconds";
 pub const ACTION_SECONDS: &str = "ballast_action_duration_seconds";
@@ -23,6 +25,12 @@ pub const PROBLEMS: &str = "ballast_problems_total";
 pub const STORE_FAILURES: &str = "ballast_store_failures_total";
 pub const KEY_EXPIRES: &str = "ballast_key_expiry_timestamp_seconds";
 pub const KEY_USED: &str = "ballast_key_last_use_timestamp_seconds";
+pub const OLDEST_JOB_SECONDS: &str = "ballast_oldest_job_age_seconds";
+pub const JOBS_EXPIRED: &str = "ballast_jobs_expired_total";
+pub const STORE_BYTES: &str = "ballast_store_bytes";
+pub const STORE_FREE_BYTES: &str = "ballast_store_free_bytes";
+pub const STORE_LOG_BYTES: &str = "ballast_store_log_bytes";
+pub const DISK_LEFT_BYTES: &str = "ballast_disk_left_bytes";
 
 /// Upper bounds of the buckets of training steps, in seconds: milliseconds to an hour.
 pub const STEP_BUCKETS: [f64; 10] = [0.01, 0.1, 0.5, 1.0, 5.0, 15.0, 60.0, 300.0, 900.0, 3600.0];
@@ -83,4 +91,34 @@ pub fn describe() {
         "Memory by part: prepared policies, factors and bridges kept ready, live sessions, and what running jobs have reserved."
     );
     describe_gauge!(MEMORY_LIMIT, Unit::Bytes, "The memory limit, which the parts share.");
+    describe_gauge!(
+        OLDEST_JOB_SECONDS,
+        Unit::Seconds,
+        "Time since the oldest queued job was made, and since the oldest running one began, by state; 0 where there is none."
+    );
+    describe_counter!(JOBS_EXPIRED, "Ended jobs deleted by age.");
+    describe_gauge!(STORE_BYTES, Unit::Bytes, "Size of the database.");
+    describe_gauge!(STORE_FREE_BYTES, Unit::Bytes, "Of the database, pages that hold nothing; over a folder.");
+    describe_gauge!(STORE_LOG_BYTES, Unit::Bytes, "Size of the write-ahead log; over a folder.");
+    describe_gauge!(DISK_LEFT_BYTES, Unit::Bytes, "Room left on the disk of the database; over a folder.");
+    metrics::counter!(JOBS_EXPIRED).absolute(0);
+}
+
+/// Records how old the oldest jobs are at `now_ms` and what room the store takes.
+pub fn record_store(oldest: OldestJobs, room: Room, now_ms: i64) {
+    for (state, since) in [("queued", oldest.queued_ms), ("running", oldest.running_ms)] {
+        let age_ms = since.map_or(0, |since| now_ms.saturating_sub(since).max(0));
+        metrics::gauge!(OLDEST_JOB_SECONDS, "state" => state).set(age_ms as f64 / 1000.0);
+    }
+    let parts = [
+        (STORE_BYTES, Some(room.database)),
+        (STORE_FREE_BYTES, room.free),
+        (STORE_LOG_BYTES, room.log),
+        (DISK_LEFT_BYTES, room.disk_left),
+    ];
+    for (name, bytes) in parts {
+        if let Some(bytes) = bytes {
+            metrics::gauge!(name).set(bytes as f64);
+        }
+    }
 }

@@ -26,6 +26,7 @@ mod slots;
 pub mod spans;
 mod sync;
 mod trainer;
+mod upkeep;
 pub mod what_if;
 
 use std::sync::Arc;
@@ -56,6 +57,7 @@ pub struct Service {
     pub shutdown: Shutdown,
     memory: Memory,
     store: Store,
+    clock: Clock,
     trainer: Option<Trainer>,
 }
 
@@ -75,12 +77,14 @@ impl Service {
             StoreLocation::Folder(folder) => Store::open(folder).await?,
             StoreLocation::Postgres(url) => Store::connect(url).await?,
         };
+        let store = store.with_quotas(config.quotas);
         exit_on_fatal(store.clone());
         let keys = Arc::new(Keys::load(store.clone(), config.limits.clone(), clock.clone()).await?);
         if keys.are_absent() && !config.allow_anonymous && !config.listen.ip().to_canonical().is_loopback() {
             return Err(ServiceError::NobodyAsked { address: config.listen });
         }
         tokio::spawn(keys::keep_fresh(keys.clone(), shutdown.clone()));
+        tokio::spawn(upkeep::keep_tidy(store.clone(), clock.clone(), config.retain_jobs, shutdown.clone()));
         let memory = Memory::new(config.memory_limit);
         tracing::info!(memory_limit_bytes = config.memory_limit.bytes, "memory: {memory}");
         let jobs = Jobs::new(store.clone(), clock.clone(), memory.clone(), config.training_threads);
@@ -88,9 +92,10 @@ impl Service {
         let sessions = Sessions::new(config, store.clone(), clock.clone(), policies.clone());
         let audit = Audit::new(store.clone());
         tokio::spawn(audit::keep_bounded(store.clone(), clock.clone(), config.audit, shutdown.clone()));
-        let start = || Trainer::start(config, store.clone(), clock, jobs.board(), memory.clone(), shutdown.clone());
+        let start =
+            || Trainer::start(config, store.clone(), clock.clone(), jobs.board(), memory.clone(), shutdown.clone());
         let trainer = config.role.runs_jobs().then(start).transpose()?;
-        Ok(Arc::new(Service { audit, jobs, keys, policies, sessions, shutdown, memory, store, trainer }))
+        Ok(Arc::new(Service { audit, jobs, keys, policies, sessions, shutdown, memory, store, clock, trainer }))
     }
 
     /// Queues an evaluation. The same key and request again give the same job.
@@ -139,6 +144,16 @@ impl Service {
     /// Tells the recorder what takes memory now.
     pub fn record_memory(&self) {
         self.memory.record();
+    }
+
+    /// Records how old the oldest jobs are and what room the store takes.
+    ///
+    /// # Errors
+    /// The store does not answer.
+    pub async fn record_store(&self) -> Result<(), ServiceError> {
+        let (oldest, room) = (self.store.oldest_jobs().await?, self.store.room().await?);
+        metrics::record_store(oldest, room, self.clock.now_milliseconds());
+        Ok(())
     }
 
     /// Waits for the running job to be requeued and closes the store. Call after the shutdown has begun.

@@ -267,7 +267,7 @@ async fn keep_lease(
             () = shutdown.begun() => stop.store(true, Ordering::Relaxed),
             () = tokio::time::sleep(CANCEL_POLL.min(lease / 3)) => {}
         }
-        if matches!(store.job(&job).await, Ok(Some(row)) if row.cancel_requested) {
+        if matches!(store.is_to_stop(&job).await, Ok(true)) {
             stop.store(true, Ordering::Relaxed);
         }
         if renewed.elapsed() >= lease / 3 {

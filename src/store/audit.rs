@@ -148,7 +148,7 @@ impl Store {
             .bind(tenant.as_str())
             .bind(object.as_str()),
         };
-        self.read("reading the audit", page, |rows| rows.iter().map(AuditRow::from_row).collect()).await
+        self.list("reading the audit", page, |rows| rows.iter().map(AuditRow::from_row).collect()).await
     }
 
     /// Drops entries past their bounds, oldest first, a few thousand of each chain; their number. What was cut is itself an
@@ -157,7 +157,7 @@ impl Store {
         let chains = query("SELECT tenant FROM audit_chains ORDER BY tenant");
         let names = |rows: &[Row]| rows.iter().map(|row| row.get("tenant")).collect::<Result<Vec<String>, _>>();
         let mut dropped = 0;
-        for tenant in self.read("reading the audit", chains, names).await? {
+        for tenant in self.list("reading the audit", chains, names).await? {
             dropped += self
                 .write("cutting the audit", move |connection| cut(connection, tenant, bounds, now_ms).boxed())
                 .await?;

@@ -16,12 +16,27 @@ use super::error::{Failure, StoreError};
 use super::job::JobRow;
 use super::keys::KeyRow;
 use super::query::{Connection, Query, Row, query};
+use super::quotas::{OBSERVATION_BYTES, ROW_BYTES};
 use super::sessions::SessionRow;
 use super::{PostgresUrl, leases, migrations, observations, policies, postgres, sqlite};
 
 const DOING: &str = "checking the store";
 /// Rows of jobs, policies or sessions read at a time.
 const PAGE: i64 = 256;
+
+/// Each tenant with its totals and what its rows sum to; of a row $1 bytes beside what it holds, of an observation $2.
+const TOTALS: &str = "
+    WITH parts (tenant, sessions, bytes) AS (
+        SELECT tenant, 0, $1 FROM jobs
+        UNION ALL SELECT tenant, 0, octet_length(json) FROM job_requests JOIN jobs ON jobs.job = job_requests.job
+        UNION ALL SELECT tenant, 0, octet_length(json) FROM job_reports JOIN jobs ON jobs.job = job_reports.job
+        UNION ALL SELECT tenant, 0, $1 + octet_length(json)
+            FROM policy_owners JOIN policies ON policies.policy = policy_owners.policy
+        UNION ALL SELECT tenant, 1, $1 + octet_length(initial_history) + horizon * $2 FROM sessions
+    ), sums (tenant, sessions, bytes) AS (SELECT tenant, sum(sessions), sum(bytes) FROM parts GROUP BY tenant)
+    SELECT coalesce(usage.tenant, sums.tenant) AS tenant, usage.sessions, CAST(sums.sessions AS BIGINT) AS counted,
+           usage.bytes AS kept, CAST(sums.bytes AS BIGINT) AS summed
+    FROM usage FULL JOIN sums ON sums.tenant = usage.tenant";
 
 /// A store about to be checked.
 pub struct Inspection(Reader);
@@ -90,6 +105,8 @@ impl Inspection {
         tell(format!("jobs: {jobs}, with {checkpoints} checkpoints as sealed"));
         let (sessions, observations) = self.sessions().await?;
         tell(format!("sessions: {sessions}, with {observations} observations, as sealed and none missing between"));
+        let tenants = self.totals().await?;
+        tell(format!("totals: of {tenants} tenants, each the sum of what it keeps"));
         let keys = self.read(query("SELECT * FROM access_keys ORDER BY sequence")).await?;
         let keys: Vec<_> = keys.iter().map(KeyRow::from_row).collect::<Result<_, _>>()?;
         tell(format!("keys: {}, each readable", keys.len()));
@@ -170,6 +187,19 @@ impl Inspection {
             }
             sessions += page.len();
         }
+    }
+
+    /// What quotas go by: the totals of each tenant against its rows.
+    async fn totals(&mut self) -> Result<usize, Failure> {
+        let totals = self.read(query(TOTALS).bind(ROW_BYTES).bind(OBSERVATION_BYTES)).await?;
+        for row in &totals {
+            let [kept, summed]: [Option<i64>; 2] = [row.get("kept")?, row.get("summed")?];
+            let [sessions, counted]: [Option<i64>; 2] = [row.get("sessions")?, row.get("counted")?];
+            if kept.unwrap_or(0) != summed.unwrap_or(0) || sessions.unwrap_or(0) != counted.unwrap_or(0) {
+                return Err(Failure::Corrupt(format!("the total of tenant {}", row.get::<String>("tenant")?)));
+            }
+        }
+        Ok(totals.len())
     }
 
     async fn read(&mut self, query: Query) -> Result<Vec<Row>, Failure> {

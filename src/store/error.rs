@@ -42,9 +42,49 @@ pub enum StoreError {
     /// The database refused a statement: a defect of this program.
     #[error("the store refused a statement while {doing}")]
     Refused { doing: &'static str, source: Arc<sqlx::Error> },
+    /// A tenant would keep more than it may; nothing of the write was kept. HTTP 429 for jobs queued, else 413.
+    #[error(transparent)]
+    OverQuota(OverQuota),
     /// The schema could not be brought up to date.
     #[error("cannot migrate the store")]
     Migration { source: Arc<sqlx::migrate::MigrateError> },
+}
+
+/// What a tenant may keep so much of and no more; how much is set in [`Quotas`](super::Quotas).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quota {
+    QueuedJobs,
+    Sessions,
+    Bytes,
+}
+
+/// A tenant would keep more than it may.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("the tenant keeps {kept} {} and may keep {limit}; this takes {wanted} more", quota.counted())]
+pub struct OverQuota {
+    pub quota: Quota,
+    pub kept: u64,
+    pub wanted: u64,
+    pub limit: u64,
+}
+
+impl Quota {
+    /// The option of `ballast serve` that sets it.
+    pub fn option(self) -> &'static str {
+        match self {
+            Quota::QueuedJobs => "quota-queued-jobs",
+            Quota::Sessions => "quota-sessions",
+            Quota::Bytes => "quota-bytes",
+        }
+    }
+
+    fn counted(self) -> &'static str {
+        match self {
+            Quota::QueuedJobs => "queued jobs",
+            Quota::Sessions => "sessions",
+            Quota::Bytes => "bytes",
+        }
+    }
 }
 
 impl StoreError {
@@ -64,12 +104,14 @@ pub(super) enum Failure {
     Sqlite(sqlx::Error),
     Postgres(sqlx::Error),
     Corrupt(String),
+    OverQuota(OverQuota),
 }
 
 impl Failure {
     pub(super) fn during(self, doing: &'static str) -> StoreError {
         match self {
             Failure::Corrupt(what) => StoreError::Corrupt { what },
+            Failure::OverQuota(over) => StoreError::OverQuota(over),
             Failure::Sqlite(error) => sqlite::classify(doing, error),
             Failure::Postgres(error) => postgres::classify(doing, error),
         }

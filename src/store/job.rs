@@ -46,7 +46,7 @@ pub struct NewJob {
     pub created_ms: i64,
 }
 
-/// A job as stored.
+/// A job as stored, without its request and its report.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JobRow {
     /// Order of creation; the cursor of [`Store::jobs`](super::Store::jobs).
@@ -55,7 +55,6 @@ pub struct JobRow {
     pub tenant: Tenant,
     pub kind: JobKind,
     pub state: JobState,
-    pub request_json: String,
     pub steps_total: usize,
     /// Number of checkpoints saved; equals `steps_total` once succeeded.
     pub steps_done: usize,
@@ -67,8 +66,6 @@ pub struct JobRow {
     pub deaths: i64,
     /// The policy of a succeeded training, even where that policy was deleted since.
     pub policy: Option<String>,
-    /// The report of a succeeded evaluation.
-    pub report_json: Option<String>,
     /// Why it failed.
     pub error: Option<String>,
     pub created_ms: i64,
@@ -92,6 +89,7 @@ pub enum CreateJob {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClaimedJob {
     pub row: JobRow,
+    pub request_json: String,
     /// To be named in every write of this worker.
     pub attempt: i64,
 }
@@ -124,6 +122,13 @@ pub struct JobCounts {
     pub cancelled: u64,
 }
 
+/// Since when the job waits that has waited longest, and since when the one runs that has run longest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct OldestJobs {
+    pub queued_ms: Option<i64>,
+    pub running_ms: Option<i64>,
+}
+
 impl JobRow {
     pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
         let job: String = row.get("job")?;
@@ -133,14 +138,12 @@ impl JobRow {
             tenant: Tenant::stored(&row.get::<String>("tenant")?),
             kind: JobKind::parse(&row.get::<String>("kind")?).ok_or_else(|| damaged("kind"))?,
             state: JobState::parse(&row.get::<String>("state")?).ok_or_else(|| damaged("state"))?,
-            request_json: row.get("request_json")?,
             steps_total: from_sql(row.get("steps_total")?)?,
             steps_done: from_sql(row.get("steps_done")?)?,
             cancel_requested: row.get("cancel_requested")?,
             attempt: row.get("attempt")?,
             deaths: row.get("deaths")?,
             policy: row.get("policy")?,
-            report_json: row.get("report_json")?,
             error: row.get("error")?,
             created_ms: row.get("created_ms")?,
             started_ms: row.get("started_ms")?,

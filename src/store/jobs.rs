@@ -1,26 +1,49 @@
-//! Jobs as users see them: created once, listed, cancelled.
+//! Jobs as users see them: created once, listed, cancelled, deleted once they have ended.
 
 use futures_util::FutureExt;
 
 use super::audit::{self, Actor, Deed};
 use super::codec::to_sql;
 use super::error::Failure;
-use super::job::{CreateJob, JobCounts, JobRow, NewJob};
+use super::job::{CreateJob, JobCounts, JobRow, NewJob, OldestJobs};
 use super::job_state::{JobEvent, JobState};
-use super::query::{Connection, query};
+use super::query::{Connection, Row, query};
+use super::quotas::{self, Quotas, ROW_BYTES, Usage};
 use super::tenant::Tenant;
-use super::{Store, StoreError};
+use super::{Store, StoreError, turns};
 
 impl Store {
     /// Queues a job and records its idempotency key, both or neither.
+    ///
+    /// # Errors
+    /// [`StoreError::OverQuota`] where the tenant has as many jobs queued, or keeps as many bytes, as it may.
     pub async fn create_job(&self, new: NewJob) -> Result<CreateJob, StoreError> {
-        let actor = self.actor.clone();
-        self.write("creating a job", move |connection| create(connection, new, actor).boxed()).await
+        let (quotas, actor) = (self.quotas, self.actor.clone());
+        self.write("creating a job", move |connection| create(connection, new, quotas, actor).boxed()).await
     }
 
     pub async fn job(&self, job: &str) -> Result<Option<JobRow>, StoreError> {
         let find = query("SELECT * FROM jobs WHERE job = $1").bind(job);
-        self.read("reading a job", find, |rows| rows.first().map(JobRow::from_row).transpose()).await
+        self.list("reading a job", find, |rows| rows.first().map(JobRow::from_row).transpose()).await
+    }
+
+    /// The report of a tenant's succeeded evaluation.
+    pub async fn report(&self, tenant: &Tenant, job: &str) -> Result<Option<String>, StoreError> {
+        let find = query(
+            "SELECT json FROM job_reports JOIN jobs ON jobs.job = job_reports.job
+             WHERE jobs.job = $1 AND tenant = $2",
+        );
+        let find = find.bind(job).bind(tenant.as_str());
+        self.list("reading a report", find, |rows| rows.first().map(|row| row.get("json")).transpose()).await
+    }
+
+    /// Whether a user asked for the job to stop; false where there is no such job.
+    pub async fn is_to_stop(&self, job: &str) -> Result<bool, StoreError> {
+        let asked = query("SELECT cancel_requested FROM jobs WHERE job = $1").bind(job);
+        let asked = self.probe("asking whether a job is to stop", asked, |rows| {
+            rows.first().map(|row| row.get("cancel_requested")).transpose()
+        });
+        Ok(asked.await?.unwrap_or(false))
     }
 
     /// At most `limit` jobs of a tenant, newest first; `after` is the `sequence` of the last row of the page before.
@@ -29,7 +52,7 @@ impl Store {
             .bind(tenant.as_str())
             .bind(after.unwrap_or(i64::MAX))
             .bind(to_sql(limit));
-        self.read("listing jobs", page, |rows| rows.iter().map(JobRow::from_row).collect()).await
+        self.list("listing jobs", page, |rows| rows.iter().map(JobRow::from_row).collect()).await
     }
 
     /// Cancels a queued job at once and flags a running one; a terminal job stays as it is. `None` where there is no such
@@ -41,7 +64,7 @@ impl Store {
 
     pub async fn count_jobs_by_state(&self) -> Result<JobCounts, StoreError> {
         let count = query("SELECT state, count(*) AS jobs FROM jobs GROUP BY state");
-        self.read("counting jobs", count, |rows| {
+        self.probe("counting jobs", count, |rows| {
             let mut counts = JobCounts::default();
             for row in rows {
                 let state: String = row.get("state")?;
@@ -59,42 +82,62 @@ impl Store {
         })
         .await
     }
+
+    pub async fn oldest_jobs(&self) -> Result<OldestJobs, StoreError> {
+        let oldest = query(
+            "SELECT (SELECT created_ms FROM jobs WHERE state = $1 ORDER BY sequence LIMIT 1) AS queued_ms,
+                    (SELECT min(started_ms) FROM jobs WHERE state = $2) AS running_ms",
+        );
+        let oldest = oldest.bind(JobState::Queued.as_str()).bind(JobState::Running.as_str());
+        self.probe("finding the oldest jobs", oldest, |rows| {
+            let Some(row) = rows.first() else { return Ok(OldestJobs::default()) };
+            Ok(OldestJobs { queued_ms: row.get("queued_ms")?, running_ms: row.get("running_ms")? })
+        })
+        .await
+    }
 }
 
-async fn create(mut connection: Connection<'_>, new: NewJob, actor: Actor) -> Result<CreateJob, Failure> {
+/// The tenant's turn stays locked: nobody else queues for it, nor takes its idempotency key, in between.
+async fn create(
+    mut connection: Connection<'_>,
+    new: NewJob,
+    quotas: Quotas,
+    actor: Actor,
+) -> Result<CreateJob, Failure> {
     let connection = &mut connection;
+    turns::enter(connection, &new.tenant).await?;
     if let Some(key) = &new.idempotency_key
         && let Some(earlier) = repeated(connection, &new.tenant, key, &new.request_hash).await?
     {
         return Ok(earlier);
     }
-    let insert = query(
-        "INSERT INTO jobs (job, kind, state, request_json, steps_total, created_ms, tenant)
-         VALUES ($1, $2, $3, $4, $5, $6, $7)",
-    );
+    quotas::admit_job(connection, &new.tenant, quotas).await?;
+    let insert =
+        query("INSERT INTO jobs (job, kind, state, steps_total, created_ms, tenant) VALUES ($1, $2, $3, $4, $5, $6)");
     let insert = insert
         .bind(new.job.as_str())
         .bind(new.kind.as_str())
         .bind(JobState::Queued.as_str())
-        .bind(new.request_json)
         .bind(to_sql(new.steps_total))
         .bind(new.created_ms)
         .bind(new.tenant.as_str());
     connection.execute(insert).await?;
-    if let Some(key) = &new.idempotency_key {
+    let bytes = Usage::of_bytes(ROW_BYTES + quotas::length(new.request_json.as_bytes()));
+    let request = query("INSERT INTO job_requests (job, json) VALUES ($1, $2)");
+    connection.execute(request.bind(new.job.as_str()).bind(new.request_json)).await?;
+    if let Some(key) = new.idempotency_key {
         let take = query(
             "INSERT INTO idempotency_keys (tenant, idempotency_key, request_hash, job) VALUES ($1, $2, $3, $4)
              ON CONFLICT (tenant, idempotency_key) DO NOTHING",
         );
-        let take =
-            take.bind(new.tenant.as_str()).bind(key.as_str()).bind(new.request_hash.as_str()).bind(new.job.as_str());
+        let take = take.bind(new.tenant.as_str()).bind(key).bind(new.request_hash).bind(new.job.as_str());
         if connection.execute(take).await? == 0 {
-            // Somebody else took the key in the meantime.
+            // A session took the key in the meantime.
             connection.execute(query("DELETE FROM jobs WHERE job = $1").bind(new.job)).await?;
-            let earlier = repeated(connection, &new.tenant, key, &new.request_hash).await?;
-            return earlier.ok_or_else(|| Failure::Corrupt(format!("the idempotency key {key}")));
+            return Ok(CreateJob::KeyConflict);
         }
     }
+    quotas::take(connection, &new.tenant, bytes, quotas).await?;
     let outcome = format!("queued, {}", new.kind.as_str());
     audit::record(connection, &actor, &new.tenant, Deed::QueueJob, &new.job, &outcome).await?;
     let row = find(connection, &new.job).await?;
@@ -146,18 +189,28 @@ async fn cancel(
     find(connection, &job).await
 }
 
-/// Sets a terminal state and deletes the checkpoints.
+/// Sets a terminal state; the checkpoints and the request are needed no more.
 pub(super) async fn end(
     connection: &mut Connection<'_>,
     row: &JobRow,
     state: JobState,
     now_ms: i64,
 ) -> Result<(), Failure> {
-    connection.execute(query("DELETE FROM checkpoints WHERE job = $1").bind(row.job.as_str())).await?;
+    let job = row.job.as_str();
+    connection.execute(query("DELETE FROM checkpoints WHERE job = $1").bind(job)).await?;
     let end = query(
         "UPDATE jobs SET state = $1, finished_ms = $2, cancel_requested = FALSE, worker = NULL, lease_until_ms = NULL
          WHERE job = $3",
     );
-    connection.execute(end.bind(state.as_str()).bind(now_ms).bind(row.job.as_str())).await?;
-    Ok(())
+    connection.execute(end.bind(state.as_str()).bind(now_ms).bind(job)).await?;
+    let request =
+        query("DELETE FROM job_requests WHERE job = $1 RETURNING CAST(octet_length(json) AS BIGINT) AS bytes")
+            .bind(job);
+    let bytes = sum(&connection.rows(request).await?)?;
+    quotas::change(connection, &row.tenant, Usage::of_bytes(-bytes)).await.map(drop)
+}
+
+/// The sum of the column `bytes`.
+fn sum(rows: &[Row]) -> Result<i64, Failure> {
+    rows.iter().map(|row| row.get::<i64>("bytes")).sum()
 }

@@ -138,7 +138,7 @@ impl Store {
     /// Every key, revoked ones among them, oldest first.
     pub async fn keys(&self) -> Result<Vec<KeyRow>, StoreError> {
         let all = query("SELECT * FROM access_keys ORDER BY sequence");
-        self.read("reading the keys", all, |rows| rows.iter().map(KeyRow::from_row).collect()).await
+        self.probe("reading the keys", all, |rows| rows.iter().map(KeyRow::from_row).collect()).await
     }
 }
 

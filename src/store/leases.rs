@@ -16,15 +16,16 @@ use super::job::{ClaimedJob, JobOutcome, JobRow};
 use super::job_state::{JobEvent, JobState};
 use super::jobs::{end, find};
 use super::query::{Connection, Query, Row, query};
-use super::{Store, StoreError, policies};
+use super::quotas::{self, Quotas, Usage};
+use super::{Store, StoreError, policies, turns};
 
 /// Workers that may die under a job between two checkpoints.
 const MOST_DEATHS: i64 = 3;
 
 impl Store {
-    /// Takes the oldest job that is queued, or whose worker's lease ran out, until `now_ms + 1000 lease_seconds`.
-    /// A job that was asked to stop is cancelled on the way rather than claimed, and one under which too many workers died
-    /// fails.
+    /// Takes the oldest job whose worker's lease ran out, else the queued one [whose turn it is](super::turns), until
+    /// `now_ms + 1000 lease_seconds`. A job that was asked to stop is cancelled on the way rather than claimed, and one under
+    /// which too many workers died fails.
     pub async fn claim_job(
         &self,
         worker: &str,
@@ -121,18 +122,28 @@ async fn claim(
         let take =
             take.bind(next.as_str()).bind(worker).bind(until_ms).bind(now_ms).bind(deaths).bind(row.job.as_str());
         connection.execute(take).await?;
-        let row = find(connection, &row.job).await?;
-        return Ok(row.map(|row| ClaimedJob { attempt: row.attempt, row }));
+        return claimed(connection, &row.job).await.map(Some);
     }
     Ok(None)
 }
 
-/// The oldest job that is queued or whose lease ran out, and that nobody else is taking.
+async fn claimed(connection: &mut Connection<'_>, job: &str) -> Result<ClaimedJob, Failure> {
+    let request = connection.row(query("SELECT json FROM job_requests WHERE job = $1").bind(job)).await?;
+    let request_json = request.map(|row| row.get("json")).transpose()?;
+    match (find(connection, job).await?, request_json) {
+        (Some(row), Some(request_json)) => Ok(ClaimedJob { attempt: row.attempt, row, request_json }),
+        _ => Err(Failure::Corrupt(format!("the request of job {job}"))),
+    }
+}
+
+/// A job to take over, which had its turn; else the one whose turn it is. Nobody else is taking it.
 async fn claimable(connection: &mut Connection<'_>, now_ms: i64) -> Result<Option<JobRow>, Failure> {
-    let oldest =
-        query("SELECT * FROM jobs WHERE state = $1 OR (state = $2 AND lease_until_ms <= $3) ORDER BY sequence LIMIT 1");
-    let oldest = oldest.bind(JobState::Queued.as_str()).bind(JobState::Running.as_str()).bind(now_ms);
-    connection.row(oldest.for_update_of_free()).await?.as_ref().map(JobRow::from_row).transpose()
+    let left = query("SELECT * FROM jobs WHERE state = $1 AND lease_until_ms <= $2 ORDER BY sequence LIMIT 1");
+    let left = left.bind(JobState::Running.as_str()).bind(now_ms);
+    match connection.row(left.for_update_of_free()).await? {
+        Some(row) => JobRow::from_row(&row).map(Some),
+        None => turns::take(connection).await,
+    }
 }
 
 async fn renew(mut connection: Connection<'_>, job: String, attempt: i64, until_ms: i64) -> Result<bool, Failure> {
@@ -208,19 +219,23 @@ async fn finish(
         JobOutcome::Cancelled => JobEvent::Cancel,
     };
     let Ok(next) = row.state.next(event) else { return Ok(false) };
-    end(connection, &row, next, now_ms).await?;
     let update = match outcome {
         JobOutcome::Succeeded { policy_id, policy_json } => {
-            policies::insert(connection, &row.tenant, &policy_id, policy_json, now_ms).await?;
-            query("UPDATE jobs SET policy = $1, steps_done = steps_total WHERE job = $2").bind(policy_id)
+            policies::insert(connection, &row.tenant, &policy_id, policy_json, now_ms, Quotas::NONE).await?;
+            query("UPDATE jobs SET policy = $1, steps_done = steps_total WHERE job = $2").bind(policy_id).bind(job)
         }
         JobOutcome::Reported { report_json } => {
-            query("UPDATE jobs SET report_json = $1, steps_done = steps_total WHERE job = $2").bind(report_json)
+            let bytes = Usage::of_bytes(quotas::length(report_json.as_bytes()));
+            let report = query("INSERT INTO job_reports (job, json) VALUES ($1, $2)").bind(job.as_str());
+            connection.execute(report.bind(report_json)).await?;
+            quotas::change(connection, &row.tenant, bytes).await?;
+            query("UPDATE jobs SET steps_done = steps_total WHERE job = $1").bind(job)
         }
-        JobOutcome::Failed { reason } => query("UPDATE jobs SET error = $1 WHERE job = $2").bind(reason),
-        JobOutcome::Cancelled => return Ok(true),
+        JobOutcome::Failed { reason } => query("UPDATE jobs SET error = $1 WHERE job = $2").bind(reason).bind(job),
+        JobOutcome::Cancelled => query("UPDATE jobs SET error = NULL WHERE job = $1").bind(job),
     };
-    connection.execute(update.bind(job)).await?;
+    connection.execute(update).await?;
+    end(connection, &row, next, now_ms).await?;
     Ok(true)
 }
 

@@ -11,14 +11,15 @@
 //!    is appended, because the table's keys admit one. Keys are the exception:
 //!    a [`KeyRing`] adds and revokes them beside the process that holds the folder, one statement each.
 //!
-//! What is decided is written once, in `jobs`, `keys`, `leases`, `policies`, `sessions` and `observations`; how a statement is
-//! run, how a group of writes is committed and what an error means is the engine's, in `sqlite` and `postgres`.
+//! What is decided is written once, in `jobs`, `keys`, `leases`, `turns`, `quotas`, `retention`, `policies`, `sessions` and
+//! `observations`; how a statement is run, how a group of writes is committed and what an error means is the engine's, in `sqlite` and `postgres`.
 //!
 //! Conflicts, repeats and gaps are outcomes, not errors. The store reads no clock: time enters as milliseconds since the
 //! epoch; leases are measured by [`Store::lease_time`]. Identifiers are opaque and made by the caller.
 //!
 //! Not done, and why: a digest over the end of a session's observations (a lost tail needs a lost file; a
-//! write-ahead log that damage cut short is refused at the start); deleting old jobs (they are small, and an idempotency key must outlive its request).
+//! write-ahead log that damage cut short is refused at the start); deleting old sessions and policies by age (an investor's
+//! record is not ours to expire).
 
 mod audit;
 mod check;
@@ -35,27 +36,32 @@ mod observations;
 mod policies;
 mod postgres;
 mod query;
+mod quotas;
+mod retention;
 mod sessions;
 mod sqlite;
 mod tenant;
+mod turns;
 
 use std::path::Path;
 
 use futures_util::future::BoxFuture;
 
 use error::Failure;
-use query::{Connection, Query, Row};
+use query::{Connection, Purpose, Query, Row};
 
 pub use audit::{Actor, AuditBounds, AuditFilter, AuditRow, Deed};
 pub use check::Inspection;
-pub use error::StoreError;
+pub use error::{OverQuota, Quota, StoreError};
 pub use idempotency::RequestKey;
-pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, NewJob};
+pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, NewJob, OldestJobs};
 pub use job_state::{IllegalTransition, JobEvent, JobState};
 pub use keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, Successor};
 pub use observations::{Append, ObservationRow};
 pub use policies::{DeletePolicy, PolicyRow, PolicySummary};
 pub use postgres::{PostgresUrl, UrlError};
+pub use quotas::{Quotas, Usage};
+pub use retention::{DeleteJob, Room};
 pub use sessions::{CreateSession, Head, Seen, SessionFacts, SessionRow, SessionSummary};
 pub use sqlite::{backup, restore};
 pub use tenant::Tenant;
@@ -66,6 +72,7 @@ pub struct Store {
     engine: Engine,
     /// Whose changes are made through it, as the audit has them.
     actor: Actor,
+    quotas: Quotas,
 }
 
 #[derive(Clone)]
@@ -95,12 +102,17 @@ impl Store {
     }
 
     fn over(engine: Engine) -> Store {
-        Store { engine, actor: Actor::service(0) }
+        Store { engine, actor: Actor::service(0), quotas: Quotas::default() }
     }
 
     /// The same store, changed by `actor`: each change is written into the audit as his.
     pub fn by(&self, actor: Actor) -> Store {
         Store { actor, ..self.clone() }
+    }
+
+    /// The same store, where every tenant may keep so much.
+    pub fn with_quotas(self, quotas: Quotas) -> Store {
+        Store { quotas, ..self }
     }
 
     /// The time by which leases are measured, in milliseconds, where the caller's own clock shows `local_ms`.
@@ -163,16 +175,46 @@ impl Store {
         }
     }
 
-    /// Reads the rows of one statement.
+    /// Reads what an answer to an investor rests on, by one statement.
     async fn read<T>(
         &self,
         doing: &'static str,
         query: Query,
         decode: impl FnOnce(&[Row]) -> Result<T, Failure>,
     ) -> Result<T, StoreError> {
+        self.read_for(Purpose::Advice, doing, query, decode).await
+    }
+
+    /// Reads what is listed, shown or followed, by one statement.
+    async fn list<T>(
+        &self,
+        doing: &'static str,
+        query: Query,
+        decode: impl FnOnce(&[Row]) -> Result<T, Failure>,
+    ) -> Result<T, StoreError> {
+        self.read_for(Purpose::Lists, doing, query, decode).await
+    }
+
+    /// Reads what tells how the store, the queue and the keys are, by one statement.
+    async fn probe<T>(
+        &self,
+        doing: &'static str,
+        query: Query,
+        decode: impl FnOnce(&[Row]) -> Result<T, Failure>,
+    ) -> Result<T, StoreError> {
+        self.read_for(Purpose::Probes, doing, query, decode).await
+    }
+
+    async fn read_for<T>(
+        &self,
+        purpose: Purpose,
+        doing: &'static str,
+        query: Query,
+        decode: impl FnOnce(&[Row]) -> Result<T, Failure>,
+    ) -> Result<T, StoreError> {
         let rows = match &self.engine {
-            Engine::Sqlite(folder) => folder.read(doing, query).await?,
-            Engine::Postgres(database) => database.read(doing, query).await?,
+            Engine::Sqlite(folder) => folder.read(purpose, doing, query).await?,
+            Engine::Postgres(database) => database.read(purpose, doing, query).await?,
         };
         decode(&rows).map_err(|failure| failure.during(doing))
     }

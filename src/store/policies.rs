@@ -7,6 +7,7 @@ use super::audit::{self, Actor, Deed};
 use super::codec::to_sql;
 use super::error::Failure;
 use super::query::{Connection, Row, query};
+use super::quotas::{self, Quotas, ROW_BYTES, Usage};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 use crate::control::policy::content_hash;
@@ -45,7 +46,8 @@ impl Store {
     /// Stores a policy of a tenant under its content hash. False where the tenant had it.
     ///
     /// # Errors
-    /// [`StoreError::Corrupt`] where `id` is not the hash of `json`.
+    /// [`StoreError::Corrupt`] where `id` is not the hash of `json`, [`StoreError::OverQuota`] where the tenant keeps as many
+    /// bytes as it may.
     pub async fn insert_policy(
         &self,
         tenant: &Tenant,
@@ -55,10 +57,11 @@ impl Store {
     ) -> Result<bool, StoreError> {
         let doing = "inserting a policy";
         verify(id, json).map_err(|failure| failure.during(doing))?;
-        let (tenant, id, json, actor) = (tenant.clone(), id.to_owned(), json.to_vec(), self.actor.clone());
+        let (tenant, id, json) = (tenant.clone(), id.to_owned(), json.to_vec());
+        let (quotas, actor) = (self.quotas, self.actor.clone());
         self.write(doing, move |mut connection| {
             async move {
-                let is_new = insert(&mut connection, &tenant, &id, json, created_ms).await?;
+                let is_new = insert(&mut connection, &tenant, &id, json, created_ms, quotas).await?;
                 if is_new {
                     audit::record(&mut connection, &actor, &tenant, Deed::ImportPolicy, &id, "stored").await?;
                 }
@@ -101,7 +104,7 @@ impl Store {
              WHERE tenant = $1 AND policy_owners.sequence < $2 ORDER BY policy_owners.sequence DESC LIMIT $3",
         );
         let page = page.bind(tenant.as_str()).bind(after.unwrap_or(i64::MAX)).bind(to_sql(limit));
-        self.read("listing policies", page, |rows| rows.iter().map(PolicySummary::from_row).collect()).await
+        self.list("listing policies", page, |rows| rows.iter().map(PolicySummary::from_row).collect()).await
     }
 
     pub async fn delete_policy(&self, tenant: &Tenant, id: &str) -> Result<DeletePolicy, StoreError> {
@@ -120,7 +123,9 @@ pub(super) async fn insert(
     id: &str,
     json: Vec<u8>,
     created_ms: i64,
+    quotas: Quotas,
 ) -> Result<bool, Failure> {
+    let bytes = Usage::of_bytes(ROW_BYTES + quotas::length(&json));
     let insert = |json: Vec<u8>| {
         query("INSERT INTO policies (policy, created_ms, json) VALUES ($1, $2, $3) ON CONFLICT (policy) DO NOTHING")
             .bind(id)
@@ -137,7 +142,11 @@ pub(super) async fn insert(
         "INSERT INTO policy_owners (tenant, policy, created_ms) VALUES ($1, $2, $3)
          ON CONFLICT (policy, tenant) DO NOTHING",
     );
-    Ok(connection.execute(own.bind(tenant.as_str()).bind(id).bind(created_ms)).await? > 0)
+    let is_new = connection.execute(own.bind(tenant.as_str()).bind(id).bind(created_ms)).await? > 0;
+    if is_new {
+        quotas::take(connection, tenant, bytes, quotas).await?;
+    }
+    Ok(is_new)
 }
 
 pub(super) async fn is_owned(connection: &mut Connection<'_>, tenant: &Tenant, id: &str) -> Result<bool, Failure> {
@@ -153,8 +162,11 @@ async fn delete(
     actor: Actor,
 ) -> Result<DeletePolicy, Failure> {
     let connection = &mut connection;
-    let lock = query("SELECT sequence FROM policies WHERE policy = $1").bind(id.as_str()).for_update();
-    if connection.row(lock).await?.is_none() || !is_owned(connection, &tenant, &id).await? {
+    let lock = query("SELECT CAST(octet_length(json) AS BIGINT) AS bytes FROM policies WHERE policy = $1");
+    let Some(row) = connection.row(lock.bind(id.as_str()).for_update()).await? else {
+        return Ok(DeletePolicy::Absent);
+    };
+    if !is_owned(connection, &tenant, &id).await? {
         return Ok(DeletePolicy::Absent);
     }
     let count = query("SELECT count(*) AS sessions FROM sessions WHERE policy = $1 AND tenant = $2");
@@ -170,6 +182,8 @@ async fn delete(
          AND NOT EXISTS (SELECT 1 FROM policy_owners WHERE policy_owners.policy = policies.policy)",
     );
     connection.execute(unowned.bind(id.as_str())).await?;
+    let bytes = Usage::of_bytes(ROW_BYTES + row.get::<i64>("bytes")?);
+    quotas::change(connection, &tenant, bytes.given_back()).await?;
     audit::record(connection, &actor, &tenant, Deed::DeletePolicy, &id, "deleted").await?;
     Ok(DeletePolicy::Deleted)
 }

@@ -10,6 +10,17 @@ use sqlx::{AssertSqlSafe, Database, Decode, Encode, Postgres, Row as _, Sqlite, 
 
 use super::error::Failure;
 
+/// What rows are read for. Each purpose has connections of its own: whoever lists keeps no advice and no probe waiting.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Purpose {
+    /// An answer to an investor, or a job's work.
+    Advice,
+    /// What is listed, shown or followed.
+    Lists,
+    /// How the store, the queue and the keys are.
+    Probes,
+}
+
 /// A statement and the values of `$1`, `$2` and so on.
 pub(super) struct Query {
     sql: &'static str,

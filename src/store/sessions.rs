@@ -8,6 +8,7 @@ use super::error::Failure;
 use super::idempotency::{self, RequestKey};
 use super::observations::ObservationRow;
 use super::query::{Connection, Row, query};
+use super::quotas::{self, Quotas, Usage};
 use super::tenant::Tenant;
 use super::{Engine, Store, StoreError, policies};
 
@@ -94,9 +95,12 @@ pub struct SessionSummary {
 
 impl Store {
     /// Opens a session and records its idempotency key, both or neither.
+    ///
+    /// # Errors
+    /// [`StoreError::OverQuota`] where the tenant has as many sessions, or keeps as many bytes, as it may.
     pub async fn create_session(&self, new: SessionRow, key: Option<RequestKey>) -> Result<CreateSession, StoreError> {
-        let actor = self.actor.clone();
-        self.write("creating a session", move |connection| create(connection, new, key, actor).boxed()).await
+        let (quotas, actor) = (self.quotas, self.actor.clone());
+        self.write("creating a session", move |connection| create(connection, new, key, quotas, actor).boxed()).await
     }
 
     /// A session of a tenant.
@@ -173,7 +177,7 @@ impl Store {
              FROM sessions WHERE tenant = $1 AND sequence < $2 ORDER BY sequence DESC LIMIT $3",
         );
         let page = page.bind(tenant.as_str()).bind(after.unwrap_or(i64::MAX)).bind(to_sql(limit));
-        self.read("listing sessions", page, |rows| rows.iter().map(SessionSummary::from_row).collect()).await
+        self.list("listing sessions", page, |rows| rows.iter().map(SessionSummary::from_row).collect()).await
     }
 
     /// Deletes a session of a tenant and its observations. False where there was none.
@@ -184,9 +188,9 @@ impl Store {
     }
 
     pub async fn count_sessions(&self) -> Result<u64, StoreError> {
-        let count = query("SELECT count(*) AS sessions FROM sessions");
+        let count = query("SELECT CAST(coalesce(sum(sessions), 0) AS BIGINT) AS sessions FROM usage");
         let counted = |rows: &[Row]| rows.first().map_or(Ok(0), |row| row.get("sessions"));
-        self.read("counting sessions", count, counted).await.map(i64::unsigned_abs)
+        self.probe("counting sessions", count, counted).await.map(i64::unsigned_abs)
     }
 }
 
@@ -194,6 +198,7 @@ async fn create(
     mut connection: Connection<'_>,
     row: SessionRow,
     key: Option<RequestKey>,
+    quotas: Quotas,
     actor: Actor,
 ) -> Result<CreateSession, Failure> {
     let connection = &mut connection;
@@ -213,6 +218,9 @@ async fn create(
         let earlier = idempotency::repeated(connection, &row.tenant, key).await?;
         return earlier.ok_or_else(|| Failure::Corrupt(format!("the idempotency key {}", key.key)));
     }
+    let history_bytes = quotas::length(&encode_reals(&row.initial_history));
+    let usage = Usage::of_session(history_bytes, to_sql(row.horizon));
+    quotas::take(connection, &row.tenant, usage, quotas).await?;
     let outcome = format!("opened under policy {}", row.policy);
     audit::record(connection, &actor, &row.tenant, Deed::OpenSession, &row.session, &outcome).await?;
     Ok(created)
@@ -253,10 +261,14 @@ async fn delete(
     let connection = &mut connection;
     let count = query("SELECT count(*) AS observations FROM observations WHERE session = $1").bind(session.as_str());
     let observations: i64 = connection.row(count).await?.map_or(Ok(0), |row| row.get("observations"))?;
-    let delete = query("DELETE FROM sessions WHERE session = $1 AND tenant = $2");
-    if connection.execute(delete.bind(session.as_str()).bind(tenant.as_str())).await? == 0 {
-        return Ok(false);
-    }
+    let delete = query(
+        "DELETE FROM sessions WHERE session = $1 AND tenant = $2
+         RETURNING CAST(octet_length(initial_history) AS BIGINT) AS history_bytes, horizon",
+    );
+    let deleted = connection.row(delete.bind(session.as_str()).bind(tenant.as_str())).await?;
+    let Some(row) = deleted else { return Ok(false) };
+    let usage = Usage::of_session(row.get("history_bytes")?, row.get("horizon")?);
+    quotas::change(connection, &tenant, usage.given_back()).await?;
     let outcome = format!("deleted, with {observations} observations");
     audit::record(connection, &actor, &tenant, Deed::DeleteSession, &session, &outcome).await?;
     Ok(true)

@@ -10,7 +10,7 @@ import httpx
 import pytest
 from conftest import Network, Service, train
 
-from ballast import Ballast, JobEnded, ProgressPrinter, Unreachable, wire
+from ballast import Ballast, JobEnded, JobNotEnded, ProgressPrinter, Unreachable, wire
 from ballast.events import Event, parsed
 
 #: Steps of a training that outlasts a restart.
@@ -50,6 +50,8 @@ def test_a_restart_in_the_middle_is_bridged(service: Service, ballast: Ballast) 
 
 def test_a_cancelled_training_says_so(ballast: Ballast) -> None:
     training = train(ballast, horizon=LONG, design={"count": 400}, seed=34)
+    with pytest.raises(JobNotEnded):
+        training.delete()
     training.cancel()
     with pytest.raises(JobEnded, match="ended as cancelled") as end:
         training.session()

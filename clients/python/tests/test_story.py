@@ -93,6 +93,8 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     assert ballast.health()["status"] == "ok"
     evaluation = compare(ballast)
     assert ballast.evaluation(evaluation.id).report()["reference"] == "all_bank"
+    ballast.training(training.id).delete()
+    assert training.id not in [job["job"] for job in ballast.jobs()]
 
     ids = {training.id: "{id}", evaluation.id: "{id}", policy.id: "{id}", own.id: "{id}", session.id: "{id}"}
     reached = {(method, "/".join(ids.get(part, part) for part in path.split("/"))) for method, path in network.sent}

@@ -1,6 +1,6 @@
 // Jobs: what is being computed, how far it is, and how to stop it.
 
-import { follow, get, isOver, Problem, remove } from "./api.js";
+import { follow, get, isOver, post, Problem } from "./api.js";
 import { announce, h } from "./dom.js";
 import { count, duration, moment, short } from "./format.js";
 import { foot, Pages } from "./pages.js";
@@ -167,9 +167,9 @@ function links(card) {
   stop.addEventListener("click", async () => {
     stop.disabled = true;
     announce("Asked it to stop.");
-    const answer = await remove(`/jobs/${job.job}`).catch((error) => error);
+    const answer = await post(`/jobs/${job.job}/cancel`).catch((error) => error);
     if (answer instanceof Problem) announce(answer.message);
-    else card.update(await answer.json());
+    else card.update(answer);
   });
   return stop;
 }

@@ -17,7 +17,7 @@ use crate::store::{ClaimedJob, JobOutcome, StoreError};
 
 impl Worker {
     pub(super) fn evaluate(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<Ended, StoreError> {
-        let request = match serde_json::from_str(&claimed.row.request_json) {
+        let request = match serde_json::from_str(&claimed.request_json) {
             Ok(request) => request,
             Err(error) => return Ok(failed(format!("the stored request cannot be read: {error}"))),
         };

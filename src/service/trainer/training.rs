@@ -15,7 +15,7 @@ use crate::store::{ClaimedJob, JobOutcome, StoreError};
 
 impl Worker {
     pub(super) fn train(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<Ended, StoreError> {
-        let specification: Specification = match serde_json::from_str(&claimed.row.request_json) {
+        let specification: Specification = match serde_json::from_str(&claimed.request_json) {
             Ok(specification) => specification,
             Err(error) => return Ok(failed(format!("the stored specification cannot be read: {error}"))),
         };

@@ -23,13 +23,15 @@ use sqlx::{ConnectOptions, Connection as _, Postgres};
 
 use super::error::{Failure, StoreError};
 use super::migrations;
-use super::query::{Connection, Query, Row, query};
+use super::query::{Connection, Purpose, Query, Row, query};
 
 pub(super) use classify::classify;
 pub use url::{PostgresUrl, UrlError};
 
-/// Connections of one process. A server takes 100 unless told otherwise: a few replicas, and room for an operator.
-const CONNECTIONS: u32 = 10;
+/// Connections of one process, ten in all. A server takes 100 unless told otherwise: a few replicas, and room for an operator.
+const WORK_CONNECTIONS: u32 = 6;
+const LIST_CONNECTIONS: u32 = 3;
+const PROBE_CONNECTIONS: u32 = 1;
 /// A request waits this long for a connection before it is told to come back.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
 /// Past the server's own bounds below, and within the time of a request.
@@ -44,7 +46,10 @@ const SETTINGS: &str = "SELECT set_config('statement_timeout', '15s', false),
 
 #[derive(Clone)]
 pub(super) struct Database {
-    pool: PgPool,
+    /// Writes, and what advice is read from.
+    work: PgPool,
+    lists: PgPool,
+    probes: PgPool,
 }
 
 impl Database {
@@ -55,20 +60,18 @@ impl Database {
         migrate(&mut connection).await?;
         // Everything is committed; a server that does not say goodbye changes nothing.
         let _ = connection.close().await;
-        let pool = PgPoolOptions::new()
-            .max_connections(CONNECTIONS)
-            .acquire_timeout(CONNECT_TIMEOUT)
-            .after_connect(|connection, _| {
-                async move { sqlx::query(SETTINGS).execute(connection).await.map(|_| ()) }.boxed()
-            })
-            .connect_lazy_with(options);
-        Ok(Database { pool })
+        Ok(Database {
+            work: pool(WORK_CONNECTIONS, &options),
+            lists: pool(LIST_CONNECTIONS, &options),
+            probes: pool(PROBE_CONNECTIONS, &options),
+        })
     }
 
     pub(super) async fn ping(&self) -> Result<(), StoreError> {
         let doing = "answering a ping";
-        let rows =
-            self.read(doing, query("SELECT pg_is_in_recovery() AS standby, EXISTS (SELECT 1 FROM jobs)")).await?;
+        let rows = self
+            .read(Purpose::Probes, doing, query("SELECT pg_is_in_recovery() AS standby, EXISTS (SELECT 1 FROM jobs)"))
+            .await?;
         match rows.first().map(|row| row.get("standby")).transpose().map_err(|failure| failure.during(doing))? {
             Some(true) => Err(StoreError::Unavailable { doing, source: None }),
             _ => Ok(()),
@@ -78,13 +81,24 @@ impl Database {
     pub(super) async fn time(&self) -> Result<i64, StoreError> {
         let doing = "reading the server's clock";
         let clock = query("SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS BIGINT) AS time_ms");
-        let rows = self.read(doing, clock).await?;
+        let rows = self.read(Purpose::Advice, doing, clock).await?;
         let time = rows.first().ok_or(Failure::Postgres(sqlx::Error::RowNotFound)).and_then(|row| row.get("time_ms"));
         time.map_err(|failure| failure.during(doing))
     }
 
+    /// The size of the database, in bytes.
+    pub(super) async fn size(&self) -> Result<u64, StoreError> {
+        let doing = "measuring the database";
+        let size = query("SELECT pg_database_size(current_database()) AS size");
+        let rows = self.read(Purpose::Probes, doing, size).await?;
+        let size = rows.first().ok_or(Failure::Postgres(sqlx::Error::RowNotFound)).and_then(|row| row.get("size"));
+        size.map(i64::unsigned_abs).map_err(|failure| failure.during(doing))
+    }
+
     pub(super) async fn close(&self) {
-        self.pool.close().await;
+        for pool in [&self.work, &self.lists, &self.probes] {
+            pool.close().await;
+        }
     }
 
     /// Runs `work` in a transaction and answers after its commit.
@@ -93,7 +107,7 @@ impl Database {
         T: Send + 'static,
         W: for<'c> FnOnce(Connection<'c>) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
     {
-        self.bounded(doing, |connection| {
+        self.bounded(&self.work, doing, |connection| {
             async move {
                 // Rolls back where it is dropped before its commit.
                 let mut transaction = connection.begin().await.map_err(Failure::Postgres)?;
@@ -106,24 +120,39 @@ impl Database {
         .await
     }
 
-    pub(super) async fn read(&self, doing: &'static str, query: Query) -> Result<Vec<Row>, StoreError> {
-        self.bounded(doing, |connection| async move { Connection::Postgres(connection).rows(query).await }.boxed())
-            .await
+    pub(super) async fn read(
+        &self,
+        purpose: Purpose,
+        doing: &'static str,
+        query: Query,
+    ) -> Result<Vec<Row>, StoreError> {
+        let pool = match purpose {
+            Purpose::Advice => &self.work,
+            Purpose::Lists => &self.lists,
+            Purpose::Probes => &self.probes,
+        };
+        self.bounded(pool, doing, |connection| {
+            async move { Connection::Postgres(connection).rows(query).await }.boxed()
+        })
+        .await
     }
 
     /// Runs one statement, a transaction of its own; the number of rows it changed.
     pub(super) async fn execute(&self, doing: &'static str, query: Query) -> Result<u64, StoreError> {
-        self.bounded(doing, |connection| async move { Connection::Postgres(connection).execute(query).await }.boxed())
-            .await
+        self.bounded(&self.work, doing, |connection| {
+            async move { Connection::Postgres(connection).execute(query).await }.boxed()
+        })
+        .await
     }
 
     /// Runs `work` on a connection for no longer than [`OPERATION_TIMEOUT`]; one that failed is not used again.
     async fn bounded<T>(
         &self,
+        pool: &PgPool,
         doing: &'static str,
         work: impl for<'c> FnOnce(&'c mut PoolConnection<Postgres>) -> BoxFuture<'c, Result<T, Failure>>,
     ) -> Result<T, StoreError> {
-        let acquired = self.pool.acquire().await;
+        let acquired = pool.acquire().await;
         let mut connection = acquired.map_err(|error| Failure::Postgres(error).during(doing))?;
         let result = match tokio::time::timeout(OPERATION_TIMEOUT, work(&mut connection)).await {
             Ok(result) => result.map_err(|failure| failure.during(doing)),
@@ -134,6 +163,16 @@ impl Database {
         }
         result
     }
+}
+
+fn pool(connections: u32, options: &PgConnectOptions) -> PgPool {
+    PgPoolOptions::new()
+        .max_connections(connections)
+        .acquire_timeout(CONNECT_TIMEOUT)
+        .after_connect(|connection, _| {
+            async move { sqlx::query(SETTINGS).execute(connection).await.map(|_| ()) }.boxed()
+        })
+        .connect_lazy_with(options.clone())
 }
 
 const OPENING: &str = "opening the database";

@@ -5,23 +5,24 @@ mod changes;
 mod classify;
 mod copy;
 mod opening;
+mod room;
 mod sync;
 mod write_ahead_log;
 mod writer;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
-use sqlx::sqlite::SqlitePool;
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::error::{Failure, StoreError};
 use super::observations::{APPENDING, Append, ObservationRow};
-use super::query::{Connection, Query, Row, query};
+use super::query::{Connection, Purpose, Query, Row, query};
 use batch::Appending;
 use changes::Changes;
+use opening::Readers;
 use writer::{Operation, Reply, Request, Undo};
 
 pub(super) use classify::classify;
@@ -31,7 +32,8 @@ pub(super) use opening::{inspect, inspect_file, version};
 /// An open folder. Clones share the connections, the lock and the writer.
 #[derive(Clone)]
 pub(super) struct Folder {
-    readers: SqlitePool,
+    dir: PathBuf,
+    readers: Readers,
     requests: mpsc::Sender<Request>,
     changes: Arc<Changes>,
     /// The first fatal error, from whichever side met it.
@@ -40,19 +42,19 @@ pub(super) struct Folder {
 
 impl Folder {
     pub(super) async fn open(dir: &Path) -> Result<Folder, StoreError> {
-        Folder::over(opening::open(dir).await?)
+        Folder::over(dir, opening::open(dir).await?)
     }
 
     /// A folder that another process may hold, for writes that meet none of its own.
     pub(super) async fn open_beside(dir: &Path) -> Result<Folder, StoreError> {
-        Folder::over(opening::open_beside(dir).await?)
+        Folder::over(dir, opening::open_beside(dir).await?)
     }
 
-    fn over(opening::Opened { lock, writer, readers }: opening::Opened) -> Result<Folder, StoreError> {
+    fn over(dir: &Path, opening::Opened { lock, writer, readers }: opening::Opened) -> Result<Folder, StoreError> {
         let (requests, receiver) = mpsc::channel(writer::QUEUE);
         let fatal = watch::Sender::new(None);
         writer::start(writer, receiver, fatal.clone(), lock)?;
-        Ok(Folder { readers, requests, changes: Changes::new(changes::NUMBERS), fatal })
+        Ok(Folder { dir: dir.to_owned(), readers, requests, changes: Changes::new(changes::NUMBERS), fatal })
     }
 
     pub(super) async fn ping(&self) -> Result<(), StoreError> {
@@ -61,7 +63,7 @@ impl Folder {
         if self.requests.is_closed() {
             return Err(StoreError::Unavailable { doing, source: None });
         }
-        self.read(doing, query("SELECT job FROM jobs LIMIT 1")).await.map(|_| ())
+        self.read(Purpose::Probes, doing, query("SELECT job FROM jobs LIMIT 1")).await.map(|_| ())
     }
 
     pub(super) async fn until_fatal(&self) -> StoreError {
@@ -132,9 +134,14 @@ impl Folder {
     }
 
     /// Reads, and remembers a fatal failure.
-    pub(super) async fn read(&self, doing: &'static str, query: Query) -> Result<Vec<Row>, StoreError> {
+    pub(super) async fn read(
+        &self,
+        purpose: Purpose,
+        doing: &'static str,
+        query: Query,
+    ) -> Result<Vec<Row>, StoreError> {
         let reading = async {
-            let mut reader = self.readers.acquire().await.map_err(Failure::Sqlite)?;
+            let mut reader = self.readers.of_purpose(purpose).acquire().await.map_err(Failure::Sqlite)?;
             Connection::Sqlite(&mut reader).rows(query).await
         };
         let result = reading.await.map_err(|failure| failure.during(doing));

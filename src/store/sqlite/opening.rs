@@ -5,29 +5,44 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous};
+use sqlx::sqlite::{
+    SqliteAutoVacuum, SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
+};
 use sqlx::{ConnectOptions, Connection, SqliteConnection};
 
 use super::write_ahead_log;
 use crate::store::error::{Failure, StoreError};
 use crate::store::job_state::JobState;
 use crate::store::migrations;
+use crate::store::query::Purpose;
 
 pub(super) const DATABASE: &str = "ballast.sqlite";
-const LOG: &str = "ballast.sqlite-wal";
+pub(super) const LOG: &str = "ballast.sqlite-wal";
 const LOCK: &str = "ballast.lock";
 /// The first release without the reset bug of the write-ahead log.
 const OLDEST_ENGINE: [u32; 3] = [3, 51, 3];
 /// A reader waits this long for recovery after a crash, and a writer for one that adds or revokes a key.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
-/// Each read connection is a thread; reads are short.
-const READERS: u32 = 4;
+/// A log that grew beyond this, in bytes, is cut back to it once it is copied into the database.
+const LOG_KEPT: &str = "67108864";
+/// Each read connection is a thread; reads are short. Advice has most of them, and lists as few as keep a processor busy.
+const ADVICE_READERS: u32 = 4;
+const LIST_READERS: u32 = 2;
+const PROBE_READERS: u32 = 1;
 
 /// A folder, its schema up to date. It is ours where there is a lock.
 pub(super) struct Opened {
     pub lock: Option<File>,
     pub writer: SqliteConnection,
-    pub readers: SqlitePool,
+    pub readers: Readers,
+}
+
+/// The read connections, by what they are for.
+#[derive(Clone)]
+pub(super) struct Readers {
+    advice: SqlitePool,
+    lists: SqlitePool,
+    probes: SqlitePool,
 }
 
 pub(super) async fn open(dir: &Path) -> Result<Opened, StoreError> {
@@ -39,7 +54,7 @@ pub(super) async fn open(dir: &Path) -> Result<Opened, StoreError> {
     migrate(&mut writer).await?;
     end_leases(&mut writer).await?;
     empty_log(&mut writer).await?;
-    Ok(Opened { lock: Some(lock), writer, readers: readers(&file) })
+    Ok(Opened { lock: Some(lock), writer, readers: Readers::of(&file) })
 }
 
 /// As [`open`], without holding the folder and without touching what its holder does. The lock is needed only to bring
@@ -57,7 +72,7 @@ pub(super) async fn open_beside(dir: &Path) -> Result<Opened, StoreError> {
     }
     let mut writer = connect(&file).await?;
     refuse_old_engine(&mut writer).await?;
-    Ok(Opened { lock: None, writer, readers: readers(&file) })
+    Ok(Opened { lock: None, writer, readers: Readers::of(&file) })
 }
 
 /// The database of a folder, whether or not a process holds it, to be read only.
@@ -92,10 +107,34 @@ async fn is_current(file: &Path) -> Result<bool, StoreError> {
     Ok(found == migrations::newest(&migrator))
 }
 
-fn readers(file: &Path) -> SqlitePool {
+impl Readers {
+    fn of(file: &Path) -> Readers {
+        Readers {
+            advice: readers(file, ADVICE_READERS),
+            lists: readers(file, LIST_READERS),
+            probes: readers(file, PROBE_READERS),
+        }
+    }
+
+    pub(super) fn of_purpose(&self, purpose: Purpose) -> &SqlitePool {
+        match purpose {
+            Purpose::Advice => &self.advice,
+            Purpose::Lists => &self.lists,
+            Purpose::Probes => &self.probes,
+        }
+    }
+
+    pub(super) async fn close(&self) {
+        for readers in [&self.advice, &self.lists, &self.probes] {
+            readers.close().await;
+        }
+    }
+}
+
+fn readers(file: &Path, connections: u32) -> SqlitePool {
     let options = SqliteConnectOptions::new().filename(file).read_only(true).busy_timeout(BUSY_TIMEOUT);
     SqlitePoolOptions::new()
-        .max_connections(READERS)
+        .max_connections(connections)
         .acquire_timeout(BUSY_TIMEOUT)
         .test_before_acquire(false)
         .connect_lazy_with(options.disable_statement_logging())
@@ -150,6 +189,9 @@ pub(super) async fn connect(file: &Path) -> Result<SqliteConnection, StoreError>
     let options = SqliteConnectOptions::new()
         .filename(file)
         .create_if_missing(true)
+        // Takes effect in a new file only.
+        .auto_vacuum(SqliteAutoVacuum::Incremental)
+        .pragma("journal_size_limit", LOG_KEPT)
         .journal_mode(SqliteJournalMode::Wal)
         .synchronous(SqliteSynchronous::Full)
         .foreign_keys(true)

@@ -92,6 +92,10 @@ class InUse(ProblemError, slug="in-use"):
     """Sessions live by the policy."""
 
 
+class JobNotEnded(ProblemError, slug="job-not-ended"):
+    """The job is queued or runs: cancel it before it is deleted."""
+
+
 class IdempotencyConflict(ProblemError, slug="idempotency-conflict"):
     """The idempotency key was used with another body."""
 
@@ -110,6 +114,14 @@ class SessionCompleted(ProblemError, slug="session-completed"):
 
 class BodyTooLarge(ProblemError, slug="body-too-large"):
     """The body is larger than the service takes."""
+
+
+class QuotaExceeded(ProblemError, slug="quota-exceeded"):
+    """The tenant keeps as much as it may; ``rule`` says how much that is and what to delete."""
+
+
+class QueueFull(ProblemError, slug="queue-full"):
+    """The tenant has as many jobs queued as it may, and still did at the last of the repetitions."""
 
 
 class TooManyRequests(ProblemError, slug="too-many-requests"):

@@ -46,8 +46,15 @@ class Job:
 
     def cancel(self) -> wire.Job:
         """Asks the job to stop, which it does within a second; a job that has ended stays as it is."""
-        self.job = self._transport.json("DELETE", self._path)
+        self.job = self._transport.json("POST", f"{self._path}/cancel")
         return self.job
+
+    def delete(self) -> None:
+        """Deletes a job that has ended, its report and its idempotency key; a policy that it made stays.
+
+        Raises :class:`JobNotEnded` while it is queued or runs, and :class:`NotFound` where there is none.
+        """
+        self._transport.call("DELETE", self._path)
 
     def events(self) -> Iterator[wire.Job]:
         """The job now, then at every change of it, up to its end. A stream that breaks is taken up where it was."""

@@ -6,7 +6,6 @@ CREATE TABLE jobs (
     tenant           TEXT NOT NULL,
     kind             TEXT NOT NULL,
     state            TEXT NOT NULL CHECK (state IN ('queued', 'running', 'succeeded', 'failed', 'cancelled')),
-    request_json     TEXT NOT NULL,
     steps_total      BIGINT NOT NULL,
     steps_done       BIGINT NOT NULL DEFAULT 0,
     cancel_requested BOOLEAN NOT NULL DEFAULT FALSE,
@@ -17,7 +16,6 @@ CREATE TABLE jobs (
     lease_until_ms   BIGINT,
     -- No foreign key: a terminal job keeps the name of a policy deleted since.
     policy           TEXT,
-    report_json      TEXT,
     error            TEXT,
     created_ms       BIGINT NOT NULL,
     started_ms       BIGINT,
@@ -26,6 +24,35 @@ CREATE TABLE jobs (
 
 CREATE INDEX jobs_by_state ON jobs (state, sequence);
 CREATE INDEX jobs_by_tenant ON jobs (tenant, sequence);
+CREATE INDEX jobs_in_turn ON jobs (tenant, state, sequence);
+CREATE INDEX jobs_by_end ON jobs (finished_ms) WHERE finished_ms IS NOT NULL;
+
+-- What may hold megabytes stands apart from the jobs: neither a list nor a renewed lease reads or rewrites it.
+-- A request goes when its job ends.
+CREATE TABLE job_requests (
+    job  TEXT PRIMARY KEY REFERENCES jobs (job) ON DELETE CASCADE,
+    json TEXT NOT NULL
+);
+
+CREATE TABLE job_reports (
+    job  TEXT PRIMARY KEY REFERENCES jobs (job) ON DELETE CASCADE,
+    json TEXT NOT NULL
+);
+
+-- The last turn of each tenant that ever queued a job: the lowest is the next.
+CREATE TABLE turns (
+    tenant TEXT PRIMARY KEY,
+    turn   BIGINT NOT NULL
+);
+
+CREATE INDEX turns_in_order ON turns (turn, tenant);
+
+-- What each tenant keeps, as its rows sum to.
+CREATE TABLE usage (
+    tenant   TEXT PRIMARY KEY,
+    sessions BIGINT NOT NULL,
+    bytes    BIGINT NOT NULL
+);
 
 CREATE TABLE checkpoints (
     job   TEXT NOT NULL REFERENCES jobs (job) ON DELETE CASCADE,

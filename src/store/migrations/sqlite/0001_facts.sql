@@ -7,7 +7,6 @@ CREATE TABLE jobs (
     tenant           TEXT NOT NULL,
     kind             TEXT NOT NULL,
     state            TEXT NOT NULL CHECK (state IN ('queued', 'running', 'succeeded', 'failed', 'cancelled')),
-    request_json     TEXT NOT NULL,
     steps_total      INTEGER NOT NULL,
     steps_done       INTEGER NOT NULL DEFAULT 0,
     cancel_requested INTEGER NOT NULL DEFAULT 0,
@@ -18,7 +17,6 @@ CREATE TABLE jobs (
     lease_until_ms   INTEGER,
     -- No foreign key: a terminal job keeps the name of a policy deleted since.
     policy           TEXT,
-    report_json      TEXT,
     error            TEXT,
     created_ms       INTEGER NOT NULL,
     started_ms       INTEGER,
@@ -27,6 +25,35 @@ CREATE TABLE jobs (
 
 CREATE INDEX jobs_by_state ON jobs (state, sequence);
 CREATE INDEX jobs_by_tenant ON jobs (tenant, sequence);
+CREATE INDEX jobs_in_turn ON jobs (tenant, state, sequence);
+CREATE INDEX jobs_by_end ON jobs (finished_ms) WHERE finished_ms IS NOT NULL;
+
+-- What may hold megabytes stands apart from the jobs: neither a list nor a renewed lease reads or rewrites it.
+-- A request goes when its job ends.
+CREATE TABLE job_requests (
+    job  TEXT PRIMARY KEY REFERENCES jobs (job) ON DELETE CASCADE,
+    json TEXT NOT NULL
+) STRICT;
+
+CREATE TABLE job_reports (
+    job  TEXT PRIMARY KEY REFERENCES jobs (job) ON DELETE CASCADE,
+    json TEXT NOT NULL
+) STRICT;
+
+-- The last turn of each tenant that ever queued a job: the lowest is the next.
+CREATE TABLE turns (
+    tenant TEXT PRIMARY KEY,
+    turn   INTEGER NOT NULL
+) STRICT, WITHOUT ROWID;
+
+CREATE INDEX turns_in_order ON turns (turn, tenant);
+
+-- What each tenant keeps, as its rows sum to.
+CREATE TABLE usage (
+    tenant   TEXT PRIMARY KEY,
+    sessions INTEGER NOT NULL,
+    bytes    INTEGER NOT NULL
+) STRICT, WITHOUT ROWID;
 
 CREATE TABLE checkpoints (
     job   TEXT NOT NULL REFERENCES jobs (job) ON DELETE CASCADE,

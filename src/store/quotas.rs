@@ -1,0 +1,133 @@
+//! How much a tenant may keep: jobs queued, sessions, bytes.
+//!
+//! What a tenant keeps is a row of totals, changed in the transaction that changes what they are the totals of, as its last
+//! statement: whoever waits for the row waits for a commit and no more. Queued jobs are counted where they stand, up to
+//! the quota.
+//!
+//! Bytes are those of requests, reports, policies and histories, and [`ROW_BYTES`] for each job, policy and session. A
+//! session takes the room of all its observations when it is opened: no return that an investor reports is ever refused
+//! for a quota, nor is what a worker finished. Checkpoints are not counted; they go with the end of their job.
+//!
+//! Checked by: `tests/quotas.rs`, `tests/store_model.rs`.
+
+use super::codec::to_sql;
+use super::error::{Failure, OverQuota, Quota};
+use super::job_state::JobState;
+use super::query::{Connection, query};
+use super::tenant::Tenant;
+use super::{Store, StoreError};
+
+/// What a row of jobs, policies or sessions takes with its index entries, beside what is counted by its length.
+pub(super) const ROW_BYTES: i64 = 1024;
+/// What one observation takes with its answer, its seal and its index entry, measured over SQLite.
+pub(super) const OBSERVATION_BYTES: i64 = 1024;
+
+/// What every tenant may keep; 0: any number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Quotas {
+    pub queued_jobs: u32,
+    pub sessions: u32,
+    pub bytes: u64,
+}
+
+impl Quotas {
+    pub(super) const NONE: Quotas = Quotas { queued_jobs: 0, sessions: 0, bytes: 0 };
+}
+
+impl Default for Quotas {
+    /// Far above what a tenant needs: they stop loops gone wild, not users.
+    fn default() -> Self {
+        Quotas { queued_jobs: 1_000, sessions: 1_000_000, bytes: 100 << 30 }
+    }
+}
+
+/// What a tenant keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Usage {
+    pub sessions: i64,
+    pub bytes: i64,
+}
+
+impl Usage {
+    pub(super) fn of_bytes(bytes: i64) -> Self {
+        Usage { sessions: 0, bytes }
+    }
+
+    /// Of a session, with the observations it may come to have.
+    pub(super) fn of_session(history_bytes: i64, horizon: i64) -> Self {
+        let observations = horizon.saturating_mul(OBSERVATION_BYTES);
+        Usage { sessions: 1, bytes: ROW_BYTES.saturating_add(history_bytes).saturating_add(observations) }
+    }
+
+    pub(super) fn given_back(self) -> Self {
+        Usage { sessions: -self.sessions, bytes: -self.bytes }
+    }
+}
+
+impl Store {
+    /// What a tenant keeps.
+    pub async fn usage(&self, tenant: &Tenant) -> Result<Usage, StoreError> {
+        let totals = query("SELECT sessions, bytes FROM usage WHERE tenant = $1").bind(tenant.as_str());
+        self.list("reading what a tenant keeps", totals, |rows| {
+            let Some(row) = rows.first() else { return Ok(Usage::default()) };
+            Ok(Usage { sessions: row.get("sessions")?, bytes: row.get("bytes")? })
+        })
+        .await
+    }
+}
+
+/// # Errors
+/// The tenant has as many jobs queued as it may.
+pub(super) async fn admit_job(connection: &mut Connection<'_>, tenant: &Tenant, quotas: Quotas) -> Result<(), Failure> {
+    if quotas.queued_jobs == 0 {
+        return Ok(());
+    }
+    let count = query(
+        "SELECT count(*) AS queued
+         FROM (SELECT 1 AS one FROM jobs WHERE tenant = $1 AND state = $2 LIMIT $3) AS waiting",
+    );
+    let count = count.bind(tenant.as_str()).bind(JobState::Queued.as_str()).bind(i64::from(quotas.queued_jobs));
+    let queued: i64 = connection.row(count).await?.map_or(Ok(0), |row| row.get("queued"))?;
+    within(Quota::QueuedJobs, queued, 1, quotas.queued_jobs.into())
+}
+
+/// Adds to what a tenant keeps.
+///
+/// # Errors
+/// It would keep more than it may; the transaction is to be undone.
+pub(super) async fn take(
+    connection: &mut Connection<'_>,
+    tenant: &Tenant,
+    more: Usage,
+    quotas: Quotas,
+) -> Result<(), Failure> {
+    let kept = change(connection, tenant, more).await?;
+    within(Quota::Sessions, kept.sessions - more.sessions, more.sessions, quotas.sessions.into())?;
+    within(Quota::Bytes, kept.bytes - more.bytes, more.bytes, quotas.bytes)
+}
+
+/// Changes what a tenant keeps, whatever it may; what it keeps now.
+pub(super) async fn change(connection: &mut Connection<'_>, tenant: &Tenant, by: Usage) -> Result<Usage, Failure> {
+    let change = query(
+        "INSERT INTO usage (tenant, sessions, bytes) VALUES ($1, $2, $3)
+         ON CONFLICT (tenant) DO UPDATE SET sessions = usage.sessions + excluded.sessions,
+                                            bytes = usage.bytes + excluded.bytes
+         RETURNING sessions, bytes",
+    );
+    let changed = connection.row(change.bind(tenant.as_str()).bind(by.sessions).bind(by.bytes)).await?;
+    let changed = changed.ok_or_else(|| Failure::Corrupt(format!("what the tenant {tenant} keeps")))?;
+    Ok(Usage { sessions: changed.get("sessions")?, bytes: changed.get("bytes")? })
+}
+
+fn within(quota: Quota, kept: i64, wanted: i64, limit: u64) -> Result<(), Failure> {
+    let (kept, wanted) = (u64::try_from(kept).unwrap_or_default(), u64::try_from(wanted).unwrap_or_default());
+    if limit == 0 || wanted == 0 || kept.saturating_add(wanted) <= limit {
+        return Ok(());
+    }
+    Err(Failure::OverQuota(OverQuota { quota, kept, wanted, limit }))
+}
+
+/// The bytes of a text or of bytes, as totals count them.
+pub(super) fn length(bytes: &[u8]) -> i64 {
+    to_sql(bytes.len())
+}

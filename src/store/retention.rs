@@ -1,0 +1,110 @@
+//! What is kept no longer: ended jobs, deleted by their tenant or by age, and the room that deleted things leave.
+//!
+//! A job goes with its report and its idempotency key: a key is good for as long as its job is there. What a job made, a
+//! policy, stays. A job that has not ended is not deleted but cancelled.
+
+use futures_util::FutureExt;
+
+use super::audit::{self, Actor, Deed};
+use super::codec::to_sql;
+use super::error::Failure;
+use super::job::JobRow;
+use super::jobs::find;
+use super::query::{Connection, query};
+use super::quotas::{self, ROW_BYTES, Usage};
+use super::tenant::Tenant;
+use super::{Engine, Store, StoreError};
+
+/// What became of a request to delete a job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DeleteJob {
+    Deleted,
+    /// The tenant has no such job.
+    Absent,
+    /// It is queued or runs; it stays.
+    NotEnded,
+}
+
+/// The room a store takes, in bytes, as far as the engine tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Room {
+    /// Of the database.
+    pub database: u64,
+    /// Of its pages that hold nothing.
+    pub free: Option<u64>,
+    /// Of the write-ahead log.
+    pub log: Option<u64>,
+    /// Of what the file system has left.
+    pub disk_left: Option<u64>,
+}
+
+impl Store {
+    /// Deletes an ended job of a tenant, its report and its idempotency key.
+    pub async fn delete_job(&self, tenant: &Tenant, job: &str) -> Result<DeleteJob, StoreError> {
+        let (tenant, job, actor) = (tenant.clone(), job.to_owned(), self.actor.clone());
+        self.write("deleting a job", move |connection| delete(connection, tenant, job, actor).boxed()).await
+    }
+
+    /// Deletes jobs that ended before `ended_before_ms`, at most `limit` of them, oldest first; how many.
+    pub async fn expire_jobs(&self, ended_before_ms: i64, limit: usize) -> Result<usize, StoreError> {
+        self.write("deleting old jobs", move |connection| expire(connection, ended_before_ms, limit).boxed()).await
+    }
+
+    /// The room it takes.
+    pub async fn room(&self) -> Result<Room, StoreError> {
+        match &self.engine {
+            Engine::Sqlite(folder) => folder.room().await,
+            Engine::Postgres(database) => {
+                Ok(Room { database: database.size().await?, free: None, log: None, disk_left: None })
+            }
+        }
+    }
+
+    /// Gives at most `pages` free pages back to the file system; the file is that much smaller once the log is copied into
+    /// it. PostgreSQL does so by itself.
+    pub async fn give_back_pages(&self, pages: u32) -> Result<(), StoreError> {
+        match &self.engine {
+            Engine::Sqlite(folder) => folder.give_back_pages(pages).await,
+            Engine::Postgres(_) => Ok(()),
+        }
+    }
+}
+
+async fn delete(
+    mut connection: Connection<'_>,
+    tenant: Tenant,
+    job: String,
+    actor: Actor,
+) -> Result<DeleteJob, Failure> {
+    let connection = &mut connection;
+    let row = match find(connection, &job).await?.filter(|row| row.tenant == tenant) {
+        None => return Ok(DeleteJob::Absent),
+        Some(row) if !row.state.is_terminal() => return Ok(DeleteJob::NotEnded),
+        Some(row) => row,
+    };
+    remove(connection, &row).await?;
+    let outcome = format!("deleted, {}", row.state.as_str());
+    audit::record(connection, &actor, &tenant, Deed::DeleteJob, &job, &outcome).await?;
+    Ok(DeleteJob::Deleted)
+}
+
+/// By tenant, so that two who expire jobs at the same moment wait for each other's totals in the same order.
+async fn expire(mut connection: Connection<'_>, before_ms: i64, limit: usize) -> Result<usize, Failure> {
+    let ended = query("SELECT * FROM jobs WHERE finished_ms < $1 ORDER BY finished_ms LIMIT $2");
+    let ended = connection.rows(ended.bind(before_ms).bind(to_sql(limit)).for_update_of_free()).await?;
+    let mut ended: Vec<_> = ended.iter().map(JobRow::from_row).collect::<Result<_, _>>()?;
+    ended.sort_by(|one, other| one.tenant.as_str().cmp(other.tenant.as_str()));
+    for row in &ended {
+        remove(&mut connection, row).await?;
+    }
+    Ok(ended.len())
+}
+
+async fn remove(connection: &mut Connection<'_>, row: &JobRow) -> Result<(), Failure> {
+    let job = row.job.as_str();
+    let report = query("DELETE FROM job_reports WHERE job = $1 RETURNING CAST(octet_length(json) AS BIGINT) AS bytes");
+    let report = connection.row(report.bind(job)).await?;
+    let bytes: i64 = report.map_or(Ok(0), |row| row.get("bytes"))?;
+    connection.execute(query("DELETE FROM jobs WHERE job = $1").bind(job)).await?;
+    quotas::change(connection, &row.tenant, Usage::of_bytes(ROW_BYTES + bytes).given_back()).await.map(drop)
+}
