@@ -12,8 +12,10 @@
 
 #![forbid(unsafe_code)]
 
+#[deny(missing_docs)]
 pub mod control;
 pub mod http;
+#[deny(missing_docs)]
 pub mod numerics;
 pub mod report;
 pub mod service;

@@ -29,8 +29,8 @@ const CIRCLES: [(&str, &str); 5] = [
     ("http/access.rs http/extract.rs", "the gate apart from its table, what it leaves in a request below both"),
     ("http/dashboard.rs http/operations.rs http/router.rs", "the description as a value that the router sets once"),
     (
-        "store/codec.rs store/error.rs store/migrations.rs store/observations.rs store/policies.rs store/postgres/mod.rs \
-         store/query.rs store/sessions.rs store/sqlite/mod.rs",
+        "store/audit.rs store/codec.rs store/error.rs store/idempotency.rs store/migrations.rs store/observations.rs \
+         store/policies.rs store/postgres/mod.rs store/query.rs store/sessions.rs store/sqlite/mod.rs",
         "a neutral cause in the error, found where the engine's error is met",
     ),
     ("store/sqlite/batch.rs store/sqlite/writer.rs", "operations in a file below both"),

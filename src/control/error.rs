@@ -15,6 +15,7 @@ pub struct FieldError {
 }
 
 impl FieldError {
+    /// A field named as in the request, its value, and the rule as a sentence without its subject.
     pub fn new(field: impl Into<String>, value: impl std::fmt::Display, rule: impl Into<String>) -> Self {
         FieldError { field: field.into(), value: value.to_string(), rule: rule.into() }
     }
@@ -23,26 +24,45 @@ impl FieldError {
 /// Why a training could not go on.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum TrainError {
+    /// The request breaks a rule.
     #[error(transparent)]
     Specification(#[from] FieldError),
     /// The stop signal was raised.
     #[error("stopped on request")]
     Stopped,
+    /// No diagonal made the covariance matrix of a surrogate positive definite.
     #[error("step {step}: the covariance matrix of the {surrogate} surrogate is singular even with jitter {jitter:e}")]
-    Singular { step: usize, surrogate: &'static str, jitter: f64 },
+    Singular {
+        /// The step being fitted.
+        step: usize,
+        /// `value` or `policy`.
+        surrogate: &'static str,
+        /// The last one tried, in squared units of the scaled target.
+        jitter: f64,
+    },
+    /// A robust step has no finite solution.
     #[error(
         "step {step}, design point {point}: the robust step gave the gain {gain} for the action {action}: not both finite"
     )]
-    NotFinite { step: usize, point: usize, gain: f64, action: f64 },
+    NotFinite {
+        /// The step being solved.
+        step: usize,
+        /// Its design point.
+        point: usize,
+        /// Log certainty equivalent over the floor.
+        gain: f64,
+        /// The policy's target.
+        action: f64,
+    },
 }
 
 /// Why stored or imported policy bytes are not a policy.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum PolicyError {
+    /// The bytes are not a document of the format; what the parser said.
     #[error("the policy is not valid JSON of its format: {0}")]
     Format(String),
+    /// A part of the document breaks a rule.
     #[error(transparent)]
     Field(#[from] FieldError),
-    #[error("a policy surrogate's covariance matrix cannot be factorised at step {step}")]
-    Singular { step: usize },
 }

@@ -60,6 +60,7 @@ impl Estimate {
         self
     }
 
+    /// Bytes in all.
     pub fn bytes(&self) -> usize {
         self.parts.iter().fold(0, |sum, part| sum.saturating_add(part.bytes))
     }

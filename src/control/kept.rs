@@ -24,7 +24,14 @@ const PROVEN_SHARE: f64 = 0.5;
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Key {
     /// Simulated paths of Brownian bridges.
-    Bridges { sample_size: usize, paths: usize, seed: u64 },
+    Bridges {
+        /// Of the laws they are for; all large sizes share one.
+        sample_size: usize,
+        /// How many.
+        paths: usize,
+        /// Of the specification.
+        seed: u64,
+    },
     /// The factor behind a predicted deviation, by the hash of what it is made of.
     Factor([u8; 32]),
     /// A prepared policy, by the name its owner knows it under.
@@ -45,12 +52,16 @@ impl Key {
 /// The parts of what is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Part {
+    /// Simulated paths.
     Bridges,
+    /// Factors behind predicted deviations.
     Factors,
+    /// Prepared policies.
     Policies,
 }
 
 impl Part {
+    /// Every part.
     pub const ALL: [Part; 3] = [Part::Bridges, Part::Factors, Part::Policies];
 }
 
@@ -168,6 +179,7 @@ impl Kept {
         Ok(Arc::new(prepare.await?))
     }
 
+    /// Drops what is kept under the key, if anything is.
     pub fn forget(&self, key: &Key) {
         self.0.things.remove(key);
     }

@@ -55,11 +55,13 @@ pub use policy::{what_if, worst_case};
 pub use problem::{state, utility};
 pub use request::{framework, rules, specification};
 
+/// Advice and who gives it.
 pub mod advisor {
     pub use super::policy::advice::{Advice, AdviceSource, Uncertainty};
     pub use super::policy::advisor::{AdviceMode, Advisor};
 }
 
+/// Training and what it tells.
 pub mod backward {
     pub use super::progress::{Phase, StepProgress, Watch};
     pub use super::solved_step::StepSolution;

@@ -6,6 +6,7 @@ use thiserror::Error;
 /// A pool of threads; work installed on it is spread over them.
 pub struct TrainingPool(rayon::ThreadPool);
 
+/// The threads could not be started.
 #[derive(Debug, Error)]
 #[error("starting {threads} training threads")]
 pub struct PoolError {

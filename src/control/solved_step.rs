@@ -12,8 +12,11 @@ pub const FORMAT: &str = "ballast-policy-1";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepSolution {
+    /// Periods observed before it.
     pub step: usize,
+    /// What it answers with.
     pub solution: Solution,
+    /// How well it was solved.
     pub diagnostics: StepDiagnostics,
 }
 
@@ -21,7 +24,9 @@ pub struct StepSolution {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StepDiagnostics {
+    /// Periods observed before it.
     pub step: usize,
+    /// Design points solved.
     pub design_count: usize,
     /// Share of the design points at which the robust allocation is zero.
     pub all_bank_share: f64,
@@ -48,6 +53,7 @@ pub struct SurrogateDiagnostics {
     pub signal_variance: f64,
     /// In units of the target's variance over the design.
     pub noise_variance: f64,
+    /// Of the scaled targets, at the hyperparameters found.
     pub log_likelihood_per_point: f64,
     /// Root mean square of the leave-one-out errors, in the target's own unit.
     pub leave_one_out_error: f64,

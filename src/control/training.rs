@@ -72,21 +72,21 @@ impl Training {
     ) -> Result<StepSolution, TrainError> {
         let next = NextValue::new(&self.problem.specification, step + 1, after.map(|after| &after.solution));
         let bellman = BellmanStep { problem: &self.problem, step, next: &next };
-        let crew = Crew { bellman, design: &self.design, watch };
+        let solver = DesignSolver { bellman, design: &self.design, watch };
         let count = self.design.count(step);
         if count == 1 {
-            let only = crew.solve_point(0, self.problem.features(&self.design.state(step, 0)))?;
-            crew.report(1, 1);
+            let only = solver.solve_point(0, self.problem.features(&self.design.state(step, 0)))?;
+            solver.report(1, 1);
             let solution = Solution::Single(SingleSolution { floor_gain: only.floor_gain, action: only.action });
             return Ok(StepSolution { step, solution, diagnostics: diagnostics(step, &[only]) });
         }
-        let candidates = crew.features(0..self.design.candidate_count(step))?;
+        let candidates = solver.features(0..self.design.candidate_count(step))?;
         let scaling = Scaling::of(&candidates);
         let names = self.problem.selection.names();
         let specification = &self.problem.specification;
         let fitting = Fitting { specification, names: &names, step, scaling: &scaling, watch };
         let as_drawn: Vec<usize> = (0..self.design.as_drawn_count(step)).collect();
-        let mut solved = crew.solve(&as_drawn, &candidates, Vec::new())?;
+        let mut solved = solver.solve(&as_drawn, &candidates, Vec::new())?;
         let start = match after.and_then(|after| fitting.start_from(&after.solution)) {
             Some(start) => start,
             None => fitting.coarse(&solved)?,
@@ -95,9 +95,9 @@ impl Training {
             let inputs: Vec<Vec<f64>> = candidates.iter().map(|features| scaling.apply(features)).collect();
             let weights = fitting.weights(&solved, &start.value, &inputs)?;
             let chosen = farthest_points(&inputs, &start.value.lengthscales, &weights, as_drawn.len(), count);
-            solved = crew.solve(&chosen[as_drawn.len()..], &candidates, solved)?;
+            solved = solver.solve(&chosen[as_drawn.len()..], &candidates, solved)?;
         }
-        let guards = crew.features(self.design.guards(step))?;
+        let guards = solver.features(self.design.guards(step))?;
         let mut diagnostics = diagnostics(step, &solved);
         let solution = fitting.surrogates(&solved, &start, &guards, &mut diagnostics)?;
         Ok(StepSolution { step, solution, diagnostics })
@@ -124,13 +124,13 @@ impl Training {
 }
 
 /// What it takes to solve design points of one step.
-struct Crew<'a> {
+struct DesignSolver<'a> {
     bellman: BellmanStep<'a>,
     design: &'a Design,
     watch: &'a Watch<'a>,
 }
 
-impl Crew<'_> {
+impl DesignSolver<'_> {
     /// The unscaled features of some states.
     fn features(&self, states: Range<usize>) -> Result<Vec<Features>, TrainError> {
         let features = |index| {

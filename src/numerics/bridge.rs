@@ -27,7 +27,9 @@ pub enum Statistic {
 /// A simulated quantile and the standard error of its simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantile {
+    /// In the unit of the law's values.
     pub value: f64,
+    /// Of the simulation alone, in the same unit.
     pub standard_error: f64,
 }
 

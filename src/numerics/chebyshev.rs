@@ -21,6 +21,7 @@ impl Chebyshev {
         Chebyshev { nodes, weights }
     }
 
+    /// Where values are wanted, ascending, in [0, 1].
     pub fn nodes(&self) -> &[f64] {
         &self.nodes
     }

@@ -128,11 +128,6 @@ impl Cholesky {
     pub fn log_determinant(&self) -> f64 {
         2.0 * self.lower.diagonal().iter().map(|pivot| pivot.ln()).sum::<f64>()
     }
-
-    /// Number of rows, n.
-    pub fn order(&self) -> usize {
-        self.lower.nrows()
-    }
 }
 
 /// Overwrites the lower triangle of a column-major matrix with its factor; `None` at a pivot that is not positive.

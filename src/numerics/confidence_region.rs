@@ -30,14 +30,18 @@ const RADIUS_STEP: f64 = 1e-3;
 /// A normal law, or the point mass at the mean where the variance is 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NormalLaw {
+    /// mu.
     pub mean: f64,
+    /// s2, at least 0.
     pub variance: f64,
 }
 
 /// The law of a region under which a payoff is expected to be least.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorstNormal {
+    /// The law itself.
     pub law: NormalLaw,
+    /// Of the payoff under it.
     pub expectation: f64,
     /// Where on the boundary: an angle of [`ConfidenceRegion::at`].
     pub angle: f64,

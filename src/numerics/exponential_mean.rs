@@ -19,7 +19,9 @@ pub struct ExponentialMean<'a> {
 /// Mean and variance of e^Z under the law with the worst mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorstExponential {
+    /// Of e^Z.
     pub mean: f64,
+    /// Of e^Z.
     pub variance: f64,
 }
 

@@ -16,8 +16,11 @@ use super::matern;
 /// The scales of a Gaussian process: l_i in the units of input i, s2 and noise in the units of the target squared.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Hyperparameters {
+    /// One a dimension, in the inputs' units.
     pub lengthscales: Vec<f64>,
+    /// s2, in squared units of the targets.
     pub signal_variance: f64,
+    /// Added to the diagonal, in squared units of the targets.
     pub noise_variance: f64,
 }
 
@@ -206,10 +209,6 @@ impl GaussianProcess {
     /// Amount added to the diagonal beyond the noise to make the matrix factor, in the units of the target squared.
     pub fn jitter(&self) -> f64 {
         self.jitter
-    }
-
-    pub fn hyperparameters(&self) -> &Hyperparameters {
-        &self.hyper
     }
 
     /// The part that evaluates means, which is all that a stored process needs.

@@ -30,14 +30,18 @@ const LONGEST_START: f64 = 30.0;
 /// Least and greatest value of each scale; both positive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bounds {
+    /// Lower and upper bound of every length scale.
     pub lengthscale: [f64; 2],
+    /// Lower and upper bound.
     pub signal_variance: [f64; 2],
+    /// Lower and upper bound.
     pub noise_variance: [f64; 2],
 }
 
 /// The most likely scales found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
+    /// The best found.
     pub hyperparameters: Hyperparameters,
     /// ln p(targets) over all rows.
     pub log_likelihood: f64,
@@ -50,8 +54,10 @@ pub struct Fit {
 /// Why there are no scales.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum FitError {
+    /// No jitter made the covariance matrix factor.
     #[error(transparent)]
     Singular(#[from] Singular),
+    /// The stop signal was raised.
     #[error("the search was asked to stop")]
     Stopped,
 }

@@ -11,7 +11,14 @@ pub enum ContinuousLaw {
     /// Components (weight, mean, standard deviation); weights sum to 1.
     GaussianMixture(Vec<(f64, f64, f64)>),
     /// Location, scale, degrees of freedom.
-    StudentT { location: f64, scale: f64, degrees_of_freedom: f64 },
+    StudentT {
+        /// The mean.
+        location: f64,
+        /// What a standard t variable is multiplied by.
+        scale: f64,
+        /// Above 2.
+        degrees_of_freedom: f64,
+    },
 }
 
 /// Nodes of a standard normal component: the trapezoidal rule of step 1/4 on [-8, 8] is exact to rounding

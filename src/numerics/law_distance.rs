@@ -16,6 +16,7 @@ use super::law::ContinuousLaw;
 /// A value, and where the law puts it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placed {
+    /// The value itself.
     pub value: f64,
     /// F(value).
     share: f64,

@@ -31,10 +31,13 @@ pub enum SearchOutcome {
 /// The best point a search evaluated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Minimum {
+    /// The best point found.
     pub point: Vec<f64>,
+    /// The function there.
     pub value: f64,
     /// Calls of the objective.
     pub evaluations: usize,
+    /// How the search ended.
     pub outcome: SearchOutcome,
 }
 

@@ -55,6 +55,7 @@ impl CentralMoments {
         CentralMoments { size, mean: self.mean + shift, sums }
     }
 
+    /// m, in the unit of the values.
     pub fn mean(&self) -> f64 {
         self.mean
     }

@@ -24,8 +24,11 @@ pub fn interpolated_quantile(sorted: &[f64], share: f64) -> f64 {
 /// A figure and the interval around it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Estimate {
+    /// The estimate itself.
     pub value: f64,
+    /// Lower end of its interval.
     pub low: f64,
+    /// Upper end of its interval.
     pub high: f64,
 }
 

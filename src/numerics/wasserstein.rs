@@ -13,16 +13,22 @@
 /// A ball around a discrete law: `masses[k]` sits at `support[k]` (ascending, distinct), the masses sum to 1.
 #[derive(Debug, Clone, Copy)]
 pub struct WassersteinBall<'a> {
+    /// s_k, ascending and distinct.
     pub support: &'a [f64],
+    /// p_k, which sum to 1.
     pub masses: &'a [f64],
+    /// In the unit of the support, at least 0.
     pub radius: f64,
 }
 
 /// Mass moved from one support point to another (or kept, where they are equal); indices into the support.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Move {
+    /// Where the mass was.
     pub from: usize,
+    /// Where it is put.
     pub to: usize,
+    /// How much.
     pub mass: f64,
 }
 
@@ -35,6 +41,7 @@ pub struct WorstLaw {
     pub dual: f64,
     /// Lagrange multiplier of the radius, at least 0.
     pub multiplier: f64,
+    /// That make the law out of the ball's own.
     pub moves: Vec<Move>,
 }
 

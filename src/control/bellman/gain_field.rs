@@ -49,10 +49,12 @@ impl<'a> GainField<'a> {
         &self.returns
     }
 
+    /// The utility relative to the floor of the state.
     pub fn utility(&self) -> RelativeUtility {
         self.utility
     }
 
+    /// Bank return per step.
     pub fn rate_per_step(&self) -> f64 {
         self.problem.specification.problem.rate_per_step
     }

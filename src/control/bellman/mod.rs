@@ -35,6 +35,7 @@ const WINDOW_GROWTHS: usize = 4;
 /// The robust step at every state of one step.
 #[derive(Clone, Copy)]
 pub struct BellmanStep<'a> {
+    /// What is solved.
     pub problem: &'a Problem,
     /// Periods observed before it.
     pub step: usize,

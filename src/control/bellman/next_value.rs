@@ -14,6 +14,7 @@ pub enum NextValue {
     Terminal,
     /// The same floor gain everywhere.
     Constant(f64),
+    /// The clamped prediction of the step's value surrogate.
     Surrogate(Box<ValueSurrogate>),
     /// The floor gain itself, however it is known: what a surrogate is measured against.
     Exact(Box<dyn Fn(&State) -> f64 + Send + Sync>),

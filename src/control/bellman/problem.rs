@@ -22,8 +22,11 @@ const NO_BALL: Radii = Radii { radius: 0.0, radius_ahead: 0.0 };
 
 /// The problem of a completed specification.
 pub struct Problem {
+    /// As completed.
     pub specification: Specification,
+    /// Radii of its uncertainty sets.
     pub sets: RadiusEstimator,
+    /// What of a state the surrogates see.
     pub selection: FeatureSelection,
     /// The uncertainty set of every state, where nothing is learned; computed once.
     frozen: OnceLock<Frozen>,
@@ -35,6 +38,7 @@ struct Frozen {
 }
 
 impl Problem {
+    /// Of a completed specification.
     pub fn new(specification: &Specification) -> Self {
         Problem::with(specification, Kept::default())
     }

@@ -27,9 +27,19 @@ pub struct RobustSolution {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Adversary {
     /// Of a ball: the centre's masses moved about a support of log-returns, ascending.
-    Transport { support: Vec<f64>, moves: Vec<Move> },
+    Transport {
+        /// Log-returns, ascending.
+        support: Vec<f64>,
+        /// By indices into the support.
+        moves: Vec<Move>,
+    },
     /// Of a confidence region, around its estimate.
-    Normal { worst: NormalLaw, estimate: NormalLaw },
+    Normal {
+        /// The law itself, of log-returns.
+        worst: NormalLaw,
+        /// The middle of the region.
+        estimate: NormalLaw,
+    },
 }
 
 /// The worst expectation of relative utility under one action, with its law.

@@ -67,13 +67,16 @@ pub fn yearly_certainty_equivalent(kind: UtilitySpecification, growth: &[f64], w
 /// are arithmetic, deviations grow with the root of time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Annual {
+    /// Of simple returns, per year.
     pub mean: f64,
+    /// Standard deviation of simple returns, per root of a year.
     pub volatility: f64,
     /// Mean excess over the bank by its deviation; 0 where nothing exceeds the bank, ever.
     pub sharpe_ratio: f64,
 }
 
 impl Annual {
+    /// From simple returns of the strategy and of the bank, period by period.
     pub fn of(returns: &[f64], bank: &[f64], periods_per_year: f64) -> Self {
         let excess: Vec<f64> = returns.iter().zip(bank).map(|(ours, bank)| ours - bank).collect();
         let (mean, deviation) = mean_and_deviation(returns);

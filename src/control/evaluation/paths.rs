@@ -29,7 +29,9 @@ const REPORTS: usize = 100;
 
 /// A prepared comparison: the completed request, the true law, the initial histories.
 pub struct Evaluation {
+    /// As completed.
     pub request: EvaluationRequest,
+    /// The log-returns that each group of paths starts from.
     pub histories: Vec<Vec<f64>>,
     law: ContinuousLaw,
     kept: Kept,
@@ -38,25 +40,31 @@ pub struct Evaluation {
 /// One step of one path as a framework lived it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lived {
+    /// Share of wealth held in the risky asset.
     pub allocation: f64,
+    /// Of the uncertainty set, in the unit of an advice's radius.
     pub radius: f64,
     /// Distance of the centre of its ball to the true law.
     pub distance: f64,
+    /// Whether the advice was solved anew.
     pub resolved: bool,
 }
 
 /// One path: terminal wealth of every strategy, and every step of every framework, framework by framework.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
+    /// Terminal wealth, strategy by strategy: frameworks, then constant mixes.
     pub wealth: Vec<f64>,
+    /// Framework by framework, each step by step.
     pub lived: Vec<Lived>,
 }
 
 /// Where the paths of one history start.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Start {
+pub struct HistoryStart {
     /// The bridge quantile there, under that radius rule.
     pub quantile: Option<f64>,
+    /// Of the first framework with a ball, in log-return; 0 where there is none.
     pub radius: f64,
     /// Certainty equivalent of each framework's first advice.
     pub promised: Vec<f64>,
@@ -65,7 +73,9 @@ pub struct Start {
 /// Everything simulated: `outcomes` holds the paths of the first history, then those of the second, and so on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcomes {
-    pub starts: Vec<Start>,
+    /// History by history.
+    pub starts: Vec<HistoryStart>,
+    /// Path by path, history by history.
     pub outcomes: Vec<Outcome>,
     /// Seconds spent on re-solved steps; all else is the same for the same request.
     pub resolve_seconds: f64,
@@ -73,7 +83,9 @@ pub struct Outcomes {
 
 /// A framework and the policy that serves every history, where one does.
 pub struct Follower {
+    /// Which framework it follows.
     pub framework: Framework,
+    /// Absent where each history has a policy of its own.
     pub advisor: Option<Advisor>,
 }
 
@@ -163,9 +175,9 @@ impl Evaluation {
     ) -> Result<Outcomes, TrainError> {
         let first = self.request.problem.history.len();
         let distances = LawDistance::new(self.law.clone(), first..first + self.request.problem.horizon);
-        let crew = Crew { evaluation: self, followers, watch, clock, distances, done: AtomicUsize::new(0) };
+        let simulator = Simulator { evaluation: self, followers, watch, clock, distances, done: AtomicUsize::new(0) };
         let found: Result<Vec<_>, TrainError> =
-            (0..self.histories.len()).into_par_iter().map(|history| crew.history(history)).collect();
+            (0..self.histories.len()).into_par_iter().map(|history| simulator.history(history)).collect();
         let mut all = Outcomes { starts: Vec::new(), outcomes: Vec::new(), resolve_seconds: 0.0 };
         for (start, outcomes) in found? {
             all.starts.push(start);
@@ -190,7 +202,7 @@ pub fn drawn_history(request: &EvaluationRequest, law: &ContinuousLaw, index: us
 }
 
 /// What it takes to simulate.
-struct Crew<'a> {
+struct Simulator<'a> {
     evaluation: &'a Evaluation,
     followers: &'a [Follower],
     watch: &'a Watch<'a>,
@@ -202,8 +214,8 @@ struct Crew<'a> {
 /// The paths of one history, with the seconds each spent on re-solved steps.
 type Paths = Vec<(Outcome, f64)>;
 
-impl Crew<'_> {
-    fn history(&self, index: usize) -> Result<(Start, Paths), TrainError> {
+impl Simulator<'_> {
+    fn history(&self, index: usize) -> Result<(HistoryStart, Paths), TrainError> {
         let history = self.evaluation.histories[index].as_slice();
         let own = self.own_advisors(history)?;
         let advisors: Vec<&Advisor> = self
@@ -312,8 +324,8 @@ impl Crew<'_> {
 }
 
 /// Quantile and radius at a history, those of the first framework with a ball, and what the frameworks promise there.
-fn start(advisors: &[&Advisor], history: &[f64]) -> Result<Start, TrainError> {
-    let mut start = Start { quantile: None, radius: 0.0, promised: Vec::with_capacity(advisors.len()) };
+fn start(advisors: &[&Advisor], history: &[f64]) -> Result<HistoryStart, TrainError> {
+    let mut start = HistoryStart { quantile: None, radius: 0.0, promised: Vec::with_capacity(advisors.len()) };
     for advisor in advisors {
         let state = advisor.initial_state(Some(history), None)?;
         start.promised.push(advisor.advise(0, &state, AdviceMode::Surrogate).certainty_equivalent);

@@ -13,6 +13,7 @@ pub const FORMAT: &str = "ballast-evaluation-1";
 /// Strategies compared on common returns. `docs/evaluation.md` says where the intervals come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EvaluationReport {
+    /// `ballast-evaluation-1`.
     pub format: String,
     /// The completed request.
     pub request: EvaluationRequest,
@@ -22,14 +23,18 @@ pub struct EvaluationReport {
     pub strategies: Vec<StrategyReport>,
     /// Common bin edges of terminal utility, ascending.
     pub histogram_edges: Vec<f64>,
+    /// In the order they were drawn.
     pub histories: Vec<HistoryReport>,
+    /// What it took.
     pub costs: Costs,
 }
 
 /// What the evaluation cost; the only part that differs between two runs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Costs {
+    /// Seconds of all trainings.
     pub training_seconds: f64,
+    /// Seconds of the simulation.
     pub simulation_seconds: f64,
     /// Mean of one re-solved step; null where there was none.
     pub resolve_seconds: Option<f64>,
@@ -38,21 +43,27 @@ pub struct Costs {
 /// One strategy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StrategyReport {
+    /// `adaptive`, `mix_0.5`, `all_bank` and the like.
     pub strategy: String,
+    /// Null for constant mixes.
     pub framework: Option<Framework>,
     /// The allocation of a constant mix.
     pub constant_mix: Option<f64>,
     /// The policy followed; null for constant mixes and where each history had its own.
     pub policy: Option<String>,
+    /// Of terminal wealth.
     pub utility: UtilityReport,
     /// Terminal wealth that is worth as much for certain.
     pub certainty_equivalent: Estimate,
+    /// Terminal, in units of the initial wealth's currency.
     pub wealth: WealthReport,
     /// This strategy less the reference, on the same returns; null for the reference.
     pub difference: Option<Difference>,
     /// Counts of the bins between `histogram_edges`.
     pub histogram: Vec<usize>,
+    /// Period by period; null for constant mixes.
     pub periods: Option<Vec<PeriodReport>>,
+    /// Null where the framework has no Wasserstein ball.
     pub coverage: Option<Coverage>,
     /// Share of steps advised by solving the step anew.
     pub resolved_share: Option<f64>,
@@ -61,53 +72,72 @@ pub struct StrategyReport {
 /// Terminal utility.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct UtilityReport {
+    /// Over paths.
     pub mean: Estimate,
+    /// Over paths.
     pub variance: Estimate,
+    /// A fifth of the paths end with less.
     pub quantile_20: Estimate,
+    /// Nine tenths of the paths end with less.
     pub quantile_90: Estimate,
     /// Of the paths of one history, averaged over histories.
     pub max: Estimate,
+    /// Of the paths of one history, averaged over histories.
     pub min: Estimate,
 }
 
 /// Terminal wealth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WealthReport {
+    /// Over paths.
     pub mean: Estimate,
 }
 
 /// A paired difference to the reference.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Difference {
+    /// Of mean terminal utility.
     pub utility: Estimate,
+    /// Of the certainty equivalent, in terminal wealth.
     pub certainty_equivalent: Estimate,
 }
 
 /// One period over all paths.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct PeriodReport {
+    /// From 1.
     pub period: usize,
+    /// Returns known at its start.
     pub sample_size: usize,
+    /// Share of wealth held in the risky asset.
     pub allocation: Spread,
     /// Share of paths that held nothing in the risky asset.
     pub all_bank_share: f64,
+    /// Null where the framework has no Wasserstein ball.
     pub radius: Option<RadiusSpread>,
 }
 
 /// Mean and quantiles over paths.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Spread {
+    /// Over paths.
     pub mean: f64,
+    /// A tenth of the paths have less.
     pub quantile_10: f64,
+    /// Nine tenths of the paths have less.
     pub quantile_90: f64,
 }
 
 /// The radius over paths.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RadiusSpread {
+    /// Over paths, in log-return, as all below.
     pub mean: f64,
+    /// A tenth of the paths have less.
     pub quantile_10: f64,
+    /// The median.
     pub quantile_50: f64,
+    /// Nine tenths of the paths have less.
     pub quantile_90: f64,
     /// On the first path.
     pub first_path: f64,
@@ -118,14 +148,18 @@ pub struct RadiusSpread {
 pub struct Coverage {
     /// 1 - alpha, under a radius rule that has one.
     pub target: Option<f64>,
+    /// Ascending; one entry where the ball is frozen.
     pub by_sample_size: Vec<CoverageAtSize>,
     /// Share of paths on which some period's ball did not hold it.
     pub ever_left: Estimate,
 }
 
+/// How often the ball held the true law at one sample size.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct CoverageAtSize {
+    /// Returns known then.
     pub sample_size: usize,
+    /// Share of the paths.
     pub covered: Estimate,
 }
 
@@ -134,6 +168,7 @@ pub struct CoverageAtSize {
 pub struct HistoryReport {
     /// The bridge quantile there; null under other radius rules.
     pub quantile: Option<f64>,
+    /// Of the first framework with a ball, in log-return; 0 where there is none.
     pub radius: f64,
     /// What each framework promises there: the certainty equivalent of its first advice, by its own account.
     pub promised: Vec<f64>,

@@ -20,6 +20,7 @@ const PATHS: usize = 2000;
 /// One period of the real world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Period {
+    /// Of the risky asset.
     pub log_return: f64,
     /// Simple return of the bank.
     pub bank_return: f64,
@@ -28,15 +29,21 @@ pub struct Period {
 /// How allocations are found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Strategy {
+    /// A ball that learns, at this miscoverage.
     Adaptive {
+        /// Miscoverage of its ball.
         alpha: f64,
     },
+    /// A ball frozen at the window.
     Static {
+        /// Miscoverage of its ball.
         alpha: f64,
     },
+    /// The empirical law of the window, learned and taken as true.
     PlugIn,
     /// The same share always.
     Mix {
+        /// Share of wealth in the risky asset.
         share: f64,
     },
 }
@@ -44,6 +51,7 @@ pub enum Strategy {
 /// What was held through one period, and why.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decision {
+    /// Share of wealth in the risky asset.
     pub allocation: f64,
     /// Radius of the ball then; 0 where there is none.
     pub radius: f64,
@@ -62,6 +70,7 @@ pub struct WalkForward {
     pub risk_aversion: f64,
     /// Design points a step.
     pub count: usize,
+    /// Of every training.
     pub seed: u64,
 }
 
@@ -78,6 +87,7 @@ impl Strategy {
 }
 
 impl WalkForward {
+    /// Log utility at risk aversion 1, power utility above.
     pub fn utility(&self) -> UtilitySpecification {
         match self.risk_aversion {
             1.0 => UtilitySpecification::Log {},

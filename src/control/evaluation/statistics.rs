@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::control::evaluation::paths::{Evaluation, Follower, Lived, Outcomes, Start};
+use crate::control::evaluation::paths::{Evaluation, Follower, HistoryStart, Lived, Outcomes};
 use crate::control::evaluation::report::{
     Costs, Coverage, CoverageAtSize, Difference, EvaluationReport, FORMAT, HistoryReport, PeriodReport, RadiusSpread,
     Spread, StrategyReport, UtilityReport, WealthReport,
@@ -219,7 +219,7 @@ impl Table<'_> {
             utilities[history * paths..(history + 1) * paths].iter().sum::<f64>() / paths as f64
         };
         let starts = self.outcomes.starts.iter().enumerate();
-        let report = |(history, start): (usize, &Start)| HistoryReport {
+        let report = |(history, start): (usize, &HistoryStart)| HistoryReport {
             quantile: start.quantile,
             radius: start.radius,
             promised: start.promised.clone(),

@@ -31,17 +31,20 @@ pub struct Advice {
     /// Radius of the uncertainty set: of the Wasserstein ball, in log-return; in the parametric frameworks half the width
     /// of the confidence region in the mean, in estimated standard deviations of a return.
     pub radius: f64,
+    /// Returns seen, those of the history among them.
     pub sample_size: usize,
     /// Predicted standard deviation of the log certainty equivalent.
     pub surrogate_sd: f64,
     /// Whether the state lies where the surrogates were trained.
     pub in_design: bool,
+    /// How it was found.
     pub source: AdviceSource,
 }
 
 /// The uncertainty set of a state, in figures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Uncertainty {
+    /// Returns seen, those of the history among them.
     pub sample_size: usize,
     /// Raw moments of the empirical law, first to the specification's count.
     pub moments: Vec<f64>,

@@ -55,6 +55,7 @@ struct Prediction {
 }
 
 impl Advisor {
+    /// A policy that keeps what can be made again in the cache of the process.
     pub fn new(policy: Policy) -> Self {
         Advisor::with(policy, Kept::default())
     }
@@ -76,10 +77,12 @@ impl Advisor {
         self.problem.sets.heaviest(sample_size, self.specification().problem.horizon)
     }
 
+    /// The policy it answers by.
     pub fn policy(&self) -> &Policy {
         &self.policy
     }
 
+    /// The completed specification of the policy.
     pub fn specification(&self) -> &Specification {
         self.policy.specification()
     }

@@ -19,14 +19,24 @@ const STEP_BYTES: usize = 4096;
 
 /// One step ready for evaluation. The factor behind the predicted deviation is made on first use, and kept elsewhere.
 pub enum PreparedStep {
+    /// The solution of the one state there is.
     Single(SingleSolution),
-    Surrogates { value: Box<ValueSurrogate>, policy: Box<Surrogate>, factor: Factor },
+    /// Both surrogates.
+    Surrogates {
+        /// Of the value.
+        value: Box<ValueSurrogate>,
+        /// Of the action, not yet moved into its interval.
+        policy: Box<Surrogate>,
+        /// Behind the predicted deviation of the value.
+        factor: Factor,
+    },
 }
 
 /// The process behind the predicted deviation, which does not depend on the targets: the name it is kept under.
 pub struct Factor(Key);
 
 impl PreparedStep {
+    /// Of a step of a policy trained from `specification`.
     pub fn new(specification: &Specification, step: &StepSolution) -> Self {
         match &step.solution {
             Solution::Single(single) => PreparedStep::Single(*single),

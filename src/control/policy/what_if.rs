@@ -18,6 +18,7 @@ pub struct Hypothesis {
     pub radius: Option<HypotheticalRadius>,
 }
 
+/// A radius other than the state's own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum HypotheticalRadius {
     /// So many times the state's own.
@@ -33,6 +34,7 @@ pub struct Supposed {
     pub step: usize,
     /// Wealth by then.
     pub wealth: f64,
+    /// For the period after those observed by then.
     pub advice: Advice,
     /// Where the step was solved, not read off a surrogate.
     pub worst_case: Option<WorstCase>,

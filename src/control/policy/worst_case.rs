@@ -28,9 +28,13 @@ pub struct WorstCase {
 /// The worst mean and variance of the log-return of one period, within the confidence region of the estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WorstNormalLaw {
+    /// Of the log-return, per step.
     pub mean: f64,
+    /// Of the log-return, per step.
     pub variance: f64,
+    /// As the returns seen say, per step.
     pub estimated_mean: f64,
+    /// As the returns seen say, per step.
     pub estimated_variance: f64,
 }
 
@@ -41,13 +45,16 @@ pub struct TransportedMass {
     pub atom: f64,
     /// Log-return in the worst case; equal to `atom` where the mass stays.
     pub moved_to: f64,
+    /// A probability.
     pub mass: f64,
 }
 
 /// The worst-case law in figures, of log-returns.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WorstLawSummary {
+    /// Per step.
     pub mean: f64,
+    /// Per root of a step.
     pub standard_deviation: f64,
     /// Share of the probability that moves; absent where laws are normal, and none is a transport of what was seen.
     pub share_moved: Option<f64>,

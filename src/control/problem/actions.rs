@@ -7,7 +7,9 @@ const COARSE_ACTIONS: usize = 8;
 /// A closed interval of shares of wealth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ActionInterval {
+    /// A share of wealth.
     pub lowest: f64,
+    /// A share of wealth.
     pub highest: f64,
 }
 

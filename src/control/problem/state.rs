@@ -7,7 +7,9 @@ use crate::numerics::empirical::EmpiricalDistribution;
 /// Wealth and the empirical law of log-returns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
+    /// x, positive.
     pub wealth: f64,
+    /// F^, of the returns seen.
     pub law: EmpiricalDistribution,
 }
 

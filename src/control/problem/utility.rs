@@ -15,9 +15,15 @@ const LARGEST_EXPONENT: f64 = 600.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RelativeUtility {
     /// `u(w) = (1 - exp(-k (e^w - 1))) / k`, k the risk aversion times the floor.
-    Exponential { k: f64 },
+    Exponential {
+        /// Without unit.
+        k: f64,
+    },
     /// `u(w) = (e^((1 - eta) w) - 1) / (1 - eta)`, eta the risk aversion.
-    Power { eta: f64 },
+    Power {
+        /// Without unit, above 1.
+        eta: f64,
+    },
     /// `u(w) = w`.
     Log,
 }
@@ -39,7 +45,7 @@ impl RelativeUtility {
         match self {
             RelativeUtility::Exponential { k } => -(-k * log_gain.exp_m1()).min(LARGEST_EXPONENT).exp_m1() / k,
             RelativeUtility::Power { eta } => ((1.0 - eta) * log_gain).min(LARGEST_EXPONENT).exp_m1() / (1.0 - eta),
-            RelativeUtility::Log => log_gain.max(-LARGEST_EXPONENT),
+            RelativeUtility::Log => log_gain,
         }
     }
 

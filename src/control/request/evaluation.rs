@@ -26,10 +26,13 @@ pub struct EvaluationRequest {
     /// As in a training; `framework` is left out, and `law` is the true law that returns are drawn from (default: the
     /// design's sampling law).
     pub problem: ProblemSpecification,
+    /// As in a training.
     #[serde(default)]
     pub design: DesignSpecification,
+    /// As in a training.
     #[serde(default)]
     pub surrogate: SurrogateSpecification,
+    /// The same request and seed give the same report, but for its costs.
     #[serde(default = "defaults::seed")]
     pub seed: u64,
     /// Frameworks to compare.
@@ -45,6 +48,7 @@ pub struct EvaluationRequest {
     /// Simulated paths per initial history.
     #[serde(default = "defaults::paths")]
     pub paths: usize,
+    /// Which histories paths start from.
     #[serde(default)]
     pub histories: InitialHistories,
     /// Confidence of the intervals.
@@ -60,7 +64,10 @@ pub enum InitialHistories {
     #[default]
     Given,
     /// So many draws from the true law, each as long as the problem's own.
-    Drawn { count: usize },
+    Drawn {
+        /// How many.
+        count: usize,
+    },
 }
 
 mod defaults {

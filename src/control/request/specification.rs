@@ -12,9 +12,12 @@ use crate::control::request::framework::Framework;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Specification {
+    /// What the investor is and may do.
     pub problem: ProblemSpecification,
+    /// Where the surrogates are trained.
     #[serde(default)]
     pub design: DesignSpecification,
+    /// How the surrogates are made.
     #[serde(default)]
     pub surrogate: SurrogateSpecification,
     /// The same specification and seed give the same policy, bit for bit.
@@ -22,9 +25,11 @@ pub struct Specification {
     pub seed: u64,
 }
 
+/// The investor, the asset, and what is known of its returns.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProblemSpecification {
+    /// What the investor is robust against.
     #[serde(default)]
     pub framework: Framework,
     /// Number of allocation decisions, T.
@@ -33,11 +38,13 @@ pub struct ProblemSpecification {
     /// Bank return per step, r: wealth in the bank grows by the factor 1 + r.
     #[serde(default = "defaults::rate_per_step")]
     pub rate_per_step: f64,
+    /// x_0, in any currency.
     #[serde(default = "defaults::initial_wealth")]
     pub initial_wealth: f64,
     /// Share of wealth that may be held in the risky asset: `[0, highest]`.
     #[serde(default = "defaults::action_interval")]
     pub action_interval: [f64; 2],
+    /// Of terminal wealth.
     #[serde(default)]
     pub utility: UtilitySpecification,
     /// Default: `bridge`; `chi_square` in the parametric frameworks, which take no other.
@@ -59,9 +66,15 @@ pub struct ProblemSpecification {
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum UtilitySpecification {
     /// `(1 - exp(-risk_aversion x)) / risk_aversion`, risk aversion per unit of wealth.
-    Exponential { risk_aversion: f64 },
+    Exponential {
+        /// Absolute, per unit of wealth.
+        risk_aversion: f64,
+    },
     /// `(x^(1 - risk_aversion) - 1) / (1 - risk_aversion)`, risk aversion above 1.
-    Power { risk_aversion: f64 },
+    Power {
+        /// Relative, without unit.
+        risk_aversion: f64,
+    },
     /// `ln x`.
     Log {},
 }
@@ -79,29 +92,42 @@ impl Default for UtilitySpecification {
 pub enum RadiusRule {
     /// `scale Q / sqrt(n)`, Q the (1 - alpha)-quantile of the bridge statistic over simulated paths.
     Bridge {
+        /// Miscoverage, the probability that the ball misses the true law.
         #[serde(default = "defaults::alpha")]
         alpha: f64,
+        /// Simulated paths.
         #[serde(default = "defaults::paths")]
         paths: usize,
+        /// A factor on the radius.
         #[serde(default = "defaults::scale")]
         scale: f64,
     },
     /// `sqrt(ln(C / alpha) / (c n))`, the concentration inequality of Fournier and Guillin.
     Concentration {
+        /// Miscoverage.
         #[serde(default = "defaults::alpha")]
         alpha: f64,
+        /// C of the inequality.
         #[serde(rename = "C")]
         numerator: f64,
+        /// c of the inequality, per squared log-return.
         #[serde(rename = "c")]
         rate: f64,
     },
     /// `kappa / sqrt(n)`.
-    RootN { kappa: f64 },
+    RootN {
+        /// In log-return.
+        kappa: f64,
+    },
     /// The same radius at every sample size.
-    Fixed { radius: f64 },
+    Fixed {
+        /// In log-return.
+        radius: f64,
+    },
     /// `sqrt(kappa / n)` estimated standard deviations, kappa the (1 - alpha)-quantile of chi-square with two degrees
     /// of freedom: `n (mu - m)^2 / v + n (s2 - v)^2 / (2 v^2) <= kappa`, m and v the sample's mean and variance.
     ChiSquare {
+        /// Miscoverage.
         #[serde(default = "defaults::alpha")]
         alpha: f64,
     },
@@ -140,7 +166,9 @@ impl ProblemSpecification {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Interval {
+    /// The lower end.
     pub min: f64,
+    /// The upper end.
     pub max: f64,
 }
 
@@ -148,23 +176,33 @@ pub struct Interval {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum SamplingLaw {
+    /// A mixture of normal laws.
     GaussianMixture {
+        /// At least one; their weights sum to 1.
         components: Vec<MixtureComponent>,
     },
     /// Smoothed bootstrap of the history, with the history's own mean and variance.
     Bootstrap {},
+    /// A Student t law, moved and stretched.
     StudentT {
+        /// Its mean, in log-return per step.
         location: f64,
+        /// What a standard t variable is multiplied by, in log-return.
         scale: f64,
+        /// Above 2: its variance is finite.
         degrees_of_freedom: f64,
     },
 }
 
+/// One normal law of a mixture, of log-returns per step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MixtureComponent {
+    /// Its probability.
     pub weight: f64,
+    /// In log-return.
     pub mean: f64,
+    /// In squared log-return.
     pub variance: f64,
 }
 
@@ -180,6 +218,7 @@ pub struct DesignSpecification {
     /// Design points per step, N. Default 1000; 200 where the state is wealth alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<usize>,
+    /// Where the empirical laws of the design start.
     #[serde(default)]
     pub initial_laws: InitialLaws,
     /// The law that moves the design forward. Default: `bootstrap`.
@@ -201,16 +240,20 @@ pub enum InitialLaws {
     Resampled,
 }
 
+/// How the surrogates are made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SurrogateSpecification {
+    /// What the value surrogate regresses.
     #[serde(default)]
     pub target: SurrogateTarget,
+    /// What the surrogates see of a state.
     #[serde(default)]
     pub features: FeatureMap,
     /// Number of moments of the law that enter the features; at most two in the parametric frameworks, whose law has no more.
     #[serde(default = "defaults::moment_count")]
     pub moment_count: usize,
+    /// Where the hyperparameters are searched.
     #[serde(default)]
     pub bounds: HyperparameterBounds,
 }
@@ -253,8 +296,11 @@ pub enum FeatureMap {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct HyperparameterBounds {
+    /// In standard deviations of an input over the design.
     pub lengthscale: [f64; 2],
+    /// In mean squares of the target over the design.
     pub signal_variance: [f64; 2],
+    /// In mean squares of the target over the design.
     pub noise_variance: [f64; 2],
 }
 

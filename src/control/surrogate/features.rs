@@ -33,7 +33,9 @@ pub struct Features(pub(super) Vec<f64>);
 /// What of an empirical law and its ball the features are made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LawSummary {
+    /// Of the empirical law.
     pub moments: CentralMoments,
+    /// Of its uncertainty set.
     pub radii: Radii,
     /// `min_F E_F[e^Z] / (1 + r) - 1` over the ball: the first unit of allocation earns this against the worst law,
     /// and its sign decides whether anything is held at the last step.

@@ -30,14 +30,18 @@ impl Surrogate {
 
 /// The value surrogate of one step.
 pub struct ValueSurrogate {
+    /// From features to inputs.
     pub scaling: Scaling,
+    /// Of the target, not yet clamped.
     pub surrogate: Surrogate,
     /// Predictions are clamped to it.
     pub largest_gain: f64,
+    /// From targets to floor gains.
     pub target: TargetMap,
 }
 
 impl ValueSurrogate {
+    /// Of a stored step, whose target maps as `target` does.
     pub fn new(stored: &StepSurrogates, target: TargetMap) -> Self {
         ValueSurrogate {
             scaling: stored.scaling.clone(),

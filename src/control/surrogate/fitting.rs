@@ -21,7 +21,7 @@ const GUARDED_SHARE: f64 = 0.99;
 /// Weight that an expected error of the root mean square adds to a candidate. At 1,000 points of the paper's problem with
 /// alpha 0.5, 2 to 6 leave 0.10 basis points of error at the last step where weights by the floor gain left 0.15.
 const WEIGHT_OF_ERROR: f64 = 3.0;
-/// Share of the signal variance that the smoothing of errors takes for noise.
+/// Share of the signal variance that the smoothing of errors takes for noise: single errors are noisy, their size is not.
 const NOISE_OF_ERRORS: f64 = 0.3;
 
 /// Guards whose deviations are computed together: a block that stays in the second-level cache beside the factor's.
@@ -29,7 +29,9 @@ const GUARDS_AT_A_TIME: usize = 64;
 
 /// A state of the design with the solution of the robust step there: y^i and what the surrogates learn of it.
 pub struct DesignPoint {
+    /// x.
     pub wealth: f64,
+    /// y-check.
     pub features: Features,
     /// The best action, a share of wealth.
     pub action: f64,
@@ -44,18 +46,24 @@ pub struct DesignPoint {
 }
 
 /// Hyperparameters from which the search for both surrogates starts.
-pub struct Start {
+pub struct StartingScales {
+    /// Of the value surrogate.
     pub value: Hyperparameters,
+    /// Of the policy surrogate.
     pub policy: Hyperparameters,
 }
 
 /// What a fit needs to know of its step.
 pub struct Fitting<'a> {
+    /// As completed.
     pub specification: &'a Specification,
     /// Names of all features.
     pub names: &'a [String],
+    /// The step being fitted.
     pub step: usize,
+    /// Of the candidates.
     pub scaling: &'a Scaling,
+    /// Told of progress, asked whether to stop.
     pub watch: &'a Watch<'a>,
 }
 
@@ -89,9 +97,9 @@ enum Centre {
 
 impl Fitting<'_> {
     /// The hyperparameters of the step after, if it has surrogates of the same inputs.
-    pub fn start_from(&self, after: &Solution) -> Option<Start> {
+    pub fn start_from(&self, after: &Solution) -> Option<StartingScales> {
         match after {
-            Solution::Surrogates(stored) if stored.scaling.active == self.scaling.active => Some(Start {
+            Solution::Surrogates(stored) if stored.scaling.active == self.scaling.active => Some(StartingScales {
                 value: stored.value.hyperparameters.clone(),
                 policy: stored.policy.hyperparameters.clone(),
             }),
@@ -103,19 +111,18 @@ impl Fitting<'_> {
     ///
     /// # Errors
     /// A covariance matrix that stays singular.
-    pub fn coarse(&self, solved: &[DesignPoint]) -> Result<Start, TrainError> {
+    pub fn coarse(&self, solved: &[DesignPoint]) -> Result<StartingScales, TrainError> {
         let inputs = self.inputs(solved);
         let [value, policy] = self.targets(solved);
-        Ok(Start {
+        Ok(StartingScales {
             value: self.search("value", &inputs, &value.scaled, None)?.hyperparameters,
             policy: self.search("policy", &inputs, &policy.scaled, None)?.hyperparameters,
         })
     }
 
-    /// How much farther than they are the candidates at `inputs` count as being from the design: where no error of the
-    /// value is expected once, where the root mean square is, 4 times.
-    ///
-    /// Expected are the leave-one-out errors of the design points solved so far, smoothed.
+    /// The weight of each candidate's distance to the design: 1 where no error of the value is expected, 4 where the expected
+    /// error equals the root mean square. The expected error is that of the design points solved so far, each predicted from
+    /// the others, smoothed over the inputs.
     ///
     /// # Errors
     /// A covariance matrix that stays singular.
@@ -148,7 +155,7 @@ impl Fitting<'_> {
     pub fn surrogates(
         &self,
         solved: &[DesignPoint],
-        start: &Start,
+        start: &StartingScales,
         guards: &[Features],
         diagnostics: &mut StepDiagnostics,
     ) -> Result<Solution, TrainError> {

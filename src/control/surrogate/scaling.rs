@@ -14,7 +14,9 @@ const SMALLEST_SPREAD: f64 = 1e-9;
 pub struct Scaling {
     /// Indices, among all features, of those that vary.
     pub active: Vec<usize>,
+    /// Means of those, in their own units.
     pub centre: Vec<f64>,
+    /// Standard deviations of those, in their own units.
     pub spread: Vec<f64>,
 }
 

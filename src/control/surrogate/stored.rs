@@ -10,10 +10,13 @@ use crate::numerics::gp::Hyperparameters;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StoredSurrogate {
+    /// For scaled inputs and targets.
     pub hyperparameters: Hyperparameters,
     /// K^-1 times the scaled targets, one a design point.
     pub weights: Vec<f64>,
+    /// In the target's unit.
     pub offset: f64,
+    /// In the target's unit.
     pub scale: f64,
 }
 
@@ -21,15 +24,19 @@ pub struct StoredSurrogate {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepSurrogates {
+    /// From features to inputs.
     pub scaling: Scaling,
     /// Scaled inputs, one column a feature, one entry a design point.
     pub inputs: Vec<Vec<f64>>,
+    /// Of the value target.
     pub value: StoredSurrogate,
+    /// Of the policy target, an action.
     pub policy: StoredSurrogate,
     /// Largest floor gain on the design: predictions are clamped to it.
     pub largest_gain: f64,
-    /// States whose predicted standard deviation of the value target exceeds this lie outside the design:
-    /// the 99 % quantile of the leave-one-out deviations on the design.
+    /// States whose predicted standard deviation of the value target exceeds this, in units of the value's `scale`, lie
+    /// outside the design: the 99 % quantile of the deviations at fresh states of the design's own law where the law is part of
+    /// the state, of the leave-one-out deviations at the design points where it is not.
     pub deviation_limit: f64,
 }
 
@@ -37,7 +44,9 @@ pub struct StepSurrogates {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SingleSolution {
+    /// Log certainty equivalent over the all-bank floor.
     pub floor_gain: f64,
+    /// A share of wealth.
     pub action: f64,
 }
 
@@ -45,7 +54,9 @@ pub struct SingleSolution {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Solution {
+    /// Where all states are one.
     Single(SingleSolution),
+    /// Where they differ.
     Surrogates(Box<StepSurrogates>),
 }
 

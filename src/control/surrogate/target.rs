@@ -14,6 +14,7 @@ pub struct TargetMap {
 }
 
 impl TargetMap {
+    /// Of a completed specification at `step`.
     pub fn new(specification: &Specification, step: usize) -> Self {
         TargetMap {
             target: specification.surrogate.target,
@@ -29,6 +30,7 @@ impl TargetMap {
         floor(wealth, self.rate_per_step, self.steps_left)
     }
 
+    /// True where the value itself is regressed.
     pub fn is_value(&self) -> bool {
         self.target == SurrogateTarget::Value
     }

@@ -8,7 +8,9 @@ use crate::numerics::empirical::EmpiricalDistribution;
 /// A discrete law of log-returns: ascending distinct atoms, and their masses, which sum to 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Centre {
+    /// Log-returns, ascending.
     pub atoms: Vec<f64>,
+    /// Of the atoms, in their order.
     pub masses: Vec<f64>,
 }
 
@@ -61,6 +63,7 @@ impl Centre {
         self.atoms.iter().zip(&self.masses).map(|(atom, mass)| atom * mass).sum()
     }
 
+    /// Per step.
     pub fn variance(&self) -> f64 {
         let mean = self.mean();
         self.atoms.iter().zip(&self.masses).map(|(atom, mass)| mass * (atom - mean).powi(2)).sum()

@@ -28,8 +28,15 @@ const TAIL_RATIO: f64 = 1.3;
 pub enum UncertaintySet {
     /// One law, taken as true.
     Point(Centre),
-    /// The laws within `radius` > 0 of the centre, in log-return, on the `support` where one is given.
-    Ball { centre: Centre, radius: f64, support: Option<Interval> },
+    /// The laws within a Wasserstein distance of the centre.
+    Ball {
+        /// The law in the middle.
+        centre: Centre,
+        /// In log-return, positive.
+        radius: f64,
+        /// Log-returns that laws may give mass to; all where there is none.
+        support: Option<Interval>,
+    },
     /// The normal laws that the estimates do not reject.
     Region(ConfidenceRegion),
 }
@@ -45,6 +52,7 @@ impl Reach {
     /// Enough for monthly returns; the certificate of the step says where it is not.
     pub const FIRST: Reach = Reach { below: 0.6, above: 0.3 };
 
+    /// Twice as far both ways.
     pub fn doubled(self) -> Self {
         Reach { below: 2.0 * self.below, above: 2.0 * self.above }
     }

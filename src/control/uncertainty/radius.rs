@@ -26,19 +26,23 @@ pub struct RadiusEstimator {
 /// The uncertainty set of a law: its radius, and the quantile behind it under the bridge rule.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measure {
+    /// In log-return; of a confidence region, in estimated standard deviations.
     pub radius: f64,
+    /// Absent under other rules than the bridge's.
     pub quantile: Option<Quantile>,
 }
 
 /// The radius of a law and what it tends to be one return later.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Radii {
+    /// In log-return; of a confidence region, in estimated standard deviations.
     pub radius: f64,
     /// Of the mean statistic over the laws with one value of this law twice; the radius itself where no step comes after.
     pub radius_ahead: f64,
 }
 
 impl RadiusEstimator {
+    /// Of a completed specification; bridges are kept in `kept`.
     pub fn new(specification: &Specification, kept: Kept) -> Self {
         let uncertain = !matches!(specification.problem.framework, Framework::KnownLaw | Framework::PlugIn);
         let rule = specification.problem.radius_rule();

@@ -39,7 +39,9 @@ class Costs(TypedDict):
     """What the evaluation cost; the only part that differs between two runs."""
 
     training_seconds: float
+    """Seconds of all trainings."""
     simulation_seconds: float
+    """Seconds of the simulation."""
     resolve_seconds: NotRequired[float | None]
     """Mean of one re-solved step; null where there was none."""
 
@@ -48,8 +50,11 @@ class Estimate(TypedDict):
     """A figure and the interval around it."""
 
     value: float
+    """The estimate itself."""
     low: float
+    """Lower end of its interval."""
     high: float
+    """Upper end of its interval."""
 
 
 Explain: TypeAlias = Literal["worst_case"]
@@ -79,6 +84,7 @@ class HistoryReport(TypedDict):
     quantile: NotRequired[float | None]
     """The bridge quantile there; null under other radius rules."""
     radius: float
+    """Of the first framework with a ball, in log-return; 0 where there is none."""
     promised: list[float]
     """What each framework promises there: the certainty equivalent of its first advice, by its own account."""
     mean_utility: list[float]
@@ -89,8 +95,11 @@ class HyperparameterBounds(TypedDict):
     """Box of the maximum-likelihood search, for inputs and targets scaled to unit variance."""
 
     lengthscale: NotRequired[list[float]]
+    """In standard deviations of an input over the design."""
     signal_variance: NotRequired[list[float]]
+    """In mean squares of the target over the design."""
     noise_variance: NotRequired[list[float]]
+    """In mean squares of the target over the design."""
 
 
 class Imported(TypedDict):
@@ -109,6 +118,7 @@ class InitialHistories2(TypedDict):
     """So many draws from the true law, each as long as the problem's own."""
 
     count: int
+    """How many."""
     kind: Literal["drawn"]
 
 
@@ -124,7 +134,9 @@ class Interval(TypedDict):
     """A closed interval."""
 
     min: float
+    """The lower end."""
     max: float
+    """The upper end."""
 
 
 JobKind: TypeAlias = Literal["train", "evaluate"]
@@ -135,9 +147,14 @@ JobState: TypeAlias = Literal["queued", "running", "succeeded", "failed", "cance
 
 
 class MixtureComponent(TypedDict):
+    """One normal law of a mixture, of log-returns per step."""
+
     weight: float
+    """Its probability."""
     mean: float
+    """In log-return."""
     variance: float
+    """In squared log-return."""
 
 
 class Observation(TypedDict):
@@ -185,6 +202,7 @@ class OpenSession(TypedDict):
 
 
 Phase: TypeAlias = Literal["solving", "fitting", "simulating"]
+"""What a job is doing."""
 
 
 class PolicyEntry(TypedDict):
@@ -225,8 +243,11 @@ class RadiusRule1(TypedDict):
     """`scale Q / sqrt(n)`, Q the (1 - alpha)-quantile of the bridge statistic over simulated paths."""
 
     alpha: NotRequired[float]
+    """Miscoverage, the probability that the ball misses the true law."""
     paths: NotRequired[int]
+    """Simulated paths."""
     scale: NotRequired[float]
+    """A factor on the radius."""
     rule: Literal["bridge"]
 
 
@@ -234,8 +255,11 @@ class RadiusRule2(TypedDict):
     """`sqrt(ln(C / alpha) / (c n))`, the concentration inequality of Fournier and Guillin."""
 
     alpha: NotRequired[float]
+    """Miscoverage."""
     C: float
+    """C of the inequality."""
     c: float
+    """c of the inequality, per squared log-return."""
     rule: Literal["concentration"]
 
 
@@ -243,6 +267,7 @@ class RadiusRule3(TypedDict):
     """`kappa / sqrt(n)`."""
 
     kappa: float
+    """In log-return."""
     rule: Literal["root_n"]
 
 
@@ -250,6 +275,7 @@ class RadiusRule4(TypedDict):
     """The same radius at every sample size."""
 
     radius: float
+    """In log-return."""
     rule: Literal["fixed"]
 
 
@@ -260,6 +286,7 @@ class RadiusRule5(TypedDict):
     """
 
     alpha: NotRequired[float]
+    """Miscoverage."""
     rule: Literal["chi_square"]
 
 
@@ -274,17 +301,22 @@ class RadiusSpread(TypedDict):
     """The radius over paths."""
 
     mean: float
+    """Over paths, in log-return, as all below."""
     quantile_10: float
+    """A tenth of the paths have less."""
     quantile_50: float
+    """The median."""
     quantile_90: float
+    """Nine tenths of the paths have less."""
     first_path: float
     """On the first path."""
 
 
 class SamplingLaw1(TypedDict):
-    """A law of log-returns that can be drawn from."""
+    """A mixture of normal laws."""
 
     components: list[MixtureComponent]
+    """At least one; their weights sum to 1."""
     kind: Literal["gaussian_mixture"]
 
 
@@ -295,11 +327,14 @@ class SamplingLaw2(TypedDict):
 
 
 class SamplingLaw3(TypedDict):
-    """A law of log-returns that can be drawn from."""
+    """A Student t law, moved and stretched."""
 
     location: float
+    """Its mean, in log-return per step."""
     scale: float
+    """What a standard t variable is multiplied by, in log-return."""
     degrees_of_freedom: float
+    """Above 2: its variance is finite."""
     kind: Literal["student_t"]
 
 
@@ -325,8 +360,11 @@ class Spread(TypedDict):
     """Mean and quantiles over paths."""
 
     mean: float
+    """Over paths."""
     quantile_10: float
+    """A tenth of the paths have less."""
     quantile_90: float
+    """Nine tenths of the paths have less."""
 
 
 class SurrogateDiagnostics(TypedDict):
@@ -341,6 +379,7 @@ class SurrogateDiagnostics(TypedDict):
     noise_variance: float
     """In units of the target's variance over the design."""
     log_likelihood_per_point: float
+    """Of the scaled targets, at the hyperparameters found."""
     leave_one_out_error: float
     """Root mean square of the leave-one-out errors, in the target's own unit."""
     jitter: float
@@ -371,12 +410,14 @@ class TransportedMass(TypedDict):
     moved_to: float
     """Log-return in the worst case; equal to `atom` where the mass stays."""
     mass: float
+    """A probability."""
 
 
 class Uncertainty(TypedDict):
     """The uncertainty set of a state, in figures."""
 
     sample_size: int
+    """Returns seen, those of the history among them."""
     moments: list[float]
     """Raw moments of the empirical law, first to the specification's count."""
     quantile: NotRequired[float | None]
@@ -391,18 +432,24 @@ class UtilityReport(TypedDict):
     """Terminal utility."""
 
     mean: Estimate
+    """Over paths."""
     variance: Estimate
+    """Over paths."""
     quantile_20: Estimate
+    """A fifth of the paths end with less."""
     quantile_90: Estimate
+    """Nine tenths of the paths end with less."""
     max: Estimate
     """Of the paths of one history, averaged over histories."""
     min: Estimate
+    """Of the paths of one history, averaged over histories."""
 
 
 class UtilitySpecification1(TypedDict):
     """`(1 - exp(-risk_aversion x)) / risk_aversion`, risk aversion per unit of wealth."""
 
     risk_aversion: float
+    """Absolute, per unit of wealth."""
     kind: Literal["exponential"]
 
 
@@ -410,6 +457,7 @@ class UtilitySpecification2(TypedDict):
     """`(x^(1 - risk_aversion) - 1) / (1 - risk_aversion)`, risk aversion above 1."""
 
     risk_aversion: float
+    """Relative, without unit."""
     kind: Literal["power"]
 
 
@@ -427,13 +475,16 @@ class WealthReport(TypedDict):
     """Terminal wealth."""
 
     mean: Estimate
+    """Over paths."""
 
 
 class WorstLawSummary(TypedDict):
     """The worst-case law in figures, of log-returns."""
 
     mean: float
+    """Per step."""
     standard_deviation: float
+    """Per root of a step."""
     share_moved: NotRequired[float | None]
     """Share of the probability that moves; absent where laws are normal, and none is a transport of what was seen."""
     lowest_destination: NotRequired[float | None]
@@ -444,9 +495,13 @@ class WorstNormalLaw(TypedDict):
     """The worst mean and variance of the log-return of one period, within the confidence region of the estimates."""
 
     mean: float
+    """Of the log-return, per step."""
     variance: float
+    """Of the log-return, per step."""
     estimated_mean: float
+    """As the returns seen say, per step."""
     estimated_variance: float
+    """As the returns seen say, per step."""
 
 
 class Advice(TypedDict):
@@ -464,16 +519,22 @@ class Advice(TypedDict):
     of the confidence region in the mean, in estimated standard deviations of a return.
     """
     sample_size: int
+    """Returns seen, those of the history among them."""
     surrogate_sd: float
     """Predicted standard deviation of the log certainty equivalent."""
     in_design: bool
     """Whether the state lies where the surrogates were trained."""
     source: AdviceSource
+    """How it was found."""
 
 
 class CoverageAtSize(TypedDict):
+    """How often the ball held the true law at one sample size."""
+
     sample_size: int
+    """Returns known then."""
     covered: Estimate
+    """Share of the paths."""
 
 
 class DesignSpecification(TypedDict):
@@ -482,6 +543,7 @@ class DesignSpecification(TypedDict):
     count: NotRequired[int | None]
     """Design points per step, N. Default 1000; 200 where the state is wealth alone."""
     initial_laws: NotRequired[InitialLaws]
+    """Where the empirical laws of the design start."""
     sampling_law: NotRequired[SamplingLaw | None]
     wealth: NotRequired[Interval | None]
 
@@ -490,7 +552,9 @@ class Difference(TypedDict):
     """A paired difference to the reference."""
 
     utility: Estimate
+    """Of mean terminal utility."""
     certainty_equivalent: Estimate
+    """Of the certainty equivalent, in terminal wealth."""
 
 
 class JobProgress(TypedDict):
@@ -526,23 +590,31 @@ class PeriodReport(TypedDict):
     """One period over all paths."""
 
     period: int
+    """From 1."""
     sample_size: int
+    """Returns known at its start."""
     allocation: Spread
+    """Share of wealth held in the risky asset."""
     all_bank_share: float
     """Share of paths that held nothing in the risky asset."""
     radius: NotRequired[RadiusSpread | None]
 
 
 class ProblemSpecification(TypedDict):
+    """The investor, the asset, and what is known of its returns."""
+
     framework: NotRequired[Framework]
+    """What the investor is robust against."""
     horizon: NotRequired[int]
     """Number of allocation decisions, T."""
     rate_per_step: NotRequired[float]
     """Bank return per step, r: wealth in the bank grows by the factor 1 + r."""
     initial_wealth: NotRequired[float]
+    """x_0, in any currency."""
     action_interval: NotRequired[list[float]]
     """Share of wealth that may be held in the risky asset: `[0, highest]`."""
     utility: NotRequired[UtilitySpecification]
+    """Of terminal wealth."""
     radius: NotRequired[RadiusRule | None]
     support: NotRequired[Interval | None]
     law: NotRequired[SamplingLaw | None]
@@ -588,7 +660,9 @@ class StepDiagnostics(TypedDict):
     """How well a step was solved."""
 
     step: int
+    """Periods observed before it."""
     design_count: int
+    """Design points solved."""
     all_bank_share: float
     """Share of the design points at which the robust allocation is zero."""
     uncertified_share: float
@@ -603,11 +677,16 @@ class StepDiagnostics(TypedDict):
 
 
 class SurrogateSpecification(TypedDict):
+    """How the surrogates are made."""
+
     target: NotRequired[SurrogateTarget]
+    """What the value surrogate regresses."""
     features: NotRequired[FeatureMap]
+    """What the surrogates see of a state."""
     moment_count: NotRequired[int]
     """Number of moments of the law that enter the features; at most two in the parametric frameworks, whose law has no more."""
     bounds: NotRequired[HyperparameterBounds]
+    """Where the hyperparameters are searched."""
 
 
 class Sweep(TypedDict):
@@ -669,6 +748,7 @@ class Coverage(TypedDict):
     target: NotRequired[float | None]
     """1 - alpha, under a radius rule that has one."""
     by_sample_size: list[CoverageAtSize]
+    """Ascending; one entry where the ball is frozen."""
     ever_left: Estimate
     """Share of paths on which some period's ball did not hold it."""
 
@@ -682,8 +762,11 @@ class EvaluationRequest(TypedDict):
     design's sampling law).
     """
     design: NotRequired[DesignSpecification]
+    """As in a training."""
     surrogate: NotRequired[SurrogateSpecification]
+    """As in a training."""
     seed: NotRequired[int]
+    """The same request and seed give the same report, but for its costs."""
     frameworks: NotRequired[list[Framework]]
     """Frameworks to compare."""
     constant_mixes: NotRequired[list[float] | None]
@@ -693,6 +776,7 @@ class EvaluationRequest(TypedDict):
     paths: NotRequired[int]
     """Simulated paths per initial history."""
     histories: NotRequired[InitialHistories]
+    """Which histories paths start from."""
     level: NotRequired[float]
     """Confidence of the intervals."""
 
@@ -729,8 +813,11 @@ class Specification(TypedDict):
     """A whole training job: the problem, the design that samples its states, the surrogates, one seed."""
 
     problem: ProblemSpecification
+    """What the investor is and may do."""
     design: NotRequired[DesignSpecification]
+    """Where the surrogates are trained."""
     surrogate: NotRequired[SurrogateSpecification]
+    """How the surrogates are made."""
     seed: NotRequired[int]
     """The same specification and seed give the same policy, bit for bit."""
 
@@ -739,19 +826,23 @@ class StrategyReport(TypedDict):
     """One strategy."""
 
     strategy: str
+    """`adaptive`, `mix_0.5`, `all_bank` and the like."""
     framework: NotRequired[Framework | None]
     constant_mix: NotRequired[float | None]
     """The allocation of a constant mix."""
     policy: NotRequired[str | None]
     """The policy followed; null for constant mixes and where each history had its own."""
     utility: UtilityReport
+    """Of terminal wealth."""
     certainty_equivalent: Estimate
     """Terminal wealth that is worth as much for certain."""
     wealth: WealthReport
+    """Terminal, in units of the initial wealth's currency."""
     difference: NotRequired[Difference | None]
     histogram: list[int]
     """Counts of the bins between `histogram_edges`."""
     periods: NotRequired[list[PeriodReport] | None]
+    """Period by period; null for constant mixes."""
     coverage: NotRequired[Coverage | None]
     resolved_share: NotRequired[float | None]
     """Share of steps advised by solving the step anew."""
@@ -778,6 +869,7 @@ class EvaluationReport(TypedDict):
     """Strategies compared on common returns. `docs/evaluation.md` says where the intervals come from."""
 
     format: str
+    """`ballast-evaluation-1`."""
     request: EvaluationRequest
     """The completed request."""
     reference: str
@@ -787,7 +879,9 @@ class EvaluationReport(TypedDict):
     histogram_edges: list[float]
     """Common bin edges of terminal utility, ascending."""
     histories: list[HistoryReport]
+    """In the order they were drawn."""
     costs: Costs
+    """What it took."""
 
 
 class PolicyDetail(TypedDict):
