@@ -98,7 +98,10 @@ impl BellmanStep<'_> {
 
     /// All-bank is feasible and no law can hurt it; and no law of the set is better in every period than its best return.
     fn bounded(&self, state: &State, solution: RobustSolution) -> RobustSolution {
-        let floor_gain = solution.floor_gain.clamp(0.0, self.problem.largest_gain(self.step, state));
+        let gain = solution.floor_gain;
+        let largest = self.problem.largest_gain(self.step, state);
+        // What is not a number stays so, and no zero is negative.
+        let floor_gain = if gain <= 0.0 { 0.0 } else { gain.clamp(0.0, largest) };
         RobustSolution { floor_gain, ..solution }
     }
 
