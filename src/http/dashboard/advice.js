@@ -12,7 +12,6 @@ export const SOURCES = {
   policy_surrogate: "read off the policy",
   resolved: "solved anew on request",
   resolved_other_radius: "solved anew for another radius",
-  unsolved: "the step has no finite solution: all in the bank",
   resolved_outside_design: "solved anew, because this state lies outside the policy\u2019s design",
   unsolved: "because the step has no finite solution here: all stays in the bank, which no law can hurt",
 };
