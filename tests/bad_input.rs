@@ -20,6 +20,7 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
         ("/problem/initial_wealth", json!(-1.0), "problem.initial_wealth"),
         ("/problem/action_interval", json!([0.1, 1.0]), "problem.action_interval[0]"),
         ("/problem/action_interval", json!([0.0, 1.5]), "problem.action_interval[1]"),
+        ("/problem/action_interval", json!([0.0, 5e-324]), "problem.action_interval[1]"),
         ("/problem/utility", json!({"kind": "exponential", "risk_aversion": 0.0}), "problem.utility.risk_aversion"),
         ("/problem/utility", json!({"kind": "power", "risk_aversion": 1.0}), "problem.utility.risk_aversion"),
         ("/problem/radius", json!({"rule": "bridge", "alpha": 0.0}), "problem.radius.alpha"),

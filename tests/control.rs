@@ -311,3 +311,54 @@ fn anybody_can_evaluate_an_exported_policy() {
         assert!(advice.in_design, "the test must reach the surrogate");
     }
 }
+
+#[test]
+fn a_known_law_without_a_mean_of_its_exponential_is_solved_within_the_returns_accepted() {
+    let law = json!({ "kind": "student_t", "location": 0.0, "scale": 1.0, "degrees_of_freedom": 2.1 });
+    for utility in [json!({ "kind": "log" }), json!({ "kind": "power", "risk_aversion": 5.0 })] {
+        let solved = advisor(json!({
+            "problem": { "horizon": 2, "framework": "known_law", "law": law, "utility": utility, "history": [0.01, -0.02] },
+            "design": { "count": 20 } }));
+        let state = solved.initial_state(None, None).unwrap();
+        for mode in [AdviceMode::Surrogate, AdviceMode::Resolve] {
+            let advice = solved.advise(0, &state, mode);
+            assert!((0.0..=1.0).contains(&advice.allocation), "{advice:?}");
+            assert!(
+                advice.certainty_equivalent >= advice.floor && advice.certainty_equivalent.is_finite(),
+                "{advice:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn no_import_shows_more_than_the_best_return_earns_in_every_period() {
+    let history = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008];
+    let policy = train(
+        json!({ "problem": { "horizon": 3, "rate_per_step": 0.002, "history": history }, "design": { "count": 20 } }),
+    );
+    let mut claims: Value = serde_json::from_slice(&policy.to_json()).unwrap();
+    for step in [1, 2] {
+        let solution = &mut claims["steps"][step]["solution"];
+        solution["value"]["offset"] = json!(1e30);
+        solution["value"]["scale"] = json!(1e30);
+        solution["deviation_limit"] = json!(1e30);
+        solution["largest_gain"] = json!(100.0);
+    }
+    let refused = Policy::from_json(&serde_json::to_vec(&claims).unwrap()).unwrap_err().to_string();
+    assert!(refused.starts_with("steps[1].solution.largest_gain is 100"), "{refused}");
+    for step in [1, 2] {
+        claims["steps"][step]["solution"]["largest_gain"] = json!(4.9);
+    }
+    let claiming = Advisor::new(Policy::from_json(&serde_json::to_vec(&claims).unwrap()).unwrap());
+    let mut state = claiming.initial_state(None, None).unwrap();
+    for step in 0..3 {
+        for mode in [AdviceMode::Surrogate, AdviceMode::Resolve] {
+            let advice = claiming.advise(step, &state, mode);
+            let most = advice.floor * (0.033_f64.exp() / 1.002).powi(3 - step as i32);
+            assert!(advice.certainty_equivalent <= most * (1.0 + 1e-12), "{step} {mode:?}: {advice:?}, at most {most}");
+            assert!(advice.surrogate_sd < 1.0, "{advice:?}");
+        }
+        state = claiming.advance(&state, 0.5, 0.01);
+    }
+}

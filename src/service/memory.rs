@@ -124,20 +124,18 @@ pub struct Memory {
     limit: MemoryLimit,
     kept: Kept,
     jobs: Arc<Semaphore>,
+    /// Of that semaphore, when no job runs.
+    permits: usize,
 }
 
 /// Bytes reserved by a job until this is dropped.
-pub(super) struct Reserved {
-    _permits: OwnedSemaphorePermit,
-    bytes: usize,
-}
+pub(super) struct Reserved(#[expect(dead_code, reason = "held, not read")] OwnedSemaphorePermit);
 
 impl Memory {
     pub fn new(limit: MemoryLimit) -> Self {
         let permits = (eighths(limit, EIGHTHS_FOR_JOBS) / UNIT).min(Semaphore::MAX_PERMITS);
         let kept = Kept::new(eighths(limit, EIGHTHS_KEPT));
-        gauge!(names::MEMORY_LIMIT).set(limit.bytes as f64);
-        Memory { limit, kept, jobs: Arc::new(Semaphore::new(permits)) }
+        Memory { limit, kept, jobs: Arc::new(Semaphore::new(permits)), permits }
     }
 
     /// What is kept ready for requests.
@@ -174,15 +172,16 @@ impl Memory {
     /// Waits until the other jobs of this process leave room for a job.
     pub(super) async fn reserve(&self, estimate: &Estimate) -> Result<Reserved, ServiceError> {
         self.admits(estimate)?;
-        let bytes = estimate.bytes();
-        let permits = u32::try_from(bytes / UNIT).unwrap_or(u32::MAX);
+        let permits = u32::try_from(estimate.bytes() / UNIT).unwrap_or(u32::MAX);
         let permits = self.jobs.clone().acquire_many_owned(permits).await.map_err(ServiceError::internal)?;
-        gauge!(names::MEMORY, "part" => "jobs_reserved").increment(bytes as f64);
-        Ok(Reserved { _permits: permits, bytes })
+        Ok(Reserved(permits))
     }
 
     /// Tells the recorder how much each part takes now.
     pub fn record(&self) {
+        gauge!(names::MEMORY_LIMIT).set(self.limit.bytes as f64);
+        let reserved = self.permits.saturating_sub(self.jobs.available_permits()) * UNIT;
+        gauge!(names::MEMORY, "part" => "jobs_reserved").set(reserved as f64);
         for (part, bytes) in self.kept.bytes() {
             let part = match part {
                 Part::Bridges => "bridges",
@@ -199,12 +198,6 @@ impl fmt::Display for Memory {
         let (jobs, kept) = (Size(self.for_jobs()), Size(eighths(self.limit, EIGHTHS_KEPT)));
         write!(formatter, "{}: {jobs} for jobs, {kept} kept ready, ", self.limit)?;
         write!(formatter, "{} for live sessions", Size(self.for_sessions()))
-    }
-}
-
-impl Drop for Reserved {
-    fn drop(&mut self) {
-        gauge!(names::MEMORY, "part" => "jobs_reserved").decrement(self.bytes as f64);
     }
 }
 
