@@ -2,11 +2,11 @@
 //!
 //! Upper estimates from the sizes in a request alone. Every large thing of a training is in one of a few classes, and
 //! the constants below are what one thing of each takes, found by counting what the allocator was asked for
-//! (`tests/memory.rs` holds the estimates to it).
+//! (`tests/estimates.rs` holds the estimates to it).
 
 use super::bellman::problem::Problem;
 use super::policy::Policy;
-use super::policy::prepared::{factor_bytes, prepared_bytes};
+use super::policy::prepared::{bytes_ready, factor_bytes, prepared_bytes};
 use super::problem::utility::depends_on_wealth;
 use super::request::evaluation::EvaluationRequest;
 use super::request::framework::Framework;
@@ -116,6 +116,11 @@ impl Sizes {
         product(&[self.horizon, self.count, self.inputs + 2, POLICY_NUMBER_BYTES])
     }
 
+    /// Bytes of the policy made ready to advise.
+    fn prepared(&self) -> usize {
+        bytes_ready(self.horizon, self.horizon.saturating_mul(self.count), self.inputs)
+    }
+
     /// Bytes while the surrogates of one step are fitted.
     fn fit(&self) -> usize {
         let candidate = 2 * self.inputs * NUMBER + CANDIDATE_BYTES;
@@ -153,11 +158,12 @@ fn training_keeps(sizes: &Sizes) -> usize {
 }
 
 /// What of a policy trained from a completed specification must be kept ready to advise by it.
-pub fn advising(specification: &Specification) -> [Estimate; 2] {
+pub fn advising(specification: &Specification) -> [Estimate; 3] {
     let sizes = Sizes::of(specification);
     [
         Estimate::of("design.count", sizes.count, sizes.factor()),
         Estimate::of("problem.radius.paths", sizes.paths, sizes.bridges),
+        Estimate::of("problem.horizon", sizes.horizon, sizes.prepared()),
     ]
 }
 

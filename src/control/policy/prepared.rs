@@ -80,14 +80,19 @@ pub fn factor_bytes(stored: &StepSurrogates) -> usize {
     GaussianProcess::bytes_of(stored.value.weights.len(), stored.inputs.len())
 }
 
-/// Bytes of a prepared policy, without bridges and factors: its numbers, and the inputs twice more, ready to evaluate.
+/// Bytes of a prepared policy, without bridges and factors.
 pub fn prepared_bytes(policy: &Policy) -> usize {
-    let numbers = |step: &StepSolution| match &step.solution {
-        Solution::Single(_) => 0,
-        Solution::Surrogates(stored) => {
-            3 * stored.inputs.iter().map(Vec::len).sum::<usize>() + 4 * stored.value.weights.len()
-        }
-    };
-    let steps = policy.steps();
-    size_of::<f64>() * steps.iter().map(numbers).sum::<usize>() + POLICY_BYTES + STEP_BYTES * steps.len()
+    let designs = policy.steps().iter().map(|step| match &step.solution {
+        Solution::Single(_) => (0, 0),
+        Solution::Surrogates(stored) => (stored.value.weights.len(), stored.inputs.len()),
+    });
+    let (points, inputs) = designs.fold((0, 0), |(sum, most), (points, inputs)| (sum + points, most.max(inputs)));
+    bytes_ready(policy.steps().len(), points, inputs)
+}
+
+/// Of so many steps with so many design points in all: the inputs as stored and for either surrogate, and the weights of
+/// both as stored and ready to evaluate.
+pub fn bytes_ready(steps: usize, points: usize, inputs: usize) -> usize {
+    let numbers = points.saturating_mul(3 * inputs + 4);
+    numbers.saturating_mul(size_of::<f64>()).saturating_add(POLICY_BYTES + STEP_BYTES * steps)
 }
