@@ -407,11 +407,13 @@ fn who_is_held_or_asked_for_stays_and_who_is_left_alone_goes() {
             }
             drop((waiting, held));
             assert!(slots.count() <= 2 * ROOMS.slots);
-            slots.grow(100);
-            keep("heavy").await;
-            slots.grow(100);
-            keep("heavier").await;
+            for name in ["heavy", "heavier", "heaviest"] {
+                keep(name).await;
+                slots.weigh(&name.to_owned(), 100);
+            }
             assert_eq!(slots.count(), 2, "what fills a generation by its weight ages it");
+            keep("heavier").await;
+            assert_eq!(slots.bytes(), 200, "what is asked for again weighs again");
         });
     });
 }

@@ -39,26 +39,20 @@ impl Cholesky {
     ///
     /// Cost n^3 / 3.
     pub fn factor(matrix: DMatrix<f64>) -> Option<Cholesky> {
-        Cholesky::attempt(matrix).ok()
-    }
-
-    /// As [`Cholesky::factor`]; what does not factor is given back, spoilt on and below the diagonal.
-    fn attempt(matrix: DMatrix<f64>) -> Result<Cholesky, DMatrix<f64>> {
         let mut lower = matrix;
         let n = lower.nrows();
         assert_eq!(n, lower.ncols(), "a matrix to factor must be square");
         let diagonal = lower.diagonal();
-        let factored = if n < BLOCKED_FROM_ROWS {
-            let found = nalgebra::Cholesky::new(lower.clone());
-            found.map(|found| lower = found.unpack_dirty())
+        if n < BLOCKED_FROM_ROWS {
+            lower = nalgebra::Cholesky::new(lower)?.unpack_dirty();
         } else {
-            factor_blocked(lower.as_mut_slice(), n)
-        };
+            factor_blocked(lower.as_mut_slice(), n)?;
+        }
         let positive = diagonal.iter().zip(lower.diagonal().iter()).all(|(entry, root)| {
             let pivot = root * root;
             pivot > LEAST_PIVOT_SHARE * entry && pivot.is_finite()
         });
-        if factored.is_some() && positive { Ok(Cholesky { lower }) } else { Err(lower) }
+        positive.then_some(Cholesky { lower })
     }
 
     /// The memory of the factor, for another matrix.
@@ -164,26 +158,20 @@ fn eliminate_block(l: &[f64], n: usize, j: usize, x: &mut [f64]) {
     }
 }
 
-/// Factors A + jitter I for the smallest jitter of 0, 1e-12, 1e-10, 1e-8 and 1e-6 mean diagonals that succeeds, in the
-/// memory of A, reading its lower triangle alone.
+/// Factors A + jitter I for the smallest jitter of 0, 1e-12, 1e-10, 1e-8 and 1e-6 mean diagonals that succeeds.
 ///
-/// Returns the factor and the amount added to the diagonal, in the units of A. Cost that of a factorisation
-/// for each try.
-pub fn factor_with_jitter(matrix: DMatrix<f64>) -> Result<(Cholesky, f64), Singular> {
-    let mut matrix = matrix;
-    let diagonal = matrix.diagonal();
-    let scale = diagonal.iter().sum::<f64>() / matrix.nrows().max(1) as f64;
+/// `matrix` makes A, anew for each try, so that one matrix takes memory at a time. Returns the factor and the amount added
+/// to the diagonal, in the units of A. Cost that of a factorisation for each try.
+pub fn factor_with_jitter(matrix: impl Fn() -> DMatrix<f64>) -> Result<(Cholesky, f64), Singular> {
     let mut jitter = 0.0;
-    // No factorisation touches what stands above the diagonal: there the matrix waits for the next try.
-    matrix.fill_upper_triangle_with_lower_triangle();
     for relative in RELATIVE_JITTERS {
-        jitter = relative * scale;
-        matrix.set_diagonal(&diagonal.add_scalar(jitter));
-        match Cholesky::attempt(matrix) {
-            Ok(factor) => return Ok((factor, jitter)),
-            Err(spoilt) => matrix = spoilt,
+        let mut shifted = matrix();
+        let n = shifted.nrows();
+        jitter = relative * (shifted.diagonal().iter().sum::<f64>() / n.max(1) as f64);
+        (0..n).for_each(|i| shifted[(i, i)] += jitter);
+        if let Some(factor) = Cholesky::factor(shifted) {
+            return Ok((factor, jitter));
         }
-        matrix.fill_lower_triangle_with_upper_triangle();
     }
     Err(Singular { jitter })
 }
@@ -221,10 +209,10 @@ mod tests {
     #[test]
     fn a_rank_one_matrix_needs_jitter_and_an_indefinite_one_is_refused() {
         for n in [3, 100] {
-            let (_, jitter) = factor_with_jitter(DMatrix::from_element(n, n, 2.0)).unwrap();
+            let (_, jitter) = factor_with_jitter(|| DMatrix::from_element(n, n, 2.0)).unwrap();
             assert!(jitter > 0.0 && jitter <= 2e-6);
-            assert_eq!(factor_with_jitter(dominant(n)).unwrap().1, 0.0);
-            let refused = factor_with_jitter(-dominant(n)).unwrap_err();
+            assert_eq!(factor_with_jitter(|| dominant(n)).unwrap().1, 0.0);
+            let refused = factor_with_jitter(|| -dominant(n)).unwrap_err();
             assert!(refused.to_string().contains("not positive definite"));
             assert!(Cholesky::factor(DMatrix::from_element(n, n, f64::NAN)).is_none());
         }

@@ -157,9 +157,12 @@ impl GaussianProcess {
         hyper: &Hyperparameters,
     ) -> Result<GaussianProcess, Singular> {
         assert_eq!(inputs.nrows(), targets.len(), "one target for each row");
-        let mut kernel = DMatrix::zeros(targets.len(), targets.len());
-        kernel_lower(&hyper.scale(inputs), hyper, &mut kernel);
-        let (cholesky, jitter) = factor_with_jitter(kernel)?;
+        let scaled = hyper.scale(inputs);
+        let (cholesky, jitter) = factor_with_jitter(|| {
+            let mut kernel = DMatrix::zeros(targets.len(), targets.len());
+            kernel_lower(&scaled, hyper, &mut kernel);
+            kernel
+        })?;
         let weights = cholesky.solve(targets);
         let mean = GpMean::new(inputs, &weights, hyper);
         Ok(GaussianProcess { hyper: hyper.clone(), cholesky, jitter, weights, mean })

@@ -177,8 +177,9 @@ impl Memory {
         Ok(Reserved(permits))
     }
 
-    /// Tells the recorder how much each part takes now.
-    pub fn record(&self) {
+    /// Tells the recorder how much each part takes now, `live_sessions` of them the sessions.
+    pub(super) fn record(&self, live_sessions: usize) {
+        gauge!(names::MEMORY, "part" => "live_sessions").set(live_sessions as f64);
         gauge!(names::MEMORY_LIMIT).set(self.limit.bytes as f64);
         let reserved = self.permits.saturating_sub(self.jobs.available_permits()) * UNIT;
         gauge!(names::MEMORY, "part" => "jobs_reserved").set(reserved as f64);

@@ -89,7 +89,7 @@ impl Service {
         tracing::info!(memory_limit_bytes = config.memory_limit.bytes, "memory: {memory}");
         let jobs = Jobs::new(store.clone(), clock.clone(), memory.clone(), config.training_threads);
         let policies = Arc::new(Policies::new(store.clone(), memory.clone()));
-        let sessions = Sessions::new(config, store.clone(), clock.clone(), policies.clone());
+        let sessions = Sessions::new(config, store.clone(), clock.clone(), policies.clone(), &memory);
         let audit = Audit::new(store.clone());
         tokio::spawn(audit::keep_bounded(store.clone(), clock.clone(), config.audit, shutdown.clone()));
         let start =
@@ -143,7 +143,7 @@ impl Service {
 
     /// Tells the recorder what takes memory now.
     pub fn record_memory(&self) {
-        self.memory.record();
+        self.memory.record(self.sessions.bytes());
     }
 
     /// Records how old the oldest jobs are and what room the store takes.

@@ -21,6 +21,7 @@ use super::idempotency;
 use super::identity;
 use super::keys::Caller;
 use super::live::Live;
+use super::memory::Memory;
 use super::observation::{Observe, Observed};
 use super::policies::Policies;
 use super::slots::{Generation, Held, Slots, Source};
@@ -33,8 +34,9 @@ use crate::store::{
     Append, CreateSession, ObservationRow, RequestKey, SessionFacts, SessionRow, SessionSummary, Store, Tenant,
 };
 
-/// Two of these are kept: 100,000 sessions, 128 MB of returns in laws and histories.
-const GENERATION: Generation = Generation { slots: 100_000, weight: 1 << 24 };
+/// Bytes of a session in memory, and of each of its returns, in the law and in the history.
+const SESSION_BYTES: usize = 3000;
+const RETURN_BYTES: usize = 16;
 
 /// Whose session it is, and its name.
 type Name = (Tenant, String);
@@ -83,11 +85,13 @@ pub struct Sessions {
 }
 
 impl Sessions {
-    pub(super) fn new(config: &Config, store: Store, clock: Clock, policies: Arc<Policies>) -> Self {
+    pub(super) fn new(config: &Config, store: Store, clock: Clock, policies: Arc<Policies>, memory: &Memory) -> Self {
         let size = |common| Size { common, guests: config.guest_limit };
         let advising = Bounded::new("advise", size(config.advice_limit), config.turn_wait);
         let resolving = Bounded::new("solve", size(config.resolve_limit), config.turn_wait);
-        let slots = Arc::new(Slots::new(GENERATION));
+        // Two generations are kept.
+        let weight = memory.for_sessions() / 2;
+        let slots = Arc::new(Slots::new(Generation { slots: weight / SESSION_BYTES, weight }));
         Sessions { store, clock, policies, slots, advising, resolving }
     }
 
@@ -126,6 +130,11 @@ impl Sessions {
         };
         let seen = row.as_opened();
         Ok(Live { row: Arc::new(row), state, seen, price: None, radius: None, advice: None })
+    }
+
+    /// Bytes of the sessions in memory.
+    pub(super) fn bytes(&self) -> usize {
+        self.slots.bytes()
     }
 
     /// Number of sessions in memory.
@@ -323,7 +332,8 @@ impl Source<Live> for Rows<'_> {
         }
         let last = observations.last().and_then(|row| serde_json::from_str::<Observed>(&row.answer_json).ok());
         let price = last.and_then(|answer| answer.price);
-        self.sessions.slots.grow(state.law.sample_size() + row.initial_history.len());
+        let bytes = SESSION_BYTES + RETURN_BYTES * state.law.sample_size();
+        self.sessions.slots.weigh(&(self.tenant.clone(), self.session.to_owned()), bytes);
         Ok(Live { row: Arc::new(row), state, seen, price, radius: None, advice: None })
     }
 }

@@ -40,7 +40,7 @@ pub(super) trait Source<S> {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Generation {
     pub slots: usize,
-    /// Sum of what [`Slots::grow`] was told.
+    /// Sum of what [`Slots::weigh`] was told of its slots, in bytes.
     pub weight: usize,
 }
 
@@ -54,12 +54,14 @@ struct Slot<S> {
     state: Arc<AsyncMutex<Option<S>>>,
     /// Those who have its lock or wait for it. Changed under the lock of the map alone.
     holders: usize,
+    /// Bytes, once its state was read.
+    weight: usize,
 }
 
 struct Map<N, S> {
     young: HashMap<N, Slot<S>>,
     old: HashMap<N, Slot<S>>,
-    /// Read into memory since the young generation began.
+    /// Of the young.
     weight: usize,
 }
 
@@ -78,9 +80,22 @@ impl<N: Eq + Hash + Clone, S> Slots<N, S> {
         Held { state: state.lock_owned().await, _place: place }
     }
 
-    /// So much more is in memory.
-    pub(super) fn grow(&self, weight: usize) {
-        self.lock().weight += weight;
+    /// The state of a slot that is held takes so many bytes.
+    pub(super) fn weigh(&self, name: &N, weight: usize) {
+        let mut map = self.lock();
+        let Map { young, old, weight: of_the_young } = &mut *map;
+        if let Some(slot) = young.get_mut(name) {
+            *of_the_young = of_the_young.saturating_sub(slot.weight).saturating_add(weight);
+            slot.weight = weight;
+        } else if let Some(slot) = old.get_mut(name) {
+            slot.weight = weight;
+        }
+    }
+
+    /// Bytes of all of them.
+    pub(super) fn bytes(&self) -> usize {
+        let map = self.lock();
+        map.weight + weight_of(&map.old)
     }
 
     /// Number of slots, held or kept.
@@ -104,6 +119,7 @@ impl<N: Eq + Hash + Clone, S> Map<N, S> {
             if self.young.len() >= largest.slots || self.weight >= largest.weight {
                 dropped = self.age();
             }
+            self.weight += slot.weight;
             self.young.insert(name.clone(), slot);
         }
         let slot = self.young.entry(name.clone()).or_insert_with(Slot::empty);
@@ -115,27 +131,33 @@ impl<N: Eq + Hash + Clone, S> Map<N, S> {
     fn age(&mut self) -> HashMap<N, Slot<S>> {
         let old = mem::replace(&mut self.old, mem::take(&mut self.young));
         let (held, dropped) = old.into_iter().partition(|(_, slot)| slot.holders > 0);
+        self.weight = weight_of(&held);
         self.young = held;
-        self.weight = 0;
         dropped
     }
 
     /// One holder less; an empty slot whose last holder leaves is gone.
     fn leave(&mut self, name: &N) {
-        for generation in [&mut self.young, &mut self.old] {
-            let Some(slot) = generation.get_mut(name) else { continue };
-            slot.holders -= 1;
-            if slot.holders == 0 && slot.state.try_lock().is_ok_and(|state| state.is_none()) {
-                generation.remove(name);
+        let is_young = self.young.contains_key(name);
+        let generation = if is_young { &mut self.young } else { &mut self.old };
+        let Some(slot) = generation.get_mut(name) else { return };
+        slot.holders -= 1;
+        if slot.holders == 0 && slot.state.try_lock().is_ok_and(|state| state.is_none()) {
+            let weight = generation.remove(name).map_or(0, |slot| slot.weight);
+            if is_young {
+                self.weight -= weight;
             }
-            return;
         }
     }
 }
 
+fn weight_of<N, S>(slots: &HashMap<N, Slot<S>>) -> usize {
+    slots.values().map(|slot| slot.weight).sum()
+}
+
 impl<S> Slot<S> {
     fn empty() -> Self {
-        Slot { state: Arc::new(AsyncMutex::new(None)), holders: 0 }
+        Slot { state: Arc::new(AsyncMutex::new(None)), holders: 0, weight: 0 }
     }
 }
 
