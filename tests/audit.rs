@@ -228,3 +228,25 @@ async fn every_change_over_http_names_its_key_and_a_refused_one_is_no_entry() {
     assert!(shown.lines().nth(1).unwrap().contains(&format!("{key}\toperate,train")) || shown.contains(key), "{shown}");
     assert!(ballast(&["check"]).contains("audit: "));
 }
+/// Who reported what is part of the report.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_observation_is_shown_with_the_key_that_reported_it() {
+    let mut app = App::start().await;
+    let key = app.key("north", "admin").await;
+    hold(&mut app, &key).await;
+    app.train(&specification(2)).await;
+    app.open().await;
+    assert_eq!(app.observe(1, 0.01).await.0, 200);
+    assert_eq!(app.observe(2, 0.02).await.0, 200);
+    let (_, page) = app.get(&format!("/audit?object={}", app.session)).await;
+    let deeds: Vec<_> = entries(&page).iter().map(|entry| entry[2]).collect();
+    assert_eq!(deeds, ["session.observe", "session.observe", "session.open"]);
+    let keys: Vec<_> = entries(&page).iter().map(|entry| entry[1]).collect();
+    assert!(keys[0].starts_with("key_") && keys.iter().all(|key| *key == keys[0]), "{page}");
+    let folder = app.folder().to_owned();
+    app.restart_after("UPDATE observations SET access_key = 'key_of_another' WHERE period = 1").await;
+    hold(&mut app, &key).await;
+    assert_eq!(app.action().await.0, 500);
+    let inspection = Inspection::of_folder(&folder).await.unwrap();
+    assert!(inspection.run(&mut |_| {}).await.unwrap_err().to_string().starts_with("period 1 of session"));
+}

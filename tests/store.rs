@@ -118,6 +118,7 @@ fn observation(session: &str, period: usize, content: &str) -> ObservationRow {
         wealth_after: 101.0,
         answer_json: format!(r#"{{"answer":"{content}"}}"#),
         created_ms: 7,
+        key: "key_1".into(),
     }
 }
 

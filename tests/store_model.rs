@@ -238,6 +238,7 @@ fn observation(session: u8, period: usize, content: u8) -> ObservationRow {
         wealth_after: 100.0 / 3.0 + period as f64,
         answer_json: format!(r#"{{"answer":{content}}}"#),
         created_ms: 7,
+        key: String::new(),
     }
 }
 

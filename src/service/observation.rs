@@ -1,5 +1,7 @@
 //! What an investor reports of a period, and what is answered.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -33,6 +35,9 @@ pub struct Observe {
     pub executed_allocation: Option<f64>,
     /// Wealth reached, where fees or flows made it differ from what the return and the allocation give.
     pub wealth: Option<f64>,
+    /// The name of the key that reports it, which no body says; empty where none was asked for.
+    #[serde(skip)]
+    pub reported_by: Arc<str>,
 }
 
 /// The session after an observation.

@@ -235,6 +235,7 @@ impl Sessions {
             wealth_after: answer.wealth,
             answer_json: serde_json::to_string(&answer).map_err(ServiceError::internal)?,
             created_ms: self.clock.now_milliseconds(),
+            key: report.reported_by.to_string(),
         };
         let next = live.taken_to(live.seen.followed_by(&new), state, report.price, answer.uncertainty.radius);
         held.clear();

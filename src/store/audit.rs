@@ -23,6 +23,7 @@ use futures_util::FutureExt;
 
 use super::codec::{Seal, to_sql};
 use super::error::Failure;
+use super::observations::ObservationRow;
 use super::query::{Connection, Query, Row, query};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
@@ -123,7 +124,7 @@ const CUT_AT_ONCE: i64 = 5_000;
 
 impl Store {
     /// At most `limit` entries, newest first; `after` is the `sequence` of the last row of the page before. Where the object
-    /// is a session, its observations are among them, as far as they fall between the entries of the page.
+    /// is a session, at most as many of its observations are on the first page beside them.
     pub async fn deeds(
         &self,
         filter: &AuditFilter,
@@ -148,7 +149,26 @@ impl Store {
             .bind(tenant.as_str())
             .bind(object.as_str()),
         };
-        self.list("reading the audit", page, |rows| rows.iter().map(AuditRow::from_row).collect()).await
+        let decode = |rows: &[Row]| rows.iter().map(AuditRow::from_row).collect();
+        let mut page: Vec<AuditRow> = self.list("reading the audit", page, decode).await?;
+        if let (Some(object), None) = (&filter.object, after) {
+            let observed = self.observed(object, limit).await?;
+            let asked = |row: &AuditRow| filter.tenant.as_ref().is_none_or(|tenant| row.tenant == *tenant);
+            page.extend(observed.into_iter().filter(asked));
+            page.sort_by_key(|row| std::cmp::Reverse(row.at_ms));
+        }
+        Ok(page)
+    }
+
+    /// The newest observations of a session, newest first, as entries; none where it is no session.
+    async fn observed(&self, session: &str, limit: usize) -> Result<Vec<AuditRow>, StoreError> {
+        let newest = query(
+            "SELECT observations.*, sessions.tenant FROM observations
+             JOIN sessions ON sessions.session = observations.session
+             WHERE observations.session = $1 ORDER BY period DESC LIMIT $2",
+        );
+        let decode = |rows: &[Row]| rows.iter().map(AuditRow::of_observation).collect();
+        self.list("reading the audit", newest.bind(session).bind(to_sql(limit)), decode).await
     }
 
     /// Drops entries past their bounds, oldest first, a few thousand of each chain; their number. What was cut is itself an
@@ -318,6 +338,21 @@ impl AuditRow {
             .text(&self.object)
             .text(&self.outcome)
             .integer(self.at_ms)
+    }
+
+    /// An observation, its own seal verified.
+    fn of_observation(row: &Row) -> Result<Self, Failure> {
+        let observation = ObservationRow::from_row(row)?;
+        Ok(AuditRow {
+            sequence: 0,
+            tenant: Tenant::stored(&row.get::<String>("tenant")?),
+            key: observation.key,
+            roles: String::new(),
+            deed: Deed::Observe.as_str().to_owned(),
+            object: observation.session,
+            outcome: format!("period {} recorded", observation.period),
+            at_ms: observation.created_ms,
+        })
     }
 
     fn from_row(row: &Row) -> Result<Self, Failure> {

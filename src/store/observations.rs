@@ -24,6 +24,8 @@ pub struct ObservationRow {
     pub wealth_after: f64,
     pub answer_json: String,
     pub created_ms: i64,
+    /// The name of the key that reported it; empty where none was asked for.
+    pub key: String,
 }
 
 /// What became of an observation to append.
@@ -147,8 +149,8 @@ async fn repeated(connection: &mut Connection<'_>, new: &ObservationRow) -> Resu
 }
 
 const NAMES: &str = "session, period, content_hash, log_return, executed_allocation, advised_allocation,
-                     wealth_after, answer_json, created_ms, seal";
-const COLUMNS: usize = 10;
+                     wealth_after, answer_json, created_ms, access_key, seal";
+const COLUMNS: usize = 11;
 /// The period after the last that `new.session` has.
 const NEXT: &str = "(SELECT coalesce(max(period), 0) + 1 FROM observations WHERE observations.session = new.session)";
 
@@ -216,6 +218,7 @@ fn bind_row(insert: Query, new: &ObservationRow) -> Query {
         .bind(new.wealth_after)
         .bind(new.answer_json.as_str())
         .bind(new.created_ms)
+        .bind(new.key.as_str())
         .bind(new.seal().finish())
 }
 
@@ -236,9 +239,10 @@ impl ObservationRow {
             .real(self.wealth_after)
             .text(&self.answer_json)
             .integer(self.created_ms)
+            .text(&self.key)
     }
 
-    fn from_row(row: &Row) -> Result<Self, Failure> {
+    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
         let read = ObservationRow {
             session: row.get("session")?,
             period: from_sql(row.get("period")?)?,
@@ -249,6 +253,7 @@ impl ObservationRow {
             wealth_after: row.get("wealth_after")?,
             answer_json: row.get("answer_json")?,
             created_ms: row.get("created_ms")?,
+            key: row.get("access_key")?,
         };
         let seal: Vec<u8> = row.get("seal")?;
         read.seal().verify(&seal, || format!("period {} of session {}", read.period, read.session))?;

@@ -120,6 +120,8 @@ CREATE TABLE observations (
     wealth_after        DOUBLE PRECISION NOT NULL,
     answer_json         TEXT NOT NULL,
     created_ms          BIGINT NOT NULL,
+    -- Of who reported it.
+    access_key          TEXT NOT NULL,
     seal                BYTEA NOT NULL,
     PRIMARY KEY (session, period)
 );

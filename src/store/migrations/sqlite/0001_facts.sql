@@ -121,6 +121,8 @@ CREATE TABLE observations (
     wealth_after        ANY NOT NULL,
     answer_json         TEXT NOT NULL,
     created_ms          INTEGER NOT NULL,
+    -- Of who reported it.
+    access_key          TEXT NOT NULL,
     seal                BLOB NOT NULL,
     PRIMARY KEY (session, period)
 ) STRICT;
