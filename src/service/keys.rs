@@ -123,6 +123,8 @@ pub struct Caller {
     pub allowance: Arc<Allowance>,
     clock: Clock,
     revoked: AtomicBool,
+    /// Of the key; a rotation brings it forward while the caller is let in already.
+    expires_ms: AtomicI64,
     /// When it last called; 0 before.
     used_ms: AtomicI64,
 }
@@ -130,9 +132,10 @@ pub struct Caller {
 impl Caller {
     fn new(tenant: Tenant, key: Option<KeyRow>, allowance: Arc<Allowance>, clock: Clock) -> Arc<Self> {
         let (revoked, used_ms) = (AtomicBool::new(false), AtomicI64::new(0));
+        let expires_ms = AtomicI64::new(key.as_ref().and_then(|key| key.expires_ms).unwrap_or(NEVER));
         let (name, roles) = key.as_ref().map_or(("", "anybody".to_owned()), |key| (&key.key, key.roles.to_string()));
         let actor = Actor { key: name.into(), roles: roles.into(), at_ms: 0 };
-        Arc::new(Caller { tenant, key, actor, allowance, clock, revoked, used_ms })
+        Arc::new(Caller { tenant, key, actor, allowance, clock, revoked, expires_ms, used_ms })
     }
 
     /// Who changes something now.
@@ -161,7 +164,17 @@ impl Caller {
     }
 
     fn expires_ms(&self) -> Option<i64> {
-        self.key.as_ref().and_then(|key| key.expires_ms)
+        Some(self.expires_ms.load(Ordering::Relaxed)).filter(|expires_ms| *expires_ms != NEVER)
+    }
+
+    /// The key as it is now, where nothing of it changed but when it expires.
+    fn follow(&self, row: &KeyRow) -> bool {
+        let expires_ms = row.expires_ms;
+        let is_same = self.key.as_ref().is_some_and(|key| KeyRow { expires_ms, ..key.clone() } == *row);
+        if is_same {
+            self.expires_ms.store(expires_ms.unwrap_or(NEVER), Ordering::Relaxed);
+        }
+        is_same
     }
 
     fn note_use(&self) {
@@ -173,6 +186,8 @@ impl Caller {
     }
 }
 
+/// A time that does not come.
+const NEVER: i64 = i64::MAX;
 /// When a key was last used is known to a second.
 const USE_PRECISION_MS: i64 = 1000;
 
@@ -263,7 +278,12 @@ impl Keys {
         let figures = known.by_hash.values().filter_map(|caller| {
             let (key, used_ms) = (caller.key.as_ref()?, caller.used_ms.load(Ordering::Relaxed));
             let used_ms = (used_ms > 0).then_some(used_ms);
-            Some(KeyFigures { tenant: key.tenant.clone(), key: key.key.clone(), expires_ms: key.expires_ms, used_ms })
+            Some(KeyFigures {
+                tenant: key.tenant.clone(),
+                key: key.key.clone(),
+                expires_ms: caller.expires_ms(),
+                used_ms,
+            })
         });
         let mut figures: Vec<_> = figures.collect();
         figures.sort_by(|one, other| one.key.cmp(&other.key));
@@ -297,7 +317,11 @@ impl Known {
                 self.ended.insert(start, row);
                 continue;
             }
-            let kept = before.remove(&start).filter(|caller| caller.key.as_ref() == Some(&row));
+            // One that does not follow is left among those that are gone.
+            let kept = before.get(&start).filter(|caller| caller.follow(&row)).cloned();
+            if kept.is_some() {
+                before.remove(&start);
+            }
             let caller = kept.unwrap_or_else(|| {
                 let allowance = self.allowances.entry(row.tenant.clone());
                 let allowance = allowance.or_insert_with(|| Arc::new(Allowance::new(limits))).clone();
@@ -428,5 +452,11 @@ mod tests {
         known(&keys, vec![expiring(Some(10_000)), row("b", "north", None)]);
         assert_eq!(keys.admit(Some("a")).unwrap_err(), of_north);
         assert!(keys.admit(Some("b")).is_ok() && keys.figures().len() == 1);
+        // Who is let in already ends with the key, should a rotation bring that forward.
+        let follower = keys.admit(Some("b")).unwrap();
+        known(&keys, vec![KeyRow { expires_ms: Some(20_000), ..row("b", "north", None) }]);
+        assert!(!follower.has_ended() && Arc::ptr_eq(&follower, &keys.admit(Some("b")).unwrap()));
+        now.store(20_000, Ordering::Relaxed);
+        assert!(follower.has_ended());
     }
 }
