@@ -213,7 +213,9 @@ async fn callers(app: &App, outside: &Outside) -> [Caller; 3] {
 
 async fn no_law_is_stale(mut app: App, outside: Outside) {
     let mut request = specification(PERIODS);
+    // The law counts here and not the policy: a quick one.
     request["problem"]["radius"] = json!({ "rule": "fixed", "radius": 0.001 });
+    request["design"]["count"] = json!(10);
     app.train(&request).await;
     let mut lives = Vec::new();
     for _ in 0..SESSIONS {
