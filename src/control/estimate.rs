@@ -17,8 +17,8 @@ use crate::numerics::gp::GaussianProcess;
 /// Bytes of a double.
 const NUMBER: usize = 8;
 /// Square matrices of the order of the design that stand at once while both surrogates are fitted side by side: the kernel,
-/// its inverse and the room to invert in, each twice.
-const FIT_MATRICES: usize = 6;
+/// its inverse, the room to invert in and to factor in, each twice.
+const FIT_MATRICES: usize = 8;
 /// Candidates and guards a design point, each with features, scaled inputs and their headers.
 const CANDIDATES: usize = 3;
 const GUARDS: usize = 1000;
