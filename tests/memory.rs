@@ -15,9 +15,9 @@ use support::App;
 /// The address space of the process under attack, in kibibytes: 900 MB.
 const ADDRESS_SPACE_KIB: usize = 900_000;
 
-/// Weekly returns of five years.
-fn weekly_returns() -> Vec<f64> {
-    (0..260).map(|k| 0.002 + 0.02 * ((k * 7919 % 1013) as f64 / 506.5 - 1.0)).collect()
+/// Monthly returns of three years.
+fn monthly_returns() -> Vec<f64> {
+    (0..36).map(|k| 0.002 + 0.02 * ((k * 7919 % 1013) as f64 / 506.5 - 1.0)).collect()
 }
 
 /// A process that may not address more than 900 MB; `arguments` are added to its command line.
@@ -122,13 +122,15 @@ async fn imported_policies_asked_once_each_stay_within_the_budget() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn policies_of_one_seed_share_their_bridges() {
-    const PERIODS: usize = 6;
+    const PERIODS: usize = 4;
     let limit = MemoryLimit::chosen(4 << 30);
     let mut app = App::configured(|config| config.memory_limit = limit).await;
     let mut kept = Vec::new();
     for risk_aversion in [3.0, 5.0, 8.0] {
         let utility = json!({ "kind": "power", "risk_aversion": risk_aversion });
-        let problem = json!({ "horizon": PERIODS, "history": weekly_returns(), "utility": utility });
+        let radius = json!({ "rule": "bridge", "alpha": 0.1, "paths": 200 });
+        let history = monthly_returns();
+        let problem = json!({ "horizon": PERIODS, "history": history, "utility": utility, "radius": radius });
         app.train(&json!({ "problem": problem, "design": { "count": 20 } })).await;
         app.open().await;
         for period in 1..=PERIODS {
@@ -137,8 +139,8 @@ async fn policies_of_one_seed_share_their_bridges() {
         }
         kept.push(part(&app, "bridges").await);
     }
-    // 2,000 paths at each of the sample sizes 260 to 266.
-    let sizes = (260..=260 + PERIODS).map(|size| size * 2000 * 8);
+    // 200 paths at each of the sample sizes 36 to 40.
+    let sizes = (36..=36 + PERIODS).map(|size| size * 200 * 8);
     assert_eq!(kept, vec![sizes.sum::<usize>(); 3]);
     assert_eq!(part(&app, "jobs_reserved").await, 0);
 }
