@@ -30,7 +30,7 @@ const CIRCLES: [(&str, &str); 5] = [
     ("http/dashboard.rs http/operations.rs http/router.rs", "the description as a value that the router sets once"),
     (
         "store/audit.rs store/codec.rs store/error.rs store/idempotency.rs store/migrations.rs store/observations.rs \
-         store/policies.rs store/postgres/mod.rs store/query.rs store/sessions.rs store/sqlite/mod.rs",
+         store/policies.rs store/postgres/mod.rs store/query.rs store/quotas.rs store/sessions.rs store/sqlite/mod.rs",
         "a neutral cause in the error, found where the engine's error is met",
     ),
     ("store/sqlite/batch.rs store/sqlite/writer.rs", "operations in a file below both"),
