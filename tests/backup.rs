@@ -198,12 +198,13 @@ async fn a_backup_replaces_nothing_and_leaves_nothing_where_it_fails() {
 }
 
 /// Each kind of damage, the statement that makes it, and what the check says.
-const DAMAGES: [(&str, &str); 6] = [
+const DAMAGES: [(&str, &str); 7] = [
     ("UPDATE policies SET json = x'7b7d'", "policy "),
     ("UPDATE jobs SET kind = 'dream'", "the kind of job"),
     ("UPDATE sessions SET initial_wealth = 1e6", "the start of session"),
     ("UPDATE observations SET log_return = 0.5 WHERE period = 2", "period 2 of session"),
     ("DELETE FROM observations WHERE period = 1", "period 1 of session"),
+    ("UPDATE usage SET bytes = bytes + 1", "the total of tenant"),
     ("UPDATE access_keys SET roles = 'root'", "the roles of key"),
 ];
 
@@ -223,7 +224,7 @@ async fn a_check_finds_every_kind_of_damage() {
     }
     let copies = tempfile::tempdir().unwrap();
     let references = ("DELETE FROM policies", "a reference from");
-    let newer = ("UPDATE _sqlx_migrations SET version = 9999 WHERE version = 2", "newer than");
+    let newer = ("UPDATE _sqlx_migrations SET version = 9999 WHERE version = 1", "newer than");
     let older = ("DELETE FROM _sqlx_migrations", "older than");
     for (number, (statement, complaint)) in DAMAGES.into_iter().chain([references, newer, older]).enumerate() {
         let folder = copies.path().join(number.to_string());
