@@ -25,7 +25,7 @@ fn assert_refused((status, problem): (StatusCode, Value), expected: u16, option:
 
 #[tokio::test]
 async fn what_a_tenant_may_keep_is_refused_with_the_numbers() {
-    let quotas = Quotas { queued_jobs: 2, sessions: 2, bytes: 1 << 20 };
+    let quotas = Quotas { queued_jobs: 2, sessions: 2, bytes: 150_000 };
     let mut app = App::configured(|config| config.quotas = quotas).await;
     app.train(&specification(2)).await;
     for _ in 0..2 {
@@ -35,7 +35,7 @@ async fn what_a_tenant_may_keep_is_refused_with_the_numbers() {
     assert_refused(app.post("/sessions", &session).await, 413, "quota-sessions", 3, 2);
     assert_eq!(app.observe(1, 0.01).await.0, 200, "a return is never refused for a quota");
     assert_eq!(app.delete(&format!("/sessions/{}", app.session)).await, 204);
-    let long = json!({ "policy": app.policy, "history": vec![0.01; 140_000] });
+    let long = json!({ "policy": app.policy, "history": vec![0.01; 19_900] });
     let (status, problem) = app.post("/sessions", &long).await;
     assert_eq!((status, &problem["field"]), (StatusCode::PAYLOAD_TOO_LARGE, &json!("quota-bytes")), "{problem}");
     app.open().await;
