@@ -13,6 +13,8 @@ pub struct Caller {
     client: Client,
     /// Replicas, asked in turn.
     urls: Vec<String>,
+    /// Shown with every call.
+    key: Option<String>,
 }
 
 /// Status and body of an answer.
@@ -20,8 +22,16 @@ pub type Answer = (u16, Value);
 
 impl Caller {
     pub fn new(urls: &[&str]) -> Caller {
-        let client = Client::builder().timeout(PATIENCE).build().unwrap();
-        Caller { client, urls: urls.iter().map(|&url| url.to_owned()).collect() }
+        Caller { client: client(), urls: urls.iter().map(|&url| url.to_owned()).collect(), key: None }
+    }
+
+    pub fn with_key(url: &str, key: &str) -> Caller {
+        Caller { key: Some(key.to_owned()), ..Caller::new(&[url]) }
+    }
+
+    /// Another like it, over connections of its own.
+    pub fn another(&self) -> Caller {
+        Caller { client: client(), ..self.clone() }
     }
 
     /// From now on the next replica is asked first.
@@ -35,6 +45,10 @@ impl Caller {
 
     pub async fn post(&self, path: &str, body: &Value) -> Option<Answer> {
         self.call(Method::POST, path, Some(body), None).await
+    }
+
+    pub async fn delete(&self, path: &str) -> Option<Answer> {
+        self.call(Method::DELETE, path, None, None).await
     }
 
     /// Queues a training under an idempotency key.
@@ -51,10 +65,19 @@ impl Caller {
         if let Some(key) = key {
             request = request.header("idempotency-key", key);
         }
+        if let Some(key) = &self.key {
+            request = request.bearer_auth(key);
+        }
         let answer = request.send().await.ok()?;
         let status = answer.status().as_u16();
         let text = answer.text().await.ok()?;
         Some((status, serde_json::from_str(&text).unwrap_or(Value::String(text))))
+    }
+
+    /// A question as it goes over the wire.
+    pub fn request(&self, method: &str, path: &str) -> String {
+        let key = self.key.as_deref().unwrap_or_default();
+        format!("{method} {path} HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer {key}\r\n\r\n")
     }
 
     /// Every job, newest first.
@@ -78,4 +101,8 @@ impl Caller {
         let (status, session) = self.post("/sessions", &json!({ "policy": policy })).await?;
         (status == 201).then(|| session["session"].as_str().unwrap_or_default().to_owned())
     }
+}
+
+fn client() -> Client {
+    Client::builder().timeout(PATIENCE).build().unwrap()
 }

@@ -13,6 +13,8 @@ pub struct Ledger {
     pub trainings: Vec<Training>,
     /// Answers that no client should ever see.
     pub complaints: Vec<String>,
+    /// Advice for a period that was acknowledged before it was asked for.
+    pub stale: usize,
 }
 
 pub struct Session {
@@ -53,6 +55,7 @@ impl Ledger {
         self.sessions.extend(other.sessions);
         self.trainings.extend(other.trainings);
         self.complaints.extend(other.complaints);
+        self.stale += other.stale;
     }
 
     /// Reads every fact back, then sends everything again: the same answers, and nothing new but what was pending.

@@ -27,12 +27,17 @@ pub struct Load {
 impl Load {
     /// Clients of the replicas at `urls`; `seed` decides what each of them does.
     pub fn start(urls: &[&str], policy: &str, clients: usize, seed: u64) -> Load {
+        Load::of(&Caller::new(urls), urls.len(), policy, clients, seed)
+    }
+
+    /// Clients that call as `caller`, each beginning with another of its replicas.
+    pub fn of(caller: &Caller, replicas: usize, policy: &str, clients: usize, seed: u64) -> Load {
         let (stop, answered) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicUsize::new(0)));
         let clients = (0..clients).map(|number| {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             random.set_stream(number as u64);
-            let mut caller = Caller::new(urls);
-            (0..number % urls.len()).for_each(|_| caller.turn());
+            let mut caller = caller.another();
+            (0..number % replicas).for_each(|_| caller.turn());
             let client = Client {
                 caller,
                 random,
@@ -146,6 +151,7 @@ impl Client {
         }
         let period = answer.and_then(|(_, action)| action["period"].as_u64()).unwrap_or_default() as usize;
         if !(observed + 1..=observed + 1 + usize::from(pending)).contains(&period) {
+            self.ledger.stale += 1;
             self.ledger.complaints.push(format!("advice for period {period} after {observed} acknowledged"));
         }
         true

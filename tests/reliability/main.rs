@@ -1,5 +1,5 @@
 //! Broken on purpose: the real binary is killed, starved, cut off and lied to, and then asked for everything it
-//! acknowledged. Prints a table; fails where anything is lost, doubled or panicked, and where no row ran.
+//! acknowledged. Prints a table; fails where anything is lost, doubled, stale or panicked, and where no row ran.
 //!
 //! `cargo test --test reliability` is the short form. `cargo test --test reliability -- --trials 100 kill` runs a hundred
 //! trials of every row whose name contains `kill`; `BALLAST_RELIABILITY_TRIALS` does the same for all rows. Rows that need
@@ -15,6 +15,7 @@ mod kills;
 mod ledger;
 mod load;
 mod mount;
+mod neighbours;
 mod power;
 mod replicas;
 mod scene;
@@ -23,6 +24,7 @@ mod storm;
 #[path = "../support/mod.rs"]
 mod support;
 mod syncs;
+mod tenants;
 mod tracer;
 
 use std::process::ExitCode;
@@ -65,6 +67,10 @@ const ROWS: &[Row] = &[
     row!("kill -9 at an fsync", 4, syncs::killed),
     row!("damaged bytes on disk", 60, damage::flipped),
     row!("replicas and database", 1, replicas::crashed),
+    row!("strangers, reads fail", 1, neighbours::strangers),
+    row!("connections, streams held", 1, neighbours::holders),
+    row!("large jobs listed", 1, neighbours::listers),
+    row!("queues filled by another", 1, neighbours::crowds),
 ];
 
 /// Trials asked for, and the parts of names to choose rows by.
@@ -111,8 +117,9 @@ enum Verdict {
 
 fn header() -> String {
     let [trials, faults, acknowledged, lost] = ["trials", "faults", "acknowledged", "lost"];
-    let [doubled, panics, ready] = ["doubled", "panics", "ready in"];
-    format!("{:<26}{trials:>7}{faults:>8}{acknowledged:>14}{lost:>6}{doubled:>9}{panics:>8}{ready:>11}", "fault")
+    let [doubled, stale, panics, ready] = ["doubled", "stale", "panics", "ready in"];
+    let counts = format!("{acknowledged:>14}{lost:>6}{doubled:>9}{stale:>7}{panics:>8}");
+    format!("{:<30}{trials:>7}{faults:>8}{counts}{ready:>11}", "fault")
 }
 
 /// Prints the row.
@@ -121,13 +128,13 @@ fn report(row: &Row, outcome: Outcome) -> Verdict {
         Ok(Some(tally)) => tally,
         Ok(None) => return Verdict::LeftOut,
         Err(reason) => {
-            println!("{:<26} FAILED: {reason}", row.fault);
+            println!("{:<30} FAILED: {reason}", row.fault);
             return Verdict::Unsound;
         }
     };
-    let Tally { trials, faults, audit, panics, ready, complaints, note } = &tally;
+    let Tally { trials, faults, audit, stale, panics, ready, complaints, note } = &tally;
     println!(
-        "{:<26}{trials:>7}{faults:>8}{:>14}{:>6}{:>9}{panics:>8}{:>8} ms  {note}",
+        "{:<30}{trials:>7}{faults:>8}{:>14}{:>6}{:>9}{stale:>7}{panics:>8}{:>8} ms  {note}",
         row.fault,
         audit.acknowledged,
         audit.lost,

@@ -47,6 +47,7 @@ pub struct Tally {
     pub trials: usize,
     pub faults: usize,
     pub audit: Audit,
+    pub stale: usize,
     pub panics: usize,
     /// The slowest start.
     pub ready: Duration,
@@ -58,7 +59,7 @@ pub struct Tally {
 impl Tally {
     pub fn is_sound(&self) -> bool {
         let Audit { acknowledged, lost, doubled } = self.audit;
-        acknowledged > 0 && (lost, doubled, self.panics) == (0, 0, 0) && self.complaints.is_empty()
+        acknowledged > 0 && (lost, doubled, self.stale, self.panics) == (0, 0, 0, 0) && self.complaints.is_empty()
     }
 
     pub fn complain(&mut self, complaint: impl Into<String>) {
@@ -99,6 +100,7 @@ impl Tally {
     /// Asks for everything in `ledger` and counts the jobs, of which there must be one for each of `keys` and those new.
     pub async fn examine(&mut self, ledger: &Ledger, caller: &Caller, keys: &mut usize) {
         self.audit += ledger.audit(caller).await;
+        self.stale += ledger.stale;
         self.complaints.extend(ledger.complaints.iter().cloned());
         *keys += ledger.trainings.len();
         let Some(jobs) = caller.jobs().await else { return self.complain("the jobs are not to be had") };

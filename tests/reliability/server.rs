@@ -28,6 +28,13 @@ impl Site {
         Site { arguments: vec!["--data".into(), data.to_str().unwrap().into()], folder }
     }
 
+    /// As [`Site::new`], started with `more` arguments.
+    pub fn limited(more: &[&str]) -> Site {
+        let mut site = Site::new();
+        site.arguments.extend(more.iter().map(|&part| part.into()));
+        site
+    }
+
     /// A server that keeps its facts in `data`, which somebody else made.
     pub fn at(data: &Path) -> Site {
         Site::with(&["--data", data.to_str().unwrap()])
@@ -139,6 +146,19 @@ impl Server {
             let stat = std::fs::read_to_string(thread.path().join("stat")).unwrap_or_default();
             stat.rsplit(") ").next().is_some_and(|rest| rest.starts_with(['T', 't']))
         })
+    }
+
+    /// Whether it is the process that was started.
+    pub fn lives(&mut self) -> bool {
+        self.child.try_wait().unwrap().is_none()
+    }
+
+    /// Most resident memory so far, in MB.
+    pub fn peak_mb(&self) -> usize {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).unwrap_or_default();
+        let peak =
+            status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse().ok());
+        peak.map_or(usize::MAX, |kilobytes: usize| kilobytes >> 10)
     }
 
     /// Waits for its end; `None` where it does not come.

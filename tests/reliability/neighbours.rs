@@ -1,0 +1,213 @@
+//! Attacks of one tenant on another: calls for his sessions while reads fail, connections and streams held, lists of large
+//! jobs, and queues filled. What was acknowledged to him stays, no advice of his is stale, and he is answered throughout.
+
+use std::time::{Duration, Instant};
+
+use futures_util::future::join_all;
+use serde_json::{Value, json};
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
+use sqlx::{ConnectOptions, Connection};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+
+use crate::caller::Caller;
+use crate::scene::{HORIZON, Outcome, Tally, import, specification};
+use crate::server::Site;
+use crate::tenants::{Tenants, sessions};
+
+/// How long an attack lasts.
+const ATTACK: Duration = Duration::from_secs(2);
+/// Calls under way at a time.
+const AT_ONCE: usize = 16;
+/// On a machine that does nothing else advice takes a millisecond; one that builds beside it gets this much.
+const ANSWERED: Duration = Duration::from_millis(500);
+
+#[derive(Debug, Clone, Copy)]
+pub enum Attack {
+    Intrude,
+    Hold,
+    List,
+    Crowd,
+}
+
+impl Attack {
+    /// The calls made.
+    pub async fn run(self, tenants: &mut Tenants, tally: &mut Tally) -> Result<usize, String> {
+        match self {
+            Attack::Intrude => intrude(tenants, tally).await,
+            Attack::Hold => hold(tenants, tally).await,
+            Attack::List => list(tenants, tally).await,
+            Attack::Crowd => crowd(tenants, tally).await,
+        }
+    }
+}
+
+pub async fn strangers(trials: usize) -> Outcome {
+    Tenants::attacked(Site::new(), trials, Attack::Intrude).await
+}
+
+/// Every route of sessions by the owner's names, while the table of observations is away now and again.
+async fn intrude(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
+    let end = Instant::now() + ATTACK;
+    let strangers = (0..4).map(|_| intruder(tenants, end));
+    let file = tenants.site.data().join("ballast.sqlite");
+    let (found, hidden) = tokio::join!(join_all(strangers), hide(&file, end));
+    let (calls, answered): (Vec<usize>, Vec<Vec<String>>) = found.into_iter().unzip();
+    tally.complaints.extend(answered.concat());
+    Ok(calls.into_iter().sum::<usize>() + hidden.map_err(|error| error.to_string())?)
+}
+
+/// Calls made until `end`, and those that were answered.
+async fn intruder(tenants: &Tenants, end: Instant) -> (usize, Vec<String>) {
+    let (stranger, mut calls, mut answered) = (tenants.neighbour.another(), 0, Vec::new());
+    while Instant::now() < end {
+        for name in sessions(&tenants.owner).await {
+            let report = json!({ "session": name, "period": 1, "log_return": 0.5 });
+            let answers = [
+                stranger.get(&format!("/action?session={name}")).await,
+                stranger.get(&format!("/sessions/{name}")).await,
+                stranger.get(&format!("/sessions/{name}/history")).await,
+                stranger.post("/observe", &report).await,
+                stranger.post("/what-if", &json!({ "session": name, "wealth": 1.0 })).await,
+                stranger.delete(&format!("/sessions/{name}")).await,
+            ];
+            calls += answers.len();
+            let served = answers.into_iter().flatten().filter(|(status, _)| *status < 300);
+            answered.extend(served.map(|(status, body)| format!("a stranger got {status} {body}")));
+        }
+    }
+    (calls, answered)
+}
+
+/// Takes the table of observations away for a moment, again and again; how often.
+async fn hide(file: &std::path::Path, end: Instant) -> Result<usize, sqlx::Error> {
+    let options = SqliteConnectOptions::new().filename(file).busy_timeout(Duration::from_secs(5));
+    let mut times = 0;
+    while Instant::now() < end {
+        tokio::time::sleep(Duration::from_millis(50)).await;
+        let mut connection: SqliteConnection = options.clone().disable_statement_logging().connect().await?;
+        sqlx::query("ALTER TABLE observations RENAME TO hidden").execute(&mut connection).await?;
+        tokio::time::sleep(Duration::from_millis(3)).await;
+        sqlx::query("ALTER TABLE hidden RENAME TO observations").execute(&mut connection).await?;
+        connection.close().await?;
+        times += 1;
+    }
+    Ok(times)
+}
+
+pub async fn holders(trials: usize) -> Outcome {
+    Tenants::attacked(Site::new(), trials, Attack::Hold).await
+}
+
+/// Connections that say nothing more after a first polite question, and streams of a job that does not end.
+async fn hold(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
+    const HELD: usize = 2000;
+    let address = tenants.server.url.trim_start_matches("http://").to_owned();
+    let job = tenants.neighbour.train("held", &specification(HORIZON)).await;
+    let job = job.and_then(|(_, job)| job["job"].as_str().map(str::to_owned)).ok_or("no job")?;
+    let follow = tenants.neighbour.request("GET", &format!("/jobs/{job}/events"));
+    let polite = "GET /livez HTTP/1.1\r\nhost: localhost\r\n\r\n".to_owned();
+    let pulse = tenants.pulse("").await?;
+    let mut held = Vec::new();
+    for number in 0..HELD {
+        let question = if number % 2 == 0 { &polite } else { &follow };
+        // One that is refused is an attack that failed.
+        held.extend(asked(&address, question).await);
+    }
+    let end = Instant::now() + ATTACK;
+    while Instant::now() < end {
+        let ready = reqwest::get(format!("{}/readyz", tenants.server.url)).await.map(|answer| answer.status().as_u16());
+        if ready.as_ref().ok() != Some(&200) {
+            tally.complain(format!("/readyz: {ready:?}"));
+        }
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    pulse.stop().await.told(ANSWERED, tally);
+    Ok(held.len())
+}
+
+async fn asked(address: &str, question: &str) -> Option<TcpStream> {
+    let asking = async {
+        let mut stream = TcpStream::connect(address).await.ok()?;
+        stream.write_all(question.as_bytes()).await.ok()?;
+        (stream.read(&mut [0; 64]).await.ok()? > 0).then_some(stream)
+    };
+    tokio::time::timeout(Duration::from_millis(200), asking).await.ok()?
+}
+
+pub async fn listers(trials: usize) -> Outcome {
+    // Nothing that is queued is taken.
+    Tenants::attacked(Site::limited(&["--role", "api"]), trials, Attack::List).await
+}
+
+/// Lists of as many large jobs as a tenant may queue.
+async fn list(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
+    const JOBS: usize = 100;
+    const RETURNS: usize = 20_000;
+    let mut large = specification(2);
+    let history = (0..RETURNS).map(|index| 0.02 * (f64::from(index as u32)).sin());
+    large["problem"]["history"] = history.map(Value::from).collect();
+    large["problem"]["radius"] = json!({ "rule": "fixed", "radius": 0.001 });
+    let mut queued = 0;
+    for number in 0..JOBS {
+        match tenants.neighbour.train(&format!("{}-{number}", tally.trials), &large).await {
+            Some((202, _)) => queued += 1,
+            // As many as may be.
+            Some((429 | 413, _)) => break,
+            other => return Err(format!("a large job: {other:?}")),
+        }
+    }
+    let pulse = tenants.pulse("").await?;
+    let calls = until(Instant::now() + ATTACK, &tenants.neighbour, "/jobs?limit=1000").await;
+    pulse.stop().await.told(ANSWERED, tally);
+    tally.note += &format!(", {queued} large jobs listed {calls} times");
+    Ok(calls)
+}
+
+/// Asks for `path` from many connections until `end`; how often.
+async fn until(end: Instant, caller: &Caller, path: &str) -> usize {
+    let asking = (0..AT_ONCE).map(async |_| {
+        let (caller, mut calls) = (caller.another(), 0);
+        while Instant::now() < end {
+            caller.get(path).await;
+            calls += 1;
+        }
+        calls
+    });
+    join_all(asking).await.into_iter().sum()
+}
+
+pub async fn crowds(trials: usize) -> Outcome {
+    Tenants::attacked(Site::new(), trials, Attack::Crowd).await
+}
+
+/// Trainings and explanations of one tenant, as many as it may: the other's training ends before they do, and his questions
+/// that must be solved are never turned away.
+async fn crowd(tenants: &mut Tenants, tally: &mut Tally) -> Result<usize, String> {
+    const TRAININGS: usize = 30;
+    let neighbour = &tenants.neighbour.clone();
+    let policy = import(neighbour).await;
+    let session = neighbour.open(&policy).await.ok_or("no session")?;
+    for number in 0..TRAININGS {
+        neighbour.train(&format!("crowd-{}-{number}", tally.trials), &specification(HORIZON)).await;
+    }
+    let queued = Instant::now();
+    let own = tenants.owner.train(&format!("own-{}", tally.trials), &specification(2)).await;
+    tenants.trainings += 1;
+    let own = own.and_then(|(_, job)| job["job"].as_str().map(str::to_owned)).ok_or("no job of the owner's")?;
+    let pulse = tenants.pulse("&mode=resolve").await?;
+    let path = format!("/action?session={session}&explain=worst_case");
+    let calls = until(Instant::now() + ATTACK, neighbour, &path).await;
+    pulse.stop().await.told(2 * ANSWERED, tally);
+    while !matches!(tenants.owner.get(&format!("/jobs/{own}")).await, Some((200, job)) if job["finished_ms"].is_i64()) {
+        if queued.elapsed() > Duration::from_secs(30) {
+            tally.complain("the owner's training still waits");
+            break;
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    for job in neighbour.jobs().await.unwrap_or_default() {
+        neighbour.delete(&format!("/jobs/{}", job["job"].as_str().unwrap_or_default())).await;
+    }
+    Ok(calls + TRAININGS)
+}
