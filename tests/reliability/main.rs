@@ -68,6 +68,8 @@ const ROWS: &[Row] = &[
     row!("damaged bytes on disk", 60, damage::flipped),
     row!("replicas and database", 1, replicas::crashed),
     row!("strangers, reads fail", 1, neighbours::strangers),
+    row!("jobs larger than memory", 1, neighbours::overreachers),
+    row!("policies beyond memory", 1, neighbours::hoarders),
     row!("connections, streams held", 1, neighbours::holders),
     row!("large jobs listed", 1, neighbours::listers),
     row!("queues filled by another", 1, neighbours::crowds),

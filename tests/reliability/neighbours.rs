@@ -1,6 +1,7 @@
-//! Attacks of one tenant on another: calls for his sessions while reads fail, connections and streams held, lists of large
-//! jobs, and queues filled. What was acknowledged to him stays, no advice of his is stale, and he is answered throughout.
+//! Attacks of one tenant on another: calls for his sessions while reads fail, jobs larger than memory, more policies than it
+//! holds, connections and streams held, lists of large jobs, and queues filled. What was acknowledged to him stays, no advice of his is stale, and he is answered throughout.
 
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use futures_util::future::join_all;
@@ -11,7 +12,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
 use crate::caller::Caller;
-use crate::scene::{HORIZON, Outcome, Tally, import, specification};
+use crate::scene::{HORIZON, Outcome, Tally, import, specification, undisturbed};
 use crate::server::Site;
 use crate::tenants::{Tenants, sessions};
 
@@ -25,6 +26,8 @@ const ANSWERED: Duration = Duration::from_millis(500);
 #[derive(Debug, Clone, Copy)]
 pub enum Attack {
     Intrude,
+    Overreach,
+    Hoard,
     Hold,
     List,
     Crowd,
@@ -35,6 +38,8 @@ impl Attack {
     pub async fn run(self, tenants: &mut Tenants, tally: &mut Tally) -> Result<usize, String> {
         match self {
             Attack::Intrude => intrude(tenants, tally).await,
+            Attack::Overreach => overreach(tenants, tally).await,
+            Attack::Hoard => hoard(tenants, tally).await,
             Attack::Hold => hold(tenants, tally).await,
             Attack::List => list(tenants, tally).await,
             Attack::Crowd => crowd(tenants, tally).await,
@@ -93,6 +98,60 @@ async fn hide(file: &std::path::Path, end: Instant) -> Result<usize, sqlx::Error
         times += 1;
     }
     Ok(times)
+}
+
+pub async fn overreachers(trials: usize) -> Outcome {
+    Tenants::attacked(Site::new(), trials, Attack::Overreach).await
+}
+
+/// Jobs that take more than the address space of the process: refused by name, or queued and never begun.
+async fn overreach(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
+    const ADDRESS_SPACE: usize = 900 << 20;
+    const JOBS: usize = 4;
+    let bounded =
+        Command::new("prlimit").args(["--pid", &tenants.server.pid(), &format!("--as={ADDRESS_SPACE}")]).status();
+    if !bounded.is_ok_and(|status| status.success()) {
+        return Err("prlimit does not bound the process".into());
+    }
+    let mut large = specification(2);
+    large["problem"]["radius"] = json!({ "rule": "fixed", "radius": 0.001 });
+    for count in (0..JOBS).map(|number| 7000 + 1000 * number) {
+        large["design"]["count"] = json!(count);
+        let answer = tenants.neighbour.train(&format!("large-{}-{count}", tally.trials), &large).await;
+        if !matches!(answer, Some((202 | 422, _))) {
+            tally.complain(format!("a job of {count} design points: {answer:?}"));
+        }
+    }
+    Ok(JOBS)
+}
+
+pub async fn hoarders(trials: usize) -> Outcome {
+    Tenants::attacked(Site::limited(&["--memory-limit", "400MB"]), trials, Attack::Hoard).await
+}
+
+/// Policies that each want bridges of their own: resident memory stays within the limit.
+async fn hoard(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
+    const LIMIT_MB: usize = 400;
+    const POLICIES: u64 = 24;
+    let neighbour = &tenants.neighbour;
+    let returns: Vec<f64> = (0..260).map(|index| 0.02 * f64::from(index).sin()).collect();
+    let mut policy: Value = serde_json::from_slice(&undisturbed(HORIZON)).map_err(|error| error.to_string())?;
+    policy["specification"]["problem"]["radius"]["paths"] = json!(5000);
+    let mut answered = 0;
+    for number in 0..POLICIES {
+        policy["specification"]["seed"] = json!(1000 * tally.trials as u64 + number);
+        let Some((201, imported)) = neighbour.post("/policies/import", &policy).await else { continue };
+        let opening = json!({ "policy": imported["policy"], "history": returns });
+        let Some((201, session)) = neighbour.post("/sessions", &opening).await else { continue };
+        let path = format!("/action?session={}", session["session"].as_str().unwrap_or_default());
+        answered += usize::from(matches!(neighbour.get(&path).await, Some((200, _))));
+    }
+    let peak = tenants.server.peak_mb();
+    tally.note = format!("{peak} MB resident at most, {answered} policies asked");
+    if peak > LIMIT_MB || answered == 0 {
+        tally.complain(tally.note.clone());
+    }
+    Ok(POLICIES as usize)
 }
 
 pub async fn holders(trials: usize) -> Outcome {

@@ -28,7 +28,7 @@ pub fn specification(horizon: usize) -> Value {
 }
 
 /// The policy that a training of so many steps gives when nothing disturbs it.
-fn undisturbed(steps: usize) -> Vec<u8> {
+pub fn undisturbed(steps: usize) -> Vec<u8> {
     static POLICIES: Mutex<BTreeMap<usize, Vec<u8>>> = Mutex::new(BTreeMap::new());
     POLICIES.lock().unwrap().entry(steps).or_insert_with(|| trained(&specification(steps))).clone()
 }
