@@ -136,7 +136,7 @@ pub async fn hoarders(trials: usize) -> Outcome {
 /// Policies that each want bridges of their own: resident memory stays within the limit.
 async fn hoard(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
     const LIMIT_MB: usize = 400;
-    const POLICIES: u64 = 24;
+    const POLICIES: u64 = 12;
     let neighbour = &tenants.neighbour;
     let returns: Vec<f64> = (0..260).map(|index| 0.02 * f64::from(index).sin()).collect();
     let mut policy: Value = serde_json::from_slice(&undisturbed(HORIZON)).map_err(|error| error.to_string())?;
@@ -199,8 +199,7 @@ async fn asked(address: &str, question: &str) -> Option<TcpStream> {
 }
 
 pub async fn listers(trials: usize) -> Outcome {
-    // Nothing that is queued is taken.
-    Tenants::attacked(Site::limited(&["--role", "api"]), trials, Attack::List).await
+    Tenants::attacked(Site::new(), trials, Attack::List).await
 }
 
 /// Lists of as many large jobs as a tenant may queue.
@@ -212,6 +211,8 @@ async fn list(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
     large["problem"]["history"] = history.map(Value::from).collect();
     large["problem"]["radius"] = json!({ "rule": "fixed", "radius": 0.001 });
     let mut queued = 0;
+    // Keeps the worker from what is queued behind it.
+    tenants.neighbour.train(&format!("long-{}", tally.trials), &specification(HORIZON)).await;
     for number in 0..JOBS {
         match tenants.neighbour.train(&format!("{}-{number}", tally.trials), &large).await {
             Some((202, _)) => queued += 1,
