@@ -10,53 +10,23 @@
 //! certificate is. A key is rotated without a gap: its successor is in force before it expires itself.
 
 use std::collections::HashMap;
-use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
 
-use rand::TryRng;
-use rand::rngs::SysRng;
 use sha2::{Digest, Sha256};
 
 use super::allowance::{Allowance, Limits};
 use super::clock::Clock;
 use super::error::ServiceError;
 use super::identity;
+pub use super::secret::{PREFIX, Secret};
 use super::shutdown::Shutdown;
 use crate::control::error::FieldError;
 use crate::store::{Actor, KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, Store, StoreError, Successor, Tenant};
 
 /// A key made or revoked elsewhere counts within this time.
 pub const REFRESH: Duration = Duration::from_millis(500);
-/// What a key starts with, so that people and scanners of repositories know one when they see it.
-pub const PREFIX: &str = "ballast_";
-
-/// The text of a key, 256 random bits; shown once, printed by nothing else.
-pub struct Secret(String);
-
-impl Secret {
-    /// # Errors
-    /// The operating system gives no random bits.
-    pub fn new() -> Result<Self, ServiceError> {
-        let mut bits = [0u8; 32];
-        SysRng.try_fill_bytes(&mut bits).map_err(|error| ServiceError::Internal(format!("no random bits: {error}")))?;
-        let digits: String = bits.iter().map(|byte| format!("{byte:02x}")).collect();
-        Ok(Secret(format!("{PREFIX}{digits}")))
-    }
-
-    /// The text, to be shown to its new holder.
-    pub fn reveal(&self) -> &str {
-        &self.0
-    }
-}
-
-impl fmt::Debug for Secret {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str("Secret(..)")
-    }
-}
-
 fn hash(text: &str) -> [u8; 32] {
     Sha256::digest(text).into()
 }

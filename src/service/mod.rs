@@ -20,6 +20,7 @@ pub mod observation;
 pub mod policies;
 pub mod process;
 pub mod progress;
+mod secret;
 pub mod sessions;
 pub mod shutdown;
 mod slots;

@@ -24,7 +24,7 @@ use futures_util::FutureExt;
 use super::codec::{Seal, to_sql};
 use super::error::Failure;
 use super::observations::ObservationRow;
-use super::query::{Connection, Query, Row, query};
+use super::query::{Connection, Row, query};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 
@@ -265,65 +265,8 @@ async fn cut(mut connection: Connection<'_>, tenant: String, bounds: AuditBounds
     Ok(dropped)
 }
 
-fn missing(tenant: &str, number: i64) -> Failure {
+pub(super) fn missing(tenant: &str, number: i64) -> Failure {
     Failure::Corrupt(format!("entry {number} of the audit of {tenant}"))
-}
-
-/// The chains, with their ends.
-pub(super) fn chains() -> Query {
-    query("SELECT * FROM audit_chains ORDER BY tenant")
-}
-
-/// A chain on its way through a check.
-pub(super) struct Chain {
-    pub tenant: String,
-    /// Entries found so far, those cut among them.
-    pub number: i64,
-    seal: Vec<u8>,
-    end: i64,
-    end_seal: Vec<u8>,
-}
-
-impl Chain {
-    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
-        Ok(Chain {
-            tenant: row.get("tenant")?,
-            number: row.get("cut_number")?,
-            seal: row.get("cut_seal")?,
-            end: row.get("number")?,
-            end_seal: row.get("seal")?,
-        })
-    }
-
-    /// The entries that follow, no more than `limit`; what was added since the check began is not among them.
-    pub(super) fn next(&self, limit: i64) -> Query {
-        let next =
-            query("SELECT * FROM audit WHERE tenant = $1 AND number > $2 AND number <= $3 ORDER BY number LIMIT $4");
-        next.bind(self.tenant.as_str()).bind(self.number).bind(self.end).bind(limit)
-    }
-
-    pub(super) fn is_whole(&self) -> bool {
-        self.number == self.end
-    }
-
-    /// Goes on over what [`Chain::next`] found.
-    pub(super) fn follow(&mut self, rows: &[Row]) -> Result<(), Failure> {
-        if rows.is_empty() {
-            return Err(missing(&self.tenant, self.number + 1));
-        }
-        for row in rows {
-            AuditRow::from_row(row)?;
-            let (number, previous): (i64, Vec<u8>) = (row.get("number")?, row.get("previous")?);
-            if number != self.number + 1 || previous != self.seal {
-                return Err(missing(&self.tenant, self.number + 1));
-            }
-            (self.number, self.seal) = (number, row.get("seal")?);
-        }
-        if self.is_whole() && self.seal != self.end_seal {
-            return Err(missing(&self.tenant, self.end));
-        }
-        Ok(())
-    }
 }
 
 impl AuditRow {
@@ -355,7 +298,7 @@ impl AuditRow {
         })
     }
 
-    fn from_row(row: &Row) -> Result<Self, Failure> {
+    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
         let read = AuditRow {
             sequence: row.get("sequence")?,
             tenant: Tenant::stored(&row.get::<String>("tenant")?),

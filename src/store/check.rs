@@ -11,7 +11,7 @@ use std::path::Path;
 use sqlx::SqliteConnection;
 use sqlx::postgres::PgConnection;
 
-use super::audit::{self, Chain};
+use super::audit_chain::{self, Chain};
 use super::error::{Failure, StoreError};
 use super::job::JobRow;
 use super::keys::KeyRow;
@@ -117,7 +117,7 @@ impl Inspection {
 
     async fn audit(&mut self) -> Result<(usize, usize), Failure> {
         let (mut chains, mut entries) = (0, 0);
-        for row in self.read(audit::chains()).await? {
+        for row in self.read(audit_chain::chains()).await? {
             let mut chain = Chain::from_row(&row)?;
             while !chain.is_whole() {
                 let page = self.read(chain.next(PAGE)).await?;

@@ -22,6 +22,7 @@
 //! record is not ours to expire).
 
 mod audit;
+mod audit_chain;
 mod check;
 mod codec;
 mod error;
