@@ -74,9 +74,10 @@ async fn a_thousand_slow_sockets_harm_nobody_else() {
     app.open().await;
     let before = slowest(&app, 1).await;
 
-    let head = "GET /readyz HTTP/1.1\r\nHost: here\r\nX-Slow: ".to_owned();
-    let body = "POST /train HTTP/1.1\r\nHost: here\r\nContent-Type: application/json\r\nContent-Length: 9999\r\n\r\n{";
-    let reader = "GET /openapi.json HTTP/1.1\r\nHost: here\r\n\r\n".repeat(100);
+    let head = "GET /readyz HTTP/1.1\r\nHost: localhost\r\nX-Slow: ".to_owned();
+    let body =
+        "POST /train HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 9999\r\n\r\n{";
+    let reader = "GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n".repeat(100);
     let kinds = [head, body.to_owned(), reader];
     let mut sockets: Vec<TcpStream> =
         (0..SLOW_SOCKETS).map(|index| open_socket(&address, &kinds[index % kinds.len()])).collect();
@@ -101,7 +102,8 @@ async fn a_thousand_slow_sockets_harm_nobody_else() {
 async fn a_body_that_does_not_come_is_not_waited_for() {
     let app = App::configured(|config| config.request_timeout = Duration::from_millis(300)).await;
     let address = app.url.strip_prefix("http://").unwrap();
-    let head = "POST /train HTTP/1.1\r\nHost: here\r\nContent-Type: application/json\r\nContent-Length: 9\r\n\r\n{";
+    let head =
+        "POST /train HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 9\r\n\r\n{";
     let mut socket = TcpStream::connect(address).unwrap();
     socket.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
     socket.write_all(head.as_bytes()).unwrap();
@@ -187,6 +189,69 @@ async fn heavy_calls_past_the_bound_come_back_later_and_starve_nobody() {
     assert!(slowest < ANSWERED_WITHIN, "{slowest:?}");
     // Every place was given up again.
     assert_eq!(app.post("/what-if", &sweep).await.0, 200);
+}
+
+/// A question is what it says once it is decoded, however it was written.
+#[tokio::test(flavor = "multi_thread")]
+async fn the_class_of_a_call_is_that_of_what_it_asks() {
+    let mut app = App::configured(|config| config.limits = Limits::new([0, 2, 0], 4)).await;
+    app.train(&specification(3)).await;
+    app.open().await;
+    for question in ["mode=resolve", "mode=%72esolve", "explain=worst_case", "explain=%77orst_case"] {
+        let asked = join_all((0..20).map(|_| {
+            let url = format!("{}/action?session={}&{question}", app.url, app.session);
+            app.client.get(url).send()
+        }));
+        let statuses: Vec<u16> = asked.await.into_iter().map(|answer| answer.unwrap().status().as_u16()).collect();
+        assert!(statuses.iter().all(|status| [200, 429, 503].contains(status)), "{question}: {statuses:?}");
+        assert!(statuses.iter().filter(|status| **status == 429).count() >= 10, "{question}: {statuses:?}");
+        assert_eq!(app.action().await.0, 200, "{question}");
+    }
+    // No word of a name makes a cheap question a dear one.
+    let session = app.get("/action?session=session_resolve_explain").await;
+    assert_eq!(session.0, 404, "{}", session.1);
+}
+
+/// Advice for a state outside the design is solved, and counts as what it is from then on; so does the observation that
+/// needs it.
+#[tokio::test(flavor = "multi_thread")]
+async fn advice_that_must_solve_is_heavy_from_then_on() {
+    let mut app = App::configured(|config| config.limits = Limits::new([0, 3, 0], 4)).await;
+    app.train(&specification(3)).await;
+    let far = json!({ "history": [0.3, -0.3, 0.25, -0.28, 0.31, -0.2], "wealth": 100.0 });
+    let mut sessions = Vec::new();
+    for _ in 0..12 {
+        app.open_with(far.clone()).await;
+        sessions.push(app.session.clone());
+    }
+    let mut statuses = Vec::new();
+    for session in &sessions {
+        app.session.clone_from(session);
+        let (status, answer) = app.action().await;
+        if status == 200 {
+            assert_eq!(answer["source"], "resolved_outside_design", "{answer}");
+        } else {
+            assert_eq!((status.as_u16(), &answer["value"]), (429, &json!("heavy")), "{answer}");
+        }
+        statuses.push(status.as_u16());
+    }
+    assert!(statuses.contains(&200) && statuses.contains(&429), "{statuses:?}");
+    // What was put off is recorded in its turn.
+    let deadline = Instant::now() + Duration::from_secs(20);
+    while app.observe(1, 0.01).await.0 != 200 {
+        assert!(Instant::now() < deadline, "never in turn");
+        tokio::time::sleep(Duration::from_millis(200)).await;
+    }
+    let put_off = loop {
+        app.open_with(far.clone()).await;
+        let (status, answer) = app.observe(1, 0.01).await;
+        if status == 429 {
+            break answer;
+        }
+        assert_eq!(status, 200, "{answer}");
+        assert!(Instant::now() < deadline, "no observation outside the design was ever put off");
+    };
+    assert_eq!(put_off["value"], "heavy", "{put_off}");
 }
 
 /// Pointers to everything in a document; of a list only the ends, for its entries are alike.

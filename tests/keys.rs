@@ -411,10 +411,12 @@ async fn an_address_that_others_reach_asks_for_keys() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().to_str().unwrap().to_owned();
     let (code, _, said) = ballast(&["serve", "--listen", "0.0.0.0:0", "--data", &data]);
+    assert!(code == Some(1) && said.contains("--tls-cert") && said.contains("--allow-plaintext"), "{said}");
+    let (code, _, said) = ballast(&["serve", "--listen", "0.0.0.0:0", "--allow-plaintext", "--data", &data]);
     assert!(code == Some(1) && said.contains("ballast keys create") && said.contains("--allow-anonymous"), "{said}");
     let public = |allow: Option<(&str, &str)>| {
         let (child, url) = process::serve(|command| {
-            command.args(["--listen", "0.0.0.0:0", "--data", &data]).envs(allow);
+            command.args(["--listen", "0.0.0.0:0", "--allow-plaintext", "--data", &data]).envs(allow);
         });
         (Process(child), url.replace("0.0.0.0", "127.0.0.1"))
     };

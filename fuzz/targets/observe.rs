@@ -6,6 +6,7 @@ use std::sync::{Arc, LazyLock, Mutex};
 use ballast::control::policy::Policy;
 use ballast::http::decode;
 use ballast::service::Service;
+use ballast::service::allowance::{Allowance, HeavyTurn, Limits};
 use ballast::service::clock::Clock;
 use ballast::service::config::Config;
 use ballast::service::observation::Observe;
@@ -13,6 +14,11 @@ use ballast::service::shutdown::Shutdown;
 use ballast::store::Tenant;
 use libfuzzer_sys::fuzz_target;
 use tokio::runtime::Runtime;
+
+/// As a call of its own has it.
+fn turn() -> Arc<HeavyTurn> {
+    Arc::new(HeavyTurn::new(Arc::new(Allowance::new(&Limits::default()))))
+}
 
 struct Live {
     runtime: Runtime,
@@ -46,12 +52,12 @@ fuzz_target!(|body: &[u8]| {
     let mut session = live.session.lock().expect("nothing panicked");
     // Otherwise nearly every report would be of another session.
     (report.session, report.period) = session.clone();
-    let observed = live.runtime.block_on(live.service.sessions.observe(&Tenant::default(), report.clone()));
+    let observed = live.runtime.block_on(live.service.sessions.observe(&Tenant::default(), report.clone(), &turn()));
     let Ok(observed) = observed else { return };
     assert!(observed.wealth.is_finite() && observed.wealth > 0.0, "{observed:?}");
     assert!((0.0..=1.0).contains(&observed.executed_allocation), "{observed:?}");
     assert!(observed.uncertainty.radius.is_finite() && observed.uncertainty.radius >= 0.0, "{observed:?}");
-    let again = live.runtime.block_on(live.service.sessions.observe(&Tenant::default(), report));
+    let again = live.runtime.block_on(live.service.sessions.observe(&Tenant::default(), report, &turn()));
     assert_eq!(again.expect("told again"), observed);
     *session = match observed.completed {
         true => (open(&live.runtime, &live.service, &live.policy), 1),

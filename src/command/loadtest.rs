@@ -18,6 +18,7 @@ mod populate;
 mod scenarios;
 mod server;
 mod stored;
+mod tunnel;
 
 use figures::Report;
 use server::Server;
@@ -27,9 +28,12 @@ pub struct LoadTest {
     /// What to run; everything unless given
     #[arg(value_enum)]
     scenarios: Vec<Scenario>,
-    /// Drive the service at http://host:port instead of starting one
+    /// Drive the service at http://host:port or https://host:port instead of starting one
     #[arg(long)]
     url: Option<String>,
+    /// Authorities in PEM, one of which the certificate of an https service must be by
+    #[arg(long, requires = "url")]
+    ca: Option<PathBuf>,
     /// Start the service over this PostgreSQL database, which keeps what is written to it, instead of SQLite
     #[arg(long, conflicts_with = "url")]
     store: Option<String>,
@@ -110,7 +114,7 @@ pub fn run(arguments: &LoadTest) -> Result<(), Box<dyn Error>> {
 
 async fn measure(arguments: &LoadTest) -> Result<Report, Box<dyn Error>> {
     let mut server = match &arguments.url {
-        Some(url) => Server::at(url)?,
+        Some(url) => Server::at(url, arguments.ca.as_deref()).await?,
         None => Server::start(&arguments.folder, arguments.store.as_deref(), arguments.replicas.into()).await?,
     };
     let mut report = Report::default();

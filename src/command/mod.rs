@@ -19,6 +19,7 @@ pub mod reproduce;
 pub mod serve;
 mod store_location;
 mod tables;
+mod tls_client;
 mod traces;
 
 /// An error and its causes on one line.

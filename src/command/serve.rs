@@ -1,12 +1,13 @@
 //! `ballast serve`: the service, until SIGTERM or SIGINT.
 
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use ballast::http;
 use ballast::service::allowance::Limits;
 use ballast::service::audit::AuditKept;
-use ballast::service::config::{Config, DAY, Role};
+use ballast::service::config::{Config, DAY, Role, TlsFiles};
 use ballast::service::memory::{MemoryLimit, Size};
 use ballast::service::shutdown::Shutdown;
 use ballast::store::Quotas;
@@ -22,6 +23,14 @@ pub struct Serve {
     /// Address to listen on; port 0 picks a free one.
     #[arg(long, env = "BALLAST_LISTEN", default_value = "127.0.0.1:8080")]
     listen: SocketAddr,
+    /// Another address for /livez, /readyz, /health, /metrics and the description alone, which no caller can fill.
+    #[arg(long, env = "BALLAST_OPERATIONS_LISTEN")]
+    operations_listen: Option<SocketAddr>,
+    #[command(flatten)]
+    tls: TlsArgs,
+    /// Names the service answers to beside its own while it asks for no key, separated by commas.
+    #[arg(long = "host", env = "BALLAST_HOSTS", value_delimiter = ',')]
+    hosts: Vec<String>,
     #[command(flatten)]
     store: StoreArgs,
     /// Listen where others reach it even while the store holds no key.
@@ -83,6 +92,20 @@ struct QuotaArgs {
     retain_jobs_days: u16,
 }
 
+/// How connections are encrypted.
+#[derive(Debug, Args)]
+struct TlsArgs {
+    /// Certificate chain in PEM: connections are encrypted by TLS 1.2 or 1.3. Read anew when it changes.
+    #[arg(long, env = "BALLAST_TLS_CERT", requires = "tls_key")]
+    tls_cert: Option<PathBuf>,
+    /// Its private key, in PEM.
+    #[arg(long, env = "BALLAST_TLS_KEY", requires = "tls_cert")]
+    tls_key: Option<PathBuf>,
+    /// Listen where others reach it without encryption: something in front of it encrypts.
+    #[arg(long, env = "BALLAST_ALLOW_PLAINTEXT", value_parser = FalseyValueParser::new())]
+    allow_plaintext: bool,
+}
+
 /// What one tenant may ask.
 #[derive(Debug, Args)]
 struct LimitArgs {
@@ -98,6 +121,15 @@ struct LimitArgs {
     /// Calls of the heavy class under way at a time; a tenant gets half.
     #[arg(long, env = "BALLAST_HEAVY_CALLS", default_value_t = 64, value_parser = clap::value_parser!(u16).range(1..))]
     heavy_calls: u16,
+    /// Event streams of one tenant open at a time.
+    #[arg(long, env = "BALLAST_STREAMS", default_value_t = 256, value_parser = clap::value_parser!(u16).range(1..))]
+    streams: u16,
+    /// Connections held at a time, as far as the process may open files.
+    #[arg(long, env = "BALLAST_CONNECTIONS", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..))]
+    connections: u32,
+    /// Those of one address; a quarter of all unless given. All of them where a proxy stands in front.
+    #[arg(long, env = "BALLAST_CONNECTIONS_PER_ADDRESS", value_parser = clap::value_parser!(u32).range(1..))]
+    connections_per_address: Option<u32>,
 }
 
 /// [`Role`] as the command line names it.
@@ -133,6 +165,13 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     config.quotas =
         Quotas { queued_jobs: quotas.quota_queued_jobs, sessions: quotas.quota_sessions, bytes: quotas.quota_bytes };
     config.retain_jobs = (quotas.retain_jobs_days > 0).then(|| DAY * quotas.retain_jobs_days.into());
+    config.limits.streams_of_one = limits.streams.into();
+    config.connection_limit = limits.connections as usize;
+    config.connections_of_address = limits.connections_per_address.map(|most| most as usize);
+    config.operations_listen = arguments.operations_listen;
+    let TlsArgs { tls_cert, tls_key, allow_plaintext } = arguments.tls;
+    config.tls = tls_cert.zip(tls_key).map(|(certificate, key)| TlsFiles { certificate, key });
+    (config.allow_plaintext, config.hosts) = (allow_plaintext, arguments.hosts);
     config.role = arguments.role.into();
     config.lease = Duration::from_secs(arguments.lease_seconds.into());
     config.training_threads = arguments.training_threads.map_or(config.training_threads, usize::from);
@@ -140,7 +179,10 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     let shutdown = Shutdown::new();
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
     let running = http::serve(config, shutdown.clone()).await?;
-    println!("listening on http://{}", running.address);
+    println!("listening on {}://{}", running.scheme, running.address);
+    if let Some(address) = running.operations {
+        println!("for operators on {}://{address}", running.scheme);
+    }
     tokio::spawn(async move {
         tokio::select! {
             _ = terminate.recv() => {}

@@ -5,21 +5,29 @@
 //! describe a published program. Everything else tells of somebody's data, so it asks for a key: `/health` and `/metrics`
 //! too, whose figures are of all tenants together. An operation that is in no line of the table is for admins alone.
 //!
-//! The gate refuses in this order: no key, no role, too fast, too much at a time. The first three come before a body is
-//! read. An unknown or another tenant's thing is found to be so by the use cases, with one and the same 404.
+//! The gate refuses in this order: not meant for this service, no key, no role. A handler then takes the call off its
+//! class by asking for its caller: too fast is said before a body is read, too much at a time after it. What class a call
+//! has is decided by its route or from its parsed question, never from its text. An unknown or another tenant's thing is
+//! found to be so by the use cases, with one and the same 404.
 
-use std::sync::{Arc, OnceLock};
+use std::marker::PhantomData;
+use std::ops::Deref;
+use std::sync::Arc;
 
-use axum::extract::{DefaultBodyLimit, FromRequestParts, MatchedPath, Request, State};
+use axum::extract::{DefaultBodyLimit, FromRequestParts, MatchedPath, OptionalFromRequestParts, Request, State};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, Method, header};
+use axum::http::{HeaderMap, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use serde::de::DeserializeOwned;
 
-use super::extract::BodyLimit;
+use super::conversation::LocalAddress;
+use super::extract::{AfterBody, BodyLimit, Parameters};
+use super::hosts::{self, Hosts};
 use super::problem::{Problem, ProblemKind};
 use crate::service::Service;
-use crate::service::allowance::{Class, Places, TooMany};
+use crate::service::allowance::{Class, HeavyTurn, Refused};
+use crate::service::error::ServiceError;
 use crate::service::keys::{Caller, PREFIX, Turned};
 use crate::store::{KeyRole, Tenant};
 
@@ -46,15 +54,6 @@ pub fn access(method: &str, route: Option<&str>) -> Access {
     }
 }
 
-fn class(method: &str, route: Option<&str>, query: &str) -> Class {
-    match (method, route.unwrap_or_default()) {
-        (_, "/action") if query.contains("resolve") || query.contains("explain") => Class::Heavy,
-        (_, "/action" | "/observe") | ("POST", "/sessions" | "/jobs/{id}/cancel") | ("DELETE", _) => Class::Live,
-        ("POST", _) => Class::Heavy,
-        _ => Class::Read,
-    }
-}
-
 /// The one body that is large by nature.
 const LARGE_BODY: &str = "/policies/import";
 
@@ -66,6 +65,7 @@ pub struct Gate {
     pub large_body_bytes: usize,
     /// Of any other request.
     pub body_bytes: usize,
+    pub hosts: Arc<Hosts>,
 }
 
 /// Whose request was answered, for those who record it: an extension of the response.
@@ -84,66 +84,43 @@ impl Asker {
     }
 }
 
-/// Lets a request through to its handler, with its [`Caller`] and the size its body may have.
+/// Lets a request through to its handler, with its [`Call`] and the size its body may have.
 pub async fn admit(State(gate): State<Gate>, mut request: Request, next: Next) -> Response {
-    let (method, matched) = (request.method().as_str(), request.extensions().get::<MatchedPath>().cloned());
+    let matched = request.extensions().get::<MatchedPath>().cloned();
     let route = matched.as_ref().map(MatchedPath::as_str);
-    let access = access(method, route);
+    if let Err(problem) = addressed(&gate, &request) {
+        return problem.into_response();
+    }
+    let access = access(request.method().as_str(), route);
     let limit = if route == Some(LARGE_BODY) { gate.large_body_bytes } else { gate.body_bytes };
-    let has_body = request.method() == Method::POST;
-    let class = class(method, route, request.uri().query().unwrap_or_default());
-    let admitted = match access {
+    let call = match access {
         Access::Open => None,
         access => match admitted(&gate.service, access, request.headers()) {
-            Ok(caller) => Some(caller),
+            Ok(caller) => Some(Call::new(caller)),
             Err((of, problem)) => return Asker::signed(of.tenant, of.key, problem.into_response()),
         },
     };
-    let (mut turn, mut asker) = (None, None);
-    if let Some(caller) = admitted {
-        asker = Some((caller.tenant.clone(), caller.key().clone()));
-        if let Err(refused) = caller.allowance.take(class) {
-            return Asker::signed(Some(caller.tenant.clone()), caller.key().clone(), too_many(class, refused));
-        }
-        if class == Class::Heavy {
-            let own = turn.insert(Turn { caller: caller.clone(), places: Arc::default() });
-            if has_body {
-                request.extensions_mut().insert(own.clone());
-            } else if let Err(problem) = own.begin() {
-                return problem.into_response();
-            }
-        }
-        request.extensions_mut().insert(caller);
+    if let Some(call) = &call {
+        request.extensions_mut().insert(call.clone());
     }
     DefaultBodyLimit::max(limit).apply(&mut request);
     request.extensions_mut().insert(BodyLimit(limit));
     let response = next.run(request).await;
-    drop(turn);
-    match asker {
-        Some((tenant, key)) => Asker::signed(Some(tenant), key, response),
+    // Here the call ends: not before are the places of a heavy one given up.
+    match call {
+        Some(call) => Asker::signed(Some(call.tenant.clone()), call.key().clone(), response),
         None => response,
     }
 }
 
-/// The places of a heavy call: taken once its body is there, so that whoever sends his slowly holds none; given up with
-/// the answer.
-#[derive(Clone)]
-pub struct Turn {
-    caller: Arc<Caller>,
-    places: Arc<OnceLock<Places>>,
-}
-
-impl Turn {
-    /// # Errors
-    /// All places are taken.
-    pub fn begin(&self) -> Result<(), Problem> {
-        let places = self.caller.allowance.places().ok_or_else(|| {
-            let detail = "as many calls that solve, train or import are under way as may be at a time";
-            Problem::new(ProblemKind::Overloaded, detail)
-        })?;
-        self.places.get_or_init(|| places);
-        Ok(())
+/// Whether the request is meant for this service, as far as it says.
+fn addressed(gate: &Gate, request: &Request) -> Result<(), Problem> {
+    hosts::refuse_ambiguous(request.headers())?;
+    if !gate.service.keys.are_absent() {
+        return Ok(());
     }
+    let local = request.extensions().get::<LocalAddress>().map(|LocalAddress(local)| local.ip());
+    gate.hosts.refuse_foreign(request.headers(), request.uri(), local)
 }
 
 fn admitted(service: &Service, access: Access, headers: &HeaderMap) -> Result<Arc<Caller>, (Asker, Problem)> {
@@ -182,24 +159,113 @@ fn unauthenticated(turned: Turned) -> Problem {
     Problem::new(ProblemKind::Unauthenticated, detail).naming("Authorization", value, rule)
 }
 
-fn too_many(class: Class, TooMany { per_second, wait }: TooMany) -> Response {
-    let seconds = wait.as_secs_f64().ceil().max(1.0);
-    let detail = format!("more than {per_second} {} calls in a second", class.name());
-    let rule = format!("must come at most {per_second} times a second, over all keys of the tenant");
-    let problem = Problem::new(ProblemKind::TooManyRequests, detail).naming("rate", class.name(), rule);
-    ([(header::RETRY_AFTER, seconds.to_string())], problem).into_response()
+/// A call let through by the gate: who calls, and what it must take before it does heavy work.
+#[derive(Debug, Clone)]
+pub struct Call {
+    pub caller: Arc<Caller>,
+    pub turn: Arc<HeavyTurn>,
 }
 
-/// Who calls: what the gate found.
-pub struct By(pub Arc<Caller>);
+impl Call {
+    fn new(caller: Arc<Caller>) -> Self {
+        let turn = Arc::new(HeavyTurn::new(caller.allowance.clone()));
+        Call { caller, turn }
+    }
 
-impl<S: Send + Sync> FromRequestParts<S> for By {
+    /// Takes the call off its class.
+    fn counted(self, class: Class) -> Result<Self, Refused> {
+        match class {
+            Class::Heavy => self.turn.count()?,
+            class => self.caller.allowance.take(class).map_err(|refused| Refused::TooOften(class, refused))?,
+        }
+        Ok(self)
+    }
+
+    fn of(parts: &Parts) -> Result<Self, Problem> {
+        // A handler whose operation the table calls open cannot know for whom it works.
+        let call = parts.extensions.get::<Call>().cloned();
+        call.ok_or_else(|| Problem::new(ProblemKind::Internal, "the call has no caller"))
+    }
+}
+
+impl Deref for Call {
+    type Target = Caller;
+
+    fn deref(&self) -> &Caller {
+        &self.caller
+    }
+}
+
+/// A class of calls as a type, for [`By`].
+pub trait Classed {
+    const CLASS: Class;
+}
+
+/// See [`Class::Live`].
+pub struct Live;
+/// See [`Class::Heavy`].
+pub struct Heavy;
+/// See [`Class::Read`].
+pub struct Read;
+
+impl Classed for Live {
+    const CLASS: Class = Class::Live;
+}
+
+impl Classed for Heavy {
+    const CLASS: Class = Class::Heavy;
+}
+
+impl Classed for Read {
+    const CLASS: Class = Class::Read;
+}
+
+/// Who calls, once the call is taken off its class. No handler learns for whom it works in another way but [`Asked`], so
+/// none is reached without its class. Places of heavy calls are taken when the body is there, so that whoever sends his
+/// slowly holds none.
+pub struct By<C>(pub Call, pub PhantomData<C>);
+
+impl<C: Classed, S: Send + Sync> FromRequestParts<S> for By<C> {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
-        let caller = parts.extensions.get::<Arc<Caller>>().cloned();
-        // A handler whose operation the table calls open cannot know for whom it works.
-        caller.map(By).ok_or_else(|| Problem::new(ProblemKind::Internal, "the call has no caller"))
+        let call = Call::of(parts)?.counted(C::CLASS).map_err(ServiceError::from)?;
+        if C::CLASS == Class::Heavy {
+            parts.extensions.insert(AfterBody(call.turn.clone()));
+        }
+        Ok(By(call, PhantomData))
+    }
+}
+
+impl<C: Classed, S: Send + Sync> OptionalFromRequestParts<S> for By<C> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Option<Self>, Problem> {
+        if parts.extensions.get::<Call>().is_none() {
+            return Ok(None);
+        }
+        <Self as FromRequestParts<S>>::from_request_parts(parts, state).await.map(Some)
+    }
+}
+
+/// A question whose class its parsed parameters decide.
+pub trait Question {
+    fn class(&self) -> Class;
+}
+
+/// Who calls, and what is asked, once the call is taken off the class of what is asked; a question that cannot be read
+/// costs a call too.
+pub struct Asked<Q>(pub Call, pub Q);
+
+impl<Q: Question + DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Asked<Q> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let call = Call::of(parts)?;
+        let question = Parameters::<Q>::from_request_parts(parts, state).await;
+        let class = question.as_ref().map_or(Class::Read, |Parameters(question)| question.class());
+        let call = call.counted(class).map_err(ServiceError::from)?;
+        question.map(|Parameters(question)| Asked(call, question))
     }
 }
 

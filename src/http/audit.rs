@@ -7,7 +7,7 @@ use axum::extract::State;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::access::By;
+use super::access::{By, Read};
 use super::extract::Parameters;
 use super::page::{self, Page};
 use super::problem::{Problem, ProblemKind};
@@ -76,7 +76,7 @@ impl From<AuditRow> for AuditEntry {
         (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn list(
     State(service): State<Arc<Service>>,
-    By(_admin): By,
+    By(_admin, _): By<Read>,
     Parameters(ask): Parameters<Ask>,
 ) -> Result<Json<AuditPage>, Problem> {
     let (limit, after) = Page::new(ask.limit, ask.after).bounds()?;

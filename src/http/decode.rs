@@ -7,22 +7,21 @@ use serde_path_to_error::{Path, Segment};
 use super::problem::{Problem, ProblemKind};
 use crate::control::error::FieldError;
 
-/// Values longer than this are cut when shown back.
-const SHOWN_CHARACTERS: usize = 80;
-
 /// Parses a JSON body. Refuses NaN, infinities, numbers beyond double precision, unknown fields (where the type
 /// does), trailing bytes and nesting deeper than 128.
 pub fn json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     let mut reader = serde_json::Deserializer::from_slice(bytes);
     match serde_path_to_error::deserialize(&mut reader) {
+        Err(error) if error.inner().is_data() => {
+            let fractional = error.inner().to_string().starts_with("invalid type: floating point");
+            let whole = if fractional { with_whole_numbers(bytes) } else { None };
+            whole.ok_or_else(|| mismatch(bytes, dotted(error.path()), error.inner()))
+        }
         Ok(value) => reader.end().map(|()| value).map_err(|error| syntax(bytes, "", &error)),
         Err(error) => {
             let path = dotted(error.path());
             let cause = error.into_inner();
-            match cause.classify() {
-                serde_json::error::Category::Data => Err(mismatch(bytes, path, &cause)),
-                _ => Err(overlong(bytes, &path).unwrap_or_else(|| syntax(bytes, &path, &cause))),
-            }
+            Err(misshapen(bytes, &path, &cause).unwrap_or_else(|| syntax(bytes, &path, &cause)))
         }
     }
 }
@@ -32,7 +31,7 @@ pub fn parameters<T: DeserializeOwned>(pairs: Vec<(String, String)>) -> Result<T
     let mut object = serde_json::Map::new();
     for (name, value) in pairs {
         if object.contains_key(&name) {
-            let error = FieldError::new(name, shortened(&value), "must be given once");
+            let error = FieldError::new(name, value, "must be given once");
             return Err(Problem::of_field(ProblemKind::InvalidQuery, error));
         }
         object.insert(name, Value::String(value));
@@ -44,18 +43,61 @@ pub fn parameters<T: DeserializeOwned>(pairs: Vec<(String, String)>) -> Result<T
     })
 }
 
+/// To JSON Schema 5.0 is an integer, to serde it is none: the same body with every such number written as one, read
+/// under the same rules.
+fn with_whole_numbers<T: DeserializeOwned>(bytes: &[u8]) -> Option<T> {
+    serde_json::from_slice(&whole_numbers(bytes)).ok()
+}
+
+/// The same JSON without fractions of nothing but zeros; minus zero keeps its own.
+fn whole_numbers(bytes: &[u8]) -> Vec<u8> {
+    let mut written = Vec::with_capacity(bytes.len());
+    let (mut in_string, mut at) = (false, 0);
+    while at < bytes.len() {
+        let length = if in_string { 0 } else { bytes[at..].iter().take_while(|byte| is_numeric(**byte)).count() };
+        if length > 0 {
+            written.extend_from_slice(whole(&bytes[at..at + length]));
+            at += length;
+            continue;
+        }
+        let escaped = in_string && bytes[at] == b'\\' && at + 1 < bytes.len();
+        in_string ^= bytes[at] == b'"';
+        let end = at + 1 + usize::from(escaped);
+        written.extend_from_slice(&bytes[at..end]);
+        at = end;
+    }
+    written
+}
+
+fn is_numeric(byte: u8) -> bool {
+    byte.is_ascii_digit() || matches!(byte, b'+' | b'-' | b'.' | b'e' | b'E')
+}
+
+fn whole(number: &[u8]) -> &[u8] {
+    let Some(point) = number.iter().position(|byte| *byte == b'.') else { return number };
+    let (whole, fraction) = (&number[..point], &number[point + 1..]);
+    let is_whole = whole != b"-0" && !fraction.is_empty() && fraction.iter().all(|digit| *digit == b'0');
+    if is_whole { whole } else { number }
+}
+
 /// Valid JSON of the wrong shape.
 fn mismatch(bytes: &[u8], path: String, cause: &serde_json::Error) -> Problem {
     let given = serde_json::from_slice(bytes).unwrap_or(Value::Null);
     Problem::of_field(ProblemKind::InvalidField, located(&given, path, &without_position(cause)))
 }
 
-/// The parser stops at an element too many as at a byte too many; the body is JSON all the same.
-fn overlong(bytes: &[u8], path: &str) -> Option<Problem> {
+/// The parser stops at an element too many as at a byte too many, and at a list where it wants a word; the body is JSON
+/// all the same.
+fn misshapen(bytes: &[u8], path: &str, cause: &serde_json::Error) -> Option<Problem> {
+    const ELEMENT_TOO_MANY: &str = "trailing characters";
     let given: Value = serde_json::from_slice(bytes).ok()?;
     let value = lookup(&given, path).unwrap_or(&given);
-    let error = FieldError::new(path, shortened(&value.to_string()), "must have fewer elements");
-    Some(Problem::of_field(ProblemKind::InvalidField, error))
+    let rule = match without_position(cause).as_str() {
+        ELEMENT_TOO_MANY => "must have fewer elements".to_owned(),
+        expected => format!("must have another type: {expected}"),
+    };
+    let field = if path.is_empty() { "body" } else { path };
+    Some(Problem::of_field(ProblemKind::InvalidField, FieldError::new(field, value, rule)))
 }
 
 /// Names the field a message of serde is about: unknown and missing fields stand in the message, not in the path.
@@ -74,7 +116,7 @@ fn located(given: &Value, path: String, message: &str) -> FieldError {
     }
     let value = lookup(given, &field).map_or("null".to_owned(), Value::to_string);
     let field = if field.is_empty() { "body".to_owned() } else { field };
-    FieldError::new(field, shortened(&value), rule)
+    FieldError::new(field, value, rule)
 }
 
 /// Text that is not JSON: shows the token the parser stopped at.
@@ -91,7 +133,7 @@ fn token(bytes: &[u8], cause: &serde_json::Error) -> String {
     let start = line[..stop].iter().rposition(delimiter).map_or(0, |position| position + 1);
     let rest = &line[start..];
     let end = rest.iter().position(|byte| matches!(byte, b',' | b']' | b'}' | b' ')).unwrap_or(rest.len());
-    shortened(&String::from_utf8_lossy(&rest[..end]))
+    String::from_utf8_lossy(&rest[..end]).into_owned()
 }
 
 fn without_position(cause: &serde_json::Error) -> String {
@@ -126,13 +168,6 @@ fn lookup<'a>(given: &'a Value, field: &str) -> Option<&'a Value> {
             None => value.get(part),
         }
     })
-}
-
-fn shortened(text: &str) -> String {
-    match text.char_indices().nth(SHOWN_CHARACTERS) {
-        Some((end, _)) => format!("{}...", &text[..end]),
-        None => text.to_owned(),
-    }
 }
 
 #[cfg(test)]
@@ -176,6 +211,43 @@ mod tests {
         let (field, value, _) = refused(r#"{"problem": {"history": [0.1, NaN]}}"#);
         assert_eq!((field.as_str(), value), ("problem.history[1]", Value::from("NaN")));
         assert_eq!(refused(r#"{"problem": {"history": [0.1, 1e999]}}"#).0, "problem.history[1]");
+    }
+
+    #[test]
+    fn a_deep_list_is_not_called_a_long_one() {
+        for depth in [1, 2, 3, 4, 127] {
+            let (_, _, rule) = refused(&format!("{}{}", "[".repeat(depth), "]".repeat(depth)));
+            assert!(!rule.contains("fewer elements"), "{depth}: {rule}");
+        }
+        let (_, _, rule) = refused(&format!("{}{}", "[".repeat(128), "]".repeat(128)));
+        assert!(!rule.contains("fewer elements"), "{rule}");
+    }
+
+    #[test]
+    fn refused_text_is_shown_in_part() {
+        let long = "x".repeat(4 << 20);
+        for body in [
+            format!(r#"{{"problem": "{long}"}}"#),
+            format!(r#"{{"{long}": 1}}"#),
+            format!(r#"{{"problem": {{"{long}": 1}}}}"#),
+            format!(r#"{{"problem": {{"history": [0.1], "utility": {{"kind": "{long}"}}}}}}"#),
+            format!(r#"{{"problem": {{"history": [{long}]}}}}"#),
+        ] {
+            let shown = serde_json::to_string(&json::<Specification>(body.as_bytes()).unwrap_err()).unwrap();
+            assert!(shown.len() < 2000, "{}: {}", &body[..20], shown.len());
+        }
+    }
+
+    #[test]
+    fn a_whole_number_may_be_written_with_a_point() {
+        let read = |body: &str| json::<Specification>(body.as_bytes());
+        let dotted = read(r#"{"problem": {"history": [1.0, -0.0], "horizon": 3.0}, "seed": 7.0}"#).unwrap();
+        assert_eq!(dotted, read(r#"{"problem": {"history": [1, -0.0], "horizon": 3}, "seed": 7}"#).unwrap());
+        assert_eq!(refused(r#"{"problem": {"history": [1.0], "horizon": 3.5}}"#).0, "problem.horizon");
+        let twice = r#"{"problem": {"history": [1.0], "horizon": 3.0, "horizon": 3}}"#;
+        assert!(read(twice).is_err(), "a field given twice");
+        let text = br#"{"1.0": "a\\\"1.0", "b\"": [2.50, -0.0, 1.0e3, 70.00]}"#;
+        assert_eq!(whole_numbers(text), br#"{"1.0": "a\\\"1.0", "b\"": [2.50, -0.0, 1.0e3, 70]}"#);
     }
 
     #[test]

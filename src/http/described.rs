@@ -12,17 +12,19 @@ use utoipa::openapi::{ContentBuilder, OpenApi, Ref, RefOr, Response, ResponseBui
 use super::access::{Access, access};
 use super::problem::ProblemKind;
 
-/// Operations that touch no store and take no input: they answer or the process is gone.
+/// Operations that touch no store and take no input: but for how they are addressed, they answer or the process is gone.
 const INFALLIBLE: [&str; 4] = ["/livez", "/openapi.json", "/docs", "/"];
 
 /// Adds what is missing; what a handler describes itself stays.
 pub fn with_every_problem(description: &mut OpenApi) {
     for (path, item) in &mut description.paths.paths {
-        if INFALLIBLE.contains(&path.as_str()) {
-            continue;
-        }
+        let is_infallible = INFALLIBLE.contains(&path.as_str());
         for (method, operation) in [("GET", &mut item.get), ("POST", &mut item.post), ("DELETE", &mut item.delete)] {
             let Some(operation) = operation else { continue };
+            if is_infallible {
+                describe(operation, &ADDRESSED);
+                continue;
+            }
             let own: &[_] = if method == "GET" { &[] } else { &[ProblemKind::StorageFull] };
             if let Access::Role(role) = access(method, Some(path)) {
                 guard(operation, role.as_str());
@@ -53,8 +55,16 @@ fn guard(operation: &mut Operation, role: &str) {
 }
 
 fn complete(operation: &mut Operation, own: &[ProblemKind]) {
+    let kinds: Vec<ProblemKind> = by_shape(operation).iter().chain(own).copied().collect();
+    describe(operation, &kinds);
+}
+
+/// What every request may break: who it says is asked, and who asks.
+const ADDRESSED: [ProblemKind; 2] = [ProblemKind::InvalidHeader, ProblemKind::Misdirected];
+
+fn describe(operation: &mut Operation, kinds: &[ProblemKind]) {
     let mut meanings: BTreeMap<u16, Vec<&str>> = BTreeMap::new();
-    for kind in by_shape(operation).iter().chain(own) {
+    for kind in kinds {
         let (_, status, title) = kind.entry();
         meanings.entry(status.as_u16()).or_default().push(title);
     }
@@ -67,6 +77,7 @@ fn complete(operation: &mut Operation, own: &[ProblemKind]) {
 fn by_shape(operation: &Operation) -> Vec<ProblemKind> {
     use ProblemKind as Kind;
     let mut kinds = vec![Kind::Internal, Kind::Overloaded];
+    kinds.extend(ADDRESSED);
     if operation.request_body.is_some() {
         kinds.extend([Kind::MalformedJson, Kind::BodyTooLarge, Kind::UnsupportedMediaType, Kind::InvalidField]);
     }

@@ -6,7 +6,7 @@ use axum::extract::State;
 use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse, Response};
 
-use super::access::By;
+use super::access::{By, Heavy, Read};
 use super::extract::{Id, JsonBody};
 use super::jobs::{accepted, idempotency_key};
 use super::problem::Problem;
@@ -27,7 +27,7 @@ use crate::service::Service;
         (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn evaluate(
     State(service): State<Arc<Service>>,
-    By(caller): By,
+    By(caller, _): By<Heavy>,
     headers: HeaderMap,
     JsonBody(request): JsonBody<EvaluationRequest>,
 ) -> Result<Response, Problem> {
@@ -39,7 +39,11 @@ pub async fn evaluate(
     responses(
         (status = 200, description = "The report.", body = EvaluationReport),
         (status = 404, description = "There is no such job, or it has no report.", body = Problem, content_type = "application/problem+json")))]
-pub async fn report(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<Response, Problem> {
+pub async fn report(
+    State(service): State<Arc<Service>>,
+    By(caller, _): By<Read>,
+    Id(id): Id,
+) -> Result<Response, Problem> {
     let report = service.jobs.report(&caller.tenant, &id).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], report).into_response())
 }

@@ -4,6 +4,9 @@
 //! with `Last-Event-ID` therefore misses nothing and sees nothing twice, even across a restart of the service. A client
 //! that has seen the terminal state gets 204, which tells an `EventSource` to stay away.
 //!
+//! A tenant may have so many streams open, and each ends after some minutes; its client comes back with the id of what it
+//! saw last, and has lost nothing.
+//!
 //! A job that another replica runs is followed by asking the store: its finished steps show, the points inside a step do
 //! not. Notifications of PostgreSQL would come sooner but can be lost, so that asking would have to stay beside them.
 
@@ -18,11 +21,13 @@ use axum::response::{IntoResponse, Response};
 use futures_util::stream;
 use tokio::sync::watch;
 
-use super::access::By;
+use super::access::{By, Read};
 use super::extract::Id;
 use super::problem::Problem;
 use super::wire;
 use crate::service::Service;
+use crate::service::allowance::StreamPlace;
+use crate::service::error::ServiceError;
 use crate::service::keys::Caller;
 use crate::store::JobState;
 
@@ -37,6 +42,7 @@ struct Follower {
     changes: watch::Receiver<u64>,
     last_id: String,
     last_state: Option<JobState>,
+    place: StreamPlace,
 }
 
 /// Follow a job: events `state` and `progress` carry the job; the stream ends at a terminal state.
@@ -44,28 +50,32 @@ struct Follower {
     params(("id" = String, Path, description = "The job."),
            ("Last-Event-ID" = Option<String>, Header, description = "The id of the last event seen.")),
     responses(
-        (status = 200, description = "Server-sent events, each with the job as JSON.", body = String, content_type = "text/event-stream"),
+        (status = 200, description = "Server-sent events, each with the job as JSON; a stream ends after some minutes, to be resumed.", body = String, content_type = "text/event-stream"),
         (status = 204, description = "The terminal state was seen already."),
         (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json")))]
 pub async fn follow(
     State(service): State<Arc<Service>>,
-    By(caller): By,
+    By(caller, _): By<Read>,
     Id(job): Id,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
+    // First: what is one too many costs the store nothing.
+    let place = caller.allowance.stream().map_err(ServiceError::from)?;
     let changes = service.jobs.changes();
     let now = wire::Job::from(service.jobs.get(&caller.tenant, &job).await?);
     let last_id = headers.get("last-event-id").and_then(|id| id.to_str().ok()).unwrap_or("").to_owned();
     if now.state.is_terminal() && last_id == event_id(&now) {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
-    let follower = Follower { service, caller, job, changes, last_id, last_state: None };
+    let caller = caller.caller;
+    let follower = Follower { service, caller, job, changes, last_id, last_state: None, place };
     let events = stream::unfold(Some(follower), |follower| async { follower?.next().await });
     Ok(Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE)).into_response())
 }
 
 impl Follower {
-    /// The next event that differs from the last; none once the job or the service ends, or the key is revoked.
+    /// The next event that differs from the last; none once the job or the service ends, the key is revoked, or the stream
+    /// is old.
     async fn next(mut self) -> Option<(Result<Event, Infallible>, Option<Self>)> {
         while !self.caller.has_ended() {
             self.changes.mark_unchanged();
@@ -80,6 +90,7 @@ impl Follower {
             tokio::select! {
                 _ = self.changes.changed() => {}
                 () = tokio::time::sleep(POLL) => {}
+                () = tokio::time::sleep_until(self.place.until.into()) => return None,
                 () = self.service.shutdown.begun() => return None,
             }
         }

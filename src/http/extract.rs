@@ -1,14 +1,17 @@
 //! Extractors that refuse with problem documents where axum's own refuse with plain text.
 
+use std::sync::Arc;
+
 use axum::body::Bytes;
 use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode, header};
 use serde::de::DeserializeOwned;
 
-use super::access::Turn;
 use super::decode;
 use super::problem::{Problem, ProblemKind};
+use crate::service::allowance::HeavyTurn;
+use crate::service::error::ServiceError;
 
 /// A JSON body.
 pub struct JsonBody<T>(pub T);
@@ -25,6 +28,10 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T> {
 /// The bytes of a body declared to be JSON, not yet parsed.
 pub struct JsonBytes(pub Bytes);
 
+/// The turn of a heavy call, to be begun once its body is read.
+#[derive(Clone)]
+pub struct AfterBody(pub Arc<HeavyTurn>);
+
 /// Largest body taken, in bytes, as the router tells its extractors.
 #[derive(Debug, Clone, Copy)]
 pub struct BodyLimit(pub usize);
@@ -34,10 +41,11 @@ impl<S: Send + Sync> FromRequest<S> for JsonBytes {
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
         refuse_other_media(request.headers())?;
+        refuse_encoded(request.headers())?;
         let declared = request.headers().get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok());
         let size = declared.and_then(|length| length.parse::<u64>().ok()).map(|length| format!("{length} bytes"));
         let limit = request.extensions().get::<BodyLimit>().map_or(0, |limit| limit.0);
-        let turn = request.extensions().get::<Turn>().cloned();
+        let turn = request.extensions().get::<AfterBody>().cloned();
         let bytes = Bytes::from_request(request, state).await.map_err(|rejection| {
             let size = size.unwrap_or_else(|| "a stream".to_owned());
             match rejection.status() {
@@ -52,7 +60,7 @@ impl<S: Send + Sync> FromRequest<S> for JsonBytes {
                 ),
             }
         })?;
-        turn.map_or(Ok(()), |turn| turn.begin())?;
+        turn.map_or(Ok(()), |AfterBody(turn)| turn.begin()).map_err(ServiceError::from)?;
         Ok(JsonBytes(bytes))
     }
 }
@@ -66,6 +74,14 @@ fn refuse_other_media(headers: &HeaderMap) -> Result<(), Problem> {
     let detail = format!("the content-type is '{declared}'; it must be application/json");
     let problem = Problem::new(ProblemKind::UnsupportedMediaType, detail);
     Err(problem.naming("content-type", declared, "must be application/json"))
+}
+
+/// Nothing here decodes a body: one that says it is encoded would be read as what it is not.
+fn refuse_encoded(headers: &HeaderMap) -> Result<(), Problem> {
+    let mut encodings = headers.get_all(header::CONTENT_ENCODING).iter().map(|value| value.to_str().unwrap_or("?"));
+    let Some(encoding) = encodings.find(|encoding| !encoding.eq_ignore_ascii_case("identity")) else { return Ok(()) };
+    let problem = Problem::new(ProblemKind::UnsupportedMediaType, "the body is encoded, and is taken as it is only");
+    Err(problem.naming("content-encoding", encoding, "must be absent"))
 }
 
 /// The parameters of the query string.

@@ -5,6 +5,8 @@ use std::error::Error;
 use serde_json::Value;
 
 use super::problem::{Problem, ProblemKind};
+use super::telemetry;
+use crate::service::allowance::{Refused, TooMany};
 use crate::service::error::ServiceError;
 use crate::service::metrics as names;
 use crate::store::{OverQuota, Quota, StoreError};
@@ -26,6 +28,9 @@ impl From<ServiceError> for Problem {
             ServiceError::PolicyInUse { policy, .. } => {
                 problem(Kind::InUse).naming("policy", policy, "must have no session that lives by it")
             }
+            ServiceError::Refused(Refused::TooManyStreams { most }) => {
+                problem(Kind::TooManyRequests).naming("streams", most, format!("must be at most {most} at a time"))
+            }
             ServiceError::PeriodConflict { period } => problem(Kind::PeriodConflict).naming(
                 "period",
                 period,
@@ -44,7 +49,13 @@ impl From<ServiceError> for Problem {
             ServiceError::Policy(cause) => {
                 problem(Kind::InvalidPolicy).naming("steps", Value::Null, format!("must make a policy: {cause}"))
             }
-            ServiceError::Draining | ServiceError::Busy => problem(Kind::Overloaded),
+            ServiceError::Draining | ServiceError::Busy | ServiceError::Refused(Refused::NoPlace) => {
+                problem(Kind::Overloaded)
+            }
+            ServiceError::Refused(Refused::TooOften(class, TooMany { per_second, wait })) => {
+                let rule = format!("must come at most {per_second} times a second, over all keys of the tenant");
+                problem(Kind::TooManyRequests).naming("rate", class.name(), rule).to_be_asked_again_in(wait)
+            }
             // Said at the start, before anybody asks.
             error @ ServiceError::NobodyAsked { .. } => Problem::new(Kind::Internal, error.to_string()),
             ServiceError::JobNotEnded { job } => {
@@ -61,7 +72,10 @@ impl From<ServiceError> for Problem {
 }
 
 fn of_store(error: &StoreError) -> Problem {
-    tracing::error!(error = error as &dyn Error, "the store failed");
+    // A probe needs no key, and fails as often as it is asked.
+    if telemetry::may_log() {
+        tracing::error!(error = error as &dyn Error, "the store failed");
+    }
     names::count_failure(error);
     let kind = match error {
         StoreError::Full { .. } => ProblemKind::StorageFull,

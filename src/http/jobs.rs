@@ -7,7 +7,7 @@ use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
-use super::access::By;
+use super::access::{By, Heavy, Live, Read};
 use super::extract::{Id, JsonBody, Parameters};
 use super::page::{self, Page};
 use super::problem::{Problem, ProblemKind};
@@ -29,7 +29,7 @@ use crate::service::jobs::Job;
         (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn train(
     State(service): State<Arc<Service>>,
-    By(caller): By,
+    By(caller, _): By<Heavy>,
     headers: HeaderMap,
     JsonBody(specification): JsonBody<Specification>,
 ) -> Result<Response, Problem> {
@@ -60,7 +60,7 @@ pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {
         (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn list(
     State(service): State<Arc<Service>>,
-    By(caller): By,
+    By(caller, _): By<Read>,
     Parameters(page): Parameters<Page>,
 ) -> Result<Json<wire::JobPage>, Problem> {
     let (limit, after) = page.bounds()?;
@@ -74,7 +74,11 @@ pub async fn list(
     responses(
         (status = 200, description = "The job.", body = wire::Job),
         (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json")))]
-pub async fn get(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<Json<wire::Job>, Problem> {
+pub async fn get(
+    State(service): State<Arc<Service>>,
+    By(caller, _): By<Read>,
+    Id(id): Id,
+) -> Result<Json<wire::Job>, Problem> {
     Ok(Json(service.jobs.get(&caller.tenant, &id).await?.into()))
 }
 
@@ -83,7 +87,11 @@ pub async fn get(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id
     responses(
         (status = 202, description = "The job as it is now.", body = wire::Job),
         (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json")))]
-pub async fn cancel(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<Response, Problem> {
+pub async fn cancel(
+    State(service): State<Arc<Service>>,
+    By(caller, _): By<Live>,
+    Id(id): Id,
+) -> Result<Response, Problem> {
     let job = wire::Job::from(service.jobs.cancel(&caller, &id).await?);
     Ok((StatusCode::ACCEPTED, Json(job)).into_response())
 }
@@ -94,7 +102,11 @@ pub async fn cancel(State(service): State<Arc<Service>>, By(caller): By, Id(id):
         (status = 204, description = "Deleted."),
         (status = 404, description = "There is no such job.", body = Problem, content_type = "application/problem+json"),
         (status = 409, description = "It is queued or runs: cancel it first.", body = Problem, content_type = "application/problem+json")))]
-pub async fn delete(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<StatusCode, Problem> {
+pub async fn delete(
+    State(service): State<Arc<Service>>,
+    By(caller, _): By<Live>,
+    Id(id): Id,
+) -> Result<StatusCode, Problem> {
     service.jobs.delete(&caller, &id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

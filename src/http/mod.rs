@@ -2,6 +2,9 @@
 
 mod access;
 mod audit;
+mod bounds;
+mod connections;
+mod conversation;
 mod dashboard;
 pub mod decode;
 mod described;
@@ -10,7 +13,9 @@ mod evaluations;
 mod events;
 mod extract;
 mod fault;
+mod hosts;
 mod jobs;
+mod listener;
 mod operations;
 mod page;
 mod patient;
@@ -20,6 +25,7 @@ mod router;
 mod server;
 mod sessions;
 mod telemetry;
+mod tls;
 mod what_if;
 mod wire;
 

@@ -1,25 +1,55 @@
-//! A connection that is patient, but not without end: a client that stops reading its answer is cut off.
+//! A connection that is patient, but not without end, and that is polite at its end.
+//!
+//! A client that stops reading its answer is cut off; so is one that begins a head and does not finish it, and one that
+//! asks nothing for long. Where an answer was given before the request was read to its end, what is still on its way is
+//! taken and thrown away, within bounds, before the connection closes: else the system would answer it by a reset, which
+//! makes many clients throw the answer away unread.
 
 use std::future::Future;
 use std::io;
 use std::pin::Pin;
-use std::task::{Context, Poll};
+use std::sync::Arc;
+use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::time::Sleep;
+use tokio::time::{Instant, Sleep};
 
-/// `stream`, whose writes fail once nothing of them has been taken for `limit`.
-pub struct Patient<S> {
-    stream: S,
-    limit: Duration,
-    /// Runs while a write waits.
-    stalled: Option<Pin<Box<Sleep>>>,
+use super::connections::{Connection, Phase};
+
+/// How long a client may take.
+#[derive(Debug, Clone, Copy)]
+pub struct Patience {
+    /// To take anything of its answer.
+    pub to_read: Duration,
+    /// From the first byte of a head to its last.
+    pub for_head: Duration,
+    /// Between two requests.
+    pub between: Duration,
+    /// To send what is left of a request that was answered already.
+    pub to_finish: Duration,
+    /// Bytes of it that are taken.
+    pub left_bytes: usize,
 }
 
-impl<S: AsyncWrite + Unpin> Patient<S> {
-    pub fn new(stream: S, limit: Duration) -> Self {
-        Patient { stream, limit, stalled: None }
+/// `stream`, whose reads and writes fail once the patience with its client is over.
+pub struct Patient<S> {
+    stream: S,
+    patience: Patience,
+    connection: Arc<Connection>,
+    /// Runs while a write waits.
+    stalled: Option<Pin<Box<Sleep>>>,
+    /// When the head under way was begun, and of which request it is.
+    head: Option<(u64, Instant)>,
+    /// Runs while a request is waited for; at most as late as it must be.
+    silent: Option<Pin<Box<Sleep>>>,
+    /// Bytes thrown away at the end, and until when they are.
+    end: Option<(usize, Pin<Box<Sleep>>)>,
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin> Patient<S> {
+    pub fn new(stream: S, patience: Patience, connection: Arc<Connection>) -> Self {
+        Patient { stream, patience, connection, stalled: None, head: None, silent: None, end: None }
     }
 
     fn bounded<T>(
@@ -30,15 +60,51 @@ impl<S: AsyncWrite + Unpin> Patient<S> {
         let written = write(Pin::new(&mut self.stream), context);
         if written.is_ready() {
             self.stalled = None;
+            self.connection.taken();
             return written;
         }
-        let limit = self.limit;
+        let limit = self.patience.to_read;
         let stalled = self.stalled.get_or_insert_with(|| Box::pin(tokio::time::sleep(limit)));
         stalled.as_mut().poll(context).map(|()| Err(io::ErrorKind::TimedOut.into()))
     }
+
+    /// Fails where the client has been silent for too long; wakes the task no later than then.
+    fn silence(&mut self, context: &mut Context<'_>) -> Poll<io::Error> {
+        loop {
+            let ends = match self.head {
+                Some((_, began)) => began + self.patience.for_head,
+                None => Instant::from_std(self.connection.since()) + self.patience.between,
+            };
+            if ends <= Instant::now() {
+                return Poll::Ready(io::ErrorKind::TimedOut.into());
+            }
+            let silent = self.silent.get_or_insert_with(|| Box::pin(tokio::time::sleep_until(ends)));
+            // Put off only when it fires: a busy connection moves its end with every request.
+            if silent.deadline() > ends {
+                silent.as_mut().reset(ends);
+            }
+            ready!(silent.as_mut().poll(context));
+            silent.as_mut().reset(ends);
+        }
+    }
+
+    /// Throws away what the client still sends; ready once it has nothing more to say, or has said too much.
+    fn finish(&mut self, context: &mut Context<'_>) -> Poll<()> {
+        let patience = self.patience;
+        let (taken, over) = self.end.get_or_insert_with(|| (0, Box::pin(tokio::time::sleep(patience.to_finish))));
+        let mut space = [0; 16 << 10];
+        while *taken < patience.left_bytes && over.as_mut().poll(context).is_pending() {
+            let mut buffer = ReadBuf::new(&mut space);
+            match ready!(Pin::new(&mut self.stream).poll_read(context, &mut buffer)) {
+                Ok(()) if !buffer.filled().is_empty() => *taken += buffer.filled().len(),
+                _ => break,
+            }
+        }
+        Poll::Ready(())
+    }
 }
 
-impl<S: AsyncWrite + Unpin> AsyncWrite for Patient<S> {
+impl<S: AsyncRead + AsyncWrite + Unpin> AsyncWrite for Patient<S> {
     fn poll_write(mut self: Pin<&mut Self>, context: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
         self.bounded(context, |stream, context| stream.poll_write(context, bytes))
     }
@@ -60,35 +126,73 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Patient<S> {
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        self.bounded(context, |stream, context| stream.poll_shutdown(context))
+        if self.end.is_none() {
+            ready!(self.bounded(context, |stream, context| stream.poll_shutdown(context)))?;
+        }
+        if self.connection.has_left() {
+            ready!(self.finish(context));
+        }
+        Poll::Ready(Ok(()))
     }
 }
 
-impl<S: AsyncRead + Unpin> AsyncRead for Patient<S> {
+impl<S: AsyncRead + AsyncWrite + Unpin> AsyncRead for Patient<S> {
     fn poll_read(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_read(context, buffer)
+        let before = buffer.filled().len();
+        let read = Pin::new(&mut self.stream).poll_read(context, buffer);
+        let asked = self.connection.requests();
+        self.head = self.head.filter(|(of, _)| *of == asked);
+        if self.connection.phase() != Phase::Waiting {
+            return read;
+        }
+        match read {
+            Poll::Pending => self.silence(context).map(Err),
+            Poll::Ready(_) if buffer.filled().len() > before => {
+                let (_, began) = *self.head.get_or_insert_with(|| (asked, Instant::now()));
+                // A client that sends a byte now and then never leaves a read waiting.
+                if began.elapsed() < self.patience.for_head {
+                    read
+                } else {
+                    Poll::Ready(Err(io::ErrorKind::TimedOut.into()))
+                }
+            }
+            read => read,
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use tokio::io::{AsyncReadExt, AsyncWriteExt};
+    use std::net::Ipv4Addr;
 
+    use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
+
+    use super::super::connections::{Bounds, Connections, Held};
     use super::*;
+
+    const LIMIT: Duration = Duration::from_millis(200);
+
+    fn patient(stream: DuplexStream) -> (Held, Patient<DuplexStream>) {
+        let connections = Connections::new(Bounds { all: 1, of_address: 1, for_probes: 0 });
+        let held = connections.place(Ipv4Addr::LOCALHOST.into()).unwrap();
+        let between = 3 * LIMIT;
+        let patience = Patience { to_read: LIMIT, for_head: LIMIT, between, to_finish: LIMIT, left_bytes: 64 };
+        let patient = Patient::new(stream, patience, held.connection.clone());
+        (held, patient)
+    }
 
     #[tokio::test]
     async fn a_reader_that_stops_is_cut_off_and_one_that_goes_on_is_not() {
-        let limit = Duration::from_millis(200);
         let (here, mut there) = tokio::io::duplex(16);
-        let mut patient = Patient::new(here, limit);
+        let (_held, mut patient) = patient(here);
         let reading = tokio::spawn(async move {
             let mut taken = [0; 16];
             for _ in 0..6 {
-                tokio::time::sleep(limit / 4).await;
+                tokio::time::sleep(LIMIT / 4).await;
                 there.read_exact(&mut taken).await.unwrap();
             }
             there
@@ -98,5 +202,65 @@ mod tests {
         let _there = reading.await.unwrap();
         let refused = patient.write_all(&[7; 16]).await.unwrap_err();
         assert_eq!(refused.kind(), io::ErrorKind::TimedOut);
+    }
+
+    #[tokio::test]
+    async fn a_head_that_does_not_end_is_cut_off_however_it_comes() {
+        let (here, mut there) = tokio::io::duplex(16);
+        let (_held, mut patient) = patient(here);
+        let dripping = tokio::spawn(async move {
+            while there.write_all(b"x").await.is_ok() {
+                tokio::time::sleep(LIMIT / 10).await;
+            }
+        });
+        let began = Instant::now();
+        let refused = loop {
+            if let Err(error) = patient.read_u8().await {
+                break error;
+            }
+        };
+        assert_eq!(refused.kind(), io::ErrorKind::TimedOut);
+        assert!(began.elapsed() < 2 * LIMIT, "{:?}", began.elapsed());
+        drop(patient);
+        dripping.await.unwrap();
+    }
+
+    #[tokio::test]
+    async fn who_asks_again_and_again_is_never_cut_off() {
+        let (here, mut there) = tokio::io::duplex(16);
+        let (held, mut patient) = patient(here);
+        for _ in 0..8 {
+            there.write_all(b"head").await.unwrap();
+            let mut head = [0; 4];
+            patient.read_exact(&mut head).await.unwrap();
+            assert!(held.connection.begin(Phase::Working));
+            held.connection.rest();
+            tokio::time::sleep(LIMIT / 3).await;
+        }
+    }
+
+    #[tokio::test]
+    async fn who_asks_nothing_is_waited_for_longer_but_not_without_end() {
+        let (here, _there) = tokio::io::duplex(16);
+        let (_held, mut patient) = patient(here);
+        let began = Instant::now();
+        assert_eq!(patient.read_u8().await.unwrap_err().kind(), io::ErrorKind::TimedOut);
+        assert!((2 * LIMIT..5 * LIMIT).contains(&began.elapsed()), "{:?}", began.elapsed());
+    }
+
+    #[tokio::test]
+    async fn what_is_left_of_a_request_is_taken_within_bounds() {
+        for (sent, taken) in [(48, true), (96 + 16 + 1, false)] {
+            let (here, mut there) = tokio::io::duplex(16);
+            let (held, mut patient) = patient(here);
+            held.connection.leave();
+            let sending = tokio::spawn(async move {
+                let sent = there.write_all(&vec![1; sent]).await;
+                (sent.is_ok(), there)
+            });
+            patient.shutdown().await.unwrap();
+            drop(patient);
+            assert_eq!(sending.await.unwrap().0, taken, "{sent}");
+        }
     }
 }

@@ -7,7 +7,7 @@ use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
-use super::access::By;
+use super::access::{By, Heavy, Live, Read};
 use super::decode;
 use super::extract::{Id, JsonBytes, Parameters};
 use super::page::{self, Page};
@@ -26,7 +26,7 @@ use crate::service::error::ServiceError;
         (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn list(
     State(service): State<Arc<Service>>,
-    By(caller): By,
+    By(caller, _): By<Read>,
     Parameters(page): Parameters<Page>,
 ) -> Result<Json<wire::PolicyPage>, Problem> {
     let (limit, after) = page.bounds()?;
@@ -42,7 +42,7 @@ pub async fn list(
         (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json")))]
 pub async fn get(
     State(service): State<Arc<Service>>,
-    By(caller): By,
+    By(caller, _): By<Read>,
     Id(id): Id,
 ) -> Result<Json<wire::PolicyDetail>, Problem> {
     let row = service.policies.get(&caller.tenant, &id).await?;
@@ -63,7 +63,11 @@ pub async fn get(
     responses(
         (status = 200, description = "The document.", body = serde_json::Value),
         (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json")))]
-pub async fn export(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<Response, Problem> {
+pub async fn export(
+    State(service): State<Arc<Service>>,
+    By(caller, _): By<Read>,
+    Id(id): Id,
+) -> Result<Response, Problem> {
     let row = service.policies.get(&caller.tenant, &id).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], row.json).into_response())
 }
@@ -76,7 +80,7 @@ pub async fn export(State(service): State<Arc<Service>>, By(caller): By, Id(id):
         (status = 422, description = "The document is not a usable policy.", body = Problem, content_type = "application/problem+json")))]
 pub async fn import(
     State(service): State<Arc<Service>>,
-    By(caller): By,
+    By(caller, _): By<Heavy>,
     JsonBytes(document): JsonBytes,
 ) -> Result<Response, Problem> {
     // A document may hold 64 MB: too much to parse between two requests.
@@ -92,7 +96,11 @@ pub async fn import(
         (status = 204, description = "Deleted."),
         (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json"),
         (status = 409, description = "Sessions live by it.", body = Problem, content_type = "application/problem+json")))]
-pub async fn delete(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<StatusCode, Problem> {
+pub async fn delete(
+    State(service): State<Arc<Service>>,
+    By(caller, _): By<Live>,
+    Id(id): Id,
+) -> Result<StatusCode, Problem> {
     service.policies.delete(&caller, &id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -3,6 +3,8 @@
 //! [`ProblemKind::entry`] is the only place that pairs a kind with its slug, status and title; responses, the
 //! OpenAPI description and the documentation page are derived from it.
 
+use std::time::Duration;
+
 use axum::Json;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -18,6 +20,7 @@ use crate::service::metrics::PROBLEMS;
 pub enum ProblemKind {
     MalformedJson,
     InvalidQuery,
+    InvalidHeader,
     Unauthenticated,
     Forbidden,
     UnknownRoute,
@@ -32,6 +35,7 @@ pub enum ProblemKind {
     BodyTooLarge,
     QuotaExceeded,
     UnsupportedMediaType,
+    Misdirected,
     InvalidField,
     InvalidPolicy,
     TooManyRequests,
@@ -43,9 +47,10 @@ pub enum ProblemKind {
 
 impl ProblemKind {
     /// In ascending order of status.
-    pub const ALL: [ProblemKind; 23] = [
+    pub const ALL: [ProblemKind; 25] = [
         ProblemKind::MalformedJson,
         ProblemKind::InvalidQuery,
+        ProblemKind::InvalidHeader,
         ProblemKind::Unauthenticated,
         ProblemKind::Forbidden,
         ProblemKind::UnknownRoute,
@@ -60,6 +65,7 @@ impl ProblemKind {
         ProblemKind::BodyTooLarge,
         ProblemKind::QuotaExceeded,
         ProblemKind::UnsupportedMediaType,
+        ProblemKind::Misdirected,
         ProblemKind::InvalidField,
         ProblemKind::InvalidPolicy,
         ProblemKind::TooManyRequests,
@@ -75,6 +81,7 @@ impl ProblemKind {
         match self {
             Self::MalformedJson => ("malformed-json", S::BAD_REQUEST, "The body is not JSON"),
             Self::InvalidQuery => ("invalid-query", S::BAD_REQUEST, "A query parameter breaks a rule"),
+            Self::InvalidHeader => ("invalid-header", S::BAD_REQUEST, "A header breaks a rule"),
             Self::Unauthenticated => ("unauthenticated", S::UNAUTHORIZED, "The call needs a key"),
             Self::Forbidden => ("forbidden", S::FORBIDDEN, "The key lacks a role"),
             Self::UnknownRoute => ("unknown-route", S::NOT_FOUND, "There is nothing at this address"),
@@ -93,6 +100,7 @@ impl ProblemKind {
             Self::UnsupportedMediaType => {
                 ("unsupported-media-type", S::UNSUPPORTED_MEDIA_TYPE, "The body must be application/json")
             }
+            Self::Misdirected => ("misdirected", S::MISDIRECTED_REQUEST, "The service does not answer to this name"),
             Self::InvalidField => ("invalid-field", S::UNPROCESSABLE_ENTITY, "A field breaks a rule"),
             Self::InvalidPolicy => ("invalid-policy", S::UNPROCESSABLE_ENTITY, "The document is not a usable policy"),
             Self::TooManyRequests => ("too-many-requests", S::TOO_MANY_REQUESTS, "The tenant calls too often"),
@@ -130,6 +138,23 @@ pub struct Problem {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<String>, example = "must lie in [1, 520]")]
     pub rule: Option<Box<str>>,
+    /// When to ask again, where that is known; shown as `Retry-After`.
+    #[serde(skip)]
+    pub retry_after: Option<Duration>,
+}
+
+/// Longest text shown of a field's name, of a value and of a sentence, in characters: refused text is the caller's own and
+/// may hold megabytes.
+const SHOWN_FIELD: usize = 120;
+const SHOWN_VALUE: usize = 80;
+const SHOWN_SENTENCE: usize = 400;
+
+/// `text` itself where it is no longer than `limit` characters, else its start.
+pub fn shortened(text: &str, limit: usize) -> String {
+    match text.char_indices().nth(limit) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.to_owned(),
+    }
 }
 
 impl Problem {
@@ -139,15 +164,21 @@ impl Problem {
             kind: format!("/problems/{slug}"),
             title,
             status: status.as_u16(),
-            detail: detail.into(),
+            detail: shortened(&detail.into(), SHOWN_SENTENCE),
             field: None,
             value: None,
             rule: None,
+            retry_after: None,
         }
     }
 
     /// A field that breaks a rule. A value that is not JSON is shown as text.
     pub fn of_field(kind: ProblemKind, error: FieldError) -> Self {
+        let error = FieldError {
+            field: shortened(&error.field, SHOWN_FIELD),
+            value: shortened(&error.value, SHOWN_VALUE),
+            rule: shortened(&error.rule, SHOWN_SENTENCE),
+        };
         let detail = error.to_string();
         let value = serde_json::from_str(&error.value).unwrap_or(Value::String(error.value));
         Problem::new(kind, detail).naming(error.field, value, error.rule)
@@ -155,7 +186,17 @@ impl Problem {
 
     /// The same problem with what it is about: the field, what it held, what it must be.
     pub fn naming(self, field: impl Into<String>, value: impl Into<Value>, rule: impl Into<Box<str>>) -> Self {
-        Problem { field: Some(field.into()), value: Some(Box::new(value.into())), rule: Some(rule.into()), ..self }
+        let value = match value.into() {
+            Value::String(text) => Value::String(shortened(&text, SHOWN_VALUE)),
+            value => value,
+        };
+        let (field, rule) = (shortened(&field.into(), SHOWN_FIELD), shortened(&rule.into(), SHOWN_SENTENCE));
+        Problem { field: Some(field), value: Some(Box::new(value)), rule: Some(rule.into()), ..self }
+    }
+
+    /// The same problem with the time after which it may be gone.
+    pub fn to_be_asked_again_in(self, wait: Duration) -> Self {
+        Problem { retry_after: Some(wait), ..self }
     }
 }
 
@@ -174,7 +215,7 @@ pub fn count_from_zero() {
 
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
-        const RETRY_AFTER_SECONDS: HeaderValue = HeaderValue::from_static("1");
+        let wait = self.retry_after.map(|wait| wait.as_secs_f64().ceil().max(1.0) as u64);
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         metrics::counter!(PROBLEMS, "problem" => self.slug().to_owned()).increment(1);
         let mut response = (status, Json(self)).into_response();
@@ -184,8 +225,8 @@ impl IntoResponse for Problem {
             headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
         }
         let passes = [StatusCode::TOO_MANY_REQUESTS, StatusCode::SERVICE_UNAVAILABLE, StatusCode::INSUFFICIENT_STORAGE];
-        if passes.contains(&status) {
-            headers.insert(header::RETRY_AFTER, RETRY_AFTER_SECONDS);
+        if let Some(seconds) = wait.or(passes.contains(&status).then_some(1)) {
+            headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
         }
         response
     }

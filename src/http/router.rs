@@ -15,10 +15,12 @@ use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use super::access::Gate;
+use super::access::{By, Gate, Read};
+use super::hosts::Hosts;
 use super::problem::{Problem, ProblemKind};
 use super::{
-    access, audit, dashboard, described, evaluations, events, jobs, operations, policies, sessions, telemetry, what_if,
+    access, audit, bounds, dashboard, described, evaluations, events, jobs, operations, policies, sessions, telemetry,
+    what_if,
 };
 use crate::service::Service;
 use crate::service::config::Config;
@@ -81,6 +83,7 @@ fn pages() -> OpenApiRouter<Arc<Service>> {
 pub fn description() -> utoipa::openapi::OpenApi {
     let mut description = routes().into_openapi();
     described::with_every_problem(&mut description);
+    bounds::tell(&mut description);
     description
 }
 
@@ -92,12 +95,21 @@ pub fn description_json() -> &'static str {
 
 /// The whole application; for a replica that only works, the operator's part of it.
 pub fn application(service: Arc<Service>, config: &Config) -> Router {
-    let routes = if config.role.answers() { routes() } else { operators() };
+    guarded(if config.role.answers() { routes() } else { operators() }, service, config)
+}
+
+/// The operator's part of it.
+pub fn for_operators(service: Arc<Service>, config: &Config) -> Router {
+    guarded(operators(), service, config)
+}
+
+fn guarded(routes: OpenApiRouter<Arc<Service>>, service: Arc<Service>, config: &Config) -> Router {
     let (router, _) = routes.split_for_parts();
     let gate = Gate {
         service: service.clone(),
         large_body_bytes: config.body_limit_bytes,
         body_bytes: config.body_limit_bytes.min(BODY_BYTES),
+        hosts: Arc::new(Hosts::new(&config.hosts)),
     };
     router
         .fallback(unknown_route)
@@ -126,12 +138,12 @@ async fn answered(State(around): State<Surroundings>, request: Request, next: Ne
     response
 }
 
-async fn unknown_route(uri: Uri) -> Problem {
+async fn unknown_route(_: By<Read>, uri: Uri) -> Problem {
     let problem = Problem::new(ProblemKind::UnknownRoute, format!("there is nothing at {}", uri.path()));
     problem.naming("path", uri.path(), "must be a path of /openapi.json")
 }
 
-async fn wrong_method(method: Method, uri: Uri) -> Problem {
+async fn wrong_method(_: Option<By<Read>>, method: Method, uri: Uri) -> Problem {
     let problem = Problem::new(ProblemKind::WrongMethod, format!("{} does not take {method}", uri.path()));
     problem.naming("method", method.as_str(), "must be one that the Allow header names")
 }

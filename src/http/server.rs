@@ -1,20 +1,19 @@
-//! The accept loop: bounded connections, bounded headers, bounded silence, a drain at the end.
+//! From a configuration to a service that answers: one door for callers, one for the operator, a drain at the end.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
-use hyper::server::conn::http1;
-use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
-use hyper_util::service::TowerToHyperService;
 use thiserror::Error;
-use tokio::net::TcpListener;
-use tokio::sync::Semaphore;
 use tokio::task::JoinHandle;
+use tokio_rustls::TlsAcceptor;
 
-use super::patient::Patient;
+use super::connections::{Bounds, Connections};
+use super::listener::{Door, Manners};
+use super::patient::Patience;
+use super::tls::{Certificate, TlsError};
 use super::{router, telemetry};
 use crate::service::Service;
 use crate::service::clock::Clock;
@@ -22,21 +21,32 @@ use crate::service::config::Config;
 use crate::service::error::ServiceError;
 use crate::service::shutdown::Shutdown;
 
-/// A client that has not sent its headers by then is cut off.
+/// A client that has not sent its head by then is cut off.
 const HEADER_TIMEOUT: Duration = Duration::from_secs(5);
-/// A head that is not whole after so many bytes, and one read of as many, is refused; hyper takes 100 lines at most.
-const HEAD_BYTES: usize = 32 << 10;
 /// A client that takes nothing of its answer for so long is cut off.
 const READER_TIMEOUT: Duration = Duration::from_secs(30);
+/// A connection that asks nothing for so long is closed: longer than the proxies usual keep theirs (60 s), so that they close
+/// it first and no request crosses the end. Such a connection gives way long before, where its place is needed.
+const BETWEEN_REQUESTS: Duration = Duration::from_secs(75);
+/// The rest of a refused body is taken for so long, so that its sender comes to read why.
+const REFUSED_BODY_TIME: Duration = Duration::from_secs(10);
+/// Places of the door for the operator: probes, a scrape, a person, and as much again.
+const OPERATORS: usize = 64;
+/// Places for probes at the door for callers, where calls under way fill it.
+const PROBES: usize = 16;
 /// Descriptors that are not connections: the store's files, the runtime, the standard streams.
 const OTHER_DESCRIPTORS: usize = 128;
-/// Pause after a failed accept: out of descriptors, most likely.
-const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
 #[derive(Debug, Error)]
 pub enum ServeError {
     #[error("cannot listen on {address}")]
     Listen { address: SocketAddr, source: std::io::Error },
+    #[error(
+        "{address} can be reached by others, and what is said there would not be encrypted: give --tls-cert and --tls-key, listen on loopback, or say --allow-plaintext where something in front of it encrypts"
+    )]
+    Plaintext { address: SocketAddr },
+    #[error("cannot encrypt connections")]
+    Encryption(#[from] TlsError),
     #[error("cannot start the service")]
     Start(#[from] ServiceError),
 }
@@ -45,6 +55,10 @@ pub enum ServeError {
 pub struct Running {
     /// The address bound.
     pub address: SocketAddr,
+    /// That of the operator's own, where there is one.
+    pub operations: Option<SocketAddr>,
+    /// `http` or `https`.
+    pub scheme: &'static str,
     shutdown: Shutdown,
     task: JoinHandle<()>,
 }
@@ -67,64 +81,87 @@ impl Running {
 /// Starts the service and serves it until `shutdown` begins.
 ///
 /// # Errors
-/// The address is taken, or the service cannot start.
+/// An address is taken, or public without encryption; the certificate cannot be used; the service cannot start.
 pub async fn serve(config: Config, shutdown: Shutdown) -> Result<Running, ServeError> {
     telemetry::install_recorder();
-    let failed = |source| ServeError::Listen { address: config.listen, source };
-    let listener = TcpListener::bind(config.listen).await.map_err(failed)?;
-    let address = listener.local_addr().map_err(failed)?;
+    let exposed = std::iter::once(config.listen).chain(config.operations_listen).find(|at| !at.ip().is_loopback());
+    if let (Some(address), None, false) = (exposed, &config.tls, config.allow_plaintext) {
+        return Err(ServeError::Plaintext { address });
+    }
+    let certificate = config.tls.clone().map(Certificate::load).transpose()?;
+    let encryption = certificate.as_ref().map(Certificate::acceptor).transpose()?;
+    let door_at = async |address| Door::at(address).await.map_err(|source| ServeError::Listen { address, source });
+    let door = door_at(config.listen).await?;
+    let back_door = match config.operations_listen {
+        Some(address) => Some(door_at(address).await?),
+        None => None,
+    };
+    let (address, operations) = (door.address, back_door.as_ref().map(|door| door.address));
     let service = Service::start(&config, Clock::system(), shutdown.clone()).await?;
-    tracing::info!(%address, store = %config.store, role = ?config.role, "listening");
-    let application = router::application(service.clone(), &config);
-    let task = tokio::spawn(run(listener, application, service, config));
-    Ok(Running { address, shutdown, task })
+    let scheme = if encryption.is_some() { "https" } else { "http" };
+    tracing::info!(%address, scheme, store = %config.store, role = ?config.role, "listening");
+    let front = manners(router::application(service.clone(), &config), bounds(&config), &config, &encryption);
+    let back = manners(router::for_operators(service.clone(), &config), OPERATORS_BOUNDS, &config, &encryption);
+    let doors = Doors { front: (door, front), back: back_door.map(|door| (door, back)), certificate };
+    let task = tokio::spawn(doors.run(service, config.drain));
+    Ok(Running { address, operations, scheme, shutdown, task })
 }
 
-async fn run(listener: TcpListener, application: Router, service: Arc<Service>, config: Config) {
-    let upkeep = tokio::spawn(telemetry::keep_up());
-    let connections = GracefulShutdown::new();
-    let permits = Arc::new(Semaphore::new(connection_limit(config.connection_limit)));
-    loop {
-        let accepted = async {
-            let permit = permits.clone().acquire_owned().await;
-            (permit, listener.accept().await)
-        };
-        let (permit, accepted) = tokio::select! {
-            accepted = accepted => accepted,
-            () = service.shutdown.begun() => break,
-        };
-        let Ok((stream, _)) = accepted else {
-            tokio::time::sleep(ACCEPT_PAUSE).await;
-            continue;
-        };
-        let handler = TowerToHyperService::new(application.clone());
-        let connection = http1::Builder::new()
-            .timer(TokioTimer::new())
-            .header_read_timeout(HEADER_TIMEOUT)
-            .max_buf_size(HEAD_BYTES)
-            .serve_connection(TokioIo::new(Patient::new(stream, READER_TIMEOUT)), handler);
-        let connection = connections.watch(connection);
-        tokio::spawn(async move {
-            if let Err(error) = connection.await {
-                tracing::debug!(%error, "connection ended");
+const OPERATORS_BOUNDS: Bounds = Bounds { all: OPERATORS, of_address: OPERATORS, for_probes: PROBES };
+
+fn bounds(config: &Config) -> Bounds {
+    let all = connection_limit(config.connection_limit);
+    let of_address = config.connections_of_address.unwrap_or(all.div_ceil(4)).clamp(1, all);
+    Bounds { all, of_address, for_probes: PROBES }
+}
+
+fn manners(application: Router, bounds: Bounds, config: &Config, encryption: &Option<TlsAcceptor>) -> Manners {
+    let patience = Patience {
+        to_read: READER_TIMEOUT,
+        for_head: HEADER_TIMEOUT,
+        between: BETWEEN_REQUESTS,
+        to_finish: REFUSED_BODY_TIME,
+        // The largest body taken anywhere: who sends more would be refused wherever he sent it.
+        left_bytes: config.body_limit_bytes,
+    };
+    Manners { application, connections: Connections::new(bounds), patience, encryption: encryption.clone() }
+}
+
+/// Everything that answers.
+struct Doors {
+    front: (Door, Manners),
+    back: Option<(Door, Manners)>,
+    certificate: Option<Arc<Certificate>>,
+}
+
+impl Doors {
+    async fn run(self, service: Arc<Service>, drain: Duration) {
+        let upkeep = tokio::spawn(telemetry::keep_up(self.front.1.connections.clone()));
+        let fresh = self.certificate.map(|certificate| tokio::spawn(certificate.keep_fresh()));
+        let stopping = GracefulShutdown::new();
+        let ((front, manners), back) = (self.front, self.back);
+        let behind = async {
+            if let Some((door, manners)) = back {
+                door.open(manners, &service.shutdown, &stopping).await;
             }
-            drop(permit);
-        });
+        };
+        tokio::join!(front.open(manners, &service.shutdown, &stopping), behind);
+        tracing::info!("stopping: draining connections");
+        if tokio::time::timeout(drain, stopping.shutdown()).await.is_err() {
+            tracing::warn!("some connections were still open at the end of the drain");
+        }
+        service.close().await;
+        fresh.inspect(JoinHandle::abort);
+        upkeep.abort();
+        tracing::info!("stopped");
     }
-    drop(listener);
-    tracing::info!("stopping: draining connections");
-    if tokio::time::timeout(config.drain, connections.shutdown()).await.is_err() {
-        tracing::warn!("some connections were still open at the end of the drain");
-    }
-    service.close().await;
-    upkeep.abort();
-    tracing::info!("stopped");
 }
 
 /// As many as asked for, but never so many that the store finds no descriptor for its files.
 fn connection_limit(asked: usize) -> usize {
+    let others = OTHER_DESCRIPTORS + OPERATORS + 2 * PROBES;
     match descriptors() {
-        Some(descriptors) => asked.min(descriptors.saturating_sub(OTHER_DESCRIPTORS).max(1)),
+        Some(descriptors) => asked.min(descriptors.saturating_sub(others).max(1)),
         None => asked,
     }
 }

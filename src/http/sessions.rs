@@ -10,7 +10,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-use super::access::By;
+use super::access::{self, Asked, By, Live, Read};
 use super::extract::{Id, JsonBody, Parameters};
 use super::jobs::idempotency_key;
 use super::page::{self, Page};
@@ -18,6 +18,7 @@ use super::problem::Problem;
 use super::wire;
 use crate::control::advisor::AdviceMode;
 use crate::service::Service;
+use crate::service::allowance::Class;
 use crate::service::metrics::{ACTION_SECONDS, OBSERVE_SECONDS};
 use crate::service::observation::{Observe, Observed};
 use crate::service::sessions::{Question, Start};
@@ -33,7 +34,7 @@ use crate::service::sessions::{Question, Start};
         (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn open(
     State(service): State<Arc<Service>>,
-    By(caller): By,
+    By(caller, _): By<Live>,
     headers: HeaderMap,
     JsonBody(request): JsonBody<wire::OpenSession>,
 ) -> Result<Response, Problem> {
@@ -53,7 +54,7 @@ pub async fn open(
         (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn list(
     State(service): State<Arc<Service>>,
-    By(caller): By,
+    By(caller, _): By<Read>,
     Parameters(page): Parameters<Page>,
 ) -> Result<Json<wire::SessionPage>, Problem> {
     let (limit, after) = page.bounds()?;
@@ -69,7 +70,7 @@ pub async fn list(
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json")))]
 pub async fn get(
     State(service): State<Arc<Service>>,
-    By(caller): By,
+    By(caller, _): By<Read>,
     Id(id): Id,
 ) -> Result<Json<wire::Session>, Problem> {
     Ok(Json(service.sessions.get(&caller.tenant, &id).await?.into()))
@@ -82,7 +83,7 @@ pub async fn get(
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json")))]
 pub async fn history(
     State(service): State<Arc<Service>>,
-    By(caller): By,
+    By(caller, _): By<Read>,
     Id(id): Id,
 ) -> Result<Json<wire::SessionHistory>, Problem> {
     let (row, observations) = service.sessions.history(&caller.tenant, &id).await?;
@@ -100,7 +101,11 @@ pub async fn history(
     responses(
         (status = 204, description = "Deleted."),
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json")))]
-pub async fn delete(State(service): State<Arc<Service>>, By(caller): By, Id(id): Id) -> Result<StatusCode, Problem> {
+pub async fn delete(
+    State(service): State<Arc<Service>>,
+    By(caller, _): By<Live>,
+    Id(id): Id,
+) -> Result<StatusCode, Problem> {
     service.sessions.delete(&caller, &id).await?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -114,12 +119,12 @@ pub async fn delete(State(service): State<Arc<Service>>, By(caller): By, Id(id):
         (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn observe(
     State(service): State<Arc<Service>>,
-    By(caller): By,
+    By(caller, _): By<Live>,
     JsonBody(report): JsonBody<Observe>,
 ) -> Result<Json<Observed>, Problem> {
     let started = Instant::now();
     let report = Observe { reported_by: caller.key().clone(), ..report };
-    let observed = service.sessions.observe(&caller.tenant, report).await?;
+    let observed = service.sessions.observe(&caller.tenant, report, &caller.turn).await?;
     metrics::histogram!(OBSERVE_SECONDS).record(started.elapsed().as_secs_f64());
     Ok(Json(observed))
 }
@@ -146,6 +151,16 @@ enum Explain {
     WorstCase,
 }
 
+impl access::Question for Ask {
+    /// Advice from the surrogate that turns out to need a solve becomes heavy then.
+    fn class(&self) -> Class {
+        match (self.mode, self.explain) {
+            (Some(Mode::Resolve), _) | (_, Some(Explain::WorstCase)) => Class::Heavy,
+            (Some(Mode::Surrogate) | None, None) => Class::Live,
+        }
+    }
+}
+
 /// The robust allocation for the coming period.
 #[utoipa::path(get, path = "/action", tag = "sessions",
     params(("session" = String, Query, description = "The session."),
@@ -158,8 +173,7 @@ enum Explain {
         (status = 409, description = "The session has reached its horizon.", body = Problem, content_type = "application/problem+json")))]
 pub async fn action(
     State(service): State<Arc<Service>>,
-    By(caller): By,
-    Parameters(ask): Parameters<Ask>,
+    Asked(caller, ask): Asked<Ask>,
 ) -> Result<Json<wire::Action>, Problem> {
     let (question, label) = match (ask.explain, ask.mode) {
         (Some(Explain::WorstCase), _) => (Question::Explain, "explain"),
@@ -167,7 +181,7 @@ pub async fn action(
         (None, _) => (Question::Advise(AdviceMode::Surrogate), "surrogate"),
     };
     let started = Instant::now();
-    let action = service.sessions.action(&caller.tenant, &ask.session, question).await?;
+    let action = service.sessions.action(&caller.tenant, &ask.session, question, &caller.turn).await?;
     metrics::histogram!(ACTION_SECONDS, "mode" => label).record(started.elapsed().as_secs_f64());
     Ok(Json(wire::Action::new(ask.session, action)))
 }

@@ -1,16 +1,20 @@
 //! One log line and two metrics a request; the metrics page.
 
-use std::sync::OnceLock;
+use std::num::NonZeroU32;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, LazyLock, OnceLock};
 use std::time::{Duration, Instant};
 
 use axum::extract::{MatchedPath, Request};
 use axum::http::Method;
 use axum::response::Response;
+use governor::{DefaultDirectRateLimiter, Quota, RateLimiter};
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use tracing::Span;
 
 use super::access::Asker;
-use super::problem;
+use super::connections::Connections;
+use super::problem::{self, shortened};
 use crate::service::keys::KeyFigures;
 use crate::service::{metrics as names, process, spans};
 use crate::store::JobCounts;
@@ -36,14 +40,40 @@ pub fn install_recorder() {
 /// Histograms hold every sample until they are read: this bounds what gathers where nobody reads the page.
 const UPKEEP: Duration = Duration::from_secs(5);
 
-/// Reads the histograms now and then, without end.
-pub async fn keep_up() {
+/// Reads the histograms now and then, counts the connections, and tells of lines left out; without end.
+pub async fn keep_up(connections: Arc<Connections>) {
     loop {
         tokio::time::sleep(UPKEEP).await;
+        for (phase, count) in connections.count() {
+            metrics::gauge!(names::CONNECTIONS, "phase" => phase.name()).set(count as f64);
+        }
+        let left_out = LEFT_OUT.swap(0, Ordering::Relaxed);
+        if left_out > 0 {
+            tracing::warn!(left_out, "lines about callers without a key were left out");
+        }
         if let Some(recorder) = RECORDER.get().and_then(Option::as_ref) {
             recorder.run_upkeep();
         }
     }
+}
+
+/// Lines a second about callers who show no key: no more than a disk bears for months, and enough to see what happens.
+/// So many may come at once, too.
+const UNKNOWN_CALLERS_LINES: NonZeroU32 = NonZeroU32::new(20).expect("not zero");
+/// Longest path logged, in characters: names of things are shorter.
+const LOGGED_PATH: usize = 200;
+
+static LINES: LazyLock<DefaultDirectRateLimiter> =
+    LazyLock::new(|| RateLimiter::direct(Quota::per_second(UNKNOWN_CALLERS_LINES)));
+static LEFT_OUT: AtomicU64 = AtomicU64::new(0);
+
+/// Whether a line about somebody who shows no key may be written now.
+pub fn may_log() -> bool {
+    let may = LINES.check().is_ok();
+    if !may {
+        LEFT_OUT.fetch_add(1, Ordering::Relaxed);
+    }
+    may
 }
 
 /// The metrics page, with the counts of the store as they are now.
@@ -80,7 +110,7 @@ impl Recording {
         let method = request.method().clone();
         let route = request.extensions().get::<MatchedPath>().map_or("unmatched", MatchedPath::as_str).to_owned();
         let span = spans::of_request(method.as_str(), &route);
-        Recording { started: Instant::now(), method, path: request.uri().path().to_owned(), route, span }
+        Recording { started: Instant::now(), method, path: shortened(request.uri().path(), LOGGED_PATH), route, span }
     }
 
     /// What is done for the request is done in it.
@@ -92,11 +122,11 @@ impl Recording {
         let Recording { started, method, path, route, span } = self;
         let (seconds, status) = (started.elapsed().as_secs_f64(), response.status().as_u16());
         // An unknown method would be a label of its own for every word a client can think of.
-        let verb = match method {
-            Method::GET => "GET",
-            Method::POST => "POST",
-            Method::DELETE => "DELETE",
-            Method::HEAD => "HEAD",
+        let verb = match &method {
+            &Method::GET => "GET",
+            &Method::POST => "POST",
+            &Method::DELETE => "DELETE",
+            &Method::HEAD => "HEAD",
             _ => "other",
         };
         metrics::histogram!(names::HTTP_REQUEST_SECONDS, "method" => verb, "route" => route.clone()).record(seconds);
@@ -110,6 +140,9 @@ impl Recording {
         }
         spans::answered(&span, status, asker.map(|_| tenant));
         let key = asker.map_or("", |asker| &asker.key);
-        tracing::info!(%method, path, status, seconds, tenant, key, "request");
+        if !key.is_empty() || may_log() {
+            let method = shortened(method.as_str(), LOGGED_PATH);
+            tracing::info!(method, path, status, seconds, tenant, key, "request");
+        }
     }
 }

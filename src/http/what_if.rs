@@ -6,7 +6,7 @@ use std::time::Instant;
 use axum::Json;
 use axum::extract::State;
 
-use super::access::By;
+use super::access::{By, Heavy};
 use super::extract::JsonBody;
 use super::problem::Problem;
 use crate::service::Service;
@@ -22,7 +22,7 @@ use crate::service::what_if::{WhatIf, WhatIfAnswer};
         (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn what_if(
     State(service): State<Arc<Service>>,
-    By(caller): By,
+    By(caller, _): By<Heavy>,
     JsonBody(request): JsonBody<WhatIf>,
 ) -> Result<Json<WhatIfAnswer>, Problem> {
     let started = Instant::now();

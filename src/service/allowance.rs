@@ -2,11 +2,15 @@
 //!
 //! One tenant's flood is refused before any work, and cannot take the turns of another: calls that solve wait for places
 //! of their own, of which a tenant gets half at most, and advice and observations need none of them.
+//!
+//! Some calls are known to be heavy only once they are under way: advice for a state outside the design, an observation
+//! that needs such advice. Each call therefore carries a [`HeavyTurn`], and what is about to solve begins it.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
+use thiserror::Error;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 /// Calls that cost alike.
@@ -39,11 +43,26 @@ pub struct Limits {
     pub heavy: Arc<Semaphore>,
     /// Those of one tenant.
     pub heavy_of_one: usize,
+    /// Event streams of one tenant open at a time.
+    pub streams_of_one: usize,
+    /// A stream older than this ends; its client comes back and goes on where it was.
+    pub stream_age: Duration,
 }
+
+/// A page follows the jobs it shows, a program a few.
+const STREAMS_OF_ONE: usize = 256;
+/// Long enough that coming back costs nothing, short enough that no stream is for ever.
+const STREAM_AGE: Duration = Duration::from_secs(300);
 
 impl Limits {
     pub fn new(rates: [u32; 3], heavy: usize) -> Self {
-        Limits { rates, heavy: Arc::new(Semaphore::new(heavy)), heavy_of_one: heavy.div_ceil(2) }
+        Limits {
+            rates,
+            heavy: Arc::new(Semaphore::new(heavy)),
+            heavy_of_one: heavy.div_ceil(2),
+            streams_of_one: STREAMS_OF_ONE,
+            stream_age: STREAM_AGE,
+        }
     }
 }
 
@@ -59,7 +78,21 @@ impl Default for Limits {
 pub struct Allowance {
     buckets: [Bucket; 3],
     heavy: [Arc<Semaphore>; 2],
+    streams: Arc<Semaphore>,
+    streams_of_one: usize,
+    stream_age: Duration,
     epoch: Instant,
+}
+
+/// Why a call has to come back later.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum Refused {
+    #[error("more than {} {} calls in a second", .1.per_second, .0.name())]
+    TooOften(Class, TooMany),
+    #[error("the tenant has {most} event streams open, as many as it may")]
+    TooManyStreams { most: usize },
+    #[error("as many calls that solve, train or import are under way as may be at a time")]
+    NoPlace,
 }
 
 /// The call was one too many.
@@ -70,14 +103,25 @@ pub struct TooMany {
     pub wait: Duration,
 }
 
+/// The place of an event stream, given up when dropped.
+#[derive(Debug)]
+pub struct StreamPlace {
+    _place: OwnedSemaphorePermit,
+    /// When the stream has to end.
+    pub until: Instant,
+}
+
 /// The places of a heavy call, given up when dropped.
-pub type Places = Vec<OwnedSemaphorePermit>;
+type Places = Vec<OwnedSemaphorePermit>;
 
 impl Allowance {
     pub fn new(limits: &Limits) -> Self {
         Allowance {
             buckets: limits.rates.map(Bucket::new),
             heavy: [Arc::new(Semaphore::new(limits.heavy_of_one)), limits.heavy.clone()],
+            streams: Arc::new(Semaphore::new(limits.streams_of_one)),
+            streams_of_one: limits.streams_of_one,
+            stream_age: limits.stream_age,
             epoch: Instant::now(),
         }
     }
@@ -91,9 +135,59 @@ impl Allowance {
         self.buckets[class as usize].take(now)
     }
 
+    /// A place for an event stream.
+    ///
+    /// # Errors
+    /// [`Refused::TooManyStreams`].
+    pub fn stream(&self) -> Result<StreamPlace, Refused> {
+        let place = self.streams.clone().try_acquire_owned();
+        let place = place.map_err(|_| Refused::TooManyStreams { most: self.streams_of_one })?;
+        Ok(StreamPlace { _place: place, until: Instant::now() + self.stream_age })
+    }
+
     /// Places for a heavy call, the tenant's own first; `None` where all are taken.
-    pub fn places(&self) -> Option<Places> {
+    fn places(&self) -> Option<Places> {
         self.heavy.iter().map(|places| places.clone().try_acquire_owned().ok()).collect()
+    }
+}
+
+/// What one call must take before it does heavy work: one call off the heavy rate and the places, each once, whoever asks
+/// first. The places are given up when it is dropped.
+#[derive(Debug)]
+pub struct HeavyTurn {
+    allowance: Arc<Allowance>,
+    counted: OnceLock<()>,
+    places: OnceLock<Places>,
+}
+
+impl HeavyTurn {
+    pub fn new(allowance: Arc<Allowance>) -> Self {
+        HeavyTurn { allowance, counted: OnceLock::new(), places: OnceLock::new() }
+    }
+
+    /// Takes the call off the heavy rate, before its body is read.
+    ///
+    /// # Errors
+    /// [`Refused::TooOften`].
+    pub fn count(&self) -> Result<(), Refused> {
+        if self.counted.get().is_none() {
+            self.allowance.take(Class::Heavy).map_err(|refused| Refused::TooOften(Class::Heavy, refused))?;
+            self.counted.get_or_init(|| ());
+        }
+        Ok(())
+    }
+
+    /// Takes places too: heavy work comes next.
+    ///
+    /// # Errors
+    /// [`Refused::TooOften`], or [`Refused::NoPlace`] where all places are taken.
+    pub fn begin(&self) -> Result<(), Refused> {
+        self.count()?;
+        if self.places.get().is_none() {
+            let places = self.allowance.places().ok_or(Refused::NoPlace)?;
+            self.places.get_or_init(|| places);
+        }
+        Ok(())
     }
 }
 
@@ -159,6 +253,21 @@ mod tests {
             takers.into_iter().map(|taker| taker.join().unwrap()).sum()
         });
         assert_eq!(given, 1000);
+    }
+
+    #[test]
+    fn a_heavy_call_is_counted_once_and_gives_its_place_up_when_it_ends() {
+        let limits = Limits::new([0, 1, 0], 1);
+        let allowance = Arc::new(Allowance::new(&limits));
+        let turn = HeavyTurn::new(allowance.clone());
+        turn.count().unwrap();
+        turn.begin().unwrap();
+        turn.begin().unwrap();
+        assert!(matches!(HeavyTurn::new(allowance).begin(), Err(Refused::TooOften(Class::Heavy, _))));
+        let other = HeavyTurn::new(Arc::new(Allowance::new(&limits)));
+        assert!(matches!(other.begin(), Err(Refused::NoPlace)));
+        drop(turn);
+        other.begin().unwrap();
     }
 
     #[test]

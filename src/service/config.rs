@@ -49,11 +49,26 @@ impl Role {
     }
 }
 
+/// A certificate chain and its private key, in PEM.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TlsFiles {
+    pub certificate: PathBuf,
+    pub key: PathBuf,
+}
+
 /// The configuration of one process.
 #[derive(Debug, Clone)]
 pub struct Config {
     /// Port 0 picks a free one.
     pub listen: SocketAddr,
+    /// An address of its own for what an operator asks, so that no caller can keep him out.
+    pub operations_listen: Option<SocketAddr>,
+    /// What connections are encrypted by.
+    pub tls: Option<TlsFiles>,
+    /// Whether an address that others reach may be listened on without encryption.
+    pub allow_plaintext: bool,
+    /// Names the service answers to beside its own, while it asks for no key.
+    pub hosts: Vec<String>,
     /// Whether an address that others reach may be listened on while the store holds no key.
     pub allow_anonymous: bool,
     pub limits: Limits,
@@ -68,8 +83,10 @@ pub struct Config {
     pub memory_limit: MemoryLimit,
     /// Threads of the training pool.
     pub training_threads: usize,
-    /// Connections served at a time, as far as there are descriptors; more wait in the kernel's queue.
+    /// Connections held at a time, as far as there are descriptors; past that, those give way that wait for their client.
     pub connection_limit: usize,
+    /// Those of one address, likewise; a quarter of all unless given.
+    pub connections_of_address: Option<usize>,
     /// Largest request body, in bytes: an exported policy of a few thousand design points fits.
     pub body_limit_bytes: usize,
     pub request_timeout: Duration,
@@ -96,6 +113,10 @@ impl Config {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Config {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
+            operations_listen: None,
+            tls: None,
+            allow_plaintext: false,
+            hosts: Vec::new(),
             allow_anonymous: false,
             limits: Limits::default(),
             audit: AuditKept::default(),
@@ -106,6 +127,7 @@ impl Config {
             memory_limit: MemoryLimit::of_the_system(),
             training_threads: cores.saturating_sub(1).max(1),
             connection_limit: 4096,
+            connections_of_address: None,
             body_limit_bytes: 64 << 20,
             request_timeout: Duration::from_secs(30),
             resolve_limit: cores.div_ceil(2),

@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 
 use thiserror::Error;
 
+use super::allowance::Refused;
 use crate::control::error::{FieldError, PolicyError};
 use crate::store::StoreError;
 
@@ -39,6 +40,8 @@ pub enum ServiceError {
     Draining,
     #[error("too many requests of this kind wait already")]
     Busy,
+    #[error(transparent)]
+    Refused(#[from] Refused),
     #[error("{0}")]
     Internal(String),
 }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::allowance::HeavyTurn;
 use super::bounded::Bounded;
 use super::error::ServiceError;
 use super::observation::{Observe, Observed};
@@ -9,6 +10,14 @@ use crate::control::advisor::{Advice, AdviceMode, Advisor, Uncertainty};
 use crate::control::rules as limits;
 use crate::control::state::State;
 use crate::store::{Seen, SessionRow};
+
+/// By what a call is answered, where its work is done, and what it must take before it solves.
+pub(super) struct Means<'a> {
+    pub advisor: Arc<Advisor>,
+    pub advising: &'a Bounded,
+    pub resolving: &'a Bounded,
+    pub turn: &'a HeavyTurn,
+}
 
 /// A session replayed from its rows. It holds no policy: what it is advised by is kept under its name, and may be dropped.
 #[derive(Clone)]
@@ -45,25 +54,35 @@ impl Live {
     }
 
     /// The surrogate's advice for the coming period, computed once: here where that takes less than a thread would, else
-    /// on a thread that may block.
-    pub(super) async fn surrogate_advice(
-        &mut self,
-        advisor: &Arc<Advisor>,
-        advising: &Bounded,
-    ) -> Result<&Advice, ServiceError> {
+    /// on a thread that may block. A state outside the design is solved, which is heavy from there on.
+    pub(super) async fn surrogate_advice(&mut self, means: &Means<'_>) -> Result<&Advice, ServiceError> {
         let step = self.observed();
-        if self.advice.is_none() && advisor.is_prompt(step, &self.state) {
-            let radius = self.radius.unwrap_or_else(|| advisor.radius(&self.state));
-            self.advice = advisor.advise_from_surrogate(step, &self.state, radius);
-        }
         let advice = match self.advice.take() {
             Some(advice) => advice,
-            None => {
-                let (advisor, state) = (advisor.clone(), self.state.clone());
-                advising.run(&self.row.tenant, move || advisor.advise(step, &state, AdviceMode::Surrogate)).await?
-            }
+            None => match self.predicted(step, means).await? {
+                Some(advice) => advice,
+                None => {
+                    means.turn.begin()?;
+                    let (advisor, state) = (means.advisor.clone(), self.state.clone());
+                    let tenant = &self.row.tenant;
+                    means.resolving.run(tenant, move || advisor.advise(step, &state, AdviceMode::Surrogate)).await?
+                }
+            },
         };
         Ok(self.advice.insert(advice))
+    }
+
+    /// What the surrogate says of the state; `None` where it lies outside the design.
+    async fn predicted(&self, step: usize, means: &Means<'_>) -> Result<Option<Advice>, ServiceError> {
+        let predict = move |advisor: &Advisor, state: &State, radius: Option<f64>| {
+            let radius = radius.unwrap_or_else(|| advisor.radius(state));
+            advisor.advise_from_surrogate(step, state, radius)
+        };
+        if means.advisor.is_prompt(step, &self.state) {
+            return Ok(predict(&means.advisor, &self.state, self.radius));
+        }
+        let (advisor, state, radius) = (means.advisor.clone(), self.state.clone(), self.radius);
+        means.advising.run(&self.row.tenant, move || predict(&advisor, &state, radius)).await
     }
 
     /// The state after `log_return`, and the answer to it; nothing is changed yet but the memoised advice.
@@ -71,15 +90,14 @@ impl Live {
         &mut self,
         report: &Observe,
         log_return: f64,
-        advisor: &Arc<Advisor>,
-        advising: &Bounded,
+        means: &Means<'_>,
     ) -> Result<(State, Observed), ServiceError> {
-        let advised = self.surrogate_advice(advisor, advising).await?.allocation;
+        let advised = self.surrogate_advice(means).await?.allocation;
         let executed_allocation = report.executed_allocation.unwrap_or(advised);
-        let mut state = advisor.advance(&self.state, executed_allocation, log_return);
+        let mut state = means.advisor.advance(&self.state, executed_allocation, log_return);
         state.wealth = report.wealth.unwrap_or(state.wealth);
         limits::within("wealth", state.wealth, limits::WEALTH.0, limits::WEALTH.1)?;
-        let (state, uncertainty) = self.measured(state, advisor, advising).await?;
+        let (state, uncertainty) = self.measured(state, &means.advisor, means.advising).await?;
         let answer = Observed {
             session: report.session.clone(),
             period: report.period,

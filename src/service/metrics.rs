@@ -15,6 +15,10 @@ pub const ACTION_SECONDS: &str = "ballast_action_duration_seconds";
 pub const HTTP_REQUEST_SECONDS: &str = "ballast_http_request_duration_seconds";
 pub const HTTP_REQUESTS: &str = "ballast_http_requests_total";
 pub const JOBS: &str = "ballast_jobs";
+/// Connections held, by what they do.
+pub const CONNECTIONS: &str = "ballast_connections";
+pub const CONNECTIONS_REFUSED: &str = "ballast_connections_refused_total";
+pub const CERTIFICATE_LOADS: &str = "ballast_certificate_loads_total";
 pub const SESSIONS: &str = "ballast_sessions";
 pub const TURNS_WAITING: &str = "ballast_turns_waiting";
 pub const MEMORY: &str = "ballast_memory_bytes";
@@ -79,6 +83,15 @@ pub fn describe() {
     describe_histogram!(ACTION_SECONDS, Unit::Seconds, "Duration of finding one allocation, by mode.");
     describe_histogram!(HTTP_REQUEST_SECONDS, Unit::Seconds, "Duration of one request, by method and route.");
     describe_counter!(HTTP_REQUESTS, "Requests answered, by method, route and status.");
+    describe_gauge!(
+        CONNECTIONS,
+        "Connections held, by phase: waiting and receiving ones give way where a place is needed."
+    );
+    describe_counter!(CONNECTIONS_REFUSED, "Connections that got no place, since every one was worked on.");
+    describe_counter!(
+        CERTIFICATE_LOADS,
+        "Certificates read anew, by outcome: taken, or refused and the one before kept."
+    );
     describe_gauge!(JOBS, "Jobs in the store, by state.");
     describe_gauge!(SESSIONS, "Sessions in the store.");
     describe_counter!(REFUSALS, "Calls answered 401, 403 or 429, by tenant and status; of a wrong key, whose it was.");

@@ -11,7 +11,7 @@ use crate::control::policy::content_hash;
 use crate::control::request::rules as limits;
 
 /// Prices taken: any currency, any quantity.
-const PRICE: (f64, f64) = (1e-12, 1e15);
+pub const PRICE: (f64, f64) = (1e-12, 1e15);
 const ONE_RETURN: &str = "must be the only one of log_return, simple_return and price";
 
 /// The return of one period, given in exactly one of three ways, and what was done in it.

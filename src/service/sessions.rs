@@ -13,6 +13,7 @@ use std::sync::Arc;
 use serde::Serialize;
 use tracing::Instrument;
 
+use super::allowance::HeavyTurn;
 use super::bounded::{Bounded, Size};
 use super::clock::Clock;
 use super::config::Config;
@@ -20,7 +21,7 @@ use super::error::ServiceError;
 use super::idempotency;
 use super::identity;
 use super::keys::Caller;
-use super::live::Live;
+use super::live::{Live, Means};
 use super::memory::Memory;
 use super::observation::{Observe, Observed};
 use super::policies::Policies;
@@ -197,11 +198,16 @@ impl Sessions {
     ///
     /// # Errors
     /// A field breaks a rule; the period was observed with other content, is not the next, or lies past the horizon.
-    pub async fn observe(&self, tenant: &Tenant, report: Observe) -> Result<Observed, ServiceError> {
-        let (sessions, tenant) = (self.clone(), tenant.clone());
+    pub async fn observe(
+        &self,
+        tenant: &Tenant,
+        report: Observe,
+        turn: &Arc<HeavyTurn>,
+    ) -> Result<Observed, ServiceError> {
+        let (sessions, tenant, turn) = (self.clone(), tenant.clone(), turn.clone());
         let recording = async move {
             let mut held = sessions.hold(&tenant, &report.session).await;
-            sessions.record(&tenant, &report, &mut held).await
+            sessions.record(&tenant, &report, &turn, &mut held).await
         };
         let recording = tokio::spawn(recording.in_current_span());
         recording.await.map_err(ServiceError::internal)?
@@ -211,6 +217,7 @@ impl Sessions {
         &self,
         tenant: &Tenant,
         report: &Observe,
+        turn: &HeavyTurn,
         held: &mut Held<Name, Live>,
     ) -> Result<Observed, ServiceError> {
         let live = held.current(&Rows { sessions: self, tenant, session: &report.session }).await?;
@@ -223,8 +230,8 @@ impl Sessions {
         }
         live.expects(report.period)?;
         let log_return = report.checked_log_return(live.price)?;
-        let advisor = self.advisor(tenant, live).await?;
-        let (state, answer) = live.after(report, log_return, &advisor, &self.advising).await?;
+        let means = self.means(tenant, live, turn).await?;
+        let (state, answer) = live.after(report, log_return, &means).await?;
         let new = ObservationRow {
             session: report.session.clone(),
             period: report.period,
@@ -264,8 +271,14 @@ impl Sessions {
     /// The robust allocation for the coming period.
     ///
     /// # Errors
-    /// There is no such session, or it has reached its horizon.
-    pub async fn action(&self, tenant: &Tenant, session: &str, question: Question) -> Result<Action, ServiceError> {
+    /// There is no such session, it has reached its horizon, or it must be solved and too much is under way.
+    pub async fn action(
+        &self,
+        tenant: &Tenant,
+        session: &str,
+        question: Question,
+        turn: &HeavyTurn,
+    ) -> Result<Action, ServiceError> {
         let mut held = self.hold(tenant, session).await;
         let live = held.current(&Rows { sessions: self, tenant, session }).await?;
         if live.observed() >= live.row.horizon {
@@ -276,13 +289,15 @@ impl Sessions {
         if let Some(advice) = live.advice.clone().filter(|_| surrogate) {
             return Ok(Action { period, advice, worst_case: None });
         }
-        let advisor = self.advisor(tenant, live).await?;
+        let means = self.means(tenant, live, turn).await?;
         if surrogate {
-            let advice = live.surrogate_advice(&advisor, &self.advising).await?.clone();
+            let advice = live.surrogate_advice(&means).await?.clone();
             return Ok(Action { period, advice, worst_case: None });
         }
+        let advisor = means.advisor;
         let (state, step) = (live.state.clone(), live.observed());
         drop(held);
+        turn.begin()?;
         let solving = self.resolving.run(tenant, move || match question {
             Question::Explain => {
                 let (advice, worst_case) = advisor.explain(step, &state);
@@ -297,6 +312,11 @@ impl Sessions {
     /// The policy of a session, made ready.
     pub(super) async fn advisor(&self, tenant: &Tenant, live: &Live) -> Result<Arc<Advisor>, ServiceError> {
         self.policies.advisor(tenant, &live.row.policy).await
+    }
+
+    async fn means<'a>(&'a self, tenant: &Tenant, live: &Live, turn: &'a HeavyTurn) -> Result<Means<'a>, ServiceError> {
+        let advisor = self.advisor(tenant, live).await?;
+        Ok(Means { advisor, advising: &self.advising, resolving: &self.resolving, turn })
     }
 
     async fn hold(&self, tenant: &Tenant, session: &str) -> Held<Name, Live> {

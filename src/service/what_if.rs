@@ -13,7 +13,7 @@ use crate::control::worst_case::{WorstCase, WorstLawSummary};
 use crate::store::Tenant;
 
 /// Points of a sweep; each is one turn among the robust steps that requests cause.
-const POINTS: std::ops::RangeInclusive<usize> = 2..=101;
+pub const POINTS: std::ops::RangeInclusive<usize> = 2..=101;
 
 /// What is supposed of a session. What is not given stays as it is.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, ToSchema)]

@@ -1,6 +1,7 @@
 //! A real server on a free port, and a client that tells stories.
 #![allow(dead_code)]
 
+pub mod certificates;
 pub mod place;
 pub mod postgres;
 pub mod process;

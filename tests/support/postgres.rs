@@ -24,6 +24,13 @@ const KEEPER: &str = r#"
     trap '"$BIN/pg_ctl" -D data -m immediate stop >>log 2>&1 || true; cd /; rm -rf "$folder"' EXIT
     start() { "$BIN/pg_ctl" -D data -w -l log -o "-p $PORT -k $folder -c listen_addresses=127.0.0.1" start >>log 2>&1; }
     "$BIN/initdb" -D data -U ballast -A trust -E UTF8 --locale=C --no-sync >>log 2>&1 || { cat log >&2; exit 1; }
+    if [ -n "${CERTIFICATE:-}" ]; then
+        printf '%s' "$CERTIFICATE" >data/server.crt
+        (umask 077; printf '%s' "$PRIVATE_KEY" >data/server.key)
+        echo "ssl = on" >>data/postgresql.conf
+        # Who comes without encryption is turned away.
+        sed -i 's/^host /hostssl /' data/pg_hba.conf
+    fi
     start || { cat log >&2; exit 1; }
     echo done
     while read -r word; do
@@ -44,6 +51,15 @@ pub struct Cluster {
 impl Cluster {
     /// `None` where no server is installed.
     pub fn start() -> Option<Cluster> {
+        Cluster::start_with(&[])
+    }
+
+    /// One that takes encrypted connections alone, by this certificate and key in PEM; `None` as for [`database`].
+    pub fn encrypted(certificate: &str, key: &str) -> Option<Cluster> {
+        Cluster::start_with(&[("CERTIFICATE", certificate), ("PRIVATE_KEY", key)]).or_else(skip)
+    }
+
+    fn start_with(variables: &[(&str, &str)]) -> Option<Cluster> {
         let bin = installed()?;
         let port = TcpListener::bind(("127.0.0.1", 0)).unwrap().local_addr().unwrap().port();
         let root = Command::new("id").arg("-u").output().unwrap().stdout == b"0\n";
@@ -56,6 +72,7 @@ impl Cluster {
             .args(["-c", KEEPER])
             .env("BIN", bin)
             .env("PORT", port.to_string())
+            .envs(variables.iter().copied())
             .current_dir("/")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -85,6 +102,11 @@ impl Cluster {
     /// Starts it again and waits for its recovery.
     pub fn recover(&self) {
         self.tell("start");
+    }
+
+    /// The database that every server has, as its address.
+    pub fn own_database(&self) -> String {
+        self.url("postgres")
     }
 
     fn url(&self, database: &str) -> String {

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use thiserror::Error;
 
 use super::connection::{Connection, get};
+use super::tunnel::{self, TunnelError};
 use crate::command::host::{DataFolder, HostError};
 
 /// A service that is not ready by then never will be.
@@ -27,6 +28,10 @@ pub enum ServerError {
     NoAddress { said: String, log: String },
     #[error("{url} names no service")]
     Url { url: String },
+    #[error("{url} is encrypted: say by --ca whose certificates to trust")]
+    NoAuthorities { url: String },
+    #[error("cannot speak TLS")]
+    Tls(#[from] TunnelError),
     #[error("the service was not ready within {} s", PATIENCE.as_secs())]
     NotReady,
 }
@@ -69,10 +74,19 @@ impl Drop for Own {
 
 impl Server {
     /// The service at `url`.
-    pub fn at(url: &str) -> Result<Self, ServerError> {
-        let host = url.trim_start_matches("http://").trim_end_matches('/');
+    pub async fn at(url: &str, authorities: Option<&Path>) -> Result<Self, ServerError> {
+        let encrypted = url.strip_prefix("https://");
+        let host = encrypted.unwrap_or(url.trim_start_matches("http://")).trim_end_matches('/');
         let found = host.to_socket_addrs().ok().and_then(|mut addresses| addresses.next());
         let address = found.ok_or_else(|| ServerError::Url { url: url.to_owned() })?;
+        let address = match (encrypted, authorities) {
+            (None, _) => address,
+            (Some(_), None) => return Err(ServerError::NoAuthorities { url: url.to_owned() }),
+            (Some(_), Some(authorities)) => {
+                let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
+                tunnel::open(address, name, authorities).await?
+            }
+        };
         Ok(Server { addresses: vec![address], own: None })
     }
 

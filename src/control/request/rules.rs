@@ -9,15 +9,18 @@ use crate::control::request::specification::{
 
 /// The covariance matrix of 10,000 points takes 800 MB.
 pub const LARGEST_COUNT: usize = 10_000;
-const COUNT: std::ops::RangeInclusive<usize> = 10..=LARGEST_COUNT;
+/// Design points of a step.
+pub const COUNT: std::ops::RangeInclusive<usize> = 10..=LARGEST_COUNT;
 /// Ten years of weeks.
-const HORIZON: std::ops::RangeInclusive<usize> = 1..=520;
-const HISTORY_LENGTH: std::ops::RangeInclusive<usize> = 2..=20_000;
+pub const HORIZON: std::ops::RangeInclusive<usize> = 1..=520;
+/// Log-returns of a history.
+pub const HISTORY_LENGTH: std::ops::RangeInclusive<usize> = 2..=20_000;
 /// Largest log-return in absolute value: a factor of 148 in one step.
 pub const LOG_RETURN: f64 = 5.0;
 /// Two observations closer than this are one value: the standard deviation must exceed it.
 const SMALLEST_DEVIATION: f64 = 1e-7;
-const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
+/// Simulated bridge paths.
+pub const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
 /// Bridge matrix of 30 million numbers: 240 MB.
 const BRIDGE_NUMBERS: usize = 30_000_000;
 /// Simulated returns of the design: 800 MB.
@@ -28,7 +31,8 @@ const EXPONENTIAL_SCALE: f64 = 300.0;
 const SMALLEST_HIGHEST_ACTION: f64 = 1e-4;
 /// Smallest and largest wealth.
 pub const WEALTH: (f64, f64) = (1e-6, 1e15);
-const MOMENTS: std::ops::RangeInclusive<usize> = 1..=6;
+/// Moments of the law among the features.
+pub const MOMENTS: std::ops::RangeInclusive<usize> = 1..=6;
 
 /// Factors on a bridge radius.
 pub const RADIUS_SCALE: (f64, f64) = (0.0, 100.0);

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use sqlx::postgres::{PgConnectOptions, PgSslMode};
+use sqlx::postgres::PgConnectOptions;
 use thiserror::Error;
 
 /// A parsed `postgres://user:password@host:port/database`. What it lacks comes from libpq's variables (`PGPASSWORD`, ...)
@@ -18,8 +18,6 @@ pub enum UrlError {
     Scheme,
     #[error("the address of the store cannot be read")]
     Address { source: sqlx::Error },
-    #[error("the address of the store asks for sslmode={mode}, and this binary has no TLS")]
-    Encryption { mode: &'static str },
 }
 
 impl PostgresUrl {
@@ -39,12 +37,7 @@ impl FromStr for PostgresUrl {
             return Err(UrlError::Scheme);
         }
         let options = PgConnectOptions::from_str(text).map_err(|source| UrlError::Address { source })?;
-        match options.get_ssl_mode() {
-            PgSslMode::Require => Err(UrlError::Encryption { mode: "require" }),
-            PgSslMode::VerifyCa => Err(UrlError::Encryption { mode: "verify-ca" }),
-            PgSslMode::VerifyFull => Err(UrlError::Encryption { mode: "verify-full" }),
-            _ => Ok(PostgresUrl(Box::new(options))),
-        }
+        Ok(PostgresUrl(Box::new(options)))
     }
 }
 
@@ -82,10 +75,13 @@ mod tests {
     }
 
     #[test]
-    fn encryption_is_refused_rather_than_left_out() {
-        for mode in ["require", "verify-ca", "verify-full"] {
-            let refused = format!("postgres://h/d?sslmode={mode}").parse::<PostgresUrl>().unwrap_err();
-            assert!(refused.to_string().contains(mode), "{refused}");
+    fn every_mode_of_encryption_is_taken() {
+        for mode in ["disable", "prefer", "require", "verify-ca", "verify-full"] {
+            assert!(
+                format!("postgres://h/d?sslmode={mode}&sslrootcert=ca.pem").parse::<PostgresUrl>().is_ok(),
+                "{mode}"
+            );
         }
+        assert!("postgres://h/d?sslmode=verify-ful".parse::<PostgresUrl>().is_err());
     }
 }

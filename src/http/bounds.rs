@@ -1,0 +1,184 @@
+//! The rules of single fields that JSON Schema can tell, told: lengths, ends of ranges, exactly one of several.
+//!
+//! The rules stand in `control::rules` and beside the requests they are of; what is here repeats their numbers for readers
+//! of the description, and a test asks the rules themselves at both ends. Rules between fields are the service's to tell.
+
+use serde_json::{Map, Value, json};
+use utoipa::openapi::{OpenApi, RefOr, Schema};
+
+use crate::control::rules::{
+    COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, RADIUS_SCALE, WEALTH,
+};
+use crate::service::observation::PRICE;
+use crate::service::what_if::POINTS;
+
+/// Adds to every schema what its fields may hold.
+pub fn tell(description: &mut OpenApi) {
+    let Some(components) = &mut description.components else { return };
+    for (name, field, rule) in rules() {
+        if let Some(schema) = components.schemas.get_mut(name) {
+            bound(schema, field, &rule);
+        }
+    }
+    if let Some(sweep) = components.schemas.get_mut("Sweep") {
+        merged(sweep, &json!({ "minProperties": 1, "maxProperties": 1 }));
+    }
+}
+
+fn rules() -> Vec<(&'static str, &'static str, Value)> {
+    let within = |low: f64, high: f64| json!({ "minimum": low, "maximum": high });
+    let whole = |range: &std::ops::RangeInclusive<usize>| json!({ "minimum": range.start(), "maximum": range.end() });
+    let pair = json!({ "minItems": 2, "maxItems": 2, "items": { "minimum": 1e-12, "maximum": 1e12 } });
+    let history = json!({ "minItems": HISTORY_LENGTH.start(), "maxItems": HISTORY_LENGTH.end(),
+        "items": within(-LOG_RETURN, LOG_RETURN) });
+    let (wealth, level) = (within(WEALTH.0, WEALTH.1), within(1e-3, 0.999));
+    let action = json!({ "minItems": 2, "maxItems": 2, "items": within(0.0, 1.0) });
+    let price = within(PRICE.0, PRICE.1);
+    vec![
+        ("ProblemSpecification", "horizon", whole(&HORIZON)),
+        ("ProblemSpecification", "rate_per_step", within(-0.5, 0.5)),
+        ("ProblemSpecification", "initial_wealth", wealth.clone()),
+        ("ProblemSpecification", "action_interval", action),
+        ("ProblemSpecification", "history", history.clone()),
+        ("UtilitySpecification", "risk_aversion", within(1e-12, 1e9)),
+        ("RadiusRule", "paths", whole(&PATHS)),
+        ("RadiusRule", "scale", within(RADIUS_SCALE.0, RADIUS_SCALE.1)),
+        ("RadiusRule", "kappa", within(0.0, 100.0)),
+        ("RadiusRule", "radius", within(FIXED_RADIUS.0, FIXED_RADIUS.1)),
+        ("RadiusRule", "c", within(1e-9, 1e12)),
+        ("SamplingLaw", "components", json!({ "minItems": 1, "maxItems": 32 })),
+        ("SamplingLaw", "location", within(-1.0, 1.0)),
+        ("SamplingLaw", "scale", within(1e-6, 1.0)),
+        ("SamplingLaw", "degrees_of_freedom", within(2.1, 1e6)),
+        ("MixtureComponent", "weight", json!({ "exclusiveMinimum": 0, "maximum": 1 })),
+        ("MixtureComponent", "mean", within(-1.0, 1.0)),
+        ("MixtureComponent", "variance", within(1e-12, 1.0)),
+        ("DesignSpecification", "count", whole(&COUNT)),
+        ("SurrogateSpecification", "moment_count", whole(&MOMENTS)),
+        ("HyperparameterBounds", "lengthscale", pair.clone()),
+        ("HyperparameterBounds", "signal_variance", pair.clone()),
+        ("HyperparameterBounds", "noise_variance", pair),
+        ("OpenSession", "policy", json!({ "minLength": 1 })),
+        ("OpenSession", "history", history),
+        ("OpenSession", "wealth", wealth.clone()),
+        ("Observe", "session", json!({ "minLength": 1 })),
+        ("Observe", "period", json!({ "minimum": 1 })),
+        ("Observe", "log_return", within(-LOG_RETURN, LOG_RETURN)),
+        ("Observe", "simple_return", within((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())),
+        ("Observe", "price", price.clone()),
+        ("Observe", "previous_price", price),
+        ("Observe", "executed_allocation", within(0.0, 1.0)),
+        ("Observe", "wealth", wealth.clone()),
+        ("WhatIf", "session", json!({ "minLength": 1 })),
+        ("WhatIf", "wealth", wealth),
+        ("WhatIf", "radius_scale", within(RADIUS_SCALE.0, RADIUS_SCALE.1)),
+        ("WhatIf", "radius", within(FIXED_RADIUS.0, FIXED_RADIUS.1)),
+        ("WhatIf", "log_return", within(-LOG_RETURN, LOG_RETURN)),
+        ("WhatIf", "simple_return", within((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())),
+        ("SweepRange", "points", whole(&POINTS)),
+        ("EvaluationRequest", "level", level),
+    ]
+}
+
+/// Adds the rule to the field, in every variant that has it.
+fn bound(schema: &mut RefOr<Schema>, field: &str, rule: &Value) {
+    let RefOr::T(schema) = schema else { return };
+    match schema {
+        Schema::Object(object) => {
+            if let Some(property) = object.properties.get_mut(field) {
+                merged(property, rule);
+            }
+        }
+        Schema::OneOf(variants) => variants.items.iter_mut().for_each(|variant| bound(variant, field, rule)),
+        _ => {}
+    }
+}
+
+fn merged(schema: &mut RefOr<Schema>, rule: &Value) {
+    let Ok(mut written) = serde_json::to_value(&*schema) else { return };
+    merge(&mut written, rule);
+    if let Ok(read) = serde_json::from_value(written) {
+        *schema = read;
+    }
+}
+
+fn merge(into: &mut Value, rule: &Value) {
+    let (Value::Object(into), Value::Object(rule)) = (into, rule) else { return };
+    for (key, value) in rule {
+        match value {
+            Value::Object(_) => merge(into.entry(key).or_insert(Value::Object(Map::new())), value),
+            value => drop(into.insert(key.clone(), value.clone())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::specification::Specification;
+    use crate::http::router;
+
+    /// The field that the rules refuse in a sound specification with `value` at `pointer`.
+    fn refused(pointer: &str, value: Value) -> Option<String> {
+        let mut given = json!({
+            "problem": { "history": [0.1, -0.1, 0.05], "horizon": 3, "rate_per_step": 0.0, "initial_wealth": 100.0,
+                "utility": { "kind": "exponential", "risk_aversion": 0.01 },
+                "radius": { "rule": "bridge", "paths": 200, "scale": 1.0 } },
+            "design": { "count": 20, "sampling_law": { "kind": "student_t", "location": 0.0, "scale": 0.1,
+                "degrees_of_freedom": 5.0 } },
+            "surrogate": { "moment_count": 4 }
+        });
+        *given.pointer_mut(pointer).unwrap_or_else(|| panic!("{pointer}")) = value;
+        let specification: Result<Specification, _> = serde_json::from_value(given);
+        specification.unwrap().completed().err().map(|error| error.field)
+    }
+
+    #[test]
+    fn the_rules_and_the_description_have_the_same_ends() {
+        let description = serde_json::to_value(router::description()).unwrap();
+        let of = |schema: &str, variant: Option<usize>, field: &str| {
+            let schema = &description["components"]["schemas"][schema];
+            let schema = variant.map_or(schema, |variant| &schema["oneOf"][variant]);
+            schema["properties"][field].clone()
+        };
+        for (pointer, schema, step) in [
+            ("/problem/horizon", of("ProblemSpecification", None, "horizon"), 1.0),
+            ("/problem/rate_per_step", of("ProblemSpecification", None, "rate_per_step"), 1e-3),
+            ("/problem/initial_wealth", of("ProblemSpecification", None, "initial_wealth"), 1e-7),
+            ("/problem/history/0", of("ProblemSpecification", None, "history")["items"].clone(), 1e-3),
+            ("/problem/radius/paths", of("RadiusRule", Some(0), "paths"), 1.0),
+            ("/problem/radius/scale", of("RadiusRule", Some(0), "scale"), 1e-3),
+            ("/design/count", of("DesignSpecification", None, "count"), 1.0),
+            ("/design/sampling_law/location", of("SamplingLaw", Some(2), "location"), 1e-3),
+            ("/design/sampling_law/scale", of("SamplingLaw", Some(2), "scale"), 1e-7),
+            ("/design/sampling_law/degrees_of_freedom", of("SamplingLaw", Some(2), "degrees_of_freedom"), 1e-3),
+            ("/surrogate/moment_count", of("SurrogateSpecification", None, "moment_count"), 1.0),
+        ] {
+            let number = |value: f64| if step == 1.0 { json!(value as u64) } else { json!(value) };
+            let named = pointer.replace("/0", "[0]").trim_start_matches('/').replace('/', ".");
+            for (end, beyond) in [("minimum", -step), ("maximum", step)] {
+                let end = schema[end].as_f64().unwrap_or_else(|| panic!("{pointer} has no {end}: {schema}"));
+                assert_ne!(refused(pointer, number(end)).as_ref(), Some(&named), "{pointer} at {end}");
+                let beyond = end + if step == 1.0 { beyond } else { beyond * end.abs().max(1.0) };
+                assert_eq!(refused(pointer, number(beyond)), Some(named.clone()), "{pointer} at {beyond}");
+            }
+        }
+        let interval = of("ProblemSpecification", None, "action_interval");
+        assert_eq!((&interval["minItems"], &interval["maxItems"]), (&json!(2), &json!(2)));
+    }
+
+    #[test]
+    fn every_rule_is_of_a_field_there_is() {
+        let description = serde_json::to_value(router::description()).unwrap();
+        for (schema, field, rule) in rules() {
+            let schema = &description["components"]["schemas"][schema];
+            let variants = schema["oneOf"].as_array().cloned().unwrap_or(vec![schema.clone()]);
+            let told = variants.iter().filter(|variant| {
+                let property = &variant["properties"][field];
+                rule.as_object().unwrap().keys().all(|key| !property[key].is_null())
+            });
+            assert!(told.count() > 0, "{field}: {rule} is not told by {schema}");
+        }
+        assert_eq!(description["components"]["schemas"]["Sweep"]["maxProperties"], 1);
+    }
+}

@@ -1,0 +1,396 @@
+//! Who is connected: a table in which waiting never holds a place against somebody who asks.
+//!
+//! Whether a client is honest cannot be told from a connection that says nothing. So a full table does not keep new
+//! callers out: the connection that has waited longest for its client gives way, among those of the caller's own address
+//! where that has its share, else among those of the address with most. What gives way is, in this order, a connection
+//! between two requests, one whose body is still to come, and a stream of events, which its client resumes where it ended.
+//! A call that is being worked on never gives way; such calls are bounded by the limits of their tenants and by the time
+//! of a request. Where even they fill the table, a few places beyond it take callers who may ask the probes only.
+//!
+//! An address is an IPv4 address, or the first 64 bits of an IPv6 address: what one subscriber has.
+
+use std::collections::HashMap;
+use std::net::{IpAddr, Ipv6Addr};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use tokio::sync::Notify;
+
+/// How many connections there may be.
+#[derive(Debug, Clone, Copy)]
+pub struct Bounds {
+    pub all: usize,
+    /// Those of one address.
+    pub of_address: usize,
+    /// Places beyond `all` for the probes.
+    pub for_probes: usize,
+}
+
+/// What a connection does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// Waits for a request, or for the client to take the end of an answer.
+    Waiting,
+    /// Has a request whose body is not whole yet.
+    Receiving,
+    /// Sends events.
+    Streaming,
+    /// Has a request that is being answered.
+    Working,
+    /// Gave way: nothing more is answered.
+    Closed,
+}
+
+impl Phase {
+    /// In the order in which they give way; the last two never do.
+    pub const ALL: [Phase; 5] = [Phase::Waiting, Phase::Receiving, Phase::Streaming, Phase::Working, Phase::Closed];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Phase::Waiting => "waiting",
+            Phase::Receiving => "receiving",
+            Phase::Streaming => "streaming",
+            Phase::Working => "working",
+            Phase::Closed => "closed",
+        }
+    }
+
+    fn gives_way(self) -> bool {
+        matches!(self, Phase::Waiting | Phase::Receiving | Phase::Streaming)
+    }
+}
+
+/// What a connection may ask.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    Any,
+    /// One question to a probe.
+    Probes,
+}
+
+/// One connection: its phase, and since when, in one number, so that whoever takes its place and whoever begins a request
+/// on it cannot both succeed.
+#[derive(Debug)]
+pub struct Connection {
+    pub place: Place,
+    number: u64,
+    opened: Instant,
+    /// Milliseconds since `opened`, shifted by [`PHASE_BITS`], and the phase.
+    state: AtomicU64,
+    requests: AtomicU64,
+    left: AtomicBool,
+    gave_way: Notify,
+}
+
+const PHASE_BITS: u32 = 3;
+
+impl Connection {
+    fn new(number: u64, place: Place) -> Arc<Self> {
+        let (state, requests) = (AtomicU64::new(Phase::Waiting as u64), AtomicU64::new(0));
+        Arc::new(Connection {
+            place,
+            number,
+            opened: Instant::now(),
+            state,
+            requests,
+            left: AtomicBool::new(false),
+            gave_way: Notify::new(),
+        })
+    }
+
+    fn packed(&self, phase: Phase) -> u64 {
+        let milliseconds = u64::try_from(self.opened.elapsed().as_millis()).unwrap_or(u64::MAX >> PHASE_BITS);
+        milliseconds << PHASE_BITS | phase as u64
+    }
+
+    fn unpacked(&self) -> (u64, Phase, Instant) {
+        let state = self.state.load(Ordering::Acquire);
+        let phase = Phase::ALL[(state & ((1 << PHASE_BITS) - 1)) as usize];
+        (state, phase, self.opened + Duration::from_millis(state >> PHASE_BITS))
+    }
+
+    pub fn phase(&self) -> Phase {
+        self.unpacked().1
+    }
+
+    /// Since when it is in its phase, or took something of an answer.
+    pub fn since(&self) -> Instant {
+        self.unpacked().2
+    }
+
+    pub fn age(&self) -> Duration {
+        self.opened.elapsed()
+    }
+
+    /// Requests begun.
+    pub fn requests(&self) -> u64 {
+        self.requests.load(Ordering::Relaxed)
+    }
+
+    /// Begins a request, in the phase `to`; whether the connection still has its place.
+    #[must_use]
+    pub fn begin(&self, to: Phase) -> bool {
+        self.requests.fetch_add(1, Ordering::Relaxed);
+        self.change(|phase| (phase != Phase::Closed).then_some(to))
+    }
+
+    /// The body of the request is whole.
+    pub fn received(&self) {
+        self.change(|phase| (phase == Phase::Receiving).then_some(Phase::Working));
+    }
+
+    /// The answer is a stream of events.
+    pub fn stream(&self) {
+        self.change(|phase| (phase != Phase::Closed).then_some(Phase::Streaming));
+    }
+
+    /// The answer is given.
+    pub fn rest(&self) {
+        self.change(|phase| (phase != Phase::Closed).then_some(Phase::Waiting));
+    }
+
+    /// The answer came before the request was read to its end.
+    pub fn leave(&self) {
+        self.left.store(true, Ordering::Relaxed);
+    }
+
+    pub fn has_left(&self) -> bool {
+        self.left.load(Ordering::Relaxed)
+    }
+
+    /// The client took something.
+    pub fn taken(&self) {
+        self.change(|phase| (phase == Phase::Waiting).then_some(Phase::Waiting));
+    }
+
+    fn change(&self, next: impl Fn(Phase) -> Option<Phase>) -> bool {
+        loop {
+            let (state, phase, _) = self.unpacked();
+            let Some(next) = next(phase) else { return false };
+            let replaced =
+                self.state.compare_exchange_weak(state, self.packed(next), Ordering::AcqRel, Ordering::Acquire);
+            if replaced.is_ok() {
+                return true;
+            }
+        }
+    }
+
+    /// Takes the place away, unless it was begun to be used since it was looked at.
+    fn give_way(&self, looked_at: u64) -> bool {
+        let closed = self.packed(Phase::Closed);
+        let gives = self.state.compare_exchange(looked_at, closed, Ordering::AcqRel, Ordering::Acquire).is_ok();
+        if gives {
+            self.gave_way.notify_one();
+        }
+        gives
+    }
+
+    /// Resolves once the connection has to give way.
+    pub async fn gave_way(&self) {
+        self.gave_way.notified().await;
+    }
+}
+
+/// All connections of a listener.
+pub struct Connections {
+    bounds: Bounds,
+    table: Mutex<Table>,
+}
+
+#[derive(Default)]
+struct Table {
+    next: u64,
+    count: usize,
+    by_address: HashMap<IpAddr, Vec<Arc<Connection>>>,
+    probing: Vec<Arc<Connection>>,
+}
+
+/// A connection's place, given up when dropped.
+pub struct Held {
+    pub connection: Arc<Connection>,
+    address: IpAddr,
+    connections: Arc<Connections>,
+}
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        self.connections.lock().remove(self.address, &self.connection);
+    }
+}
+
+impl Connections {
+    pub fn new(bounds: Bounds) -> Arc<Self> {
+        Arc::new(Connections { bounds, table: Mutex::default() })
+    }
+
+    /// A place for a connection from `address`; `None` where every one is worked on, those for probes too.
+    pub fn place(self: &Arc<Self>, address: IpAddr) -> Option<Held> {
+        let address = subscriber(address);
+        let connection = self.lock().placed(address, &self.bounds)?;
+        Some(Held { connection, address, connections: self.clone() })
+    }
+
+    /// How many there are in each phase.
+    pub fn count(&self) -> [(Phase, usize); 5] {
+        let table = self.lock();
+        let all = || table.by_address.values().flatten().chain(&table.probing);
+        Phase::ALL.map(|phase| (phase, all().filter(|connection| connection.phase() == phase).count()))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Table> {
+        // No code panics while holding the lock.
+        self.table.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Table {
+    fn placed(&mut self, address: IpAddr, bounds: &Bounds) -> Option<Arc<Connection>> {
+        let own = self.by_address.get(&address).map_or(0, Vec::len);
+        let has_room =
+            (own < bounds.of_address || self.make_room_at(address)) && (self.count < bounds.all || self.make_room());
+        self.next += 1;
+        if has_room {
+            let connection = Connection::new(self.next, Place::Any);
+            self.by_address.entry(address).or_default().push(connection.clone());
+            self.count += 1;
+            return Some(connection);
+        }
+        if self.probing.len() >= bounds.for_probes {
+            let oldest = longest_waiting(self.probing.iter())?;
+            self.probing.retain(|other| other.number != oldest.number);
+        }
+        let connection = Connection::new(self.next, Place::Probes);
+        self.probing.push(connection.clone());
+        Some(connection)
+    }
+
+    /// Has one connection of the address give way.
+    fn make_room_at(&mut self, address: IpAddr) -> bool {
+        let gave = self.by_address.get(&address).and_then(|own| longest_waiting(own.iter()));
+        gave.is_some_and(|gave| self.remove(address, &gave))
+    }
+
+    /// Has one connection give way: of the address with most, else of any.
+    fn make_room(&mut self) -> bool {
+        let largest = self.by_address.iter().max_by_key(|(_, own)| own.len()).map(|(address, _)| *address);
+        if largest.is_some_and(|address| self.make_room_at(address)) {
+            return true;
+        }
+        let addresses: Vec<IpAddr> = self.by_address.keys().copied().collect();
+        addresses.into_iter().any(|address| self.make_room_at(address))
+    }
+
+    fn remove(&mut self, address: IpAddr, connection: &Connection) -> bool {
+        if connection.place == Place::Probes {
+            self.probing.retain(|other| other.number != connection.number);
+            return true;
+        }
+        let Some(own) = self.by_address.get_mut(&address) else { return false };
+        let Some(at) = own.iter().position(|other| other.number == connection.number) else { return false };
+        own.swap_remove(at);
+        if own.is_empty() {
+            self.by_address.remove(&address);
+        }
+        self.count -= 1;
+        true
+    }
+}
+
+/// The one among them that gave way: first in the order of phases, then of time.
+fn longest_waiting<'a>(among: impl Iterator<Item = &'a Arc<Connection>> + Clone) -> Option<Arc<Connection>> {
+    // Whoever was chosen may begin a request in the same moment; then another is.
+    const TRIES: usize = 8;
+    (0..TRIES).find_map(|_| {
+        let seen = among.clone().map(|connection| (connection, connection.unpacked()));
+        let able = seen.filter(|(_, (_, phase, _))| phase.gives_way());
+        let (connection, (state, ..)) = able.min_by_key(|(_, (_, phase, since))| (*phase as u8, *since))?;
+        connection.give_way(state).then(|| connection.clone())
+    })
+}
+
+fn subscriber(address: IpAddr) -> IpAddr {
+    match address.to_canonical() {
+        IpAddr::V6(address) => Ipv6Addr::from_bits(address.to_bits() & !u128::from(u64::MAX)).into(),
+        address => address,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn address(last: u8) -> IpAddr {
+        [10, 0, 0, last].into()
+    }
+
+    fn table(all: usize, of_address: usize, for_probes: usize) -> Arc<Connections> {
+        Connections::new(Bounds { all, of_address, for_probes })
+    }
+
+    fn later() {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+
+    #[test]
+    fn the_longest_waiting_of_the_same_address_gives_way() {
+        let table = table(10, 2, 0);
+        let stranger = table.place(address(9)).unwrap();
+        later();
+        let first = table.place(address(1)).unwrap();
+        later();
+        let second = table.place(address(1)).unwrap();
+        later();
+        // Used again: now the second is the one that has waited longest.
+        assert!(first.connection.begin(Phase::Working));
+        first.connection.rest();
+        let third = table.place(address(1)).unwrap();
+        let phases = [&stranger, &first, &second, &third].map(|held| held.connection.phase());
+        assert_eq!(phases, [Phase::Waiting, Phase::Waiting, Phase::Closed, Phase::Waiting]);
+        assert!(!second.connection.begin(Phase::Working), "what gave way answers nothing more");
+    }
+
+    #[test]
+    fn a_full_table_takes_from_the_address_with_most() {
+        let table = table(4, 4, 0);
+        let rare = table.place(address(1)).unwrap();
+        later();
+        let crowd: Vec<Held> = (0..3).map(|_| table.place(address(2)).unwrap()).collect();
+        let _new = table.place(address(3)).unwrap();
+        assert_eq!(rare.connection.phase(), Phase::Waiting);
+        assert_eq!(crowd.iter().filter(|held| held.connection.phase() == Phase::Closed).count(), 1);
+        drop(crowd);
+        assert_eq!(table.lock().count, 2, "each place is given up once");
+    }
+
+    #[test]
+    fn bodies_to_come_give_way_before_streams_and_work_never_does() {
+        let table = table(3, 3, 1);
+        let held: Vec<Held> = (0..3).map(|_| table.place(address(1)).unwrap()).collect();
+        assert!(held[0].connection.begin(Phase::Working));
+        held[0].connection.stream();
+        assert!(held[1].connection.begin(Phase::Receiving));
+        assert!(held[2].connection.begin(Phase::Working));
+        let fourth = table.place(address(1)).unwrap();
+        assert!(fourth.connection.begin(Phase::Working));
+        let fifth = table.place(address(1)).unwrap();
+        assert!(fifth.connection.begin(Phase::Working));
+        let phases: Vec<Phase> = held.iter().map(|held| held.connection.phase()).collect();
+        assert_eq!(phases, [Phase::Closed, Phase::Closed, Phase::Working]);
+        let probe = table.place(address(1)).unwrap();
+        assert_eq!((fifth.connection.place, probe.connection.place), (Place::Any, Place::Probes));
+        let next = table.place(address(1)).unwrap();
+        assert_eq!((probe.connection.phase(), next.connection.place), (Phase::Closed, Place::Probes));
+        assert!(next.connection.begin(Phase::Working));
+        assert!(table.place(address(1)).is_none(), "every place is worked on");
+    }
+
+    #[test]
+    fn an_address_is_what_a_subscriber_has() {
+        let of = |text: &str| subscriber(text.parse().unwrap());
+        assert_eq!(of("2001:db8:1:2:3::4"), of("2001:db8:1:2:ffff::"));
+        assert_ne!(of("2001:db8:1:2::"), of("2001:db8:1:3::"));
+        assert_eq!(of("::ffff:10.0.0.1"), of("10.0.0.1"));
+        assert_ne!(of("10.0.0.1"), of("10.0.0.2"));
+    }
+}

@@ -1,0 +1,231 @@
+//! One connection from its first byte to its last: requests one after the other, each in the phase it is in.
+
+use std::convert::Infallible;
+use std::net::SocketAddr;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use axum::Router;
+use axum::body::Body;
+use axum::extract::Request;
+use axum::http::{HeaderMap, HeaderValue, header};
+use axum::response::{IntoResponse, Response};
+use http_body_util::BodyExt;
+use hyper::body::{Body as _, Bytes, Frame, Incoming, SizeHint};
+use hyper::server::conn::http1;
+use hyper::service::service_fn;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::server::graceful::Watcher;
+use thiserror::Error;
+use tokio::io::{AsyncRead, AsyncWrite};
+use tower::Service;
+
+use super::connections::{Connection, Held, Phase, Place};
+use super::patient::{Patience, Patient};
+use super::problem::{Problem, ProblemKind};
+use crate::service::shutdown::Shutdown;
+
+/// A head that is not whole after so many bytes, and one read of as many, is refused; hyper takes 100 lines at most.
+const HEAD_BYTES: usize = 32 << 10;
+/// A connection that has asked so often, or is so old, is closed with the next answer: what balances callers over
+/// replicas sees them anew, and nothing that gathers with a connection gathers for ever.
+const LARGEST_REQUESTS: u64 = 100_000;
+const LARGEST_AGE: Duration = Duration::from_secs(60 * 60);
+/// A body that was refused unread is taken after all where it is so small and comes so soon: the connection can go on.
+const SMALL_BODY: u64 = 64 << 10;
+const SMALL_BODY_WAIT: Duration = Duration::from_millis(100);
+/// What may be asked where every other place is worked on.
+const PROBES: [&str; 4] = ["/livez", "/readyz", "/health", "/metrics"];
+
+/// A request's own end of its connection.
+#[derive(Debug, Clone, Copy)]
+pub struct LocalAddress(pub SocketAddr);
+
+/// How a connection learns that the service stops.
+pub struct Stopping {
+    pub shutdown: Shutdown,
+    /// Ends it between two requests.
+    pub watcher: Watcher,
+}
+
+/// The place was taken by somebody else before the request was begun.
+#[derive(Debug, Error)]
+#[error("the connection gave way")]
+struct GaveWay;
+
+/// Answers what comes over `stream` until it ends, has to give way, or the service stops.
+pub async fn hold<S>(
+    stream: S,
+    held: &Held,
+    local: SocketAddr,
+    patience: Patience,
+    application: Router,
+    stopping: Stopping,
+) where
+    S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
+{
+    let connection = held.connection.clone();
+    let keep_alive = HeaderValue::from_str(&format!("timeout={}", patience.between.as_secs()));
+    let keep_alive = keep_alive.unwrap_or(HeaderValue::from_static("timeout=1"));
+    let service =
+        service_fn(move |request| answer(connection.clone(), local, keep_alive.clone(), application.clone(), request));
+    let stream = TokioIo::new(Patient::new(stream, patience, held.connection.clone()));
+    let serving = http1::Builder::new()
+        .timer(TokioTimer::new())
+        // The stream has a patience of its own, which tells a head under way from none.
+        .header_read_timeout(None)
+        .max_buf_size(HEAD_BYTES)
+        .serve_connection(stream, service);
+    tokio::select! {
+        ended = stopping.watcher.watch(serving) => {
+            if let Err(error) = ended {
+                tracing::debug!(%error, "connection ended");
+            }
+        }
+        () = held.connection.gave_way() => tracing::debug!("connection gave way"),
+        () = unused_at_the_end(&stopping.shutdown, &held.connection) => {}
+    }
+}
+
+/// Resolves at the shutdown where nothing was ever asked: hyper waits for a first request before it ends a connection.
+async fn unused_at_the_end(shutdown: &Shutdown, connection: &Connection) {
+    shutdown.begun().await;
+    if connection.requests() > 0 {
+        std::future::pending().await
+    }
+}
+
+async fn answer(
+    connection: Arc<Connection>,
+    local: SocketAddr,
+    keep_alive: HeaderValue,
+    mut application: Router,
+    request: hyper::Request<Incoming>,
+) -> Result<Response, GaveWay> {
+    let receives = !request.body().is_end_stream();
+    if !connection.begin(if receives { Phase::Receiving } else { Phase::Working }) {
+        return Err(GaveWay);
+    }
+    let small = is_small(request.headers(), request.body());
+    let (parts, body) = request.into_parts();
+    let inbox = Arc::new(Mutex::new(body));
+    let path = parts.uri.path().to_owned();
+    let mut request =
+        Request::from_parts(parts, Body::new(Reading { inbox: inbox.clone(), connection: connection.clone() }));
+    request.extensions_mut().insert(LocalAddress(local));
+    let mut response = match connection.place {
+        Place::Probes if !PROBES.contains(&path.as_str()) => {
+            Problem::new(ProblemKind::Overloaded, "as many calls are under way as may be at a time").into_response()
+        }
+        _ => application.call(request).await.unwrap_or_else(|never: Infallible| match never {}),
+    };
+    let is_whole = !receives || take_rest(&inbox, small).await;
+    if !is_whole {
+        connection.leave();
+    }
+    let is_old = connection.requests() >= LARGEST_REQUESTS || connection.age() >= LARGEST_AGE;
+    if !is_whole || is_old || connection.place == Place::Probes {
+        response.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
+    } else {
+        response.headers_mut().insert("keep-alive", keep_alive);
+    }
+    if response.headers().get(header::CONTENT_TYPE).is_some_and(|media| media == "text/event-stream") {
+        connection.stream();
+    }
+    Ok(response.map(|body| Body::new(Writing { body, connection })))
+}
+
+/// Whether the rest of a refused body is worth waiting for; whoever waits to be told to send it has not sent it.
+fn is_small(headers: &HeaderMap, body: &Incoming) -> bool {
+    !headers.contains_key(header::EXPECT) && body.size_hint().upper().is_some_and(|bytes| bytes <= SMALL_BODY)
+}
+
+/// Whether the body is whole, after its rest was thrown away where that is little.
+async fn take_rest(inbox: &Arc<Mutex<Incoming>>, small: bool) -> bool {
+    let is_whole = || inbox.lock().unwrap_or_else(PoisonError::into_inner).is_end_stream();
+    if is_whole() || !small {
+        return is_whole();
+    }
+    let rest = async {
+        let mut body = Rest(inbox.clone());
+        while let Some(Ok(_)) = body.frame().await {}
+    };
+    // Too late is as good as not at all.
+    let _ = tokio::time::timeout(SMALL_BODY_WAIT, rest).await;
+    is_whole()
+}
+
+/// The body of a request, which outlives who reads it.
+struct Rest(Arc<Mutex<Incoming>>);
+
+impl hyper::body::Body for Rest {
+    type Data = Bytes;
+    type Error = hyper::Error;
+
+    fn poll_frame(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, hyper::Error>>> {
+        let mut body = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        Pin::new(&mut *body).poll_frame(context)
+    }
+}
+
+/// The same for the application; its end is the end of a phase.
+struct Reading {
+    inbox: Arc<Mutex<Incoming>>,
+    connection: Arc<Connection>,
+}
+
+impl hyper::body::Body for Reading {
+    type Data = Bytes;
+    type Error = hyper::Error;
+
+    fn poll_frame(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, hyper::Error>>> {
+        let mut body = self.inbox.lock().unwrap_or_else(PoisonError::into_inner);
+        let frame = Pin::new(&mut *body).poll_frame(context);
+        if body.is_end_stream() || matches!(frame, Poll::Ready(None)) {
+            self.connection.received();
+        }
+        frame
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.inbox.lock().unwrap_or_else(PoisonError::into_inner).is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.inbox.lock().unwrap_or_else(PoisonError::into_inner).size_hint()
+    }
+}
+
+/// The body of an answer; the connection rests once it is gone.
+struct Writing {
+    body: Body,
+    connection: Arc<Connection>,
+}
+
+impl Drop for Writing {
+    fn drop(&mut self) {
+        self.connection.rest();
+    }
+}
+
+impl hyper::body::Body for Writing {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        Pin::new(&mut self.body).poll_frame(context)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}

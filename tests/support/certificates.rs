@@ -1,0 +1,34 @@
+//! Certificates for tests, made when they are needed.
+
+use rcgen::{BasicConstraints, CertificateParams, IsCa, Issuer, KeyPair};
+
+/// An authority of its own.
+pub struct Authority {
+    issuer: Issuer<'static, KeyPair>,
+    /// What who trusts it holds.
+    pub pem: String,
+}
+
+/// A certificate and its key, in PEM.
+pub struct Certificate {
+    pub pem: String,
+    pub key: String,
+}
+
+impl Authority {
+    pub fn new() -> Authority {
+        let mut params = CertificateParams::new(Vec::new()).unwrap();
+        params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+        let key = KeyPair::generate().unwrap();
+        let pem = params.self_signed(&key).unwrap().pem();
+        Authority { issuer: Issuer::new(params, key), pem }
+    }
+
+    /// One for this name or address.
+    pub fn certificate(&self, name: &str) -> Certificate {
+        let key = KeyPair::generate().unwrap();
+        let params = CertificateParams::new(vec![name.to_owned()]).unwrap();
+        let certificate = params.signed_by(&key, &self.issuer).unwrap();
+        Certificate { pem: certificate.pem(), key: key.serialize_pem() }
+    }
+}
