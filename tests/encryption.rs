@@ -116,12 +116,15 @@ async fn callers_are_answered_over_tls_1_2_and_1_3_and_in_the_clear_not_at_all()
     assert!(load.status.success(), "{}", String::from_utf8_lossy(&load.stderr));
 }
 
+/// The answer and the certificate it came under.
+type Shown = (String, Vec<u8>);
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_new_certificate_counts_without_a_restart_and_a_bad_one_does_not() {
     let authority = Authority::new();
     let (_process, address, folder) = serve(&authority);
     let shown = async || ask(&address, "/metrics", &authority.pem, rustls::ALL_VERSIONS).await.unwrap();
-    let until = async |what: &str, reached: &dyn Fn(&(String, Vec<u8>)) -> bool| {
+    let until = async |what: &str, reached: &dyn Fn(&Shown) -> bool| {
         let deadline = Instant::now() + TAKEN_WITHIN;
         loop {
             let now = shown().await;

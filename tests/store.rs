@@ -797,7 +797,7 @@ async fn a_key_is_listed_and_revoked_beside_the_store(place: &Place) {
     let Rotate::Rotated { old, new } = ring.rotate("key_1", successor.clone(), 50).await.unwrap() else { panic!() };
     assert_eq!((old.expires_ms, new.expires_ms), (Some(50), Some(105)), "as long as the one before was made for");
     assert_eq!((&new.tenant, &new.roles), (&old.tenant, &old.roles));
-    assert_eq!(store.keys().await.unwrap(), [old, new]);
+    assert_eq!(store.keys().await.unwrap(), [*old, *new]);
     let again = |created_ms| Successor { key: format!("key_{created_ms}"), created_ms, ..successor.clone() };
     assert!(ring.rotate("key_1", again(6), 60).await.is_err(), "two keys of one text");
     assert_eq!(ring.list().await.unwrap()[0].expires_ms, Some(50), "all of a rotation or nothing");

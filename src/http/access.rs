@@ -97,7 +97,10 @@ pub async fn admit(State(gate): State<Gate>, mut request: Request, next: Next) -
         Access::Open => None,
         access => match admitted(&gate.service, access, request.headers()) {
             Ok(caller) => Some(Call::new(caller)),
-            Err((of, problem)) => return Asker::signed(of.tenant, of.key, problem.into_response()),
+            Err(refused) => {
+                let (of, problem) = *refused;
+                return Asker::signed(of.tenant, of.key, problem.into_response());
+            }
         },
     };
     if let Some(call) = &call {
@@ -123,13 +126,13 @@ fn addressed(gate: &Gate, request: &Request) -> Result<(), Problem> {
     gate.hosts.refuse_foreign(request.headers(), request.uri(), local)
 }
 
-fn admitted(service: &Service, access: Access, headers: &HeaderMap) -> Result<Arc<Caller>, (Asker, Problem)> {
+fn admitted(service: &Service, access: Access, headers: &HeaderMap) -> Result<Arc<Caller>, Box<(Asker, Problem)>> {
     let caller = service.keys.admit(bearer(headers)).map_err(|turned| {
         let tenant = match &turned {
             Turned::WrongKey { of } => of.clone(),
             Turned::NoKey => None,
         };
-        (Asker { tenant, key: "".into() }, unauthenticated(turned))
+        Box::new((Asker { tenant, key: "".into() }, unauthenticated(turned)))
     })?;
     match access {
         Access::Role(role) if !caller.may(role) => {
@@ -137,7 +140,7 @@ fn admitted(service: &Service, access: Access, headers: &HeaderMap) -> Result<Ar
             let rule = format!("must be a key with the role {role}");
             let shown = format!("a key with {}", caller.roles());
             let problem = Problem::new(ProblemKind::Forbidden, detail).naming("Authorization", shown, rule);
-            Err((Asker { tenant: Some(caller.tenant.clone()), key: caller.key().clone() }, problem))
+            Err(Box::new((Asker { tenant: Some(caller.tenant.clone()), key: caller.key().clone() }, problem)))
         }
         _ => Ok(caller),
     }

@@ -83,7 +83,7 @@ pub async fn list(
     let tenant = ask.tenant.map(|name| name.parse()).transpose();
     let tenant = tenant.map_err(|error| Problem::of_field(ProblemKind::InvalidQuery, error))?;
     let rows = service.audit.list(&AuditFilter { tenant, object: ask.object }, limit, after).await?;
-    let entries = rows.iter().filter(|row| row.sequence > 0);
-    let next = page::next(entries.clone().count(), limit, entries.last().map(|row| row.sequence));
+    let mut entries = rows.iter().filter(|row| row.sequence > 0);
+    let next = page::next(entries.clone().count(), limit, entries.next_back().map(|row| row.sequence));
     Ok(Json(AuditPage { entries: rows.into_iter().map(Into::into).collect(), next }))
 }

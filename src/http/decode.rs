@@ -177,7 +177,7 @@ mod tests {
 
     fn refused(body: &str) -> (String, Value, String) {
         let problem = json::<Specification>(body.as_bytes()).unwrap_err();
-        (problem.field.unwrap(), *problem.value.unwrap(), problem.rule.unwrap().into())
+        (problem.field.unwrap().into(), *problem.value.unwrap(), problem.rule.unwrap().into())
     }
 
     #[test]

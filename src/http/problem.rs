@@ -124,12 +124,12 @@ pub struct Problem {
     #[schema(example = 422)]
     pub status: u16,
     /// This occurrence, in one sentence.
-    #[schema(example = "problem.horizon is 0: must lie in [1, 520]")]
-    pub detail: String,
+    #[schema(value_type = String, example = "problem.horizon is 0: must lie in [1, 520]")]
+    pub detail: Box<str>,
     /// Dotted path of the offending field, header or parameter; every problem that the client can mend names it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(example = "problem.horizon")]
-    pub field: Option<String>,
+    #[schema(value_type = Option<String>, example = "problem.horizon")]
+    pub field: Option<Box<str>>,
     /// What the field held.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<Value>)]
@@ -164,7 +164,7 @@ impl Problem {
             kind: format!("/problems/{slug}"),
             title,
             status: status.as_u16(),
-            detail: shortened(&detail.into(), SHOWN_SENTENCE),
+            detail: shortened(&detail.into(), SHOWN_SENTENCE).into(),
             field: None,
             value: None,
             rule: None,
@@ -191,7 +191,7 @@ impl Problem {
             value => value,
         };
         let (field, rule) = (shortened(&field.into(), SHOWN_FIELD), shortened(&rule.into(), SHOWN_SENTENCE));
-        Problem { field: Some(field), value: Some(Box::new(value)), rule: Some(rule.into()), ..self }
+        Problem { field: Some(field.into()), value: Some(Box::new(value)), rule: Some(rule.into()), ..self }
     }
 
     /// The same problem with the time after which it may be gone.

@@ -122,11 +122,11 @@ impl Recording {
         let Recording { started, method, path, route, span } = self;
         let (seconds, status) = (started.elapsed().as_secs_f64(), response.status().as_u16());
         // An unknown method would be a label of its own for every word a client can think of.
-        let verb = match &method {
-            &Method::GET => "GET",
-            &Method::POST => "POST",
-            &Method::DELETE => "DELETE",
-            &Method::HEAD => "HEAD",
+        let verb = match method {
+            Method::GET => "GET",
+            Method::POST => "POST",
+            Method::DELETE => "DELETE",
+            Method::HEAD => "HEAD",
             _ => "other",
         };
         metrics::histogram!(names::HTTP_REQUEST_SECONDS, "method" => verb, "route" => route.clone()).record(seconds);

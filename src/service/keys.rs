@@ -75,7 +75,7 @@ pub async fn rotate(
     let overlap_ms = i64::try_from(overlap.as_millis()).unwrap_or(i64::MAX);
     let successor = Successor { key, hash, created_ms, expires_ms };
     match ring.rotate(old, successor, created_ms.saturating_add(overlap_ms)).await? {
-        Rotate::Rotated { old, new } => Ok(Rotated { old, new, secret }),
+        Rotate::Rotated { old, new } => Ok(Rotated { old: *old, new: *new, secret }),
         Rotate::Absent => Err(ServiceError::unknown("key", old)),
         Rotate::Ended => Err(FieldError::new("key", old, "must be in force; make a new one").into()),
     }

@@ -50,8 +50,11 @@ pub(super) struct Slots<N: Eq + Hash + Clone, S> {
     map: Mutex<Map<N, S>>,
 }
 
+/// What the users of one slot share.
+type Shared<S> = Arc<AsyncMutex<Option<S>>>;
+
 struct Slot<S> {
-    state: Arc<AsyncMutex<Option<S>>>,
+    state: Shared<S>,
     /// Those who have its lock or wait for it. Changed under the lock of the map alone.
     holders: usize,
     /// Bytes, once its state was read.
@@ -112,7 +115,7 @@ impl<N: Eq + Hash + Clone, S> Slots<N, S> {
 
 impl<N: Eq + Hash + Clone, S> Map<N, S> {
     /// The slot of `name`, with one holder more, and what had to go for it.
-    fn enter(&mut self, name: &N, largest: Generation) -> (Arc<AsyncMutex<Option<S>>>, HashMap<N, Slot<S>>) {
+    fn enter(&mut self, name: &N, largest: Generation) -> (Shared<S>, HashMap<N, Slot<S>>) {
         let mut dropped = HashMap::new();
         if !self.young.contains_key(name) {
             let slot = self.old.remove(name).unwrap_or_else(Slot::empty);

@@ -57,7 +57,7 @@ pub struct Successor {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Rotate {
     /// Both are in force; the old one is shown as it is now.
-    Rotated { old: KeyRow, new: KeyRow },
+    Rotated { old: Box<KeyRow>, new: Box<KeyRow> },
     /// There is no key of this name.
     Absent,
     /// It is no longer in force, so there is nothing to hand over.
@@ -202,7 +202,8 @@ async fn rotate(
     connection.execute(expire.bind(expires_ms).bind(key.as_str())).await?;
     let (actor, outcome) = (Actor::operator(created_ms), format!("succeeded by {}", new.key));
     audit::record(connection, &actor, &old.tenant, Deed::RotateKey, &key, &outcome).await?;
-    Ok(Rotate::Rotated { old: KeyRow { expires_ms: Some(expires_ms), ..old }, new })
+    let old = KeyRow { expires_ms: Some(expires_ms), ..old };
+    Ok(Rotate::Rotated { old: Box::new(old), new: Box::new(new) })
 }
 
 impl From<KeyRow> for NewKey {

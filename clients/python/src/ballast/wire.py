@@ -91,14 +91,23 @@ class HistoryReport(TypedDict):
     """Mean terminal utility of each strategy, in their order."""
 
 
+LengthscaleItem: TypeAlias = float
+
+
+SignalVarianceItem: TypeAlias = float
+
+
+NoiseVarianceItem: TypeAlias = float
+
+
 class HyperparameterBounds(TypedDict):
     """Box of the maximum-likelihood search, for inputs and targets scaled to unit variance."""
 
-    lengthscale: NotRequired[list[float]]
+    lengthscale: NotRequired[list[LengthscaleItem]]
     """In standard deviations of an input over the design."""
-    signal_variance: NotRequired[list[float]]
+    signal_variance: NotRequired[list[SignalVarianceItem]]
     """In mean squares of the target over the design."""
-    noise_variance: NotRequired[list[float]]
+    noise_variance: NotRequired[list[NoiseVarianceItem]]
     """In mean squares of the target over the design."""
 
 
@@ -190,12 +199,15 @@ class Observe(TypedDict):
     """Wealth reached, where fees or flows made it differ from what the return and the allocation give."""
 
 
+HistoryItem: TypeAlias = float
+
+
 class OpenSession(TypedDict):
     """A session to open."""
 
     policy: str
     """The policy to live by."""
-    history: NotRequired[list[float] | None]
+    history: NotRequired[list[HistoryItem] | None]
     """Log-returns known at the start. Default: the policy's."""
     wealth: NotRequired[float | None]
     """Default: the policy's initial wealth."""
@@ -237,6 +249,9 @@ class Problem(TypedDict):
     """What the field held."""
     rule: NotRequired[str | None]
     """What the field must be."""
+
+
+ActionIntervalItem: TypeAlias = float
 
 
 class RadiusRule1(TypedDict):
@@ -611,14 +626,14 @@ class ProblemSpecification(TypedDict):
     """Bank return per step, r: wealth in the bank grows by the factor 1 + r."""
     initial_wealth: NotRequired[float]
     """x_0, in any currency."""
-    action_interval: NotRequired[list[float]]
+    action_interval: NotRequired[list[ActionIntervalItem]]
     """Share of wealth that may be held in the risky asset: `[0, highest]`."""
     utility: NotRequired[UtilitySpecification]
     """Of terminal wealth."""
     radius: NotRequired[RadiusRule | None]
     support: NotRequired[Interval | None]
     law: NotRequired[SamplingLaw | None]
-    history: list[float]
+    history: list[HistoryItem]
     """The log-returns observed before the start, at least two of them distinct."""
 
 
@@ -692,11 +707,11 @@ class SurrogateSpecification(TypedDict):
 class Sweep(TypedDict):
     """Exactly one range."""
 
-    wealth: NotRequired[SweepRange | None]
-    radius_scale: NotRequired[SweepRange | None]
-    radius: NotRequired[SweepRange | None]
     log_return: NotRequired[SweepRange | None]
+    radius: NotRequired[SweepRange | None]
+    radius_scale: NotRequired[SweepRange | None]
     simple_return: NotRequired[SweepRange | None]
+    wealth: NotRequired[SweepRange | None]
 
 
 class WhatIf(TypedDict):
