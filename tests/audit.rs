@@ -67,7 +67,7 @@ async fn a_change_and_its_entry_are_one(place: &Place) {
     let page = store.deeds(&of_one, 15, None).await.unwrap();
     assert_eq!(store.deeds(&of_one, 15, Some(page[14].sequence)).await.unwrap().len(), 5);
     let of_policy = AuditFilter { tenant: Some(north), object: Some(id) };
-    assert_eq!(store.deeds(&of_policy, 15, None).await.unwrap(), [entry.clone()]);
+    assert_eq!(store.deeds(&of_policy, 15, None).await.unwrap(), std::slice::from_ref(entry));
     second.close().await;
     store.close().await;
     check(place).await.unwrap();
@@ -150,14 +150,6 @@ on_both_engines!(
     a_cut_chain_is_whole_and_says_that_it_was_cut,
 );
 
-/// Waits until a key made beside the service counts.
-async fn hold(app: &mut App, key: &str) {
-    app.hold(key);
-    while app.get("/no-such-path").await.0 == 401 {
-        tokio::time::sleep(std::time::Duration::from_millis(20)).await;
-    }
-}
-
 fn entries(page: &Value) -> Vec<[&str; 4]> {
     page["entries"]
         .as_array()
@@ -172,7 +164,7 @@ async fn every_change_over_http_names_its_key_and_a_refused_one_is_no_entry() {
     let mut app = App::start().await;
     let (north, south, admin) =
         (app.key("north", "train,operate,read").await, app.key("south", "admin").await, app.key("ops", "admin").await);
-    hold(&mut app, &admin).await;
+    app.enter(&admin).await;
     app.hold(&north);
     app.train(&specification(2)).await;
     app.open().await;
@@ -182,10 +174,10 @@ async fn every_change_over_http_names_its_key_and_a_refused_one_is_no_entry() {
     let mut slow = specification(400);
     slow["design"] = json!({ "count": 40 });
     let job = app.queue(&slow).await;
-    assert_eq!(app.delete(&format!("/jobs/{job}")).await, 202);
+    assert_eq!(app.cancel(&job).await, 202);
 
     // A stranger's calls change nothing, and are not in the way of who looks for what was changed.
-    hold(&mut app, &south).await;
+    app.enter(&south).await;
     assert_eq!(app.delete(&format!("/sessions/{session}")).await, 404);
     assert_eq!(app.get("/audit").await.0, 200);
     assert_eq!(app.post("/policies/import", &document).await.0, 201);
@@ -233,7 +225,7 @@ async fn every_change_over_http_names_its_key_and_a_refused_one_is_no_entry() {
 async fn an_observation_is_shown_with_the_key_that_reported_it() {
     let mut app = App::start().await;
     let key = app.key("north", "admin").await;
-    hold(&mut app, &key).await;
+    app.enter(&key).await;
     app.train(&specification(2)).await;
     app.open().await;
     assert_eq!(app.observe(1, 0.01).await.0, 200);
@@ -245,7 +237,7 @@ async fn an_observation_is_shown_with_the_key_that_reported_it() {
     assert!(keys[0].starts_with("key_") && keys.iter().all(|key| *key == keys[0]), "{page}");
     let folder = app.folder().to_owned();
     app.restart_after("UPDATE observations SET access_key = 'key_of_another' WHERE period = 1").await;
-    hold(&mut app, &key).await;
+    app.enter(&key).await;
     assert_eq!(app.action().await.0, 500);
     let inspection = Inspection::of_folder(&folder).await.unwrap();
     assert!(inspection.run(&mut |_| {}).await.unwrap_err().to_string().starts_with("period 1 of session"));

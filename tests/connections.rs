@@ -233,7 +233,7 @@ async fn a_crowd_of_streams_of_one_key_keeps_nobody_out() {
     );
     assert!(statuses.get("200").copied().unwrap_or(0) <= 256 && statuses.contains_key("429"), "{statuses:?}");
     assert!(slowest < ANSWERED_WITHIN, "{slowest:?}");
-    assert_eq!(app.delete(&format!("/jobs/{job}")).await, 202);
+    assert_eq!(app.cancel(&job).await, 202);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -256,7 +256,7 @@ async fn streams_are_bounded_in_number_and_age_and_go_on_where_they_were() {
     assert!(opened.elapsed() < Duration::from_secs(10), "{:?}", opened.elapsed());
     drop(second);
     let last = seen.lines().filter_map(|line| line.strip_prefix("id: ")).next_back().unwrap();
-    assert_eq!(app.delete(&format!("/jobs/{job}")).await, 202);
+    assert_eq!(app.cancel(&job).await, 202);
     let again = app.client.get(&url).header("last-event-id", last).send().await.unwrap();
     assert_eq!(again.status(), 200);
     let rest = again.text().await.unwrap();

@@ -280,7 +280,7 @@ async fn an_evaluation_is_cancelled_within_a_second_in_every_stage() {
         let running = app.until(&job, |job| job["progress"]["phase"] == phase).await;
         assert_eq!(running["progress"]["steps_total"], 25);
         let asked = Instant::now();
-        assert_eq!(app.delete(&format!("/jobs/{job}")).await, 202);
+        assert_eq!(app.cancel(&job).await, 202);
         app.until(&job, |job| job["state"] == "cancelled").await;
         assert!(asked.elapsed() < Duration::from_secs(1), "{phase} {:?}", asked.elapsed());
         assert_eq!(app.get(&format!("/jobs/{job}/report")).await.0, 404);

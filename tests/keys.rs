@@ -461,8 +461,8 @@ async fn log_of(configure: impl FnOnce(&mut Command), issue: impl AsyncFnOnce() 
 }
 
 fn assert_no_secret(log: &str, secrets: &[String]) {
-    // It did log, each request among the rest.
-    assert!(log.lines().filter(|line| line.contains("/observe")).count() >= 2, "{log}");
+    // It did log, each request with a key among the rest.
+    assert!(log.lines().any(|line| line.contains("/observe")), "{log}");
     for secret in secrets {
         // A part that is cut out gives as much away.
         let part = &secret[secret.len() - 16..];

@@ -131,7 +131,7 @@ async fn a_job_is_followed_and_cancelled_through_a_replica_that_does_not_run_it(
     let following = api.app.client.get(format!("{}/jobs/{job}/events", api.app.url)).send().await.unwrap();
     api.app.until(&job, |job| job["progress"]["steps_done"].as_u64() >= Some(1)).await;
     let asked = Instant::now();
-    assert_eq!(api.app.delete(&format!("/jobs/{job}")).await, 202);
+    assert_eq!(api.app.cancel(&job).await, 202);
     api.app.until(&job, |job| job["state"] == "cancelled").await;
     assert!(asked.elapsed() < Duration::from_secs(2), "{:?}", asked.elapsed());
     let text = following.text().await.unwrap();

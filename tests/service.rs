@@ -152,7 +152,7 @@ async fn a_cancel_does_not_wait_for_a_long_fit_or_a_large_design() {
         app.until(&job, |job| job["state"] == "running" && (phase.is_empty() || job["progress"]["phase"] == phase))
             .await;
         let asked = Instant::now();
-        assert_eq!(app.delete(&format!("/jobs/{job}")).await, 202);
+        assert_eq!(app.cancel(&job).await, 202);
         app.until(&job, |job| job["state"] == "cancelled").await;
         assert!(asked.elapsed() < Duration::from_secs(1), "{phase} {:?}", asked.elapsed());
     }

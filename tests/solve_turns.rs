@@ -44,10 +44,7 @@ async fn solved_within(app: &App, session: &str) -> Duration {
 async fn explains_of_one_tenant_do_not_keep_anothers_solve_waiting() {
     let mut app = App::start().await;
     let (north, south) = (app.key("north", "admin").await, app.key("south", "admin").await);
-    app.hold(&south);
-    while app.get("/no-such-path").await.0 != 404 {
-        tokio::time::sleep(Duration::from_millis(20)).await;
-    }
+    app.enter(&south).await;
     app.train(&specification(2)).await;
     let short = open(&app, &returns(SHORT)).await;
     // The first one makes ready what the others find.

@@ -76,10 +76,7 @@ async fn used(endpoint: Option<&str>) -> (Process, App, String) {
     });
     let (process, mut app) = (Process(child), App::at(url, folder));
     let key = app.key("north", "admin").await;
-    app.hold(&key);
-    while app.get("/no-such-path").await.0 != 404 {
-        tokio::time::sleep(Duration::from_millis(20)).await;
-    }
+    app.enter(&key).await;
     app.train(&specification(2)).await;
     app.open().await;
     assert_eq!(app.observe(1, 0.01).await.0, 200);

@@ -50,10 +50,6 @@ impl ApiClient {
         self.json(Method::POST, path, body.to_string().into()).await
     }
 
-    pub async fn delete(&self, path: &str) -> Result<Value, ApiError> {
-        self.json(Method::DELETE, path, Bytes::new()).await
-    }
-
     /// Reads the answer at `path` to its end, whatever it is.
     pub async fn touch(&self, path: &str) -> Result<(), ApiError> {
         let (call, response) = self.send(Method::GET, path, Bytes::new()).await?;

@@ -9,7 +9,7 @@ use super::observation::{Observe, Observed};
 use crate::control::advisor::{Advice, AdviceMode, Advisor, Uncertainty};
 use crate::control::rules as limits;
 use crate::control::state::State;
-use crate::store::{Seen, SessionRow};
+use crate::store::{Seen, SessionFacts, SessionRow};
 
 /// By what a call is answered, where its work is done, and what it must take before it solves.
 pub(super) struct Means<'a> {
@@ -34,7 +34,28 @@ pub struct Live {
     pub(super) advice: Option<Advice>,
 }
 
+/// Bytes of a session in memory, and of each of its returns, in the law and in the history.
+pub(super) const SESSION_BYTES: usize = 3000;
+const RETURN_BYTES: usize = 16;
+
 impl Live {
+    /// The session that its rows tell of.
+    pub(super) fn replayed(facts: SessionFacts, advisor: &Advisor) -> Result<Live, ServiceError> {
+        let SessionFacts { row, observations, seen } = facts;
+        let mut state = advisor.initial_state(Some(&row.initial_history), Some(row.initial_wealth))?;
+        for observation in &observations {
+            state = advisor.advance(&state, observation.executed_allocation, observation.log_return);
+            state.wealth = observation.wealth_after;
+        }
+        let last = observations.last().and_then(|row| serde_json::from_str::<Observed>(&row.answer_json).ok());
+        let price = last.and_then(|answer| answer.price);
+        Ok(Live { row: Arc::new(row), state, seen, price, radius: None, advice: None })
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        SESSION_BYTES + RETURN_BYTES * self.state.law.sample_size()
+    }
+
     /// Periods observed.
     pub fn observed(&self) -> usize {
         self.seen.observed()

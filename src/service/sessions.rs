@@ -21,7 +21,7 @@ use super::error::ServiceError;
 use super::idempotency;
 use super::identity;
 use super::keys::Caller;
-use super::live::{Live, Means};
+use super::live::{Live, Means, SESSION_BYTES};
 use super::memory::Memory;
 use super::observation::{Observe, Observed};
 use super::policies::Policies;
@@ -34,10 +34,6 @@ use crate::control::worst_case::WorstCase;
 use crate::store::{
     Append, CreateSession, ObservationRow, RequestKey, SessionFacts, SessionRow, SessionSummary, Store, Tenant,
 };
-
-/// Bytes of a session in memory, and of each of its returns, in the law and in the history.
-const SESSION_BYTES: usize = 3000;
-const RETURN_BYTES: usize = 16;
 
 /// Whose session it is, and its name.
 type Name = (Tenant, String);
@@ -344,17 +340,10 @@ impl Source<Live> for Rows<'_> {
     }
 
     async fn read(&self) -> Result<Live, ServiceError> {
-        let SessionFacts { row, observations, seen } = self.sessions.facts(self.tenant, self.session).await?;
-        let advisor = self.sessions.policies.advisor(self.tenant, &row.policy).await?;
-        let mut state = advisor.initial_state(Some(&row.initial_history), Some(row.initial_wealth))?;
-        for observation in &observations {
-            state = advisor.advance(&state, observation.executed_allocation, observation.log_return);
-            state.wealth = observation.wealth_after;
-        }
-        let last = observations.last().and_then(|row| serde_json::from_str::<Observed>(&row.answer_json).ok());
-        let price = last.and_then(|answer| answer.price);
-        let bytes = SESSION_BYTES + RETURN_BYTES * state.law.sample_size();
-        self.sessions.slots.weigh(&(self.tenant.clone(), self.session.to_owned()), bytes);
-        Ok(Live { row: Arc::new(row), state, seen, price, radius: None, advice: None })
+        let facts = self.sessions.facts(self.tenant, self.session).await?;
+        let advisor = self.sessions.policies.advisor(self.tenant, &facts.row.policy).await?;
+        let live = Live::replayed(facts, &advisor)?;
+        self.sessions.slots.weigh(&(self.tenant.clone(), self.session.to_owned()), live.bytes());
+        Ok(live)
     }
 }

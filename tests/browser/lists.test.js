@@ -41,7 +41,7 @@ before(async () => {
       design: { count: 1000 },
       seed: k,
     });
-    await fetch(`${ballast.url}/jobs/${job}`, { method: "DELETE" });
+    await fetch(`${ballast.url}/jobs/${job}/cancel`, { method: "POST" });
   }
 });
 

@@ -271,7 +271,8 @@ async fn crowd(tenants: &mut Tenants, tally: &mut Tally) -> Result<usize, String
         tokio::time::sleep(Duration::from_millis(50)).await;
     }
     for job in neighbour.jobs().await.unwrap_or_default() {
-        neighbour.delete(&format!("/jobs/{}", job["job"].as_str().unwrap_or_default())).await;
+        let path = format!("/jobs/{}/cancel", job["job"].as_str().unwrap_or_default());
+        neighbour.post(&path, &Value::Null).await;
     }
     Ok(calls + TRAININGS)
 }

@@ -182,6 +182,20 @@ impl App {
         self.send(Method::DELETE, path, None).await.0
     }
 
+    /// Waits until the keys made beside the service count, and shows this one from then on.
+    pub async fn enter(&mut self, key: &str) {
+        for (shown, is_turned_away) in [("", true), (key, false)] {
+            self.hold(shown);
+            while (self.get("/jobs").await.0 == 401) != is_turned_away {
+                tokio::time::sleep(Duration::from_millis(20)).await;
+            }
+        }
+    }
+
+    pub async fn cancel(&self, job: &str) -> StatusCode {
+        self.send(Method::POST, &format!("/jobs/{job}/cancel"), None).await.0
+    }
+
     /// Queues a training; its job.
     pub async fn queue(&self, specification: &Value) -> String {
         let (status, job) = self.post("/train", specification).await;

@@ -1,5 +1,6 @@
 //! The scenarios: what is asked of the service, and what must hold of its answers.
 
+use serde_json::json;
 use std::error::Error;
 use std::time::{Duration, Instant};
 
@@ -118,7 +119,7 @@ impl Test<'_> {
             tell("the same while 1,000 design points are trained");
             let job = long_training(server).await?;
             let load = self.now_and_then(server, sessions).await?;
-            ApiClient::new(server.addresses[0]).delete(&format!("/jobs/{job}")).await?;
+            ApiClient::new(server.addresses[0]).post(&format!("/jobs/{job}/cancel"), &json!({})).await?;
             let must = Must { p99_ms: Some(TRAINING_P99_MS), ..Must::default() };
             report.load("action-while-training", &load, must);
         }

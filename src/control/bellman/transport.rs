@@ -81,6 +81,10 @@ impl<'f> TransportPricing<'f> {
     /// Below the window, an interval [first - far, first - near] passes if u0(first - far) + gamma near >= max_j { E_j -
     /// gamma (z_j - first) }, since |z - z_j| = (first - z) + (z_j - first); above it, the window's own edge decides.
     fn certified(&self, payoff: &[f64], worst: &WorstLaw, action: f64) -> bool {
+        // A ball of radius 0 holds its centre alone, all of whose returns are in the window.
+        if self.radius <= 0.0 {
+            return true;
+        }
         let Grid { support, masses } = &self.grid;
         let (Some(&first), Some(&last)) = (support.first(), support.last()) else { return true };
         let rate = self.field.rate_per_step();
