@@ -35,7 +35,8 @@ async fn what_a_tenant_may_keep_is_refused_with_the_numbers() {
     assert_refused(app.post("/sessions", &session).await, 413, "quota-sessions", 3, 2);
     assert_eq!(app.observe(1, 0.01).await.0, 200, "a return is never refused for a quota");
     assert_eq!(app.delete(&format!("/sessions/{}", app.session)).await, 204);
-    let long = json!({ "policy": app.policy, "history": [0.01, -0.01].repeat(9_950) });
+    let history = [0.01, -0.01].repeat(9_950);
+    let long = json!({ "policy": app.policy, "history": history });
     let (status, problem) = app.post("/sessions", &long).await;
     assert_eq!((status, &problem["field"]), (StatusCode::PAYLOAD_TOO_LARGE, &json!("quota-bytes")), "{problem}");
     app.open().await;
