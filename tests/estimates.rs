@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 
 /// An estimate may be this many times what is taken. More would refuse what fits; less leaves no room for what the
 /// sizes in a request do not tell, as how long a search goes on.
-const GENEROSITY: f64 = 3.0;
+const GENEROSITY: f64 = 4.0;
 /// What every job is granted whatever it asks, in bytes: small jobs may be as generous as they like.
 const GRANTED: usize = 16 << 20;
 const THREADS: usize = 2;

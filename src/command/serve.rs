@@ -1,5 +1,6 @@
 //! `ballast serve`: the service, until SIGTERM or SIGINT.
 
+use std::io::Write;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -179,10 +180,12 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     let shutdown = Shutdown::new();
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
     let running = http::serve(config, shutdown.clone()).await?;
-    println!("listening on {}://{}", running.scheme, running.address);
+    let mut told = format!("listening on {}://{}\n", running.scheme, running.address);
     if let Some(address) = running.operations {
-        println!("for operators on {}://{address}", running.scheme);
+        told += &format!("for operators on {}://{address}\n", running.scheme);
     }
+    // Nobody has to read it: the log says it too.
+    let _ = std::io::stdout().write_all(told.as_bytes());
     tokio::spawn(async move {
         tokio::select! {
             _ = terminate.recv() => {}

@@ -168,10 +168,10 @@ impl GaussianProcess {
         Ok(GaussianProcess { hyper: hyper.clone(), cholesky, jitter, weights, mean })
     }
 
-    /// Bytes that a process over `points` rows of `inputs` columns holds: the square factor above all, and two thirds as
+    /// Bytes that a process over `points` rows of `inputs` columns holds: the square factor above all, and a quarter as
     /// much for what making it leaves behind (`tests/estimates.rs` measures it).
     pub fn bytes_of(points: usize, inputs: usize) -> usize {
-        size_of::<f64>().saturating_mul(points).saturating_mul(points + 2 * points / 3 + inputs + 2)
+        size_of::<f64>().saturating_mul(points).saturating_mul(points + points / 4 + inputs + 2)
     }
 
     /// Posterior mean k^T (K + noise I)^-1 y at `query`. Cost O(n d).

@@ -19,7 +19,8 @@ use super::{Store, StoreError};
 
 /// What a row of jobs, policies or sessions takes with its index entries, beside what is counted by its length.
 pub(super) const ROW_BYTES: i64 = 1024;
-/// What one observation takes with its answer, its seal and its index entry, measured over SQLite.
+/// What one observation takes with its answer, its seal and its index entry: 723 bytes over SQLite and 804 over
+/// PostgreSQL (`docs/capacity.md`), and room for a longer answer.
 pub(super) const OBSERVATION_BYTES: i64 = 1024;
 
 /// What every tenant may keep; 0: any number.

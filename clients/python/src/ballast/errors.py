@@ -120,6 +120,14 @@ class QuotaExceeded(ProblemError, slug="quota-exceeded"):
     """The tenant keeps as much as it may; ``rule`` says how much that is and what to delete."""
 
 
+class InvalidHeader(ProblemError, slug="invalid-header"):
+    """A header of the call breaks a rule; ``field`` names it."""
+
+
+class Misdirected(ProblemError, slug="misdirected"):
+    """The service does not answer to the host name it was asked by; ``rule`` says which it answers to."""
+
+
 class QueueFull(ProblemError, slug="queue-full"):
     """The tenant has as many jobs queued as it may, and still did at the last of the repetitions."""
 
