@@ -104,6 +104,10 @@ struct Model {
     sessions: Vec<(u8, u8, Vec<u8>)>,
 }
 
+/// Why a job fails under which three workers died.
+const DIED: &str = "the process of its worker ended 3 times while it ran, with no step finished in between; \
+                    it may take more memory than its machine has";
+
 impl Model {
     fn job(&mut self, job: u8) -> Option<&mut Job> {
         self.jobs.iter_mut().find(|row| row.name == job_name(job))
@@ -134,6 +138,7 @@ impl Model {
             row.deaths += i64::from(row.state == JobState::Running);
             if row.deaths >= 3 {
                 row.end(JobState::Failed, now);
+                row.result = Some(DIED.to_owned());
                 continue;
             }
             (row.state, row.lease_until, row.attempt) = (JobState::Running, now + LEASE_MS, row.attempt + 1);

@@ -23,7 +23,7 @@ use super::{Store, StoreError, policies, turns};
 const MOST_DEATHS: i64 = 3;
 
 impl Store {
-    /// Takes the oldest job whose worker's lease ran out, else the queued one [whose turn it is](super::turns), until
+    /// Takes the oldest job whose worker's lease ran out, else the queued one whose turn it is (`super::turns`), until
     /// `now_ms + 1000 lease_seconds`. A job that was asked to stop is cancelled on the way rather than claimed, and one under
     /// which too many workers died fails.
     pub async fn claim_job(

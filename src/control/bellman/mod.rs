@@ -7,7 +7,7 @@
 //! the wealth that the action earns and, where the framework learns, the law with z in it. Source: paper (3.2) to (3.4),
 //! with V taken at the adversary's z.
 //!
-//! What differs between uncertainty sets is how an action is priced ([`Pricing`]); the search for the best one is the same.
+//! What differs between uncertainty sets is how an action is priced (`Pricing`); the search for the best one is the same.
 
 pub mod gain_field;
 pub mod next_value;
