@@ -19,10 +19,10 @@ pub enum StoreError {
     /// Busy, closing, or not reached. The same request may succeed later. HTTP 503.
     #[error("the store is unavailable while {doing}")]
     Unavailable { doing: &'static str, source: Option<Arc<sqlx::Error>> },
-    /// The file was written by a later release.
+    /// The file has a schema newer than this binary's.
     #[error("the store has schema {found}, newer than {known}, the newest this binary knows")]
     NewerSchema { found: i64, known: i64 },
-    /// The file was written by an earlier release; where nothing may be changed, it is not brought up to date.
+    /// The file has a schema older than this binary's; where nothing may be changed, it is not brought up to date.
     #[error(
         "the store has schema {found}, older than {known}, this binary's; a start of the service brings it up to date"
     )]
