@@ -13,6 +13,8 @@ use std::path::{Path, PathBuf};
 const FLOORS: [&str; 5] = ["numerics", "control", "store", "service", "http"];
 /// The place of `service` among them.
 const SERVICE: usize = 3;
+/// What lies behind the face of `control`, named by that floor alone: how a robust step is solved.
+const BEHIND_THE_FACE: [&str; 3] = ["bellman", "surrogate", "uncertainty"];
 /// Names no floor and is named by none below `service`: what mathematics and facts look like is not their matter.
 const LEAF: &str = "report";
 const FILE_LINES: usize = 350;
@@ -385,6 +387,12 @@ fn faults(source: &Source) -> Vec<String> {
                 fault(at, format!("{} names the leaf {name}", source.top()));
             }
         }
+        let modules = module_paths(&source.code).into_iter().filter(|_| source.top() != "control");
+        for path in modules.filter(|path| path.len() > 2 && path[..2] == ["crate", "control"]) {
+            if BEHIND_THE_FACE.contains(&path[2].as_str()) {
+                fault(0, format!("{} names control::{}, which lies behind its face", source.top(), path[2]));
+            }
+        }
         for at in words(&source.code, "ballast") {
             fault(at, "a floor names the crate as `crate`".into());
         }
@@ -523,6 +531,12 @@ fn a_broken_rule_is_found() {
     assert_eq!(faults_of("report/page.rs", leaf), ["report/page.rs:1: report names the higher floor numerics"]);
     assert_eq!(faults_of("store/jobs.rs", leaf), ["store/jobs.rs:1: store names the leaf report"]);
     assert_eq!(faults_of("service/jobs.rs", leaf), [""; 0]);
+    let behind = "use crate::control::{bellman::BellmanStep, policy::Policy};";
+    assert_eq!(
+        faults_of("service/jobs.rs", behind),
+        ["service/jobs.rs:1: service names control::bellman, which lies behind its face"]
+    );
+    assert_eq!(faults_of("control/training.rs", behind), [""; 0]);
     assert_eq!(faults_of("report/page.rs", "fn f() { println!() }").len(), 1);
     assert_eq!(faults_of("numerics/gp.rs", "use rayon::prelude::*;").len(), 1);
     assert_eq!(faults_of("control/policy.rs", "use rayon::prelude::*;").len(), 0);

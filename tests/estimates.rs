@@ -4,16 +4,17 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use ballast::control::advisor::Advisor;
-use ballast::control::backward::{Training, Watch};
 use ballast::control::estimate;
-use ballast::control::evaluate::Evaluation;
-use ballast::control::evaluation::EvaluationRequest;
-use ballast::control::evaluation_report::{Costs, EvaluationReport};
+use ballast::control::evaluation::paths::Evaluation;
+use ballast::control::evaluation::report::{Costs, EvaluationReport};
 use ballast::control::kept::Kept;
 use ballast::control::policy::Policy;
+use ballast::control::policy::advisor::Advisor;
 use ballast::control::pool::TrainingPool;
-use ballast::control::specification::Specification;
+use ballast::control::progress::Watch;
+use ballast::control::request::evaluation::EvaluationRequest;
+use ballast::control::request::specification::Specification;
+use ballast::control::training::Training;
 use serde_json::{Value, json};
 
 /// An estimate may be this many times what is taken. More would refuse what fits; less leaves no room for what the

@@ -5,12 +5,12 @@ mod support;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use ballast::control::backward::Watch;
 use ballast::control::error::TrainError;
-use ballast::control::evaluate::{Evaluation, Follower, Outcomes};
-use ballast::control::evaluation_report::{Costs, EvaluationReport};
+use ballast::control::evaluation::paths::{Evaluation, Follower, Outcomes};
+use ballast::control::evaluation::report::{Costs, EvaluationReport};
 use ballast::control::pool::TrainingPool;
-use ballast::control::utility::utility;
+use ballast::control::problem::utility::utility;
+use ballast::control::progress::Watch;
 use reqwest::Method;
 use serde_json::{Value, json};
 use support::App;
@@ -122,7 +122,7 @@ fn differences_are_paired() {
     let report = EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS);
     assert_eq!((report.reference.as_str(), report.strategies[0].difference.is_none()), ("plug_in", true));
     let kind = evaluation.request.problem.utility;
-    let apart = |outcome: &ballast::control::evaluate::Outcome| {
+    let apart = |outcome: &ballast::control::evaluation::paths::Outcome| {
         utility(kind, outcome.wealth[1]) - utility(kind, outcome.wealth[0])
     };
     let mean = outcomes.outcomes.iter().map(apart).sum::<f64>() / 400.0;
@@ -201,7 +201,7 @@ fn the_bridge_ball_covers_the_paper_s_law_less_often_than_it_promises() {
 
 #[test]
 fn every_framework_takes_part_whatever_its_default_radius_rule() {
-    use ballast::control::specification::Specification;
+    use ballast::control::request::specification::Specification;
     let names = ["adaptive", "static", "known_law", "plug_in", "parametric_static", "parametric_adaptive"];
     let rest = json!({ "frameworks": names, "constant_mixes": [0.0], "histories": { "kind": "drawn", "count": 2 } });
     let mut request = small(rest);

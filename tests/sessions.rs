@@ -4,8 +4,8 @@ mod support;
 
 use std::time::Duration;
 
-use ballast::control::advisor::Advisor;
 use ballast::control::policy::Policy;
+use ballast::control::policy::advisor::Advisor;
 use serde_json::{Value, json};
 use support::{App, specification};
 
@@ -97,7 +97,7 @@ async fn what_was_executed_and_what_was_reached_are_taken_as_stated() {
     state = advisor.advance(&state, allocation, log_return);
     state = advisor.advance(&state, number(&second["executed_allocation"]), 0.01);
     state.wealth = 77.5;
-    let advice = advisor.advise(2, &state, ballast::control::advisor::AdviceMode::Surrogate);
+    let advice = advisor.advise(2, &state, ballast::control::policy::advisor::AdviceMode::Surrogate);
     assert_eq!(number(&action["allocation"]), advice.allocation);
     assert_eq!(number(&action["certainty_equivalent"]), advice.certainty_equivalent);
     let (_, third) = app.report(3, json!({ "log_return": 0.01, "executed_allocation": 1.0 })).await;

@@ -32,6 +32,18 @@
 //! | steps 1 to 6 | `Training` | 3.1 | `control/training.rs` | `tests/control.rs::whole_horizons_agree_with_nested_grids` |
 //! | V-hat_0, N' | `Evaluation` | 3.1 | `control/evaluation/paths.rs` | `tests/evaluate.rs::a_simulated_path_is_the_advisor_s_own` |
 //!
+//! The face of the floor, which is what `store`, `service` and `http` may name (a test reads `src` and checks):
+//!
+//! - `request`, `error`: a request comes in, and a field of it may be refused;
+//! - `training`, `progress`, `solved_step`: it is solved step by step, with what a step reports and leaves behind;
+//! - `policy`, `problem`: the document answers in a state;
+//! - `evaluation`: strategies are compared;
+//! - `estimate`, `kept`, `pool`: what work costs, and the memory and threads that its caller lends.
+//!
+//! The method itself stays behind it: how a step is solved (`bellman`, `uncertainty`, `surrogate`) may change without a
+//! higher floor noticing. The binary measures the method's parts one by one (`bench`), so they are public to it. Everything
+//! has one path, the one where it is written; only a policy's document is named by its room.
+//!
 //! Not the paper's: the floor gain that stands for V (`problem::utility`), radius rules other than (2.5) and (2.7), and the
 //! parametric frameworks (`bellman::normal`).
 
@@ -49,21 +61,3 @@ pub mod solved_step;
 pub mod surrogate;
 pub mod training;
 pub mod uncertainty;
-
-pub use evaluation::{paths as evaluate, report as evaluation_report};
-pub use policy::{what_if, worst_case};
-pub use problem::{state, utility};
-pub use request::{framework, rules, specification};
-
-/// Advice and who gives it.
-pub mod advisor {
-    pub use super::policy::advice::{Advice, AdviceSource, Uncertainty};
-    pub use super::policy::advisor::{AdviceMode, Advisor};
-}
-
-/// Training and what it tells.
-pub mod backward {
-    pub use super::progress::{Phase, StepProgress, Watch};
-    pub use super::solved_step::StepSolution;
-    pub use super::training::Training;
-}

@@ -14,7 +14,7 @@ use crate::control::bellman::problem::Problem;
 use crate::control::bellman::solution::RobustSolution;
 use crate::control::error::TrainError;
 use crate::control::kept::Kept;
-use crate::control::policy::document::Policy;
+use crate::control::policy::Policy;
 use crate::control::problem::state::State;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::specification::Specification;

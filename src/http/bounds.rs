@@ -1,12 +1,12 @@
 //! The rules of single fields that JSON Schema can tell, told: lengths, ends of ranges, exactly one of several.
 //!
-//! The rules stand in `control::rules` and beside the requests they are of; what is here repeats their numbers for readers
+//! The rules stand in `control::request::rules` and beside the requests they are of; what is here repeats their numbers for readers
 //! of the description, and a test asks the rules themselves at both ends. Rules between fields are the service's to tell.
 
 use serde_json::{Map, Value, json};
 use utoipa::openapi::{OpenApi, RefOr, Schema};
 
-use crate::control::rules::{
+use crate::control::request::rules::{
     COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, RADIUS_SCALE, WEALTH,
 };
 use crate::service::observation::PRICE;
@@ -115,7 +115,7 @@ fn merge(into: &mut Value, rule: &Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::specification::Specification;
+    use crate::control::request::specification::Specification;
     use crate::http::router;
 
     /// The field that the rules refuse in a sound specification with `value` at `pointer`.

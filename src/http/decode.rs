@@ -173,7 +173,7 @@ fn lookup<'a>(given: &'a Value, field: &str) -> Option<&'a Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::specification::Specification;
+    use crate::control::request::specification::Specification;
 
     fn refused(body: &str) -> (String, Value, String) {
         let problem = json::<Specification>(body.as_bytes()).unwrap_err();

@@ -11,8 +11,8 @@ use super::extract::{Id, JsonBody};
 use super::jobs::{accepted, idempotency_key};
 use super::problem::Problem;
 use super::wire;
-use crate::control::evaluation::EvaluationRequest;
-use crate::control::evaluation_report::EvaluationReport;
+use crate::control::evaluation::report::EvaluationReport;
+use crate::control::request::evaluation::EvaluationRequest;
 use crate::service::Service;
 
 /// Queue a comparison of frameworks on common simulated returns.

@@ -101,9 +101,9 @@ impl Follower {
 fn event_id(job: &wire::Job) -> String {
     let points = job.progress.points_done.unwrap_or(0);
     let phase = job.progress.phase.map_or("", |phase| match phase {
-        crate::control::backward::Phase::Solving => "s",
-        crate::control::backward::Phase::Fitting => "f",
-        crate::control::backward::Phase::Simulating => "p",
+        crate::control::progress::Phase::Solving => "s",
+        crate::control::progress::Phase::Fitting => "f",
+        crate::control::progress::Phase::Simulating => "p",
     });
     format!("{}-{}-{points}{phase}", job.state.as_str(), job.progress.steps_done)
 }

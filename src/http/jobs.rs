@@ -13,7 +13,7 @@ use super::page::{self, Page};
 use super::problem::{Problem, ProblemKind};
 use super::wire;
 use crate::control::error::FieldError;
-use crate::control::specification::Specification;
+use crate::control::request::specification::Specification;
 use crate::service::Service;
 use crate::service::jobs::Job;
 

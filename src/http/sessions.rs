@@ -16,7 +16,7 @@ use super::jobs::idempotency_key;
 use super::page::{self, Page};
 use super::problem::Problem;
 use super::wire;
-use crate::control::advisor::AdviceMode;
+use crate::control::policy::advisor::AdviceMode;
 use crate::service::Service;
 use crate::service::allowance::Class;
 use crate::service::metrics::{ACTION_SECONDS, OBSERVE_SECONDS};

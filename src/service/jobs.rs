@@ -12,9 +12,9 @@ use super::keys::Caller;
 use super::memory::Memory;
 use super::progress::{Progress, ProgressBoard};
 use crate::control::estimate;
-use crate::control::evaluation::EvaluationRequest;
 use crate::control::policy::content_hash;
-use crate::control::specification::Specification;
+use crate::control::request::evaluation::EvaluationRequest;
+use crate::control::request::specification::Specification;
 use crate::store::{CreateJob, DeleteJob, JobKind, JobRow, NewJob, Store, Tenant};
 
 /// A job as stored, and how far it is where it runs in this process.

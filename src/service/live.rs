@@ -6,9 +6,10 @@ use super::allowance::HeavyTurn;
 use super::bounded::Bounded;
 use super::error::ServiceError;
 use super::observation::{Observe, Observed};
-use crate::control::advisor::{Advice, AdviceMode, Advisor, Uncertainty};
-use crate::control::rules as limits;
-use crate::control::state::State;
+use crate::control::policy::advice::{Advice, Uncertainty};
+use crate::control::policy::advisor::{AdviceMode, Advisor};
+use crate::control::problem::state::State;
+use crate::control::request::rules as limits;
 use crate::store::{Seen, SessionFacts, SessionRow};
 
 /// By what a call is answered, where its work is done, and what it must take before it solves.

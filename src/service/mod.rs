@@ -45,7 +45,7 @@ use shutdown::Shutdown;
 use trainer::Trainer;
 
 use crate::control::error::FieldError;
-use crate::control::evaluation::EvaluationRequest;
+use crate::control::request::evaluation::EvaluationRequest;
 use crate::store::{JobCounts, Store};
 
 /// The use cases over one store.

@@ -7,10 +7,10 @@ use tokio::sync::Semaphore;
 use super::error::ServiceError;
 use super::keys::Caller;
 use super::memory::Memory;
-use crate::control::advisor::Advisor;
 use crate::control::error::FieldError;
 use crate::control::estimate::{self, Estimate};
 use crate::control::kept::{Kept, Key};
+use crate::control::policy::advisor::Advisor;
 use crate::control::policy::{Policy, content_hash};
 use crate::store::{DeletePolicy, PolicyRow, PolicySummary, Store, Tenant};
 

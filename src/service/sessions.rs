@@ -27,10 +27,11 @@ use super::observation::{Observe, Observed};
 use super::policies::Policies;
 use super::slots::{Generation, Held, Slots, Source};
 use super::spans;
-use crate::control::advisor::{Advice, AdviceMode, Advisor};
 use crate::control::error::FieldError;
+use crate::control::policy::advice::Advice;
+use crate::control::policy::advisor::{AdviceMode, Advisor};
 use crate::control::policy::content_hash;
-use crate::control::worst_case::WorstCase;
+use crate::control::policy::worst_case::WorstCase;
 use crate::store::{
     Append, CreateSession, ObservationRow, RequestKey, SessionFacts, SessionRow, SessionSummary, Store, Tenant,
 };

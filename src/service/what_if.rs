@@ -6,10 +6,11 @@ use utoipa::ToSchema;
 use super::error::ServiceError;
 use super::observation::log_return_of;
 use super::sessions::Sessions;
-use crate::control::advisor::{Advice, AdviceMode};
 use crate::control::error::FieldError;
-use crate::control::what_if::{Hypothesis, HypotheticalRadius, Supposed};
-use crate::control::worst_case::{WorstCase, WorstLawSummary};
+use crate::control::policy::advice::Advice;
+use crate::control::policy::advisor::AdviceMode;
+use crate::control::policy::what_if::{Hypothesis, HypotheticalRadius, Supposed};
+use crate::control::policy::worst_case::{WorstCase, WorstLawSummary};
 use crate::store::Tenant;
 
 /// Points of a sweep; each is one turn among the robust steps that requests cause.

@@ -10,7 +10,8 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use ballast::control::backward::{Training, Watch};
+use ballast::control::progress::Watch;
+use ballast::control::training::Training;
 use ballast::http::{self, Running};
 use ballast::service::clock::Clock;
 use ballast::service::config::Config;

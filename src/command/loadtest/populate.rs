@@ -3,10 +3,11 @@
 use std::error::Error;
 use std::path::Path;
 
-use ballast::control::backward::{Training, Watch};
 use ballast::control::policy::content_hash;
 use ballast::control::pool::TrainingPool;
-use ballast::control::specification::{InitialLaws, Specification};
+use ballast::control::progress::Watch;
+use ballast::control::request::specification::{InitialLaws, Specification};
+use ballast::control::training::Training;
 use ballast::store::{CreateSession, SessionRow, Store, Tenant};
 use futures_util::{StreamExt, stream};
 use serde_json::Value;

@@ -5,5 +5,3 @@ pub mod paths;
 pub mod report;
 pub mod rolling;
 pub mod statistics;
-
-pub use super::request::evaluation::EvaluationRequest;

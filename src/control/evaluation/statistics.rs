@@ -7,7 +7,7 @@ use crate::control::evaluation::report::{
     Costs, Coverage, CoverageAtSize, Difference, EvaluationReport, FORMAT, HistoryReport, PeriodReport, RadiusSpread,
     Spread, StrategyReport, UtilityReport, WealthReport,
 };
-use crate::control::policy::document::content_hash;
+use crate::control::policy::content_hash;
 use crate::control::problem::state::floor;
 use crate::control::problem::utility::{RelativeUtility, utility};
 use crate::control::request::framework::Framework;

@@ -2,7 +2,7 @@
 
 pub mod advice;
 pub mod advisor;
-pub mod document;
+mod document;
 pub mod prepared;
 pub mod what_if;
 pub mod worst_case;

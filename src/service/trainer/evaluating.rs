@@ -4,15 +4,15 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use super::{Ended, Worker, ended_training, failed};
-use crate::control::advisor::Advisor;
-use crate::control::backward::Watch;
 use crate::control::error::TrainError;
 use crate::control::estimate;
-use crate::control::evaluate::{Evaluation, Follower};
-use crate::control::evaluation_report::{Costs, EvaluationReport};
-use crate::control::framework::Framework;
+use crate::control::evaluation::paths::{Evaluation, Follower};
+use crate::control::evaluation::report::{Costs, EvaluationReport};
 use crate::control::kept::Kept;
 use crate::control::policy::Policy;
+use crate::control::policy::advisor::Advisor;
+use crate::control::progress::Watch;
+use crate::control::request::framework::Framework;
 use crate::store::{ClaimedJob, JobOutcome, StoreError};
 
 impl Worker {

@@ -6,11 +6,13 @@ use std::time::Instant;
 
 use super::super::metrics as names;
 use super::{Ended, Worker, ended_training, failed};
-use crate::control::backward::{StepSolution, Training, Watch};
 use crate::control::estimate;
 use crate::control::kept::Kept;
 use crate::control::policy::{Policy, content_hash};
-use crate::control::specification::Specification;
+use crate::control::progress::Watch;
+use crate::control::request::specification::Specification;
+use crate::control::solved_step::StepSolution;
+use crate::control::training::Training;
 use crate::store::{ClaimedJob, JobOutcome, StoreError};
 
 impl Worker {
