@@ -25,19 +25,6 @@ const LONG_FILES: [(&str, &str); 0] = [];
 /// Functions above `FUNCTION_LINES` as `file: function`, and why.
 const LONG_FUNCTIONS: [(&str, &str); 0] = [];
 
-/// Files that still stand in a circle of imports, and what cuts it.
-const CIRCLES: [(&str, &str); 5] = [
-    ("command/demo/calls.rs command/demo/story.rs", "what has passed (`Past`) in a file below both"),
-    ("http/access.rs http/extract.rs", "the gate apart from its table, what it leaves in a request below both"),
-    ("http/dashboard.rs http/operations.rs http/router.rs", "the description as a value that the router sets once"),
-    (
-        "store/audit.rs store/codec.rs store/error.rs store/idempotency.rs store/migrations.rs store/observations.rs \
-         store/policies.rs store/postgres/mod.rs store/query.rs store/quotas.rs store/sessions.rs store/sqlite/mod.rs",
-        "a neutral cause in the error, found where the engine's error is met",
-    ),
-    ("store/sqlite/batch.rs store/sqlite/writer.rs", "operations in a file below both"),
-];
-
 /// Calls that read the clock, log, print or sleep; they enter the lower floors as arguments or not at all.
 const EFFECTS: [&str; 9] = [
     "Instant::now",
@@ -478,15 +465,8 @@ fn no_files_name_each_other_in_a_circle() {
     let sources = sources();
     let imports = imports(&sources);
     assert!(imports.values().map(BTreeSet::len).sum::<usize>() > 500, "the imports were not read");
-    let known: BTreeSet<&str> = CIRCLES.iter().flat_map(|(files, _)| files.split_whitespace()).collect();
-    let new: Vec<String> = circles(&imports)
-        .into_iter()
-        .filter(|circle| circle.split_whitespace().any(|file| !known.contains(file)))
-        .collect();
-    assert!(new.is_empty(), "circles of imports:\n{}", new.join("\n"));
-    for floor in ["numerics/", "control/", "service/", "report/"] {
-        assert!(!known.iter().any(|file| file.starts_with(floor)), "{floor} has none to excuse");
-    }
+    let circles: Vec<String> = circles(&imports).into_iter().collect();
+    assert!(circles.is_empty(), "circles of imports:\n{}", circles.join("\n"));
 }
 
 #[test]

@@ -14,6 +14,7 @@ use super::host::{Host, HostError};
 use super::monthly_returns::ReturnsError;
 
 mod calls;
+mod past;
 mod progress;
 mod story;
 

@@ -6,13 +6,14 @@
 
 use std::sync::LazyLock;
 
+use axum::Extension;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use sha2::{Digest, Sha256};
 
+use super::documentation::Shared;
 use super::extract::Id;
 use super::problem::{Problem, ProblemKind};
-use super::router;
 
 const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; \
     font-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; \
@@ -106,10 +107,10 @@ fn asset(name: &str) -> Option<&'static Asset> {
     responses(
         (status = 200, description = "A page; the description of this interface where only JSON is accepted.", body = String, content_type = "text/html"),
         (status = 304, description = "The page is the one that `If-None-Match` names.")))]
-pub async fn root(headers: HeaderMap) -> Response {
+pub async fn root(Extension(published): Extension<Shared>, headers: HeaderMap) -> Response {
     let mut response = match asset("index.html") {
         Some(page) if !wants_json(&headers) => served(page, &headers),
-        _ => ([(header::CONTENT_TYPE, "application/json")], router::description_json()).into_response(),
+        _ => ([(header::CONTENT_TYPE, "application/json")], published.json.as_str()).into_response(),
     };
     response.headers_mut().insert(header::LINK, HeaderValue::from_static(LINKS));
     response.headers_mut().insert(header::VARY, HeaderValue::from_static("accept"));

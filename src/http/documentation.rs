@@ -1,6 +1,7 @@
 //! The OpenAPI description as one static page, and the table of problems; no script, nothing loaded from elsewhere.
 
 use std::fmt::Write;
+use std::sync::LazyLock;
 
 use serde_json::Value;
 use utoipa::openapi::OpenApi;
@@ -13,8 +14,24 @@ code{background:#8882;padding:0 .2em}h2{border-top:1px solid #8885;padding-top:1
 <h1>Ballast</h1><p>The machine-readable form is <a href=\"/openapi.json\">openapi.json</a>; \
 <a href=\"/\">the dashboard</a> is made of these calls.</p>";
 
-/// The page.
-pub fn page(description: &OpenApi) -> String {
+/// The description as it is published. Made once: anybody may ask for it, as often as he likes.
+pub struct Published {
+    /// As checked in under `api/openapi.json`.
+    pub json: String,
+    /// As a page to read.
+    pub page: String,
+}
+
+/// What the router hands to those of its handlers that publish the description of all of them.
+pub type Shared = &'static LazyLock<Published>;
+
+impl Published {
+    pub fn of(description: &OpenApi) -> Self {
+        Published { json: description.to_pretty_json().unwrap_or_default() + "\n", page: page(description) }
+    }
+}
+
+fn page(description: &OpenApi) -> String {
     let description = serde_json::to_value(description).unwrap_or_default();
     let mut page = String::from(HEAD);
     for (path, operations) in members(&description["paths"]) {

@@ -1,16 +1,17 @@
 //! For the operator: is it alive, is it ready, how is it doing.
 
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
 
-use axum::Json;
 use axum::extract::State;
 use axum::http::header;
 use axum::response::{Html, IntoResponse, Response};
+use axum::{Extension, Json};
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::documentation::Shared;
 use super::problem::Problem;
-use super::{documentation, router, telemetry};
+use super::telemetry;
 use crate::service::Service;
 
 /// The service in a few words.
@@ -71,14 +72,13 @@ pub async fn metrics(State(service): State<Arc<Service>>) -> Result<Response, Pr
 /// The description of this interface.
 #[utoipa::path(get, path = "/openapi.json", tag = "operations",
     responses((status = 200, description = "OpenAPI 3.1.", body = serde_json::Value)))]
-pub async fn openapi() -> Response {
-    ([(header::CONTENT_TYPE, "application/json")], router::description_json()).into_response()
+pub async fn openapi(Extension(published): Extension<Shared>) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], published.json.as_str()).into_response()
 }
 
 /// The description as a page to read.
 #[utoipa::path(get, path = "/docs", tag = "operations",
     responses((status = 200, description = "A page.", body = String, content_type = "text/html")))]
-pub async fn docs() -> Html<&'static str> {
-    static PAGE: LazyLock<String> = LazyLock::new(|| documentation::page(&router::description()));
-    Html(&PAGE)
+pub async fn docs(Extension(published): Extension<Shared>) -> Html<&'static str> {
+    Html(&published.page)
 }

@@ -4,11 +4,11 @@ use std::panic::AssertUnwindSafe;
 use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
-use axum::Router;
 use axum::extract::{Request, State};
 use axum::http::{Method, Uri};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
+use axum::{Extension, Router};
 use futures_util::FutureExt;
 use tracing::Instrument;
 use utoipa::OpenApi;
@@ -16,6 +16,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::access::{By, Gate, Read};
+use super::documentation::{Published, Shared};
 use super::hosts::Hosts;
 use super::problem::{Problem, ProblemKind};
 use super::{
@@ -87,20 +88,31 @@ pub fn description() -> utoipa::openapi::OpenApi {
     description
 }
 
-/// The description as checked in under `api/openapi.json`. Made once: anybody may ask for it, as often as he likes.
+static PUBLISHED: LazyLock<Published> = LazyLock::new(|| Published::of(&description()));
+
+/// The description as checked in under `api/openapi.json`.
 pub fn description_json() -> &'static str {
-    static JSON: LazyLock<String> = LazyLock::new(|| description().to_pretty_json().unwrap_or_default() + "\n");
-    &JSON
+    &PUBLISHED.json
 }
 
 /// The whole application; for a replica that only works, the operator's part of it.
 pub fn application(service: Arc<Service>, config: &Config) -> Router {
-    guarded(if config.role.answers() { routes() } else { operators() }, service, config)
+    let routes = match config.role.answers() {
+        true => publishing(operators().merge(pages())).merge(users()),
+        false => publishing(operators()),
+    };
+    guarded(routes, service, config)
 }
 
 /// The operator's part of it.
 pub fn for_operators(service: Arc<Service>, config: &Config) -> Router {
-    guarded(operators(), service, config)
+    guarded(publishing(operators()), service, config)
+}
+
+/// With the description at hand. Not the users' routes, which have no need of it and are asked most.
+fn publishing(routes: OpenApiRouter<Arc<Service>>) -> OpenApiRouter<Arc<Service>> {
+    let published: Shared = &PUBLISHED;
+    routes.route_layer(Extension(published))
 }
 
 fn guarded(routes: OpenApiRouter<Arc<Service>>, service: Arc<Service>, config: &Config) -> Router {

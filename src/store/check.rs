@@ -52,7 +52,7 @@ impl Inspection {
     /// # Errors
     /// There is none, or it cannot be read.
     pub async fn of_folder(dir: &Path) -> Result<Self, StoreError> {
-        sqlite::inspect(dir).await.map(|connection| Inspection(Reader::Sqlite(connection)))
+        sqlite::opening::inspect(dir).await.map(|connection| Inspection(Reader::Sqlite(connection)))
     }
 
     /// A [`backup`](super::backup), which nobody writes to.
@@ -60,7 +60,7 @@ impl Inspection {
     /// # Errors
     /// As [`Inspection::of_folder`].
     pub async fn of_backup(file: &Path) -> Result<Self, StoreError> {
-        sqlite::inspect_file(file).await.map(|connection| Inspection(Reader::Sqlite(connection)))
+        sqlite::opening::inspect_file(file).await.map(|connection| Inspection(Reader::Sqlite(connection)))
     }
 
     /// # Errors
@@ -86,7 +86,7 @@ impl Inspection {
     async fn schema(&mut self) -> Result<i64, StoreError> {
         match &mut self.0 {
             Reader::Sqlite(connection) => {
-                migrations::require_newest(&migrations::sqlite(), sqlite::version(connection).await?)
+                migrations::require_newest(&migrations::sqlite(), sqlite::opening::version(connection).await?)
             }
             Reader::Postgres(connection) => {
                 migrations::require_newest(&migrations::postgres(), postgres::version(connection).await?)

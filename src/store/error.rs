@@ -1,22 +1,23 @@
 //! Errors of the store: what the caller, the operator and the process must do next.
 
+mod postgres;
+mod sqlite;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use thiserror::Error;
 
-use super::{postgres, sqlite};
-
 /// Why the store could not answer. Clones share the cause, since one failed commit answers a whole group.
 #[derive(Debug, Clone, Error)]
 pub enum StoreError {
-    /// No room for the write; nothing of it was kept, and reads go on. HTTP 507.
+    /// No room for the write; nothing of it was kept, and reads go on.
     #[error("the disk is full")]
     Full { source: Arc<sqlx::Error> },
     /// An I/O error, a failed fsync or a damaged file of SQLite: what is in memory can no longer be trusted. The process must exit.
     #[error("the store failed while {doing}; the process must restart")]
     Fatal { doing: &'static str, source: Arc<sqlx::Error> },
-    /// Busy, closing, or not reached. The same request may succeed later. HTTP 503.
+    /// Busy, closing, or not reached. The same request may succeed later.
     #[error("the store is unavailable while {doing}")]
     Unavailable { doing: &'static str, source: Option<Arc<sqlx::Error>> },
     /// The file has a schema newer than this binary's.
@@ -42,7 +43,7 @@ pub enum StoreError {
     /// The database refused a statement: a defect of this program.
     #[error("the store refused a statement while {doing}")]
     Refused { doing: &'static str, source: Arc<sqlx::Error> },
-    /// A tenant would keep more than it may; nothing of the write was kept. HTTP 429 for jobs queued, else 413.
+    /// A tenant would keep more than it may; nothing of the write was kept.
     #[error(transparent)]
     OverQuota(OverQuota),
     /// The schema could not be brought up to date.
@@ -98,22 +99,61 @@ impl StoreError {
     }
 }
 
+/// What an engine's error means to whoever waits for an answer, whichever engine it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Cause {
+    Full,
+    Fatal,
+    Unavailable,
+    DamagedRow,
+    Refused,
+}
+
 /// What goes wrong inside an operation, before it is known what was being done.
 #[derive(Debug)]
 pub(super) enum Failure {
-    Sqlite(sqlx::Error),
-    Postgres(sqlx::Error),
+    /// What the engine's error means is found where it is met, so that nobody above needs to know the engine.
+    Engine(Cause, sqlx::Error),
     Corrupt(String),
     OverQuota(OverQuota),
 }
 
 impl Failure {
+    pub(super) fn sqlite(error: sqlx::Error) -> Self {
+        Failure::Engine(sqlite::cause(&error), error)
+    }
+
+    pub(super) fn postgres(error: sqlx::Error) -> Self {
+        Failure::Engine(postgres::cause(&error), error)
+    }
+
     pub(super) fn during(self, doing: &'static str) -> StoreError {
-        match self {
-            Failure::Corrupt(what) => StoreError::Corrupt { what },
-            Failure::OverQuota(over) => StoreError::OverQuota(over),
-            Failure::Sqlite(error) => sqlite::classify(doing, error),
-            Failure::Postgres(error) => postgres::classify(doing, error),
+        let (cause, source) = match self {
+            Failure::Corrupt(what) => return StoreError::Corrupt { what },
+            Failure::OverQuota(over) => return StoreError::OverQuota(over),
+            Failure::Engine(cause, error) => (cause, Arc::new(error)),
+        };
+        match cause {
+            Cause::Full => StoreError::Full { source },
+            Cause::Fatal => StoreError::Fatal { doing, source },
+            Cause::Unavailable => StoreError::Unavailable { doing, source: Some(source) },
+            Cause::DamagedRow => StoreError::Corrupt { what: format!("a row read while {doing}: {source}") },
+            Cause::Refused => StoreError::Refused { doing, source },
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refused_statement_spares_the_rest_of_its_group_and_a_full_disk_does_not() {
+        let met = |cause| Failure::Engine(cause, sqlx::Error::RowNotFound).during("testing");
+        assert!(!met(Cause::Refused).ends_group() && !met(Cause::DamagedRow).ends_group());
+        for ending in [Cause::Full, Cause::Fatal, Cause::Unavailable] {
+            assert!(met(ending).ends_group(), "{ending:?}");
+        }
+        assert!(met(Cause::Fatal).is_fatal());
     }
 }

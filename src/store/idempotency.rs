@@ -4,7 +4,6 @@
 
 use super::error::Failure;
 use super::query::{Connection, query};
-use super::sessions::{CreateSession, SessionRow};
 use super::tenant::Tenant;
 
 /// What tells a repeated request from a new one.
@@ -16,24 +15,25 @@ pub struct RequestKey {
     pub request_hash: String,
 }
 
-/// What a key used before answers; `None` for a new key.
-pub(super) async fn repeated(
+/// What a key was used for.
+pub(super) enum Used {
+    /// The same request, which opened this session.
+    BySame { session: Option<String> },
+    /// Another request.
+    ByAnother,
+}
+
+/// What the key was used for before; `None` for a new key.
+pub(super) async fn used(
     connection: &mut Connection<'_>,
     tenant: &Tenant,
     key: &RequestKey,
-) -> Result<Option<CreateSession>, Failure> {
+) -> Result<Option<Used>, Failure> {
     let used = query("SELECT request_hash, session FROM idempotency_keys WHERE tenant = $1 AND idempotency_key = $2");
     let used = used.bind(tenant.as_str()).bind(key.key.as_str());
     let Some(used) = connection.row(used.for_share()).await? else { return Ok(None) };
-    if used.get::<String>("request_hash")? != key.request_hash {
-        return Ok(Some(CreateSession::KeyConflict));
-    }
-    let session: Option<String> = used.get("session")?;
-    let find = query("SELECT * FROM sessions WHERE session = $1").bind(session.unwrap_or_default());
-    match connection.row(find).await? {
-        Some(row) => Ok(Some(CreateSession::Repeated(SessionRow::from_row(&row)?))),
-        None => Err(Failure::Corrupt(format!("the idempotency key {}", key.key))),
-    }
+    let is_same = used.get::<String>("request_hash")? == key.request_hash;
+    Ok(Some(if is_same { Used::BySame { session: used.get("session")? } } else { Used::ByAnother }))
 }
 
 /// Takes the key for a session. False where somebody else took it in the meantime.

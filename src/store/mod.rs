@@ -12,7 +12,8 @@
 //!    a [`KeyRing`] adds and revokes them beside the process that holds the folder, one statement each.
 //!
 //! What is decided is written once, in `jobs`, `keys`, `leases`, `turns`, `quotas`, `retention`, `policies`, `sessions` and
-//! `observations`; how a statement is run, how a group of writes is committed and what an error means is the engine's, in `sqlite` and `postgres`.
+//! `observations`; how a statement is run and how a group of writes is committed is the engine's, in `sqlite` and
+//! `postgres`; what an engine's error means is said in `error`.
 //!
 //! Conflicts, repeats and gaps are outcomes, not errors. The store reads no clock: time enters as milliseconds since the
 //! epoch; leases are measured by [`Store::lease_time`]. Identifiers are opaque and made by the caller.
@@ -23,9 +24,11 @@
 
 mod audit;
 mod audit_chain;
+mod backup;
 mod check;
 mod codec;
 mod error;
+mod head;
 mod idempotency;
 mod job;
 mod job_state;
@@ -52,8 +55,10 @@ use error::Failure;
 use query::{Connection, Purpose, Query, Row};
 
 pub use audit::{Actor, AuditBounds, AuditFilter, AuditRow, Deed};
+pub use backup::{backup, restore};
 pub use check::Inspection;
 pub use error::{OverQuota, Quota, StoreError};
+pub use head::Head;
 pub use idempotency::RequestKey;
 pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, NewJob, OldestJobs};
 pub use job_state::{IllegalTransition, JobEvent, JobState};
@@ -63,8 +68,7 @@ pub use policies::{DeletePolicy, PolicyRow, PolicySummary};
 pub use postgres::{PostgresUrl, UrlError};
 pub use quotas::{Quotas, Usage};
 pub use retention::{DeleteJob, Room};
-pub use sessions::{CreateSession, Head, Seen, SessionFacts, SessionRow, SessionSummary};
-pub use sqlite::{backup, restore};
+pub use sessions::{CreateSession, Seen, SessionFacts, SessionRow, SessionSummary};
 pub use tenant::Tenant;
 
 /// The durable facts of one folder or one database. Clones share the connections.

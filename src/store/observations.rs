@@ -6,9 +6,9 @@ use futures_util::FutureExt;
 
 use super::codec::{Seal, from_sql, to_sql};
 use super::error::Failure;
+use super::head::Head;
 use super::postgres::Database;
 use super::query::{Connection, Query, Row, query};
-use super::sessions::Head;
 use super::{Engine, Store, StoreError};
 
 /// One period's return and what was answered to it; as read, verified against its seal.

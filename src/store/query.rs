@@ -157,8 +157,8 @@ impl<T> Column for T where T: for<'r> Decode<'r, Sqlite> + Type<Sqlite> + for<'r
 impl Row {
     pub(super) fn get<T: Column>(&self, column: &str) -> Result<T, Failure> {
         match self {
-            Row::Sqlite(row) => row.try_get(column).map_err(Failure::Sqlite),
-            Row::Postgres(row) => row.try_get(column).map_err(Failure::Postgres),
+            Row::Sqlite(row) => row.try_get(column).map_err(Failure::sqlite),
+            Row::Postgres(row) => row.try_get(column).map_err(Failure::postgres),
         }
     }
 }
@@ -173,11 +173,11 @@ impl Connection<'_> {
     pub(super) async fn rows(&mut self, query: Query) -> Result<Vec<Row>, Failure> {
         match self {
             Connection::Sqlite(connection) => {
-                let rows = query.sqlite().fetch_all(&mut **connection).await.map_err(Failure::Sqlite)?;
+                let rows = query.sqlite().fetch_all(&mut **connection).await.map_err(Failure::sqlite)?;
                 Ok(rows.into_iter().map(Row::Sqlite).collect())
             }
             Connection::Postgres(connection) => {
-                let rows = query.postgres().fetch_all(&mut **connection).await.map_err(Failure::Postgres)?;
+                let rows = query.postgres().fetch_all(&mut **connection).await.map_err(Failure::postgres)?;
                 Ok(rows.into_iter().map(Row::Postgres).collect())
             }
         }
@@ -200,11 +200,11 @@ impl Connection<'_> {
     pub(super) async fn execute(&mut self, query: Query) -> Result<u64, Failure> {
         match self {
             Connection::Sqlite(connection) => {
-                let done = query.sqlite().execute(&mut **connection).await.map_err(Failure::Sqlite)?;
+                let done = query.sqlite().execute(&mut **connection).await.map_err(Failure::sqlite)?;
                 Ok(done.rows_affected())
             }
             Connection::Postgres(connection) => {
-                let done = query.postgres().execute(&mut **connection).await.map_err(Failure::Postgres)?;
+                let done = query.postgres().execute(&mut **connection).await.map_err(Failure::postgres)?;
                 Ok(done.rows_affected())
             }
         }

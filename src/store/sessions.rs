@@ -5,7 +5,8 @@ use futures_util::FutureExt;
 use super::audit::{self, Actor, Deed};
 use super::codec::{Seal, decode_reals, encode_reals, from_sql, to_sql};
 use super::error::Failure;
-use super::idempotency::{self, RequestKey};
+use super::head::Head;
+use super::idempotency::{self, RequestKey, Used};
 use super::observations::ObservationRow;
 use super::query::{Connection, Row, query};
 use super::quotas::{self, Quotas, Usage};
@@ -37,16 +38,6 @@ pub struct SessionRow {
     pub initial_history: Vec<f64>,
     pub horizon: usize,
     pub created_ms: i64,
-}
-
-/// What tells whether a session is still what it was: how far it is, and the seal of its last row.
-///
-/// Rows are only appended, and a seal covers the time its row was made: equal heads mean equal sessions, even where the
-/// database was restored from a copy and went on differently.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Head {
-    pub observed: usize,
-    pub(super) seal: Vec<u8>,
 }
 
 /// A session as it was read: its start and every observation.
@@ -203,7 +194,7 @@ async fn create(
 ) -> Result<CreateSession, Failure> {
     let connection = &mut connection;
     if let Some(key) = &key
-        && let Some(earlier) = idempotency::repeated(connection, &row.tenant, key).await?
+        && let Some(earlier) = repeated(connection, &row.tenant, key).await?
     {
         return Ok(earlier);
     }
@@ -215,7 +206,7 @@ async fn create(
         && !idempotency::take(connection, &row.tenant, key, &row.session).await?
     {
         connection.execute(query("DELETE FROM sessions WHERE session = $1").bind(row.session)).await?;
-        let earlier = idempotency::repeated(connection, &row.tenant, key).await?;
+        let earlier = repeated(connection, &row.tenant, key).await?;
         return earlier.ok_or_else(|| Failure::Corrupt(format!("the idempotency key {}", key.key)));
     }
     let history_bytes = quotas::length(&encode_reals(&row.initial_history));
@@ -224,6 +215,24 @@ async fn create(
     let outcome = format!("opened under policy {}", row.policy);
     audit::record(connection, &actor, &row.tenant, Deed::OpenSession, &row.session, &outcome).await?;
     Ok(created)
+}
+
+/// What a key used before answers; `None` for a new key.
+async fn repeated(
+    connection: &mut Connection<'_>,
+    tenant: &Tenant,
+    key: &RequestKey,
+) -> Result<Option<CreateSession>, Failure> {
+    let session = match idempotency::used(connection, tenant, key).await? {
+        None => return Ok(None),
+        Some(Used::ByAnother) => return Ok(Some(CreateSession::KeyConflict)),
+        Some(Used::BySame { session }) => session,
+    };
+    let find = query("SELECT * FROM sessions WHERE session = $1").bind(session.unwrap_or_default());
+    match connection.row(find).await? {
+        Some(row) => Ok(Some(CreateSession::Repeated(SessionRow::from_row(&row)?))),
+        None => Err(Failure::Corrupt(format!("the idempotency key {}", key.key))),
+    }
 }
 
 /// The policy stays locked until the session is there: it cannot be deleted in between.

@@ -6,8 +6,8 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::DemoError;
+use super::past::{ALPHA, INITIAL_WEALTH, Past, RISK_AVERSION};
 use super::progress::{Job, ProgressView};
-use super::story::{ALPHA, INITIAL_WEALTH, Past, RISK_AVERSION};
 use crate::command::api_client::ApiClient;
 
 /// Pause before an event stream that ended early is opened again.

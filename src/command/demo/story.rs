@@ -2,6 +2,7 @@
 
 use super::DemoError;
 use super::calls::{Advice, Move, advice, observe, open_session, train};
+use super::past::{ALPHA, HISTORY, INITIAL_WEALTH, Past, RISK_AVERSION};
 use crate::command::api_client::ApiClient;
 use crate::command::monthly_returns::{Month, MonthlyReturns};
 
@@ -9,12 +10,7 @@ const YEAR: &str = "2008";
 const FIRST_MONTH: &str = "2008-01";
 /// Januaries in which the same rule, looking one month ahead, is asked for comparison.
 const JANUARIES: [&str; 4] = ["1947-01", "1975-01", "1987-01", FIRST_MONTH];
-/// Months of history: twenty years.
-const HISTORY: usize = 240;
 const HORIZON: usize = 12;
-pub const INITIAL_WEALTH: f64 = 100.0;
-pub const RISK_AVERSION: f64 = 3.0;
-pub const ALPHA: f64 = 0.1;
 const LINE_WIDTH: usize = 108;
 /// Moves of the worst-case law that are told one by one.
 const MOVES_TOLD: usize = 3;
@@ -42,32 +38,6 @@ pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
         tell_worst_case("December's", &last);
     }
     Ok(())
-}
-
-/// What was known before a month.
-pub struct Past {
-    month: String,
-    pub log_returns: Vec<f64>,
-    /// Bank return per month: that of the last month known.
-    pub rate: f64,
-    mean_return: f64,
-}
-
-impl Past {
-    fn before(market: &MonthlyReturns, month: &str) -> Result<Self, DemoError> {
-        let months = market.before(month, HISTORY)?;
-        Ok(Past {
-            month: month.into(),
-            log_returns: months.iter().map(|row| row.risky_return.ln_1p()).collect(),
-            rate: months.last().map_or(0.0, |row| row.risk_free_return),
-            mean_return: months.iter().map(|row| row.risky_return).sum::<f64>() / months.len() as f64,
-        })
-    }
-
-    /// How much more than the bank the average month paid.
-    fn edge(&self) -> f64 {
-        self.mean_return - self.rate
-    }
 }
 
 fn tell_why(past: &Past, advice: &Advice) {
@@ -201,12 +171,5 @@ mod tests {
     #[test]
     fn a_sentence_is_cut_between_words() {
         assert_eq!(wrapped("one two  three overlong", 7), ["one two", "three", "overlong"]);
-    }
-
-    #[test]
-    fn january_2008_pays_beyond_the_bank_more_than_the_radius_and_1987_less() {
-        let market = MonthlyReturns::bundled().unwrap();
-        assert!(Past::before(&market, FIRST_MONTH).unwrap().edge() > 0.0049);
-        assert!(Past::before(&market, "1987-01").unwrap().edge() < 0.0056);
     }
 }

@@ -10,7 +10,6 @@
 //! more. A connection that met any of it is closed rather than trusted. An operation cut off during its commit may have
 //! happened; callers find out by repeating it, which every operation here allows.
 
-mod classify;
 mod url;
 
 use std::time::Duration;
@@ -25,7 +24,6 @@ use super::error::{Failure, StoreError};
 use super::migrations;
 use super::query::{Connection, Purpose, Query, Row, query};
 
-pub(super) use classify::classify;
 pub use url::{PostgresUrl, UrlError};
 
 /// Connections of one process, ten in all. A server takes 100 unless told otherwise: a few replicas, and room for an operator.
@@ -82,7 +80,7 @@ impl Database {
         let doing = "reading the server's clock";
         let clock = query("SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS BIGINT) AS time_ms");
         let rows = self.read(Purpose::Advice, doing, clock).await?;
-        let time = rows.first().ok_or(Failure::Postgres(sqlx::Error::RowNotFound)).and_then(|row| row.get("time_ms"));
+        let time = rows.first().ok_or(Failure::postgres(sqlx::Error::RowNotFound)).and_then(|row| row.get("time_ms"));
         time.map_err(|failure| failure.during(doing))
     }
 
@@ -91,7 +89,7 @@ impl Database {
         let doing = "measuring the database";
         let size = query("SELECT pg_database_size(current_database()) AS size");
         let rows = self.read(Purpose::Probes, doing, size).await?;
-        let size = rows.first().ok_or(Failure::Postgres(sqlx::Error::RowNotFound)).and_then(|row| row.get("size"));
+        let size = rows.first().ok_or(Failure::postgres(sqlx::Error::RowNotFound)).and_then(|row| row.get("size"));
         size.map(i64::unsigned_abs).map_err(|failure| failure.during(doing))
     }
 
@@ -110,9 +108,9 @@ impl Database {
         self.bounded(&self.work, doing, |connection| {
             async move {
                 // Rolls back where it is dropped before its commit.
-                let mut transaction = connection.begin().await.map_err(Failure::Postgres)?;
+                let mut transaction = connection.begin().await.map_err(Failure::postgres)?;
                 let answer = work(Connection::Postgres(&mut transaction)).await?;
-                transaction.commit().await.map_err(Failure::Postgres)?;
+                transaction.commit().await.map_err(Failure::postgres)?;
                 Ok(answer)
             }
             .boxed()
@@ -153,7 +151,7 @@ impl Database {
         work: impl for<'c> FnOnce(&'c mut PoolConnection<Postgres>) -> BoxFuture<'c, Result<T, Failure>>,
     ) -> Result<T, StoreError> {
         let acquired = pool.acquire().await;
-        let mut connection = acquired.map_err(|error| Failure::Postgres(error).during(doing))?;
+        let mut connection = acquired.map_err(|error| Failure::postgres(error).during(doing))?;
         let result = match tokio::time::timeout(OPERATION_TIMEOUT, work(&mut connection)).await {
             Ok(result) => result.map_err(|failure| failure.during(doing)),
             Err(_) => Err(StoreError::Unavailable { doing, source: None }),
@@ -205,9 +203,9 @@ pub(super) async fn version(connection: &mut PgConnection) -> Result<i64, StoreE
 async fn migrate(connection: &mut PgConnection) -> Result<(), StoreError> {
     let migrator = migrations::postgres();
     migrations::refuse_newer(&migrator, version(connection).await?)?;
-    migrator.run(connection).await.map_err(|error| migrations::failed(error, Failure::Postgres))
+    migrator.run(connection).await.map_err(|error| migrations::failed(error, Failure::postgres))
 }
 
 fn opening(error: sqlx::Error) -> StoreError {
-    Failure::Postgres(error).during(OPENING)
+    Failure::postgres(error).during(OPENING)
 }

@@ -1,10 +1,12 @@
 //! Observations that wait together go into the table together: one statement for all of them, since handing a statement
 //! to SQLite, which has a thread of its own, costs more than what it does to one row.
 
+use std::collections::VecDeque;
+
 use futures_util::FutureExt;
 use sqlx::SqliteConnection;
 
-use super::writer::{Answer, Operation, Reply, Undo, Waiting};
+use super::operation::{Answer, Operation, Reply, Undo};
 use crate::store::error::StoreError;
 use crate::store::observations::{self, APPENDING, Append, ObservationRow, append};
 use crate::store::query::Connection;
@@ -30,6 +32,19 @@ impl Appending {
     /// How to answer it once it is appended and its group's end is known.
     fn appended(self) -> Answer {
         Box::new(move |group: Result<(), StoreError>| self.reply.send(group.map(|()| Append::Appended)))
+    }
+}
+
+/// What the next group is made of.
+#[derive(Default)]
+pub(super) struct Waiting {
+    pub operations: VecDeque<Operation>,
+    pub appends: Vec<Appending>,
+}
+
+impl Waiting {
+    pub(super) fn is_empty(&self) -> bool {
+        self.operations.is_empty() && self.appends.is_empty()
     }
 }
 

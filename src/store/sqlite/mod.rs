@@ -2,9 +2,8 @@
 
 mod batch;
 mod changes;
-mod classify;
-mod copy;
-mod opening;
+pub(super) mod opening;
+mod operation;
 mod room;
 mod sync;
 mod write_ahead_log;
@@ -23,11 +22,8 @@ use super::query::{Connection, Purpose, Query, Row, query};
 use batch::Appending;
 use changes::Changes;
 use opening::Readers;
-use writer::{Operation, Reply, Request, Undo};
-
-pub(super) use classify::classify;
-pub use copy::{backup, restore};
-pub(super) use opening::{inspect, inspect_file, version};
+use operation::{Operation, Reply, Undo};
+use writer::Request;
 
 /// An open folder. Clones share the connections, the lock and the writer.
 #[derive(Clone)]
@@ -141,7 +137,7 @@ impl Folder {
         query: Query,
     ) -> Result<Vec<Row>, StoreError> {
         let reading = async {
-            let mut reader = self.readers.of_purpose(purpose).acquire().await.map_err(Failure::Sqlite)?;
+            let mut reader = self.readers.of_purpose(purpose).acquire().await.map_err(Failure::sqlite)?;
             Connection::Sqlite(&mut reader).rows(query).await
         };
         let result = reading.await.map_err(|failure| failure.during(doing));

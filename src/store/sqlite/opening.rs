@@ -16,7 +16,7 @@ use crate::store::job_state::JobState;
 use crate::store::migrations;
 use crate::store::query::Purpose;
 
-pub(super) const DATABASE: &str = "ballast.sqlite";
+pub(in crate::store) const DATABASE: &str = "ballast.sqlite";
 pub(super) const LOG: &str = "ballast.sqlite-wal";
 const LOCK: &str = "ballast.lock";
 /// The first release without the reset bug of the write-ahead log.
@@ -140,11 +140,11 @@ fn readers(file: &Path, connections: u32) -> SqlitePool {
         .connect_lazy_with(options.disable_statement_logging())
 }
 
-pub(super) fn unusable(path: &Path, error: std::io::Error) -> StoreError {
+pub(in crate::store) fn unusable(path: &Path, error: std::io::Error) -> StoreError {
     StoreError::Folder { path: PathBuf::from(path), source: Arc::new(error) }
 }
 
-pub(super) fn lock(dir: &Path) -> Result<File, StoreError> {
+pub(in crate::store) fn lock(dir: &Path) -> Result<File, StoreError> {
     std::fs::create_dir_all(dir).map_err(|error| unusable(dir, error))?;
     let path = dir.join(LOCK);
     let file = File::options().create(true).truncate(false).write(true).open(&path);
@@ -185,7 +185,7 @@ async fn empty_log(connection: &mut SqliteConnection) -> Result<(), StoreError> 
     }
 }
 
-pub(super) async fn connect(file: &Path) -> Result<SqliteConnection, StoreError> {
+pub(in crate::store) async fn connect(file: &Path) -> Result<SqliteConnection, StoreError> {
     let options = SqliteConnectOptions::new()
         .filename(file)
         .create_if_missing(true)
@@ -221,10 +221,10 @@ async fn refuse_old_engine(connection: &mut SqliteConnection) -> Result<(), Stor
     Ok(())
 }
 
-pub(super) async fn migrate(connection: &mut SqliteConnection) -> Result<(), StoreError> {
+pub(in crate::store) async fn migrate(connection: &mut SqliteConnection) -> Result<(), StoreError> {
     let migrator = migrations::sqlite();
     migrations::refuse_newer(&migrator, version(connection).await?)?;
-    migrator.run(connection).await.map_err(|error| migrations::failed(error, Failure::Sqlite))
+    migrator.run(connection).await.map_err(|error| migrations::failed(error, Failure::sqlite))
 }
 
 /// The version of the schema; 0 where there is none yet.
@@ -249,6 +249,6 @@ async fn end_leases(connection: &mut SqliteConnection) -> Result<(), StoreError>
         .map_err(opening)
 }
 
-pub(super) fn opening(error: sqlx::Error) -> StoreError {
-    Failure::Sqlite(error).during("opening the store")
+pub(in crate::store) fn opening(error: sqlx::Error) -> StoreError {
+    Failure::sqlite(error).during("opening the store")
 }

@@ -19,7 +19,7 @@ impl Folder {
              FROM pragma_page_count, pragma_freelist_count, pragma_page_size",
         );
         let rows = self.read(Purpose::Probes, DOING, pages).await?;
-        let row = rows.first().ok_or_else(|| Failure::Sqlite(sqlx::Error::RowNotFound).during(DOING))?;
+        let row = rows.first().ok_or_else(|| Failure::sqlite(sqlx::Error::RowNotFound).during(DOING))?;
         let number = |column| row.get::<i64>(column).map(i64::unsigned_abs).map_err(|failure| failure.during(DOING));
         let page_size = number("page_size")?;
         Ok(Room {
@@ -35,7 +35,7 @@ impl Folder {
             async move {
                 let Connection::Sqlite(connection) = connection else { return Ok(()) };
                 let give_back = sqlx::AssertSqlSafe(format!("PRAGMA incremental_vacuum({pages})"));
-                sqlx::query(give_back).fetch_all(connection).await.map(drop).map_err(Failure::Sqlite)
+                sqlx::query(give_back).fetch_all(connection).await.map(drop).map_err(Failure::sqlite)
             }
             .boxed()
         })

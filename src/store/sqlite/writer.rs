@@ -6,16 +6,13 @@
 //! leave after the commit. Errors after which SQLite may have rolled back by itself (disk full, I/O) fail every operation
 //! that ran in the group; those that had not run yet go to the next one. After a fatal error the writer stops for good.
 
-use std::collections::VecDeque;
 use std::fs::File;
 
-use futures_util::FutureExt;
-use futures_util::future::BoxFuture;
 use sqlx::{Connection, SqliteConnection};
 use tokio::sync::{mpsc, oneshot, watch};
 
-use super::batch::{self, Appending};
-use super::changes::Change;
+use super::batch::{self, Appending, Waiting};
+use super::operation::{Answer, Operation, Undo};
 use crate::store::error::{Failure, StoreError};
 use crate::store::observations::ROWS_AT_ONCE;
 
@@ -30,88 +27,6 @@ pub(super) enum Request {
     Append(Appending),
     /// Commit what waits, then close and answer.
     Close(oneshot::Sender<()>),
-}
-
-/// One caller's reads and writes. Given an error instead of a connection, it passes that on as its own.
-pub(super) struct Operation {
-    undo: Undo,
-    run: Run,
-}
-
-/// How what an operation changed before it failed is undone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Undo {
-    /// By a savepoint, two statements more.
-    Savepoint,
-    /// By SQLite, as it changes rows by one statement.
-    Statement,
-}
-
-type Run = Box<dyn for<'c> FnOnce(Result<&'c mut SqliteConnection, StoreError>) -> BoxFuture<'c, Ran> + Send>;
-
-/// An operation that ran: whether its savepoint may be kept, and how to answer its caller once the group's end is known.
-struct Ran {
-    end: Result<(), StoreError>,
-    answer: Answer,
-}
-
-/// Tells a caller how its group ended.
-pub(super) type Answer = Box<dyn FnOnce(Result<(), StoreError>) + Send>;
-
-/// Where the outcome of a write goes, and the change it may be.
-pub(super) struct Reply<T> {
-    change: Option<Change>,
-    sender: oneshot::Sender<Result<T, StoreError>>,
-}
-
-impl<T> Reply<T> {
-    pub(super) fn new(change: Option<Change>) -> (Self, oneshot::Receiver<Result<T, StoreError>>) {
-        let (sender, answer) = oneshot::channel();
-        (Reply { change, sender }, answer)
-    }
-
-    /// Call after the end of the transaction.
-    pub(super) fn send(self, outcome: Result<T, StoreError>) {
-        drop(self.change);
-        // A caller that stopped waiting needs no answer.
-        let _ = self.sender.send(outcome);
-    }
-}
-
-impl Operation {
-    /// `work` as an operation, answered to `reply`.
-    pub(super) fn new<T, W>(doing: &'static str, undo: Undo, work: W, reply: Reply<T>) -> Self
-    where
-        T: Send + 'static,
-        W: for<'c> FnOnce(&'c mut SqliteConnection) -> BoxFuture<'c, Result<T, Failure>> + Send + 'static,
-    {
-        let run: Run = Box::new(move |connection| {
-            async move {
-                let result = match connection {
-                    Ok(connection) => work(connection).await.map_err(|failure| failure.during(doing)),
-                    Err(error) => Err(error),
-                };
-                let end = result.as_ref().map(|_| ()).map_err(StoreError::clone);
-                let answer = Box::new(move |group: Result<(), StoreError>| reply.send(group.and(result)));
-                Ran { end, answer }
-            }
-            .boxed()
-        });
-        Operation { undo, run }
-    }
-}
-
-/// What the next group is made of.
-#[derive(Default)]
-pub(super) struct Waiting {
-    pub operations: VecDeque<Operation>,
-    pub appends: Vec<Appending>,
-}
-
-impl Waiting {
-    fn is_empty(&self) -> bool {
-        self.operations.is_empty() && self.appends.is_empty()
-    }
 }
 
 /// Starts the writer on a thread of its own: its many short waits for SQLite do not queue behind requests.
@@ -228,5 +143,5 @@ async fn run_group(
 
 pub(super) async fn execute(connection: &mut SqliteConnection, statement: &'static str) -> Result<(), StoreError> {
     let result = sqlx::query(statement).execute(connection).await;
-    result.map(|_| ()).map_err(|error| Failure::Sqlite(error).during("committing a group"))
+    result.map(|_| ()).map_err(|error| Failure::sqlite(error).during("committing a group"))
 }

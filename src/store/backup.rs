@@ -14,9 +14,9 @@ use std::path::{Path, PathBuf};
 
 use sqlx::Connection;
 
-use super::opening::{DATABASE, connect, inspect, lock, migrate, opening, unusable, version};
-use crate::store::check::Inspection;
-use crate::store::error::{Failure, StoreError};
+use super::check::Inspection;
+use super::error::{Failure, StoreError};
+use super::sqlite::opening::{DATABASE, connect, inspect, lock, migrate, opening, unusable, version};
 
 /// Copies the database of `dir` into the new file `out`, readable by its owner alone, and verifies the copy, telling what
 /// was verified. A process may hold the folder and write.
@@ -79,7 +79,7 @@ async fn copy(dir: &Path, partial: &Path) -> Result<(), StoreError> {
     let name = partial.to_str().ok_or_else(|| unusable(partial, Error::other("its name is not UTF-8")))?;
     let mut connection = inspect(dir).await?;
     let copied = sqlx::query("VACUUM INTO ?").bind(name).execute(&mut connection).await;
-    copied.map_err(|error| Failure::Sqlite(error).during("copying the database"))?;
+    copied.map_err(|error| Failure::sqlite(error).during("copying the database"))?;
     connection.close().await.map_err(opening)
 }
 

@@ -1,0 +1,48 @@
+//! The investor of the story: what he wants, and what was known before a month.
+
+use super::DemoError;
+use crate::command::monthly_returns::MonthlyReturns;
+
+/// Months of history: twenty years.
+pub const HISTORY: usize = 240;
+pub const INITIAL_WEALTH: f64 = 100.0;
+pub const RISK_AVERSION: f64 = 3.0;
+pub const ALPHA: f64 = 0.1;
+
+/// What was known before a month.
+pub struct Past {
+    pub month: String,
+    pub log_returns: Vec<f64>,
+    /// Bank return per month: that of the last month known.
+    pub rate: f64,
+    mean_return: f64,
+}
+
+impl Past {
+    pub fn before(market: &MonthlyReturns, month: &str) -> Result<Self, DemoError> {
+        let months = market.before(month, HISTORY)?;
+        Ok(Past {
+            month: month.into(),
+            log_returns: months.iter().map(|row| row.risky_return.ln_1p()).collect(),
+            rate: months.last().map_or(0.0, |row| row.risk_free_return),
+            mean_return: months.iter().map(|row| row.risky_return).sum::<f64>() / months.len() as f64,
+        })
+    }
+
+    /// How much more than the bank the average month paid.
+    pub fn edge(&self) -> f64 {
+        self.mean_return - self.rate
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn january_2008_pays_beyond_the_bank_more_than_the_radius_and_1987_less() {
+        let market = MonthlyReturns::bundled().unwrap();
+        assert!(Past::before(&market, "2008-01").unwrap().edge() > 0.0049);
+        assert!(Past::before(&market, "1987-01").unwrap().edge() < 0.0056);
+    }
+}
