@@ -185,11 +185,11 @@ fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads_and_through_json(
     request["design"]["initial_laws"] = json!("resampled");
     let on = |threads: usize, request: &Value| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| train(request.clone()).to_json())
+        pool.install(|| train(request.clone()).to_json().unwrap())
     };
     let one = on(1, &request);
     assert!(one == on(2, &request) && one == on(4, &request), "the bytes differ between thread counts");
-    assert!(Policy::from_json(&one).unwrap().to_json() == one, "the bytes change through JSON");
+    assert!(Policy::from_json(&one).unwrap().to_json().unwrap() == one, "the bytes change through JSON");
     request["seed"] = json!(2);
     assert!(one != on(1, &request), "another seed gives the same bytes");
 }
@@ -269,7 +269,7 @@ fn anybody_can_evaluate_an_exported_policy() {
         "problem": { "horizon": 3, "history": history, "radius": { "rule": "fixed", "radius": 0.004 } },
         "design": { "count": 60 }
     }));
-    let document: Value = serde_json::from_slice(&solved.policy().to_json()).unwrap();
+    let document: Value = serde_json::from_slice(&solved.policy().to_json().unwrap()).unwrap();
     let mut state = solved.initial_state(None, None).unwrap();
     for (step, log_return) in [(1, 0.03), (2, -0.02)] {
         state = solved.advance(&state, 0.5, log_return);
@@ -337,7 +337,7 @@ fn no_import_shows_more_than_the_best_return_earns_in_every_period() {
     let policy = train(
         json!({ "problem": { "horizon": 3, "rate_per_step": 0.002, "history": history }, "design": { "count": 20 } }),
     );
-    let mut claims: Value = serde_json::from_slice(&policy.to_json()).unwrap();
+    let mut claims: Value = serde_json::from_slice(&policy.to_json().unwrap()).unwrap();
     for step in [1, 2] {
         let solution = &mut claims["steps"][step]["solution"];
         solution["value"]["offset"] = json!(1e30);

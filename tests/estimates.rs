@@ -92,7 +92,7 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
             let kept = Kept::new(estimate::kept_by_training(&specification));
             let policy = pool.install(|| Training::with(&specification, kept).unwrap().run(&watch).unwrap());
             // As a worker stores it.
-            let json = policy.to_json();
+            let json = policy.to_json().unwrap();
             let copies = [json.clone(), json];
             drop(copies);
             policy
@@ -112,7 +112,8 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
                 let followers = evaluation.train(&watch).unwrap();
                 let outcomes = evaluation.simulate(&followers, &watch, &|| 0.0).unwrap();
                 let costs = Costs::new(0.0, 0.0, &outcomes);
-                serde_json::to_string(&EvaluationReport::new(&evaluation, &followers, &outcomes, costs)).unwrap()
+                serde_json::to_string(&EvaluationReport::new(&evaluation, &followers, &outcomes, costs).unwrap())
+                    .unwrap()
             })
         });
         holds(what, estimate::evaluation(&request, THREADS).bytes(), taken);

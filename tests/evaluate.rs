@@ -56,7 +56,7 @@ fn simulated(request: Value) -> (Evaluation, Vec<Follower>, Outcomes) {
 
 fn reported(request: Value) -> EvaluationReport {
     let (evaluation, followers, outcomes) = simulated(request);
-    EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS)
+    EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS).unwrap()
 }
 
 /// E[U] of all-stock: log wealth is a sum of ten draws, so normal given how many came from the first component.
@@ -119,7 +119,7 @@ fn the_known_law_promises_its_value_and_keeps_it() {
 fn differences_are_paired() {
     let (evaluation, followers, outcomes) =
         simulated(small(json!({ "frameworks": ["plug_in"], "constant_mixes": [0.4, 0.5], "paths": 400 })));
-    let report = EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS);
+    let report = EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS).unwrap();
     assert_eq!((report.reference.as_str(), report.strategies[0].difference.is_none()), ("plug_in", true));
     let kind = evaluation.request.problem.utility;
     let apart = |outcome: &ballast::control::evaluation::paths::Outcome| {
@@ -207,7 +207,7 @@ fn every_framework_takes_part_whatever_its_default_radius_rule() {
     let mut request = small(rest);
     request["problem"].as_object_mut().unwrap().remove("radius");
     let (evaluation, followers, outcomes) = simulated(request);
-    let report = EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS);
+    let report = EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS).unwrap();
     for (strategy, name) in report.strategies.iter().zip(names) {
         assert_eq!(strategy.strategy, name);
         // A Wasserstein ball is what coverage speaks of, and a set frozen at its history has a policy for each.

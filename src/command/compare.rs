@@ -1,6 +1,7 @@
 //! A comparison of strategies in this process, with its progress on the screen: a bar on a terminal, a line a stage
 //! elsewhere.
 
+use std::error::Error;
 use std::io::{IsTerminal, stderr};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
@@ -106,21 +107,22 @@ impl Workshop {
     /// Simulates a comparison and reports it.
     ///
     /// # Errors
-    /// As the trainings of frameworks frozen at a history.
+    /// As the trainings of frameworks frozen at a history; a policy has no name.
     pub fn compare(
         &self,
         stage: &str,
         evaluation: &Evaluation,
         followers: &[Follower],
         training_seconds: f64,
-    ) -> Result<(Outcomes, EvaluationReport), TrainError> {
+    ) -> Result<(Outcomes, EvaluationReport), Box<dyn Error>> {
         let started = Instant::now();
         let clock = || started.elapsed().as_secs_f64();
-        self.run(stage, evaluation.request.problem.horizon, |watch| {
+        let (outcomes, report) = self.run(stage, evaluation.request.problem.horizon, |watch| {
             let outcomes = evaluation.simulate(followers, watch, &clock)?;
             let costs = Costs::new(training_seconds, clock(), &outcomes);
             let report = EvaluationReport::new(evaluation, followers, &outcomes, costs);
-            Ok((outcomes, report))
-        })
+            Ok::<_, TrainError>((outcomes, report))
+        })?;
+        Ok((outcomes, report?))
     }
 }

@@ -35,7 +35,7 @@ use crate::store::JobState;
 const POLL: Duration = Duration::from_secs(1);
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
-struct Follower {
+struct JobStream {
     service: Arc<Service>,
     caller: Arc<Caller>,
     job: String,
@@ -68,12 +68,12 @@ pub async fn follow(
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
     let caller = caller.caller;
-    let follower = Follower { service, caller, job, changes, last_id, last_state: None, place };
-    let events = stream::unfold(Some(follower), |follower| async { follower?.next().await });
+    let events = JobStream { service, caller, job, changes, last_id, last_state: None, place };
+    let events = stream::unfold(Some(events), |events| async { events?.next().await });
     Ok(Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE)).into_response())
 }
 
-impl Follower {
+impl JobStream {
     /// The next event that differs from the last; none once the job or the service ends, the key is revoked, or the stream
     /// is old.
     async fn next(mut self) -> Option<(Result<Event, Infallible>, Option<Self>)> {

@@ -2,8 +2,6 @@
 
 use std::error::Error;
 
-use serde_json::Value;
-
 use super::problem::{Problem, ProblemKind};
 use super::telemetry;
 use crate::service::allowance::{Refused, TooMany};
@@ -45,9 +43,6 @@ impl From<ServiceError> for Problem {
             ServiceError::Completed { session, horizon } => {
                 let rule = format!("must name a session with fewer than {horizon} periods observed");
                 problem(Kind::SessionCompleted).naming("session", session, rule)
-            }
-            ServiceError::Policy(cause) => {
-                problem(Kind::InvalidPolicy).naming("steps", Value::Null, format!("must make a policy: {cause}"))
             }
             ServiceError::Draining | ServiceError::Busy | ServiceError::Refused(Refused::NoPlace) => {
                 problem(Kind::Overloaded)

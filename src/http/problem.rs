@@ -37,7 +37,6 @@ pub enum ProblemKind {
     UnsupportedMediaType,
     Misdirected,
     InvalidField,
-    InvalidPolicy,
     TooManyRequests,
     QueueFull,
     Internal,
@@ -47,7 +46,7 @@ pub enum ProblemKind {
 
 impl ProblemKind {
     /// In ascending order of status.
-    pub const ALL: [ProblemKind; 25] = [
+    pub const ALL: [ProblemKind; 24] = [
         ProblemKind::MalformedJson,
         ProblemKind::InvalidQuery,
         ProblemKind::InvalidHeader,
@@ -67,7 +66,6 @@ impl ProblemKind {
         ProblemKind::UnsupportedMediaType,
         ProblemKind::Misdirected,
         ProblemKind::InvalidField,
-        ProblemKind::InvalidPolicy,
         ProblemKind::TooManyRequests,
         ProblemKind::QueueFull,
         ProblemKind::Internal,
@@ -102,7 +100,6 @@ impl ProblemKind {
             }
             Self::Misdirected => ("misdirected", S::MISDIRECTED_REQUEST, "The service does not answer to this name"),
             Self::InvalidField => ("invalid-field", S::UNPROCESSABLE_ENTITY, "A field breaks a rule"),
-            Self::InvalidPolicy => ("invalid-policy", S::UNPROCESSABLE_ENTITY, "The document is not a usable policy"),
             Self::TooManyRequests => ("too-many-requests", S::TOO_MANY_REQUESTS, "The tenant calls too often"),
             Self::QueueFull => ("queue-full", S::TOO_MANY_REQUESTS, "The tenant has as many jobs queued as it may"),
             Self::Internal => ("internal", S::INTERNAL_SERVER_ERROR, "The service failed"),

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use thiserror::Error;
 
 use super::allowance::Refused;
-use crate::control::error::{FieldError, PolicyError};
+use crate::control::error::FieldError;
 use crate::store::StoreError;
 
 #[derive(Debug, Error)]
@@ -29,8 +29,6 @@ pub enum ServiceError {
     #[error("the session '{session}' has observed all {horizon} periods of its horizon")]
     Completed { session: String, horizon: usize },
     #[error(transparent)]
-    Policy(PolicyError),
-    #[error(transparent)]
     Store(#[from] StoreError),
     #[error(
         "{address} can be reached by others and the store holds no key: make one with `ballast keys create`, listen on loopback, or say --allow-anonymous"
@@ -44,15 +42,6 @@ pub enum ServiceError {
     Refused(#[from] Refused),
     #[error("{0}")]
     Internal(String),
-}
-
-impl From<PolicyError> for ServiceError {
-    fn from(error: PolicyError) -> Self {
-        match error {
-            PolicyError::Field(field) => ServiceError::Field(field),
-            other => ServiceError::Policy(other),
-        }
-    }
 }
 
 impl ServiceError {

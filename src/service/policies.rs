@@ -86,7 +86,7 @@ impl Policies {
         let checked = tokio::task::spawn_blocking(move || {
             let policy = document.checked()?;
             memory.keeps(&estimate::advising_by(&policy))?;
-            Ok::<_, FieldError>(policy.to_json())
+            policy.to_json().map_err(ServiceError::internal)
         });
         let json = checked.await.map_err(ServiceError::internal)??;
         let policy = content_hash(&json);

@@ -143,15 +143,14 @@ impl Worker {
         let (worker, signal) = (self.clone(), stop.clone());
         let (answer, solved) = mpsc::channel();
         let solving = std::thread::Builder::new().name("job".into()).spawn(move || {
-            let ended = catch_unwind(AssertUnwindSafe(|| worker.solve(&claimed, &signal))).unwrap_or_else(|panic| {
-                Ok(Ended::Finished(JobOutcome::Failed { reason: panic_reason(panic.as_ref()) }))
-            });
+            let ended = catch_unwind(AssertUnwindSafe(|| worker.solve(&claimed, &signal)))
+                .unwrap_or_else(|panic| failed(panic_reason(panic.as_ref())));
             // Nobody listens where the work was given up.
             let _ = answer.send(ended);
         });
         let ended = match &solving {
-            Ok(_) => until_solved(&solved, &stop).unwrap_or_else(|error| ended_by(&job, &error)),
-            Err(error) => Ended::Finished(JobOutcome::Failed { reason: format!("no thread: {error}") }),
+            Ok(_) => until_solved(&solved, &stop),
+            Err(error) => failed(format!("no thread: {error}")),
         };
         self.close_at_last(&job, attempt, &ended);
         keeper.abort();
@@ -172,11 +171,12 @@ impl Worker {
         }
     }
 
-    fn solve(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<Ended, StoreError> {
-        match claimed.row.kind {
+    fn solve(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Ended {
+        let solved = match claimed.row.kind {
             JobKind::Train => self.train(claimed, stop),
             JobKind::Evaluate => self.evaluate(claimed, stop),
-        }
+        };
+        solved.map_or_else(|ended| ended, Ended::Finished)
     }
 
     /// Waits for the memory of a job; how it ends where it can never have it: whoever queued it has more than is here.
@@ -226,15 +226,15 @@ impl Worker {
 }
 
 /// The end of the work; `Stopped` where it goes on past [`PATIENCE`] after the stop signal.
-fn until_solved(solved: &mpsc::Receiver<Result<Ended, StoreError>>, stop: &AtomicBool) -> Result<Ended, StoreError> {
+fn until_solved(solved: &mpsc::Receiver<Ended>, stop: &AtomicBool) -> Ended {
     let mut stopped_at = None;
     loop {
         match solved.recv_timeout(STOP_POLL) {
             Ok(ended) => return ended,
-            Err(mpsc::RecvTimeoutError::Disconnected) => return Ok(Ended::Stopped),
+            Err(mpsc::RecvTimeoutError::Disconnected) => return Ended::Stopped,
             Err(mpsc::RecvTimeoutError::Timeout) if stop.load(Ordering::Relaxed) => {
                 if stopped_at.get_or_insert_with(Instant::now).elapsed() >= PATIENCE {
-                    return Ok(Ended::Stopped);
+                    return Ended::Stopped;
                 }
             }
             Err(mpsc::RecvTimeoutError::Timeout) => {}
@@ -243,11 +243,25 @@ fn until_solved(solved: &mpsc::Receiver<Result<Ended, StoreError>>, stop: &Atomi
 }
 
 /// How a job ends whose checkpoints could not be read or written: trying again helps where the store was full or busy.
-fn ended_by(job: &str, error: &StoreError) -> Ended {
-    tracing::error!(job, error = error as &dyn std::error::Error, "the store failed during a job");
-    match error {
-        StoreError::Full { .. } | StoreError::Unavailable { .. } => Ended::Interrupted(error.clone()),
-        _ => Ended::Finished(JobOutcome::Failed { reason: error.to_string() }),
+impl From<StoreError> for Ended {
+    fn from(error: StoreError) -> Self {
+        match error {
+            StoreError::Full { .. } | StoreError::Unavailable { .. } => Ended::Interrupted(error),
+            _ => {
+                tracing::error!(error = &error as &dyn std::error::Error, "the store failed during a job");
+                failed(error.to_string())
+            }
+        }
+    }
+}
+
+/// How a job ends whose training stopped or failed.
+impl From<TrainError> for Ended {
+    fn from(error: TrainError) -> Self {
+        match error {
+            TrainError::Stopped => Ended::Stopped,
+            error => failed(error.to_string()),
+        }
     }
 }
 
@@ -286,14 +300,6 @@ async fn keep_lease(
 
 fn failed(reason: String) -> Ended {
     Ended::Finished(JobOutcome::Failed { reason })
-}
-
-/// How a job ends whose training stopped or failed.
-fn ended_training(error: &TrainError) -> Ended {
-    match error {
-        TrainError::Stopped => Ended::Stopped,
-        error => failed(error.to_string()),
-    }
 }
 
 fn log_outcome(job: &str, outcome: &JobOutcome) {

@@ -54,7 +54,7 @@ pub fn trained(specification: &Value) -> Vec<u8> {
     let specification = serde_json::from_value(specification.clone()).expect("a specification");
     let stop = AtomicBool::new(false);
     let training = Training::new(&specification).expect("a training");
-    training.run(&Watch { stop: &stop, progress: &|_| {} }).expect("a policy").to_json()
+    training.run(&Watch { stop: &stop, progress: &|_| {} }).expect("a policy").to_json().unwrap()
 }
 
 async fn connection(folder: &Path) -> SqliteConnection {

@@ -48,7 +48,7 @@ impl World {
         let watch = Watch::unwatched();
         let pool = TrainingPool::new(std::thread::available_parallelism().map_or(1, usize::from))?;
         let trained = pool.install(|| training.run(&watch))?;
-        let import = post("/policies/import", &String::from_utf8(trained.to_json())?);
+        let import = post("/policies/import", &String::from_utf8(trained.to_json()?)?);
         let imported = Connection::open(server.addresses[0]).await?.exchange(&import).await?.to_vec();
         let policy = text(&serde_json::from_slice(&imported)?, "policy")?;
         let specification = trained.specification().clone();

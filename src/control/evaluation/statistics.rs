@@ -18,7 +18,15 @@ const BINS: usize = 40;
 
 impl EvaluationReport {
     /// The report of what was simulated, on the current pool. Cost O(strategies paths ln paths).
-    pub fn new(evaluation: &Evaluation, followers: &[Follower], outcomes: &Outcomes, costs: Costs) -> Self {
+    ///
+    /// # Errors
+    /// As [`Policy::to_json`](crate::control::policy::Policy::to_json), from whose bytes a policy has its name.
+    pub fn new(
+        evaluation: &Evaluation,
+        followers: &[Follower],
+        outcomes: &Outcomes,
+        costs: Costs,
+    ) -> serde_json::Result<Self> {
         let request = &evaluation.request;
         let sample = Clustered::new(evaluation.histories.len(), request.paths, request.level);
         let count = request.frameworks.len() + request.mixes().len();
@@ -39,8 +47,9 @@ impl EvaluationReport {
             edges: &edges,
             reference,
         };
-        let strategies: Vec<StrategyReport> = (0..count).into_par_iter().map(|index| table.strategy(index)).collect();
-        EvaluationReport {
+        let strategies = (0..count).into_par_iter().map(|index| table.strategy(index));
+        let strategies: Vec<StrategyReport> = strategies.collect::<serde_json::Result<_>>()?;
+        Ok(EvaluationReport {
             format: FORMAT.to_owned(),
             reference: strategies.get(reference).map_or(String::new(), |strategy| strategy.strategy.clone()),
             histories: table.histories(),
@@ -48,7 +57,7 @@ impl EvaluationReport {
             request: request.clone(),
             costs,
             histogram_edges: edges,
-        }
+        })
     }
 }
 
@@ -81,17 +90,19 @@ struct Table<'a> {
 }
 
 impl Table<'_> {
-    fn strategy(&self, index: usize) -> StrategyReport {
+    fn strategy(&self, index: usize) -> serde_json::Result<StrategyReport> {
         let request = &self.evaluation.request;
         let follower = self.followers.get(index);
         let mix = index.checked_sub(self.followers.len()).and_then(|mix| request.mixes().get(mix)).copied();
         let advisor = follower.and_then(|follower| follower.advisor.as_ref());
         let utilities = self.utilities[index].as_slice();
-        StrategyReport {
-            strategy: follower.map_or_else(|| mix_name(mix.unwrap_or_default()), |follower| follower.framework.name()),
+        let policy = advisor.map(|advisor| advisor.policy().to_json()).transpose()?;
+        Ok(StrategyReport {
+            strategy: follower
+                .map_or_else(|| mix_name(mix.unwrap_or_default()), |follower| follower.framework.name().to_owned()),
             framework: follower.map(|follower| follower.framework),
             constant_mix: mix,
-            policy: advisor.map(|advisor| content_hash(&advisor.policy().to_json())),
+            policy: policy.map(|json| content_hash(&json)),
             utility: self.utility(utilities),
             certainty_equivalent: self.certainty_equivalent(index),
             wealth: WealthReport { mean: self.sample.mean(&self.wealth[index]) },
@@ -100,7 +111,7 @@ impl Table<'_> {
             periods: follower.map(|_| self.periods(index)),
             coverage: follower.filter(|follower| has_ball(follower.framework)).map(|_| self.coverage(index)),
             resolved_share: follower.map(|_| share(self.lived(index), |lived| lived.resolved)),
-        }
+        })
     }
 
     fn utility(&self, utilities: &[f64]) -> UtilityReport {

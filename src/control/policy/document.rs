@@ -47,9 +47,11 @@ impl Policy {
     }
 
     /// The portable form: JSON whose numbers parse back to the same bits.
-    pub fn to_json(&self) -> Vec<u8> {
-        // Serialising plain structs of numbers and strings into memory cannot fail.
-        serde_json::to_vec(self).unwrap_or_default()
+    ///
+    /// # Errors
+    /// None that plain structs of numbers and strings can make.
+    pub fn to_json(&self) -> serde_json::Result<Vec<u8>> {
+        serde_json::to_vec(self)
     }
 
     /// Reads and checks the portable form as hostile input: format, shapes, finite numbers, the specification's rules.

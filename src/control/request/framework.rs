@@ -23,10 +23,16 @@ pub enum Framework {
 }
 
 impl Framework {
-    /// The name on the wire.
-    pub fn name(self) -> String {
-        // A unit variant always has one.
-        serde_json::to_value(self).ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default()
+    /// The name in requests and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Framework::Adaptive => "adaptive",
+            Framework::Static => "static",
+            Framework::KnownLaw => "known_law",
+            Framework::PlugIn => "plug_in",
+            Framework::ParametricStatic => "parametric_static",
+            Framework::ParametricAdaptive => "parametric_adaptive",
+        }
     }
 
     /// True where the empirical law is part of the state.
@@ -42,5 +48,18 @@ impl Framework {
     /// True where returns are taken as normal.
     pub fn is_parametric(self) -> bool {
         matches!(self, Framework::ParametricStatic | Framework::ParametricAdaptive)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_framework_is_called_what_a_request_calls_it() {
+        use Framework::{Adaptive, KnownLaw, ParametricAdaptive, ParametricStatic, PlugIn, Static};
+        for framework in [Adaptive, Static, KnownLaw, PlugIn, ParametricStatic, ParametricAdaptive] {
+            assert_eq!(serde_json::to_value(framework).unwrap(), framework.name());
+        }
     }
 }

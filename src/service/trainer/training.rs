@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use super::super::metrics as names;
-use super::{Ended, Worker, ended_training, failed};
+use super::{Ended, Worker, failed};
 use crate::control::estimate;
 use crate::control::kept::Kept;
 use crate::control::policy::{Policy, content_hash};
@@ -13,21 +13,18 @@ use crate::control::progress::Watch;
 use crate::control::request::specification::Specification;
 use crate::control::solved_step::StepSolution;
 use crate::control::training::Training;
-use crate::store::{ClaimedJob, JobOutcome, StoreError};
+use crate::store::{ClaimedJob, JobOutcome};
 
 impl Worker {
-    pub(super) fn train(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<Ended, StoreError> {
-        let specification: Specification = match serde_json::from_str(&claimed.request_json) {
-            Ok(specification) => specification,
-            Err(error) => return Ok(failed(format!("the stored specification cannot be read: {error}"))),
-        };
-        let _reserved = match self.reserve(&estimate::training(&specification, self.threads)) {
-            Ok(reserved) => reserved,
-            Err(ended) => return Ok(ended),
-        };
+    pub(super) fn train(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<JobOutcome, Ended> {
+        let specification: Specification = serde_json::from_str(&claimed.request_json)
+            .map_err(|error| failed(format!("the stored specification cannot be read: {error}")))?;
+        let _reserved = self.reserve(&estimate::training(&specification, self.threads))?;
         let kept = Kept::new(estimate::kept_by_training(&specification));
-        let trained = self.trained(claimed, &specification, 0, kept, stop)?;
-        Ok(trained.map_or_else(|ended| ended, |policy| Ended::Finished(succeeded(&policy))))
+        let policy = self.trained(claimed, &specification, 0, kept, stop)?;
+        let policy_json =
+            policy.to_json().map_err(|error| failed(format!("the policy cannot be written as JSON: {error}")))?;
+        Ok(JobOutcome::Succeeded { policy_id: content_hash(&policy_json), policy_json })
     }
 
     /// The policy of a specification, going on from the checkpoints; step s is checkpoint `first + s` of the job, whose
@@ -39,12 +36,9 @@ impl Worker {
         first: usize,
         kept: Kept,
         stop: &AtomicBool,
-    ) -> Result<Result<Policy, Ended>, StoreError> {
+    ) -> Result<Policy, Ended> {
         let job = claimed.row.job.as_str();
-        let training = match self.pool.install(|| Training::with(specification, kept)) {
-            Ok(training) => training,
-            Err(error) => return Ok(Err(ended_training(&error))),
-        };
+        let training = self.pool.install(|| Training::with(specification, kept))?;
         let checkpoints = self.runtime.block_on(self.store.checkpoints(job))?;
         let mut steps = resumed(first..first + training.horizon(), &checkpoints);
         if first == 0 || !steps.is_empty() {
@@ -53,23 +47,20 @@ impl Worker {
         for step in (0..training.horizon() - steps.len()).rev() {
             let watch = Watch { stop, progress: &|progress| self.board.advance(job, progress) };
             let started = Instant::now();
-            let solution = match self.pool.install(|| training.solve_step(step, steps.last(), &watch)) {
-                Ok(solution) => solution,
-                Err(error) => return Ok(Err(ended_training(&error))),
-            };
+            let solution = self.pool.install(|| training.solve_step(step, steps.last(), &watch))?;
             metrics::histogram!(names::TRAINING_STEP_SECONDS).record(started.elapsed().as_secs_f64());
-            let Ok(bytes) = solution.to_checkpoint() else {
-                return Ok(Err(failed(format!("step {step}: the solution cannot be written as JSON"))));
-            };
+            let bytes = solution
+                .to_checkpoint()
+                .map_err(|error| failed(format!("step {step}: the solution cannot be written as JSON: {error}")))?;
             let saving = self.store.save_checkpoint(job, claimed.attempt, first + step, &bytes);
             if !self.runtime.block_on(saving)? {
-                return Ok(Err(Ended::Fenced));
+                return Err(Ended::Fenced);
             }
             steps.push(solution);
             self.board.finish_step(job);
         }
         steps.reverse();
-        Ok(Ok(training.into_policy(steps)))
+        Ok(training.into_policy(steps))
     }
 }
 
@@ -79,9 +70,4 @@ fn resumed(range: Range<usize>, checkpoints: &[(usize, Vec<u8>)]) -> Vec<StepSol
     let newest_first = checkpoints.iter().rev().filter(|(step, _)| range.contains(step));
     let in_order = newest_first.zip(range.clone().rev()).take_while(|((step, _), expected)| step == expected);
     in_order.map_while(|((_, bytes), _)| StepSolution::from_checkpoint(bytes)).collect()
-}
-
-fn succeeded(policy: &Policy) -> JobOutcome {
-    let policy_json = policy.to_json();
-    JobOutcome::Succeeded { policy_id: content_hash(&policy_json), policy_json }
 }

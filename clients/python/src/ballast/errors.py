@@ -72,10 +72,6 @@ class InvalidQuery(ProblemError, slug="invalid-query"):
     """A query parameter breaks a rule."""
 
 
-class InvalidPolicy(ProblemError, slug="invalid-policy"):
-    """The imported document is not a usable policy."""
-
-
 class Unauthenticated(ProblemError, slug="unauthenticated"):
     """The service asks for a key, and was shown none that is in force."""
 
