@@ -1,5 +1,6 @@
 //! Who did what: over either store, over HTTP and with the real binary.
 
+#[macro_use]
 mod support;
 
 use std::process::Command;
@@ -123,25 +124,6 @@ async fn a_cut_chain_is_whole_and_says_that_it_was_cut(place: &Place) {
     check(place).await.unwrap();
     place.tamper("DELETE FROM audit WHERE tenant = 'north' AND number = 18").await;
     assert_eq!(check(place).await.unwrap_err().to_string(), "entry 18 of the audit of north is damaged");
-}
-
-macro_rules! on_both_engines {
-    ($($name:ident),* $(,)?) => {
-        mod folder {
-            $(#[tokio::test(flavor = "multi_thread")]
-            async fn $name() {
-                super::$name(&super::Place::folder()).await;
-            })*
-        }
-        mod database {
-            $(#[tokio::test(flavor = "multi_thread")]
-            async fn $name() {
-                if let Some(place) = super::Place::database().await {
-                    super::$name(&place).await;
-                }
-            })*
-        }
-    };
 }
 
 on_both_engines!(

@@ -1,5 +1,7 @@
 //! The robust dynamic programme against independent solutions, and its properties.
 
+mod support;
+
 use std::sync::atomic::AtomicBool;
 
 use ballast::control::error::TrainError;
@@ -8,23 +10,10 @@ use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::state::State;
 use ballast::control::problem::utility::utility;
 use ballast::control::progress::Watch;
-use ballast::control::request::specification::Specification;
 use ballast::control::solved_step::StepSolution;
 use ballast::control::training::Training;
 use serde_json::{Value, json};
-
-fn specification(value: Value) -> Specification {
-    serde_json::from_value::<Specification>(value).unwrap().completed().unwrap()
-}
-
-fn train(value: Value) -> Policy {
-    let watch = Watch::unwatched();
-    Training::new(&specification(value)).unwrap().run(&watch).unwrap()
-}
-
-fn advisor(value: Value) -> Advisor {
-    Advisor::new(train(value))
-}
+use support::policies::{advisor, specification, train};
 
 fn utility_of(case: &Value) -> Value {
     json!({ "kind": case["utility"], "risk_aversion": case["risk_aversion"] })

@@ -156,7 +156,10 @@ fn a_simulated_path_is_the_advisor_s_own() {
         for (index, follower) in followers.iter().enumerate() {
             let advisor = follower.advisor.as_ref().unwrap();
             let start = advisor.initial_state(None, None).unwrap();
-            let (advices, end) = advisor.simulate(start, &evaluation.returns(0, path));
+            let returns = evaluation.returns(0, path);
+            let mut walk = advisor.walk(start, &returns);
+            let advices: Vec<_> = walk.by_ref().collect();
+            let end = walk.state;
             assert_eq!(outcome.wealth[index], end.wealth);
             let lived = &outcome.lived[4 * index..4 * (index + 1)];
             assert!(lived.iter().zip(&advices).all(|(lived, advice)| lived.allocation == advice.allocation));

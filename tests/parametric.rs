@@ -9,26 +9,11 @@ use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::policy::what_if::{Hypothesis, HypotheticalRadius};
 use ballast::control::problem::state::State;
-use ballast::control::progress::Watch;
-use ballast::control::request::specification::Specification;
-use ballast::control::training::Training;
 use serde_json::{Value, json};
 use support::App;
+use support::policies::{advisor, specification, train};
 
 const FRAMEWORKS: [&str; 2] = ["parametric_static", "parametric_adaptive"];
-
-fn specification(value: Value) -> Specification {
-    serde_json::from_value::<Specification>(value).unwrap().completed().unwrap()
-}
-
-fn train(value: Value) -> Policy {
-    let watch = Watch::unwatched();
-    Training::new(&specification(value)).unwrap().run(&watch).unwrap()
-}
-
-fn advisor(value: Value) -> Advisor {
-    Advisor::new(train(value))
-}
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
@@ -307,7 +292,7 @@ async fn a_live_session_equals_the_simulator_and_tells_the_worst_mean_and_varian
         app.open().await;
         let advisor = Advisor::new(Policy::from_json(&app.export().await).unwrap());
         let returns = [0.0123456789, -0.031, 0.044];
-        let (advices, _) = advisor.simulate(advisor.initial_state(None, None).unwrap(), &returns);
+        let advices: Vec<_> = advisor.walk(advisor.initial_state(None, None).unwrap(), &returns).collect();
         let mut state = advisor.initial_state(None, None).unwrap();
         for (index, (advice, log_return)) in advices.iter().zip(returns).enumerate() {
             let (_, action) = app.action().await;

@@ -165,7 +165,7 @@ async fn a_session_lives_on_two_replicas_at_once() {
     for period in 1..=HORIZON {
         let mut expected = returns.clone();
         expected.push(0.0);
-        let (advices, _) = advisor.simulate(start.clone(), &expected);
+        let advices: Vec<_> = advisor.walk(start.clone(), &expected).collect();
         for app in apps {
             let (status, action) = app.action().await;
             assert_eq!((status.as_u16(), &action["period"]), (200, &json!(period)), "{action}");

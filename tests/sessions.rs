@@ -60,7 +60,9 @@ async fn a_live_session_equals_the_simulator_bit_for_bit() {
             let (status, observed) = app.report(index + 1, report).await;
             assert_eq!(status, 200, "{observed}");
             returns.push(number(&observed["log_return"]));
-            let (advices, state) = advisor.simulate(start.clone(), &returns);
+            let mut walk = advisor.walk(start.clone(), &returns);
+            let advices: Vec<_> = walk.by_ref().collect();
+            let state = walk.state;
             let (advice, uncertainty) = (&advices[index], advisor.uncertainty(&state));
             assert_eq!(number(&action["allocation"]), advice.allocation);
             assert_eq!(number(&action["certainty_equivalent"]), advice.certainty_equivalent);

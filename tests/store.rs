@@ -1,5 +1,6 @@
 //! The store's promises, each on both engines: SQLite on a real file, PostgreSQL on a real server.
 
+#[macro_use]
 mod support;
 
 use std::time::Duration;
@@ -13,26 +14,6 @@ use futures_util::future::join_all;
 use support::place::Place;
 
 const POLICY: &[u8] = br#"{"format":"test"}"#;
-
-/// Runs each test over either engine, in a place of its own.
-macro_rules! on_both_engines {
-    ($($name:ident),* $(,)?) => {
-        mod sqlite {
-            $(#[tokio::test(flavor = "multi_thread")]
-            async fn $name() {
-                super::$name(&super::Place::folder()).await;
-            })*
-        }
-        mod postgres {
-            $(#[tokio::test(flavor = "multi_thread")]
-            async fn $name() {
-                if let Some(place) = super::Place::database().await {
-                    super::$name(&place).await;
-                }
-            })*
-        }
-    };
-}
 
 on_both_engines!(
     a_closed_store_answers_unavailable,

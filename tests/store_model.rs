@@ -12,9 +12,8 @@ use ballast::store::{
     ObservationRow, OverQuota, Quota, Quotas, SessionRow, Store, StoreError, Tenant, Usage,
 };
 use proptest::prelude::*;
-use proptest::test_runner::{Config, TestRunner};
 use support::place::Place;
-use tokio::runtime::Runtime;
+use support::random;
 
 const CASES: u32 = 24;
 const LENGTH: usize = 60;
@@ -525,35 +524,25 @@ async fn replay(place: &Place, operations: &[Operation]) {
     store.close().await;
 }
 
-fn run(runtime: &Runtime, place: impl Fn() -> Place) {
-    let mut runner = TestRunner::new(Config { cases: CASES, failure_persistence: None, ..Config::default() });
-    let operations = proptest::collection::vec(operation(), LENGTH);
-    let outcome = runner.run(&operations, |operations| {
-        runtime.block_on(replay(&place(), &operations));
-        Ok(())
-    });
-    outcome.unwrap_or_else(|failure| panic!("{failure}"));
-}
+const TABLES: &str =
+    "jobs, job_requests, job_reports, idempotency_keys, checkpoints, turns, usage, policies, policy_owners,
+                      sessions, observations";
 
 #[test]
 fn sqlite_does_what_the_model_does() {
-    run(&Runtime::new().unwrap(), Place::folder);
+    random::over_folders(CASES, &operations(), async |place, operations| Ok(replay(place, operations).await));
 }
 
 #[test]
 fn postgresql_does_what_the_model_does() {
-    let runtime = Runtime::new().unwrap();
-    let Some(url) = runtime.block_on(support::postgres::database()) else { return };
-    let place = || {
-        runtime.block_on(async {
-            let place = Place::Database(url.clone());
-            place.open().await.close().await;
-            let empty =
-                "TRUNCATE jobs, job_requests, job_reports, idempotency_keys, checkpoints, turns, usage, policies,
-                         policy_owners, sessions, observations";
-            support::postgres::execute(&url, empty).await;
-            place
-        })
-    };
-    run(&runtime, place);
+    random::over_a_database(
+        TABLES,
+        CASES,
+        &operations(),
+        async |place, operations| Ok(replay(place, operations).await),
+    );
+}
+
+fn operations() -> impl Strategy<Value = Vec<Operation>> {
+    proptest::collection::vec(operation(), LENGTH)
 }

@@ -6,12 +6,11 @@ use std::time::Instant;
 
 use ballast::store::{CreateJob, JobKind, JobOutcome, NewJob, Store, Tenant};
 use proptest::prelude::*;
-use proptest::test_runner::{Config, TestRunner};
 use sqlx::AssertSqlSafe;
 use sqlx::Connection;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use support::place::Place;
-use tokio::runtime::Runtime;
+use support::random;
 
 const CASES: u32 = 24;
 const TENANTS: usize = 5;
@@ -92,39 +91,28 @@ async fn waits(place: &Place, before: &[Event], after: &[Event]) -> usize {
     waited
 }
 
-fn run(runtime: &Runtime, place: impl Fn() -> Place) {
-    let mut runner = TestRunner::new(Config { cases: CASES, failure_persistence: None, ..Config::default() });
+const TABLES: &str = "jobs, job_requests, turns, usage, idempotency_keys, checkpoints, job_reports";
+
+/// What happens before a job is queued, and after.
+fn events() -> impl Strategy<Value = (Vec<Event>, Vec<Event>)> {
     let events = || proptest::collection::vec(event(), 0..30);
-    let outcome = runner.run(&(events(), events()), |(before, after)| {
-        let waited = runtime.block_on(waits(&place(), &before, &after));
-        prop_assert!(waited < TENANTS, "{waited} claims of {} others came first", TENANTS - 1);
-        Ok(())
-    });
-    outcome.unwrap_or_else(|failure| panic!("{failure}"));
+    (events(), events())
+}
+
+async fn waits_its_turn(place: &Place, (before, after): &(Vec<Event>, Vec<Event>)) -> Result<(), TestCaseError> {
+    let waited = waits(place, before, after).await;
+    prop_assert!(waited < TENANTS, "{waited} claims of {} others came first", TENANTS - 1);
+    Ok(())
 }
 
 #[test]
 fn a_job_waits_for_one_claim_of_each_other_tenant_over_a_folder() {
-    run(&Runtime::new().unwrap(), Place::folder);
+    random::over_folders(CASES, &events(), waits_its_turn);
 }
 
 #[test]
 fn a_job_waits_for_one_claim_of_each_other_tenant_over_a_database() {
-    let runtime = Runtime::new().unwrap();
-    let Some(url) = runtime.block_on(support::postgres::database()) else { return };
-    let place = || {
-        runtime.block_on(async {
-            let place = Place::Database(url.clone());
-            place.open().await.close().await;
-            support::postgres::execute(
-                &url,
-                "TRUNCATE jobs, job_requests, turns, usage, idempotency_keys, checkpoints, job_reports",
-            )
-            .await;
-            place
-        })
-    };
-    run(&runtime, place);
+    random::over_a_database(TABLES, CASES, &events(), waits_its_turn);
 }
 
 /// Jobs queued by one tenant, behind the store's back.

@@ -45,7 +45,9 @@ fn a_year_equals_the_session_that_lives_it() {
         let watch = Watch::unwatched();
         let advisor = Advisor::new(Training::new(&specification).unwrap().run(&watch).unwrap());
         let returns: Vec<f64> = periods[WALK.window..].iter().map(|period| period.log_return).collect();
-        let (advices, end) = advisor.simulate(advisor.initial_state(None, None).unwrap(), &returns);
+        let mut walk = advisor.walk(advisor.initial_state(None, None).unwrap(), &returns);
+        let advices: Vec<_> = walk.by_ref().collect();
+        let end = walk.state;
         assert_eq!((decisions.len(), advices.len()), (YEAR, YEAR));
         for (decision, advice) in decisions.iter().zip(&advices) {
             let expected =

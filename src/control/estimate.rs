@@ -38,25 +38,25 @@ const LEAST: usize = 8 << 20;
 
 /// Bytes by the field of the request that asks for them.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Estimate {
-    parts: Vec<Asked>,
+pub struct Footprint {
+    parts: Vec<Demand>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-struct Asked {
+struct Demand {
     field: &'static str,
     value: usize,
     bytes: usize,
 }
 
-impl Estimate {
+impl Footprint {
     /// That `field`, which holds `value`, asks for so many bytes.
     pub fn of(field: &'static str, value: usize, bytes: usize) -> Self {
-        Estimate { parts: vec![Asked { field, value, bytes }] }
+        Footprint { parts: vec![Demand { field, value, bytes }] }
     }
 
     fn and(mut self, field: &'static str, value: usize, bytes: usize) -> Self {
-        self.parts.push(Asked { field, value, bytes });
+        self.parts.push(Demand { field, value, bytes });
         self
     }
 
@@ -65,7 +65,7 @@ impl Estimate {
         self.parts.iter().fold(0, |sum, part| sum.saturating_add(part.bytes))
     }
 
-    fn most(&self) -> Option<&Asked> {
+    fn most(&self) -> Option<&Demand> {
         self.parts.iter().max_by_key(|part| part.bytes)
     }
 
@@ -139,10 +139,10 @@ impl Sizes {
 }
 
 /// What a training of a completed specification takes on so many threads.
-pub fn training(specification: &Specification, threads: usize) -> Estimate {
+pub fn training(specification: &Specification, threads: usize) -> Footprint {
     let sizes = Sizes::of(specification);
     let solving = sizes.solving(threads).saturating_add(LEAST);
-    Estimate::of("design.count", sizes.count, sizes.fit())
+    Footprint::of("design.count", sizes.count, sizes.fit())
         .and("problem.horizon", sizes.horizon, sizes.policy())
         .and("problem.radius.paths", sizes.paths, training_keeps(&sizes).saturating_add(sizes.statistics(threads)))
         .and("problem.history", sizes.history, solving)
@@ -158,17 +158,17 @@ fn training_keeps(sizes: &Sizes) -> usize {
 }
 
 /// What of a policy trained from a completed specification must be kept ready to advise by it.
-pub fn advising(specification: &Specification) -> [Estimate; 3] {
+pub fn advising(specification: &Specification) -> [Footprint; 3] {
     let sizes = Sizes::of(specification);
     [
-        Estimate::of("design.count", sizes.count, sizes.factor()),
-        Estimate::of("problem.radius.paths", sizes.paths, sizes.bridges),
-        Estimate::of("problem.horizon", sizes.horizon, sizes.prepared()),
+        Footprint::of("design.count", sizes.count, sizes.factor()),
+        Footprint::of("problem.radius.paths", sizes.paths, sizes.bridges),
+        Footprint::of("problem.horizon", sizes.horizon, sizes.prepared()),
     ]
 }
 
 /// The same of a policy as it is, with the policy itself.
-pub fn advising_by(policy: &Policy) -> [Estimate; 3] {
+pub fn advising_by(policy: &Policy) -> [Footprint; 3] {
     let problem = &policy.specification().problem;
     let sizes = Sizes::of(policy.specification());
     let design = |solution: &Solution| match solution {
@@ -178,19 +178,19 @@ pub fn advising_by(policy: &Policy) -> [Estimate; 3] {
     let designs = policy.steps().iter().map(|step| design(&step.solution));
     let (points, factor) = designs.max_by_key(|(_, bytes)| *bytes).unwrap_or_default();
     [
-        Estimate::of("steps", points, factor),
-        Estimate::of("specification.problem.radius.paths", sizes.paths, sizes.bridges),
-        Estimate::of("specification.problem.horizon", problem.horizon, prepared_bytes(policy)),
+        Footprint::of("steps", points, factor),
+        Footprint::of("specification.problem.radius.paths", sizes.paths, sizes.bridges),
+        Footprint::of("specification.problem.horizon", problem.horizon, prepared_bytes(policy)),
     ]
 }
 
 /// What an evaluation of a completed request takes on so many threads.
-pub fn evaluation(request: &EvaluationRequest, threads: usize) -> Estimate {
+pub fn evaluation(request: &EvaluationRequest, threads: usize) -> Footprint {
     let trainings = request.frameworks.iter().filter_map(|&framework| {
         let specification = request.specification(framework, None).completed().ok()?;
         Some((framework, Sizes::of(&specification), training(&specification, threads)))
     });
-    let trainings: Vec<(Framework, Sizes, Estimate)> = trainings.collect();
+    let trainings: Vec<(Framework, Sizes, Footprint)> = trainings.collect();
     let most = trainings.iter().map(|(.., estimate)| estimate).max_by_key(|estimate| estimate.bytes());
     // Policies frozen at a history are trained on every thread at once.
     let at_once = |framework: Framework| if request.one_policy_for_all(framework) { 1 } else { threads };
@@ -200,7 +200,7 @@ pub fn evaluation(request: &EvaluationRequest, threads: usize) -> Estimate {
     let lived = product(&[request.problem.horizon, request.frameworks.len(), LIVED_BYTES]);
     let outcomes = product(&[paths, strategies * WEALTH_BYTES + lived + PATH_BYTES]);
     most.cloned()
-        .unwrap_or_else(|| Estimate::of("paths", request.paths, LEAST))
+        .unwrap_or_else(|| Footprint::of("paths", request.paths, LEAST))
         .and("frameworks", request.frameworks.len(), policies.fold(kept_by_evaluation(request), usize::saturating_add))
         .and("paths", request.paths, outcomes)
 }

@@ -22,6 +22,7 @@ use crate::service::allowance::Class;
 use crate::service::metrics::{ACTION_SECONDS, OBSERVE_SECONDS};
 use crate::service::observation::{Observe, Observed};
 use crate::service::sessions::{Question, Start};
+use crate::service::what_if::Explain;
 
 /// Open a session.
 #[utoipa::path(post, path = "/sessions", tag = "sessions", request_body = wire::OpenSession,
@@ -143,12 +144,6 @@ pub struct Ask {
 enum Mode {
     Surrogate,
     Resolve,
-}
-
-#[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-enum Explain {
-    WorstCase,
 }
 
 impl access::Question for Ask {

@@ -4,7 +4,6 @@
 //!
 //! Source: Rasmussen and Williams 2006, sections 2.2 and 5.4.
 
-use std::f64::consts::TAU;
 use std::ops::Range;
 
 use nalgebra::DMatrix;
@@ -53,11 +52,6 @@ pub(super) fn kernel_lower(scaled: &DMatrix<f64>, hyper: &Hyperparameters, kerne
         matern::matern_from_squared(below);
         below.iter_mut().for_each(|value| *value *= hyper.signal_variance);
     }
-}
-
-/// ln p(y) = -y^T alpha / 2 - ln det K / 2 - n ln(2 pi) / 2. Source: Rasmussen and Williams 2006, eq. (2.30).
-pub(super) fn log_likelihood(factor: &Cholesky, targets: &[f64], weights: &[f64]) -> f64 {
-    -0.5 * matern::dot(targets, weights) - 0.5 * factor.log_determinant() - 0.5 * targets.len() as f64 * TAU.ln()
 }
 
 /// The posterior mean alone: all that has to be kept of a process to evaluate it.
@@ -233,10 +227,5 @@ impl GaussianProcess {
         let errors = weights.iter().zip(precision.iter()).map(|(weight, p)| weight / p).collect();
         let latent_sd = precision.iter().map(|p| (1.0 / p - self.hyper.noise_variance).max(0.0).sqrt()).collect();
         LeaveOneOut { errors, latent_sd }
-    }
-
-    /// ln p(targets) under the conditioned inputs and scales. Cost O(n^2).
-    pub fn log_marginal_likelihood(&self, targets: &[f64]) -> f64 {
-        log_likelihood(&self.cholesky, targets, &self.cholesky.solve(targets))
     }
 }

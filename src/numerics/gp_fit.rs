@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use nalgebra::DMatrix;
 
 use super::cholesky::{Cholesky, Singular};
-use super::gp::{Hyperparameters, kernel_lower, log_likelihood, squared_distances_below};
+use super::gp::{Hyperparameters, kernel_lower, squared_distances_below};
 use super::matern;
 use super::minimise::{Minimum, SearchOutcome, minimise_bounded};
 use super::quasi_newton::{curvature_at, minimise_from};
@@ -98,7 +98,7 @@ pub fn fit(
         }
     }
     shorten(&mut point, inputs.ncols());
-    let Found { minimum, signal_variance } =
+    let Optimum { minimum, signal_variance } =
         Search { inputs, targets, bounds, stop }.run(&point, curvature_of_a_row.as_ref())?;
     Ok(Fit {
         hyperparameters: hyperparameters(&minimum.point, signal_variance),
@@ -115,23 +115,49 @@ fn shorten(point: &mut [f64], inputs: usize) {
 
 /// Log marginal likelihood and its gradient, in the order log length scales, log signal, log noise variance.
 ///
-///   d ln p / d theta = (1/2) sum_ij W_ij dK_ij / d theta,   W = alpha alpha^T - K^-1,   alpha = K^-1 y
-///   dk / d log l_i = s2 (5/3) (1 + r) exp(-r) ((x_i - y_i) / l_i)^2,   r = sqrt(5) scaled distance
-///
-/// `None` when the matrix is singular to working precision. One factorisation and one inverse: cost O(n^3), and
-/// O(n^2 d) for the contraction. Source: Rasmussen and Williams 2006, eqs. (2.30) and (5.9).
+/// What a fit climbs, at given scales. `None` when the matrix is singular to working precision.
 pub fn log_likelihood_and_gradient(
     inputs: &DMatrix<f64>,
     targets: &[f64],
     hyper: &Hyperparameters,
 ) -> Option<(f64, Vec<f64>)> {
-    let scaled = hyper.scale(inputs);
-    let mut matrices = Matrices::new(targets.len());
-    let factor = matrices.factor(&scaled, hyper)?;
-    let weights = factor.solve(targets);
-    let value = log_likelihood(&factor, targets, &weights);
+    let ratio = hyper.noise_variance / hyper.signal_variance;
+    let unit = Hyperparameters { signal_variance: 1.0, noise_variance: ratio, ..hyper.clone() };
+    let at = likelihood(inputs, targets, &unit, |_| hyper.signal_variance, &mut Matrices::new(targets.len()))?;
+    Some((at.log_likelihood, at.gradient))
+}
+
+/// The likelihood where the kernel has the signal variance s2 = `signal_variance(y^T A^-1 y)`.
+///
+///   ln p(y) = -y^T A^-1 y / (2 s2) - ln det A / 2 - n ln(2 pi s2) / 2,     K = s2 A,  A = R(l) + nu I
+///   d ln p / d theta = (1/2) sum_ij W_ij dA_ij / d theta,   W = alpha alpha^T - A^-1,   alpha = A^-1 y / s
+///   dk / d log l_i = (5/3) (1 + r) exp(-r) ((x_i - y_i) / l_i)^2,   r = sqrt(5) scaled distance
+///
+/// `unit` holds the length scales l, the signal variance 1 and the noise ratio nu. `None` when A is singular to working
+/// precision. One factorisation and one inverse: cost O(n^3), and O(n^2 d) for the contraction.
+/// Source: Rasmussen and Williams 2006, eqs. (2.30) and (5.9).
+/// Checked by: tests/gp.rs, gradients_equal_those_of_scikit_learn.
+fn likelihood(
+    inputs: &DMatrix<f64>,
+    targets: &[f64],
+    unit: &Hyperparameters,
+    signal_variance: impl FnOnce(f64) -> f64,
+    matrices: &mut Matrices,
+) -> Option<Likelihood> {
+    let n = targets.len() as f64;
+    let scaled = unit.scale(inputs);
+    let factor = matrices.factor(&scaled, unit)?;
+    let mut weights = factor.solve(targets);
+    let squares = matern::dot(targets, &weights);
+    let signal_variance = signal_variance(squares);
+    let log_likelihood =
+        -0.5 * squares / signal_variance - 0.5 * factor.log_determinant() - 0.5 * n * (TAU * signal_variance).ln();
+    let root = signal_variance.sqrt();
+    weights.iter_mut().for_each(|weight| *weight /= root);
     factor.inverse_lower(&mut matrices.inverse);
-    Some((value, contract(&scaled, &mut matrices.inverse, &weights, hyper)))
+    matrices.kernel = factor.into_memory();
+    let gradient = contract(&scaled, &mut matrices.inverse, &weights, unit);
+    Some(Likelihood { log_likelihood, gradient, signal_variance })
 }
 
 /// The memory of an evaluation, kept for the next: fresh pages would cost a fifth of its time.
@@ -184,10 +210,11 @@ fn contract(scaled: &DMatrix<f64>, inverse: &mut DMatrix<f64>, alpha: &[f64], hy
     gradient
 }
 
-/// The most likely signal variance at given length scales and noise ratio, with what the search needs there.
-struct Profiled {
+/// The likelihood at some scales, with what a search needs there.
+struct Likelihood {
     log_likelihood: f64,
-    /// In the order log length scales, log noise ratio.
+    /// In the order log length scales, log signal variance, log noise variance; of a search, which profiles the signal
+    /// variance out, log length scales, log noise ratio.
     gradient: Vec<f64>,
     signal_variance: f64,
 }
@@ -201,7 +228,7 @@ struct Search<'a> {
 }
 
 /// Where a search ended.
-struct Found {
+struct Optimum {
     /// Of -ln p.
     minimum: Minimum,
     /// Profiled out there.
@@ -210,7 +237,7 @@ struct Found {
 
 impl Search<'_> {
     /// The best point found from `start`: by L-BFGS-B, or by quasi-Newton steps where the curvature is known.
-    fn run(&self, start: &[f64], curvature_of_a_row: Option<&DMatrix<f64>>) -> Result<Found, FitError> {
+    fn run(&self, start: &[f64], curvature_of_a_row: Option<&DMatrix<f64>>) -> Result<Optimum, FitError> {
         let (lower, upper) = self.limits();
         let mut matrices = Matrices::new(self.targets.len());
         let mut best = (f64::INFINITY, f64::NAN);
@@ -241,7 +268,7 @@ impl Search<'_> {
         match minimum.value {
             _ if stopped() => Err(FitError::Stopped),
             f64::INFINITY => Err(Singular { jitter: 0.0 }.into()),
-            _ => Ok(Found { minimum, signal_variance: best.1 }),
+            _ => Ok(Optimum { minimum, signal_variance: best.1 }),
         }
     }
 
@@ -275,30 +302,19 @@ impl Search<'_> {
     ///
     /// Where s2 is inside its bounds its own slope vanishes, so the gradient is the partial one; where a bound of the noise
     /// holds it, s2 moves against nu. The ridge along which s2 and the length scales trade places is gone, and with it most
-    /// iterations of a search. `None` where A is singular. Cost as [`log_likelihood_and_gradient`].
-    fn profiled(&self, point: &[f64], matrices: &mut Matrices) -> Option<Profiled> {
+    /// iterations of a search. `None` where A is singular. Cost as [`likelihood`].
+    fn profiled(&self, point: &[f64], matrices: &mut Matrices) -> Option<Likelihood> {
         let Search { inputs, targets, bounds, .. } = *self;
-        let n = targets.len() as f64;
         let unit = hyperparameters(point, 1.0);
         let ratio = unit.noise_variance;
-        let scaled = unit.scale(inputs);
-        let factor = matrices.factor(&scaled, &unit)?;
-        let mut weights = factor.solve(targets);
-        let squares = matern::dot(targets, &weights);
         let (signal, noise) = (bounds.signal_variance, bounds.noise_variance);
         let (least, greatest) = (signal[0].max(noise[0] / ratio), signal[1].min(noise[1] / ratio));
-        let signal_variance = (squares / n).max(least).min(greatest);
-        let log_likelihood =
-            -0.5 * squares / signal_variance - 0.5 * factor.log_determinant() - 0.5 * n * (TAU * signal_variance).ln();
-        let root = signal_variance.sqrt();
-        weights.iter_mut().for_each(|weight| *weight /= root);
-        factor.inverse_lower(&mut matrices.inverse);
-        matrices.kernel = factor.into_memory();
-        let mut gradient = contract(&scaled, &mut matrices.inverse, &weights, &unit);
-        let (noise_slope, signal_slope) = (gradient.pop()?, gradient.pop()?);
-        let held_by_noise = signal_variance == noise[0] / ratio || signal_variance == noise[1] / ratio;
-        gradient.push(if held_by_noise { -signal_slope } else { noise_slope });
-        Some(Profiled { log_likelihood, gradient, signal_variance })
+        let profile = |squares: f64| (squares / targets.len() as f64).max(least).min(greatest);
+        let mut at = likelihood(inputs, targets, &unit, profile, matrices)?;
+        let (noise_slope, signal_slope) = (at.gradient.pop()?, at.gradient.pop()?);
+        let held_by_noise = at.signal_variance == noise[0] / ratio || at.signal_variance == noise[1] / ratio;
+        at.gradient.push(if held_by_noise { -signal_slope } else { noise_slope });
+        Some(at)
     }
 }
 

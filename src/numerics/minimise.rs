@@ -41,7 +41,8 @@ pub struct Minimum {
     pub outcome: SearchOutcome,
 }
 
-struct Evaluation {
+/// A point that a line search tried.
+struct Trial {
     point: Vec<f64>,
     value: f64,
     gradient: Vec<f64>,
@@ -50,30 +51,30 @@ struct Evaluation {
 /// What the search has learnt: the last evaluation, so that none is repeated, and the best.
 struct Record<F> {
     objective: F,
-    last: Option<Evaluation>,
+    last: Option<Trial>,
     best: Option<(Vec<f64>, f64)>,
     worst: f64,
     evaluations: usize,
 }
 
 impl<F: FnMut(&[f64]) -> (f64, Vec<f64>)> Record<F> {
-    fn evaluate(&mut self, point: &[f64]) -> &Evaluation {
+    fn evaluate(&mut self, point: &[f64]) -> &Trial {
         if self.last.as_ref().is_none_or(|last| last.point != point) {
             self.evaluations += 1;
             let (value, gradient) = (self.objective)(point);
             let finite = value.is_finite() && gradient.iter().all(|slope| slope.is_finite());
-            let evaluation = if finite {
+            let trial = if finite {
                 if self.best.as_ref().is_none_or(|best| value < best.1) {
                     self.best = Some((point.to_vec(), value));
                 }
                 self.worst = self.worst.max(value);
-                Evaluation { point: point.to_vec(), value, gradient }
+                Trial { point: point.to_vec(), value, gradient }
             } else {
                 // The line search needs a finite number to interpolate: one that it must reject.
                 let value = if self.worst.is_finite() { self.worst + 1.0 + self.worst.abs() } else { f64::MAX };
-                Evaluation { point: point.to_vec(), value, gradient: vec![0.0; point.len()] }
+                Trial { point: point.to_vec(), value, gradient: vec![0.0; point.len()] }
             };
-            self.last = Some(evaluation);
+            self.last = Some(trial);
         }
         self.last.as_ref().expect("evaluated above")
     }

@@ -59,7 +59,7 @@ pub fn minimise_from(
     let mut evaluate = |point: DVector<f64>| {
         evaluations += 1;
         let (value, gradient) = objective_and_gradient(point.as_slice());
-        Evaluation { point, value, gradient: DVector::from_vec(gradient) }
+        Iterate { point, value, gradient: DVector::from_vec(gradient) }
     };
     let (lower, upper) = (DVector::from_column_slice(lower), DVector::from_column_slice(upper));
     let into_box = |point: DVector<f64>| point.sup(&lower).inf(&upper);
@@ -97,20 +97,16 @@ pub fn minimise_from(
     Minimum { point: here.point.as_slice().to_vec(), value: here.value, evaluations, outcome }
 }
 
-struct Evaluation {
+/// A point of the search, with the function and its slopes there.
+struct Iterate {
     point: DVector<f64>,
     value: f64,
     gradient: DVector<f64>,
 }
 
 /// -H^-1 g among the coordinates that are free, H with its eigenvalues made positive; 0 for those held at a bound.
-fn newton_step(
-    curvature: &DMatrix<f64>,
-    here: &Evaluation,
-    lower: &DVector<f64>,
-    upper: &DVector<f64>,
-) -> DVector<f64> {
-    let Evaluation { point, gradient, .. } = here;
+fn newton_step(curvature: &DMatrix<f64>, here: &Iterate, lower: &DVector<f64>, upper: &DVector<f64>) -> DVector<f64> {
+    let Iterate { point, gradient, .. } = here;
     let held = |i: usize| point[i] <= lower[i] && gradient[i] > 0.0 || point[i] >= upper[i] && gradient[i] < 0.0;
     let free: Vec<usize> = (0..point.len()).filter(|&i| !held(i)).collect();
     let mut step = DVector::zeros(point.len());

@@ -16,7 +16,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use super::error::ServiceError;
 use super::metrics as names;
 use crate::control::error::FieldError;
-use crate::control::estimate::Estimate;
+use crate::control::estimate::Footprint;
 use crate::control::kept::{Kept, Part};
 
 /// Parts of the limit, in eighths. What is being made ready has half of what is kept, as [`Kept`] has it.
@@ -157,7 +157,7 @@ impl Memory {
     ///
     /// # Errors
     /// The field that asks for most, with the estimate and the limit.
-    pub fn admits(&self, estimate: &Estimate) -> Result<(), FieldError> {
+    pub fn admits(&self, estimate: &Footprint) -> Result<(), FieldError> {
         refuse_above(self.for_jobs(), "the job", estimate)
     }
 
@@ -165,12 +165,12 @@ impl Memory {
     ///
     /// # Errors
     /// The field that asks for most, with the estimate and the limit.
-    pub fn keeps(&self, things: &[Estimate]) -> Result<(), FieldError> {
+    pub fn keeps(&self, things: &[Footprint]) -> Result<(), FieldError> {
         things.iter().try_for_each(|thing| refuse_above(self.kept.heaviest(), "one of its parts", thing))
     }
 
     /// Waits until the other jobs of this process leave room for a job.
-    pub(super) async fn reserve(&self, estimate: &Estimate) -> Result<Reserved, ServiceError> {
+    pub(super) async fn reserve(&self, estimate: &Footprint) -> Result<Reserved, ServiceError> {
         self.admits(estimate)?;
         let permits = u32::try_from(estimate.bytes() / UNIT).unwrap_or(u32::MAX);
         let permits = self.jobs.clone().acquire_many_owned(permits).await.map_err(ServiceError::internal)?;
@@ -206,7 +206,7 @@ fn eighths(limit: MemoryLimit, count: usize) -> usize {
     limit.bytes / 8 * count
 }
 
-fn refuse_above(limit: usize, what: &str, estimate: &Estimate) -> Result<(), FieldError> {
+fn refuse_above(limit: usize, what: &str, estimate: &Footprint) -> Result<(), FieldError> {
     if estimate.bytes() <= limit {
         return Ok(());
     }
@@ -283,7 +283,7 @@ mod tests {
     #[tokio::test]
     async fn what_cannot_fit_is_refused_by_name_and_what_fits_waits() {
         let memory = Memory::new(MemoryLimit::chosen(8 << 30));
-        let job = |gigabytes: usize| Estimate::of("design.count", 7, gigabytes << 30);
+        let job = |gigabytes: usize| Footprint::of("design.count", 7, gigabytes << 30);
         let refused = memory.reserve(&job(4)).await.err().unwrap().to_string();
         assert!(refused.starts_with("design.count is 7: must be less") && refused.contains("4.29 GB"), "{refused}");
         let first = memory.reserve(&job(2)).await.unwrap();

@@ -8,7 +8,7 @@ use super::error::ServiceError;
 use super::keys::Caller;
 use super::memory::Memory;
 use crate::control::error::FieldError;
-use crate::control::estimate::{self, Estimate};
+use crate::control::estimate::{self, Footprint};
 use crate::control::kept::{Kept, Key};
 use crate::control::policy::advisor::Advisor;
 use crate::control::policy::{Policy, content_hash};
@@ -61,7 +61,7 @@ impl Policies {
     /// # Errors
     /// The bridges that they would ask for are too large to be kept ready.
     pub(super) fn starts_from(&self, advisor: &Advisor, returns: usize) -> Result<(), FieldError> {
-        self.memory.keeps(&[Estimate::of("history", returns, advisor.heaviest_bridges(returns))])
+        self.memory.keeps(&[Footprint::of("history", returns, advisor.heaviest_bridges(returns))])
     }
 
     /// At most `limit` policies, newest first, after the policy with sequence `after`.

@@ -113,11 +113,6 @@ impl ProgressBoard {
         }
     }
 
-    /// Asks every job to stop.
-    pub fn stop_all(&self) {
-        self.lock().values().for_each(|running| running.stop.store(true, Ordering::Relaxed));
-    }
-
     fn lock(&self) -> MutexGuard<'_, HashMap<String, Running>> {
         // No code panics while holding the lock, and a map of progress is usable after any interruption.
         self.running.lock().unwrap_or_else(PoisonError::into_inner)

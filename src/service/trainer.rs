@@ -22,7 +22,7 @@ use super::memory::{Memory, Reserved};
 use super::progress::ProgressBoard;
 use super::shutdown::Shutdown;
 use crate::control::error::TrainError;
-use crate::control::estimate::Estimate;
+use crate::control::estimate::Footprint;
 use crate::control::pool::TrainingPool;
 use crate::store::{ClaimedJob, JobKind, JobOutcome, Store, StoreError};
 
@@ -180,7 +180,7 @@ impl Worker {
     }
 
     /// Waits for the memory of a job; how it ends where it can never have it: whoever queued it has more than is here.
-    fn reserve(&self, estimate: &Estimate) -> Result<Reserved, Ended> {
+    fn reserve(&self, estimate: &Footprint) -> Result<Reserved, Ended> {
         self.runtime.block_on(self.memory.reserve(estimate)).map_err(|error| failed(error.to_string()))
     }
 

@@ -2,16 +2,16 @@
 #![allow(dead_code)]
 
 pub mod certificates;
+#[macro_use]
 pub mod place;
+pub mod policies;
 pub mod postgres;
 pub mod process;
+pub mod random;
 
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use ballast::control::progress::Watch;
-use ballast::control::training::Training;
 use ballast::http::{self, Running};
 use ballast::service::clock::Clock;
 use ballast::service::config::Config;
@@ -51,10 +51,7 @@ pub fn specification(horizon: usize) -> Value {
 
 /// The policy of a specification, trained here and now, as its portable document.
 pub fn trained(specification: &Value) -> Vec<u8> {
-    let specification = serde_json::from_value(specification.clone()).expect("a specification");
-    let stop = AtomicBool::new(false);
-    let training = Training::new(&specification).expect("a training");
-    training.run(&Watch { stop: &stop, progress: &|_| {} }).expect("a policy").to_json().unwrap()
+    policies::train(specification.clone()).to_json().expect("a document")
 }
 
 async fn connection(folder: &Path) -> SqliteConnection {

@@ -9,6 +9,27 @@ use tempfile::TempDir;
 
 use super::postgres;
 
+/// Runs each test over either engine, in a place of its own.
+#[allow(unused_macros)]
+macro_rules! on_both_engines {
+    ($($name:ident),* $(,)?) => {
+        mod sqlite {
+            $(#[tokio::test(flavor = "multi_thread")]
+            async fn $name() {
+                super::$name(&super::Place::folder()).await;
+            })*
+        }
+        mod postgres {
+            $(#[tokio::test(flavor = "multi_thread")]
+            async fn $name() {
+                if let Some(place) = super::Place::database().await {
+                    super::$name(&place).await;
+                }
+            })*
+        }
+    };
+}
+
 pub enum Place {
     Folder(TempDir),
     Database(String),

@@ -29,7 +29,7 @@ pub struct Line {
 
 /// A figure with its interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Estimate {
+pub struct BootstrapEstimate {
     pub value: f64,
     pub interval: [f64; 2],
 }
@@ -40,14 +40,14 @@ pub struct Figures {
     pub strategy: String,
     pub hindsight: bool,
     /// Of mean utility over the whole years, each from wealth 100.
-    pub yearly_certainty_equivalent: Estimate,
+    pub yearly_certainty_equivalent: BootstrapEstimate,
     /// That of the main adaptive strategy less this one.
-    pub adaptive_ahead: Estimate,
-    pub annual_mean: Estimate,
-    pub annual_volatility: Estimate,
-    pub sharpe_ratio: Estimate,
+    pub adaptive_ahead: BootstrapEstimate,
+    pub annual_mean: BootstrapEstimate,
+    pub annual_volatility: BootstrapEstimate,
+    pub sharpe_ratio: BootstrapEstimate,
     /// Share of wealth that changes between bank and asset in a year.
-    pub annual_turnover: Estimate,
+    pub annual_turnover: BootstrapEstimate,
     pub max_drawdown: f64,
     pub final_wealth: f64,
     pub mean_allocation: f64,
@@ -146,7 +146,10 @@ impl Analysis {
             let estimate = |of: &dyn Fn(&[Measured]) -> f64| {
                 let values: Vec<f64> = resampled.iter().map(|measured| of(measured)).collect();
                 let tail = 0.5 * (1.0 - CONFIDENCE);
-                Estimate { value: of(&whole), interval: [quantile(&values, tail), quantile(&values, 1.0 - tail)] }
+                BootstrapEstimate {
+                    value: of(&whole),
+                    interval: [quantile(&values, tail), quantile(&values, 1.0 - tail)],
+                }
             };
             let zero = line.decisions.iter().filter(|decision| decision.allocation <= 0.0).count();
             Figures {

@@ -2,7 +2,7 @@
 
 use ballast::report::{Axis, BarChart, Chart, Page, Table, interval, number};
 
-use super::analysis::{CONFIDENCE, Estimate, Figures, Line, MONTH_BLOCK, RESAMPLES, YEAR_BLOCK, main_line};
+use super::analysis::{BootstrapEstimate, CONFIDENCE, Figures, Line, MONTH_BLOCK, RESAMPLES, YEAR_BLOCK, main_line};
 use super::{Backtest, verdict};
 
 pub fn page(backtest: &Backtest) -> Page {
@@ -135,7 +135,7 @@ fn certainty_equivalents(backtest: &Backtest) -> BarChart {
     // From 100 on, what a year adds: bars from zero would all look alike.
     let chart = BarChart::new("What a year from 100 counts as, beyond 100", Axis::new("certainty equivalent less 100"));
     backtest.analysis.figures.iter().fold(chart, |chart, figures| {
-        let Estimate { value, interval: [low, high] } = figures.yearly_certainty_equivalent;
+        let BootstrapEstimate { value, interval: [low, high] } = figures.yearly_certainty_equivalent;
         chart.bar(&figures.strategy, value - 100.0, Some([low - 100.0, high - 100.0]))
     })
 }
@@ -175,6 +175,6 @@ fn performance_table(backtest: &Backtest) -> Table {
     })
 }
 
-fn estimate(estimate: Estimate, unit: f64, decimals: usize) -> ballast::report::Cell {
+fn estimate(estimate: BootstrapEstimate, unit: f64, decimals: usize) -> ballast::report::Cell {
     interval(unit * estimate.value, estimate.interval.map(|end| unit * end), decimals)
 }

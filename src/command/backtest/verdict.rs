@@ -3,7 +3,7 @@
 use ballast::control::policy::advice::AdviceSource;
 
 use super::Backtest;
-use super::analysis::{Estimate, Figures, main_line};
+use super::analysis::{BootstrapEstimate, Figures, main_line};
 
 /// Below it a resample of years says nothing about the next one.
 const FEWEST_YEARS: usize = 10;
@@ -49,7 +49,7 @@ fn ranking(figures: &[Figures], main: usize) -> String {
 fn against<'a>(others: impl Iterator<Item = &'a Figures>) -> String {
     let mut groups: [Vec<&str>; 3] = Default::default();
     for other in others {
-        let Estimate { interval: [low, high], .. } = other.adaptive_ahead;
+        let BootstrapEstimate { interval: [low, high], .. } = other.adaptive_ahead;
         let group = if low > 0.0 {
             0
         } else if high < 0.0 {
@@ -71,7 +71,7 @@ fn against<'a>(others: impl Iterator<Item = &'a Figures>) -> String {
 /// Whether moving in and out did anything that its average would not have done.
 fn timing(figures: &[Figures], main: usize) -> Option<String> {
     let constant = figures.iter().find(|figures| figures.hindsight)?;
-    let Estimate { value, interval: [low, high] } = constant.adaptive_ahead;
+    let BootstrapEstimate { value, interval: [low, high] } = constant.adaptive_ahead;
     let verdict = match () {
         () if low > 0.0 => "changing the allocation paid",
         () if high < 0.0 => "changing the allocation cost",
@@ -134,7 +134,7 @@ mod tests {
     use super::*;
 
     fn figures(strategy: &str, value: f64, ahead: [f64; 2], hindsight: bool) -> Figures {
-        let at = |value: f64, interval| Estimate { value, interval };
+        let at = |value: f64, interval| BootstrapEstimate { value, interval };
         let none = at(0.0, [0.0; 2]);
         Figures {
             strategy: strategy.into(),

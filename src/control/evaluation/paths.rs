@@ -297,21 +297,21 @@ impl Simulator<'_> {
         lived: &mut Vec<Lived>,
         seconds: &mut f64,
     ) -> Result<f64, TrainError> {
-        let mut state = advisor.initial_state(Some(&self.evaluation.histories[history]), None)?;
+        let start = advisor.initial_state(Some(&self.evaluation.histories[history]), None)?;
         let moves = advisor.specification().problem.framework.learns();
-        for (step, &log_return) in returns.iter().enumerate() {
+        let mut walk = advisor.walk(start, returns);
+        for step in 0..returns.len() {
             self.watch.go_on()?;
             let started = (self.clock)();
-            let advice = advisor.advise(step, &state, AdviceMode::Surrogate);
+            let Some(advice) = walk.next() else { break };
             let resolved = advice.source != AdviceSource::PolicySurrogate;
             if resolved {
                 *seconds += (self.clock)() - started;
             }
             let distance = distances[if moves { step } else { 0 }];
             lived.push(Lived { allocation: advice.allocation, radius: advice.radius, distance, resolved });
-            state = advisor.advance(&state, advice.allocation, log_return);
         }
-        Ok(state.wealth)
+        Ok(walk.state.wealth)
     }
 
     fn report_path(&self) {

@@ -4,8 +4,8 @@
 //! decided side by side, and what wealth became is counted afterwards ([`crate::control::evaluation::account`]).
 
 use crate::control::error::TrainError;
-use crate::control::policy::advice::AdviceSource;
-use crate::control::policy::advisor::{AdviceMode, Advisor};
+use crate::control::policy::advice::{Advice, AdviceSource};
+use crate::control::policy::advisor::Advisor;
 use crate::control::pool::TrainingPool;
 use crate::control::progress::Watch;
 use crate::control::request::framework::Framework;
@@ -166,14 +166,8 @@ impl WalkForward {
         };
         let specification = self.specification(framework, alpha, &periods[start - self.window..start]);
         let advisor = Advisor::new(Training::new(&specification)?.run(watch)?);
-        let mut state = advisor.initial_state(None, None)?;
-        let mut decisions = Vec::with_capacity(year.len());
-        for (step, period) in year.iter().enumerate() {
-            let advice = advisor.advise(step, &state, AdviceMode::Surrogate);
-            state = advisor.advance(&state, advice.allocation, period.log_return);
-            let source = Some(advice.source);
-            decisions.push(Decision { allocation: advice.allocation, radius: advice.radius, source });
-        }
-        Ok(decisions)
+        let returns: Vec<f64> = year.iter().map(|period| period.log_return).collect();
+        let decided = |Advice { allocation, radius, source, .. }| Decision { allocation, radius, source: Some(source) };
+        Ok(advisor.walk(advisor.initial_state(None, None)?, &returns).map(decided).collect())
     }
 }

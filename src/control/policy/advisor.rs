@@ -274,16 +274,30 @@ impl Advisor {
         next_state(state, allocation, log_return, self.specification().problem.rate_per_step)
     }
 
-    /// Follows the policy through `returns` from `start`: the advice before each return, and the state after the last.
-    /// At most `horizon` returns are used.
-    pub fn simulate(&self, start: State, returns: &[f64]) -> (Vec<Advice>, State) {
-        let mut state = start;
-        let mut advices = Vec::with_capacity(returns.len());
-        for (step, &log_return) in returns.iter().take(self.specification().problem.horizon).enumerate() {
-            let advice = self.advise(step, &state, AdviceMode::Surrogate);
-            state = self.advance(&state, advice.allocation, log_return);
-            advices.push(advice);
-        }
-        (advices, state)
+    /// The advice before each of `returns`, followed; at most `horizon` returns are used.
+    pub fn walk<'a>(&'a self, start: State, returns: &'a [f64]) -> Walk<'a> {
+        let horizon = self.specification().problem.horizon;
+        Walk { advisor: self, returns: &returns[..returns.len().min(horizon)], step: 0, state: start }
+    }
+}
+
+/// An investor who follows a policy through given returns.
+pub struct Walk<'a> {
+    advisor: &'a Advisor,
+    returns: &'a [f64],
+    step: usize,
+    /// Where he is now.
+    pub state: State,
+}
+
+impl Iterator for Walk<'_> {
+    type Item = Advice;
+
+    fn next(&mut self) -> Option<Advice> {
+        let log_return = *self.returns.get(self.step)?;
+        let advice = self.advisor.advise(self.step, &self.state, AdviceMode::Surrogate);
+        self.state = self.advisor.advance(&self.state, advice.allocation, log_return);
+        self.step += 1;
+        Some(advice)
     }
 }

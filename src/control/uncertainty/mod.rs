@@ -112,6 +112,18 @@ fn core_returns(lowest: f64, highest: f64) -> (Vec<f64>, f64) {
     ((0..=CORE_RETURNS).map(|index| lowest + index as f64 * gap).collect(), gap)
 }
 
+/// The returns after `start`, as long as `next` has one for the return before and the gap, which grows.
+fn tail(start: f64, mut gap: f64, next: impl Fn(f64, f64) -> Option<f64>) -> Vec<f64> {
+    let mut returns = Vec::new();
+    let mut at = start;
+    while let Some(further) = next(at, gap) {
+        returns.push(further);
+        at = further;
+        gap *= TAIL_RATIO;
+    }
+    returns
+}
+
 fn ball_returns(centre: &Centre, support: Option<Interval>, reach: Reach) -> Vec<f64> {
     let (lowest, highest) = (centre.lowest(), centre.highest());
     let (mut returns, gap) = core_returns(lowest, highest);
@@ -120,12 +132,10 @@ fn ball_returns(centre: &Centre, support: Option<Interval>, reach: Reach) -> Vec
         None => (lowest - reach.below, highest + reach.above),
     };
     for (start, limit, sign) in [(lowest, low, -1.0), (returns[CORE_RETURNS], high, 1.0)] {
-        let (mut at, mut step) = (start, gap);
-        while sign * (limit - at) > COINCIDENT {
-            at = if sign * (limit - at) > 1.5 * step { at + sign * step } else { limit };
-            returns.push(at);
-            step *= TAIL_RATIO;
-        }
+        returns.extend(tail(start, gap, |at, gap| {
+            let left = sign * (limit - at);
+            (left > COINCIDENT).then(|| if left > 1.5 * gap { at + sign * gap } else { limit })
+        }));
     }
     returns.retain(|&z| z >= low && z <= high);
     returns.sort_by(f64::total_cmp);
@@ -141,12 +151,8 @@ fn region_returns(region: &ConfidenceRegion) -> Vec<f64> {
     let mut returns: Vec<f64> = (-core..=core).map(|index| mean + f64::from(index) * gap).collect();
     let (low, high) = region.window();
     for (start, limit, sign) in [(returns[0], low, -1.0), (returns[returns.len() - 1], high, 1.0)] {
-        let (mut at, mut step) = (start, gap);
-        while sign * (limit - at) > 0.0 {
-            step *= TAIL_RATIO;
-            at += sign * step;
-            returns.push(at);
-        }
+        let next = |at: f64, gap: f64| (sign * (limit - at) > 0.0).then(|| at + sign * gap);
+        returns.extend(tail(start, TAIL_RATIO * gap, next));
     }
     returns.sort_by(f64::total_cmp);
     returns
