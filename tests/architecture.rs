@@ -15,6 +15,19 @@ const FLOORS: [&str; 5] = ["numerics", "control", "store", "service", "http"];
 const SERVICE: usize = 3;
 /// What lies behind the face of `control`, named by that floor alone: how a robust step is solved.
 const BEHIND_THE_FACE: [&str; 3] = ["bellman", "surrogate", "uncertainty"];
+/// Files of `control` whose types users send or read as they are, and which therefore describe themselves to the API. A
+/// copy of each for the API alone would be a second place for every field and every sentence about it. What computes is not
+/// among them: nothing of `numerics`, and of `control` neither the method nor the problem.
+const DOCUMENTS: [&str; 8] = [
+    "control/evaluation/report.rs",
+    "control/policy/advice.rs",
+    "control/policy/worst_case.rs",
+    "control/progress.rs",
+    "control/request/evaluation.rs",
+    "control/request/framework.rs",
+    "control/request/specification.rs",
+    "control/solved_step.rs",
+];
 /// Names no floor and is named by none below `service`: what mathematics and facts look like is not their matter.
 const LEAF: &str = "report";
 const FILE_LINES: usize = 350;
@@ -388,6 +401,9 @@ fn faults(source: &Source) -> Vec<String> {
             source.code.match_indices(call).for_each(|(at, _)| fault(at, format!("{call} below service")));
         }
     }
+    if matches!(source.top(), "numerics" | "control") && !DOCUMENTS.contains(&source.path.as_str()) {
+        words(&source.code, "utoipa").for_each(|at| fault(at, "what computes describes nothing for the API".into()));
+    }
     if !source.path.starts_with("control/") {
         words(&source.code, "rayon").for_each(|at| fault(at, "rayon outside control".into()));
     }
@@ -455,6 +471,7 @@ fn the_source_keeps_the_rules_of_the_house() {
     for floor in FLOORS.into_iter().chain([LEAF]) {
         assert!(visited.contains(&format!("{floor}/mod.rs")), "floor {floor} was not visited");
     }
+    assert!(DOCUMENTS.iter().all(|file| visited.contains(*file)), "a document is no file");
     let tests: BTreeSet<String> = sources.iter().flat_map(Source::test_files).collect();
     let faults: Vec<String> = sources.iter().filter(|source| !tests.contains(&source.path)).flat_map(faults).collect();
     assert!(faults.is_empty(), "{} broken rules:\n{}", faults.len(), faults.join("\n"));
@@ -520,6 +537,8 @@ fn a_broken_rule_is_found() {
     assert_eq!(faults_of("report/page.rs", "fn f() { println!() }").len(), 1);
     assert_eq!(faults_of("numerics/gp.rs", "use rayon::prelude::*;").len(), 1);
     assert_eq!(faults_of("control/policy.rs", "use rayon::prelude::*;").len(), 0);
+    assert_eq!(faults_of("control/training.rs", "use utoipa::ToSchema;").len(), 1);
+    assert_eq!(faults_of("control/progress.rs", "use utoipa::ToSchema;").len(), 0);
     assert_eq!(faults_of("store/jobs.rs", "fn f() { let now = Instant::now(); }").len(), 1);
     assert_eq!(faults_of("control/backward.rs", "fn f() { std::thread::sleep(PAUSE); }").len(), 1);
     assert_eq!(faults_of("service/clock.rs", "fn f() { let now = Instant::now(); }").len(), 0);

@@ -10,7 +10,9 @@ use super::policy::prepared::{bytes_ready, factor_bytes, prepared_bytes};
 use super::problem::utility::depends_on_wealth;
 use super::request::evaluation::EvaluationRequest;
 use super::request::framework::Framework;
-use super::request::specification::{DEFAULT_COUNT, RadiusRule, Specification};
+use super::request::rules::DEFAULT_COUNT;
+use super::request::specification::{RadiusRule, Specification};
+use super::surrogate::design::{CANDIDATES_PER_POINT, GUARDS};
 use super::surrogate::stored::Solution;
 use crate::numerics::gp::GaussianProcess;
 
@@ -19,9 +21,7 @@ const NUMBER: usize = 8;
 /// Square matrices of the order of the design that stand at once while both surrogates are fitted side by side: the kernel,
 /// its inverse, the room to invert in and to factor in, each twice.
 const FIT_MATRICES: usize = 8;
-/// Candidates and guards a design point, each with features, scaled inputs and their headers.
-const CANDIDATES: usize = 3;
-const GUARDS: usize = 1000;
+/// A candidate or a guard, with features, scaled inputs and their headers, without the numbers.
 const CANDIDATE_BYTES: usize = 160;
 /// A number of a finished policy: itself, its digits as JSON, and the copies of those that the store is given.
 const POLICY_NUMBER_BYTES: usize = 80;
@@ -124,7 +124,7 @@ impl Sizes {
     /// Bytes while the surrogates of one step are fitted.
     fn fit(&self) -> usize {
         let candidate = 2 * self.inputs * NUMBER + CANDIDATE_BYTES;
-        let candidates = product(&[CANDIDATES * self.count + GUARDS, candidate]);
+        let candidates = product(&[CANDIDATES_PER_POINT * self.count + GUARDS, candidate]);
         product(&[FIT_MATRICES, self.count, self.count, NUMBER]).saturating_add(candidates)
     }
 

@@ -30,9 +30,9 @@ impl TrainingPool {
     pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
         self.0.install(work)
     }
+}
 
-    /// `work` done on every item, in their order, on the pool this is called from.
-    pub fn map<T: Send, R: Send>(items: Vec<T>, work: impl Fn(T) -> R + Sync + Send) -> Vec<R> {
-        items.into_par_iter().map(work).collect()
-    }
+/// `work` done on every item, in their order, on the pool this is called from.
+pub fn map<T: Send, R: Send>(items: Vec<T>, work: impl Fn(T) -> R + Sync + Send) -> Vec<R> {
+    items.into_par_iter().map(work).collect()
 }

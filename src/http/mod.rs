@@ -22,6 +22,7 @@ mod patient;
 mod policies;
 pub mod problem;
 mod router;
+mod schema;
 mod server;
 mod sessions;
 mod telemetry;

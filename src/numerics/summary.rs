@@ -1,7 +1,6 @@
 //! Order statistics, and estimates with their intervals from clustered samples.
 
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
 use super::student::student_two_sided;
 
@@ -22,7 +21,7 @@ pub fn interpolated_quantile(sorted: &[f64], share: f64) -> f64 {
 }
 
 /// A figure and the interval around it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The estimate itself.
     pub value: f64,

@@ -377,7 +377,7 @@ mod tests {
     async fn the_first_key_closes_the_door_for_good() {
         let (_folder, keys) = keys().await;
         let anybody = keys.admit(None).unwrap();
-        assert!(anybody.tenant.is_default() && anybody.may(KeyRole::Admin) && !anybody.has_ended());
+        assert!(anybody.tenant == Tenant::default() && anybody.may(KeyRole::Admin) && !anybody.has_ended());
         known(&keys, vec![row("a", "north", None)]);
         assert!(anybody.has_ended());
         assert_eq!(keys.admit(None).unwrap_err(), Turned::NoKey);

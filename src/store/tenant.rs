@@ -18,10 +18,6 @@ impl Tenant {
         &self.0
     }
 
-    pub fn is_default(&self) -> bool {
-        self.as_str() == DEFAULT
-    }
-
     /// As stored, where it was checked when it was made.
     pub(super) fn stored(name: &str) -> Self {
         Tenant(name.into())

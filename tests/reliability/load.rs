@@ -51,7 +51,7 @@ impl Load {
         Load { clients: clients.collect(), stop, answered }
     }
 
-    /// Waits until so many more reports are acknowledged, or nothing has been for a while.
+    /// Waits until so many more reports are acknowledged, for 20 s at most: under a fault there may be none.
     pub async fn acknowledges(&self, reports: usize) {
         let (asked, start) = (Instant::now(), self.answered.load(Ordering::Relaxed));
         while self.answered.load(Ordering::Relaxed) < start + reports && asked.elapsed() < Duration::from_secs(20) {

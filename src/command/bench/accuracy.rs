@@ -13,7 +13,7 @@ use ballast::control::error::TrainError;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advice::Advice;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
-use ballast::control::pool::TrainingPool;
+use ballast::control::pool::{self, TrainingPool};
 use ballast::control::problem::state::State;
 use ballast::control::progress::Watch;
 use ballast::control::request::specification::{FeatureMap, InitialLaws, RadiusRule, Specification, SurrogateTarget};
@@ -108,7 +108,7 @@ fn fresh_states(specification: &Specification, step: usize, count: usize) -> Vec
 fn solved(problem: &Problem, step: usize, next: &NextValue, count: usize) -> Vec<Truth> {
     let states = fresh_states(&problem.specification, step, count);
     let solver = BellmanStep { problem, step, next };
-    TrainingPool::map(states, |state: State| Truth { floor_gain: solver.solve(&state).floor_gain, state })
+    pool::map(states, |state: State| Truth { floor_gain: solver.solve(&state).floor_gain, state })
 }
 
 fn last_truth(problem: &Problem, count: usize) -> Vec<Truth> {
@@ -175,7 +175,7 @@ fn report(problem: &Problem, advisor: &Advisor, step: usize, truths: &[Truth]) {
         false => NextValue::Terminal,
     };
     let solver = BellmanStep { problem, step, next: &next };
-    let judged = TrainingPool::map(truths.iter().collect(), |truth: &Truth| judge(advisor, solver, truth));
+    let judged = pool::map(truths.iter().collect(), |truth: &Truth| judge(advisor, solver, truth));
     let inside: Vec<&Judged> = judged.iter().filter(|one| one.in_design).collect();
     let errors: Vec<f64> = inside.iter().map(|one| one.error.abs()).collect();
     let regrets: Vec<f64> = judged.iter().map(|one| one.regret).collect();

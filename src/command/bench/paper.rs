@@ -6,7 +6,6 @@ use ballast::control::request::specification::{
 };
 use ballast::numerics::law::ContinuousLaw;
 use ballast::numerics::streams::stream;
-use serde_json::json;
 
 /// The law of the paper's section 3.
 pub fn mixture() -> SamplingLaw {
@@ -27,9 +26,8 @@ pub fn history(count: usize, seed: u64) -> Vec<f64> {
 
 /// The request of the paper with a history of `sample_size` draws.
 pub fn specification(sample_size: usize, horizon: usize, count: usize, initial_laws: InitialLaws) -> Specification {
-    let problem = json!({ "horizon": horizon, "history": history(sample_size, 1) });
     let mut specification = Specification {
-        problem: serde_json::from_value::<ProblemSpecification>(problem).unwrap_or_else(|_| unreachable!()),
+        problem: ProblemSpecification { horizon, ..ProblemSpecification::of(history(sample_size, 1)) },
         design: Default::default(),
         surrogate: Default::default(),
         seed: 1,

@@ -5,7 +5,7 @@ use std::error::Error;
 use ballast::control::bellman::problem::Problem;
 use ballast::control::evaluation::paths::{Evaluation, Follower, Outcomes};
 use ballast::control::evaluation::report::EvaluationReport;
-use ballast::control::pool::TrainingPool;
+use ballast::control::pool;
 use ballast::control::problem::sampling_law::continuous_law;
 use ballast::control::problem::utility::utility;
 use ballast::control::request::evaluation::EvaluationRequest;
@@ -97,14 +97,14 @@ fn seek(plan: &Plan, evaluation: &Evaluation) -> (Quantiles, [Vec<Vec<f64>>; 2])
     let draw = |index: usize| {
         let mut generator = stream(request.seed, "reproduce-seek", index, 0);
         let history: Vec<f64> = (0..SAMPLE_SIZE).map(|_| law.draw(&mut generator)).collect();
-        let found = sets.quantile(&EmpiricalDistribution::new(&history)).map_or(f64::NAN, |found| found.value);
+        let found = sets.measure(&EmpiricalDistribution::new(&history)).quantile.map_or(f64::NAN, |found| found.value);
         (found, history)
     };
     let mut quantiles: Vec<f64> = Vec::new();
     let mut close: [Vec<Vec<f64>>; 2] = Default::default();
     while quantiles.len() < plan.most_drawn && close.iter().any(|found| found.len() < plan.close_histories) {
         let batch = (quantiles.len()..quantiles.len() + BATCH).collect();
-        for (found, history) in TrainingPool::map(batch, draw) {
+        for (found, history) in pool::map(batch, draw) {
             quantiles.push(found);
             for (table, close) in TABLES.iter().zip(&mut close) {
                 if (found / table.quantile - 1.0).abs() <= CLOSENESS {

@@ -6,16 +6,13 @@
 use crate::control::error::TrainError;
 use crate::control::policy::advice::{Advice, AdviceSource};
 use crate::control::policy::advisor::Advisor;
-use crate::control::pool::TrainingPool;
+use crate::control::pool;
 use crate::control::progress::Watch;
 use crate::control::request::framework::Framework;
 use crate::control::request::specification::{
     DesignSpecification, ProblemSpecification, RadiusRule, Specification, SurrogateSpecification, UtilitySpecification,
 };
 use crate::control::training::Training;
-
-/// Simulated bridges behind every radius: the default of a specification.
-const PATHS: usize = 2000;
 
 /// One period of the real world.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,13 +105,9 @@ impl WalkForward {
                 framework,
                 horizon: self.year,
                 rate_per_step: past.last().map_or(0.0, |last| last.bank_return),
-                initial_wealth: 100.0,
-                action_interval: [0.0, 1.0],
                 utility: self.utility(),
-                radius: Some(RadiusRule::Bridge { alpha, paths: PATHS, scale: 1.0 }),
-                support: None,
-                law: None,
-                history: past.iter().map(|period| period.log_return).collect(),
+                radius: Some(RadiusRule::bridge(alpha)),
+                ..ProblemSpecification::of(past.iter().map(|period| period.log_return).collect())
             },
             design: DesignSpecification { count: Some(self.count), ..DesignSpecification::default() },
             surrogate: SurrogateSpecification::default(),
@@ -138,7 +131,7 @@ impl WalkForward {
         // Years outermost, so that years done stay done together.
         let jobs: Vec<(usize, Strategy)> =
             starts.flat_map(|start| strategies.iter().map(move |&strategy| (start, strategy))).collect();
-        let found = TrainingPool::map(jobs, |(start, strategy)| {
+        let found = pool::map(jobs, |(start, strategy)| {
             let decided = self.decide_year(strategy, periods, start, watch);
             if strategy.framework().is_some() {
                 trained();

@@ -1,6 +1,8 @@
 //! A policy made ready to answer: what to hold in a state, what the law and the radius are, where the next return leads.
 //! Live sessions and the simulator call these same functions.
 
+use std::sync::OnceLock;
+
 use super::advice::{Advice, AdviceSource, Uncertainty};
 use super::document::Policy;
 use super::prepared::{PreparedStep, prepared_bytes};
@@ -14,7 +16,7 @@ use crate::control::policy::worst_case::WorstCase;
 use crate::control::problem::state::{State, next_state};
 use crate::control::problem::utility::depends_on_wealth;
 use crate::control::request::specification::{Specification, UtilitySpecification};
-use crate::control::surrogate::stored::Solution;
+use crate::control::surrogate::stored::{Solution, StepSurrogates};
 use crate::control::uncertainty::radius::Measure;
 use crate::numerics::empirical::EmpiricalDistribution;
 
@@ -34,7 +36,8 @@ pub enum AdviceMode {
 pub struct Advisor {
     policy: Policy,
     problem: Problem,
-    steps: Vec<PreparedStep>,
+    /// Of the steps that have surrogates.
+    prepared: Vec<OnceLock<PreparedStep>>,
     kept: Kept,
 }
 
@@ -63,8 +66,12 @@ impl Advisor {
     /// The same with what can be made again in `kept`.
     pub fn with(policy: Policy, kept: Kept) -> Self {
         let problem = policy.problem(kept.clone());
-        let steps = policy.steps().iter().map(|step| PreparedStep::new(&problem.specification, step)).collect();
-        Advisor { policy, problem, steps, kept }
+        let prepared = policy.steps().iter().map(|_| OnceLock::new()).collect();
+        let advisor = Advisor { policy, problem, prepared, kept };
+        for step in 0..advisor.prepared.len() {
+            advisor.surrogates(step);
+        }
+        advisor
     }
 
     /// Bytes it holds, without bridges and factors.
@@ -125,26 +132,32 @@ impl Advisor {
     /// Whether [`Self::advise_from_surrogate`] and [`Self::uncertainty`] take well below a millisecond: what they need is
     /// prepared, and small.
     pub fn is_prompt(&self, step: usize, state: &State) -> bool {
-        let points = match self.policy.steps().get(step).map(|step| &step.solution) {
-            Some(Solution::Surrogates(stored)) => stored.value.weights.len(),
-            _ => 0,
-        };
-        let prepared = match self.steps.get(step) {
-            Some(PreparedStep::Surrogates { factor, .. }) => factor.is_in(&self.kept),
-            _ => true,
+        let (points, is_ready) = match self.surrogates(step) {
+            Some((stored, prepared)) => (stored.value.weights.len(), prepared.factor.is_in(&self.kept)),
+            None => (0, true),
         };
         let cost = self.problem.cost(state);
-        prepared && cost.is_some_and(|cost| cost + points * points / 2 <= PROMPT_COST)
+        is_ready && cost.is_some_and(|cost| cost + points * points / 2 <= PROMPT_COST)
     }
 
     /// Makes what [`Self::is_prompt`] asks for.
     pub fn prepare(&self, step: usize, state: &State) {
         self.problem.prepare(state);
-        if let Some(PreparedStep::Surrogates { factor, .. }) = self.steps.get(step)
-            && let Some(Solution::Surrogates(stored)) = self.policy.steps().get(step).map(|step| &step.solution)
-        {
-            factor.process(&self.kept, stored);
+        if let Some((stored, prepared)) = self.surrogates(step) {
+            prepared.factor.process(&self.kept, stored);
         }
+    }
+
+    /// The surrogates of a step, as stored and made ready; `None` where all its states are one, or past the horizon.
+    fn surrogates(&self, step: usize) -> Option<(&StepSurrogates, &PreparedStep)> {
+        match &self.policy.steps().get(step)?.solution {
+            Solution::Single(_) => None,
+            Solution::Surrogates(stored) => Some((stored, self.prepared_from(step, stored))),
+        }
+    }
+
+    fn prepared_from(&self, step: usize, stored: &StepSurrogates) -> &PreparedStep {
+        self.prepared[step].get_or_init(|| PreparedStep::new(self.specification(), step, stored))
     }
 
     fn predicted(&self, step: usize, state: &State, radius: f64, predicted: &Prediction) -> Advice {
@@ -211,17 +224,15 @@ impl Advisor {
     fn predict(&self, step: usize, state: &State, radius: f64) -> Prediction {
         // An imported policy may claim anything.
         let largest = self.problem.largest_gain(step, state);
-        match &self.steps[step] {
-            PreparedStep::Single(single) => {
+        match &self.policy.steps()[step].solution {
+            Solution::Single(single) => {
                 let in_design = self.is_single_state(step, state);
                 let floor_gain = single.floor_gain.min(largest);
                 Prediction { action: single.action, floor_gain, deviation: 0.0, in_design }
             }
-            PreparedStep::Surrogates { value, policy, factor } => {
+            Solution::Surrogates(stored) => {
+                let PreparedStep { value, policy, factor } = self.prepared_from(step, stored);
                 let input = value.scaling.apply(&self.problem.features_within(state, radius));
-                let Solution::Surrogates(stored) = &self.policy.steps()[step].solution else {
-                    return Prediction { action: 0.0, floor_gain: 0.0, deviation: f64::INFINITY, in_design: false };
-                };
                 let process = factor.process(&self.kept, stored);
                 let deviation =
                     process.as_ref().as_ref().map_or(f64::INFINITY, |found| found.latent_variance(&input).sqrt());

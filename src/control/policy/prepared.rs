@@ -7,9 +7,8 @@ use sha2::{Digest, Sha256};
 use super::document::Policy;
 use crate::control::kept::{Kept, Key};
 use crate::control::request::specification::Specification;
-use crate::control::solved_step::StepSolution;
 use crate::control::surrogate::fitted::{Surrogate, ValueSurrogate};
-use crate::control::surrogate::stored::{SingleSolution, Solution, StepSurrogates};
+use crate::control::surrogate::stored::{Solution, StepSurrogates};
 use crate::control::surrogate::target::TargetMap;
 use crate::numerics::gp::GaussianProcess;
 
@@ -17,19 +16,14 @@ use crate::numerics::gp::GaussianProcess;
 const POLICY_BYTES: usize = 4096;
 const STEP_BYTES: usize = 4096;
 
-/// One step ready for evaluation. The factor behind the predicted deviation is made on first use, and kept elsewhere.
-pub enum PreparedStep {
-    /// The solution of the one state there is.
-    Single(SingleSolution),
-    /// Both surrogates.
-    Surrogates {
-        /// Of the value.
-        value: Box<ValueSurrogate>,
-        /// Of the action, not yet moved into its interval.
-        policy: Box<Surrogate>,
-        /// Behind the predicted deviation of the value.
-        factor: Factor,
-    },
+/// The surrogates of one step ready for evaluation.
+pub struct PreparedStep {
+    /// Of the value.
+    pub value: ValueSurrogate,
+    /// Of the action, not yet moved into its interval.
+    pub policy: Surrogate,
+    /// Behind the predicted deviation of the value; made on first use, and kept elsewhere.
+    pub factor: Factor,
 }
 
 /// The process behind the predicted deviation, which does not depend on the targets: the name it is kept under.
@@ -37,14 +31,11 @@ pub struct Factor(Key);
 
 impl PreparedStep {
     /// Of a step of a policy trained from `specification`.
-    pub fn new(specification: &Specification, step: &StepSolution) -> Self {
-        match &step.solution {
-            Solution::Single(single) => PreparedStep::Single(*single),
-            Solution::Surrogates(stored) => {
-                let policy = Box::new(Surrogate::new(stored, &stored.policy));
-                let value = Box::new(ValueSurrogate::new(stored, TargetMap::new(specification, step.step)));
-                PreparedStep::Surrogates { value, policy, factor: Factor::of(stored) }
-            }
+    pub fn new(specification: &Specification, step: usize, stored: &StepSurrogates) -> Self {
+        PreparedStep {
+            value: ValueSurrogate::new(stored, TargetMap::new(specification, step)),
+            policy: Surrogate::new(stored, &stored.policy),
+            factor: Factor::of(stored),
         }
     }
 }

@@ -7,10 +7,10 @@ use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
 use crate::control::request::framework::Framework;
-use crate::control::request::rules::{self, within};
+use crate::control::request::rules::{self, DEFAULT_COUNT_WEALTH_ALONE, within};
 use crate::control::request::specification::{
-    DEFAULT_COUNT_WEALTH_ALONE, DesignSpecification, InitialLaws, ProblemSpecification, RadiusRule, SamplingLaw,
-    Specification, SurrogateSpecification,
+    DesignSpecification, InitialLaws, ProblemSpecification, RadiusRule, SamplingLaw, Specification,
+    SurrogateSpecification,
 };
 
 const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
@@ -227,14 +227,17 @@ impl EvaluationRequest {
         if !framework.is_frozen() {
             wanted.history.clone_from(&found.problem.history);
         }
-        let parts = |problem: &ProblemSpecification| serde_json::to_value(problem).unwrap_or_default();
-        let (wanted, found) = (parts(&wanted), parts(&found.problem));
+        let field = format!("policies.{}", framework.name());
+        let parts = |problem: &ProblemSpecification| {
+            serde_json::to_value(problem)
+                .map_err(|error| FieldError::new(&field, "a policy", format!("must be JSON: {error}")))
+        };
+        let (wanted, found) = (parts(&wanted)?, parts(&found.problem)?);
         let keys = wanted.as_object().into_iter().chain(found.as_object()).flat_map(|parts| parts.keys());
         for key in keys {
             if wanted.get(key) != found.get(key) {
                 let shown = found.get(key).map_or("absent".into(), |value| format!("{value:.60}"));
                 let rule = format!("must have been trained for this problem.{key}");
-                let field = format!("policies.{}", framework.name());
                 return Err(FieldError::new(field, format!("trained for problem.{key} {shown}"), rule));
             }
         }

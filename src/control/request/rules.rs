@@ -3,14 +3,18 @@
 use crate::control::error::FieldError;
 use crate::control::request::framework::Framework;
 use crate::control::request::specification::{
-    DEFAULT_COUNT, DEFAULT_COUNT_WEALTH_ALONE, InitialLaws, Interval, ProblemSpecification, RadiusRule, SamplingLaw,
-    Specification, SurrogateSpecification, UtilitySpecification,
+    InitialLaws, Interval, ProblemSpecification, RadiusRule, SamplingLaw, Specification, SurrogateSpecification,
+    UtilitySpecification,
 };
 
 /// The covariance matrix of 10,000 points takes 800 MB.
 pub const LARGEST_COUNT: usize = 10_000;
 /// Design points of a step.
 pub const COUNT: std::ops::RangeInclusive<usize> = 10..=LARGEST_COUNT;
+/// Design points per step where the law is part of the state: the paper's count.
+pub const DEFAULT_COUNT: usize = 1000;
+/// Design points per step where the state is wealth alone: the paper's count.
+pub const DEFAULT_COUNT_WEALTH_ALONE: usize = 200;
 /// Ten years of weeks.
 pub const HORIZON: std::ops::RangeInclusive<usize> = 1..=520;
 /// Log-returns of a history.

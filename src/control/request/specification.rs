@@ -135,11 +135,16 @@ pub enum RadiusRule {
 
 impl Default for RadiusRule {
     fn default() -> Self {
-        RadiusRule::Bridge { alpha: defaults::alpha(), paths: defaults::paths(), scale: defaults::scale() }
+        RadiusRule::bridge(defaults::alpha())
     }
 }
 
 impl RadiusRule {
+    /// The bridge rule at this miscoverage, with the default number of paths and no factor.
+    pub fn bridge(alpha: f64) -> Self {
+        RadiusRule::Bridge { alpha, paths: defaults::paths(), scale: defaults::scale() }
+    }
+
     /// The level of the rules that have one.
     pub fn alpha(&self) -> Option<f64> {
         match *self {
@@ -152,6 +157,22 @@ impl RadiusRule {
 }
 
 impl ProblemSpecification {
+    /// The problem of an investor who has seen `history`, every default taken: the paper's.
+    pub fn of(history: Vec<f64>) -> Self {
+        ProblemSpecification {
+            framework: Framework::default(),
+            horizon: defaults::horizon(),
+            rate_per_step: defaults::rate_per_step(),
+            initial_wealth: defaults::initial_wealth(),
+            action_interval: defaults::action_interval(),
+            utility: UtilitySpecification::default(),
+            radius: None,
+            support: None,
+            law: None,
+            history,
+        }
+    }
+
     /// The radius rule given, or the framework's default.
     pub fn radius_rule(&self) -> RadiusRule {
         let default = || match self.framework.is_parametric() {
@@ -206,26 +227,20 @@ pub struct MixtureComponent {
     pub variance: f64,
 }
 
-/// Design points per step where the law is part of the state: the paper's count.
-pub const DEFAULT_COUNT: usize = 1000;
-/// Design points per step where the state is wealth alone: the paper's count.
-pub const DEFAULT_COUNT_WEALTH_ALONE: usize = 200;
-
 /// Which states the surrogates are trained on.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct DesignSpecification {
     /// Design points per step, N. Default 1000; 200 where the state is wealth alone.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub count: Option<usize>,
     /// Where the empirical laws of the design start.
-    #[serde(default)]
     pub initial_laws: InitialLaws,
     /// The law that moves the design forward. Default: `bootstrap`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub sampling_law: Option<SamplingLaw>,
     /// Initial wealths of the design. Default: the initial wealth alone.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub wealth: Option<Interval>,
 }
 
@@ -242,19 +257,15 @@ pub enum InitialLaws {
 
 /// How the surrogates are made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct SurrogateSpecification {
     /// What the value surrogate regresses.
-    #[serde(default)]
     pub target: SurrogateTarget,
     /// What the surrogates see of a state.
-    #[serde(default)]
     pub features: FeatureMap,
     /// Number of moments of the law that enter the features; at most two in the parametric frameworks, whose law has no more.
-    #[serde(default = "defaults::moment_count")]
     pub moment_count: usize,
     /// Where the hyperparameters are searched.
-    #[serde(default)]
     pub bounds: HyperparameterBounds,
 }
 
@@ -263,7 +274,7 @@ impl Default for SurrogateSpecification {
         SurrogateSpecification {
             target: SurrogateTarget::default(),
             features: FeatureMap::default(),
-            moment_count: defaults::moment_count(),
+            moment_count: 4,
             bounds: HyperparameterBounds::default(),
         }
     }
@@ -335,8 +346,5 @@ mod defaults {
     }
     pub fn scale() -> f64 {
         1.0
-    }
-    pub fn moment_count() -> usize {
-        4
     }
 }

@@ -12,8 +12,9 @@ use rand::RngExt;
 use crate::control::problem::sampling_law::{admissible, continuous_law};
 use crate::control::problem::state::{State, next_wealth};
 use crate::control::problem::utility::depends_on_wealth;
+use crate::control::request::rules::DEFAULT_COUNT;
 use crate::control::request::specification::{
-    DEFAULT_COUNT, InitialLaws, Interval, ProblemSpecification, RadiusRule, SamplingLaw, Specification,
+    InitialLaws, Interval, ProblemSpecification, RadiusRule, SamplingLaw, Specification,
 };
 use crate::control::uncertainty::centre::Centre;
 use crate::numerics::confidence_region::{self, ConfidenceRegion, NormalLaw};
@@ -22,9 +23,9 @@ use crate::numerics::law::ContinuousLaw;
 use crate::numerics::streams::stream;
 
 /// Candidates simulated for each design point.
-const CANDIDATES_PER_POINT: usize = 3;
+pub const CANDIDATES_PER_POINT: usize = 3;
 /// States that set the guard: 10 of them lie beyond a guard that 99 % pass.
-const GUARDS: usize = 1000;
+pub const GUARDS: usize = 1000;
 /// One design point in this many is taken as drawn.
 const AS_DRAWN: usize = 4;
 

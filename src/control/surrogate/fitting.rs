@@ -75,12 +75,12 @@ struct Targets {
 }
 
 impl Targets {
-    /// Divides by the root mean square about the offset, which is the mean where `centre` is, else 0.
-    fn new(values: &[f64], centre: Centre) -> Self {
+    /// Divides by the root mean square about the offset, which is the mean of the values or 0.
+    fn new(values: &[f64], prior_mean: PriorMean) -> Self {
         let count = values.len() as f64;
-        let offset = match centre {
-            Centre::Zero => 0.0,
-            Centre::Mean => values.iter().sum::<f64>() / count,
+        let offset = match prior_mean {
+            PriorMean::Zero => 0.0,
+            PriorMean::OfTargets => values.iter().sum::<f64>() / count,
         };
         let size = (values.iter().map(|value| (value - offset).powi(2)).sum::<f64>() / count).sqrt();
         let scale = if size > 1e-12 { size } else { 1.0 };
@@ -90,9 +90,9 @@ impl Targets {
 
 /// The prior mean of a surrogate.
 #[derive(Clone, Copy)]
-enum Centre {
+enum PriorMean {
     Zero,
-    Mean,
+    OfTargets,
 }
 
 impl Fitting<'_> {
@@ -137,9 +137,10 @@ impl Fitting<'_> {
             GaussianProcess::condition(&drawn, targets, hyper).map_err(|error| self.singular("value", error.jitter))
         };
         let gains: Vec<f64> = solved.iter().map(|point| point.floor_gain).collect();
-        let gains = Targets::new(&gains, Centre::Zero).scaled;
+        let gains = Targets::new(&gains, PriorMean::Zero).scaled;
         let errors = condition(&gains, hyper)?.leave_one_out(&gains).errors;
-        let errors = Targets::new(&errors.iter().map(|error| error.abs()).collect::<Vec<f64>>(), Centre::Zero).scaled;
+        let errors =
+            Targets::new(&errors.iter().map(|error| error.abs()).collect::<Vec<f64>>(), PriorMean::Zero).scaled;
         let smooth = Hyperparameters { noise_variance: NOISE_OF_ERRORS * hyper.signal_variance, ..hyper.clone() };
         let expected = condition(&errors, &smooth)?;
         let weight = |input: &Vec<f64>| 1.0 + WEIGHT_OF_ERROR * expected.mean(input).max(0.0).sqrt();
@@ -199,8 +200,8 @@ impl Fitting<'_> {
         let map = TargetMap::new(self.specification, self.step);
         let gains: Vec<f64> = solved.iter().map(|point| map.target(point.floor_gain, point.wealth)).collect();
         let actions: Vec<f64> = solved.iter().map(|point| point.policy_target).collect();
-        let centre = if map.is_value() { Centre::Mean } else { Centre::Zero };
-        [Targets::new(&gains, centre), Targets::new(&actions, Centre::Mean)]
+        let prior_mean = if map.is_value() { PriorMean::OfTargets } else { PriorMean::Zero };
+        [Targets::new(&gains, prior_mean), Targets::new(&actions, PriorMean::OfTargets)]
     }
 
     fn search(

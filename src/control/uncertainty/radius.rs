@@ -13,10 +13,9 @@ use crate::numerics::empirical::EmpiricalDistribution;
 
 /// The radius rule of a specification, with its common random numbers.
 pub struct RadiusEstimator {
+    /// That of the specification; a radius of 0 where the framework has no uncertainty (known law, plug-in).
     rule: RadiusRule,
     seed: u64,
-    /// False where the framework has no uncertainty (known law, plug-in).
-    uncertain: bool,
     /// Sample size at the last step.
     last_size: usize,
     /// Where the common random numbers are kept.
@@ -44,16 +43,18 @@ pub struct Radii {
 impl RadiusEstimator {
     /// Of a completed specification; bridges are kept in `kept`.
     pub fn new(specification: &Specification, kept: Kept) -> Self {
-        let uncertain = !matches!(specification.problem.framework, Framework::KnownLaw | Framework::PlugIn);
-        let rule = specification.problem.radius_rule();
+        let rule = match specification.problem.framework {
+            Framework::KnownLaw | Framework::PlugIn => RadiusRule::Fixed { radius: 0.0 },
+            _ => specification.problem.radius_rule(),
+        };
         let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
         let seed = specification.seed;
-        RadiusEstimator { rule, seed, uncertain, last_size, kept }
+        RadiusEstimator { rule, seed, last_size, kept }
     }
 
     /// True where laws of one sample size have different radii.
     pub fn varies(&self) -> bool {
-        self.uncertain && matches!(self.rule, RadiusRule::Bridge { scale, .. } if scale > 0.0)
+        matches!(self.rule, RadiusRule::Bridge { scale, .. } if scale > 0.0)
     }
 
     /// The name of the bridges of sample size n; all large ones share those of [`GRADED_FROM`].
@@ -74,7 +75,7 @@ impl RadiusEstimator {
     /// Bytes of the largest bridges that a law of `sample_size` values asks for while it learns `steps` more.
     pub fn heaviest(&self, sample_size: usize, steps: usize) -> usize {
         match self.rule {
-            RadiusRule::Bridge { paths, .. } if self.uncertain => {
+            RadiusRule::Bridge { paths, .. } => {
                 let largest_of_its_own = sample_size.max(GRADED_FROM - 1);
                 AbsoluteBridges::bytes_of((sample_size + steps).min(largest_of_its_own), paths)
             }
@@ -90,7 +91,7 @@ impl RadiusEstimator {
     /// Numbers read to measure a law of this size, or `None` where its bridges are yet to be simulated.
     pub fn cost(&self, sample_size: usize) -> Option<usize> {
         match self.rule {
-            RadiusRule::Bridge { paths, .. } if self.uncertain => {
+            RadiusRule::Bridge { paths, .. } => {
                 let ready = |size: usize| self.kept.has(&self.key(size, paths));
                 self.sizes(sample_size).all(ready).then_some(2 * sample_size.min(GRADED_FROM) * paths)
             }
@@ -100,23 +101,16 @@ impl RadiusEstimator {
 
     /// Simulates what measuring laws of this size takes, where that is yet to be done.
     pub fn prepare(&self, sample_size: usize) {
-        if let RadiusRule::Bridge { paths, .. } = self.rule
-            && self.uncertain
-        {
+        if let RadiusRule::Bridge { paths, .. } = self.rule {
             self.sizes(sample_size).for_each(|size| drop(self.bridges(size, paths)));
         }
-    }
-
-    /// The bridge quantile of a law; `None` under other rules and frameworks.
-    pub fn quantile(&self, law: &EmpiricalDistribution) -> Option<Quantile> {
-        self.measure(law).quantile
     }
 
     /// Radius of the ball around `law`, in log-return; of the confidence region, in standard deviations of `law`.
     pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
         let size = law.sample_size();
         match self.rule {
-            RadiusRule::Bridge { alpha, paths, scale } if self.uncertain => {
+            RadiusRule::Bridge { alpha, paths, scale } => {
                 let bridges = self.bridges(size, paths);
                 radius(scale, bridges.bridge_quantile(law, Statistic::Now, alpha), size)
             }
@@ -128,7 +122,7 @@ impl RadiusEstimator {
     pub fn measure(&self, law: &EmpiricalDistribution) -> Measure {
         let size = law.sample_size();
         match self.rule {
-            RadiusRule::Bridge { alpha, paths, scale } if self.uncertain => {
+            RadiusRule::Bridge { alpha, paths, scale } => {
                 let quantile = self.bridges(size, paths).bridge_quantile_with_error(law, alpha);
                 Measure { radius: radius(scale, quantile.value, size), quantile: Some(quantile) }
             }
@@ -140,8 +134,8 @@ impl RadiusEstimator {
     pub fn radii(&self, law: &EmpiricalDistribution, known: f64) -> Radii {
         let size = law.sample_size();
         let radius_ahead = match self.rule {
-            RadiusRule::Bridge { .. } if self.uncertain && size >= self.last_size => known,
-            RadiusRule::Bridge { alpha, paths, scale } if self.uncertain => {
+            RadiusRule::Bridge { .. } if size >= self.last_size => known,
+            RadiusRule::Bridge { alpha, paths, scale } => {
                 let bridges = self.bridges(size + 1, paths);
                 radius(scale, bridges.bridge_quantile(law, Statistic::OneLater, alpha), size + 1)
             }
@@ -154,7 +148,7 @@ impl RadiusEstimator {
     pub fn radii_with(&self, law: &EmpiricalDistribution, values: &[f64]) -> Vec<Radii> {
         let size = law.sample_size() + 1;
         match self.rule {
-            RadiusRule::Bridge { alpha, paths, scale } if self.uncertain => {
+            RadiusRule::Bridge { alpha, paths, scale } => {
                 let quantiles = |which, size| {
                     let found = self.bridges(size, paths).bridge_quantiles_with(law.atoms(), values, which, alpha);
                     found.into_iter().map(|quantile| radius(scale, quantile, size)).collect::<Vec<f64>>()
@@ -175,7 +169,6 @@ impl RadiusEstimator {
         let size = sample_size as f64;
         match self.rule {
             RadiusRule::Bridge { .. } => 0.0,
-            _ if !self.uncertain => 0.0,
             RadiusRule::Concentration { alpha, numerator, rate } => ((numerator / alpha).ln() / (rate * size)).sqrt(),
             RadiusRule::RootN { kappa } => kappa / size.sqrt(),
             RadiusRule::Fixed { radius } => radius,
