@@ -45,7 +45,7 @@ fn prose(page: &str) -> String {
 /// What stands in backticks outside of blocks.
 fn spans(text: &str) -> Vec<String> {
     let text = prose(text);
-    assert!(text.matches('`').count() % 2 == 0, "a backtick without its other: {text}");
+    assert!(text.matches('`').count().is_multiple_of(2), "a backtick without its other: {text}");
     text.split('`').skip(1).step_by(2).map(|span| span.replace('\n', " ")).collect()
 }
 
