@@ -1,4 +1,4 @@
-//! `ballast bench`: the figures the README quotes, measured on this machine.
+//! `ballast bench`: the figures of `docs/measurements.md`, measured on this machine.
 
 use std::error::Error;
 

@@ -1,5 +1,5 @@
-// Takes the two pictures of the README, from the real binary on the bundled returns:
-// a session in the first year of the crisis in light, its policy in dark.
+// Takes two pictures of the documentation, from the real binary on the bundled returns:
+// a session in the first year of the crisis in light (README.md), its policy in dark (docs/choosing.md).
 //   cd tests/browser && npm ci && node screenshots.js
 
 import { readFile, stat } from "node:fs/promises";

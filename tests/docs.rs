@@ -1,0 +1,359 @@
+//! The README and the pages of `docs/` say what is there: links lead somewhere, files and functions that they name exist,
+//! and `docs/requests.md` has every field of every request with its bounds, its default and an example that fits.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use ballast::control::request::specification::Specification;
+use serde_json::{Value, json};
+
+const README_BYTES: usize = 10_000;
+/// Folders at the root whose files the pages name in backticks.
+const FOLDERS: [&str; 11] =
+    [".ci/", "api/", "benches/", "clients/", "data/", "docker/", "docs/", "examples/", "fuzz/", "src/", "tests/"];
+/// What a name in backticks may be in its file.
+const KINDS: [&str; 7] = ["fn", "struct", "enum", "trait", "const", "mod", "type"];
+/// Bounds of which the description is laxer than the rule, which the page has.
+const LAXER_IN_THE_DESCRIPTION: [&str; 1] = ["level"];
+
+fn read(path: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn exists(path: &str) -> bool {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path).exists()
+}
+
+/// Every page by its path from the root.
+fn pages() -> Vec<(String, String)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let names = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut paths: Vec<String> =
+        names.filter(|name| name.ends_with(".md")).map(|name| format!("docs/{name}")).collect();
+    assert!(paths.len() >= 15, "{paths:?}");
+    paths.extend(["README.md".into(), "CONTRIBUTING.md".into()]);
+    paths.into_iter().map(|path| (path.clone(), read(&path))).collect()
+}
+
+/// A page without its blocks of code.
+fn prose(page: &str) -> String {
+    page.split("\n```").step_by(2).collect::<Vec<&str>>().join("\n")
+}
+
+/// What stands in backticks outside of blocks.
+fn spans(text: &str) -> Vec<String> {
+    let text = prose(text);
+    assert!(text.matches('`').count().is_multiple_of(2), "a backtick without its other: {text}");
+    text.split('`').skip(1).step_by(2).map(|span| span.replace('\n', " ")).collect()
+}
+
+/// The name by which a heading is linked to.
+fn anchor(heading: &str) -> String {
+    let kept = heading.trim().to_lowercase().replace(' ', "-");
+    kept.chars().filter(|letter| letter.is_alphanumeric() || matches!(letter, '-' | '_')).collect()
+}
+
+fn anchors(page: &str) -> BTreeSet<String> {
+    let headings = prose(page);
+    headings.lines().filter(|line| line.starts_with('#')).map(|line| anchor(line.trim_start_matches('#'))).collect()
+}
+
+#[test]
+fn the_readme_is_short() {
+    let bytes = read("README.md").len();
+    assert!(bytes < README_BYTES, "{bytes} bytes");
+}
+
+#[test]
+fn every_link_leads_somewhere() {
+    let mut followed = 0;
+    for (path, page) in pages() {
+        let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
+        for link in prose(&page).split("](").skip(1) {
+            let link = link.split(')').next().unwrap();
+            if link.contains("://") {
+                continue;
+            }
+            let (file, at) = link.split_once('#').unwrap_or((link, ""));
+            let target = match (file, file.strip_prefix("../")) {
+                ("", _) => path.clone(),
+                (_, Some(above)) => above.to_owned(),
+                (file, None) if folder.is_empty() => file.to_owned(),
+                (file, None) => format!("{folder}/{file}"),
+            };
+            assert!(exists(&target), "{path}: there is no {target}");
+            assert!(at.is_empty() || anchors(&read(&target)).contains(at), "{path}: no heading {link}");
+            followed += 1;
+        }
+    }
+    assert!(followed > 50, "{followed} links");
+}
+
+/// Whether the file defines the last part of a name such as `Type::function`, and every part before it.
+fn defines(file: &str, name: &str) -> bool {
+    let defined = |part: &str| KINDS.iter().any(|kind| words(file, &format!("{kind} {part}")));
+    let variant = |part: &str| part.starts_with(char::is_uppercase) && words(file, part);
+    name.split("::").all(|part| defined(part) || variant(part))
+}
+
+/// Whether `text` stands in the file, and not as a part of a longer word.
+fn words(file: &str, text: &str) -> bool {
+    let is_word = |letter: char| letter.is_alphanumeric() || letter == '_';
+    file.match_indices(text).any(|(at, _)| !file[at + text.len()..].starts_with(is_word))
+}
+
+#[test]
+fn every_file_and_function_that_is_named_exists() {
+    let mut named = 0;
+    for (path, page) in pages() {
+        for span in spans(&page) {
+            let Some(name) = span.split_whitespace().find(|word| FOLDERS.iter().any(|at| word.starts_with(at))) else {
+                continue;
+            };
+            let (file, item) = name.split_once("::").map_or((name, None), |(file, item)| (file, Some(item)));
+            assert!(exists(file), "{path}: there is no {file}");
+            if let Some(item) = item {
+                assert!(defines(&read(file), item), "{path}: {file} defines no {item}");
+            }
+            named += 1;
+        }
+    }
+    assert!(named > 150, "{named} files named");
+}
+
+#[test]
+fn the_map_has_every_folder_of_the_source() {
+    let readme = read("README.md");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    for entry in fs::read_dir(source).unwrap() {
+        let entry = entry.unwrap();
+        let name = entry.file_name().into_string().unwrap();
+        let named = readme.contains(&format!("`src/{name}/`"));
+        assert!(named || !entry.file_type().unwrap().is_dir(), "the README has no src/{name}/");
+    }
+}
+
+fn description() -> Value {
+    serde_json::from_str(&read("api/openapi.json")).unwrap()
+}
+
+fn resolved<'a>(description: &'a Value, schema: &'a Value) -> &'a Value {
+    match schema["$ref"].as_str() {
+        Some(name) => description.pointer(name.trim_start_matches('#')).unwrap(),
+        None => schema,
+    }
+}
+
+/// Every field below a schema, as `outer.inner` and `list[].inner`, with its schema.
+fn fields(description: &Value, schema: &Value, path: &str, found: &mut Vec<(String, Value)>) {
+    let schema = resolved(description, schema);
+    for (name, property) in schema["properties"].as_object().into_iter().flatten() {
+        let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+        found.push((path.clone(), property.clone()));
+        fields(description, property, &path, found);
+    }
+    for several in ["oneOf", "allOf", "anyOf"] {
+        for one in schema[several].as_array().into_iter().flatten() {
+            fields(description, one, path, found);
+        }
+    }
+    if schema["items"].is_object() {
+        fields(description, &schema["items"], &format!("{path}[]"), found);
+    }
+}
+
+/// The part of a page under the heading of an operation.
+fn section(page: &str, operation: &str) -> String {
+    let heading = format!("\n## `{operation}`\n");
+    let at = page.find(&heading).unwrap_or_else(|| panic!("no heading {operation}"));
+    let rest = &page[at + heading.len()..];
+    rest[..rest.find("\n## ").unwrap_or(rest.len())].to_owned()
+}
+
+/// Whether a name of the page is that of a field; `*` stands for any part.
+fn names(name: &str, path: &str) -> bool {
+    let (name, path): (Vec<&str>, Vec<&str>) = (name.split('.').collect(), path.split('.').collect());
+    name.len() == path.len() && name.iter().zip(path).all(|(name, part)| *name == "*" || *name == part)
+}
+
+/// The rows of the tables whose first cell names a field.
+fn rows(section: &str, path: &str) -> Vec<String> {
+    let first =
+        |line: &&str| line.split(" | ").next().is_some_and(|cell| spans(cell).iter().any(|name| names(name, path)));
+    section.lines().filter(|line| line.starts_with("| ")).filter(first).map(str::to_owned).collect()
+}
+
+fn has_number(text: &str, number: f64) -> bool {
+    let parts = text.split(|letter: char| !(letter.is_ascii_alphanumeric() || matches!(letter, '.' | '-')));
+    let mut numbers = parts.filter_map(|part| part.trim_end_matches('.').parse::<f64>().ok());
+    numbers.any(|found| (found - number).abs() <= 1e-3 * number.abs())
+}
+
+/// The ends that a schema gives a field, or the elements of a list.
+fn ends(schema: &Value) -> Vec<f64> {
+    let of = |schema: &Value| [schema["minimum"].as_f64(), schema["maximum"].as_f64()].into_iter().flatten().collect();
+    let mut ends: Vec<f64> = of(schema);
+    ends.extend::<Vec<f64>>(of(&schema["items"]));
+    // A pair of numbers needs no bound on its length, nor what counts one on its lower end.
+    ends.extend(schema["maxItems"].as_f64());
+    ends.retain(|end| ![0.0, 2.0].contains(end));
+    ends
+}
+
+#[test]
+fn every_field_of_every_request_has_its_row_and_its_bounds() {
+    let (description, page) = (description(), read("docs/requests.md"));
+    let trained = section(&page, "POST /train");
+    let mut seen = 0;
+    for (path, operations) in description["paths"].as_object().unwrap() {
+        for (method, operation) in operations.as_object().unwrap() {
+            let operation_name = format!("{} {path}", method.to_uppercase());
+            let section = section(&page, &operation_name);
+            for parameter in operation["parameters"].as_array().into_iter().flatten() {
+                let name = parameter["name"].as_str().unwrap();
+                assert!(spans(&section).iter().any(|span| span == name), "{operation_name}: no {name}");
+                for end in ends(&parameter["schema"]) {
+                    assert!(has_number(&section, end), "{operation_name}: {name} does not say {end}");
+                }
+                seen += 1;
+            }
+            let mut found = Vec::new();
+            let body = &operation["requestBody"]["content"]["application/json"]["schema"];
+            fields(&description, body, "", &mut found);
+            for (field, schema) in found {
+                let mut said = rows(&section, &field);
+                let outermost = rows(&section, field.split(['.', '[']).next().unwrap());
+                if said.is_empty() && outermost.iter().any(|row| row.contains("[`POST /train`](#post-train)")) {
+                    said = rows(&trained, &field);
+                }
+                assert!(!said.is_empty(), "{operation_name}: no row for {field}");
+                for end in ends(&schema) {
+                    let is_said = has_number(&said.join(" "), end);
+                    assert!(
+                        is_said || LAXER_IN_THE_DESCRIPTION.contains(&field.as_str()),
+                        "{field} does not say {end}"
+                    );
+                }
+                seen += 1;
+            }
+        }
+    }
+    assert!(seen > 150, "{seen} fields and parameters");
+}
+
+#[test]
+fn every_answer_is_described_where_it_is_given() {
+    let (description, page) = (description(), read("docs/requests.md"));
+    let report = spans(&read("docs/evaluation.md"));
+    let mut said: Vec<(String, Vec<String>, BTreeSet<String>)> = Vec::new();
+    for (path, operations) in description["paths"].as_object().unwrap() {
+        for (method, operation) in operations.as_object().unwrap() {
+            let section: Vec<String> = spans(&section(&page, &format!("{} {path}", method.to_uppercase())));
+            for (status, response) in operation["responses"].as_object().unwrap() {
+                let schema = &response["content"]["application/json"]["schema"];
+                if !status.starts_with('2') || !schema["$ref"].is_string() {
+                    continue;
+                }
+                let mut found = Vec::new();
+                fields(&description, schema, "", &mut found);
+                let own = found.into_iter().map(|(field, _)| field).filter(|field| !field.contains(['.', '[']));
+                said.push((schema["$ref"].to_string(), section.clone(), own.collect()));
+            }
+        }
+    }
+    assert!(said.len() >= 15, "{} answers", said.len());
+    for (schema, _, fields) in &said {
+        let somewhere = said.iter().filter(|(other, ..)| other == schema).map(|(_, section, _)| section);
+        let complete = |spans: &Vec<String>| fields.iter().all(|field| spans.contains(field));
+        assert!(somewhere.chain([&report]).any(complete), "no section has all of {schema}: {fields:?}");
+    }
+}
+
+/// What of a value does not fit a schema.
+fn misfits(description: &Value, schema: &Value, value: &Value, path: &str) -> Vec<String> {
+    let schema = resolved(description, schema);
+    if let Some(variants) = schema["oneOf"].as_array() {
+        let tried: Vec<_> = variants.iter().map(|one| misfits(description, one, value, path)).collect();
+        return tried.into_iter().min_by_key(Vec::len).unwrap_or_default();
+    }
+    if let (Some(allowed), Some(word)) = (schema["enum"].as_array(), value.as_str()) {
+        return if allowed.contains(&json!(word)) { Vec::new() } else { vec![format!("{path} is {word}")] };
+    }
+    let mut found = Vec::new();
+    match value {
+        Value::Object(members) => {
+            let required = schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str);
+            found.extend(
+                required.filter(|name| !members.contains_key(*name)).map(|name| format!("{path}.{name} lacks")),
+            );
+            for (name, member) in members {
+                match schema["properties"].get(name) {
+                    Some(property) => found.extend(misfits(description, property, member, &format!("{path}.{name}"))),
+                    None if schema["additionalProperties"].is_object() => {}
+                    None => found.push(format!("{path}.{name} is no field")),
+                }
+            }
+        }
+        Value::Array(items) if schema["items"].is_object() => {
+            found.extend(items.iter().flat_map(|item| misfits(description, &schema["items"], item, path)));
+        }
+        Value::Number(number) => {
+            let number = number.as_f64().unwrap();
+            let (low, high) = (schema["minimum"].as_f64(), schema["maximum"].as_f64());
+            if low.is_some_and(|low| number < low) || high.is_some_and(|high| number > high) {
+                found.push(format!("{path} is {number}"));
+            }
+        }
+        _ => {}
+    }
+    found
+}
+
+#[test]
+fn every_example_fits_its_request() {
+    let (description, page) = (description(), read("docs/requests.md"));
+    let mut examples = 0;
+    for (path, operations) in description["paths"].as_object().unwrap() {
+        let body = &operations["post"]["requestBody"]["content"]["application/json"]["schema"];
+        if body["$ref"].is_null() {
+            continue;
+        }
+        let section = section(&page, &format!("POST {path}"));
+        let example = section.split("```json\n").nth(1).unwrap_or_else(|| panic!("{path} has no example"));
+        let example: Value = serde_json::from_str(example.split("```").next().unwrap()).unwrap();
+        assert_eq!(misfits(&description, body, &example, path), [""; 0]);
+        examples += 1;
+    }
+    assert_eq!(examples, 5);
+}
+
+#[test]
+fn the_defaults_are_those_of_a_training() {
+    let least = json!({ "problem": { "history": [0.01, -0.02, 0.03] } });
+    let completed = serde_json::from_value::<Specification>(least).unwrap().completed().unwrap();
+    let completed = serde_json::to_value(completed).unwrap();
+    let section = section(&read("docs/requests.md"), "POST /train");
+    let mut compared = BTreeSet::new();
+    for row in section.lines().filter(|line| line.starts_with("| `")) {
+        let cells: Vec<&str> = row.trim_matches('|').split(" | ").collect();
+        let (Some(name), Some(default)) = (spans(cells[0]).first().cloned(), cells.get(2)) else { continue };
+        let Some(default) = default.trim().strip_prefix('`').and_then(|rest| rest.split('`').next()) else { continue };
+        let default: Value = serde_json::from_str(default).unwrap_or_else(|error| panic!("{name}: {default}: {error}"));
+        let found = completed.pointer(&format!("/{}", name.replace('.', "/")));
+        assert_eq!(found, Some(&default), "{name}");
+        compared.insert(name);
+    }
+    let parts = ["problem", "design", "surrogate", "surrogate.bounds"];
+    let mut all: Vec<String> = vec!["seed".into()];
+    for part in parts {
+        let object = completed.pointer(&format!("/{}", part.replace('.', "/"))).unwrap().as_object().unwrap();
+        all.extend(object.keys().map(|name| format!("{part}.{name}")));
+    }
+    // Required, a part itself, or another field's value.
+    let said_in_words = ["problem.history", "surrogate.bounds", "design.wealth"];
+    all.retain(|name| !said_in_words.contains(&name.as_str()));
+    let missing: Vec<&String> = all.iter().filter(|name| !compared.contains(*name)).collect();
+    assert!(missing.is_empty(), "no default of {missing:?}");
+}
