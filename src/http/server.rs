@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
+use futures_util::future::LocalBoxFuture;
 use hyper_util::server::graceful::GracefulShutdown;
 use thiserror::Error;
 use tokio::task::JoinHandle;
@@ -82,7 +83,12 @@ impl Running {
 ///
 /// # Errors
 /// An address is taken, or public without encryption; the certificate cannot be used; the service cannot start.
-pub async fn serve(config: Config, shutdown: Shutdown) -> Result<Running, ServeError> {
+pub fn serve(config: Config, shutdown: Shutdown) -> LocalBoxFuture<'static, Result<Running, ServeError>> {
+    // Boxed, the whole application is compiled into the library, and not again into every program that serves it.
+    Box::pin(start(config, shutdown))
+}
+
+async fn start(config: Config, shutdown: Shutdown) -> Result<Running, ServeError> {
     telemetry::install_recorder();
     let exposed = std::iter::once(config.listen).chain(config.operations_listen).find(|at| !at.ip().is_loopback());
     if let (Some(address), None, false) = (exposed, &config.tls, config.allow_plaintext) {

@@ -125,7 +125,7 @@ pub async fn observe(
 ) -> Result<Json<Observed>, Problem> {
     let started = Instant::now();
     let report = Observe { reported_by: caller.key().clone(), ..report };
-    let observed = service.sessions.observe(&caller.tenant, report, &caller.turn).await?;
+    let observed = service.sessions.observe(&caller.tenant, &report, &caller.turn).await?;
     metrics::histogram!(OBSERVE_SECONDS).record(started.elapsed().as_secs_f64());
     Ok(Json(observed))
 }

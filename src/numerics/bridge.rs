@@ -48,13 +48,13 @@ impl AbsoluteBridges {
 
     /// The (1 - alpha)-quantile of a statistic of `law`; `alpha` in [0.001, 0.999], here and below.
     pub fn bridge_quantile(&self, law: &EmpiricalDistribution, which: Statistic, alpha: f64) -> f64 {
-        self.lengths.quantile(1.0 - alpha, &self.directional_statistic(law.atoms(), which))
+        self.lengths.quantile(1.0 - alpha, &mut self.directional_statistic(law.atoms(), which))
     }
 
     /// That of the law itself, with the standard error of its simulation.
     pub fn bridge_quantile_with_error(&self, law: &EmpiricalDistribution, alpha: f64) -> Quantile {
-        let statistic = self.directional_statistic(law.atoms(), Statistic::Now);
-        let (value, standard_error) = self.lengths.quantile_with_error(1.0 - alpha, &statistic);
+        let mut statistic = self.directional_statistic(law.atoms(), Statistic::Now);
+        let (value, standard_error) = self.lengths.quantile_with_error(1.0 - alpha, &mut statistic);
         Quantile { value, standard_error }
     }
 
@@ -92,7 +92,7 @@ impl AbsoluteBridges {
                 weights.place(below + 1, size, atoms[below] - value, which);
             }
             weights.pour(&mut statistic);
-            quantiles.push(self.lengths.quantile_next(1.0 - alpha, &statistic, &mut last));
+            quantiles.push(self.lengths.quantile_next(1.0 - alpha, &mut statistic, &mut last));
         }
         quantiles
     }

@@ -45,7 +45,6 @@ pub struct ScaleMixture {
 #[derive(Debug, Clone, Default)]
 pub struct LastQuantile {
     found: Option<Found>,
-    reciprocals: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -75,35 +74,35 @@ impl ScaleMixture {
     }
 
     /// The `share`-quantile of R h from draws of h, none negative; `share` in [0.001, 0.999], where the polynomial
-    /// stands for F. Cost O(draws).
-    pub fn quantile(&self, share: f64, draws: &[f64]) -> f64 {
+    /// stands for F. Cost O(draws), which are overwritten, here and below.
+    pub fn quantile(&self, share: f64, draws: &mut [f64]) -> f64 {
         self.quantile_within(TOLERANCE, share, draws, &mut LastQuantile::default())
     }
 
     /// The same, to 1e-6 of itself, for one of many sets of draws that are alike.
-    pub fn quantile_next(&self, share: f64, draws: &[f64], last: &mut LastQuantile) -> f64 {
+    pub fn quantile_next(&self, share: f64, draws: &mut [f64], last: &mut LastQuantile) -> f64 {
         self.quantile_within(NEXT_TOLERANCE, share, draws, last)
     }
 
     /// The quantile with its standard error: the deviation of F(q / h), over the density at q.
-    pub fn quantile_with_error(&self, share: f64, draws: &[f64]) -> (f64, f64) {
+    pub fn quantile_with_error(&self, share: f64, draws: &mut [f64]) -> (f64, f64) {
         let mut last = LastQuantile::default();
         let quantile = self.quantile_within(TOLERANCE, share, draws, &mut last);
         let Some(Found { slope, .. }) = last.found else { return (0.0, 0.0) };
-        let square = self.mean(quantile, &last.reciprocals, |share| share * share);
+        let reciprocals = &*draws;
+        let square = self.mean(quantile, reciprocals, |share| share * share);
         let variance = (square - share * share).max(0.0);
         (quantile, (variance / draws.len() as f64).sqrt() * quantile / slope)
     }
 
-    fn quantile_within(&self, tolerance: f64, share: f64, draws: &[f64], last: &mut LastQuantile) -> f64 {
+    /// Leaves the reciprocals of the draws in their place, unless all of them are zero.
+    fn quantile_within(&self, tolerance: f64, share: f64, draws: &mut [f64], last: &mut LastQuantile) -> f64 {
         let mean = sum(draws) / draws.len() as f64;
         if mean <= 0.0 {
             last.found = None;
             return 0.0;
         }
-        let LastQuantile { found, reciprocals } = last;
-        reciprocals.resize(draws.len(), 0.0);
-        dispatched!(reciprocals.iter_mut().zip(draws).for_each(|(reciprocal, draw)| *reciprocal = 1.0 / draw));
+        let LastQuantile { found } = last;
         let start = match found {
             Some(last) => Start {
                 quantile: mean * (last.ratio + last.trend).max(0.5 * last.ratio),
@@ -112,7 +111,8 @@ impl ScaleMixture {
             },
             None => self.lognormal(share, mean, draws),
         };
-        let (quantile, slope) = self.search(tolerance, share, reciprocals, start);
+        dispatched!(draws.iter_mut().for_each(|draw| *draw = 1.0 / *draw));
+        let (quantile, slope) = self.search(tolerance, share, draws, start);
         let ratio = quantile / mean;
         *found = Some(Found { ratio, trend: found.map_or(0.0, |before| ratio - before.ratio), slope });
         quantile
@@ -276,11 +276,11 @@ mod tests {
         for (freedom, share, expected) in
             [(1, 0.9, 1.6448536270), (2, 0.5, 1.1774100225), (29, 0.9, 6.2519972625), (29, 0.5, 5.3231688745)]
         {
-            let (found, error) = ScaleMixture::chi(freedom).quantile_with_error(share, &[2.0; 37]);
+            let (found, error) = ScaleMixture::chi(freedom).quantile_with_error(share, &mut [2.0; 37]);
             assert!((found - 2.0 * expected).abs() < 6e-4, "{freedom} {share}: {found} against {}", 2.0 * expected);
             assert!(error < 1e-4, "nothing is simulated: {error}");
         }
-        assert_eq!(ScaleMixture::chi(3).quantile_with_error(0.9, &[0.0; 9]), (0.0, 0.0));
+        assert_eq!(ScaleMixture::chi(3).quantile_with_error(0.9, &mut [0.0; 9]), (0.0, 0.0));
     }
 
     #[test]
@@ -290,10 +290,10 @@ mod tests {
             let mut last = LastQuantile::default();
             for (scale, least) in [(1.0, 0.2), (1.01, 0.2), (1.01, 0.22), (3.0, 0.3), (1e-6, 0.9), (1e-6, 0.01)] {
                 let draws: Vec<f64> = (0..403).map(|k| scale * (least + f64::from(k * 7919 % 403) / 403.0)).collect();
-                let alone = mixture.quantile(share, &draws);
+                let alone = mixture.quantile(share, &mut draws.clone());
                 let mean = draws.iter().map(|draw| mixture.share_of(alone / draw)).sum::<f64>() / 403.0;
                 assert!((mean - share).abs() < 1e-11, "{scale} {share}: {mean}");
-                let next = mixture.quantile_next(share, &draws, &mut last);
+                let next = mixture.quantile_next(share, &mut draws.clone(), &mut last);
                 assert!((next / alone - 1.0).abs() < 1e-5, "{scale} {share}: {next} against {alone}");
             }
         }

@@ -190,33 +190,13 @@ impl Sessions {
         if deleted { Ok(()) } else { Err(ServiceError::unknown("session", session)) }
     }
 
-    /// Records the return of a period, durably before it is answered, exactly once.
-    /// Runs to its end even where the caller goes away.
+    /// Records the return of a period, durably before it is answered, exactly once. Where the caller goes away meanwhile
+    /// the store may or may not record it, and nothing of it stays in memory.
     ///
     /// # Errors
     /// A field breaks a rule; the period was observed with other content, is not the next, or lies past the horizon.
-    pub async fn observe(
-        &self,
-        tenant: &Tenant,
-        report: Observe,
-        turn: &Arc<HeavyTurn>,
-    ) -> Result<Observed, ServiceError> {
-        let (sessions, tenant, turn) = (self.clone(), tenant.clone(), turn.clone());
-        let recording = async move {
-            let mut held = sessions.hold(&tenant, &report.session).await;
-            sessions.record(&tenant, &report, &turn, &mut held).await
-        };
-        let recording = tokio::spawn(recording.in_current_span());
-        recording.await.map_err(ServiceError::internal)?
-    }
-
-    async fn record(
-        &self,
-        tenant: &Tenant,
-        report: &Observe,
-        turn: &HeavyTurn,
-        held: &mut Held<Name, Live>,
-    ) -> Result<Observed, ServiceError> {
+    pub async fn observe(&self, tenant: &Tenant, report: &Observe, turn: &HeavyTurn) -> Result<Observed, ServiceError> {
+        let mut held = self.hold(tenant, &report.session).await;
         let live = held.current(&Rows { sessions: self, tenant, session: &report.session }).await?;
         let content_hash = report.content_hash().map_err(ServiceError::internal)?;
         if report.period == 0 {
