@@ -109,7 +109,12 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
             let kept = Kept::new(estimate::kept_by_evaluation(&request));
             let evaluation = Evaluation::new(request.clone()).unwrap().keeping(kept);
             pool.install(|| {
-                let followers = evaluation.train(&watch).unwrap();
+                let followers: Vec<_> = evaluation
+                    .request
+                    .frameworks
+                    .iter()
+                    .map(|&framework| evaluation.follower(framework, &watch).unwrap())
+                    .collect();
                 let outcomes = evaluation.simulate(&followers, &watch, &|| 0.0).unwrap();
                 let costs = Costs::new(0.0, 0.0, &outcomes);
                 serde_json::to_string(&EvaluationReport::new(&evaluation, &followers, &outcomes, costs).unwrap())

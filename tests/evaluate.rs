@@ -49,7 +49,12 @@ const COSTS: Costs = Costs { training_seconds: 0.0, simulation_seconds: 0.0, res
 fn simulated(request: Value) -> (Evaluation, Vec<Follower>, Outcomes) {
     let evaluation = Evaluation::new(serde_json::from_value(request).unwrap()).unwrap();
     let watch = Watch::unwatched();
-    let followers = evaluation.train(&watch).unwrap();
+    let followers: Vec<_> = evaluation
+        .request
+        .frameworks
+        .iter()
+        .map(|&framework| evaluation.follower(framework, &watch).unwrap())
+        .collect();
     let outcomes = evaluation.simulate(&followers, &watch, &|| 0.0).unwrap();
     (evaluation, followers, outcomes)
 }

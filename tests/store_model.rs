@@ -507,7 +507,7 @@ async fn compare(store: &Store, model: &Model) {
     }
 }
 
-async fn replay(place: &Place, operations: &[Operation]) {
+async fn replay(place: &Place, operations: &[Operation]) -> Result<(), TestCaseError> {
     let (mut store, mut model) = (place.open().await.with_quotas(QUOTAS), Model::default());
     for operation in operations {
         if let Operation::Reopen = operation {
@@ -522,25 +522,20 @@ async fn replay(place: &Place, operations: &[Operation]) {
     }
     compare(&store, &model).await;
     store.close().await;
+    Ok(())
 }
 
-const TABLES: &str =
-    "jobs, job_requests, job_reports, idempotency_keys, checkpoints, turns, usage, policies, policy_owners,
-                      sessions, observations";
+const TABLES: &str = "jobs, job_requests, job_reports, idempotency_keys, checkpoints, turns, usage, policies, \
+                      policy_owners, sessions, observations";
 
 #[test]
 fn sqlite_does_what_the_model_does() {
-    random::over_folders(CASES, &operations(), async |place, operations| Ok(replay(place, operations).await));
+    random::over_folders(CASES, &operations(), async |place, operations| replay(place, operations).await);
 }
 
 #[test]
 fn postgresql_does_what_the_model_does() {
-    random::over_a_database(
-        TABLES,
-        CASES,
-        &operations(),
-        async |place, operations| Ok(replay(place, operations).await),
-    );
+    random::over_a_database(TABLES, CASES, &operations(), async |place, operations| replay(place, operations).await);
 }
 
 fn operations() -> impl Strategy<Value = Vec<Operation>> {

@@ -122,13 +122,20 @@ impl BacktestArgs {
         Ok(())
     }
 
-    /// The level most is said about.
-    pub fn main_alpha(&self) -> f64 {
-        self.alpha.get(1).or(self.alpha.first()).copied().unwrap_or(0.1)
+    /// The line most is said about: the second adaptive strategy, or the only one.
+    pub fn main_line(&self) -> usize {
+        usize::from(self.alpha.len() > 1)
     }
 
+    /// Its level.
+    pub fn main_alpha(&self) -> f64 {
+        self.alpha[self.main_line()]
+    }
+
+    /// The adaptive ones first, in the order of their levels.
     fn strategies(&self) -> Vec<(String, Strategy)> {
-        let adaptive = self.alpha.iter().map(|&alpha| (adaptive_name(alpha), Strategy::Adaptive { alpha }));
+        let adaptive =
+            self.alpha.iter().map(|&alpha| (format!("adaptive, alpha {alpha}"), Strategy::Adaptive { alpha }));
         let alpha = self.main_alpha();
         adaptive
             .chain([
@@ -140,10 +147,6 @@ impl BacktestArgs {
             ])
             .collect()
     }
-}
-
-pub fn adaptive_name(alpha: f64) -> String {
-    format!("adaptive, alpha {alpha}")
 }
 
 /// Decides every month, keeps the books, and measures them.
@@ -167,8 +170,9 @@ fn walk(args: &BacktestArgs, months: &[Month]) -> Result<Backtest, BacktestError
         .zip(decisions)
         .map(|(name, decisions)| Line::new(name, decisions, lived, 1e-4 * args.cost_bp))
         .collect();
-    lines.extend(Line::hindsight(&lines, &adaptive_name(args.main_alpha()), lived, 1e-4 * args.cost_bp));
-    let analysis = Analysis::of(&lines, lived, &walk);
+    let main = args.main_line();
+    lines.push(lines[main].hindsight(lived, 1e-4 * args.cost_bp));
+    let analysis = Analysis::of(&lines, main, lived, &walk);
     let (args, months, seconds) = (args.clone(), months[window..].to_vec(), started.elapsed().as_secs_f64());
     Ok(Backtest { args, walk, months, lines, analysis, seconds })
 }

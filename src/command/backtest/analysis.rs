@@ -67,13 +67,11 @@ impl Line {
         Line { name, decisions, account, hindsight: false }
     }
 
-    /// The constant mix that holds on average what the line named `like` held: what its timing is measured against.
-    pub fn hindsight(lines: &[Line], like: &str, periods: &[Period], cost: f64) -> Option<Line> {
-        let line = lines.iter().find(|line| line.name == like)?;
-        let decision = Decision { allocation: line.mean_allocation(), radius: 0.0, source: None };
+    /// The constant mix that holds on average what this line held: what its timing is measured against.
+    pub fn hindsight(&self, periods: &[Period], cost: f64) -> Line {
+        let decision = Decision { allocation: self.mean_allocation(), radius: 0.0, source: None };
         let name = format!("constant {:.1} %", 100.0 * decision.allocation);
-        let line = Line::new(name, vec![decision; periods.len()], periods, cost);
-        Some(Line { hindsight: true, ..line })
+        Line { hindsight: true, ..Line::new(name, vec![decision; periods.len()], periods, cost) }
     }
 
     fn mean_allocation(&self) -> f64 {
@@ -115,8 +113,8 @@ impl Series<'_> {
 
 impl Analysis {
     /// Resamples months and years alike for all strategies, so that differences are of the same worlds.
-    /// The adaptive strategy that others are compared with is the one the hindsight mix follows.
-    pub fn of(lines: &[Line], periods: &[Period], walk: &WalkForward) -> Self {
+    /// Others are compared with line `main`.
+    pub fn of(lines: &[Line], main: usize, periods: &[Period], walk: &WalkForward) -> Self {
         let bank: Vec<f64> = periods.iter().map(|period| period.bank_return).collect();
         let series: Vec<Series> = lines
             .iter()
@@ -141,7 +139,6 @@ impl Analysis {
                 )
             })
             .collect();
-        let main = main_line(lines);
         let figures = lines.iter().enumerate().map(|(index, line)| {
             let estimate = |of: &dyn Fn(&[Measured]) -> f64| {
                 let values: Vec<f64> = resampled.iter().map(|measured| of(measured)).collect();
@@ -169,10 +166,4 @@ impl Analysis {
         });
         Analysis { figures: figures.collect(), years }
     }
-}
-
-/// The adaptive strategy most is said about: the second, or the only one.
-pub fn main_line(lines: &[Line]) -> usize {
-    let adaptive = lines.iter().filter(|line| line.name.starts_with("adaptive")).count();
-    usize::from(adaptive > 1)
 }

@@ -2,7 +2,7 @@
 
 use ballast::report::{Axis, BarChart, Chart, Page, Table, interval, number};
 
-use super::analysis::{BootstrapEstimate, CONFIDENCE, Figures, Line, MONTH_BLOCK, RESAMPLES, YEAR_BLOCK, main_line};
+use super::analysis::{BootstrapEstimate, CONFIDENCE, Figures, Line, MONTH_BLOCK, RESAMPLES, YEAR_BLOCK};
 use super::{Backtest, verdict};
 
 pub fn page(backtest: &Backtest) -> Page {
@@ -98,7 +98,7 @@ fn wealth(backtest: &Backtest) -> Chart {
 fn drawdowns(backtest: &Backtest) -> Chart {
     let years = years(backtest);
     let chart = Chart::new("Drawdown", time(), Axis::new("below the highest wealth so far, %").from_zero());
-    let main = &backtest.lines[main_line(&backtest.lines)].name;
+    let main = &backtest.lines[backtest.args.main_line()].name;
     let shown = ["all-stock", "60/40", main.as_str()];
     shown.iter().filter_map(|name| backtest.lines.iter().find(|line| line.name == *name)).fold(chart, |chart, line| {
         let falls = line.account.drawdowns().into_iter().skip(1).map(|fall| -100.0 * fall);
@@ -141,7 +141,7 @@ fn certainty_equivalents(backtest: &Backtest) -> BarChart {
 }
 
 fn utility_table(backtest: &Backtest) -> Table {
-    let main = &backtest.lines[main_line(&backtest.lines)].name;
+    let main = &backtest.lines[backtest.args.main_line()].name;
     let table = Table::new(
         "Certainty equivalents of a year from 100",
         &["strategy", "certainty equivalent", &format!("{main} less this"), "mean allocation, %", "all-bank months, %"],

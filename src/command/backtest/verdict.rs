@@ -3,7 +3,7 @@
 use ballast::control::policy::advice::AdviceSource;
 
 use super::Backtest;
-use super::analysis::{BootstrapEstimate, Figures, main_line};
+use super::analysis::{BootstrapEstimate, Figures};
 
 /// Below it a resample of years says nothing about the next one.
 const FEWEST_YEARS: usize = 10;
@@ -11,7 +11,7 @@ const FEWEST_YEARS: usize = 10;
 /// One statement each, the most important first.
 pub fn sentences(backtest: &Backtest) -> Vec<String> {
     let figures = &backtest.analysis.figures;
-    let main = main_line(&backtest.lines);
+    let main = backtest.args.main_line();
     let mut sentences = vec![ranking(figures, main)];
     let others = figures.iter().enumerate().filter(|(index, _)| *index != main).map(|(_, other)| other);
     let years = backtest.analysis.years;

@@ -66,10 +66,8 @@ trait Pricing {
 impl BellmanStep<'_> {
     /// Solves the step at `state`. Cost: the gain field, and some thirty actions priced.
     pub fn solve(&self, state: &State) -> RobustSolution {
-        self.bounded(
-            state,
-            self.optimum(state, &self.problem.uncertainty_set(state), self.problem.actions(), |_, _| ()).0,
-        )
+        let set = self.problem.uncertainty_set(state);
+        self.bounded(state, self.optimum(state, &set, self.problem.actions(), |_, _| ()).0)
     }
 
     /// The same were the uncertainty set of this step alone of another radius; the value of the step after stays.

@@ -147,14 +147,6 @@ impl Evaluation {
         Ok(Advisor::with(policy, self.kept.clone()))
     }
 
-    /// Every framework of the request.
-    ///
-    /// # Errors
-    /// As [`Self::follower`].
-    pub fn train(&self, watch: &Watch) -> Result<Vec<Follower>, TrainError> {
-        self.request.frameworks.iter().map(|&framework| self.follower(framework, watch)).collect()
-    }
-
     /// The returns of a path.
     pub fn returns(&self, history: usize, path: usize) -> Vec<f64> {
         let problem = &self.request.problem;

@@ -75,12 +75,12 @@ impl WorstCase {
         let expectation =
             |of: &dyn Fn(f64) -> f64| self.transport.iter().map(|mass| mass.mass * of(mass.moved_to)).sum::<f64>();
         let mean = expectation(&|z| z);
-        let moved = || self.transport.iter().filter(|mass| mass.atom != mass.moved_to);
+        let (share_moved, lowest_destination) = moved(&self.transport);
         Some(WorstLawSummary {
             mean,
             standard_deviation: expectation(&|z| (z - mean).powi(2)).sqrt(),
-            share_moved: Some(moved().map(|mass| mass.mass).sum()),
-            lowest_destination: moved().map(|mass| mass.moved_to).reduce(f64::min),
+            share_moved: Some(share_moved),
+            lowest_destination,
         })
     }
 
@@ -115,11 +115,16 @@ impl WorstCase {
     }
 }
 
+/// The probability that a transport moves, and the lowest return that any of it moves to.
+fn moved(transport: &[TransportedMass]) -> (f64, Option<f64>) {
+    let moved = || transport.iter().filter(|mass| mass.atom != mass.moved_to);
+    (moved().map(|mass| mass.mass).sum(), moved().map(|mass| mass.moved_to).reduce(f64::min))
+}
+
 fn transport_sentence(transport: &[TransportedMass], advice: &Advice) -> String {
-    let moved = transport.iter().filter(|mass| mass.atom != mass.moved_to);
-    let share: f64 = moved.clone().map(|mass| mass.mass).sum();
-    let lowest = moved.clone().map(|mass| mass.moved_to).fold(f64::INFINITY, f64::min);
-    if share > 0.0 {
+    if let (share, Some(lowest)) = moved(transport)
+        && share > 0.0
+    {
         format!(
             "Against an allocation of {:.1} %, the worst law within distance {:.4} of the {} returns seen moves {:.1} % of \
              the probability, down to a return of {:.1} % in one period; against that law the allocation is still worth \

@@ -109,10 +109,8 @@ pub fn utility(utility: UtilitySpecification, wealth: f64) -> f64 {
 pub fn certainty_equivalent(utility: UtilitySpecification, value: f64) -> f64 {
     match utility {
         UtilitySpecification::Exponential { risk_aversion } => -(-risk_aversion * value).ln_1p() / risk_aversion,
-        UtilitySpecification::Power { risk_aversion } => {
-            (((1.0 - risk_aversion) * value).ln_1p() / (1.0 - risk_aversion)).exp()
-        }
-        UtilitySpecification::Log {} => value.exp(),
+        // Of unit wealth these are the relative ones.
+        _ => RelativeUtility::new(utility, 1.0).inverse(value).exp(),
     }
 }
 

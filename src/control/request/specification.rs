@@ -133,12 +133,6 @@ pub enum RadiusRule {
     },
 }
 
-impl Default for RadiusRule {
-    fn default() -> Self {
-        RadiusRule::bridge(defaults::alpha())
-    }
-}
-
 impl RadiusRule {
     /// The bridge rule at this miscoverage, with the default number of paths and no factor.
     pub fn bridge(alpha: f64) -> Self {
@@ -175,11 +169,9 @@ impl ProblemSpecification {
 
     /// The radius rule given, or the framework's default.
     pub fn radius_rule(&self) -> RadiusRule {
-        let default = || match self.framework.is_parametric() {
-            true => RadiusRule::ChiSquare { alpha: defaults::alpha() },
-            false => RadiusRule::default(),
-        };
-        self.radius.unwrap_or_else(default)
+        let (alpha, is_parametric) = (defaults::alpha(), self.framework.is_parametric());
+        let default = if is_parametric { RadiusRule::ChiSquare { alpha } } else { RadiusRule::bridge(alpha) };
+        self.radius.unwrap_or(default)
     }
 }
 
@@ -229,18 +221,19 @@ pub struct MixtureComponent {
 
 /// Which states the surrogates are trained on.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields)]
 pub struct DesignSpecification {
     /// Design points per step, N. Default 1000; 200 where the state is wealth alone.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<usize>,
     /// Where the empirical laws of the design start.
+    #[serde(default)]
     pub initial_laws: InitialLaws,
     /// The law that moves the design forward. Default: `bootstrap`.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sampling_law: Option<SamplingLaw>,
     /// Initial wealths of the design. Default: the initial wealth alone.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wealth: Option<Interval>,
 }
 
@@ -257,15 +250,19 @@ pub enum InitialLaws {
 
 /// How the surrogates are made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields)]
 pub struct SurrogateSpecification {
     /// What the value surrogate regresses.
+    #[serde(default)]
     pub target: SurrogateTarget,
     /// What the surrogates see of a state.
+    #[serde(default)]
     pub features: FeatureMap,
     /// Number of moments of the law that enter the features; at most two in the parametric frameworks, whose law has no more.
+    #[serde(default = "defaults::moment_count")]
     pub moment_count: usize,
     /// Where the hyperparameters are searched.
+    #[serde(default)]
     pub bounds: HyperparameterBounds,
 }
 
@@ -274,7 +271,7 @@ impl Default for SurrogateSpecification {
         SurrogateSpecification {
             target: SurrogateTarget::default(),
             features: FeatureMap::default(),
-            moment_count: 4,
+            moment_count: defaults::moment_count(),
             bounds: HyperparameterBounds::default(),
         }
     }
@@ -346,5 +343,8 @@ mod defaults {
     }
     pub fn scale() -> f64 {
         1.0
+    }
+    pub fn moment_count() -> usize {
+        4
     }
 }

@@ -134,7 +134,7 @@ fn ball_returns(centre: &Centre, support: Option<Interval>, reach: Reach) -> Vec
     for (start, limit, sign) in [(lowest, low, -1.0), (returns[CORE_RETURNS], high, 1.0)] {
         returns.extend(tail(start, gap, |at, gap| {
             let left = sign * (limit - at);
-            (left > COINCIDENT).then(|| if left > 1.5 * gap { at + sign * gap } else { limit })
+            (left > COINCIDENT).then_some(if left > 1.5 * gap { at + sign * gap } else { limit })
         }));
     }
     returns.retain(|&z| z >= low && z <= high);
@@ -151,7 +151,7 @@ fn region_returns(region: &ConfidenceRegion) -> Vec<f64> {
     let mut returns: Vec<f64> = (-core..=core).map(|index| mean + f64::from(index) * gap).collect();
     let (low, high) = region.window();
     for (start, limit, sign) in [(returns[0], low, -1.0), (returns[returns.len() - 1], high, 1.0)] {
-        let next = |at: f64, gap: f64| (sign * (limit - at) > 0.0).then(|| at + sign * gap);
+        let next = |at: f64, gap: f64| (sign * (limit - at) > 0.0).then_some(at + sign * gap);
         returns.extend(tail(start, TAIL_RATIO * gap, next));
     }
     returns.sort_by(f64::total_cmp);
