@@ -172,17 +172,17 @@ const NODES: usize = 4;
 /// Adds `gaps[i]` times node i of every path, node after node, to `statistic`. Nothing is fused and the order is that of
 /// the nodes: the bits do not depend on the width of the processor's vectors.
 #[inline(always)]
-fn add_nodes(gaps: &[f64], nodes: &[f64], statistic: &mut [f64]) {
+fn add_nodes(gaps: &[f64], nodes: &[f32], statistic: &mut [f64]) {
     let paths = statistic.len();
     for (gaps, nodes) in gaps.chunks(NODES).zip(nodes.chunks(NODES * paths)) {
         if let ([a, b, c, d], (near, far)) = (gaps, nodes.split_at(nodes.len() / 2)) {
             let ((first, second), (third, fourth)) = (near.split_at(paths), far.split_at(paths));
             for ((((sum, p), q), r), s) in statistic.iter_mut().zip(first).zip(second).zip(third).zip(fourth) {
-                *sum = *sum + a * p + b * q + c * r + d * s;
+                *sum = *sum + a * f64::from(*p) + b * f64::from(*q) + c * f64::from(*r) + d * f64::from(*s);
             }
         } else {
             for (gap, node) in gaps.iter().zip(nodes.chunks_exact(paths)) {
-                statistic.iter_mut().zip(node).for_each(|(sum, value)| *sum += gap * value);
+                statistic.iter_mut().zip(node).for_each(|(sum, value)| *sum += gap * f64::from(*value));
             }
         }
     }
@@ -213,7 +213,7 @@ mod tests {
             let atoms: Vec<f64> = (0..size).map(|k| (k as f64).powf(1.3)).collect();
             let mut plain = vec![0.0; 37];
             for (pair, column) in atoms.windows(2).zip(bridges.values.chunks_exact(bridges.paths)) {
-                plain.iter_mut().zip(column).for_each(|(sum, value)| *sum += (pair[1] - pair[0]) * value);
+                plain.iter_mut().zip(column).for_each(|(sum, value)| *sum += (pair[1] - pair[0]) * f64::from(*value));
             }
             assert_eq!(bridges.directional_statistic(&atoms, Statistic::Now), plain);
         }
