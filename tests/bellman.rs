@@ -8,7 +8,7 @@ use ballast::control::bellman::next_value::NextValue;
 use ballast::control::bellman::problem::Problem;
 use ballast::control::bellman::solution::{Adversary, RobustSolution};
 use ballast::control::problem::state::State;
-use ballast::control::problem::utility::RelativeUtility;
+use ballast::control::problem::utility::{RelativeUtility, utility};
 use ballast::control::request::specification::Specification;
 use serde_json::{Value, json};
 
@@ -221,6 +221,36 @@ fn the_tabulated_field_is_the_value_of_the_next_state() {
                 // The cubics are good to 1e-6 of the gain.
                 assert!((found - relative.value(gain)).abs() < 1e-6, "{utility} {action} {z}: {found} {gain}");
             }
+        }
+    }
+}
+
+#[test]
+fn the_multiplier_is_the_utility_lost_per_unit_of_radius() {
+    for kind in utilities() {
+        let request = json!({ "problem": { "horizon": 1, "history": HISTORY, "utility": kind,
+            "action_interval": [0.0, 0.3], "radius": { "rule": "fixed", "radius": 0.004 } } });
+        let solved = support::policies::advisor(request);
+        let (state, utility_of) = (State::new(&HISTORY, 100.0).unwrap(), solved.specification().problem.utility);
+        let at = |radius: f64| {
+            let (advice, worst) = solved.explain_within(0, &state, radius);
+            assert_eq!(advice.allocation, 0.3, "{kind}: the same is held on either side");
+            (utility(utility_of, advice.certainty_equivalent), worst.multiplier)
+        };
+        let (step, [below, middle, above]) = (1e-5, [0.00399, 0.004, 0.00401].map(at));
+        let slope = (below.0 - above.0) / (2.0 * step);
+        // The slope of the utility changes by its curvature times the step, and utilities have thirteen digits.
+        assert!((middle.1 / slope - 1.0).abs() < 1e-2, "{kind}: {} against {slope}", middle.1);
+    }
+}
+
+#[test]
+fn a_loss_however_deep_has_a_utility() {
+    for kind in utilities() {
+        let relative = RelativeUtility::new(serde_json::from_value(kind.clone()).unwrap(), 1e6);
+        for gain in [-1.0, -50.0, -400.0] {
+            assert!(relative.value(gain).is_finite(), "{kind} {gain}: {}", relative.value(gain));
+            assert!(relative.value(gain) <= relative.value(0.5 * gain), "{kind} {gain}");
         }
     }
 }
