@@ -15,7 +15,7 @@ use support::{App, issue_key, postgres, process, read, specification};
 /// A key made beside a service counts within half a second; a loaded machine may take longer to say so.
 const PATIENCE: Duration = Duration::from_secs(20);
 /// What a service with keys answers without one.
-const OPEN: [&str; 6] = ["/", "/dashboard/{file}", "/docs", "/livez", "/openapi.json", "/readyz"];
+const OPEN: [&str; 7] = ["/", "/dashboard/{file}", "/docs", "/docs/{file}", "/livez", "/openapi.json", "/readyz"];
 
 /// A service over one of the stores, and keys of it.
 struct Guarded {

@@ -1,12 +1,14 @@
 //! Floor 4: translation between the wire and the use cases, and nothing else.
 
 mod access;
+mod asset;
 mod audit;
 mod bounds;
 mod connections;
 mod conversation;
 mod dashboard;
 pub mod decode;
+mod defaults;
 mod described;
 mod documentation;
 mod evaluations;
