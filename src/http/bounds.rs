@@ -178,7 +178,6 @@ mod tests {
             ("/problem/radius/paths", of("RadiusRule", Some(0), "paths"), 1.0),
             ("/problem/radius/scale", of("RadiusRule", Some(0), "scale"), 1e-3),
             ("/problem/radius/alpha", of("RadiusRule", Some(0), "alpha"), 1e-4),
-            ("/problem/utility/risk_aversion", of("UtilitySpecification", Some(0), "risk_aversion"), 1e-13),
             ("/design/count", of("DesignSpecification", None, "count"), 1.0),
             ("/design/sampling_law/location", of("SamplingLaw", Some(2), "location"), 1e-3),
             ("/design/sampling_law/scale", of("SamplingLaw", Some(2), "scale"), 1e-7),
