@@ -1,4 +1,5 @@
-//! The dashboard's files: all of them are served, as what they are, and can do no more than they must.
+//! The files of the dashboard and of the page `/docs`: all of them are served, as what they are, and can do no more than
+//! they must.
 
 mod support;
 
@@ -7,10 +8,15 @@ use std::path::Path;
 
 use reqwest::StatusCode;
 use reqwest::header::{ACCEPT, ETAG, IF_NONE_MATCH};
+use serde_json::{Value, json};
 use support::App;
 
 fn files() -> BTreeMap<String, Vec<u8>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/http/dashboard");
+    files_of("src/http/dashboard")
+}
+
+fn files_of(folder: &str) -> BTreeMap<String, Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
     let read = |entry: std::fs::DirEntry| {
         (entry.file_name().into_string().expect("UTF-8"), std::fs::read(entry.path()).expect("a file"))
     };
@@ -29,26 +35,83 @@ fn media(name: &str) -> &'static str {
     }
 }
 
+/// Asks for a file twice, the second time as one who has it; its policy.
+async fn served(app: &App, address: &str, name: &str, bytes: &[u8]) -> String {
+    let address = format!("{}{address}", app.url);
+    let answer = app.client.get(&address).send().await.expect("an answer");
+    assert_eq!(answer.status(), StatusCode::OK, "{name} is not in the table of assets");
+    let headers = answer.headers().clone();
+    assert_eq!(headers["content-type"], media(name), "{name}");
+    assert_eq!(headers["x-content-type-options"], "nosniff", "{name}");
+    assert_eq!(headers["cache-control"], "no-cache", "{name}");
+    assert_eq!(answer.bytes().await.expect("bytes"), bytes, "{name}");
+    let again = app.client.get(&address).header(IF_NONE_MATCH, &headers[ETAG]).send().await.expect("an answer");
+    assert_eq!(again.status(), StatusCode::NOT_MODIFIED, "{name}");
+    assert_eq!(again.headers()[ETAG], headers[ETAG], "{name}");
+    headers["content-security-policy"].to_str().expect("text").to_owned()
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn every_file_is_served_as_what_it_is_under_a_strict_policy() {
     let app = App::start().await;
     let files = files();
     assert!(files.contains_key("index.html") && files.contains_key("main.js"), "{:?}", files.keys());
     for (name, bytes) in &files {
-        let address = format!("{}/dashboard/{name}", app.url);
-        let answer = app.client.get(&address).send().await.expect("an answer");
-        assert_eq!(answer.status(), StatusCode::OK, "{name} is not in the table of assets");
-        let headers = answer.headers().clone();
-        assert_eq!(headers["content-type"], media(name), "{name}");
-        assert_eq!(headers["x-content-type-options"], "nosniff", "{name}");
-        assert_eq!(headers["cache-control"], "no-cache", "{name}");
-        let policy = headers["content-security-policy"].to_str().expect("text");
+        let policy = served(&app, &format!("/dashboard/{name}"), name, bytes).await;
         assert!(policy.starts_with("default-src 'none'; script-src 'self'; style-src 'self';"), "{policy}");
         assert!(!policy.contains("unsafe"), "{policy}");
-        assert_eq!(answer.bytes().await.expect("bytes"), bytes.as_slice(), "{name}");
-        let again = app.client.get(&address).header(IF_NONE_MATCH, &headers[ETAG]).send().await.expect("an answer");
-        assert_eq!(again.status(), StatusCode::NOT_MODIFIED, "{name}");
-        assert_eq!(again.headers()[ETAG], headers[ETAG], "{name}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_page_of_the_interface_is_served_and_loads_nothing_from_elsewhere() {
+    const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; \
+        connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+    let app = App::start().await;
+    let ours = files_of("src/http/documentation");
+    let page = String::from_utf8(ours["index.html"].clone()).expect("UTF-8");
+    assert_eq!(served(&app, "/docs", "index.html", page.as_bytes()).await, POLICY);
+    assert_eq!(served(&app, "/docs/start.js", "start.js", &ours["start.js"]).await, POLICY);
+    let loaded: Vec<&str> = ["src=\"", "href=\""]
+        .iter()
+        .flat_map(|attribute| page.split(attribute).skip(1).filter_map(|rest| rest.split('"').next()))
+        .collect();
+    assert_eq!(
+        loaded,
+        ["/docs/swagger-ui-bundle.js", "/docs/start.js", "data:,", "/docs/swagger-ui.css", "/openapi.json"]
+    );
+    for (file, media) in [("swagger-ui-bundle.js", "text/javascript"), ("swagger-ui.css", "text/css")] {
+        let answer = app.client.get(format!("{}/docs/{file}", app.url)).send().await.expect("an answer");
+        assert_eq!(answer.status(), StatusCode::OK, "{file}");
+        let headers = answer.headers().clone();
+        assert_eq!(headers["content-type"], format!("{media}; charset=utf-8"), "{file}");
+        assert_eq!(headers["content-security-policy"], POLICY, "{file}");
+        assert_eq!(headers["content-encoding"], "gzip", "{file}");
+        let bytes = answer.bytes().await.expect("bytes");
+        assert!(bytes.starts_with(&[0x1f, 0x8b]) && bytes.len() > 10_000, "{file} has {} bytes", bytes.len());
+    }
+    let (status, problem) = app.get("/docs/index.js").await;
+    assert_eq!((status.as_u16(), &problem["value"]), (404, &"index.js".into()), "{problem}");
+}
+
+/// What the page sends where a call is tried: a job is queued, or the thing that the example names is not there.
+#[tokio::test(flavor = "multi_thread")]
+async fn every_example_is_a_request_that_breaks_no_rule() {
+    let app = App::start().await;
+    let description: Value = serde_json::from_str(ballast::http::description_json()).expect("JSON");
+    for (path, status, missing) in [
+        ("/train", 202, Value::Null),
+        ("/evaluate", 202, Value::Null),
+        ("/sessions", 404, json!("policy")),
+        ("/observe", 404, json!("session")),
+        ("/what-if", 404, json!("session")),
+    ] {
+        let example = &description["paths"][path]["post"]["requestBody"]["content"]["application/json"]["example"];
+        let (answered, answer) = app.post(path, example).await;
+        assert_eq!((answered.as_u16(), &answer["field"]), (status, &missing), "{path}: {answer}");
+        if let Some(job) = answer["job"].as_str() {
+            app.post(&format!("/jobs/{job}/cancel"), &Value::Null).await;
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The checked-in description is the one the routes make.
 //! To accept a change: `cargo run -- openapi > api/openapi.json`, and read the difference.
 
+use ballast::http::problem::ProblemKind;
 use serde_json::Value;
 
 const CHECKED_IN: &str = include_str!("../api/openapi.json");
@@ -52,4 +53,20 @@ fn every_operation_lists_what_its_shape_can_answer() {
         }
     }
     assert_eq!(with_body, 6);
+}
+
+#[test]
+fn every_problem_is_in_the_table_and_a_full_quota_is_said_where_it_refuses() {
+    let description: Value = serde_json::from_str(CHECKED_IN).unwrap();
+    let table = description["info"]["description"].as_str().unwrap();
+    for (slug, status, title) in ProblemKind::ALL.map(ProblemKind::entry) {
+        let row = format!("| `/problems/{slug}` | {} | {title} |", status.as_u16());
+        assert_eq!(table.matches(&row).count(), 1, "{row}");
+    }
+    let (_, _, title) = ProblemKind::QuotaExceeded.entry();
+    let refusing = description["paths"].as_object().unwrap().iter().filter(|(_, operations)| {
+        operations["post"]["responses"]["413"]["description"].as_str().is_some_and(|meaning| meaning.contains(title))
+    });
+    let refusing: Vec<&String> = refusing.map(|(path, _)| path).collect();
+    assert_eq!(refusing, ["/evaluate", "/policies/import", "/sessions", "/train"]);
 }

@@ -1,12 +1,14 @@
 //! Monthly returns of a risky asset and of the bank: those bundled, of the US stock market and Treasury bills, or a file's.
 //!
-//! A file is comma-separated, one month a line, oldest first, without a gap. Its first line is
+//! A file is comma-separated, one month a row, oldest first, without a gap. Its first row is
 //! `date,risky_return,risk_free_return`, or without the last column: then the bank pays nothing. `month` and
 //! `market_return` are taken for the first two names as well. Dates read `2008-01` or `2008-01-31`; returns are simple,
 //! as fractions.
 
 use std::path::{Path, PathBuf};
 
+use csv::{ReaderBuilder, StringRecord, Trim};
+use jiff::civil::Date;
 use thiserror::Error;
 
 const CSV: &str = include_str!("../../data/us_market_monthly.csv");
@@ -31,16 +33,18 @@ pub struct MonthlyReturns {
 pub enum ReturnsError {
     #[error("reading {}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
+    #[error("reading the rows")]
+    Rows(#[from] csv::Error),
     #[error("line 1: the header is {found:?}: must be {HEADER:?}")]
     Header { found: String },
     #[error("line {line}: {found:?} has {count} fields: must have {wanted}")]
-    FieldCount { line: usize, found: String, count: usize, wanted: usize },
+    FieldCount { line: u64, found: String, count: usize, wanted: usize },
     #[error("line {line}: {column} is {found:?}: must read as in 2008-01 or 2008-01-31")]
-    Month { line: usize, column: String, found: String },
+    Month { line: u64, column: String, found: String },
     #[error("line {line}: {column} is {found}: must be the month after {previous}")]
-    Gap { line: usize, column: String, found: String, previous: String },
+    Gap { line: u64, column: String, found: String, previous: String },
     #[error("line {line}: {column} is {found:?}: must be a number above -1")]
-    Return { line: usize, column: String, found: String },
+    Return { line: u64, column: String, found: String },
     #[error("{wanted} months before {month} are wanted: the file holds {found}")]
     TooShort { month: String, wanted: usize, found: usize },
 }
@@ -58,13 +62,15 @@ impl MonthlyReturns {
         Self::parse(&read.map_err(|source| ReturnsError::Read { path: path.into(), source })?)
     }
 
-    fn parse(csv: &str) -> Result<Self, ReturnsError> {
-        let mut lines = csv.lines().zip(1..);
-        let columns = header(lines.next().map_or("", |(text, _)| text))?;
+    fn parse(text: &str) -> Result<Self, ReturnsError> {
+        let mut reader = ReaderBuilder::new().trim(Trim::All).flexible(true).from_reader(text.as_bytes());
+        let columns = header(reader.headers()?.clone())?;
         let mut months: Vec<Month> = Vec::new();
         let mut previous: Option<u32> = None;
-        for (text, line) in lines {
-            let (number, month) = row(&columns, line, text)?;
+        for record in reader.records() {
+            let record = record?;
+            let line = record.position().map_or(0, csv::Position::line);
+            let (number, month) = row(&columns, line, &record)?;
             if previous.is_some_and(|before| before + 1 != number) {
                 let previous = months.last().map_or(String::new(), |month| month.month.clone());
                 return Err(ReturnsError::Gap { line, column: columns[0].into(), found: month.month, previous });
@@ -96,48 +102,41 @@ impl MonthlyReturns {
 }
 
 /// The names of the columns, two or three.
-fn header(text: &str) -> Result<Vec<&str>, ReturnsError> {
-    let columns: Vec<&str> = text.trim_start_matches('\u{feff}').trim_end().split(',').map(str::trim).collect();
-    match columns[..] {
+fn header(columns: StringRecord) -> Result<StringRecord, ReturnsError> {
+    match columns.iter().collect::<Vec<&str>>()[..] {
         ["date" | "month", "risky_return" | "market_return"]
         | ["date" | "month", "risky_return" | "market_return", "risk_free_return"] => Ok(columns),
-        _ => Err(ReturnsError::Header { found: text.into() }),
+        _ => Err(ReturnsError::Header { found: shown(&columns) }),
     }
 }
 
-/// One line, and its month counted from year 0.
-fn row(columns: &[&str], line: usize, text: &str) -> Result<(u32, Month), ReturnsError> {
-    let fields: Vec<&str> = text.trim_end().split(',').map(str::trim).collect();
+fn shown(record: &StringRecord) -> String {
+    record.iter().collect::<Vec<&str>>().join(",")
+}
+
+/// One row, and its month counted from year 0.
+fn row(columns: &StringRecord, line: u64, fields: &StringRecord) -> Result<(u32, Month), ReturnsError> {
     if fields.len() != columns.len() {
         let (count, wanted) = (fields.len(), columns.len());
-        return Err(ReturnsError::FieldCount { line, found: text.into(), count, wanted });
+        return Err(ReturnsError::FieldCount { line, found: shown(fields), count, wanted });
     }
     let unreadable = || ReturnsError::Month { line, column: columns[0].into(), found: fields[0].into() };
-    let number = month_number(fields[0]).ok_or_else(unreadable)?;
+    let number = month_number(&fields[0]).ok_or_else(unreadable)?;
     let month = format!("{:04}-{:02}", number / 12, number % 12 + 1);
-    let risky_return = simple_return(line, columns[1], fields[1])?;
+    let risky_return = simple_return(line, &columns[1], &fields[1])?;
     let risk_free_return = match fields.get(2) {
-        Some(field) => simple_return(line, columns[2], field)?,
+        Some(field) => simple_return(line, &columns[2], field)?,
         None => 0.0,
     };
     Ok((number, Month { month, risky_return, risk_free_return }))
 }
 
 fn month_number(text: &str) -> Option<u32> {
-    if !text.bytes().all(|byte| byte == b'-' || byte.is_ascii_digit()) {
-        return None;
-    }
-    let parts: Vec<&str> = text.split('-').collect();
-    let (year, month) = match parts[..] {
-        [year, month] => (year, month),
-        [year, month, day] if day.len() == 2 && (1..=31).contains(&day.parse::<u32>().ok()?) => (year, month),
-        _ => return None,
-    };
-    let (numeral, number): (u32, u32) = (year.parse().ok()?, month.parse().ok()?);
-    (year.len() == 4 && month.len() == 2 && (1..=12).contains(&number)).then_some(12 * numeral + number - 1)
+    let date: Date = format!("{text}-01").parse().or_else(|_| text.parse()).ok()?;
+    Some(12 * u32::try_from(date.year()).ok()? + u32::from(date.month().unsigned_abs()) - 1)
 }
 
-fn simple_return(line: usize, column: &str, text: &str) -> Result<f64, ReturnsError> {
+fn simple_return(line: u64, column: &str, text: &str) -> Result<f64, ReturnsError> {
     let number = text.parse().ok().filter(|number: &f64| number.is_finite() && *number > -1.0);
     number.ok_or_else(|| ReturnsError::Return { line, column: column.into(), found: text.into() })
 }

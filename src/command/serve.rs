@@ -24,7 +24,8 @@ pub struct Serve {
     /// Address to listen on; port 0 picks a free one.
     #[arg(long, env = "BALLAST_LISTEN", default_value = "127.0.0.1:8080")]
     listen: SocketAddr,
-    /// Another address for /livez, /readyz, /health, /metrics and the description alone, which no caller can fill.
+    /// Another address for /livez, /readyz, /health, /metrics, /audit and the description alone, which no caller of the
+    /// first can fill.
     #[arg(long, env = "BALLAST_OPERATIONS_LISTEN")]
     operations_listen: Option<SocketAddr>,
     #[command(flatten)]

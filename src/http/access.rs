@@ -1,7 +1,7 @@
 //! Who may call what: one table, and one gate before every handler.
 //!
 //! Open to everybody: `/livez` and `/readyz`, which orchestrators ask without keys and which say one word; the dashboard's
-//! page and files, which are the same for everybody and where a key is typed in; `/openapi.json` and `/docs`, which
+//! page and files, which are the same for everybody and where a key is typed in; `/openapi.json` and the page `/docs`, which
 //! describe a published program. Everything else tells of somebody's data, so it asks for a key: `/health` and `/metrics`
 //! too, whose figures are of all tenants together. An operation that is in no line of the table is for admins alone.
 //!
@@ -45,7 +45,9 @@ pub enum Access {
 pub fn access(method: &str, route: Option<&str>) -> Access {
     let Some(route) = route else { return Access::AnyKey };
     match (method, route) {
-        (_, "/livez" | "/readyz" | "/" | "/dashboard/{file}" | "/openapi.json" | "/docs") => Access::Open,
+        (_, "/livez" | "/readyz" | "/" | "/dashboard/{file}" | "/openapi.json" | "/docs" | "/docs/{file}") => {
+            Access::Open
+        }
         ("POST", "/sessions" | "/observe") | ("DELETE", "/sessions/{id}") => Access::Role(KeyRole::Operate),
         ("POST", "/train" | "/evaluate" | "/jobs/{id}/cancel" | "/policies/import")
         | ("DELETE", "/jobs/{id}" | "/policies/{id}") => Access::Role(KeyRole::Train),

@@ -32,7 +32,8 @@ pub struct AuditEntry {
     pub tenant: String,
     /// The key's name; null where none was asked for, and of what was done by a command on the store.
     pub key: Option<String>,
-    /// The key's roles, `anybody` where no key was asked for, `operator` of a command on the store, or `service`.
+    /// The key's roles, `anybody` where no key was asked for, `operator` of a command on the store, or `service`. Empty for
+    /// `session.observe`: an observation keeps the name of the key alone.
     pub roles: String,
     #[schema(example = "session.delete")]
     pub action: String,

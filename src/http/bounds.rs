@@ -4,8 +4,9 @@
 //! of the description, and a test asks the rules themselves at both ends. Rules between fields are the service's to tell.
 
 use serde_json::{Map, Value, json};
-use utoipa::openapi::{OpenApi, RefOr, Schema};
+use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
+use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
 use crate::control::request::rules::{
     COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, RADIUS_SCALE, WEALTH,
 };
@@ -16,8 +17,9 @@ use crate::service::what_if::POINTS;
 pub fn tell(description: &mut OpenApi) {
     let Some(components) = &mut description.components else { return };
     for (name, field, rule) in rules() {
+        let (name, variant) = name.split_once(' ').map_or((name, None), |(name, variant)| (name, Some(variant)));
         if let Some(schema) = components.schemas.get_mut(name) {
-            bound(schema, field, &rule);
+            with_field(schema, field, variant, &mut |property| merged(property, &rule));
         }
     }
     if let Some(sweep) = components.schemas.get_mut("Sweep") {
@@ -25,13 +27,15 @@ pub fn tell(description: &mut OpenApi) {
     }
 }
 
+/// Schema, or schema and variant; field; rule.
 fn rules() -> Vec<(&'static str, &'static str, Value)> {
     let within = |low: f64, high: f64| json!({ "minimum": low, "maximum": high });
     let whole = |range: &std::ops::RangeInclusive<usize>| json!({ "minimum": range.start(), "maximum": range.end() });
     let pair = json!({ "minItems": 2, "maxItems": 2, "items": { "minimum": 1e-12, "maximum": 1e12 } });
     let history = json!({ "minItems": HISTORY_LENGTH.start(), "maxItems": HISTORY_LENGTH.end(),
         "items": within(-LOG_RETURN, LOG_RETURN) });
-    let (wealth, level) = (within(WEALTH.0, WEALTH.1), within(1e-3, 0.999));
+    let wealth = within(WEALTH.0, WEALTH.1);
+    let probability = within(1e-3, 0.999);
     let action = json!({ "minItems": 2, "maxItems": 2, "items": within(0.0, 1.0) });
     let price = within(PRICE.0, PRICE.1);
     vec![
@@ -40,7 +44,12 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("ProblemSpecification", "initial_wealth", wealth.clone()),
         ("ProblemSpecification", "action_interval", action),
         ("ProblemSpecification", "history", history.clone()),
-        ("UtilitySpecification", "risk_aversion", within(1e-12, 1e9)),
+        ("UtilitySpecification exponential", "risk_aversion", within(1e-12, 1e9)),
+        ("UtilitySpecification power", "risk_aversion", json!({ "exclusiveMinimum": 1, "maximum": 100 })),
+        ("RadiusRule bridge", "alpha", probability.clone()),
+        ("RadiusRule concentration", "alpha", probability),
+        ("RadiusRule concentration", "C", json!({ "exclusiveMinimum": 0, "maximum": 1e9 })),
+        ("RadiusRule chi_square", "alpha", within(1e-3, 1.0)),
         ("RadiusRule", "paths", whole(&PATHS)),
         ("RadiusRule", "scale", within(RADIUS_SCALE.0, RADIUS_SCALE.1)),
         ("RadiusRule", "kappa", within(0.0, 100.0)),
@@ -76,25 +85,45 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("WhatIf", "log_return", within(-LOG_RETURN, LOG_RETURN)),
         ("WhatIf", "simple_return", within((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())),
         ("SweepRange", "points", whole(&POINTS)),
-        ("EvaluationRequest", "level", level),
+        ("EvaluationRequest", "constant_mixes", json!({ "maxItems": MOST_MIXES, "items": within(0.0, 1.0) })),
+        ("EvaluationRequest", "paths", whole(&evaluation::PATHS)),
+        ("EvaluationRequest", "level", within(LEVEL.0, LEVEL.1)),
+        ("InitialHistories", "count", whole(&HISTORIES)),
     ]
 }
 
-/// Adds the rule to the field, in every variant that has it.
-fn bound(schema: &mut RefOr<Schema>, field: &str, rule: &Value) {
+/// Changes the field, in `variant` or in every variant that has it.
+pub fn with_field(
+    schema: &mut RefOr<Schema>,
+    field: &str,
+    variant: Option<&str>,
+    change: &mut impl FnMut(&mut RefOr<Schema>),
+) {
     let RefOr::T(schema) = schema else { return };
     match schema {
-        Schema::Object(object) => {
+        Schema::Object(object) if variant.is_none_or(|variant| is_tagged(object, variant)) => {
             if let Some(property) = object.properties.get_mut(field) {
-                merged(property, rule);
+                change(property);
             }
         }
-        Schema::OneOf(variants) => variants.items.iter_mut().for_each(|variant| bound(variant, field, rule)),
+        Schema::OneOf(variants) => {
+            variants.items.iter_mut().for_each(|item| with_field(item, field, variant, change));
+        }
         _ => {}
     }
 }
 
-fn merged(schema: &mut RefOr<Schema>, rule: &Value) {
+/// Whether a field of the variant can hold its name alone.
+fn is_tagged(variant: &Object, name: &str) -> bool {
+    let only = Some(vec![json!(name)]);
+    variant
+        .properties
+        .values()
+        .any(|property| matches!(property, RefOr::T(Schema::Object(tag)) if tag.enum_values == only))
+}
+
+/// Adds the members of `rule` to a schema.
+pub fn merged(schema: &mut RefOr<Schema>, rule: &Value) {
     let Ok(mut written) = serde_json::to_value(&*schema) else { return };
     merge(&mut written, rule);
     if let Ok(read) = serde_json::from_value(written) {
@@ -148,6 +177,7 @@ mod tests {
             ("/problem/history/0", of("ProblemSpecification", None, "history")["items"].clone(), 1e-3),
             ("/problem/radius/paths", of("RadiusRule", Some(0), "paths"), 1.0),
             ("/problem/radius/scale", of("RadiusRule", Some(0), "scale"), 1e-3),
+            ("/problem/radius/alpha", of("RadiusRule", Some(0), "alpha"), 1e-4),
             ("/design/count", of("DesignSpecification", None, "count"), 1.0),
             ("/design/sampling_law/location", of("SamplingLaw", Some(2), "location"), 1e-3),
             ("/design/sampling_law/scale", of("SamplingLaw", Some(2), "scale"), 1e-7),
@@ -170,14 +200,14 @@ mod tests {
     #[test]
     fn every_rule_is_of_a_field_there_is() {
         let description = serde_json::to_value(router::description()).unwrap();
-        for (schema, field, rule) in rules() {
-            let schema = &description["components"]["schemas"][schema];
+        for (name, field, rule) in rules() {
+            let schema = &description["components"]["schemas"][name.split(' ').next().unwrap()];
             let variants = schema["oneOf"].as_array().cloned().unwrap_or(vec![schema.clone()]);
             let told = variants.iter().filter(|variant| {
                 let property = &variant["properties"][field];
                 rule.as_object().unwrap().keys().all(|key| !property[key].is_null())
             });
-            assert!(told.count() > 0, "{field}: {rule} is not told by {schema}");
+            assert!(told.count() > 0, "{field}: {rule} is not told by {name}");
         }
         assert_eq!(description["components"]["schemas"]["Sweep"]["maxProperties"], 1);
     }

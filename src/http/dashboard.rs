@@ -7,11 +7,11 @@
 use std::sync::LazyLock;
 
 use axum::Extension;
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, header};
 use axum::response::{IntoResponse, Response};
-use sha2::{Digest, Sha256};
 
-use super::documentation::Shared;
+use super::asset::{Asset, HTML, SCRIPT, STYLE, TEXT};
+use super::documentation::Published;
 use super::extract::Id;
 use super::problem::{Problem, ProblemKind};
 
@@ -21,18 +21,6 @@ const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self'; st
 /// RFC 8631: where a program that starts at `/` finds the interface.
 const LINKS: &str = "</openapi.json>; rel=\"service-desc\", </docs>; rel=\"service-doc\"";
 
-const SCRIPT: &str = "text/javascript; charset=utf-8";
-const TEXT: &str = "text/plain; charset=utf-8";
-
-/// One embedded file.
-struct Asset {
-    name: &'static str,
-    media: &'static str,
-    bytes: &'static [u8],
-    /// Strong entity tag: the hash of the bytes. A browser asks each time and gets 304 until the binary changes.
-    tag: String,
-}
-
 macro_rules! assets {
     ($($name:literal: $media:expr),+ $(,)?) => {
         [$(($name, $media, include_bytes!(concat!("dashboard/", $name)).as_slice())),+]
@@ -41,8 +29,8 @@ macro_rules! assets {
 
 static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
     let files = assets! {
-        "index.html": "text/html; charset=utf-8",
-        "style.css": "text/css; charset=utf-8",
+        "index.html": HTML,
+        "style.css": STYLE,
         "icon.svg": "image/svg+xml",
         "inter.woff2": "font/woff2",
         "inter-LICENSE.txt": TEXT,
@@ -88,15 +76,8 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
     };
     let example: (_, _, &[u8]) =
         ("us_market_monthly.csv", "text/csv; charset=utf-8", include_bytes!("../../data/us_market_monthly.csv"));
-    let asset = |(name, media, bytes)| Asset { name, media, bytes, tag: entity_tag(bytes) };
-    files.into_iter().chain([example]).map(asset).collect()
+    files.into_iter().chain([example]).map(Asset::new).collect()
 });
-
-fn entity_tag(bytes: &[u8]) -> String {
-    let digest = Sha256::digest(bytes);
-    let hex: String = digest.iter().take(16).map(|byte| format!("{byte:02x}")).collect();
-    format!("\"{hex}\"")
-}
 
 fn asset(name: &str) -> Option<&'static Asset> {
     ASSETS.iter().find(|asset| asset.name == name)
@@ -107,10 +88,10 @@ fn asset(name: &str) -> Option<&'static Asset> {
     responses(
         (status = 200, description = "A page; the description of this interface where only JSON is accepted.", body = String, content_type = "text/html"),
         (status = 304, description = "The page is the one that `If-None-Match` names.")))]
-pub async fn root(Extension(published): Extension<Shared>, headers: HeaderMap) -> Response {
+pub async fn root(Extension(published): Extension<Published>, headers: HeaderMap) -> Response {
     let mut response = match asset("index.html") {
-        Some(page) if !wants_json(&headers) => served(page, &headers),
-        _ => ([(header::CONTENT_TYPE, "application/json")], published.json.as_str()).into_response(),
+        Some(page) if !wants_json(&headers) => page.served(CONTENT_SECURITY_POLICY, &headers),
+        _ => ([(header::CONTENT_TYPE, "application/json")], published.as_str()).into_response(),
     };
     response.headers_mut().insert(header::LINK, HeaderValue::from_static(LINKS));
     response.headers_mut().insert(header::VARY, HeaderValue::from_static("accept"));
@@ -133,23 +114,5 @@ pub async fn file(Id(name): Id, headers: HeaderMap) -> Result<Response, Problem>
         let problem = Problem::new(ProblemKind::NotFound, format!("the dashboard has no file {name}"));
         problem.naming("file", name, "must be a file of the dashboard")
     })?;
-    Ok(served(found, &headers))
-}
-
-fn served(asset: &'static Asset, headers: &HeaderMap) -> Response {
-    let known = headers.get(header::IF_NONE_MATCH).and_then(|tags| tags.to_str().ok());
-    let unchanged =
-        known.is_some_and(|tags| tags.split(',').any(|tag| tag.trim().trim_start_matches("W/") == asset.tag));
-    let fixed: [(HeaderName, &str); 5] = [
-        (header::CONTENT_TYPE, asset.media),
-        (header::CACHE_CONTROL, "no-cache"),
-        (header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY),
-        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
-        (header::REFERRER_POLICY, "no-referrer"),
-    ];
-    let tag = [(header::ETAG, asset.tag.as_str())];
-    if unchanged {
-        return (StatusCode::NOT_MODIFIED, fixed, tag).into_response();
-    }
-    (fixed, tag, asset.bytes).into_response()
+    Ok(found.served(CONTENT_SECURITY_POLICY, &headers))
 }

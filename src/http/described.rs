@@ -1,4 +1,4 @@
-//! The problems of every operation, derived from its shape, the table of access and the problem table.
+//! The problems, as a table and of every operation, derived from its shape, the table of access and the problem table.
 //!
 //! A handler describes the problems that are its own, such as the 409 of a period gap; what follows from having a body,
 //! a query, a path or the store is added here, so that no operation forgets it.
@@ -25,12 +25,19 @@ pub fn with_every_problem(description: &mut OpenApi) {
                 describe(operation, &ADDRESSED);
                 continue;
             }
-            let own: &[_] = if method == "GET" { &[] } else { &[ProblemKind::StorageFull] };
+            let mut kinds = by_shape(operation);
+            kinds.extend(by_deed(method, path));
             if let Access::Role(role) = access(method, Some(path)) {
                 guard(operation, role.as_str());
+                kinds.extend([ProblemKind::Unauthenticated, ProblemKind::TooManyRequests]);
             }
-            complete(operation, own);
+            describe(operation, &kinds);
         }
+    }
+    let information = description.info.description.get_or_insert_default();
+    *information += "\n\n| type of problem | status | title |\n|---|---|---|";
+    for (slug, status, title) in ProblemKind::ALL.map(ProblemKind::entry) {
+        *information += &format!("\n| `/problems/{slug}` | {} | {title} |", status.as_u16());
     }
     let key = HttpBuilder::new().scheme(HttpAuthScheme::Bearer).description(Some(KEY)).build();
     let components = description.components.get_or_insert_default();
@@ -40,23 +47,12 @@ pub fn with_every_problem(description: &mut OpenApi) {
 const SCHEME: &str = "key";
 const KEY: &str = "A key of `ballast keys create`. A service whose store holds none asks for none.";
 
-/// Says that the operation asks for a key with this role, and how it refuses.
+/// Says that the operation asks for a key with this role.
 fn guard(operation: &mut Operation, role: &str) {
     operation.security = Some(vec![SecurityRequirement::new(SCHEME, [role])]);
-    let titled = |kind: ProblemKind| kind.entry().2;
-    let responses = [
-        ("401", titled(ProblemKind::Unauthenticated).to_owned()),
-        ("403", format!("{}: {role}", titled(ProblemKind::Forbidden))),
-        ("429", titled(ProblemKind::TooManyRequests).to_owned()),
-    ];
-    for (status, meaning) in responses {
-        operation.responses.responses.insert(status.into(), RefOr::T(response(&meaning)));
-    }
-}
-
-fn complete(operation: &mut Operation, own: &[ProblemKind]) {
-    let kinds: Vec<ProblemKind> = by_shape(operation).iter().chain(own).copied().collect();
-    describe(operation, &kinds);
+    let (_, status, title) = ProblemKind::Forbidden.entry();
+    let refused = response(&format!("{title}: {role}"));
+    operation.responses.responses.insert(status.as_str().into(), RefOr::T(refused));
 }
 
 /// What every request may break: who it says is asked, and who asks.
@@ -71,6 +67,17 @@ fn describe(operation: &mut Operation, kinds: &[ProblemKind]) {
     for (status, titles) in meanings {
         let described = operation.responses.responses.entry(status.to_string());
         described.or_insert_with(|| RefOr::T(response(&titles.join("; "))));
+    }
+}
+
+/// What may keep an operation from writing.
+fn by_deed(method: &str, path: &str) -> &'static [ProblemKind] {
+    use ProblemKind as Kind;
+    match (method, path) {
+        ("GET", _) => &[],
+        ("POST", "/train" | "/evaluate") => &[Kind::StorageFull, Kind::QuotaExceeded, Kind::QueueFull],
+        ("POST", "/sessions" | "/policies/import") => &[Kind::StorageFull, Kind::QuotaExceeded],
+        _ => &[Kind::StorageFull],
     }
 }
 

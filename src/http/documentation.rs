@@ -1,72 +1,62 @@
-//! The OpenAPI description as one static page, and the table of problems; no script, nothing loaded from elsewhere.
+//! The OpenAPI description as a page: Swagger UI, embedded, at `/docs` and below `/docs/`.
+//!
+//! It works where the network ends at this machine. The files of Swagger UI come with the crate `utoipa-swagger-ui`; the
+//! page that loads them is ours, so that it stands at one address and loads no more than it shows.
 
-use std::fmt::Write;
-use std::sync::LazyLock;
+use std::borrow::Cow;
+use std::sync::{Arc, LazyLock};
 
-use serde_json::Value;
-use utoipa::openapi::OpenApi;
+use axum::http::HeaderMap;
+use axum::response::Response;
 
-use super::problem::ProblemKind;
+use super::asset::{Asset, HTML, SCRIPT, STYLE};
+use super::extract::Id;
+use super::problem::{Problem, ProblemKind};
 
-const HEAD: &str = "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Ballast: interface</title>\
-<style>body{font:16px/1.5 system-ui;max-width:60rem;margin:2rem auto;padding:0 1rem}\
-code{background:#8882;padding:0 .2em}h2{border-top:1px solid #8885;padding-top:1rem}</style>\
-<h1>Ballast</h1><p>The machine-readable form is <a href=\"/openapi.json\">openapi.json</a>; \
-<a href=\"/\">the dashboard</a> is made of these calls.</p>";
+/// What the router hands to those of its handlers that publish the description of all of them, as checked in under
+/// `api/openapi.json`. Made once: anybody may ask for it, as often as he likes.
+pub type Published = &'static LazyLock<String>;
 
-/// The description as it is published. Made once: anybody may ask for it, as often as he likes.
-pub struct Published {
-    /// As checked in under `api/openapi.json`.
-    pub json: String,
-    /// As a page to read.
-    pub page: String,
+/// The dashboard's, but that Swagger UI has pictures in its style sheet and makes markup from text, which it cleans.
+const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; \
+    connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+static PAGE: LazyLock<Asset> =
+    LazyLock::new(|| Asset::new(("index.html", HTML, include_bytes!("documentation/index.html"))));
+
+static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
+    let start = Asset::new(("start.js", SCRIPT, include_bytes!("documentation/start.js")));
+    let theirs = [("swagger-ui.css", STYLE), ("swagger-ui-bundle.js", SCRIPT)];
+    theirs.into_iter().filter_map(|(name, media)| embedded(name, media)).chain([start]).collect()
+});
+
+/// A file of Swagger UI, compressed as it is kept.
+fn embedded(name: &'static str, media: &'static str) -> Option<Asset> {
+    let file = utoipa_swagger_ui::serve(name, Arc::default()).ok()??;
+    let Cow::Borrowed(bytes) = file.bytes else { return None };
+    let asset = Asset::new((name, media, bytes));
+    Some(if file.gzpipped { asset.compressed() } else { asset })
 }
 
-/// What the router hands to those of its handlers that publish the description of all of them.
-pub type Shared = &'static LazyLock<Published>;
-
-impl Published {
-    pub fn of(description: &OpenApi) -> Self {
-        Published { json: description.to_pretty_json().unwrap_or_default() + "\n", page: page(description) }
-    }
+/// This interface as a page to read and to try: calls with their parameters, bodies, defaults and examples.
+#[utoipa::path(get, path = "/docs", tag = "operations",
+    responses(
+        (status = 200, description = "A page.", body = String, content_type = "text/html"),
+        (status = 304, description = "The page is the one that `If-None-Match` names.")))]
+pub async fn docs(headers: HeaderMap) -> Response {
+    PAGE.served(CONTENT_SECURITY_POLICY, &headers)
 }
 
-fn page(description: &OpenApi) -> String {
-    let description = serde_json::to_value(description).unwrap_or_default();
-    let mut page = String::from(HEAD);
-    for (path, operations) in members(&description["paths"]) {
-        for (method, operation) in members(operations) {
-            operation_section(&mut page, method, path, operation);
-        }
-    }
-    page.push_str("<h2>Problems</h2><ul>");
-    for (slug, status, title) in ProblemKind::ALL.map(ProblemKind::entry) {
-        // Writing to a string cannot fail.
-        let _ = write!(page, "<li><code>/problems/{slug}</code> {}: {}", status.as_u16(), escaped(title));
-    }
-    page.push_str("</ul></html>");
-    page
-}
-
-fn operation_section(page: &mut String, method: &str, path: &str, operation: &Value) {
-    let summary = escaped(operation["summary"].as_str().unwrap_or_default());
-    let _ = write!(page, "<h2><code>{} {}</code></h2><p>{summary}</p><ul>", method.to_uppercase(), escaped(path));
-    for parameter in operation["parameters"].as_array().into_iter().flatten() {
-        let name = escaped(parameter["name"].as_str().unwrap_or_default());
-        let meaning = escaped(parameter["description"].as_str().unwrap_or_default());
-        let _ = write!(page, "<li><code>{name}</code> {meaning}");
-    }
-    for (status, response) in members(&operation["responses"]) {
-        let meaning = escaped(response["description"].as_str().unwrap_or_default());
-        let _ = write!(page, "<li>{status}: {meaning}");
-    }
-    page.push_str("</ul>");
-}
-
-fn members(value: &Value) -> impl Iterator<Item = (&String, &Value)> {
-    value.as_object().into_iter().flatten()
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+/// A file of the page `/docs`.
+#[utoipa::path(get, path = "/docs/{file}", tag = "operations", params(("file" = String, Path, description = "Its name.")),
+    responses(
+        (status = 200, description = "The file.", body = String, content_type = "text/javascript"),
+        (status = 304, description = "The file is the one that `If-None-Match` names."),
+        (status = 404, description = "There is no such file.", body = Problem, content_type = "application/problem+json")))]
+pub async fn docs_file(Id(name): Id, headers: HeaderMap) -> Result<Response, Problem> {
+    let found = ASSETS.iter().find(|asset| asset.name == name).ok_or_else(|| {
+        let problem = Problem::new(ProblemKind::NotFound, format!("the page /docs has no file {name}"));
+        problem.naming("file", name, "must be a file of the page /docs")
+    })?;
+    Ok(found.served(CONTENT_SECURITY_POLICY, &headers))
 }

@@ -16,7 +16,20 @@ use crate::control::request::evaluation::EvaluationRequest;
 use crate::service::Service;
 
 /// Queue a comparison of frameworks on common simulated returns.
-#[utoipa::path(post, path = "/evaluate", tag = "jobs", request_body = EvaluationRequest,
+#[utoipa::path(post, path = "/evaluate", tag = "jobs",
+    request_body(content = EvaluationRequest, example = json!({
+        "problem": {
+            "history": [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008],
+            "law": { "kind": "gaussian_mixture", "components": [
+                { "weight": 0.4, "mean": 0.006, "variance": 0.016 }, { "weight": 0.6, "mean": 0.016, "variance": 0.00625 }
+            ] }
+        },
+        "frameworks": ["adaptive", "static", "known_law", "plug_in"],
+        "constant_mixes": [0.0, 0.5, 1.0],
+        "paths": 1000,
+        "histories": { "kind": "drawn", "count": 200 },
+        "level": 0.95
+    })),
     params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
     responses(
         (status = 202, description = "Queued; poll the Location or follow its events.", body = wire::Job, headers(

@@ -18,7 +18,18 @@ use crate::service::Service;
 use crate::service::jobs::Job;
 
 /// Queue a training.
-#[utoipa::path(post, path = "/train", tag = "jobs", request_body = Specification,
+#[utoipa::path(post, path = "/train", tag = "jobs",
+    request_body(content = Specification, example = json!({
+        "problem": {
+            "framework": "adaptive", "horizon": 12, "rate_per_step": 0.0027, "initial_wealth": 100.0,
+            "action_interval": [0.0, 1.0], "utility": { "kind": "power", "risk_aversion": 3.0 },
+            "radius": { "rule": "bridge", "alpha": 0.1, "paths": 2000, "scale": 1.0 },
+            "history": [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008]
+        },
+        "design": { "count": 500, "initial_laws": "given", "sampling_law": { "kind": "bootstrap" } },
+        "surrogate": { "target": "floor_gain", "features": "standardized", "moment_count": 4 },
+        "seed": 1
+    })),
     params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
     responses(
         (status = 202, description = "Queued; poll the Location or follow its events.", body = wire::Job, headers(

@@ -1,6 +1,7 @@
 //! Floor 4: translation between the wire and the use cases, and nothing else.
 
 mod access;
+mod asset;
 mod audit;
 mod bodies;
 mod bounds;
@@ -8,6 +9,7 @@ mod connections;
 mod conversation;
 mod dashboard;
 pub mod decode;
+mod defaults;
 mod described;
 mod documentation;
 mod evaluations;

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use axum::extract::State;
 use axum::http::header;
-use axum::response::{Html, IntoResponse, Response};
+use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::documentation::Shared;
+use super::documentation::Published;
 use super::problem::Problem;
 use super::telemetry;
 use crate::service::Service;
@@ -72,13 +72,6 @@ pub async fn metrics(State(service): State<Arc<Service>>) -> Result<Response, Pr
 /// The description of this interface.
 #[utoipa::path(get, path = "/openapi.json", tag = "operations",
     responses((status = 200, description = "OpenAPI 3.1.", body = serde_json::Value)))]
-pub async fn openapi(Extension(published): Extension<Shared>) -> Response {
-    ([(header::CONTENT_TYPE, "application/json")], published.json.as_str()).into_response()
-}
-
-/// The description as a page to read.
-#[utoipa::path(get, path = "/docs", tag = "operations",
-    responses((status = 200, description = "A page.", body = String, content_type = "text/html")))]
-pub async fn docs(Extension(published): Extension<Shared>) -> Html<&'static str> {
-    Html(&published.page)
+pub async fn openapi(Extension(published): Extension<Published>) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], published.as_str()).into_response()
 }

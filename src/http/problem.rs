@@ -1,7 +1,7 @@
 //! Every way a request can fail, once: RFC 9457 problem documents.
 //!
 //! [`ProblemKind::entry`] is the only place that pairs a kind with its slug, status and title; responses, the
-//! OpenAPI description and the documentation page are derived from it.
+//! OpenAPI description, its table of all kinds among it, are derived from it.
 
 use std::time::Duration;
 

@@ -17,12 +17,12 @@ use utoipa_axum::routes;
 
 use super::access::{By, Gate, Read};
 use super::bodies::Bodies;
-use super::documentation::{Published, Shared};
+use super::documentation::Published;
 use super::hosts::Hosts;
 use super::problem::{Problem, ProblemKind};
 use super::{
-    access, audit, bounds, dashboard, described, evaluations, events, jobs, operations, policies, sessions, telemetry,
-    what_if,
+    access, audit, bounds, dashboard, defaults, described, documentation, evaluations, events, jobs, operations,
+    policies, sessions, telemetry, what_if,
 };
 use crate::service::Service;
 use crate::service::config::Config;
@@ -74,7 +74,8 @@ fn operators() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(operations::metrics))
         .routes(routes!(audit::list))
         .routes(routes!(operations::openapi))
-        .routes(routes!(operations::docs))
+        .routes(routes!(documentation::docs))
+        .routes(routes!(documentation::docs_file))
 }
 
 fn pages() -> OpenApiRouter<Arc<Service>> {
@@ -86,14 +87,15 @@ pub fn description() -> utoipa::openapi::OpenApi {
     let mut description = routes().into_openapi();
     described::with_every_problem(&mut description);
     bounds::tell(&mut description);
+    defaults::tell(&mut description);
     description
 }
 
-static PUBLISHED: LazyLock<Published> = LazyLock::new(|| Published::of(&description()));
+static PUBLISHED: LazyLock<String> = LazyLock::new(|| description().to_pretty_json().unwrap_or_default() + "\n");
 
 /// The description as checked in under `api/openapi.json`.
 pub fn description_json() -> &'static str {
-    &PUBLISHED.json
+    &PUBLISHED
 }
 
 /// The whole application; for a replica that only works, the operator's part of it.
@@ -112,7 +114,7 @@ pub fn for_operators(service: Arc<Service>, config: &Config) -> Router {
 
 /// With the description at hand. Not the users' routes, which have no need of it and are asked most.
 fn publishing(routes: OpenApiRouter<Arc<Service>>) -> OpenApiRouter<Arc<Service>> {
-    let published: Shared = &PUBLISHED;
+    let published: Published = &PUBLISHED;
     routes.route_layer(Extension(published))
 }
 

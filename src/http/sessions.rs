@@ -25,7 +25,10 @@ use crate::service::sessions::{Question, Start};
 use crate::service::what_if::Explain;
 
 /// Open a session.
-#[utoipa::path(post, path = "/sessions", tag = "sessions", request_body = wire::OpenSession,
+#[utoipa::path(post, path = "/sessions", tag = "sessions",
+    request_body(content = wire::OpenSession, example = json!({
+        "policy": "2c882522ef92e64d9ad1cb0dd2b4ff4e7c3b0c1e8f5d2a6b9c0d1e2f3a4b5c6d", "wealth": 2500.0
+    })),
     params(("Idempotency-Key" = Option<String>, Header,
             description = "The same key and body again give the same session and answer, until it is deleted.")),
     responses(
@@ -112,7 +115,10 @@ pub async fn delete(
 }
 
 /// Report the return of a period: exactly once, durable before it is answered.
-#[utoipa::path(post, path = "/observe", tag = "sessions", request_body = Observe,
+#[utoipa::path(post, path = "/observe", tag = "sessions",
+    request_body(content = Observe, example = json!({
+        "session": "session_0123456789abcdef0123456789abcdef", "period": 1, "simple_return": 0.012, "executed_allocation": 0.3
+    })),
     responses(
         (status = 200, description = "Recorded; the same period and content again give the same answer.", body = Observed),
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),

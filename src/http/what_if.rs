@@ -14,7 +14,11 @@ use crate::service::metrics::ACTION_SECONDS;
 use crate::service::what_if::{WhatIf, WhatIfAnswer};
 
 /// The allocation were wealth, radius or the next return another; nothing is changed.
-#[utoipa::path(post, path = "/what-if", tag = "sessions", request_body = WhatIf,
+#[utoipa::path(post, path = "/what-if", tag = "sessions",
+    request_body(content = WhatIf, example = json!({
+        "session": "session_0123456789abcdef0123456789abcdef",
+        "sweep": { "radius_scale": { "from": 0.0, "to": 2.0, "points": 21 } }
+    })),
     responses(
         (status = 200, description = "One point, or the points of a sweep.", body = WhatIfAnswer),
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),

@@ -8,6 +8,8 @@
 
 use std::f64::consts::PI;
 
+use statrs::function::gamma::checked_gamma_lr;
+
 use super::dispatch::dispatched;
 use super::matern::{dot, sum};
 
@@ -228,20 +230,9 @@ fn polynomial(value: impl Fn(f64) -> f64) -> [f64; COEFFICIENTS] {
     sum
 }
 
-/// P(R <= x): the regularised incomplete gamma function P(m/2, x^2/2), by its series. Source: Press et al., Numerical
-/// Recipes, section 6.2.
+/// P(R <= x): the regularised incomplete gamma function P(m/2, x^2/2), which the library has above 0 alone.
 fn chi_cdf(x: f64, freedom: usize) -> f64 {
-    let (half, square) = (0.5 * freedom as f64, 0.5 * x * x);
-    if square <= 0.0 {
-        return 0.0;
-    }
-    let (mut term, mut sum, mut order) = (1.0, 1.0, half);
-    while term > 1e-16 * sum {
-        order += 1.0;
-        term *= square / order;
-        sum += term;
-    }
-    (sum.ln() + half * square.ln() - square - libm::lgamma(half + 1.0)).exp().min(1.0)
+    checked_gamma_lr(0.5 * freedom as f64, 0.5 * x * x).unwrap_or(0.0)
 }
 
 #[cfg(test)]

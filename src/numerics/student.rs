@@ -2,8 +2,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// Terms after which the continued fraction is given up: it needs about the square root of the degrees of freedom.
-const MOST_TERMS: usize = 100_000;
+use statrs::function::beta::checked_beta_reg;
 
 /// P(N <= x) for a standard normal N.
 pub fn normal_cdf(x: f64) -> f64 {
@@ -22,10 +21,14 @@ pub fn student_density(x: f64, freedom: f64) -> f64 {
 }
 
 /// P(T <= x): half the regularised incomplete beta function I_y(freedom/2, 1/2) at y = freedom / (freedom + x^2) lies
-/// beyond |x|.
+/// beyond |x|. Near 0, where 1 - y would lose its digits, half of I_(1-y)(1/2, freedom/2) lies within. NaN where x is.
 pub fn student_cdf(x: f64, freedom: f64) -> f64 {
     let square = x * x;
-    let beyond = 0.5 * incomplete_beta(0.5 * freedom, 0.5, freedom / (freedom + square), square / (freedom + square));
+    let beyond = match square < freedom {
+        true => checked_beta_reg(0.5, 0.5 * freedom, square / (freedom + square)).map(|within| 0.5 - 0.5 * within),
+        false => checked_beta_reg(0.5 * freedom, 0.5, freedom / (freedom + square)).map(|beyond| 0.5 * beyond),
+    };
+    let beyond = beyond.unwrap_or(f64::NAN);
     if x > 0.0 { 1.0 - beyond } else { beyond }
 }
 
@@ -41,46 +44,6 @@ pub fn student_two_sided(level: f64, freedom: f64) -> f64 {
         if share(middle) < level { low = middle } else { high = middle }
     }
     0.5 * (low + high)
-}
-
-/// I_x(a, b) with `complement` = 1 - x, by the continued fraction on the side where it converges.
-/// Source: Press et al., Numerical Recipes, section 6.4.
-fn incomplete_beta(a: f64, b: f64, x: f64, complement: f64) -> f64 {
-    if x <= 0.0 || complement <= 0.0 {
-        return if x <= 0.0 { 0.0 } else { 1.0 };
-    }
-    let log_front = libm::lgamma(a + b) - libm::lgamma(a) - libm::lgamma(b) + a * x.ln() + b * complement.ln();
-    let front = log_front.exp();
-    if x < (a + 1.0) / (a + b + 2.0) {
-        front * continued_fraction(a, b, x) / a
-    } else {
-        1.0 - front * continued_fraction(b, a, complement) / b
-    }
-}
-
-/// Lentz's evaluation.
-fn continued_fraction(a: f64, b: f64, x: f64) -> f64 {
-    const TINY: f64 = 1e-300;
-    let guarded = |value: f64| if value.abs() < TINY { TINY } else { value };
-    let mut c = 1.0;
-    let mut d = 1.0 / guarded(1.0 - (a + b) * x / (a + 1.0));
-    let mut fraction = d;
-    for term in 1..MOST_TERMS {
-        let m = term as f64;
-        let even = m * (b - m) * x / ((a + 2.0 * m - 1.0) * (a + 2.0 * m));
-        let odd = -(a + m) * (a + b + m) * x / ((a + 2.0 * m) * (a + 2.0 * m + 1.0));
-        let mut last = 1.0;
-        for coefficient in [even, odd] {
-            d = 1.0 / guarded(1.0 + coefficient * d);
-            c = guarded(1.0 + coefficient / c);
-            last = c * d;
-            fraction *= last;
-        }
-        if (last - 1.0).abs() < 1e-15 {
-            break;
-        }
-    }
-    fraction
 }
 
 #[cfg(test)]

@@ -2,32 +2,28 @@
 
 use std::fmt::Display;
 
+use csv::{ByteRecord, Writer, WriterBuilder};
+
 /// A file in the making; numbers are written in the shortest form that reads back as the same.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Csv {
-    text: String,
-}
+#[derive(Debug)]
+pub struct Csv(Writer<Vec<u8>>);
 
 impl Csv {
     pub fn new(header: &[&str]) -> Self {
-        let mut csv = Csv { text: String::new() };
+        let mut csv = Csv(WriterBuilder::new().flexible(true).from_writer(Vec::new()));
         csv.row(header);
         csv
     }
 
     pub fn row<T: Display>(&mut self, fields: impl IntoIterator<Item = T>) {
-        let fields: Vec<String> = fields.into_iter().map(|field| quoted(field.to_string())).collect();
-        self.text.push_str(&fields.join(","));
-        self.text.push('\n');
+        let fields: ByteRecord = fields.into_iter().map(|field| field.to_string().into_bytes()).collect();
+        // Writing to memory cannot fail.
+        let _ = self.0.write_byte_record(&fields);
     }
 
     pub fn into_text(self) -> String {
-        self.text
+        String::from_utf8(self.0.into_inner().unwrap_or_default()).unwrap_or_default()
     }
-}
-
-fn quoted(field: String) -> String {
-    if field.contains(['"', ',', '\n', '\r']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field }
 }
 
 #[cfg(test)]

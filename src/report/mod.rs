@@ -32,10 +32,10 @@ mod ticks;
 #[cfg(test)]
 mod well_formed;
 
+pub use self::csv::Csv;
 pub use axis::Axis;
 pub use bars::BarChart;
 pub use chart::Chart;
-pub use csv::Csv;
 pub use drawing::{ChartError, Draw, Drawing};
 pub use page::Page;
 pub use table::{Cell, Table, interval, number};

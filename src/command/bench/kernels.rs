@@ -2,7 +2,6 @@
 
 use std::error::Error;
 use std::hint::black_box;
-use std::io::Write;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -115,15 +114,13 @@ fn standardized(inputs: &DMatrix<f64>, targets: &[f64]) -> (DMatrix<f64>, Vec<f6
     (DMatrix::from_iterator(inputs.nrows(), inputs.ncols(), columns), standard(targets))
 }
 
-fn write_csv(path: &PathBuf, inputs: &DMatrix<f64>, targets: &[f64]) -> Result<(), std::io::Error> {
-    let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
-    let names: Vec<String> = (1..=inputs.ncols()).map(|index| format!("x{index}")).collect();
-    writeln!(file, "{},y", names.join(","))?;
+fn write_csv(path: &PathBuf, inputs: &DMatrix<f64>, targets: &[f64]) -> csv::Result<()> {
+    let mut file = csv::Writer::from_path(path)?;
+    file.write_record((1..=inputs.ncols()).map(|index| format!("x{index}")).chain(["y".to_owned()]))?;
     for (row, target) in inputs.row_iter().zip(targets) {
-        let cells: Vec<String> = row.iter().map(|x| format!("{x:e}")).collect();
-        writeln!(file, "{},{target:e}", cells.join(","))?;
+        file.write_record(row.iter().chain([target]).map(|number| format!("{number:e}")))?;
     }
-    file.flush()
+    Ok(file.flush()?)
 }
 
 fn exponentials_per_second(runs: usize) -> f64 {

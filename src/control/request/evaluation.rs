@@ -13,11 +13,16 @@ use crate::control::request::specification::{
     SurrogateSpecification,
 };
 
-const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
-const HISTORIES: std::ops::RangeInclusive<usize> = 2..=1000;
+/// Simulated paths of one history.
+pub const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
+/// Drawn histories.
+pub const HISTORIES: std::ops::RangeInclusive<usize> = 2..=1000;
+/// Confidence of intervals, a probability.
+pub const LEVEL: (f64, f64) = (0.5, 0.999);
 /// Simulated steps of one strategy; each keeps its advice.
 const STEPS: usize = 5_000_000;
-const MOST_MIXES: usize = 101;
+/// Constant allocations.
+pub const MOST_MIXES: usize = 101;
 
 /// A comparison of strategies on common simulated returns.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -161,7 +166,7 @@ impl EvaluationRequest {
             let rule = format!("times histories.count and problem.horizon must be at most {STEPS}");
             return Err(FieldError::new("paths", self.paths, rule));
         }
-        within("level", self.level, 0.5, 0.999)
+        within("level", self.level, LEVEL.0, LEVEL.1)
     }
 
     /// Number of initial histories.

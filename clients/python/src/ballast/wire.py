@@ -19,7 +19,10 @@ class AuditEntry(TypedDict):
     key: NotRequired[str | None]
     """The key's name; null where none was asked for, and of what was done by a command on the store."""
     roles: str
-    """The key's roles, `anybody` where no key was asked for, `operator` of a command on the store, or `service`."""
+    """
+    The key's roles, `anybody` where no key was asked for, `operator` of a command on the store, or `service`. Empty for
+    `session.observe`: an observation keeps the name of the key alone.
+    """
     action: str
     object: str
     """What it was done to."""
@@ -55,6 +58,9 @@ class Estimate(TypedDict):
     """Lower end of its interval."""
     high: float
     """Upper end of its interval."""
+
+
+ConstantMix: TypeAlias = float
 
 
 Explain: TypeAlias = Literal["worst_case"]
@@ -784,7 +790,7 @@ class EvaluationRequest(TypedDict):
     """The same request and seed give the same report, but for its costs."""
     frameworks: NotRequired[list[Framework]]
     """Frameworks to compare."""
-    constant_mixes: NotRequired[list[float] | None]
+    constant_mixes: NotRequired[list[ConstantMix] | None]
     """Constant allocations to compare; 0 is all-bank. Default: 0 to 1 by 0.1, as far as the actions go."""
     policies: NotRequired[dict[str, str]]
     """A trained policy for a framework; the others are trained inside the job."""

@@ -1,0 +1,72 @@
+//! The defaults of requests, told as reading a request gives them.
+//!
+//! The least request that can be read is read and written again: what was not in it is a default. What depends on other
+//! fields is filled in later, by the service, and told by the field's own description.
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value, json};
+use utoipa::openapi::OpenApi;
+
+use super::bounds::{merged, with_field};
+use crate::control::request::evaluation::EvaluationRequest;
+use crate::control::request::specification::{
+    DesignSpecification, HyperparameterBounds, ProblemSpecification, RadiusRule, Specification, SurrogateSpecification,
+};
+
+/// Adds to every schema of a request what stands for its fields where they are left out.
+pub fn tell(description: &mut OpenApi) {
+    let Some(components) = &mut description.components else { return };
+    for (name, defaults) in told() {
+        let Some(schema) = components.schemas.get_mut(name) else { continue };
+        for (field, default) in defaults {
+            with_field(schema, &field, None, &mut |property| merged(property, &json!({ "default": default })));
+        }
+    }
+}
+
+fn told() -> [(&'static str, Map<String, Value>); 7] {
+    let history = json!({ "history": [] });
+    [
+        ("Specification", of::<Specification>(json!({ "problem": history }))),
+        ("ProblemSpecification", of::<ProblemSpecification>(history.clone())),
+        ("DesignSpecification", of::<DesignSpecification>(json!({}))),
+        ("SurrogateSpecification", of::<SurrogateSpecification>(json!({}))),
+        ("HyperparameterBounds", of::<HyperparameterBounds>(json!({}))),
+        ("RadiusRule", of::<RadiusRule>(json!({ "rule": "bridge" }))),
+        ("EvaluationRequest", of::<EvaluationRequest>(json!({ "problem": history }))),
+    ]
+}
+
+fn of<T: Serialize + DeserializeOwned>(least: Value) -> Map<String, Value> {
+    let read = serde_json::from_value::<T>(least.clone()).ok().and_then(|read| serde_json::to_value(read).ok());
+    let Some(Value::Object(mut whole)) = read else { return Map::new() };
+    whole.retain(|field, value| least.get(field).is_none() && !value.is_null());
+    whole
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::http::router;
+
+    #[test]
+    fn every_default_is_told() {
+        let description = serde_json::to_value(router::description()).unwrap();
+        let schemas = &description["components"]["schemas"];
+        for (name, field, default) in [
+            ("ProblemSpecification", "horizon", json!(10)),
+            ("ProblemSpecification", "framework", json!("adaptive")),
+            ("ProblemSpecification", "action_interval", json!([0.0, 1.0])),
+            ("SurrogateSpecification", "moment_count", json!(4)),
+            ("HyperparameterBounds", "noise_variance", json!([1e-10, 1.0])),
+            ("EvaluationRequest", "level", json!(0.95)),
+            ("Specification", "seed", json!(1)),
+        ] {
+            assert_eq!(schemas[name]["properties"][field]["default"], default, "{name}.{field}");
+        }
+        let rules = schemas["RadiusRule"]["oneOf"].as_array().unwrap();
+        assert_eq!(rules.iter().filter(|rule| rule["properties"]["alpha"]["default"] == 0.1).count(), 3);
+        assert!(told().iter().all(|(_, defaults)| !defaults.is_empty()));
+    }
+}

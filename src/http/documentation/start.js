@@ -1,0 +1,10 @@
+// The page /docs: what this very service answers at /openapi.json, and nothing from elsewhere.
+
+SwaggerUIBundle({
+  url: "/openapi.json",
+  dom_id: "#interface",
+  deepLinking: true,
+  defaultModelExpandDepth: 4,
+  // Else a service of the network would be asked whether the description is valid.
+  validatorUrl: null,
+});

@@ -1,0 +1,54 @@
+// The page /docs in a browser: it shows bodies, defaults and examples, and asks for nothing from elsewhere.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { browser, call, service } from "./ballast.js";
+
+let ballast, chromium, page;
+const faults = [];
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  page.setDefaultTimeout(60_000);
+  page.on("pageerror", (error) => faults.push(error.message));
+  page.on("console", (message) => message.type() === "error" && faults.push(message.text()));
+  page.on("request", (request) => {
+    const { protocol, origin } = new URL(request.url());
+    if (protocol !== "data:" && origin !== ballast.url) faults.push(`asked for ${request.url()}`);
+  });
+  await page.goto(`${ballast.url}/docs`);
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+test("every call is listed, and every problem", async () => {
+  await page.locator("#operations-jobs-train").waitFor();
+  const { paths } = await call(ballast.url, "/openapi.json");
+  const calls = Object.values(paths).flatMap(Object.keys).length;
+  assert.ok(calls > 25);
+  assert.equal(await page.locator(".opblock").count(), calls);
+  await page.getByRole("cell", { name: "/problems/invalid-field" }).waitFor();
+});
+
+test("a call shows its example, its fields and their defaults", async () => {
+  const train = page.locator("#operations-jobs-train");
+  await train.getByRole("button").first().click();
+  await train.getByText('"target": "floor_gain"').first().waitFor();
+  await train.getByRole("tab", { name: "Schema" }).first().click();
+  await train.getByText("horizon", { exact: true }).first().waitFor();
+  await train.getByText("10", { exact: true }).first().waitFor();
+});
+
+test("a call is tried", async () => {
+  const live = page.locator("#operations-operations-livez");
+  await live.getByRole("button").first().click();
+  await live.getByRole("button", { name: "Try it out" }).click();
+  await live.getByRole("button", { name: "Execute" }).click();
+  await live.locator(".live-responses-table").getByText("ok", { exact: true }).waitFor();
+});
+
+test("the page and the console held no fault", () => assert.deepEqual(faults, []));
