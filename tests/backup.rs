@@ -10,6 +10,7 @@ use std::time::Duration;
 use ballast::store::Store;
 use futures_util::future::join_all;
 use serde_json::{Value, json};
+use support::patience::patience;
 use support::place::Place;
 use support::{App, execute, specification, trained};
 
@@ -104,7 +105,7 @@ async fn until(counts: &[AtomicUsize], before: &[usize], more: usize) -> Vec<usi
         }
         now()
     };
-    tokio::time::timeout(Duration::from_secs(60), waiting).await.expect("the clients go on")
+    tokio::time::timeout(patience(), waiting).await.expect("the clients go on")
 }
 
 /// The restored service has the first `before` of what was `acknowledged` and answers them alike, and where it stands at

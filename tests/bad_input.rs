@@ -32,6 +32,7 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
         ("/problem/radius", json!({"rule": "fixed", "radius": -1.0}), "problem.radius.radius"),
         ("/problem/support", json!({"min": -30.0, "max": 1.0}), "problem.support.min"),
         ("/problem/support", json!({"min": 1.0, "max": 0.0}), "problem.support.max"),
+        ("/problem/support", json!({"min": 1.0, "max": 1.0}), "problem.support.max"),
         ("/problem/law", mixture(1.0, 0.0, 0.01), "problem.law"),
         ("/problem/history", json!([0.1]), "problem.history"),
         ("/problem/history", json!([0.1, 0.1, 0.1]), "problem.history"),

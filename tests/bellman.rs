@@ -1,10 +1,14 @@
 //! One robust step: what its certificate, its duality gap and its window promise.
 
+mod support;
+
 use ballast::control::bellman::BellmanStep;
+use ballast::control::bellman::gain_field::GainField;
 use ballast::control::bellman::next_value::NextValue;
 use ballast::control::bellman::problem::Problem;
-use ballast::control::bellman::solution::RobustSolution;
+use ballast::control::bellman::solution::{Adversary, RobustSolution};
 use ballast::control::problem::state::State;
+use ballast::control::problem::utility::{RelativeUtility, utility};
 use ballast::control::request::specification::Specification;
 use serde_json::{Value, json};
 
@@ -48,6 +52,111 @@ fn a_certified_value_is_that_over_all_returns() {
     }
 }
 
+/// The lowest and the highest return of the window that a step ended with.
+fn window(solution: &RobustSolution) -> [f64; 2] {
+    let Adversary::Transport { support, .. } = &solution.adversary else { panic!("{solution:?}") };
+    [support[0], support[support.len() - 1]]
+}
+
+#[test]
+fn a_window_that_is_too_small_grows_until_it_is_certified() {
+    // Of 0.95 of wealth nearly all may be lost, and a wide ball reaches for it past the first window.
+    let utility = json!({ "kind": "power", "risk_aversion": 4.0 });
+    let [lowest, highest] = [-0.044, 0.062];
+    let price = |radius: f64, action: f64, support| {
+        last_step(&problem(radius, &utility, support), |step, state| step.price(state, action))
+    };
+    let small = price(0.001, 0.1, None);
+    assert!(small.certified, "{small:?}");
+    for (found, first) in window(&small).into_iter().zip([lowest - 0.6, highest + 0.3]) {
+        assert!((found - first).abs() < 1e-12, "{found} and not {first}: this window need not grow");
+    }
+    let grown = price(0.1, 0.95, None);
+    assert!(grown.certified && window(&grown)[0] < lowest - 1.1, "{:?}", window(&grown));
+    // Within the first window the same step would have looked better than it is.
+    let cut_off = price(0.1, 0.95, Some([lowest - 0.6, highest + 0.3]));
+    assert!(cut_off.floor_gain > grown.floor_gain + 1e-3, "{} {}", cut_off.floor_gain, grown.floor_gain);
+    let whole = price(0.1, 0.95, Some([-8.0, 5.0]));
+    assert!((whole.floor_gain - grown.floor_gain).abs() < 1e-6, "{} {}", whole.floor_gain, grown.floor_gain);
+}
+
+/// The first of two steps at the history; what is learned of a return is worth this in the second.
+fn first_step(problem: &Problem) -> RobustSolution {
+    let gain = |state: &State| {
+        let atoms = state.law.atoms();
+        0.05 * (10.0 * atoms.iter().sum::<f64>() / atoms.len() as f64).tanh().max(0.0)
+    };
+    let state = State::new(&HISTORY, 100.0).unwrap();
+    BellmanStep { problem, step: 0, next: &NextValue::Exact(Box::new(gain)) }.solve(&state)
+}
+
+#[test]
+fn a_certified_value_is_that_over_all_returns_where_steps_follow() {
+    let problem = |radius: f64, support: Option<[f64; 2]>| {
+        let mut request = json!({ "problem": { "horizon": 2, "history": HISTORY, "action_interval": [0.0, 0.95],
+            "utility": { "kind": "power", "risk_aversion": 4.0 }, "radius": { "rule": "fixed", "radius": radius } } });
+        if let Some([min, max]) = support {
+            request["problem"]["support"] = json!({ "min": min, "max": max });
+        }
+        Problem::new(&serde_json::from_value::<Specification>(request).unwrap().completed().unwrap())
+    };
+    for radius in RADII {
+        let (found, wide) = (first_step(&problem(radius, None)), first_step(&problem(radius, Some([-8.0, 5.0]))));
+        assert!(found.certified && found.floor_gain > 0.0, "{radius}: {found:?}");
+        // The next value bends where its mean passes 0, between returns at which it is exact: a cubic is off by a few 1e-6.
+        assert!((found.floor_gain - wide.floor_gain).abs() < 1e-5, "{radius}: {found:?} {wide:?}");
+    }
+}
+
+/// Lower bound of the worst expectation of relative utility on a support by duality, the best of all multipliers: plain code.
+fn best_dual(support: &[f64], payoff: &[f64], radius: f64) -> f64 {
+    let dual = |gamma: f64| {
+        let worst_from = |atom: &f64| {
+            let moved = support.iter().zip(payoff).map(|(z, value)| value + gamma * (z - atom).abs());
+            moved.fold(f64::INFINITY, f64::min)
+        };
+        HISTORY.iter().map(worst_from).sum::<f64>() / HISTORY.len() as f64 - gamma * radius
+    };
+    // Concave in the multiplier: thirds, until nothing is left between.
+    let (mut low, mut high) = (0.0, 1e3);
+    for _ in 0..200 {
+        let [left, right] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
+        if dual(left) < dual(right) { low = left } else { high = right }
+    }
+    dual(low)
+}
+
+#[test]
+fn the_reported_gap_bounds_the_error_of_the_value() {
+    for (utility, relative) in [
+        (json!({ "kind": "power", "risk_aversion": 4.0 }), (|w: f64| (1.0 - (-3.0 * w).exp()) / 3.0) as fn(f64) -> f64),
+        (json!({ "kind": "log" }), |w| w),
+    ] {
+        for radius in RADII {
+            for action in [0.1, 0.5, 0.9] {
+                let problem = problem(radius, &utility, Some([-1.0, 1.0]));
+                let found = last_step(&problem, |step, state| step.price(state, action));
+                let Adversary::Transport { support, moves } = &found.adversary else { panic!("{found:?}") };
+                let growth = |z: &f64| (1.0 - action) * 1.002 + action * z.exp();
+                let payoff: Vec<f64> = support.iter().map(|z| relative((growth(z) / 1.002).ln())).collect();
+                let truth = best_dual(support, &payoff, radius);
+                let value = relative(found.floor_gain);
+                let bound = relative(found.floor_gain - found.duality_gap);
+                // Sums of eight utilities of size 1, and the multiplier by thirds, where the dual is flat.
+                let rounding = 1e-12;
+                assert!(bound <= truth + rounding, "{utility} {radius} {action}: {bound} is no lower bound of {truth}");
+                assert!(value >= truth - rounding, "{utility} {radius} {action}: {value} is less than {truth}");
+                // The law that is reported has the value that is reported, and lies within the ball.
+                let reached: f64 = moves.iter().map(|moved| moved.mass * payoff[moved.to]).sum();
+                let spent: f64 =
+                    moves.iter().map(|moved| moved.mass * (support[moved.to] - support[moved.from]).abs()).sum();
+                assert!((reached - value).abs() < rounding, "{utility} {radius} {action}: {reached} {value}");
+                assert!(spent <= radius + rounding, "{utility} {radius} {action}: {spent}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_loss_without_bound_is_not_certified() {
     // All in the asset, power utility falls like e^(3 |z|) where the distance costs |z|: every window is left.
@@ -68,6 +177,80 @@ fn primal_and_dual_meet_at_every_radius() {
                 let found = last_step(&problem, |step, state| step.price(state, action));
                 assert!(found.duality_gap.abs() < 1e-10, "{utility} {radius} {action}: {}", found.duality_gap);
             }
+        }
+    }
+}
+
+#[test]
+fn a_support_bounds_where_mass_may_go() {
+    for utility in utilities() {
+        let price =
+            |radius: f64, support| last_step(&problem(radius, &utility, support), |step, state| step.price(state, 0.9));
+        let (bounded, free) = (price(0.03, Some([-0.06, 0.08])), price(0.03, None));
+        let Adversary::Transport { support, moves } = &bounded.adversary else { panic!("{bounded:?}") };
+        assert!(moves.iter().all(|moved| (-0.06..=0.08).contains(&support[moved.to])), "{utility}: {moves:?}");
+        // Fewer laws are no worse; these bounds forbid the worst of all, but for log utility, which loses most where the
+        // highest returns come down.
+        let gained = if utility["kind"] == "log" { 0.0 } else { 1e-4 };
+        assert!(bounded.floor_gain >= free.floor_gain + gained, "{utility}: {bounded:?} {free:?}");
+        // All mass at the lowest return is as far as it goes: the mean of the history is 0.018, 0.078 above it.
+        let [far, farther] = [0.1, 1.0].map(|radius| price(radius, Some([-0.06, 0.08])).floor_gain);
+        let lowest = (0.1 + 0.9 * f64::exp(-0.06) / 1.002).ln();
+        assert!((far - lowest).abs() < 1e-12 && (farther - lowest).abs() < 1e-12, "{utility}: {far} {lowest}");
+    }
+}
+
+#[test]
+fn the_tabulated_field_is_the_value_of_the_next_state() {
+    for utility in utilities() {
+        let request = json!({ "problem": { "horizon": 2, "history": HISTORY, "utility": utility,
+            "radius": { "rule": "fixed", "radius": 0.004 } }, "design": { "count": 60 } });
+        let solved = support::policies::advisor(request);
+        let (problem, after) = (solved.policy().problem(Default::default()), &solved.policy().steps()[1].solution);
+        let next = NextValue::new(solved.specification(), 1, Some(after));
+        let state = State::new(&HISTORY, 100.0).unwrap();
+        let relative = RelativeUtility::new(solved.specification().problem.utility, problem.floor(0, &state));
+        let exact_at: Vec<f64> = (0..=40).map(|k| -0.06 + 0.0035 * f64::from(k)).collect();
+        let field = GainField::tabulate(&problem, &next, relative, &state, exact_at);
+        // Between the returns and the actions at which it is tabulated.
+        let returns: Vec<f64> = (0..20).map(|k| -0.055 + 0.0061 * f64::from(k)).collect();
+        for action in [0.0, 0.13, 0.5, 0.77, 1.0] {
+            for (z, found) in returns.iter().zip(field.at(&returns).payoff(action)) {
+                let then = solved.advance(&state, action, *z);
+                let gain = (then.wealth / (100.0 * 1.002)).ln() + solved.surrogate_gain(1, &then);
+                // The cubics are good to 1e-6 of the gain.
+                assert!((found - relative.value(gain)).abs() < 1e-6, "{utility} {action} {z}: {found} {gain}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_multiplier_is_the_utility_lost_per_unit_of_radius() {
+    for kind in utilities() {
+        let request = json!({ "problem": { "horizon": 1, "history": HISTORY, "utility": kind,
+            "action_interval": [0.0, 0.3], "radius": { "rule": "fixed", "radius": 0.004 } } });
+        let solved = support::policies::advisor(request);
+        let (state, utility_of) = (State::new(&HISTORY, 100.0).unwrap(), solved.specification().problem.utility);
+        let at = |radius: f64| {
+            let (advice, worst) = solved.explain_within(0, &state, radius);
+            assert_eq!(advice.allocation, 0.3, "{kind}: the same is held on either side");
+            (utility(utility_of, advice.certainty_equivalent), worst.multiplier)
+        };
+        let (step, [below, middle, above]) = (1e-5, [0.00399, 0.004, 0.00401].map(at));
+        let slope = (below.0 - above.0) / (2.0 * step);
+        // The slope of the utility changes by its curvature times the step, and utilities have thirteen digits.
+        assert!((middle.1 / slope - 1.0).abs() < 1e-2, "{kind}: {} against {slope}", middle.1);
+    }
+}
+
+#[test]
+fn a_loss_however_deep_has_a_utility() {
+    for kind in utilities() {
+        let relative = RelativeUtility::new(serde_json::from_value(kind.clone()).unwrap(), 1e6);
+        for gain in [-1.0, -50.0, -400.0] {
+            assert!(relative.value(gain).is_finite(), "{kind} {gain}: {}", relative.value(gain));
+            assert!(relative.value(gain) <= relative.value(0.5 * gain), "{kind} {gain}");
         }
     }
 }

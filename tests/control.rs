@@ -102,7 +102,10 @@ fn whole_horizons_agree_with_nested_grids() {
         let advice = solved.advise(0, &state, AdviceMode::Surrogate);
         let expected = case["log_certainty_equivalent_over_bank"].as_f64().unwrap();
         let error = (advice.certainty_equivalent / advice.floor).ln() - expected;
-        let allowed = if adaptive { 2e-4 } else { 5e-5 };
+        // Over two and three periods 0.02 basis points, as `bench horizons` finds with 1,000 points, and as much again for 500
+        // (20 points leave 0.3). Over ten, half a basis point: that is what the references claim for themselves, and what
+        // is left there, 0.25, is the same with 200 points and with 1,000.
+        let allowed = if case["horizon"].as_u64().unwrap() < 10 { 4e-6 } else { 5e-5 };
         println!("{} T {} error {error:e} allocation {}", case["framework"], case["horizon"], advice.allocation);
         assert!(error.abs() < allowed, "{case}: error {error:e}");
         let apart = (advice.allocation - case["allocation"].as_f64().unwrap()).abs();
@@ -228,77 +231,6 @@ fn a_checkpoint_of_another_format_is_not_gone_on_from() {
     other["format"] = json!("ballast-policy-0");
     assert_eq!(StepSolution::from_checkpoint(other.to_string().as_bytes()), None);
     assert_eq!(StepSolution::from_checkpoint(&serde_json::to_vec(&solved).unwrap()), None, "it names no format");
-}
-
-/// `docs/policy-format.md` in plain code.
-fn prediction(step: &Value, process: &str, features: &[f64]) -> f64 {
-    let numbers = |value: &Value| -> Vec<f64> { serde_json::from_value(value.clone()).unwrap() };
-    let process = &step[process];
-    let hyper = &process["hyperparameters"];
-    let lengthscales = numbers(&hyper["lengthscales"]);
-    let active: Vec<usize> = serde_json::from_value(step["scaling"]["active"].clone()).unwrap();
-    let (centre, spread) = (numbers(&step["scaling"]["centre"]), numbers(&step["scaling"]["spread"]));
-    let inputs: Vec<Vec<f64>> = serde_json::from_value(step["inputs"].clone()).unwrap();
-    let mut sum = 0.0;
-    for (point, weight) in numbers(&process["weights"]).iter().enumerate() {
-        let squared: f64 = (0..active.len())
-            .map(|i| (((features[active[i]] - centre[i]) / spread[i] - inputs[i][point]) / lengthscales[i]).powi(2))
-            .sum();
-        let r = (5.0 * squared).sqrt();
-        sum += weight * (1.0 + r + r * r / 3.0) * (-r).exp();
-    }
-    let number = |value: &Value| value.as_f64().unwrap();
-    number(&process["offset"]) + number(&process["scale"]) * number(&hyper["signal_variance"]) * sum
-}
-
-#[test]
-fn anybody_can_evaluate_an_exported_policy() {
-    let history = [0.021, -0.034, 0.052, 0.043, -0.008, 0.017];
-    let solved = advisor(json!({
-        "problem": { "horizon": 3, "history": history, "radius": { "rule": "fixed", "radius": 0.004 } },
-        "design": { "count": 60 }
-    }));
-    let document: Value = serde_json::from_slice(&solved.policy().to_json().unwrap()).unwrap();
-    let mut state = solved.initial_state(None, None).unwrap();
-    for (step, log_return) in [(1, 0.03), (2, -0.02)] {
-        state = solved.advance(&state, 0.5, log_return);
-        let z = state.law.atoms();
-        let n = z.len() as f64;
-        let mean = z.iter().sum::<f64>() / n;
-        let central = |order: i32| z.iter().map(|z| (z - mean).powi(order)).sum::<f64>() / n;
-        let deviation = central(2).sqrt();
-        // The cap by bisection.
-        let (mut low, mut high) = (-1.0, 1.0);
-        for _ in 0..100 {
-            let cap = 0.5 * (low + high);
-            let spent = z.iter().map(|z| (z - cap).max(0.0)).sum::<f64>() / n;
-            if spent > 0.004 { low = cap } else { high = cap }
-        }
-        let capped: Vec<f64> = z.iter().map(|z| z.min(low).exp() / 1.002).collect();
-        let excess = capped.iter().sum::<f64>() / n - 1.0;
-        let capped_variance = capped.iter().map(|e| (e - 1.0 - excess).powi(2)).sum::<f64>() / n;
-        let features = [
-            state.wealth.ln(),
-            mean,
-            deviation.ln(),
-            central(3) / deviation.powi(3),
-            (central(4) / deviation.powi(4)).ln(),
-            // The risk aversion 0.01 at wealth 100.
-            (excess / central(2)).asinh(),
-            (excess / capped_variance).asinh(),
-        ];
-        let stored = &document["steps"][step]["solution"];
-        let advice = solved.advise(step, &state, AdviceMode::Surrogate);
-        // A sum of 60 weights that cancel: up to 1e6 times the result's rounding.
-        let allocation = prediction(stored, "policy", &features).clamp(0.0, 1.0);
-        let gain = prediction(stored, "value", &features).clamp(0.0, stored["largest_gain"].as_f64().unwrap());
-        assert!((solved.surrogate_gain(step, &state) - gain).abs() < 1e-9, "step {step}: {gain}");
-        assert!(
-            !advice.in_design || (advice.allocation - allocation).abs() < 1e-8,
-            "step {step}: {advice:?} {allocation}"
-        );
-        assert!(advice.in_design, "the test must reach the surrogate");
-    }
 }
 
 #[test]

@@ -3,17 +3,15 @@
 mod support;
 
 use std::process::Command;
-use std::time::{Duration, Instant};
 
 use ballast::service::config::StoreLocation;
 use ballast::store::{KeyRing, KeyRole};
 use reqwest::header::{AUTHORIZATION, WWW_AUTHENTICATE};
 use reqwest::{Client, Method, StatusCode};
 use serde_json::{Value, json};
+use support::patience::{self, patience};
 use support::{App, issue_key, postgres, process, read, specification};
 
-/// A key made beside a service counts within half a second; a loaded machine may take longer to say so.
-const PATIENCE: Duration = Duration::from_secs(20);
 /// What a service with keys answers without one.
 const OPEN: [&str; 7] = ["/", "/dashboard/{file}", "/docs", "/docs/{file}", "/livez", "/openapi.json", "/readyz"];
 
@@ -55,11 +53,7 @@ impl Guarded {
 }
 
 async fn until(what: &str, mut reached: impl AsyncFnMut() -> bool) {
-    let deadline = Instant::now() + PATIENCE;
-    while !reached().await {
-        assert!(Instant::now() < deadline, "still waiting for {what}");
-        tokio::time::sleep(Duration::from_millis(10)).await;
-    }
+    patience::until(what, async || reached().await.then_some(())).await;
 }
 
 /// Every operation of the description: method, path, and the role it asks for.
@@ -335,7 +329,7 @@ async fn keys_are_made_and_revoked_while_the_service_runs() {
     assert_eq!(following.status(), 200);
     assert_eq!(ballast(&["keys", "revoke", row[0], "--data", &data]).0, Some(0));
     until("the key to be turned away", async || app.get("/jobs").await.0 == 401).await;
-    let heard = tokio::time::timeout(PATIENCE, following.text()).await.expect("the stream ends").unwrap();
+    let heard = tokio::time::timeout(patience(), following.text()).await.expect("the stream ends").unwrap();
     assert!(!heard.contains("succeeded"), "{heard}");
     // Without any key in force the door stays closed.
     app.hold("");
@@ -386,7 +380,7 @@ async fn keys_expire_and_are_rotated_without_a_gap() {
     assert_eq!(shown(&mut app, &new).await.0, 200, "the old key ended before the new one was known");
     until("the old key to expire", async || shown(&mut app, &old).await.0 == 401).await;
     assert_eq!(shown(&mut app, &new).await.0, 200);
-    let heard = tokio::time::timeout(PATIENCE, following.text()).await.expect("the stream ends").unwrap();
+    let heard = tokio::time::timeout(patience(), following.text()).await.expect("the stream ends").unwrap();
     assert!(!heard.contains("succeeded"), "{heard}");
     let (_, listed, _) = ballast(&["keys", "list", "--data", &data]);
     let rows: Vec<Vec<&str>> = listed.lines().skip(1).map(|line| line.split('\t').collect()).collect();

@@ -5,12 +5,12 @@ mod support;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
 
 use ballast::service::clock::Clock;
 use ballast::service::keys;
 use ballast::store::KeyRing;
 use serde_json::{Value, json};
+use support::patience::until;
 use support::{App, specification};
 
 const DASHBOARD: &str = include_str!("../docker/grafana/ballast.json");
@@ -60,9 +60,8 @@ async fn exposition() -> String {
     let (_, secret) = keys::issue(&ring, tenant, roles, expires_ms, &Clock::system()).await.unwrap();
     ring.close().await;
     app.hold(secret.reveal());
-    while app.get("/no-such-path").await.0 != 404 || keyless(&app).await != 401 {
-        tokio::time::sleep(Duration::from_millis(20)).await;
-    }
+    let counts = async || (app.get("/no-such-path").await.0 == 404 && keyless(&app).await == 401).then_some(());
+    until("the key to count", counts).await;
     app.client.get(format!("{}/metrics", app.url)).send().await.unwrap().text().await.unwrap()
 }
 

@@ -19,18 +19,18 @@ use reqwest::{Client, Method, StatusCode};
 use serde_json::{Value, json};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{Connection, PgConnection};
+use support::patience::{patience, until};
 use support::{App, issue_key, postgres, specification};
 use tokio::task::JoinHandle;
 
 const SESSIONS: usize = 20;
 const PERIODS: usize = 30;
 const POLLERS: usize = 2;
+/// At least.
+const FAULTS: usize = 10;
 /// Between two faults, and how long one lasts.
 const SOUND: Duration = Duration::from_millis(25);
 const FAULTY: Duration = Duration::from_millis(4);
-/// An owner who is not served for so long is stuck.
-const PATIENCE: Duration = Duration::from_secs(60);
-
 /// Where faults come from.
 #[derive(Clone)]
 enum Outside {
@@ -48,23 +48,21 @@ impl Outside {
         }
     }
 
-    /// Fails reads and writes now and again until `over`; how often.
-    async fn fail(self, over: Arc<AtomicBool>) -> usize {
-        let mut faults = 0;
+    /// Fails reads and writes now and again until `over`, and counts how often.
+    async fn fail(self, over: Arc<AtomicBool>, faults: Arc<AtomicUsize>) {
         while !over.load(Ordering::Relaxed) {
             tokio::time::sleep(SOUND).await;
             match &self {
                 Outside::File(file) => hide_observations(file).await,
                 Outside::Server(url) => end_a_connection(url).await,
             }
-            faults += 1;
+            faults.fetch_add(1, Ordering::Relaxed);
         }
-        faults
     }
 }
 
 async fn hide_observations(file: &PathBuf) {
-    let options = SqliteConnectOptions::new().filename(file).busy_timeout(PATIENCE);
+    let options = SqliteConnectOptions::new().filename(file).busy_timeout(patience());
     let mut connection = SqliteConnection::connect_with(&options).await.unwrap();
     sqlx::query("ALTER TABLE observations RENAME TO hidden").execute(&mut connection).await.unwrap();
     tokio::time::sleep(FAULTY).await;
@@ -102,7 +100,7 @@ impl Caller {
 
     /// Repeats a call until the store lets it through.
     async fn served(&self, method: Method, path: &str, body: Option<Value>) -> (StatusCode, Value) {
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + patience();
         loop {
             let (status, answer) = self.call(method.clone(), path, body.clone()).await;
             if !status.is_server_error() {
@@ -203,11 +201,7 @@ async fn callers(app: &App, outside: &Outside) -> [Caller; 3] {
         callers.push(Caller { client: Client::new(), url: app.url.clone(), key });
     }
     // The last key made: once it is known, all are.
-    let deadline = Instant::now() + PATIENCE;
-    while callers[2].get("/sessions/nobody").await.0 != 403 {
-        assert!(Instant::now() < deadline, "the keys do not count");
-        tokio::time::sleep(Duration::from_millis(10)).await;
-    }
+    until("the keys to count", async || (callers[2].get("/sessions/nobody").await.0 == 403).then_some(())).await;
     callers.try_into().ok().expect("three")
 }
 
@@ -224,7 +218,8 @@ async fn no_law_is_stale(mut app: App, outside: Outside) {
     }
     let [owner, reader, operator] = callers(&app, &outside).await;
     let over = Arc::new(AtomicBool::new(false));
-    let faults = tokio::spawn(outside.fail(over.clone()));
+    let count = Arc::new(AtomicUsize::new(0));
+    let faults = tokio::spawn(outside.fail(over.clone(), count.clone()));
     let strangers: Vec<JoinHandle<usize>> = [reader, operator]
         .into_iter()
         .flat_map(|stranger| [stranger.clone(), stranger])
@@ -234,13 +229,17 @@ async fn no_law_is_stale(mut app: App, outside: Outside) {
     let pollers: Vec<JoinHandle<usize>> = lives.iter().flat_map(|life| [life; POLLERS]).map(poll).collect();
     let owners: Vec<_> = lives.iter().map(|life| tokio::spawn(live(owner.clone(), life.clone()))).collect();
     let lived = join_all(owners).await;
+    // However quickly they lived, what they left is asked for through a few faults.
+    let enough = async || (count.load(Ordering::Relaxed) > FAULTS).then_some(());
+    until("a few faults", enough).await;
     over.store(true, Ordering::Relaxed);
     finished("an owner", lived);
     let answered: usize = finished("a poller", join_all(pollers).await).into_iter().sum();
     let refused: usize = finished("a stranger", join_all(strangers).await).into_iter().sum();
-    let faults = faults.await.unwrap();
+    faults.await.unwrap();
+    let faults = count.load(Ordering::Relaxed);
     println!("{SESSIONS} sessions of {PERIODS} periods: {answered} polls, {refused} refusals, {faults} faults");
-    assert!(answered > PERIODS && refused > PERIODS && faults > 10, "nothing was tried");
+    assert!(answered > PERIODS && refused > PERIODS && faults > FAULTS, "nothing was tried");
 }
 
 fn unlimited(config: &mut ballast::service::config::Config) {

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use ballast::store::{JobRow, JobState, Store};
 use reqwest::Client;
 use serde_json::{Value, json};
+use support::patience::{assert_within, within};
 use support::{App, specification};
 
 /// `Config::drain`: the time an operator gives the process to end.
@@ -46,7 +47,7 @@ impl Process {
             if let Some(status) = self.child.try_wait().unwrap() {
                 return status;
             }
-            assert!(asked.elapsed() < DRAIN, "still running");
+            assert!(asked.elapsed() < within(DRAIN), "still running");
             std::thread::sleep(Duration::from_millis(10));
         }
     }
@@ -120,7 +121,7 @@ async fn nothing_acknowledged_is_lost_by_a_kill() {
     assert_eq!(history["observations"].as_array().unwrap().len(), 3);
     let restarted = Instant::now();
     process.finishes(&job, &left).await;
-    assert!(restarted.elapsed() < Duration::from_secs(25), "it waited for the lease of the dead");
+    assert_within(Duration::from_secs(25), restarted, "a job whose process died, and not its lease,");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -168,6 +169,6 @@ async fn a_process_asked_to_stop_in_a_long_fit_does_not_wait_for_it() {
     process.app.until(&job, |job| job["progress"]["phase"] == "fitting").await;
     let asked = Instant::now();
     assert_eq!(process.terminate().code(), Some(0));
-    assert!(asked.elapsed() < Duration::from_secs(3), "{:?}", asked.elapsed());
+    assert_within(Duration::from_secs(3), asked, "the end of a process in a long fit");
     assert_eq!(process.left(&job).await.state, JobState::Queued);
 }

@@ -7,6 +7,7 @@ use std::time::Duration;
 use ballast::store::Quotas;
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
+use support::patience::patience;
 use support::{App, execute, specification};
 
 /// A training that takes longer than any test.
@@ -106,7 +107,7 @@ async fn ended_jobs_expire_and_the_room_they_took_goes_back() {
     assert!(before > 60e6, "{before}");
     // The store is tidied at the start and each minute.
     app.restart().await;
-    let deadline = std::time::Instant::now() + Duration::from_secs(60);
+    let deadline = std::time::Instant::now() + patience();
     loop {
         let [size, free] = [gauge(&app, "ballast_store_bytes").await, gauge(&app, "ballast_store_free_bytes").await];
         if size < 8e6 && free <= (4 << 20) as f64 {

@@ -11,13 +11,13 @@ use ballast::store::{JobRow, Store};
 use futures_util::future::join_all;
 use reqwest::{Client, StatusCode};
 use serde_json::{Value, json};
+use support::patience::{assert_within, until};
 use support::postgres::{database, private_cluster};
 use support::process::{serve, steps_solved};
 use support::{App, specification};
 
 /// Long enough for a loaded machine to renew in, short enough to wait for.
 const LEASE: Duration = Duration::from_secs(3);
-const PATIENCE: Duration = Duration::from_secs(60);
 const STEPS: usize = 40;
 
 struct Replica {
@@ -55,18 +55,6 @@ async fn row(store: &str, job: &str) -> JobRow {
     let row = store.job(job).await.unwrap().unwrap();
     store.close().await;
     row
-}
-
-/// Waits for `reached`, a level that is asked for again and again.
-async fn until<T>(what: &str, mut reached: impl AsyncFnMut() -> Option<T>) -> T {
-    let deadline = Instant::now() + PATIENCE;
-    loop {
-        if let Some(reached) = reached().await {
-            return reached;
-        }
-        assert!(Instant::now() < deadline, "still waiting for {what}");
-        tokio::time::sleep(Duration::from_millis(20)).await;
-    }
 }
 
 /// The job ends well, and its policy is the one that a single undisturbed thread trains.
@@ -133,7 +121,7 @@ async fn a_job_is_followed_and_cancelled_through_a_replica_that_does_not_run_it(
     let asked = Instant::now();
     assert_eq!(api.app.cancel(&job).await, 202);
     api.app.until(&job, |job| job["state"] == "cancelled").await;
-    assert!(asked.elapsed() < Duration::from_secs(2), "{:?}", asked.elapsed());
+    assert_within(Duration::from_secs(2), asked, "a cancel through another replica");
     let text = following.text().await.unwrap();
     assert!(text.contains("event: state") && text.contains(r#""state":"cancelled""#), "{text}");
     // The worker is free again.

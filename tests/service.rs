@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use reqwest::Method;
 use serde_json::json;
+use support::patience::assert_within;
 use support::{App, specification};
 
 #[tokio::test(flavor = "multi_thread")]
@@ -82,7 +83,7 @@ async fn a_cancel_takes_less_than_a_second() {
     let (status, _) = app.send(Method::POST, &format!("/jobs/{job}/cancel"), None).await;
     assert_eq!(status, 202);
     app.until(&job, |job| job["state"] == "cancelled").await;
-    assert!(asked.elapsed() < Duration::from_secs(1), "{:?}", asked.elapsed());
+    assert_within(Duration::from_secs(1), asked, "a cancel");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -130,8 +131,10 @@ async fn a_job_whose_store_is_busy_is_tried_again() {
     let app = App::start().await;
     let job = app.queue(&specification(60)).await;
     app.until(&job, |job| job["progress"]["steps_done"].as_u64() >= Some(1)).await;
-    // The service's writer gives up after five seconds.
-    support::lock_out(app.folder(), Duration::from_secs(7)).await;
+    // The service's writer gives up after five seconds, of which nothing outside tells; a step is solved well within two.
+    let lock = support::lock_out(app.folder()).await;
+    tokio::time::sleep(Duration::from_secs(7)).await;
+    lock.give_up().await;
     let done = app.until(&job, |job| job["finished_ms"].is_i64()).await;
     assert_eq!(done["state"], "succeeded", "{done}");
     assert!(support::attempts(app.folder()).await > 1, "it was never given back");
@@ -154,7 +157,7 @@ async fn a_cancel_does_not_wait_for_a_long_fit_or_a_large_design() {
         let asked = Instant::now();
         assert_eq!(app.cancel(&job).await, 202);
         app.until(&job, |job| job["state"] == "cancelled").await;
-        assert!(asked.elapsed() < Duration::from_secs(1), "{phase} {:?}", asked.elapsed());
+        assert_within(Duration::from_secs(1), asked, "a cancel");
     }
 }
 

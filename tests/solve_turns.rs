@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use serde_json::json;
+use support::patience::until;
 use support::{App, specification};
 
 /// Explains of one tenant under way at a time, over a session of so many returns; and another's returns.
@@ -74,20 +75,13 @@ async fn explains_of_one_tenant_do_not_keep_anothers_solve_waiting() {
         })
         .collect();
     app.hold(&south);
-    while !app
-        .client
-        .get(format!("{}/metrics", app.url))
-        .send()
-        .await
-        .unwrap()
-        .text()
-        .await
-        .unwrap()
-        .lines()
-        .any(|line| line.strip_prefix("ballast_turns_waiting{turn=\"solve\"} ").is_some_and(|waiting| waiting != "0"))
-    {
-        tokio::time::sleep(Duration::from_millis(20)).await;
-    }
+    until("explains that wait for their turn", async || {
+        let metrics = app.client.get(format!("{}/metrics", app.url)).send().await.unwrap().text().await.unwrap();
+        let mut waiting =
+            metrics.lines().filter_map(|line| line.strip_prefix(r#"ballast_turns_waiting{turn="solve"} "#));
+        waiting.any(|waiting| waiting != "0").then_some(())
+    })
+    .await;
     let beside = solved_within(&app, &short).await;
     stop.store(true, Ordering::Relaxed);
     let mut answered = 0;

@@ -8,10 +8,8 @@ use std::process::Child;
 use std::sync::mpsc::{self, Receiver};
 use std::time::{Duration, Instant};
 
+use support::patience::patience;
 use support::{App, process, specification};
-
-/// Nothing that is waited for takes longer.
-const PATIENCE: Duration = Duration::from_secs(60);
 
 struct Process(Child);
 
@@ -102,7 +100,7 @@ async fn spans_name_routes_tenants_writes_and_solves_and_no_key() {
         "ballast",
         "http.response.status_code",
     ];
-    let (mut all, deadline) = (Vec::new(), Instant::now() + PATIENCE);
+    let (mut all, deadline) = (Vec::new(), Instant::now() + patience());
     while !wanted.iter().all(|text| holds(&all, text)) {
         let missing: Vec<_> = wanted.iter().filter(|text| !holds(&all, text)).collect();
         assert!(Instant::now() < deadline, "never told of {missing:?}");

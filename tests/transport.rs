@@ -31,3 +31,22 @@ fn worst_expectation_agrees_with_the_transport_programme() {
         }
     }
 }
+
+#[test]
+fn the_dual_is_a_lower_bound_at_every_multiplier_and_tight_at_one() {
+    let support: Vec<f64> = (-20..=10).map(|k| 0.01 * f64::from(k)).collect();
+    let mut masses = vec![0.0; support.len()];
+    for atom in [12, 17, 20, 24, 29] {
+        masses[atom] = 0.2;
+    }
+    let payoff: Vec<f64> = support.iter().map(|z: &f64| -(-9.0 * z).exp()).collect();
+    let ball = WassersteinBall { support: &support, masses: &masses, radius: 0.013 };
+    let worst = ball.worst_law(&payoff);
+    let gap = |multiplier: f64| worst.expectation - ball.dual(&payoff, multiplier);
+    assert!(worst.multiplier > 1.0 && gap(worst.multiplier).abs() < 1e-12, "{}", gap(worst.multiplier));
+    // A poor multiplier shows as a gap, the wider the poorer.
+    for factors in [[1.0, 1.2, 2.0, 4.0], [1.0, 0.8, 0.5, 0.0]] {
+        let gaps = factors.map(|factor| gap(factor * worst.multiplier));
+        assert!(gaps.windows(2).all(|pair| pair[1] > pair[0] + 1e-4), "{gaps:?}");
+    }
+}

@@ -24,9 +24,9 @@
 //! | V^gamma | `envelope` | (3.4) | `numerics/wasserstein.rs` | `src/numerics/wasserstein.rs::primal_and_dual_meet_on_any_payoff` |
 //! | psi* | `WorstCase` | 2.2, (3.2) | `control/policy/worst_case.rs` | `tests/parametric.rs::the_multiplier_is_the_utility_lost_per_unit_of_radius` |
 //! | y^i_t, N | `Design` | 3.1 | `control/surrogate/design.rs` | `tests/control.rs::the_same_seed_gives_the_same_bytes_on_any_number_of_threads_and_through_json` |
-//! | y-check | `FeatureSelection` | 3.1 | `control/surrogate/features.rs` | `tests/control.rs::anybody_can_evaluate_an_exported_policy` |
+//! | y-check | `FeatureSelection` | 3.1 | `control/surrogate/features.rs` | `tests/policy_format.rs::another_program_that_follows_the_page_answers_what_the_service_answers` |
 //! | k | `weighted_sum` | 3.1 | `numerics/matern.rs` | `src/numerics/matern.rs::the_fast_sum_equals_the_plain_formula` |
-//! | V-check | `Surrogate` | 3.1 | `control/surrogate/fitted.rs` | `tests/control.rs::anybody_can_evaluate_an_exported_policy` |
+//! | V-check | `Surrogate` | 3.1 | `control/surrogate/fitted.rs` | `tests/policy_format.rs::another_program_that_follows_the_page_answers_what_the_service_answers` |
 //! | phi-check | `policy_target` | 3.1 | `control/surrogate/policy_target.rs` | `src/control/surrogate/policy_target.rs::a_parabola_is_continued_to_its_optimum` |
 //! | hyperparameters | `fit` | 3.1 | `numerics/gp_fit.rs` | `tests/gp.rs::a_fit_climbs_to_a_point_where_the_projected_gradient_vanishes` |
 //! | steps 1 to 6 | `Training` | 3.1 | `control/training.rs` | `tests/control.rs::whole_horizons_agree_with_nested_grids` |

@@ -21,6 +21,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use serde::de::DeserializeOwned;
 
+use super::bodies::Bodies;
 use super::conversation::LocalAddress;
 use super::extract::{AfterBody, BodyLimit, Parameters};
 use super::hosts::{self, Hosts};
@@ -67,6 +68,7 @@ pub struct Gate {
     pub large_body_bytes: usize,
     /// Of any other request.
     pub body_bytes: usize,
+    pub bodies: Bodies,
     pub hosts: Arc<Hosts>,
 }
 
@@ -105,13 +107,22 @@ pub async fn admit(State(gate): State<Gate>, mut request: Request, next: Next) -
             }
         },
     };
+    let room = match gate.bodies.admit(&request, limit) {
+        Ok(room) => room,
+        Err(problem) => return answered(call, problem.into_response()),
+    };
     if let Some(call) = &call {
         request.extensions_mut().insert(call.clone());
     }
     DefaultBodyLimit::max(limit).apply(&mut request);
     request.extensions_mut().insert(BodyLimit(limit));
     let response = next.run(request).await;
-    // Here the call ends: not before are the places of a heavy one given up.
+    drop(room);
+    answered(call, response)
+}
+
+/// Here the call ends: not before are the places of a heavy one given up.
+fn answered(call: Option<Call>, response: Response) -> Response {
     match call {
         Some(call) => Asker::signed(Some(call.tenant.clone()), call.key().clone(), response),
         None => response,

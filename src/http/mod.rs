@@ -3,6 +3,7 @@
 mod access;
 mod asset;
 mod audit;
+mod bodies;
 mod bounds;
 mod connections;
 mod conversation;

@@ -16,6 +16,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::access::{By, Gate, Read};
+use super::bodies::Bodies;
 use super::documentation::Published;
 use super::hosts::Hosts;
 use super::problem::{Problem, ProblemKind};
@@ -123,6 +124,7 @@ fn guarded(routes: OpenApiRouter<Arc<Service>>, service: Arc<Service>, config: &
         service: service.clone(),
         large_body_bytes: config.body_limit_bytes,
         body_bytes: config.body_limit_bytes.min(BODY_BYTES),
+        bodies: Bodies::new(config.memory_limit.bytes, config.body_limit_bytes),
         hosts: Arc::new(Hosts::new(&config.hosts)),
     };
     router

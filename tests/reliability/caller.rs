@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::support::patience::within;
 use reqwest::{Client, Method};
 use serde_json::{Value, json};
 
@@ -104,5 +105,5 @@ impl Caller {
 }
 
 fn client() -> Client {
-    Client::builder().timeout(PATIENCE).build().unwrap()
+    Client::builder().timeout(within(PATIENCE)).build().unwrap()
 }

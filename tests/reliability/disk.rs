@@ -12,6 +12,7 @@ use crate::load::Load;
 use crate::mount::{Mount, skip};
 use crate::scene::{Outcome, Tally, import};
 use crate::server::{Server, Site};
+use crate::support::patience::within;
 
 const MEGABYTES: usize = 8;
 const CLIENTS: usize = 4;
@@ -78,7 +79,7 @@ async fn refuses(caller: &Caller, session: &str) -> Result<(), String> {
         let report = json!({ "session": session, "period": period, "log_return": 0.001 });
         match caller.post("/observe", &report).await {
             Some((507, _)) => break,
-            Some((200, _)) if period < crate::scene::HORIZON - 1 && asked.elapsed() < PATIENCE => {}
+            Some((200, _)) if period < crate::scene::HORIZON - 1 && asked.elapsed() < within(PATIENCE) => {}
             other => return Err(format!("on a full disk: {other:?}")),
         }
     }
@@ -99,7 +100,9 @@ async fn writes(caller: &Caller, session: &str) -> Result<(), String> {
         let answer = caller.post("/observe", &json!({ "session": session, "period": next, "log_return": 0.002 })).await;
         match answer {
             Some((200, _)) => return Ok(()),
-            Some((503 | 507, _)) if asked.elapsed() < PATIENCE => tokio::time::sleep(Duration::from_millis(10)).await,
+            Some((503 | 507, _)) if asked.elapsed() < within(PATIENCE) => {
+                tokio::time::sleep(Duration::from_millis(10)).await
+            }
             other => return Err(format!("with room again: {other:?}")),
         }
     }

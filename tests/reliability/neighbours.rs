@@ -13,6 +13,7 @@ use tokio::net::TcpStream;
 use crate::caller::Caller;
 use crate::scene::{HORIZON, Outcome, Tally, import, specification, undisturbed};
 use crate::server::Site;
+use crate::support::patience::within;
 use crate::tenants::{Tenants, sessions};
 
 /// How long an attack lasts.
@@ -185,7 +186,7 @@ async fn hold(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
         }
         tokio::time::sleep(Duration::from_millis(100)).await;
     }
-    pulse.stop().await.told(ANSWERED, tally);
+    pulse.stop().await.told(within(ANSWERED), tally);
     Ok(held.len())
 }
 
@@ -223,7 +224,7 @@ async fn list(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
     }
     let pulse = tenants.pulse("").await?;
     let calls = until(Instant::now() + ATTACK, &tenants.neighbour, "/jobs?limit=1000").await;
-    pulse.stop().await.told(ANSWERED, tally);
+    pulse.stop().await.told(within(ANSWERED), tally);
     tally.note += &format!(", {queued} large jobs listed {calls} times");
     Ok(calls)
 }
@@ -262,7 +263,7 @@ async fn crowd(tenants: &mut Tenants, tally: &mut Tally) -> Result<usize, String
     let pulse = tenants.pulse("&mode=resolve").await?;
     let path = format!("/action?session={session}&explain=worst_case");
     let calls = until(Instant::now() + ATTACK, neighbour, &path).await;
-    pulse.stop().await.told(2 * ANSWERED, tally);
+    pulse.stop().await.told(2 * within(ANSWERED), tally);
     while !matches!(tenants.owner.get(&format!("/jobs/{own}")).await, Some((200, job)) if job["finished_ms"].is_i64()) {
         if queued.elapsed() > Duration::from_secs(30) {
             tally.complain("the owner's training still waits");

@@ -10,6 +10,7 @@ use crate::load::Load;
 use crate::mount::skip;
 use crate::scene::{Outcome, Tally, import};
 use crate::server::Site;
+use crate::support::patience::within;
 use crate::support::postgres::{Cluster, private_cluster};
 
 const CLIENTS: usize = 4;
@@ -75,7 +76,7 @@ async fn until_idle(caller: &Caller) -> Result<(), String> {
         if jobs.iter().all(|job: &Value| job["finished_ms"].is_i64()) {
             return Ok(());
         }
-        if asked.elapsed() > PATIENCE {
+        if asked.elapsed() > within(PATIENCE) {
             return Err(format!("still not ended: {jobs:?}"));
         }
         tokio::time::sleep(Duration::from_millis(50)).await;

@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use crate::caller::Caller;
 use crate::ledger::{Audit, Ledger};
 use crate::server::{Server, Site};
+use crate::support::patience::within;
 use crate::support::{self, trained};
 
 /// Periods of a session.
@@ -76,7 +77,7 @@ impl Tally {
     /// Notes how long a server took to get ready.
     pub fn started(&mut self, server: &Server) {
         self.ready = self.ready.max(server.ready);
-        if server.ready > READY {
+        if server.ready > within(READY) {
             self.complain(format!("ready only after {} ms", server.ready.as_millis()));
         }
     }

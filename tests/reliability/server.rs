@@ -9,6 +9,7 @@ use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{ConnectOptions, Connection};
 use tempfile::TempDir;
 
+use crate::support::patience::within;
 use crate::support::process::try_serve;
 
 /// Time given to a process to get ready or to end: `Config::drain` and some.
@@ -68,7 +69,7 @@ impl Site {
             if let Some(status) = server.child.try_wait().unwrap() {
                 return Err(format!("ended with {status} before it was ready: {}", self.last_words()));
             }
-            if started.elapsed() > PATIENCE {
+            if started.elapsed() > within(PATIENCE) {
                 return Err("never got ready".into());
             }
             tokio::time::sleep(POLL).await;
@@ -164,7 +165,7 @@ impl Server {
     /// Waits for its end; `None` where it does not come.
     pub async fn ended(&mut self) -> Option<ExitStatus> {
         let asked = Instant::now();
-        while asked.elapsed() < PATIENCE {
+        while asked.elapsed() < within(PATIENCE) {
             if let Some(status) = self.child.try_wait().unwrap() {
                 return Some(status);
             }

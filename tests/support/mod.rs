@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod certificates;
+pub mod patience;
 #[macro_use]
 pub mod place;
 pub mod policies;
@@ -24,9 +25,6 @@ use serde_json::{Value, json};
 use sqlx::Connection;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use tempfile::TempDir;
-
-/// Nothing that is waited for takes longer.
-const PATIENCE: Duration = Duration::from_secs(60);
 
 pub struct App {
     pub client: Client,
@@ -72,13 +70,21 @@ pub async fn attempts(folder: &Path) -> i64 {
     sqlx::query_scalar("SELECT attempt FROM jobs").fetch_one(&mut connection).await.expect("one job")
 }
 
-/// Keeps the service from writing for so long.
-pub async fn lock_out(folder: &Path, time: Duration) {
+/// Keeps the service from writing until it is given up.
+pub struct Lock(SqliteConnection);
+
+/// Locks the database of the folder.
+pub async fn lock_out(folder: &Path) -> Lock {
     let mut connection = connection(folder).await;
     sqlx::query("BEGIN IMMEDIATE").execute(&mut connection).await.expect("a lock");
-    tokio::time::sleep(time).await;
-    sqlx::query("ROLLBACK").execute(&mut connection).await.expect("the lock given up");
-    connection.close().await.expect("closed");
+    Lock(connection)
+}
+
+impl Lock {
+    pub async fn give_up(mut self) {
+        sqlx::query("ROLLBACK").execute(&mut self.0).await.expect("the lock given up");
+        self.0.close().await.expect("closed");
+    }
 }
 
 /// Makes a key; its text.
@@ -184,9 +190,8 @@ impl App {
     pub async fn enter(&mut self, key: &str) {
         for (shown, is_turned_away) in [("", true), (key, false)] {
             self.hold(shown);
-            while (self.get("/jobs").await.0 == 401) != is_turned_away {
-                tokio::time::sleep(Duration::from_millis(20)).await;
-            }
+            let counts = async || ((self.get("/jobs").await.0 == 401) == is_turned_away).then_some(());
+            patience::until("the keys to count", counts).await;
         }
     }
 
@@ -203,7 +208,7 @@ impl App {
 
     /// Waits until the job satisfies `reached`.
     pub async fn until(&self, job: &str, reached: impl Fn(&Value) -> bool) -> Value {
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + patience::patience();
         let mut steps_done = 0;
         loop {
             let (_, now) = self.get(&format!("/jobs/{job}")).await;

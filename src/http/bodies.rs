@@ -1,0 +1,97 @@
+//! The bytes that the bodies of requests under way may take together.
+//!
+//! A large body takes its part of one budget before its first byte is read, and gives it back when the call is answered:
+//! many callers who send large bodies at a time are told to come again, and the process never holds more of them than the
+//! budget. Small bodies are not counted; the connections bound them.
+
+use std::sync::Arc;
+
+use axum::extract::Request;
+use axum::http::header;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use super::problem::{Problem, ProblemKind};
+
+/// Bodies up to this size are not counted, and larger ones in units of it.
+const UNIT: usize = 64 << 10;
+/// Part of the memory limit that bodies may take: half of what the process has for itself.
+const PART: usize = 16;
+
+/// The budget.
+#[derive(Clone)]
+pub struct Bodies {
+    room: Arc<Semaphore>,
+    bytes: usize,
+}
+
+impl Bodies {
+    /// A sixteenth of the memory limit, and one body of the largest size at least.
+    pub fn new(memory_limit: usize, largest: usize) -> Self {
+        let bytes = (memory_limit / PART).max(largest);
+        let units = bytes.div_ceil(UNIT).min(u32::MAX as usize);
+        Bodies { room: Arc::new(Semaphore::new(units)), bytes }
+    }
+
+    /// The part of the budget that the body of `request` takes, which may have `limit` bytes; `None` for one that is small,
+    /// or so large that it is refused for that.
+    ///
+    /// # Errors
+    /// The bodies under way leave too little.
+    pub fn admit(&self, request: &Request, limit: usize) -> Result<Option<OwnedSemaphorePermit>, Problem> {
+        let header = |name| request.headers().get(name).and_then(|value| value.to_str().ok());
+        let declared = header(header::CONTENT_LENGTH.as_str()).and_then(|length| length.parse::<usize>().ok());
+        let is_stream = header(header::TRANSFER_ENCODING.as_str()).is_some();
+        let bytes = declared.unwrap_or(if is_stream { limit } else { 0 });
+        if bytes <= UNIT || bytes > limit {
+            return Ok(None);
+        }
+        let units = bytes.div_ceil(UNIT).min(u32::MAX as usize) as u32;
+        self.room.clone().try_acquire_many_owned(units).map(Some).map_err(|_| {
+            let detail = format!("bodies under way leave no room for {bytes} more bytes");
+            let rule = format!("must fit, with those of other calls under way, into {} bytes", self.bytes);
+            Problem::new(ProblemKind::Overloaded, detail).naming("body", bytes, rule)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use axum::body::Body;
+
+    use super::*;
+
+    fn request(headers: &[(&str, &str)]) -> Request {
+        headers
+            .iter()
+            .fold(Request::builder(), |builder, (name, value)| builder.header(*name, *value))
+            .body(Body::empty())
+            .unwrap()
+    }
+
+    fn of_length(bytes: usize) -> Request {
+        request(&[("content-length", &bytes.to_string())])
+    }
+
+    #[test]
+    fn large_bodies_share_one_budget_and_small_ones_need_none() {
+        let largest = 10 * UNIT;
+        let bodies = Bodies::new(PART * 12 * UNIT, largest);
+        let first = bodies.admit(&of_length(7 * UNIT), largest).unwrap();
+        assert!(first.is_some());
+        assert!(bodies.admit(&of_length(7 * UNIT), largest).is_err());
+        // A body of unknown length may be as long as it may be.
+        assert!(bodies.admit(&request(&[("transfer-encoding", "chunked")]), largest).is_err());
+        assert!(bodies.admit(&of_length(4 * UNIT + 1), largest).unwrap().is_some());
+        for uncounted in [of_length(UNIT), of_length(largest + 1), request(&[])] {
+            assert!(bodies.admit(&uncounted, largest).unwrap().is_none());
+        }
+        drop(first);
+        assert!(bodies.admit(&of_length(7 * UNIT), largest).unwrap().is_some());
+    }
+
+    #[test]
+    fn the_largest_body_fits_however_small_the_limit_is() {
+        let bodies = Bodies::new(1 << 20, 64 << 20);
+        assert!(bodies.admit(&of_length(64 << 20), 64 << 20).unwrap().is_some());
+    }
+}

@@ -1,0 +1,194 @@
+"""Evaluates an exported policy by docs/policy-format.md alone: the standard library and nothing of Ballast.
+
+Reads {"policy": .., "questions": [{"step", "wealth", "returns"}, ..]} from standard input, where a question may give the
+"radius" and the "radius_ahead" of a bridge rule, whose random numbers nobody else has. Answers one object a question.
+With the argument "bridge" it reads {"returns", "alpha", "paths"} and answers the quantiles Q and Q' of its own bridges.
+"""
+
+import json
+import math
+import random
+import sys
+
+
+def mean(values):
+    return sum(values) / len(values)
+
+
+def cap(returns, radius, lowest):
+    """c from (1/n) sum max(z_j - c, 0) = radius, by bisection, and at least the lowest return of the support."""
+    low, high = min(returns) - radius - 1.0, max(returns)
+    for _ in range(200):
+        middle = (low + high) / 2
+        if mean([max(z - middle, 0.0) for z in returns]) > radius:
+            low = middle
+        else:
+            high = middle
+    return max(high, lowest)
+
+
+def radius_of(problem, size):
+    """The rules of docs/requests.md that look at the number of returns alone."""
+    rule = problem["radius"]
+    if problem["framework"] == "plug_in":
+        return 0.0
+    if rule["rule"] == "fixed":
+        return rule["radius"]
+    if rule["rule"] == "root_n":
+        return rule["kappa"] / math.sqrt(size)
+    if rule["rule"] == "concentration":
+        return math.sqrt(math.log(rule["C"] / rule["alpha"]) / (rule["c"] * size))
+    raise ValueError(f"{rule['rule']} must be asked for with its radius")
+
+
+def moment_features(returns, count):
+    m = mean(returns)
+    s = math.sqrt(mean([(z - m) ** 2 for z in returns]))
+    shape = lambda order: mean([(z - m) ** order for z in returns]) / s**order
+    features = {
+        "mean": m,
+        "log_standard_deviation": math.log(s),
+        "skewness": shape(3),
+        "log_kurtosis": math.log(shape(4)),
+        "shape_5": shape(5),
+        "shape_6": math.log(shape(6)),
+    }
+    return list(features.values())[:count]
+
+
+def merton_features(problem, returns, radius):
+    utility, bank = problem["utility"], 1 + problem["rate_per_step"]
+    rho = {
+        "exponential": lambda: utility["risk_aversion"] * problem["initial_wealth"],
+        "power": lambda: utility["risk_aversion"],
+        "log": lambda: 1.0,
+    }[utility["kind"]]()
+    lowest = (problem.get("support") or {"min": -math.inf})["min"]
+    c = cap(returns, radius, lowest)
+    capped = [math.exp(min(z, c)) / bank for z in returns]
+    e = mean(capped) - 1
+    v = mean([(x - mean(capped)) ** 2 for x in capped])
+    s2 = mean([(z - mean(returns)) ** 2 for z in returns])
+    return [math.asinh(e / (rho * s2)), math.asinh(e / (rho * max(v, s2 / 100)))]
+
+
+def features(specification, question):
+    problem, surrogate = specification["problem"], specification["surrogate"]
+    framework, returns, wealth = problem["framework"], question["returns"], question["wealth"]
+    sees_wealth = problem["utility"]["kind"] == "exponential"
+    learns = framework in ("adaptive", "plug_in", "parametric_adaptive")
+    count = surrogate["moment_count"] if learns else 0
+    if framework == "parametric_adaptive":
+        count = min(count, 2)
+    if surrogate["features"] == "raw_moments":
+        raw = [mean([z**order for z in returns]) for order in range(1, count + 1)]
+        return ([wealth] if sees_wealth else []) + raw
+    found = [math.log(wealth)] if sees_wealth else []
+    if not learns:
+        return found
+    found += moment_features(returns, count)
+    if framework == "parametric_adaptive":
+        return found
+    radius = question["radius"] if "radius" in question else radius_of(problem, len(returns))
+    if problem["radius"]["rule"] == "bridge" and framework == "adaptive":
+        found += [math.log(radius), math.log(question["radius_ahead"] / radius)]
+    return found + merton_features(problem, returns, radius)
+
+
+def kernel(hyper, left, right):
+    r = math.sqrt(5 * sum(((a - b) / l) ** 2 for a, b, l in zip(left, right, hyper["lengthscales"])))
+    return hyper["signal_variance"] * (1 + r + r * r / 3) * math.exp(-r)
+
+
+def prediction(process, points, x):
+    total = sum(w * kernel(process["hyperparameters"], point, x) for w, point in zip(process["weights"], points))
+    return process["offset"] + process["scale"] * total
+
+
+def predicted_variance(hyper, points, x):
+    """s2 - k^T (K + noise_variance I)^-1 k, by a Cholesky factor L of the matrix: the square of L^-1 k is taken off."""
+    factor, solved = [], []
+    for i, point in enumerate(points):
+        row = []
+        for j in range(i + 1):
+            entry = kernel(hyper, point, points[j]) + (hyper["noise_variance"] if i == j else 0.0)
+            entry -= sum(a * b for a, b in zip(row, factor[j] if j < i else row))
+            row.append(math.sqrt(entry) if i == j else entry / factor[j][j])
+        factor.append(row)
+        known = sum(a * b for a, b in zip(row, solved))
+        solved.append((kernel(hyper, point, x) - known) / row[i])
+    return hyper["signal_variance"] - sum(a * a for a in solved)
+
+
+def certainty_equivalent(utility, value):
+    if utility["kind"] == "log":
+        return math.exp(value)
+    a = utility["risk_aversion"]
+    if utility["kind"] == "exponential":
+        return -math.log(1 - a * value) / a
+    return (1 + (1 - a) * value) ** (1 / (1 - a))
+
+
+def evaluate(policy, question):
+    specification, step = policy["specification"], question["step"]
+    problem, wealth = specification["problem"], question["wealth"]
+    solution = policy["steps"][step]["solution"]
+    floor = wealth * (1 + problem["rate_per_step"]) ** (problem["horizon"] - step)
+    if solution["kind"] == "single":
+        gain = solution["floor_gain"]
+        return {"allocation": solution["action"], "floor_gain": gain, "certainty_equivalent": floor * math.exp(gain)}
+    found, scaling = features(specification, question), solution["scaling"]
+    scales = zip(scaling["active"], scaling["centre"], scaling["spread"])
+    x = [(found[feature] - centre) / spread for feature, centre, spread in scales]
+    points = list(zip(*solution["inputs"]))
+    value = prediction(solution["value"], points, x)
+    if specification["surrogate"]["target"] == "value":
+        # Under power and log utility of a wealth of 1, for whose multiples the policy is the same.
+        unit = 1.0 if problem["utility"]["kind"] == "exponential" else wealth
+        value = math.log(certainty_equivalent(problem["utility"], value) * unit / floor)
+    gain = min(max(value, 0.0), solution["largest_gain"])
+    low, high = problem["action_interval"]
+    deviation = math.sqrt(predicted_variance(solution["value"]["hyperparameters"], points, x))
+    return {
+        "allocation": min(max(prediction(solution["policy"], points, x), low), high),
+        "floor_gain": gain,
+        "certainty_equivalent": floor * math.exp(gain),
+        "deviation": deviation,
+        "in_design": deviation <= solution["deviation_limit"],
+    }
+
+
+def bridge(size):
+    """|B(i/n)|, i = 1 to n - 1: a random walk of n steps, tied down at its end."""
+    walk, paths = 0.0, []
+    for _ in range(size):
+        walk += random.gauss(0.0, 1.0) / math.sqrt(size)
+        paths.append(walk)
+    return [abs(b - walk * (i + 1) / size) for i, b in enumerate(paths[:-1])]
+
+
+def gaps(returns):
+    ordered = sorted(returns)
+    return [high - low for low, high in zip(ordered, ordered[1:])]
+
+
+def quantile(gaps, alpha, paths):
+    """The (1 - alpha)-quantile of sum |B(i/n)| (z_(i+1) - z_(i)), and half the width that 1 standard error of its rank has."""
+    values = sorted(sum(b * gap for b, gap in zip(bridge(len(gaps) + 1), gaps)) for _ in range(paths))
+    rank, error = (1 - alpha) * paths, math.sqrt(alpha * (1 - alpha) * paths)
+    return {"value": values[round(rank)], "standard_error": (values[round(rank + error)] - values[round(rank - error)]) / 2}
+
+
+def quantiles(returns, alpha, paths):
+    random.seed(20260101)
+    doubled = [gaps(returns + [again]) for again in returns]
+    ahead = [mean(column) for column in zip(*doubled)]
+    return {"now": quantile(gaps(returns), alpha, paths), "ahead": quantile(ahead, alpha, paths)}
+
+
+if __name__ == "__main__":
+    asked = json.load(sys.stdin)
+    if sys.argv[1:] == ["bridge"]:
+        json.dump(quantiles(**asked), sys.stdout)
+    else:
+        json.dump([evaluate(asked["policy"], question) for question in asked["questions"]], sys.stdout)
