@@ -152,7 +152,7 @@ mod tests {
         let mut given = json!({
             "problem": { "history": [0.1, -0.1, 0.05], "horizon": 3, "rate_per_step": 0.0, "initial_wealth": 100.0,
                 "utility": { "kind": "exponential", "risk_aversion": 0.01 },
-                "radius": { "rule": "bridge", "paths": 200, "scale": 1.0 } },
+                "radius": { "rule": "bridge", "alpha": 0.1, "paths": 200, "scale": 1.0 } },
             "design": { "count": 20, "sampling_law": { "kind": "student_t", "location": 0.0, "scale": 0.1,
                 "degrees_of_freedom": 5.0 } },
             "surrogate": { "moment_count": 4 }
