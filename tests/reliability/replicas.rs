@@ -45,6 +45,7 @@ async fn crash_all(cluster: &Cluster, seed: u64, tally: &mut Tally) -> Result<()
     second_worker.signal("-STOP");
     worker = working.start().await?;
     tally.started(&worker);
+    // A lease runs out by time alone, and whether one was held by then is the load's.
     tokio::time::sleep(Duration::from_secs(LEASE_SECONDS + 1)).await;
     second_worker.signal("-CONT");
     load.acknowledges(20).await;
