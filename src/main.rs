@@ -17,10 +17,6 @@ struct CommandLine {
     command: Command,
 }
 
-/// Gives what is dropped back to the system: what was needed once for a large job is not held for ever.
-#[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
-
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Train on real returns and advise a live session through 2008.
