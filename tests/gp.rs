@@ -169,6 +169,21 @@ fn a_fit_climbs_to_a_point_where_the_projected_gradient_vanishes() {
     }
 }
 
+#[test]
+fn a_fit_ends_at_the_bounds_that_the_data_lie_beyond() {
+    let (inputs, targets) = smooth_sample(120, 2);
+    let free = fit(&inputs, &targets, &wide_bounds(), None).unwrap().hyperparameters;
+    let least = free.lengthscales.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = free.lengthscales.iter().copied().fold(0.0, f64::max);
+    for (lengthscale, bound) in [([1e-2, 0.5 * least], 0.5 * least), ([2.0 * most, 1e2], 2.0 * most)] {
+        let found = fit(&inputs, &targets, &Bounds { lengthscale, ..wide_bounds() }, None).unwrap();
+        for length in found.hyperparameters.lengthscales {
+            // The search is over logarithms: a bound is met to rounding.
+            assert!((length / bound - 1.0).abs() < 1e-12, "{length} and not {bound}");
+        }
+    }
+}
+
 /// A fit that nobody stops.
 fn fit(
     inputs: &DMatrix<f64>,

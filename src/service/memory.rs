@@ -280,6 +280,17 @@ mod tests {
         assert!(limit.origin != Origin::Unknown && limit.bytes > 16 << 20, "{limit}");
     }
 
+    #[test]
+    fn the_parts_leave_the_process_an_eighth() {
+        let limit = MemoryLimit::chosen(8 << 30);
+        let memory = Memory::new(limit);
+        let gigabyte = 1 << 30;
+        assert_eq!((memory.for_jobs(), memory.for_sessions()), (3 * gigabyte, gigabyte));
+        // What is kept has two eighths, no part of it more than half of them, and what is being made one eighth.
+        assert_eq!(memory.kept.heaviest(), gigabyte);
+        assert_eq!(EIGHTHS_FOR_JOBS + EIGHTHS_KEPT + EIGHTHS_KEPT / 2 + EIGHTHS_FOR_SESSIONS, 7);
+    }
+
     #[tokio::test]
     async fn what_cannot_fit_is_refused_by_name_and_what_fits_waits() {
         let memory = Memory::new(MemoryLimit::chosen(8 << 30));
