@@ -52,6 +52,17 @@ fn a_certified_value_is_that_over_all_returns() {
     }
 }
 
+#[test]
+fn wealth_whose_utility_no_longer_grows_has_a_finite_value_and_gap() {
+    let problem = problem(0.01, &json!({ "kind": "exponential", "risk_aversion": 1.0 }), None);
+    for wealth in [1e3, 1e6, 1e15] {
+        let state = State::new(&HISTORY, wealth).unwrap();
+        let found = BellmanStep { problem: &problem, step: 0, next: &NextValue::Terminal }.solve(&state);
+        assert!(found.floor_gain >= 0.0 && found.floor_gain.is_finite(), "{wealth}: {found:?}");
+        assert!(found.duality_gap.is_finite(), "{wealth}: {found:?}");
+    }
+}
+
 /// The lowest and the highest return of the window that a step ended with.
 fn window(solution: &RobustSolution) -> [f64; 2] {
     let Adversary::Transport { support, .. } = &solution.adversary else { panic!("{solution:?}") };

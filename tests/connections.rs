@@ -383,7 +383,13 @@ async fn places_are_kept_for_the_probes() {
     })
     .await;
     let lock = support::lock_out(app.folder()).await;
-    let train = || app.client.post(format!("{}/train", app.url)).json(&specification(3)).send();
+    // One that comes while a poll below has the second place is sent away, and comes again.
+    let train = async || loop {
+        let answer = app.client.post(format!("{}/train", app.url)).json(&specification(3)).send().await.unwrap();
+        if answer.status() != 503 {
+            return answer.status();
+        }
+    };
     let calls = futures_util::future::join(train(), train());
     let probes = async {
         let fresh = reqwest::Client::builder().pool_max_idle_per_host(0).build().unwrap();
@@ -397,8 +403,5 @@ async fn places_are_kept_for_the_probes() {
         lock.give_up().await;
     };
     let (calls, ()) = tokio::join!(calls, probes);
-    assert_eq!(
-        (calls.0.unwrap().status(), calls.1.unwrap().status()),
-        (reqwest::StatusCode::ACCEPTED, reqwest::StatusCode::ACCEPTED)
-    );
+    assert_eq!(calls, (reqwest::StatusCode::ACCEPTED, reqwest::StatusCode::ACCEPTED));
 }

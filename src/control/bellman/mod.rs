@@ -67,13 +67,13 @@ impl BellmanStep<'_> {
     /// Solves the step at `state`. Cost: the gain field, and some thirty actions priced.
     pub fn solve(&self, state: &State) -> RobustSolution {
         let set = self.problem.uncertainty_set(state);
-        self.bounded(state, self.optimum(state, &set, self.problem.actions(), |_, _| ()).0)
+        at_least_the_bank(self.optimum(state, &set, self.problem.actions(), |_, _| ()).0)
     }
 
     /// The same were the uncertainty set of this step alone of another radius; the value of the step after stays.
     pub fn solve_within(&self, state: &State, radius: f64) -> RobustSolution {
         let set = self.problem.uncertainty_set_within(state, radius);
-        self.bounded(state, self.optimum(state, &set, self.problem.actions(), |_, _| ()).0)
+        at_least_the_bank(self.optimum(state, &set, self.problem.actions(), |_, _| ()).0)
     }
 
     /// [`Self::solve`] with the target of the policy surrogate at the state.
@@ -85,22 +85,13 @@ impl BellmanStep<'_> {
             let gain = |action: f64| utility.inverse(pricing.value(action));
             policy_target(found.action, actions.highest, found.floor_gain, curvature, gain)
         });
-        (self.bounded(state, solution), target)
+        (at_least_the_bank(solution), target)
     }
 
     /// What one action is worth, the best or not.
     pub fn price(&self, state: &State, action: f64) -> RobustSolution {
         let only = ActionInterval { lowest: action, highest: action };
         self.optimum(state, &self.problem.uncertainty_set(state), only, |_, _| ()).0
-    }
-
-    /// All-bank is feasible and no law can hurt it; and no law of the set is better in every period than its best return.
-    fn bounded(&self, state: &State, solution: RobustSolution) -> RobustSolution {
-        let gain = solution.floor_gain;
-        let largest = self.problem.largest_gain(self.step, state);
-        // What is not a number stays so, and no zero is negative.
-        let floor_gain = if gain <= 0.0 { 0.0 } else { gain.clamp(0.0, largest) };
-        RobustSolution { floor_gain, ..solution }
     }
 
     fn utility(&self, state: &State) -> RelativeUtility {
@@ -117,6 +108,7 @@ impl BellmanStep<'_> {
         then: impl Fn(&dyn Pricing, &RobustSolution) -> T,
     ) -> (RobustSolution, T) {
         let utility = self.utility(state);
+        let largest = self.problem.largest_gain(self.step, state);
         let (mut reach, mut growths) = (Reach::FIRST, 0);
         loop {
             let field = GainField::tabulate(self.problem, self.next, utility, state, set.exact_returns(reach));
@@ -126,7 +118,7 @@ impl BellmanStep<'_> {
                 UncertaintySet::Region(region) => Box::new(NormalPricing::new(*region, &field)),
             };
             let action = best_action(pricing.as_mut(), actions);
-            let solution = solution(action, pricing.worst(action), utility);
+            let solution = solution(action, pricing.worst(action), utility, largest);
             if solution.certified || !set.has_window() || growths == WINDOW_GROWTHS {
                 let more = then(pricing.as_ref(), &solution);
                 return (solution, more);
@@ -147,12 +139,25 @@ fn best_action(pricing: &mut dyn Pricing, actions: ActionInterval) -> f64 {
     }
 }
 
-fn solution(action: f64, worst: WorstExpectation, utility: RelativeUtility) -> RobustSolution {
-    let floor_gain = utility.inverse(worst.value);
+/// All-bank is feasible and no law can hurt it.
+fn at_least_the_bank(solution: RobustSolution) -> RobustSolution {
+    let gain = solution.floor_gain;
+    // What is not a number stays so, and no zero is negative.
+    RobustSolution { floor_gain: if gain <= 0.0 { 0.0 } else { gain }, ..solution }
+}
+
+/// The primal and the dual value as gains. Neither is above the `largest` gain, for no law of the set is better in every
+/// period than its best return; where wealth is so large that its utility no longer grows, both may be that.
+fn solution(action: f64, worst: WorstExpectation, utility: RelativeUtility, largest: f64) -> RobustSolution {
+    let gain = |value: f64| match utility.inverse(value) {
+        gain if gain > largest => largest,
+        gain => gain,
+    };
+    let floor_gain = gain(worst.value);
     RobustSolution {
         action,
         floor_gain,
-        duality_gap: floor_gain - utility.inverse(worst.dual),
+        duality_gap: floor_gain - gain(worst.dual),
         multiplier: worst.multiplier,
         adversary: worst.adversary,
         certified: worst.certified,
