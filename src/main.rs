@@ -17,6 +17,10 @@ struct CommandLine {
     command: Command,
 }
 
+/// Its threads take little of the address space: a service whose address space is limited lives.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Train on real returns and advise a live session through 2008.
