@@ -4,6 +4,8 @@ use axum::http::{HeaderMap, HeaderName, StatusCode, header};
 use axum::response::{AppendHeaders, IntoResponse, Response};
 use sha2::{Digest, Sha256};
 
+use super::problem::{Problem, ProblemKind};
+
 pub const HTML: &str = "text/html; charset=utf-8";
 pub const SCRIPT: &str = "text/javascript; charset=utf-8";
 pub const STYLE: &str = "text/css; charset=utf-8";
@@ -30,6 +32,17 @@ impl Asset {
     /// The same file, whose bytes are a gzip of it.
     pub fn compressed(self) -> Self {
         Asset { is_compressed: true, ..self }
+    }
+
+    /// The file of `page` that is called `name`.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn find(files: &'static [Asset], name: &str, page: &str) -> Result<&'static Asset, Problem> {
+        files.iter().find(|asset| asset.name == name).ok_or_else(|| {
+            let problem = Problem::new(ProblemKind::NotFound, format!("{page} has no file {name}"));
+            problem.naming("file", name, format!("must be a file of {page}"))
+        })
     }
 
     /// The answer to a request with these headers; `policy` says what a browser may load and run beside it.

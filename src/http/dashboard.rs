@@ -13,7 +13,7 @@ use axum::response::{IntoResponse, Response};
 use super::asset::{Asset, HTML, SCRIPT, STYLE, TEXT};
 use super::documentation::Published;
 use super::extract::Id;
-use super::problem::{Problem, ProblemKind};
+use super::problem::Problem;
 
 const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; \
     font-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; \
@@ -110,9 +110,5 @@ fn wants_json(headers: &HeaderMap) -> bool {
         (status = 304, description = "The file is the one that `If-None-Match` names."),
         (status = 404, description = "There is no such file.", body = Problem, content_type = "application/problem+json")))]
 pub async fn file(Id(name): Id, headers: HeaderMap) -> Result<Response, Problem> {
-    let found = asset(&name).ok_or_else(|| {
-        let problem = Problem::new(ProblemKind::NotFound, format!("the dashboard has no file {name}"));
-        problem.naming("file", name, "must be a file of the dashboard")
-    })?;
-    Ok(found.served(CONTENT_SECURITY_POLICY, &headers))
+    Ok(Asset::find(&ASSETS, &name, "the dashboard")?.served(CONTENT_SECURITY_POLICY, &headers))
 }

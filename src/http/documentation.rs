@@ -11,7 +11,7 @@ use axum::response::Response;
 
 use super::asset::{Asset, HTML, SCRIPT, STYLE};
 use super::extract::Id;
-use super::problem::{Problem, ProblemKind};
+use super::problem::Problem;
 
 /// What the router hands to those of its handlers that publish the description of all of them, as checked in under
 /// `api/openapi.json`. Made once: anybody may ask for it, as often as he likes.
@@ -54,9 +54,5 @@ pub async fn docs(headers: HeaderMap) -> Response {
         (status = 304, description = "The file is the one that `If-None-Match` names."),
         (status = 404, description = "There is no such file.", body = Problem, content_type = "application/problem+json")))]
 pub async fn docs_file(Id(name): Id, headers: HeaderMap) -> Result<Response, Problem> {
-    let found = ASSETS.iter().find(|asset| asset.name == name).ok_or_else(|| {
-        let problem = Problem::new(ProblemKind::NotFound, format!("the page /docs has no file {name}"));
-        problem.naming("file", name, "must be a file of the page /docs")
-    })?;
-    Ok(found.served(CONTENT_SECURITY_POLICY, &headers))
+    Ok(Asset::find(&ASSETS, &name, "the page /docs")?.served(CONTENT_SECURITY_POLICY, &headers))
 }
