@@ -7,6 +7,8 @@ use ballast::control::bellman::gain_field::GainField;
 use ballast::control::bellman::next_value::NextValue;
 use ballast::control::bellman::problem::Problem;
 use ballast::control::bellman::solution::{Adversary, RobustSolution};
+use ballast::control::problem::dynamics::Trade;
+use ballast::control::problem::holdings::Holdings;
 use ballast::control::problem::state::State;
 use ballast::control::problem::utility::{RelativeUtility, utility};
 use ballast::control::request::specification::Specification;
@@ -95,10 +97,10 @@ fn a_window_that_is_too_small_grows_until_it_is_certified() {
 fn first_step(problem: &Problem) -> RobustSolution {
     let gain = |state: &State| {
         let atoms = state.law.atoms();
-        0.05 * (10.0 * atoms.iter().sum::<f64>() / atoms.len() as f64).tanh().max(0.0)
+        vec![0.05 * (10.0 * atoms.iter().sum::<f64>() / atoms.len() as f64).tanh().max(0.0)]
     };
     let state = State::new(&HISTORY, 100.0).unwrap();
-    BellmanStep { problem, step: 0, next: &NextValue::Exact(Box::new(gain)) }.solve(&state)
+    BellmanStep { problem, step: 0, next: &NextValue::Exact(Holdings::new(1), Box::new(gain)) }.solve(&state)
 }
 
 #[test]
@@ -226,7 +228,7 @@ fn the_tabulated_field_is_the_value_of_the_next_state() {
         // Between the returns and the actions at which it is tabulated.
         let returns: Vec<f64> = (0..20).map(|k| -0.055 + 0.0061 * f64::from(k)).collect();
         for action in [0.0, 0.13, 0.5, 0.77, 1.0] {
-            for (z, found) in returns.iter().zip(field.at(&returns).payoff(action)) {
+            for (z, found) in returns.iter().zip(field.at(&returns).payoff(Trade { action, kept: 1.0 })) {
                 let then = solved.advance(&state, action, *z);
                 let gain = (then.wealth / (100.0 * 1.002)).ln() + solved.surrogate_gain(1, &then);
                 // The cubics are good to 1e-6 of the gain.
@@ -252,6 +254,36 @@ fn the_multiplier_is_the_utility_lost_per_unit_of_radius() {
         let slope = (below.0 - above.0) / (2.0 * step);
         // The slope of the utility changes by its curvature times the step, and utilities have thirteen digits.
         assert!((middle.1 / slope - 1.0).abs() < 1e-2, "{kind}: {} against {slope}", middle.1);
+    }
+}
+
+/// Paper, section 2.4, for an order-1 ball: to first order a radius costs the largest slope of the payoff down from any
+/// return seen, however far, and not the mean slope at the returns.
+#[test]
+fn a_little_radius_costs_the_largest_slope() {
+    for kind in utilities() {
+        let request = json!({ "problem": { "horizon": 1, "history": HISTORY, "utility": kind,
+            "action_interval": [0.0, 0.3], "radius": { "rule": "fixed", "radius": 0.0 } } });
+        let solved = support::policies::advisor(request);
+        let (state, utility_of) = (State::new(&HISTORY, 100.0).unwrap(), solved.specification().problem.utility);
+        let at = |radius: f64| {
+            let (advice, worst) = solved.explain_within(0, &state, radius);
+            assert_eq!(advice.allocation, 0.3, "{kind}");
+            (advice.certainty_equivalent.ln(), worst.radius_cost)
+        };
+        let radius = 1e-5;
+        let (without, (gain, cost)) = (at(0.0).0, at(radius));
+        assert!((cost * radius / (without - gain) - 1.0).abs() < 1e-2, "{kind}: {cost}");
+        let payoff = |z: f64| utility(utility_of, 100.0 * (0.7 * 1.002 + 0.3 * z.exp()));
+        let slope = |z: f64, far: f64| (payoff(z) - payoff(z - far)) / far;
+        let down = |z: f64| (1..=2000).map(|far| slope(z, 0.002 * f64::from(far))).fold(slope(z, 1e-6), f64::max);
+        let largest = HISTORY.map(down).into_iter().fold(0.0, f64::max);
+        let mean = HISTORY.map(|z| slope(z, 1e-6)).iter().sum::<f64>() / HISTORY.len() as f64;
+        // The certainty equivalent moves by the utility's over its slope there and the wealth.
+        let wealth = without.exp();
+        let marginal = (utility(utility_of, wealth + 1e-3) - utility(utility_of, wealth - 1e-3)) / 2e-3;
+        let [largest, mean] = [largest, mean].map(|slope| slope / (marginal * wealth));
+        assert!((cost / largest - 1.0).abs() < 1e-2 && cost > 1.01 * mean, "{kind}: {cost} {largest} {mean}");
     }
 }
 

@@ -1,6 +1,6 @@
 """Evaluates an exported policy by docs/policy-format.md alone: the standard library and nothing of Ballast.
 
-Reads {"policy": .., "questions": [{"step", "wealth", "returns"}, ..]} from standard input, where a question may give the
+Reads {"policy": .., "questions": [{"step", "wealth", "holding", "returns"}, ..]} from standard input, where a question may give the
 "radius" and the "radius_ahead" of a bridge rule, whose random numbers nobody else has. Answers one object a question.
 With the argument "bridge" it reads {"returns", "alpha", "paths"} and answers the quantiles Q and Q' of its own bridges.
 """
@@ -100,9 +100,25 @@ def kernel(hyper, left, right):
     return hyper["signal_variance"] * (1 + r + r * r / 3) * math.exp(-r)
 
 
-def prediction(process, points, x):
-    total = sum(w * kernel(process["hyperparameters"], point, x) for w, point in zip(process["weights"], points))
-    return process["offset"] + process["scale"] * total
+def predictions(process, points, x):
+    covariances = [kernel(process["hyperparameters"], point, x) for point in points]
+    totals = [sum(w * k for w, k in zip(weights, covariances)) for weights in process["weights"]]
+    return [process["offset"] + process["scale"] * total for total in totals]
+
+
+def at_holding(values, holding):
+    """The cubic through the four of the even holdings around this one, in Lagrange's form."""
+    if len(values) == 1:
+        return values[0]
+    position = holding * (len(values) - 1)
+    first = min(max(math.floor(position) - 1, 0), len(values) - 4)
+    nodes = range(first, first + 4)
+    basis = lambda i: math.prod((position - j) / (i - j) for j in nodes if j != i)
+    return sum(basis(i) * values[i] for i in nodes)
+
+
+def into(band, holding):
+    return min(max(holding, band[0]), band[-1])
 
 
 def predicted_variance(hyper, points, x):
@@ -131,17 +147,20 @@ def certainty_equivalent(utility, value):
 
 def evaluate(policy, question):
     specification, step = policy["specification"], question["step"]
-    problem, wealth = specification["problem"], question["wealth"]
+    problem, holding = specification["problem"], question["holding"]
+    # What selling everything leaves.
+    wealth = question["wealth"] * (1 - problem["trading_cost"] * holding)
     solution = policy["steps"][step]["solution"]
     floor = wealth * (1 + problem["rate_per_step"]) ** (problem["horizon"] - step)
     if solution["kind"] == "single":
-        gain = solution["floor_gain"]
-        return {"allocation": solution["action"], "floor_gain": gain, "certainty_equivalent": floor * math.exp(gain)}
+        gain = max(at_holding(solution["floor_gains"], holding), 0.0)
+        allocation = into(solution["band"], holding)
+        return {"allocation": allocation, "floor_gain": gain, "certainty_equivalent": floor * math.exp(gain)}
     found, scaling = features(specification, question), solution["scaling"]
     scales = zip(scaling["active"], scaling["centre"], scaling["spread"])
     x = [(found[feature] - centre) / spread for feature, centre, spread in scales]
     points = list(zip(*solution["inputs"]))
-    value = prediction(solution["value"], points, x)
+    value = at_holding(predictions(solution["value"], points, x), holding)
     if specification["surrogate"]["target"] == "value":
         # Under power and log utility of a wealth of 1, for whose multiples the policy is the same.
         unit = 1.0 if problem["utility"]["kind"] == "exponential" else wealth
@@ -149,8 +168,9 @@ def evaluate(policy, question):
     gain = min(max(value, 0.0), solution["largest_gain"])
     low, high = problem["action_interval"]
     deviation = math.sqrt(predicted_variance(solution["value"]["hyperparameters"], points, x))
+    band = [min(max(end, low), high) for end in predictions(solution["policy"], points, x)]
     return {
-        "allocation": min(max(prediction(solution["policy"], points, x), low), high),
+        "allocation": into([band[0], max(band[-1], band[0])], holding),
         "floor_gain": gain,
         "certainty_equivalent": floor * math.exp(gain),
         "deviation": deviation,

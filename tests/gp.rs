@@ -4,7 +4,8 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use ballast::numerics::gp::{GaussianProcess, GpMean, Hyperparameters};
-use ballast::numerics::gp_fit::{self, Bounds, Fit, FitError, log_likelihood_and_gradient};
+use ballast::numerics::gp_fit::{self, Bounds, Fit, FitError};
+use ballast::numerics::gp_likelihood::log_likelihood_and_gradient;
 use ballast::numerics::minimise::{SearchOutcome, minimise_bounded};
 use nalgebra::DMatrix;
 use serde::Deserialize;
@@ -85,7 +86,7 @@ fn predictions_equal_those_of_scikit_learn() {
 #[test]
 fn gradients_equal_those_of_scikit_learn() {
     for case in cases() {
-        let (value, gradient) = log_likelihood_and_gradient(&matrix(&case.inputs), &case.targets, &case.hyper).unwrap();
+        let (value, gradient) = one_likelihood(&matrix(&case.inputs), &case.targets, &case.hyper).unwrap();
         assert_close(value, case.log_marginal_likelihood);
         let mut expected = case.gradient_log_lengthscales.clone();
         expected.extend([case.gradient_log_signal_variance, case.gradient_log_noise_variance]);
@@ -100,12 +101,12 @@ fn gradients_equal_those_of_scikit_learn() {
 fn gradients_equal_finite_differences_when_the_factorisation_is_blocked() {
     let (inputs, targets) = smooth_sample(131, 3);
     let hyper = Hyperparameters { lengthscales: vec![1.1, 0.8, 2.0], signal_variance: 1.3, noise_variance: 0.02 };
-    let (_, gradient) = log_likelihood_and_gradient(&inputs, &targets, &hyper).unwrap();
+    let (_, gradient) = one_likelihood(&inputs, &targets, &hyper).unwrap();
     let at = |index: usize, shift: f64| {
         let mut moved = hyper.clone();
         let (lengthscales, others) = (&mut moved.lengthscales, [&mut moved.signal_variance, &mut moved.noise_variance]);
         *lengthscales.iter_mut().chain(others).nth(index).unwrap() *= shift.exp();
-        log_likelihood_and_gradient(&inputs, &targets, &moved).unwrap().0
+        one_likelihood(&inputs, &targets, &moved).unwrap().0
     };
     for (index, slope) in gradient.iter().enumerate() {
         let numeric = (at(index, 1e-4) - at(index, -1e-4)) / 2e-4;
@@ -118,15 +119,15 @@ fn partial_distances_add_up_and_the_mean_alone_equals_the_process() {
     let case = cases().pop().unwrap();
     let inputs = matrix(&case.inputs);
     let process = GaussianProcess::condition(&inputs, &case.targets, &case.hyper).unwrap();
-    let mean = GpMean::new(&inputs, process.weights(), &case.hyper);
+    let mean = GpMean::new(&inputs, &[process.weights().to_vec()], &case.hyper);
     let (n, d) = inputs.shape();
     let mut scratch = Vec::new();
     for query in &case.test_inputs {
         let (mut moving, mut fixed) = (vec![f64::NAN; n], vec![f64::NAN; n]);
         mean.squared_distances(query, 0..1, &mut moving);
         mean.squared_distances(query, 1..d, &mut fixed);
-        let whole: Vec<f64> = moving.iter().zip(&fixed).map(|(a, b)| a + b).collect();
-        assert_close(mean.mean_from_squared(&whole), process.mean(query));
+        let mut whole: Vec<f64> = moving.iter().zip(&fixed).map(|(a, b)| a + b).collect();
+        assert_close(mean.means_from_squared(&mut whole)[0], process.mean(query));
         assert_eq!(mean.mean_with(query, &mut scratch), process.mean(query));
         mean.squared_distances(query, 2.min(d)..2.min(d), &mut moving);
         assert!(moving.iter().all(|&distance| distance == 0.0));
@@ -137,13 +138,14 @@ fn partial_distances_add_up_and_the_mean_alone_equals_the_process() {
 fn leave_one_out_equals_conditioning_without_the_point() {
     let (inputs, targets) = smooth_sample(70, 2);
     let hyper = Hyperparameters { lengthscales: vec![1.5, 1.0], signal_variance: 2.0, noise_variance: 0.01 };
-    let left_out = GaussianProcess::condition(&inputs, &targets, &hyper).unwrap().leave_one_out(&targets);
+    let left_out =
+        GaussianProcess::condition(&inputs, &targets, &hyper).unwrap().leave_one_out(std::slice::from_ref(&targets));
     for i in 0..targets.len() {
         let mut others = targets.clone();
         others.remove(i);
         let process = GaussianProcess::condition(&inputs.clone().remove_row(i), &others, &hyper).unwrap();
         let query: Vec<f64> = inputs.row(i).iter().copied().collect();
-        assert!((left_out.errors[i] - (targets[i] - process.mean(&query))).abs() < 1e-9);
+        assert!((left_out.errors[0][i] - (targets[i] - process.mean(&query))).abs() < 1e-9);
         assert!((left_out.latent_sd[i].powi(2) - process.latent_variance(&query)).abs() < 1e-9);
     }
 }
@@ -152,13 +154,13 @@ fn leave_one_out_equals_conditioning_without_the_point() {
 fn a_fit_climbs_to_a_point_where_the_projected_gradient_vanishes() {
     let (inputs, targets) = smooth_sample(120, 2);
     let start = Hyperparameters { lengthscales: vec![0.3, 5.0], signal_variance: 0.2, noise_variance: 0.5 };
-    let before = log_likelihood_and_gradient(&inputs, &targets, &start).unwrap().0;
+    let before = one_likelihood(&inputs, &targets, &start).unwrap().0;
     let bounds = wide_bounds();
     for start in [Some(&start), None] {
         let found = fit(&inputs, &targets, &bounds, start).unwrap();
         assert_eq!(found.outcome, SearchOutcome::Converged);
         assert!(found.log_likelihood > before + 10.0);
-        let (value, gradient) = log_likelihood_and_gradient(&inputs, &targets, &found.hyperparameters).unwrap();
+        let (value, gradient) = one_likelihood(&inputs, &targets, &found.hyperparameters).unwrap();
         assert_close(value, found.log_likelihood);
         let point = log_scales(&found.hyperparameters);
         let boxes = [bounds.lengthscale, bounds.lengthscale, bounds.signal_variance, bounds.noise_variance];
@@ -191,13 +193,31 @@ fn fit(
     bounds: &Bounds,
     start: Option<&Hyperparameters>,
 ) -> Result<Fit, FitError> {
-    gp_fit::fit(inputs, targets, bounds, start, &AtomicBool::new(false))
+    gp_fit::fit(inputs, &[targets.to_vec()], bounds, start, &AtomicBool::new(false))
+}
+
+/// Of one function of the inputs.
+fn one_likelihood(inputs: &DMatrix<f64>, targets: &[f64], hyper: &Hyperparameters) -> Option<(f64, Vec<f64>)> {
+    log_likelihood_and_gradient(inputs, &[targets.to_vec()], hyper)
+}
+
+#[test]
+fn the_likelihood_of_several_functions_is_the_sum_of_theirs() {
+    let (inputs, first) = smooth_sample(40, 2);
+    let second: Vec<f64> = first.iter().map(|value| value * value - 0.3).collect();
+    let hyper = Hyperparameters { lengthscales: vec![0.9, 1.4], signal_variance: 1.3, noise_variance: 0.02 };
+    let (together, slopes) = log_likelihood_and_gradient(&inputs, &[first.clone(), second.clone()], &hyper).unwrap();
+    let [one, other] = [first, second].map(|targets| one_likelihood(&inputs, &targets, &hyper).unwrap());
+    assert!((together - one.0 - other.0).abs() < 1e-9 * together.abs());
+    for (slope, (one, other)) in slopes.iter().zip(one.1.iter().zip(&other.1)) {
+        assert!((slope - one - other).abs() < 1e-9 * (one.abs() + other.abs()), "{slope} {one} {other}");
+    }
 }
 
 #[test]
 fn a_fit_asked_to_stop_says_so() {
     let (inputs, targets) = smooth_sample(50, 2);
-    let stopped = gp_fit::fit(&inputs, &targets, &wide_bounds(), None, &AtomicBool::new(true));
+    let stopped = gp_fit::fit(&inputs, &[targets], &wide_bounds(), None, &AtomicBool::new(true));
     assert_eq!(stopped, Err(FitError::Stopped));
 }
 
@@ -215,7 +235,7 @@ fn a_fit_through_a_subset_ends_as_high_as_an_independent_search_over_all_rows() 
             signal_variance: scales[2],
             noise_variance: scales[3],
         };
-        match log_likelihood_and_gradient(&inputs, &targets, &hyper) {
+        match one_likelihood(&inputs, &targets, &hyper) {
             Some((value, gradient)) => (-value, gradient.into_iter().map(|slope| -slope).collect()),
             None => (f64::INFINITY, vec![0.0; 4]),
         }
@@ -249,7 +269,7 @@ fn timings_at_a_thousand_rows() {
     let found = fit(&inputs, &targets, &wide_bounds(), None).unwrap();
     println!("fit: {:?}, {found:?}", clock.elapsed());
     let clock = Instant::now();
-    log_likelihood_and_gradient(&inputs, &targets, &found.hyperparameters).unwrap();
+    one_likelihood(&inputs, &targets, &found.hyperparameters).unwrap();
     println!("one evaluation: {:?}", clock.elapsed());
     let clock = Instant::now();
     let process = GaussianProcess::condition(&inputs, &targets, &found.hyperparameters).unwrap();
@@ -264,7 +284,7 @@ fn timings_at_a_thousand_rows() {
     println!("mean: {:?} each ({means})", clock.elapsed() / 1000);
     let clock = Instant::now();
     for _ in 0..1000 {
-        std::hint::black_box(process.posterior_mean().mean_from_squared(std::hint::black_box(&scratch)));
+        std::hint::black_box(process.posterior_mean().means_from_squared(std::hint::black_box(&mut scratch)));
     }
     println!("mean from squared: {:?} each", clock.elapsed() / 1000);
 }

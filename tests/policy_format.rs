@@ -52,7 +52,17 @@ fn policies() -> Vec<Value> {
     let concentration = json!({ "rule": "concentration", "alpha": 0.1, "C": 1.0, "c": 4000.0 });
     let value = json!({ "target": "value" });
     let raw_value = json!({ "target": "value", "features": "raw_moments", "moment_count": 3 });
+    let costly = |framework: &str, utility: Value, surrogate: Value| {
+        let mut costly = policy(framework, utility, bridge(), surrogate);
+        costly["problem"]["trading_cost"] = json!(0.01);
+        costly
+    };
     vec![
+        costly("adaptive", power(), json!({})),
+        costly("adaptive", exponential(), json!({})),
+        costly("plug_in", power(), value.clone()),
+        costly("static", exponential(), json!({})),
+        costly("static", power(), json!({})),
         policy("adaptive", exponential(), bridge(), six()),
         policy("adaptive", power(), bridge(), value.clone()),
         policy("adaptive", exponential(), json!({ "rule": "root_n", "kappa": 0.02 }), value),
@@ -72,13 +82,14 @@ fn policies() -> Vec<Value> {
 fn states(solved: &Advisor) -> Vec<(usize, State)> {
     let start = solved.initial_state(None, None).unwrap();
     let first = solved.advance(&start, 0.6, 0.03);
-    let other = State { wealth: 91.0, law: first.law.clone() };
+    let other = State { wealth: 91.0, holding: 0.15, ..first.clone() };
     let second = solved.advance(&first, 0.3, -0.02);
     vec![(0, start), (1, first), (1, other), (2, second)]
 }
 
 fn question(solved: &Advisor, step: usize, state: &State) -> Value {
-    let mut question = json!({ "step": step, "wealth": state.wealth, "returns": state.law.atoms() });
+    let mut question =
+        json!({ "step": step, "wealth": state.wealth, "holding": state.holding, "returns": state.law.atoms() });
     let problem = solved.policy().problem(Default::default());
     if problem.specification.problem.radius.as_ref().is_some_and(|rule| json!(rule)["rule"] == "bridge") {
         let radii = problem.sets.radii(&state.law, solved.radius(state));

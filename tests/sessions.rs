@@ -35,18 +35,28 @@ fn assert_refused(answer: &(reqwest::StatusCode, Value), status: u16, field: &st
 /// Every allocation, wealth and radius of a session as the simulator has them on the returns the service understood.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_live_session_equals_the_simulator_bit_for_bit() {
-    let mut request = specification(HORIZON);
-    // A radius small enough that the robust allocation is not always zero.
-    request["problem"]["radius"]["scale"] = json!(0.1);
-    let mut app = trained(&request).await;
+    let mut held = 0;
+    for cost in [0.0, 0.004] {
+        let mut request = specification(HORIZON);
+        // A radius small enough that the robust allocation is not always zero.
+        request["problem"]["radius"]["scale"] = json!(0.1);
+        request["problem"]["trading_cost"] = json!(cost);
+        held += lived_as_simulated(trained(&request).await).await;
+    }
+    assert!(held > 3, "the sessions hold nothing");
+}
+
+/// Compares every period of two sessions; how many of them hold anything.
+async fn lived_as_simulated(mut app: App) -> usize {
     let advisor = advisor(&app).await;
     let own: Vec<f64> = (0..12).map(|k| 0.03 * f64::from(k).sin() + 0.01).collect();
     let mut held = 0;
-    for (start, history, wealth) in
-        [(json!({}), None, None), (json!({ "history": own, "wealth": 250.0 }), Some(own.as_slice()), Some(250.0))]
+    let with_own = json!({ "history": own, "wealth": 250.0, "holding": 0.9 });
+    for (start, history, wealth, holding) in
+        [(json!({}), None, None, 0.0), (with_own, Some(own.as_slice()), Some(250.0), 0.9)]
     {
         app.open_with(start).await;
-        let start = advisor.initial_state(history, wealth).unwrap();
+        let start = advisor.initial_state(history, wealth).unwrap().with_holding(holding).unwrap();
         let reports = [
             json!({ "log_return": 0.0123456789 }),
             json!({ "simple_return": -0.0317 }),
@@ -67,6 +77,9 @@ async fn a_live_session_equals_the_simulator_bit_for_bit() {
             assert_eq!(number(&action["allocation"]), advice.allocation);
             assert_eq!(number(&action["certainty_equivalent"]), advice.certainty_equivalent);
             assert_eq!(number(&action["floor"]), advice.floor);
+            assert_eq!(action["band"], json!(advice.band));
+            assert_eq!((number(&action["holding"]), number(&action["trade"])), (advice.holding, advice.trade));
+            assert_eq!(number(&observed["holding"]), state.holding);
             assert_eq!(number(&action["radius"]), advice.radius);
             assert_eq!(action["source"], json!(advice.source));
             assert_eq!(number(&observed["executed_allocation"]), advice.allocation);
@@ -79,16 +92,19 @@ async fn a_live_session_equals_the_simulator_bit_for_bit() {
         assert_eq!(returns[1], (-0.0317_f64).ln_1p());
         assert_eq!(returns[2..], [(101.3_f64 / 99.7).ln(), (100.1_f64 / 101.3).ln()]);
     }
-    assert!(held > 0, "no period held the risky asset: the test shows nothing");
+    held
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_was_executed_and_what_was_reached_are_taken_as_stated() {
-    let mut app = trained(&specification(3)).await;
+    let (rate, cost, wealth, allocation, log_return) = (0.002, 0.01, 100.0, 0.37, 0.0213_f64);
+    let mut request = specification(3);
+    request["problem"]["trading_cost"] = json!(cost);
+    let mut app = trained(&request).await;
     app.open().await;
-    let (rate, wealth, allocation, log_return) = (0.002, 100.0, 0.37, 0.0213_f64);
     let (_, first) = app.report(1, json!({ "log_return": log_return, "executed_allocation": allocation })).await;
-    let expected = wealth * ((1.0 - allocation) * (1.0 + rate) + allocation * log_return.exp());
+    let expected =
+        wealth * (1.0 - cost * allocation) * ((1.0 - allocation) * (1.0 + rate) + allocation * log_return.exp());
     assert_eq!((number(&first["wealth"]), number(&first["executed_allocation"])), (expected, allocation));
     let (_, second) = app.report(2, json!({ "log_return": 0.01, "wealth": 77.5 })).await;
     assert_eq!(number(&second["wealth"]), 77.5);
@@ -103,7 +119,8 @@ async fn what_was_executed_and_what_was_reached_are_taken_as_stated() {
     assert_eq!(number(&action["allocation"]), advice.allocation);
     assert_eq!(number(&action["certainty_equivalent"]), advice.certainty_equivalent);
     let (_, third) = app.report(3, json!({ "log_return": 0.01, "executed_allocation": 1.0 })).await;
-    assert_eq!(number(&third["wealth"]), 77.5 * (0.0 * (1.0 + rate) + 1.0 * 0.01_f64.exp()));
+    let bought = 1.0 - cost * (1.0 - state.holding);
+    assert_eq!(number(&third["wealth"]), 77.5 * bought * (0.0 * (1.0 + rate) + 1.0 * 0.01_f64.exp()));
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -420,6 +420,7 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
                 tenant: Tenant::default(),
                 policy: policy_name(policy),
                 initial_wealth: 100.0,
+                initial_holding: 0.0,
                 initial_history: vec![0.1, -0.0],
                 horizon: 3,
                 created_ms: model.now,

@@ -10,6 +10,7 @@ use ballast::control::bellman::next_value::NextValue;
 use ballast::control::bellman::problem::Problem;
 use ballast::control::policy::advice::AdviceSource;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
+use ballast::control::problem::holdings::Holdings;
 use ballast::control::problem::state::State;
 use ballast::control::surrogate::design::Design;
 use serde_json::{Value, json};
@@ -58,9 +59,12 @@ fn judged(step: usize, count: usize) -> Vec<Judged> {
         1 => NextValue::Terminal,
         _ => {
             let last = Problem::new(TRAINED.specification());
-            NextValue::Exact(Box::new(move |state: &State| {
-                BellmanStep { problem: &last, step: 1, next: &NextValue::Terminal }.solve(state).floor_gain
-            }))
+            NextValue::Exact(
+                Holdings::new(1),
+                Box::new(move |state: &State| {
+                    vec![BellmanStep { problem: &last, step: 1, next: &NextValue::Terminal }.solve(state).floor_gain]
+                }),
+            )
         }
     };
     let solver = BellmanStep { problem: &problem, step, next: &next };

@@ -12,7 +12,8 @@ use ballast::control::request::framework::Framework;
 use ballast::control::training::Training;
 
 const YEAR: usize = 4;
-const WALK: WalkForward = WalkForward { window: 24, year: YEAR, risk_aversion: 3.0, count: 20, seed: 5 };
+const WALK: WalkForward =
+    WalkForward { window: 24, year: YEAR, risk_aversion: 3.0, trading_cost: 0.0, count: 20, seed: 5 };
 
 /// Returns that pay enough beyond the bank to be held at a wide level.
 fn periods(count: usize) -> Vec<Period> {
@@ -50,14 +51,13 @@ fn a_year_equals_the_session_that_lives_it() {
         let end = walk.state;
         assert_eq!((decisions.len(), advices.len()), (YEAR, YEAR));
         for (decision, advice) in decisions.iter().zip(&advices) {
-            let expected =
-                Decision { allocation: advice.allocation, radius: advice.radius, source: Some(advice.source) };
+            let expected = Decision { band: advice.band, radius: advice.radius, source: Some(advice.source) };
             assert_eq!(*decision, expected);
         }
-        assert!(decisions.iter().any(|decision| decision.allocation > 0.0), "{strategy:?} shows nothing");
+        assert!(decisions.iter().any(|decision| decision.band.high > 0.0), "{strategy:?} shows nothing");
         // The bank paid what the policy took it to pay, and nothing was charged.
-        let allocations = decisions.iter().map(|decision| decision.allocation);
-        let account = keep(allocations, &periods[WALK.window..], 0.0, 100.0);
+        let bands = decisions.iter().map(|decision| decision.band);
+        let account = keep(bands, &periods[WALK.window..], 0.0, 100.0);
         assert_eq!(account.wealth.last(), Some(&end.wealth));
     }
 }

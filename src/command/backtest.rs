@@ -41,9 +41,12 @@ pub struct BacktestArgs {
     /// Relative risk aversion: 1 is log utility
     #[arg(long, default_value_t = 3.0)]
     risk_aversion: f64,
-    /// Trading cost, in hundredths of a per cent of what is traded
+    /// Trading cost, in hundredths of a per cent of what is traded; policies are trained with it
     #[arg(long, default_value_t = 0.0)]
     cost_bp: f64,
+    /// Train every policy as if trading were free
+    #[arg(long)]
+    cost_blind: bool,
     /// Design points per step: more is more accurate and slower
     #[arg(long, default_value_t = 100)]
     count: usize,
@@ -122,6 +125,11 @@ impl BacktestArgs {
         Ok(())
     }
 
+    /// As a share of what is traded.
+    fn cost(&self) -> f64 {
+        1e-4 * self.cost_bp
+    }
+
     /// The line most is said about: the second adaptive strategy, or the only one.
     pub fn main_line(&self) -> usize {
         usize::from(self.alpha.len() > 1)
@@ -137,7 +145,10 @@ impl BacktestArgs {
         let adaptive =
             self.alpha.iter().map(|&alpha| (format!("adaptive, alpha {alpha}"), Strategy::Adaptive { alpha }));
         let alpha = self.main_alpha();
+        let knows_cost = self.cost_bp > 0.0 && !self.cost_blind;
+        let blind = knows_cost.then(|| (format!("cost-blind, alpha {alpha}"), Strategy::CostBlind { alpha }));
         adaptive
+            .chain(blind)
             .chain([
                 (format!("static, alpha {alpha}"), Strategy::Static { alpha }),
                 ("plug-in".into(), Strategy::PlugIn),
@@ -154,7 +165,8 @@ fn walk(args: &BacktestArgs, months: &[Month]) -> Result<Backtest, BacktestError
     args.check(months.len())?;
     let started = Instant::now();
     let (window, risk_aversion, count, seed) = (args.window, args.risk_aversion, args.count, args.seed);
-    let walk = WalkForward { window, year: MONTHS_PER_YEAR, risk_aversion, count, seed };
+    let trading_cost = if args.cost_blind { 0.0 } else { args.cost() };
+    let walk = WalkForward { window, year: MONTHS_PER_YEAR, risk_aversion, trading_cost, count, seed };
     let period = |month: &Month| Period { log_return: month.risky_return.ln_1p(), bank_return: month.risk_free_return };
     let periods: Vec<Period> = months.iter().map(period).collect();
     let (names, strategies): (Vec<String>, Vec<Strategy>) = args.strategies().into_iter().unzip();
@@ -168,10 +180,10 @@ fn walk(args: &BacktestArgs, months: &[Month]) -> Result<Backtest, BacktestError
     let mut lines: Vec<Line> = names
         .into_iter()
         .zip(decisions)
-        .map(|(name, decisions)| Line::new(name, decisions, lived, 1e-4 * args.cost_bp))
+        .map(|(name, decisions)| Line::new(name, decisions, lived, args.cost()))
         .collect();
     let main = args.main_line();
-    lines.push(lines[main].hindsight(lived, 1e-4 * args.cost_bp));
+    lines.push(lines[main].hindsight(lived, args.cost()));
     let analysis = Analysis::of(&lines, main, lived, &walk);
     let (args, months, seconds) = (args.clone(), months[window..].to_vec(), started.elapsed().as_secs_f64());
     Ok(Backtest { args, walk, months, lines, analysis, seconds })

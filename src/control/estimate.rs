@@ -7,11 +7,13 @@
 use super::bellman::problem::Problem;
 use super::policy::Policy;
 use super::policy::prepared::{bytes_ready, factor_bytes, prepared_bytes};
+use super::problem::holdings::HOLDINGS;
 use super::problem::utility::depends_on_wealth;
 use super::request::evaluation::EvaluationRequest;
 use super::request::framework::Framework;
+use super::request::radius_rule::RadiusRule;
 use super::request::rules::DEFAULT_COUNT;
-use super::request::specification::{RadiusRule, Specification};
+use super::request::specification::Specification;
 use super::surrogate::design::{CANDIDATES_PER_POINT, GUARDS};
 use super::surrogate::stored::Solution;
 use crate::numerics::gp::GaussianProcess;
@@ -86,6 +88,8 @@ struct Sizes {
     history: usize,
     count: usize,
     inputs: usize,
+    /// Functions that the surrogates of a step predict.
+    functions: usize,
     paths: usize,
     /// Bytes of the largest bridges.
     bridges: usize,
@@ -104,7 +108,8 @@ impl Sizes {
             _ => 0,
         };
         let bridges = framed.sets.heaviest(history, horizon);
-        Sizes { horizon, history, count, inputs: framed.selection.names().len(), paths, bridges }
+        let (inputs, functions) = (framed.selection.names().len(), functions(&framed));
+        Sizes { horizon, history, count, inputs, functions, paths, bridges }
     }
 
     fn factor(&self) -> usize {
@@ -113,12 +118,12 @@ impl Sizes {
 
     /// Bytes of the finished policy and its documents.
     fn policy(&self) -> usize {
-        product(&[self.horizon, self.count, self.inputs + 2, POLICY_NUMBER_BYTES])
+        product(&[self.horizon, self.count, self.inputs + self.functions, POLICY_NUMBER_BYTES])
     }
 
     /// Bytes of the policy made ready to advise.
     fn prepared(&self) -> usize {
-        bytes_ready(self.horizon, self.horizon.saturating_mul(self.count), self.inputs)
+        bytes_ready(self.horizon, self.horizon.saturating_mul(self.count), self.inputs, self.functions)
     }
 
     /// Bytes while the surrogates of one step are fitted.
@@ -136,6 +141,11 @@ impl Sizes {
     fn statistics(&self, threads: usize) -> usize {
         product(&[threads, self.paths, STATISTICS, NUMBER])
     }
+}
+
+/// The value at every holding, and the policy's ends.
+fn functions(problem: &Problem) -> usize {
+    problem.holdings(HOLDINGS).count() + problem.dynamics().sides().len()
 }
 
 /// What a training of a completed specification takes on so many threads.
@@ -173,7 +183,7 @@ pub fn advising_by(policy: &Policy) -> [Footprint; 3] {
     let sizes = Sizes::of(policy.specification());
     let design = |solution: &Solution| match solution {
         Solution::Single(_) => (1, 0),
-        Solution::Surrogates(stored) => (stored.value.weights.len(), factor_bytes(stored)),
+        Solution::Surrogates(stored) => (stored.count(), factor_bytes(stored)),
     };
     let designs = policy.steps().iter().map(|step| design(&step.solution));
     let (points, factor) = designs.max_by_key(|(_, bytes)| *bytes).unwrap_or_default();

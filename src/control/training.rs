@@ -8,13 +8,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use crate::control::bellman::BellmanStep;
 use crate::control::bellman::next_value::NextValue;
 use crate::control::bellman::problem::Problem;
 use crate::control::bellman::solution::RobustSolution;
+use crate::control::bellman::{BellmanStep, DesignSolution};
 use crate::control::error::TrainError;
 use crate::control::kept::Kept;
 use crate::control::policy::Policy;
+use crate::control::problem::holdings::{HOLDINGS, HOLDINGS_OF_ONE_LAW, Holdings};
 use crate::control::problem::state::State;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::specification::Specification;
@@ -75,10 +76,7 @@ impl Training {
         let solver = DesignSolver { bellman, design: &self.design, watch };
         let count = self.design.count(step);
         if count == 1 {
-            let only = solver.solve_point(0, self.problem.features(&self.design.state(step, 0)))?;
-            solver.report(1, 1);
-            let solution = Solution::Single(SingleSolution { floor_gain: only.floor_gain, action: only.action });
-            return Ok(StepSolution { step, solution, diagnostics: diagnostics(step, &[only]) });
+            return solver.solve_the_only();
         }
         let candidates = solver.features(0..self.design.candidate_count(step))?;
         let scaling = Scaling::of(&candidates);
@@ -170,23 +168,47 @@ impl DesignSolver<'_> {
         (self.watch.progress)(StepProgress { step: self.bellman.step, phase: Phase::Solving, done, total });
     }
 
+    /// Solves the robust step where all states are one but for the holding, of which there can then be many.
+    fn solve_the_only(&self) -> Result<StepSolution, TrainError> {
+        let (step, problem) = (self.bellman.step, self.bellman.problem);
+        let only = self.state(0);
+        let found = self.solved(0, &only, problem.holdings(HOLDINGS_OF_ONE_LAW))?;
+        self.report(1, 1);
+        let single = SingleSolution { floor_gains: found.floor_gains.clone(), band: found.solution.band };
+        let point = design_point(only.wealth, problem.features(&only), found);
+        Ok(StepSolution { step, solution: Solution::Single(single), diagnostics: diagnostics(step, &[point]) })
+    }
+
     /// Solves the robust step at one design point.
     fn solve_point(&self, point: usize, features: Features) -> Result<DesignPoint, TrainError> {
         self.watch.go_on()?;
         let state = self.state(point);
-        let (solution, policy_target) = self.bellman.solve_for_design(&state);
-        let RobustSolution { action, floor_gain, duality_gap, certified, .. } = solution;
-        if !floor_gain.is_finite() || !policy_target.is_finite() {
-            let step = self.bellman.step;
-            return Err(TrainError::NotFinite { step, point, gain: floor_gain, action: policy_target });
+        let found = self.solved(point, &state, self.bellman.problem.holdings(HOLDINGS))?;
+        Ok(design_point(state.wealth, features, found))
+    }
+
+    fn solved(&self, point: usize, state: &State, holdings: Holdings) -> Result<DesignSolution, TrainError> {
+        let found = self.bellman.solve_for_design(state, holdings);
+        let worst = |values: &[f64]| values.iter().copied().find(|value| !value.is_finite());
+        let (gain, action) = (worst(&found.floor_gains), worst(&found.policy_targets));
+        if gain.is_none() && action.is_none() && found.solution.floor_gain.is_finite() {
+            return Ok(found);
         }
-        let wealth = state.wealth;
-        Ok(DesignPoint { wealth, features, action, floor_gain, policy_target, duality_gap, certified })
+        let gain = gain.unwrap_or(found.solution.floor_gain);
+        let action = action.unwrap_or(found.solution.action);
+        Err(TrainError::NotFinite { step: self.bellman.step, point, gain, action })
     }
 
     fn state(&self, index: usize) -> State {
         self.design.state(self.bellman.step, index)
     }
+}
+
+/// What a solved state tells the surrogates.
+fn design_point(wealth: f64, features: Features, found: DesignSolution) -> DesignPoint {
+    let DesignSolution { solution, floor_gains, policy_targets } = found;
+    let RobustSolution { action, floor_gain, duality_gap, certified, .. } = solution;
+    DesignPoint { wealth, features, action, floor_gain, floor_gains, policy_targets, duality_gap, certified }
 }
 
 fn diagnostics(step: usize, solved: &[DesignPoint]) -> StepDiagnostics {

@@ -8,7 +8,7 @@ use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
 use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
 use crate::control::request::rules::{
-    COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, RADIUS_SCALE, WEALTH,
+    COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, RADIUS_SCALE, TRADING_COST, WEALTH,
 };
 use crate::service::observation::PRICE;
 use crate::service::what_if::POINTS;
@@ -43,6 +43,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("ProblemSpecification", "rate_per_step", within(-0.5, 0.5)),
         ("ProblemSpecification", "initial_wealth", wealth.clone()),
         ("ProblemSpecification", "action_interval", action),
+        ("ProblemSpecification", "trading_cost", within(TRADING_COST.0, TRADING_COST.1)),
         ("ProblemSpecification", "history", history.clone()),
         ("UtilitySpecification exponential", "risk_aversion", within(1e-12, 1e9)),
         ("UtilitySpecification power", "risk_aversion", json!({ "exclusiveMinimum": 1, "maximum": 100 })),
@@ -70,6 +71,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("OpenSession", "policy", json!({ "minLength": 1 })),
         ("OpenSession", "history", history),
         ("OpenSession", "wealth", wealth.clone()),
+        ("OpenSession", "holding", within(0.0, 1.0)),
         ("Observe", "session", json!({ "minLength": 1 })),
         ("Observe", "period", json!({ "minimum": 1 })),
         ("Observe", "log_return", within(-LOG_RETURN, LOG_RETURN)),
@@ -80,6 +82,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("Observe", "wealth", wealth.clone()),
         ("WhatIf", "session", json!({ "minLength": 1 })),
         ("WhatIf", "wealth", wealth),
+        ("WhatIf", "holding", within(0.0, 1.0)),
         ("WhatIf", "radius_scale", within(RADIUS_SCALE.0, RADIUS_SCALE.1)),
         ("WhatIf", "radius", within(FIXED_RADIUS.0, FIXED_RADIUS.1)),
         ("WhatIf", "log_return", within(-LOG_RETURN, LOG_RETURN)),
@@ -151,7 +154,7 @@ mod tests {
     fn refused(pointer: &str, value: Value) -> Option<String> {
         let mut given = json!({
             "problem": { "history": [0.1, -0.1, 0.05], "horizon": 3, "rate_per_step": 0.0, "initial_wealth": 100.0,
-                "utility": { "kind": "exponential", "risk_aversion": 0.01 },
+                "trading_cost": 0.0, "utility": { "kind": "exponential", "risk_aversion": 0.01 },
                 "radius": { "rule": "bridge", "alpha": 0.1, "paths": 200, "scale": 1.0 } },
             "design": { "count": 20, "sampling_law": { "kind": "student_t", "location": 0.0, "scale": 0.1,
                 "degrees_of_freedom": 5.0 } },
@@ -174,6 +177,7 @@ mod tests {
             ("/problem/horizon", of("ProblemSpecification", None, "horizon"), 1.0),
             ("/problem/rate_per_step", of("ProblemSpecification", None, "rate_per_step"), 1e-3),
             ("/problem/initial_wealth", of("ProblemSpecification", None, "initial_wealth"), 1e-7),
+            ("/problem/trading_cost", of("ProblemSpecification", None, "trading_cost"), 1e-3),
             ("/problem/history/0", of("ProblemSpecification", None, "history")["items"].clone(), 1e-3),
             ("/problem/radius/paths", of("RadiusRule", Some(0), "paths"), 1.0),
             ("/problem/radius/scale", of("RadiusRule", Some(0), "scale"), 1e-3),

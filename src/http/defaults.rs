@@ -10,8 +10,9 @@ use utoipa::openapi::OpenApi;
 
 use super::bounds::{merged, with_field};
 use crate::control::request::evaluation::EvaluationRequest;
+use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{
-    DesignSpecification, HyperparameterBounds, ProblemSpecification, RadiusRule, Specification, SurrogateSpecification,
+    DesignSpecification, HyperparameterBounds, ProblemSpecification, Specification, SurrogateSpecification,
 };
 
 /// Adds to every schema of a request what stands for its fields where they are left out.

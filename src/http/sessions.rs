@@ -42,7 +42,8 @@ pub async fn open(
     headers: HeaderMap,
     JsonBody(request): JsonBody<wire::OpenSession>,
 ) -> Result<Response, Problem> {
-    let start = Start { policy: request.policy, history: request.history, wealth: request.wealth };
+    let wire::OpenSession { policy, history, wealth, holding } = request;
+    let start = Start { policy, history, wealth, holding };
     let live = service.sessions.open(&caller, start, idempotency_key(&headers)?).await?;
     let session = wire::Session::from(live);
     let location = [(header::LOCATION, format!("/sessions/{}", session.session))];
@@ -95,6 +96,7 @@ pub async fn history(
         session: row.session,
         policy: row.policy,
         initial_wealth: row.initial_wealth,
+        initial_holding: row.initial_holding,
         history: row.initial_history,
         observations: observations.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
     }))

@@ -136,6 +136,8 @@ pub struct OpenSession {
     pub history: Option<Vec<f64>>,
     /// Default: the policy's initial wealth.
     pub wealth: Option<f64>,
+    /// Share of wealth in the risky asset at the start. Default: 0.
+    pub holding: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
@@ -156,6 +158,8 @@ pub struct Session {
     pub horizon: usize,
     pub state: SessionState,
     pub wealth: f64,
+    /// Share of wealth in the risky asset, before trading.
+    pub holding: f64,
     pub sample_size: usize,
     pub created_ms: i64,
 }
@@ -170,6 +174,7 @@ impl From<Live> for Session {
             period: live.observed() + 1,
             state: session_state(live.observed(), live.row.horizon),
             wealth: live.state.wealth,
+            holding: live.state.holding,
             sample_size: live.state.law.sample_size(),
             session: live.row.session.clone(),
             policy: live.row.policy.clone(),
@@ -219,6 +224,8 @@ pub struct SessionHistory {
     pub session: String,
     pub policy: String,
     pub initial_wealth: f64,
+    /// Share of it in the risky asset.
+    pub initial_holding: f64,
     /// Log-returns known at the start.
     pub history: Vec<f64>,
     pub observations: Vec<Observation>,
@@ -233,6 +240,8 @@ pub struct Observation {
     pub executed_allocation: f64,
     /// Wealth at the end of the period.
     pub wealth: f64,
+    /// Share of it in the risky asset, as the return left it.
+    pub holding: f64,
     /// Radius of the uncertainty set after the period, in the unit of an advice's.
     pub radius: f64,
     pub observed_ms: i64,
@@ -249,6 +258,7 @@ impl TryFrom<ObservationRow> for Observation {
             advised_allocation: row.advised_allocation,
             executed_allocation: row.executed_allocation,
             wealth: row.wealth_after,
+            holding: answer.holding,
             radius: answer.uncertainty.radius,
             observed_ms: row.created_ms,
         })

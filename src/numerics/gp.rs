@@ -54,39 +54,47 @@ pub(super) fn kernel_lower(scaled: &DMatrix<f64>, hyper: &Hyperparameters, kerne
     }
 }
 
-/// The posterior mean alone: all that has to be kept of a process to evaluate it.
+/// The posterior mean alone: all that has to be kept of a process to evaluate it, or of several that share inputs and scales.
 ///
 ///   m(x) = s2 sum_j w_j (1 + r_j + r_j^2/3) exp(-r_j),   r_j^2 = 5 sum_i ((x_i - x_ji) / l_i)^2
 #[derive(Debug, Clone, PartialEq)]
 pub struct GpMean {
     /// n rows, d columns, already divided by the length scales.
     inputs: DMatrix<f64>,
-    /// K^-1 y times the signal variance.
-    weights: Vec<f64>,
+    /// K^-1 y times the signal variance, function by function.
+    weights: Vec<Vec<f64>>,
     lengthscales: Vec<f64>,
 }
 
 impl GpMean {
-    /// From `inputs` (n rows, d columns, in their own units) and `weights` K^-1 y of length n. Cost O(n d).
-    pub fn new(inputs: &DMatrix<f64>, weights: &[f64], hyper: &Hyperparameters) -> GpMean {
-        assert_eq!(inputs.nrows(), weights.len(), "one weight for each row");
+    /// From `inputs` (n rows, d columns, in their own units) and, one a function, `weights` K^-1 y of length n. Cost O(n d).
+    pub fn new(inputs: &DMatrix<f64>, weights: &[Vec<f64>], hyper: &Hyperparameters) -> GpMean {
+        assert!(weights.iter().all(|weights| inputs.nrows() == weights.len()), "one weight for each row");
+        let scaled = |weights: &Vec<f64>| weights.iter().map(|weight| weight * hyper.signal_variance).collect();
         GpMean {
             inputs: hyper.scale(inputs),
-            weights: weights.iter().map(|weight| weight * hyper.signal_variance).collect(),
+            weights: weights.iter().map(scaled).collect(),
             lengthscales: hyper.lengthscales.clone(),
         }
     }
 
-    /// m(query), where `query` has d entries. Cost O(n d) and one allocation of n.
+    /// m(query) of the only function, where `query` has d entries. Cost O(n d) and one allocation of n.
     pub fn mean(&self, query: &[f64]) -> f64 {
         self.mean_with(query, &mut Vec::new())
     }
 
     /// As [`GpMean::mean`], with the distances kept in `scratch`: no allocation once it has grown to n.
     pub fn mean_with(&self, query: &[f64], scratch: &mut Vec<f64>) -> f64 {
-        scratch.resize(self.weights.len(), 0.0);
+        scratch.resize(self.input_count(), 0.0);
         self.squared_distances(query, 0..self.lengthscales.len(), scratch);
-        self.mean_from_squared(scratch)
+        matern::weighted_sum(scratch, &self.weights[0])
+    }
+
+    /// m(query) of every function. Cost O(n (d + functions)).
+    pub fn means(&self, query: &[f64]) -> Vec<f64> {
+        let mut squared = vec![0.0; self.input_count()];
+        self.squared_distances(query, 0..self.lengthscales.len(), &mut squared);
+        self.means_from_squared(&mut squared)
     }
 
     /// Overwrites `out[j]` with sum_i ((query_i - x_ji) / l_i)^2 over i in `dimensions`.
@@ -96,7 +104,7 @@ impl GpMean {
     /// Cost O(n |dimensions|).
     pub fn squared_distances(&self, query: &[f64], dimensions: Range<usize>, out: &mut [f64]) {
         assert_eq!(query.len(), self.lengthscales.len(), "one query entry for each column");
-        assert_eq!(out.len(), self.weights.len(), "one distance for each row");
+        assert_eq!(out.len(), self.input_count(), "one distance for each row");
         let n = out.len();
         let centre: Vec<f64> = dimensions.clone().map(|i| query[i] / self.lengthscales[i]).collect();
         matern::squared_distances(
@@ -108,23 +116,28 @@ impl GpMean {
         );
     }
 
-    /// m at the point whose squared scaled distances to the n inputs are given. Cost O(n), no allocation.
-    pub fn mean_from_squared(&self, squared_distances: &[f64]) -> f64 {
-        matern::weighted_sum(squared_distances, &self.weights)
+    /// m of every function at the point whose squared scaled distances to the n inputs are given, and overwritten.
+    /// Cost O(n) a function.
+    pub fn means_from_squared(&self, squared_distances: &mut [f64]) -> Vec<f64> {
+        if let [only] = self.weights.as_slice() {
+            return vec![matern::weighted_sum(squared_distances, only)];
+        }
+        matern::matern_from_squared(squared_distances);
+        self.weights.iter().map(|weights| matern::dot(squared_distances, weights)).collect()
     }
 
     /// Number of inputs, n.
     pub fn input_count(&self) -> usize {
-        self.weights.len()
+        self.inputs.nrows()
     }
 }
 
 /// What each target would have been predicted to be without it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeaveOneOut {
-    /// y_i minus its prediction from the other targets.
-    pub errors: Vec<f64>,
-    /// Standard deviation of the noise-free value at input i given the other targets.
+    /// Target by target, y_i minus its prediction from the target's other values.
+    pub errors: Vec<Vec<f64>>,
+    /// Standard deviation of the noise-free value at input i given the others.
     pub latent_sd: Vec<f64>,
 }
 
@@ -158,7 +171,7 @@ impl GaussianProcess {
             kernel
         })?;
         let weights = cholesky.solve(targets);
-        let mean = GpMean::new(inputs, &weights, hyper);
+        let mean = GpMean::new(inputs, std::slice::from_ref(&weights), hyper);
         Ok(GaussianProcess { hyper: hyper.clone(), cholesky, jitter, weights, mean })
     }
 
@@ -214,17 +227,26 @@ impl GaussianProcess {
         &self.mean
     }
 
-    /// Errors and standard deviations of each target predicted from the others, without refitting.
+    /// (K + noise I)^-1 y for other values y at the same inputs. Cost O(n^2).
+    pub fn weights_of(&self, targets: &[f64]) -> Vec<f64> {
+        self.cholesky.solve(targets)
+    }
+
+    /// Errors and standard deviations of each value of some targets predicted from its others, without refitting.
     ///
     ///   error_i = alpha_i / (A^-1)_ii,   latent variance_i = 1 / (A^-1)_ii - noise, at least 0,   A = K + noise I
     ///
     /// Cost O(2 n^3 / 3). Source: Rasmussen and Williams 2006, eqs. (5.10) to (5.12).
-    pub fn leave_one_out(&self, targets: &[f64]) -> LeaveOneOut {
-        let mut inverse = DMatrix::zeros(targets.len(), targets.len());
+    pub fn leave_one_out(&self, targets: &[Vec<f64>]) -> LeaveOneOut {
+        let points = self.weights.len();
+        let mut inverse = DMatrix::zeros(points, points);
         self.cholesky.inverse_lower(&mut inverse);
         let precision = inverse.diagonal();
-        let weights = self.cholesky.solve(targets);
-        let errors = weights.iter().zip(precision.iter()).map(|(weight, p)| weight / p).collect();
+        let of = |values: &Vec<f64>| -> Vec<f64> {
+            let weights = self.weights_of(values);
+            weights.iter().zip(precision.iter()).map(|(weight, p)| weight / p).collect()
+        };
+        let errors = targets.iter().map(of).collect();
         let latent_sd = precision.iter().map(|p| (1.0 / p - self.hyper.noise_variance).max(0.0).sqrt()).collect();
         LeaveOneOut { errors, latent_sd }
     }

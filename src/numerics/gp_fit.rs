@@ -1,13 +1,12 @@
 //! Maximum likelihood for the scales of a Gaussian process, with exact gradients.
 
-use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::DMatrix;
 
-use super::cholesky::{Cholesky, Singular};
-use super::gp::{Hyperparameters, kernel_lower, squared_distances_below};
-use super::matern;
+use super::cholesky::Singular;
+use super::gp::Hyperparameters;
+use super::gp_likelihood::{Likelihood, Matrices, likelihood};
 use super::minimise::{Minimum, SearchOutcome, minimise_bounded};
 use super::quasi_newton::{curvature_at, minimise_from};
 
@@ -62,7 +61,8 @@ pub enum FitError {
     Stopped,
 }
 
-/// The scales in `bounds` under which `targets` (n) at `inputs` (n rows, d columns) are most likely.
+/// The scales in `bounds` under which `targets` at `inputs` (n rows, d columns) are most likely: one or more functions of
+/// the inputs, n values each, that are independent draws of one process.
 ///
 /// A search over natural logarithms in the box, the signal variance profiled out, from `start` (moved into the bounds)
 /// or from the spread of the data: L-BFGS-B on all of up to 400 rows. Of more rows 300, evenly strided, are searched
@@ -72,7 +72,7 @@ pub enum FitError {
 /// Cost O(n^3) for each evaluation. Source: Rasmussen and Williams 2006, section 5.4.1.
 pub fn fit(
     inputs: &DMatrix<f64>,
-    targets: &[f64],
+    targets: &[Vec<f64>],
     bounds: &Bounds,
     start: Option<&Hyperparameters>,
     stop: &AtomicBool,
@@ -86,7 +86,8 @@ pub fn fit(
             shorten(&mut point, inputs.ncols());
             let chosen: Vec<usize> = (0..rows).map(|k| k * n / rows).collect();
             let some_inputs = inputs.select_rows(&chosen);
-            let some_targets: Vec<f64> = chosen.iter().map(|&row| targets[row]).collect();
+            let some = |values: &Vec<f64>| chosen.iter().map(|&row| values[row]).collect();
+            let some_targets: Vec<Vec<f64>> = targets.iter().map(some).collect();
             let search = Search { inputs: &some_inputs, targets: &some_targets, bounds, stop };
             let found = search.run(&point, curvature_of_a_row.as_ref())?;
             point = found.minimum.point;
@@ -113,116 +114,10 @@ fn shorten(point: &mut [f64], inputs: usize) {
     point[..inputs].iter_mut().for_each(|log_scale| *log_scale = log_scale.min(LONGEST_START.ln()));
 }
 
-/// Log marginal likelihood and its gradient, in the order log length scales, log signal, log noise variance.
-///
-/// What a fit climbs, at given scales. `None` when the matrix is singular to working precision.
-pub fn log_likelihood_and_gradient(
-    inputs: &DMatrix<f64>,
-    targets: &[f64],
-    hyper: &Hyperparameters,
-) -> Option<(f64, Vec<f64>)> {
-    let ratio = hyper.noise_variance / hyper.signal_variance;
-    let unit = Hyperparameters { signal_variance: 1.0, noise_variance: ratio, ..hyper.clone() };
-    let at = likelihood(inputs, targets, &unit, |_| hyper.signal_variance, &mut Matrices::new(targets.len()))?;
-    Some((at.log_likelihood, at.gradient))
-}
-
-/// The likelihood where the kernel has the signal variance s2 = `signal_variance(y^T A^-1 y)`.
-///
-///   ln p(y) = -y^T A^-1 y / (2 s2) - ln det A / 2 - n ln(2 pi s2) / 2,     K = s2 A,  A = R(l) + nu I
-///   d ln p / d theta = (1/2) sum_ij W_ij dA_ij / d theta,   W = alpha alpha^T - A^-1,   alpha = A^-1 y / s
-///   dk / d log l_i = (5/3) (1 + r) exp(-r) ((x_i - y_i) / l_i)^2,   r = sqrt(5) scaled distance
-///
-/// `unit` holds the length scales l, the signal variance 1 and the noise ratio nu. `None` when A is singular to working
-/// precision. One factorisation and one inverse: cost O(n^3), and O(n^2 d) for the contraction.
-/// Source: Rasmussen and Williams 2006, eqs. (2.30) and (5.9).
-/// Checked by: tests/gp.rs, gradients_equal_those_of_scikit_learn.
-fn likelihood(
-    inputs: &DMatrix<f64>,
-    targets: &[f64],
-    unit: &Hyperparameters,
-    signal_variance: impl FnOnce(f64) -> f64,
-    matrices: &mut Matrices,
-) -> Option<Likelihood> {
-    let n = targets.len() as f64;
-    let scaled = unit.scale(inputs);
-    let factor = matrices.factor(&scaled, unit)?;
-    let mut weights = factor.solve(targets);
-    let squares = matern::dot(targets, &weights);
-    let signal_variance = signal_variance(squares);
-    let log_likelihood =
-        -0.5 * squares / signal_variance - 0.5 * factor.log_determinant() - 0.5 * n * (TAU * signal_variance).ln();
-    let root = signal_variance.sqrt();
-    weights.iter_mut().for_each(|weight| *weight /= root);
-    factor.inverse_lower(&mut matrices.inverse);
-    matrices.kernel = factor.into_memory();
-    let gradient = contract(&scaled, &mut matrices.inverse, &weights, unit);
-    Some(Likelihood { log_likelihood, gradient, signal_variance })
-}
-
-/// The memory of an evaluation, kept for the next: fresh pages would cost a fifth of its time.
-struct Matrices {
-    /// K, then its factor.
-    kernel: DMatrix<f64>,
-    inverse: DMatrix<f64>,
-}
-
-impl Matrices {
-    fn new(n: usize) -> Self {
-        Matrices { kernel: DMatrix::zeros(n, n), inverse: DMatrix::zeros(n, n) }
-    }
-
-    /// The factor of K + noise I over the rows of `scaled`, in the memory of `kernel`.
-    fn factor(&mut self, scaled: &DMatrix<f64>, hyper: &Hyperparameters) -> Option<Cholesky> {
-        let n = scaled.nrows();
-        let mut kernel = std::mem::replace(&mut self.kernel, DMatrix::zeros(0, 0));
-        if kernel.nrows() != n {
-            kernel = DMatrix::zeros(n, n);
-        }
-        kernel_lower(scaled, hyper, &mut kernel);
-        Cholesky::factor(kernel)
-    }
-}
-
-/// The sums of W .* dK over one triangle, doubled; `inverse` is overwritten column by column.
-fn contract(scaled: &DMatrix<f64>, inverse: &mut DMatrix<f64>, alpha: &[f64], hyper: &Hyperparameters) -> Vec<f64> {
-    let (n, d) = scaled.shape();
-    let mut squared = vec![0.0; n];
-    let mut lengths = vec![0.0; d];
-    let (mut below_diagonal, mut trace) = (0.0, 0.0);
-    for (j, column) in inverse.as_mut_slice().chunks_exact_mut(n).enumerate() {
-        trace += alpha[j] * alpha[j] - column[j];
-        let contrast = &mut column[j + 1..];
-        let squared = &mut squared[j + 1..];
-        squared_distances_below(scaled, j, squared);
-        for (entry, other) in contrast.iter_mut().zip(&alpha[j + 1..]) {
-            *entry = alpha[j] * other - *entry;
-        }
-        below_diagonal += matern::contract_column(squared, contrast);
-        for (sum, coordinates) in lengths.iter_mut().zip(scaled.as_slice().chunks_exact(n)) {
-            *sum += matern::weighted_squares(&coordinates[j + 1..], coordinates[j], contrast);
-        }
-    }
-    let signal = hyper.signal_variance;
-    let mut gradient: Vec<f64> = lengths.iter().map(|sum| signal * sum).collect();
-    gradient.push(signal * (below_diagonal + 0.5 * trace));
-    gradient.push(0.5 * hyper.noise_variance * trace);
-    gradient
-}
-
-/// The likelihood at some scales, with what a search needs there.
-struct Likelihood {
-    log_likelihood: f64,
-    /// In the order log length scales, log signal variance, log noise variance; of a search, which profiles the signal
-    /// variance out, log length scales, log noise ratio.
-    gradient: Vec<f64>,
-    signal_variance: f64,
-}
-
 /// A search for the most likely scales of some rows.
 struct Search<'a> {
     inputs: &'a DMatrix<f64>,
-    targets: &'a [f64],
+    targets: &'a [Vec<f64>],
     bounds: &'a Bounds,
     stop: &'a AtomicBool,
 }
@@ -239,7 +134,7 @@ impl Search<'_> {
     /// The best point found from `start`: by L-BFGS-B, or by quasi-Newton steps where the curvature is known.
     fn run(&self, start: &[f64], curvature_of_a_row: Option<&DMatrix<f64>>) -> Result<Optimum, FitError> {
         let (lower, upper) = self.limits();
-        let mut matrices = Matrices::new(self.targets.len());
+        let mut matrices = Matrices::new(self.inputs.nrows());
         let mut best = (f64::INFINITY, f64::NAN);
         let stopped = || self.stop.load(Ordering::Relaxed);
         // Once stopped every point is outside the domain, and the line search gives up.
@@ -253,7 +148,7 @@ impl Search<'_> {
         };
         let mut minimum = match curvature_of_a_row {
             Some(curvature) => {
-                let curvature = curvature * self.targets.len() as f64;
+                let curvature = curvature * self.inputs.nrows() as f64;
                 minimise_from(&mut objective, start, curvature, &lower, &upper, TOLERANCE, STEP_LIMIT)
             }
             None => minimise_bounded(&mut objective, start, &lower, &upper, ITERATION_LIMIT),
@@ -274,8 +169,8 @@ impl Search<'_> {
 
     /// The second derivatives of -ln p at `point`, divided by the number of rows; `None` where they are not finite.
     fn curvature_of_a_row(&self, point: &[f64]) -> Option<DMatrix<f64>> {
-        let mut matrices = Matrices::new(self.targets.len());
-        let rows = self.targets.len() as f64;
+        let mut matrices = Matrices::new(self.inputs.nrows());
+        let rows = self.inputs.nrows() as f64;
         let slopes = |at: &[f64]| {
             let found = self.profiled(at, &mut matrices)?;
             Some(found.gradient.into_iter().map(|slope| -slope / rows).collect())
@@ -298,7 +193,7 @@ impl Search<'_> {
     /// The likelihood with the signal variance profiled out, at `point`: log length scales, then the log of the ratio
     /// nu = noise / signal variance.
     ///
-    ///   s2(l, nu) = y^T A^-1 y / n, moved into its bounds,   A = R(l) + nu I,   K = s2 A
+    ///   s2(l, nu) = sum y^T A^-1 y / (p n), moved into its bounds,   A = R(l) + nu I,   K = s2 A
     ///
     /// Where s2 is inside its bounds its own slope vanishes, so the gradient is the partial one; where a bound of the noise
     /// holds it, s2 moves against nu. The ridge along which s2 and the length scales trade places is gone, and with it most
@@ -309,7 +204,8 @@ impl Search<'_> {
         let ratio = unit.noise_variance;
         let (signal, noise) = (bounds.signal_variance, bounds.noise_variance);
         let (least, greatest) = (signal[0].max(noise[0] / ratio), signal[1].min(noise[1] / ratio));
-        let profile = |squares: f64| (squares / targets.len() as f64).max(least).min(greatest);
+        let values = (inputs.nrows() * targets.len()) as f64;
+        let profile = |squares: f64| (squares / values).max(least).min(greatest);
         let mut at = likelihood(inputs, targets, &unit, profile, matrices)?;
         let (noise_slope, signal_slope) = (at.gradient.pop()?, at.gradient.pop()?);
         let held_by_noise = at.signal_variance == noise[0] / ratio || at.signal_variance == noise[1] / ratio;
@@ -319,9 +215,10 @@ impl Search<'_> {
 }
 
 /// Length scales of sqrt(d) standard deviations, so that typical points lie about one length apart.
-fn start_from_spread(inputs: &DMatrix<f64>, targets: &[f64]) -> Hyperparameters {
+fn start_from_spread(inputs: &DMatrix<f64>, targets: &[Vec<f64>]) -> Hyperparameters {
     let root_d = (inputs.ncols() as f64).sqrt();
-    let variance = targets.iter().map(|y| y * y).sum::<f64>() / targets.len().max(1) as f64;
+    let values = inputs.nrows() * targets.len();
+    let variance = targets.iter().flatten().map(|y| y * y).sum::<f64>() / values.max(1) as f64;
     let variance = variance.max(f64::MIN_POSITIVE.sqrt());
     Hyperparameters {
         lengthscales: inputs

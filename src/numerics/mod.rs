@@ -13,6 +13,7 @@ pub mod exponential_mean;
 pub mod farthest;
 pub mod gp;
 pub mod gp_fit;
+pub mod gp_likelihood;
 pub mod law;
 pub mod law_distance;
 pub mod matern;

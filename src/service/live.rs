@@ -43,7 +43,8 @@ impl Live {
     /// The session that its rows tell of.
     pub(super) fn replayed(facts: SessionFacts, advisor: &Advisor) -> Result<Live, ServiceError> {
         let SessionFacts { row, observations, seen } = facts;
-        let mut state = advisor.initial_state(Some(&row.initial_history), Some(row.initial_wealth))?;
+        let start = advisor.initial_state(Some(&row.initial_history), Some(row.initial_wealth))?;
+        let mut state = start.with_holding(row.initial_holding)?;
         for observation in &observations {
             state = advisor.advance(&state, observation.executed_allocation, observation.log_return);
             state.wealth = observation.wealth_after;
@@ -127,6 +128,7 @@ impl Live {
             executed_allocation,
             price: report.price,
             wealth: state.wealth,
+            holding: state.holding,
             completed: report.period == self.row.horizon,
             uncertainty,
         };

@@ -52,6 +52,8 @@ pub struct Observed {
     pub price: Option<f64>,
     /// Wealth at the end of the period.
     pub wealth: f64,
+    /// Share of it in the risky asset, as the return left it.
+    pub holding: f64,
     /// Whether the horizon is reached.
     pub completed: bool,
     #[serde(flatten)]
@@ -74,7 +76,7 @@ impl Observe {
     /// `known_price` is the price reported for the period before.
     pub(super) fn checked_log_return(&self, known_price: Option<f64>) -> Result<f64, FieldError> {
         if let Some(allocation) = self.executed_allocation {
-            limits::within("executed_allocation", allocation, 0.0, 1.0)?;
+            limits::share("executed_allocation", allocation)?;
         }
         if let Some(wealth) = self.wealth {
             limits::within("wealth", wealth, limits::WEALTH.0, limits::WEALTH.1)?;

@@ -54,12 +54,13 @@ pub enum Question {
     Explain,
 }
 
-/// What a session starts from; history and wealth default to the policy's.
+/// What a session starts from; history and wealth default to the policy's, and it holds nothing unless it says so.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Start {
     pub policy: String,
     pub history: Option<Vec<f64>>,
     pub wealth: Option<f64>,
+    pub holding: Option<f64>,
 }
 
 impl Start {
@@ -96,13 +97,13 @@ impl Sessions {
     /// Opens a session. The same key and start again give the same session as it was opened.
     ///
     /// # Errors
-    /// There is no such policy, or history or wealth breaks a rule; a key used with another request.
+    /// There is no such policy, or history, wealth or holding breaks a rule; a key used with another request.
     pub async fn open(&self, caller: &Caller, start: Start, key: Option<String>) -> Result<Live, ServiceError> {
         let tenant = &caller.tenant;
         let key = key.map(|key| start.under(key)).transpose()?;
-        let Start { policy, history, wealth } = start;
+        let Start { policy, history, wealth, holding } = start;
         let advisor = self.policies.advisor(tenant, &policy).await?;
-        let state = advisor.initial_state(history.as_deref(), wealth)?;
+        let state = advisor.initial_state(history.as_deref(), wealth)?.with_holding(holding.unwrap_or(0.0))?;
         self.policies.starts_from(&advisor, state.law.sample_size())?;
         let problem = &advisor.specification().problem;
         let row = SessionRow {
@@ -110,6 +111,7 @@ impl Sessions {
             tenant: tenant.clone(),
             policy,
             initial_wealth: state.wealth,
+            initial_holding: state.holding,
             initial_history: history.unwrap_or_else(|| problem.history.clone()),
             horizon: problem.horizon,
             created_ms: self.clock.now_milliseconds(),

@@ -24,6 +24,8 @@ pub struct WhatIf {
     pub session: String,
     /// Wealth now.
     pub wealth: Option<f64>,
+    /// Share of wealth in the risky asset now, before trading.
+    pub holding: Option<f64>,
     /// Factor on the radius of the uncertainty set of the period advised; later periods keep their own.
     #[schema(example = 0.5)]
     pub radius_scale: Option<f64>,
@@ -50,6 +52,7 @@ pub enum Explain {
 #[serde(deny_unknown_fields)]
 pub struct Sweep {
     pub wealth: Option<SweepRange>,
+    pub holding: Option<SweepRange>,
     pub radius_scale: Option<SweepRange>,
     pub radius: Option<SweepRange>,
     pub log_return: Option<SweepRange>,
@@ -141,7 +144,7 @@ impl WhatIf {
             (Some(scale), None) => Some(HypotheticalRadius::Scaled(scale)),
             (None, radius) => radius.map(HypotheticalRadius::Fixed),
         };
-        let hypothesis = Hypothesis { wealth: self.wealth, log_return, radius };
+        let hypothesis = Hypothesis { wealth: self.wealth, holding: self.holding, log_return, radius };
         hypothesis.check()?;
         Ok(hypothesis)
     }
@@ -150,8 +153,9 @@ impl WhatIf {
     fn hypotheses(&self) -> Result<Vec<Hypothesis>, FieldError> {
         let Some(sweep) = &self.sweep else { return Ok(vec![self.hypothesis()?]) };
         type Field = fn(&mut WhatIf) -> &mut Option<f64>;
-        let fields: [(&str, Option<SweepRange>, Field); 5] = [
+        let fields: [(&str, Option<SweepRange>, Field); 6] = [
             ("wealth", sweep.wealth, |request| &mut request.wealth),
+            ("holding", sweep.holding, |request| &mut request.holding),
             ("radius_scale", sweep.radius_scale, |request| &mut request.radius_scale),
             ("radius", sweep.radius, |request| &mut request.radius),
             ("log_return", sweep.log_return, |request| &mut request.log_return),

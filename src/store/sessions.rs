@@ -34,6 +34,8 @@ pub struct SessionRow {
     pub tenant: Tenant,
     pub policy: String,
     pub initial_wealth: f64,
+    /// Share of it in the risky asset.
+    pub initial_holding: f64,
     /// The log-returns known at the start.
     pub initial_history: Vec<f64>,
     pub horizon: usize,
@@ -244,13 +246,15 @@ async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<Cre
         return Ok(CreateSession::NoPolicy);
     }
     let insert = query(
-        "INSERT INTO sessions (session, policy, initial_wealth, initial_history, horizon, created_ms, seal, tenant)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8) ON CONFLICT (session) DO NOTHING",
+        "INSERT INTO sessions (session, policy, initial_wealth, initial_holding, initial_history, horizon, created_ms,
+                               seal, tenant)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9) ON CONFLICT (session) DO NOTHING",
     );
     let insert = insert
         .bind(row.session.as_str())
         .bind(row.policy.as_str())
         .bind(row.initial_wealth)
+        .bind(row.initial_holding)
         .bind(encode_reals(&row.initial_history))
         .bind(to_sql(row.horizon))
         .bind(row.created_ms)
@@ -300,6 +304,7 @@ impl SessionRow {
             .text(self.tenant.as_str())
             .text(&self.policy)
             .real(self.initial_wealth)
+            .real(self.initial_holding)
             .bytes(&encode_reals(&self.initial_history))
             .integer(to_sql(self.horizon))
             .integer(self.created_ms)
@@ -313,6 +318,7 @@ impl SessionRow {
             tenant: Tenant::stored(&row.get::<String>("tenant")?),
             policy: row.get("policy")?,
             initial_wealth: row.get("initial_wealth")?,
+            initial_holding: row.get("initial_holding")?,
             initial_history: history.ok_or_else(|| Failure::Corrupt(what()))?,
             horizon: from_sql(row.get("horizon")?)?,
             created_ms: row.get("created_ms")?,

@@ -2,6 +2,7 @@
 
 use ballast::control::evaluation::account::{Account, Annual, keep, yearly_certainty_equivalent};
 use ballast::control::evaluation::rolling::{Decision, Period, WalkForward};
+use ballast::control::problem::actions::Band;
 use ballast::numerics::block_bootstrap::circular_blocks;
 use ballast::numerics::streams::stream;
 use ballast::numerics::summary::quantile;
@@ -63,19 +64,20 @@ pub struct Analysis {
 
 impl Line {
     pub fn new(name: String, decisions: Vec<Decision>, periods: &[Period], cost: f64) -> Self {
-        let account = keep(decisions.iter().map(|decision| decision.allocation), periods, cost, INITIAL_WEALTH);
+        let account = keep(decisions.iter().map(|decision| decision.band), periods, cost, INITIAL_WEALTH);
         Line { name, decisions, account, hindsight: false }
     }
 
     /// The constant mix that holds on average what this line held: what its timing is measured against.
     pub fn hindsight(&self, periods: &[Period], cost: f64) -> Line {
-        let decision = Decision { allocation: self.mean_allocation(), radius: 0.0, source: None };
-        let name = format!("constant {:.1} %", 100.0 * decision.allocation);
+        let share = self.mean_allocation();
+        let decision = Decision { band: Band::of(&[share]), radius: 0.0, source: None };
+        let name = format!("constant {:.1} %", 100.0 * share);
         Line { hindsight: true, ..Line::new(name, vec![decision; periods.len()], periods, cost) }
     }
 
     fn mean_allocation(&self) -> f64 {
-        self.decisions.iter().map(|decision| decision.allocation).sum::<f64>() / self.decisions.len() as f64
+        self.account.allocations.iter().sum::<f64>() / self.account.allocations.len() as f64
     }
 }
 
@@ -148,7 +150,7 @@ impl Analysis {
                     interval: [quantile(&values, tail), quantile(&values, 1.0 - tail)],
                 }
             };
-            let zero = line.decisions.iter().filter(|decision| decision.allocation <= 0.0).count();
+            let zero = line.account.allocations.iter().filter(|allocation| **allocation <= 0.0).count();
             Figures {
                 strategy: line.name.clone(),
                 hindsight: line.hindsight,

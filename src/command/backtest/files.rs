@@ -28,7 +28,7 @@ pub fn summary(backtest: &Backtest) -> Value {
         "whole_years": backtest.analysis.years,
         "choices": {
             "window": args.window, "alpha": args.alpha, "risk_aversion": args.risk_aversion, "cost_bp": args.cost_bp,
-            "count": args.count, "seed": args.seed,
+            "cost_blind": args.cost_blind, "count": args.count, "seed": args.seed,
         },
         "intervals": {
             "confidence": analysis::CONFIDENCE, "resamples": analysis::RESAMPLES,
@@ -71,14 +71,17 @@ fn strategies(backtest: &Backtest) -> String {
 
 /// One line a month and strategy; wealth and drawdown at its end.
 pub fn months(backtest: &Backtest) -> String {
-    let mut csv = Csv::new(&["month", "strategy", "allocation", "radius", "traded", "wealth", "drawdown"]);
+    let mut csv =
+        Csv::new(&["month", "strategy", "allocation", "low", "high", "radius", "traded", "wealth", "drawdown"]);
     for line in &backtest.lines {
         let drawdowns = line.account.drawdowns();
         for (index, (month, decision)) in backtest.months.iter().zip(&line.decisions).enumerate() {
-            let fields: [&dyn Display; 7] = [
+            let fields: [&dyn Display; 9] = [
                 &month.month,
                 &line.name,
-                &decision.allocation,
+                &line.account.allocations[index],
+                &decision.band.low,
+                &decision.band.high,
                 &decision.radius,
                 &line.account.traded[index],
                 &line.account.wealth[index + 1],

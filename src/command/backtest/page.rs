@@ -110,7 +110,7 @@ fn allocations(backtest: &Backtest) -> Chart {
     let years = years(backtest);
     let chart = Chart::new("Allocation", time(), Axis::new("share of wealth, %").from_zero());
     trained(backtest).fold(chart, |chart, line| {
-        let shares = line.decisions.iter().map(|decision| 100.0 * decision.allocation);
+        let shares = line.account.allocations.iter().map(|allocation| 100.0 * allocation);
         chart.line(&line.name, years.iter().copied().zip(shares))
     })
 }

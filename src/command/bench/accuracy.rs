@@ -14,16 +14,22 @@ use ballast::control::policy::Policy;
 use ballast::control::policy::advice::Advice;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::pool::{self, TrainingPool};
+use ballast::control::problem::actions::Band;
 use ballast::control::problem::state::State;
 use ballast::control::progress::Watch;
-use ballast::control::request::specification::{FeatureMap, InitialLaws, RadiusRule, Specification, SurrogateTarget};
+use ballast::control::request::radius_rule::RadiusRule;
+use ballast::control::request::specification::{
+    FeatureMap, InitialLaws, Specification, SurrogateTarget, UtilitySpecification,
+};
 use ballast::control::solved_step::StepDiagnostics;
 use ballast::control::solved_step::StepSolution;
 use ballast::control::surrogate::design::Design;
 use ballast::control::surrogate::stored::{SingleSolution, Solution};
 use ballast::control::training::Training;
+use ballast::numerics::streams::stream;
 use ballast::numerics::summary::quantile;
 use clap::Args;
+use rand::RngExt;
 
 use super::paper;
 
@@ -39,6 +45,15 @@ pub struct AccuracyBench {
     sample_size: usize,
     #[arg(long, default_value_t = 10)]
     horizon: usize,
+    /// Power utility of this risk aversion instead of the paper's exponential one
+    #[arg(long)]
+    power: Option<f64>,
+    /// As a share of what is traded; fresh states then hold anything
+    #[arg(long, default_value_t = 0.0)]
+    trading_cost: f64,
+    /// Of the design and the surrogates; fresh states have one of their own
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
     /// Fresh states at the last step
     #[arg(long, default_value_t = 2000)]
     states: usize,
@@ -53,6 +68,8 @@ pub struct AccuracyBench {
 /// Seed of the fresh states: another than the design's.
 const FRESH_SEED: u64 = 1_000_003;
 pub(super) const BASIS_POINTS: f64 = 1e4;
+/// Holdings at which the exact value is known, where trading costs: four times as many as a surrogate has.
+const EXACT_HOLDINGS: usize = 65;
 
 /// A state with its direct solution.
 struct Truth {
@@ -68,7 +85,14 @@ pub fn run(bench: &AccuracyBench) -> Result<(), Box<dyn Error>> {
 fn compare(bench: &AccuracyBench) -> Result<(), TrainError> {
     let mut base = paper::specification(bench.sample_size, bench.horizon, 1000, InitialLaws::Resampled).completed()?;
     base.problem.radius = Some(RadiusRule::Bridge { alpha: bench.alpha, paths: 2000, scale: 1.0 });
+    base.problem.trading_cost = bench.trading_cost;
+    base.seed = bench.seed;
+    if let Some(risk_aversion) = bench.power {
+        base.problem.utility = UtilitySpecification::Power { risk_aversion };
+    }
+    let base = base.completed()?;
     println!("paper's mixture, t0 = {}, T = {}, alpha = {}", bench.sample_size, bench.horizon, bench.alpha);
+    println!("{:?}, trading cost {}", base.problem.utility, bench.trading_cost);
     let problem = Problem::new(&base);
     let last = bench.horizon - 1;
     let mut truths = vec![(last, last_truth(&problem, bench.states))];
@@ -102,7 +126,8 @@ fn fresh_states(specification: &Specification, step: usize, count: usize) -> Vec
     fresh.seed = FRESH_SEED;
     fresh.design.count = Some(count);
     let design = Design::new(&fresh);
-    (0..count).map(|point| design.state(step, point)).collect()
+    let holding = |point| stream(FRESH_SEED, "fresh holding", step, point).random::<f64>();
+    (0..count).map(|point| State { holding: holding(point), ..design.state(step, point) }).collect()
 }
 
 fn solved(problem: &Problem, step: usize, next: &NextValue, count: usize) -> Vec<Truth> {
@@ -119,10 +144,12 @@ fn last_truth(problem: &Problem, count: usize) -> Vec<Truth> {
 pub(super) fn exact_last_value(specification: &Specification) -> NextValue {
     let problem = Problem::new(specification);
     let step = specification.problem.horizon - 1;
-    let gain = move |state: &State| {
-        BellmanStep { problem: &problem, step, next: &NextValue::Terminal }.solve(state).floor_gain
+    let holdings = problem.holdings(EXACT_HOLDINGS);
+    let gains = move |state: &State| {
+        let solver = BellmanStep { problem: &problem, step, next: &NextValue::Terminal };
+        solver.solve_for_design(state, holdings).floor_gains
     };
-    NextValue::Exact(Box::new(gain))
+    NextValue::Exact(holdings, Box::new(gains))
 }
 
 fn nested_truth(problem: &Problem, count: usize) -> Vec<Truth> {
@@ -154,7 +181,11 @@ fn unsolved(step: usize) -> StepSolution {
         value: None,
         policy: None,
     };
-    StepSolution { step, solution: Solution::Single(SingleSolution { floor_gain: 0.0, action: 0.0 }), diagnostics }
+    StepSolution {
+        step,
+        solution: Solution::Single(SingleSolution { floor_gains: vec![0.0], band: Band::of(&[0.0]) }),
+        diagnostics,
+    }
 }
 
 fn heading() {

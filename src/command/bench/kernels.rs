@@ -49,7 +49,7 @@ pub fn run(bench: &KernelsBench) -> Result<(), Box<dyn Error>> {
     let (inputs, targets) = standardized(&inputs, &targets);
     // Those of the scikit-learn program it is raced against.
     let bounds = Bounds { lengthscale: [0.1, 1e3], signal_variance: [1e-3, 1e3], noise_variance: [1e-8, 1.0] };
-    let fitted = || fit(&inputs, &targets, &bounds, None, &AtomicBool::new(false));
+    let fitted = || fit(&inputs, std::slice::from_ref(&targets), &bounds, None, &AtomicBool::new(false));
     let found = fitted()?;
     let fit_seconds = timed(bench.runs, || drop(black_box(fitted())));
     println!(

@@ -97,6 +97,7 @@ impl World {
             session: format!("session_{}", &content_hash(&index.to_le_bytes())[..32]),
             policy: self.policy.clone(),
             initial_wealth: problem.initial_wealth,
+            initial_holding: 0.0,
             initial_history: problem.history.clone(),
             horizon: self.horizon,
             created_ms: 0,

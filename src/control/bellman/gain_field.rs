@@ -1,12 +1,17 @@
 //! The floor gain of the step after, over everything one robust step can reach.
 //!
-//! From one state, the next state depends on the action and the adversary's return z only. The law's features
-//! depend on z alone, and wealth on both, linearly in the action. The prediction is a smooth function of the two, so
-//! it is tabulated once, exactly, at a few returns (local cubics between them) times a few Chebyshev nodes in the
-//! action, and every action is then priced without touching the surrogate again: a product a node and return.
+//! From one state, the next state depends on the action and the adversary's return z only. The law's features depend on z
+//! alone, and wealth and the holding on both, wealth linearly in the action. The prediction is a smooth function of z and
+//! wealth, so it is tabulated once, exactly, at a few returns (local cubics between them) times a few Chebyshev nodes in the
+//! action, where wealth matters, times the holdings at which the value is known. Every action is then priced without touching
+//! the surrogate again: a product a node and return.
+//!
+//! Where trading costs, wealth depends on what the trade keeps of it as well, by a few percent at most: nearly linearly.
 
 use super::next_value::NextValue;
 use super::problem::Problem;
+use crate::control::problem::dynamics::{Dynamics, Trade};
+use crate::control::problem::holdings::Holdings;
 use crate::control::problem::state::State;
 use crate::control::problem::utility::RelativeUtility;
 use crate::numerics::chebyshev::{Chebyshev, local_cubic};
@@ -15,15 +20,21 @@ use crate::numerics::chebyshev::{Chebyshev, local_cubic};
 /// parabola: a cubic through four nodes is good to 1e-6 of the gain.
 const ACTION_NODES: usize = 4;
 
-/// Predictions tabulated over returns and actions, for one state.
+/// Predictions tabulated over returns and trades, for one state.
 pub struct GainField<'a> {
     problem: &'a Problem,
     next: &'a NextValue,
     utility: RelativeUtility,
-    wealth: f64,
+    dynamics: Dynamics,
+    /// What selling everything grows to in one period.
+    bank: f64,
     returns: Vec<f64>,
     action_nodes: Chebyshev,
-    /// `table[i * nodes + m]`: the prediction at return i and action node m; empty where the gain is constant.
+    /// What the trades that are tabulated keep: the least and the most, or nothing where one serves all.
+    kept_nodes: Option<[f64; 2]>,
+    holdings: Holdings,
+    /// `table[(i * nodes + m) * holdings + j]`: the prediction at return i, trade m and holding j; empty where the gain is
+    /// constant. Trades run over the action nodes for each of the kept nodes.
     table: Vec<f64>,
 }
 
@@ -36,12 +47,22 @@ impl<'a> GainField<'a> {
         state: &State,
         returns: Vec<f64>,
     ) -> Self {
+        let dynamics = problem.dynamics();
         let wealth_matters = next.depends_on_wealth(&problem.selection);
         let action_nodes = Chebyshev::new(if wealth_matters { ACTION_NODES } else { 1 });
+        let liquidation = dynamics.liquidation(state.holding);
+        let kept_nodes = (wealth_matters && dynamics.trading_cost > 0.0)
+            .then(|| [1.0, dynamics.liquidation(1.0)].map(|left| left / liquidation));
         let highest = problem.actions().highest;
-        let actions: Vec<f64> = action_nodes.nodes().iter().map(|share| share * highest).collect();
-        let table = next.tabulate(problem, state, &returns, &actions);
-        GainField { problem, next, utility, wealth: state.wealth, returns, action_nodes, table }
+        let trades = |kept: f64| action_nodes.nodes().iter().map(move |share| Trade { action: share * highest, kept });
+        let trades: Vec<Trade> = match kept_nodes {
+            Some(nodes) => nodes.into_iter().flat_map(trades).collect(),
+            None => trades(1.0).collect(),
+        };
+        let table = next.tabulate(problem, state, &returns, &trades);
+        let bank = state.wealth * liquidation * (1.0 + dynamics.rate_per_step);
+        let holdings = next.holdings();
+        GainField { problem, next, utility, dynamics, bank, returns, action_nodes, kept_nodes, holdings, table }
     }
 
     /// The returns at which it is exact, ascending.
@@ -49,55 +70,86 @@ impl<'a> GainField<'a> {
         &self.returns
     }
 
-    /// The utility relative to the floor of the state.
-    pub fn utility(&self) -> RelativeUtility {
-        self.utility
+    /// What a payoff is at least: the relative utility of selling everything after `log_return`. It increases with the return.
+    pub fn least_payoff(&self, trade: Trade, log_return: f64) -> f64 {
+        let Dynamics { rate_per_step, .. } = self.dynamics;
+        let sold = self.cost_of_selling() * trade.action * log_return.exp();
+        let growth = self.dynamics.growth(trade.action, log_return) - sold;
+        self.utility.value(growth.ln() - rate_per_step.ln_1p() + trade.kept.ln())
     }
 
-    /// Bank return per step.
-    pub fn rate_per_step(&self) -> f64 {
-        self.problem.specification.problem.rate_per_step
+    /// What the wealth that a floor stands for has paid of the holding: nothing at the horizon.
+    fn cost_of_selling(&self) -> f64 {
+        if matches!(self.next, NextValue::Terminal) { 0.0 } else { self.dynamics.trading_cost }
     }
 
     /// Prepares evaluation at fixed returns.
     pub fn at(&self, returns: &[f64]) -> FieldRows<'_> {
-        let nodes = self.action_nodes.nodes().len();
-        let mut rows = vec![0.0; if self.table.is_empty() { 0 } else { nodes * returns.len() }];
+        let (nodes, holdings) = (self.trade_count(), self.holdings.count());
+        let mut rows = vec![0.0; if self.table.is_empty() { 0 } else { nodes * returns.len() * holdings }];
         if !self.table.is_empty() {
             for (index, &log_return) in returns.iter().enumerate() {
                 let (first, weights) = local_cubic(&self.returns, log_return);
                 for node in 0..nodes {
-                    let values = (0..weights.len()).filter(|i| weights[*i] != 0.0);
-                    rows[node * returns.len() + index] =
-                        values.map(|i| weights[i] * self.table[(first + i) * nodes + node]).sum();
+                    let start = (node * returns.len() + index) * holdings;
+                    let row = &mut rows[start..start + holdings];
+                    for i in (0..weights.len()).filter(|i| weights[*i] != 0.0) {
+                        let values = &self.table[((first + i) * nodes + node) * holdings..][..holdings];
+                        row.iter_mut().zip(values).for_each(|(sum, value)| *sum += weights[i] * value);
+                    }
                 }
             }
         }
-        let excesses = returns.iter().map(|z| z.exp() / (1.0 + self.rate_per_step()) - 1.0).collect();
-        FieldRows { field: self, rows, excesses }
+        let growths: Vec<f64> = returns.iter().map(|z| z.exp() / (1.0 + self.dynamics.rate_per_step)).collect();
+        let sold = 1.0 - self.cost_of_selling();
+        let excesses = growths.iter().map(|growth| sold * growth - 1.0).collect();
+        FieldRows { field: self, rows, growths, excesses }
+    }
+
+    fn trade_count(&self) -> usize {
+        self.action_nodes.nodes().len() * self.kept_nodes.map_or(1, |nodes| nodes.len())
+    }
+
+    /// The weights of the trades tabulated in what is read for `trade`.
+    fn basis(&self, trade: Trade) -> Vec<f64> {
+        let actions = self.action_nodes.basis(trade.action / self.problem.actions().highest);
+        match self.kept_nodes {
+            None => actions,
+            Some([most, least]) => {
+                let share = (most - trade.kept) / (most - least);
+                [1.0 - share, share]
+                    .into_iter()
+                    .flat_map(|kept| actions.iter().map(move |weight| kept * weight))
+                    .collect()
+            }
+        }
     }
 }
 
 /// A field restricted to fixed returns.
 pub struct FieldRows<'f> {
     field: &'f GainField<'f>,
-    /// `rows[m * returns + k]`: the prediction at action node m and return k; empty where the gain is constant.
+    /// `rows[(m * returns + k) * holdings + j]`: the prediction at trade m, return k and holding j; empty where the gain is
+    /// constant.
     rows: Vec<f64>,
-    /// `e^z / (1 + r) - 1`: what a unit of allocation earns beyond the bank.
+    /// `e^z / (1 + r)`.
+    growths: Vec<f64>,
+    /// `(1 - c) e^z / (1 + r) - 1`: what a unit of allocation earns beyond the bank once it is sold.
     excesses: Vec<f64>,
 }
 
 impl FieldRows<'_> {
     /// Relative utility of the next state's certainty equivalent, return by return: `u(w(a, z))`. Cost O(returns x nodes).
-    pub fn payoff(&self, action: f64) -> Vec<f64> {
-        let GainField { next, utility, wealth, .. } = self.field;
-        // S(x, a, z) over the all-bank wealth x (1 + r).
-        let relative: Vec<f64> = self.excesses.iter().map(|excess| 1.0 + action * excess).collect();
-        let gains = match next.constant() {
-            Some(gain) => vec![gain; relative.len()],
-            None => {
-                let mut gains = self.interpolated(action);
-                let bank = wealth * (1.0 + self.field.rate_per_step());
+    pub fn payoff(&self, trade: Trade) -> Vec<f64> {
+        let GainField { next, utility, bank, .. } = self.field;
+        // S(x, a, z), all of it sold, over what selling at once would grow to.
+        let relative: Vec<f64> =
+            self.excesses.iter().map(|excess| trade.kept * (1.0 + trade.action * excess)).collect();
+        let gains = match next {
+            NextValue::Terminal => vec![0.0; relative.len()],
+            NextValue::Constant(gains) => self.holdings(trade).map(|holding| Holdings::at(gains, holding)).collect(),
+            NextValue::Surrogate(_) | NextValue::Exact(..) => {
+                let mut gains = self.interpolated(trade);
                 next.gains(&mut gains, relative.iter().map(|relative| bank * relative));
                 gains
             }
@@ -105,13 +157,30 @@ impl FieldRows<'_> {
         utility.values(relative, &gains)
     }
 
-    /// The tabulated predictions, along the action.
-    fn interpolated(&self, action: f64) -> Vec<f64> {
-        let count = self.excesses.len();
-        let basis = self.field.action_nodes.basis(action / self.field.problem.actions().highest);
+    /// The share held after each return: `a e^z / ((1-a)(1+r) + a e^z)`.
+    fn holdings(&self, trade: Trade) -> impl Iterator<Item = f64> {
+        self.growths.iter().map(move |growth| trade.action * growth / (1.0 - trade.action + trade.action * growth))
+    }
+
+    /// The tabulated predictions, along trades and holdings.
+    fn interpolated(&self, trade: Trade) -> Vec<f64> {
+        let (count, holdings) = (self.growths.len(), self.field.holdings);
+        let basis = self.field.basis(trade);
         let mut predictions = vec![0.0; count];
-        for (weight, row) in basis.iter().zip(self.rows.chunks_exact(count)) {
-            predictions.iter_mut().zip(row).for_each(|(prediction, value)| *prediction += weight * value);
+        if !holdings.matter() {
+            for (weight, row) in basis.iter().zip(self.rows.chunks_exact(count)) {
+                predictions.iter_mut().zip(row).for_each(|(prediction, value)| *prediction += weight * value);
+            }
+            return predictions;
+        }
+        let cubics: Vec<(usize, [f64; 4])> = self.holdings(trade).map(|holding| holdings.cubic(holding)).collect();
+        for (weight, block) in basis.iter().zip(self.rows.chunks_exact(count * holdings.count())) {
+            let read = cubics.iter().zip(block.chunks_exact(holdings.count()));
+            for (prediction, ((first, cubic), values)) in predictions.iter_mut().zip(read) {
+                let along = &values[*first..first + 4];
+                let sum = cubic[0] * along[0] + cubic[1] * along[1] + cubic[2] * along[2] + cubic[3] * along[3];
+                *prediction += weight * sum;
+            }
         }
         predictions
     }

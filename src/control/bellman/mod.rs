@@ -7,6 +7,11 @@
 //! the wealth that the action earns and, where the framework learns, the law with z in it. Source: paper (3.2) to (3.4),
 //! with V taken at the adversary's z.
 //!
+//! Where trading costs, w has beside it what the trade keeps, `ln((1 - c |a - h|) / (1 - c h))`, and the wealth earned counts
+//! as if all of it were sold. What an action is worth then has a kink at the holding h, so each side of it is searched by
+//! itself, as if its cost were paid both ways, which leaves no kink. The best action is the nearer end of the band between the
+//! two optima, or the holding inside it. Source: Davis and Norman (1990), Portfolio selection with transaction costs.
+//!
 //! What differs between uncertainty sets is how an action is priced (`Pricing`); the search for the best one is the same.
 
 pub mod gain_field;
@@ -22,7 +27,9 @@ use self::normal::NormalPricing;
 use self::problem::Problem;
 use self::solution::{RobustSolution, WorstExpectation};
 use self::transport::TransportPricing;
-use crate::control::problem::actions::ActionInterval;
+use crate::control::problem::actions::{ActionInterval, Band};
+use crate::control::problem::dynamics::{Dynamics, Side, Trade};
+use crate::control::problem::holdings::Holdings;
 use crate::control::problem::state::State;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::surrogate::policy_target::policy_target;
@@ -43,49 +50,80 @@ pub struct BellmanStep<'a> {
     pub next: &'a NextValue,
 }
 
-/// Prices actions at one state: what each is worth under the law that is worst for it.
+/// Prices trades at one state: what each is worth under the law that is worst for it.
 trait Pricing {
-    /// Worst expected relative utility of an action.
-    fn value(&self, action: f64) -> f64;
+    /// Worst expected relative utility of a trade.
+    fn value(&self, trade: Trade) -> f64;
 
     /// The same, good enough to say between which actions the best one lies.
-    fn rough_value(&self, action: f64) -> f64 {
-        self.value(action)
+    fn rough_value(&self, trade: Trade) -> f64 {
+        self.value(trade)
     }
 
     /// How closely the best action is worth finding by the prices of now.
     fn tolerance(&self) -> f64;
 
-    /// Prices more exactly around where the worst law for `action` puts its mass. False where nothing is left to refine.
-    fn refine(&mut self, action: f64) -> bool;
+    /// Prices more exactly around where the worst laws for `trades` put their mass. False where nothing is left to refine.
+    fn refine(&mut self, trades: &[Trade]) -> bool;
 
-    /// The worst expectation of an action with its law.
-    fn worst(&self, action: f64) -> WorstExpectation;
+    /// The worst expectation of a trade with its law.
+    fn worst(&self, trade: Trade) -> WorstExpectation;
+}
+
+/// What the surrogates learn of one state.
+pub struct DesignSolution {
+    /// At the state's own holding.
+    pub solution: RobustSolution,
+    /// Floor gains at the holdings asked for, or the solution's own alone where the holding does not matter.
+    pub floor_gains: Vec<f64>,
+    /// Either end of the band, or the action where both are one, continued past the bounds of the interval.
+    pub policy_targets: Vec<f64>,
 }
 
 impl BellmanStep<'_> {
-    /// Solves the step at `state`. Cost: the gain field, and some thirty actions priced.
+    /// Solves the step at `state`. Cost: the gain field, and some thirty actions priced, twice as many where trading costs.
     pub fn solve(&self, state: &State) -> RobustSolution {
         let set = self.problem.uncertainty_set(state);
-        at_least_the_bank(self.optimum(state, &set, self.problem.actions(), |_, _| ()).0)
+        self.optimum(state, &set, self.problem.actions(), |_, _| ()).0.at_least_the_bank()
     }
 
     /// The same were the uncertainty set of this step alone of another radius; the value of the step after stays.
     pub fn solve_within(&self, state: &State, radius: f64) -> RobustSolution {
         let set = self.problem.uncertainty_set_within(state, radius);
-        at_least_the_bank(self.optimum(state, &set, self.problem.actions(), |_, _| ()).0)
+        self.optimum(state, &set, self.problem.actions(), |_, _| ()).0.at_least_the_bank()
     }
 
-    /// [`Self::solve`] with the target of the policy surrogate at the state.
-    pub fn solve_for_design(&self, state: &State) -> (RobustSolution, f64) {
+    /// [`Self::solve`] with what the surrogates learn: the floor gains of the state with any of `holdings`, and the band.
+    pub fn solve_for_design(&self, state: &State, holdings: Holdings) -> DesignSolution {
         let (set, actions) = (self.problem.uncertainty_set(state), self.problem.actions());
-        let utility = self.utility(state);
+        let (utility, dynamics) = (self.utility(state), self.problem.dynamics());
         let curvature = utility.relative_risk_aversion() * set.variance();
-        let (solution, target) = self.optimum(state, &set, actions, |pricing, found| {
-            let gain = |action: f64| utility.inverse(pricing.value(action));
-            policy_target(found.action, actions.highest, found.floor_gain, curvature, gain)
+        let largest = self.problem.largest_gain(self.step, state);
+        let (solution, (floor_gains, policy_targets)) = self.optimum(state, &set, actions, |pricing, found| {
+            let gain = |trade: Trade| utility.inverse(pricing.value(trade));
+            let target = |&side: &Side| {
+                let end = match side {
+                    Side::Buying => found.band.low,
+                    Side::Selling => found.band.high,
+                };
+                let gain_at = |action: f64| gain(dynamics.trade(side, state.holding, action));
+                // Where both sides are one, that is known.
+                let own = if dynamics.trading_cost > 0.0 { gain_at(end) } else { found.floor_gain };
+                policy_target(end, actions.highest, own, curvature, gain_at)
+            };
+            // Of another holding the floor is another, and so is what the trade keeps.
+            let gain_of = |holding: f64| {
+                let Trade { action, kept } = dynamics.trade_into(found.band, holding);
+                let floors = dynamics.liquidation(holding) / dynamics.liquidation(state.holding);
+                not_above(largest, gain(Trade { action, kept: kept * floors })) - floors.ln()
+            };
+            let gains = match holdings.matter() {
+                true => holdings.nodes().map(|holding| not_below_zero(gain_of(holding))).collect(),
+                false => vec![not_below_zero(found.floor_gain)],
+            };
+            (gains, dynamics.sides().iter().map(target).collect())
         });
-        (at_least_the_bank(solution), target)
+        DesignSolution { solution: solution.at_least_the_bank(), floor_gains, policy_targets }
     }
 
     /// What one action is worth, the best or not.
@@ -107,7 +145,7 @@ impl BellmanStep<'_> {
         actions: ActionInterval,
         then: impl Fn(&dyn Pricing, &RobustSolution) -> T,
     ) -> (RobustSolution, T) {
-        let utility = self.utility(state);
+        let (utility, dynamics) = (self.utility(state), self.problem.dynamics());
         let largest = self.problem.largest_gain(self.step, state);
         let (mut reach, mut growths) = (Reach::FIRST, 0);
         loop {
@@ -117,8 +155,9 @@ impl BellmanStep<'_> {
                 UncertaintySet::Ball { centre, radius, .. } => Box::new(TransportPricing::new(centre, *radius, &field)),
                 UncertaintySet::Region(region) => Box::new(NormalPricing::new(*region, &field)),
             };
-            let action = best_action(pricing.as_mut(), actions);
-            let solution = solution(action, pricing.worst(action), utility, largest);
+            let band = best_band(pricing.as_mut(), actions, dynamics, state.holding);
+            let trade = dynamics.trade_into(band, state.holding);
+            let solution = solution(band, trade.action, pricing.worst(trade), utility, largest);
             if solution.certified || !set.has_window() || growths == WINDOW_GROWTHS {
                 let more = then(pricing.as_ref(), &solution);
                 return (solution, more);
@@ -128,37 +167,63 @@ impl BellmanStep<'_> {
     }
 }
 
-/// Brackets the best action, then polishes it as the prices are refined. Its value is concave in the action.
-fn best_action(pricing: &mut dyn Pricing, actions: ActionInterval) -> f64 {
-    let (low, high) = actions.bracket(|action| pricing.rough_value(action));
+/// Brackets the best action of each side, then polishes them as the prices are refined. What a side is worth is concave in the
+/// action.
+fn best_band(pricing: &mut dyn Pricing, actions: ActionInterval, dynamics: Dynamics, holding: f64) -> Band {
+    let bracket = |&side: &Side| {
+        let bracket = actions.bracket(|action| pricing.rough_value(dynamics.trade(side, holding, action)));
+        (side, bracket)
+    };
+    let brackets: Vec<(Side, (f64, f64))> = dynamics.sides().iter().map(bracket).collect();
     loop {
-        let (action, _) = maximise_concave_scalar(|action| pricing.value(action), low, high, pricing.tolerance());
-        if !pricing.refine(action) {
-            return action;
+        let best = |&(side, (low, high)): &(Side, (f64, f64))| {
+            let trade = |action: f64| dynamics.trade(side, holding, action);
+            let (action, _) =
+                maximise_concave_scalar(|action| pricing.value(trade(action)), low, high, pricing.tolerance());
+            trade(action)
+        };
+        let ends: Vec<Trade> = brackets.iter().map(best).collect();
+        if !pricing.refine(&ends) {
+            return Band::of(&ends.iter().map(|trade| trade.action).collect::<Vec<f64>>());
         }
     }
 }
 
-/// All-bank is feasible and no law can hurt it.
-fn at_least_the_bank(solution: RobustSolution) -> RobustSolution {
-    let gain = solution.floor_gain;
-    // What is not a number stays so, and no zero is negative.
-    RobustSolution { floor_gain: if gain <= 0.0 { 0.0 } else { gain }, ..solution }
+impl RobustSolution {
+    /// All-bank is feasible and no law can hurt it.
+    fn at_least_the_bank(self) -> Self {
+        RobustSolution { floor_gain: not_below_zero(self.floor_gain), ..self }
+    }
+}
+
+/// What is not a number stays so, and no zero is negative.
+fn not_below_zero(gain: f64) -> f64 {
+    if gain <= 0.0 { 0.0 } else { gain }
+}
+
+/// What is not a number stays so.
+fn not_above(largest: f64, gain: f64) -> f64 {
+    if gain > largest { largest } else { gain }
 }
 
 /// The primal and the dual value as gains. Neither is above the `largest` gain, for no law of the set is better in every
 /// period than its best return; where wealth is so large that its utility no longer grows, both may be that.
-fn solution(action: f64, worst: WorstExpectation, utility: RelativeUtility, largest: f64) -> RobustSolution {
-    let gain = |value: f64| match utility.inverse(value) {
-        gain if gain > largest => largest,
-        gain => gain,
-    };
+fn solution(
+    band: Band,
+    action: f64,
+    worst: WorstExpectation,
+    utility: RelativeUtility,
+    largest: f64,
+) -> RobustSolution {
+    let gain = |value: f64| not_above(largest, utility.inverse(value));
     let floor_gain = gain(worst.value);
     RobustSolution {
         action,
+        band,
         floor_gain,
         duality_gap: floor_gain - gain(worst.dual),
         multiplier: worst.multiplier,
+        radius_cost: worst.multiplier * utility.inverse_slope(worst.value),
         adversary: worst.adversary,
         certified: worst.certified,
     }

@@ -1,23 +1,28 @@
 //! The value of the step after, as one robust step sees it.
 
 use super::problem::Problem;
-use crate::control::problem::state::{State, next_wealth};
+use crate::control::problem::dynamics::Trade;
+use crate::control::problem::holdings::Holdings;
+use crate::control::problem::state::State;
 use crate::control::request::specification::Specification;
 use crate::control::surrogate::features::FeatureSelection;
 use crate::control::surrogate::fitted::ValueSurrogate;
 use crate::control::surrogate::stored::Solution;
 use crate::control::surrogate::target::TargetMap;
 
+/// The floor gains of a state, at even holdings.
+pub type ExactGains = dyn Fn(&State) -> Vec<f64> + Send + Sync;
+
 /// The value of the step after, ready to be evaluated.
 pub enum NextValue {
-    /// The horizon: no gain over the wealth reached.
+    /// The horizon: no gain over the wealth reached, of which nothing is sold.
     Terminal,
-    /// The same floor gain everywhere.
-    Constant(f64),
+    /// The same floor gains everywhere, at even holdings.
+    Constant(Vec<f64>),
     /// The clamped prediction of the step's value surrogate.
     Surrogate(Box<ValueSurrogate>),
-    /// The floor gain itself, however it is known: what a surrogate is measured against.
-    Exact(Box<dyn Fn(&State) -> f64 + Send + Sync>),
+    /// The floor gains themselves, however they are known: what a surrogate is measured against.
+    Exact(Holdings, Box<ExactGains>),
 }
 
 impl NextValue {
@@ -25,19 +30,20 @@ impl NextValue {
     pub fn new(specification: &Specification, step: usize, after: Option<&Solution>) -> Self {
         match after {
             None => NextValue::Terminal,
-            Some(Solution::Single(single)) => NextValue::Constant(single.floor_gain),
+            Some(Solution::Single(single)) => NextValue::Constant(single.floor_gains.clone()),
             Some(Solution::Surrogates(stored)) => {
                 NextValue::Surrogate(Box::new(ValueSurrogate::new(stored, TargetMap::new(specification, step))))
             }
         }
     }
 
-    /// The floor gain where it is the same everywhere.
-    pub fn constant(&self) -> Option<f64> {
+    /// Where along the holding it is known.
+    pub fn holdings(&self) -> Holdings {
         match self {
-            NextValue::Terminal => Some(0.0),
-            NextValue::Constant(gain) => Some(*gain),
-            NextValue::Surrogate(_) | NextValue::Exact(_) => None,
+            NextValue::Terminal => Holdings::new(1),
+            NextValue::Constant(gains) => Holdings::new(gains.len()),
+            NextValue::Surrogate(surrogate) => surrogate.holdings(),
+            NextValue::Exact(holdings, _) => *holdings,
         }
     }
 
@@ -46,16 +52,18 @@ impl NextValue {
         match self {
             NextValue::Terminal | NextValue::Constant(_) => false,
             NextValue::Surrogate(surrogate) => selection.has_wealth() && surrogate.scaling.active.first() == Some(&0),
-            NextValue::Exact(_) => selection.has_wealth(),
+            NextValue::Exact(..) => selection.has_wealth(),
         }
     }
 
-    /// Predictions at every state that follows from `state` through one of `returns` (ascending) with one of `actions`,
-    /// return by return; nothing where the value is constant. Cost O(returns x actions x design points).
-    pub fn tabulate(&self, problem: &Problem, state: &State, returns: &[f64], actions: &[f64]) -> Vec<f64> {
-        let rate = problem.specification.problem.rate_per_step;
-        let wealth = |action: f64, log_return: f64| next_wealth(state.wealth, action, log_return, rate);
-        let mut table = Vec::with_capacity(returns.len() * actions.len());
+    /// Predictions at every state that follows from `state` through one of `returns` (ascending) after one of `trades`,
+    /// return by return, trade by trade, holding by holding; nothing where the value is constant. Without wealth in it, of one
+    /// trade alone. Cost O(returns x trades x design points x holdings).
+    pub fn tabulate(&self, problem: &Problem, state: &State, returns: &[f64], trades: &[Trade]) -> Vec<f64> {
+        let dynamics = problem.dynamics();
+        let start = state.wealth * dynamics.liquidation(state.holding);
+        let wealth = |trade: &Trade, log_return: f64| start * trade.kept * dynamics.growth(trade.action, log_return);
+        let mut table = Vec::with_capacity(returns.len() * trades.len() * self.holdings().count());
         match self {
             NextValue::Terminal | NextValue::Constant(_) => {}
             NextValue::Surrogate(surrogate) => {
@@ -63,37 +71,38 @@ impl NextValue {
                 let features = problem.features_with(&state.law, state.wealth, returns);
                 for (features, &log_return) in features.iter().zip(returns) {
                     if moves {
-                        let wealths = actions.iter().map(|&action| wealth(action, log_return));
+                        let wealths = trades.iter().map(|trade| wealth(trade, log_return));
                         table.extend(surrogate.predictions(features, wealths.map(|x| problem.selection.wealth(x))));
                     } else {
-                        table.push(surrogate.prediction(features));
+                        table.extend(surrogate.prediction(features));
                     }
                 }
             }
-            NextValue::Exact(gain) => {
+            NextValue::Exact(_, gains) => {
                 for &log_return in returns {
                     let mut law = state.law.clone();
                     if problem.specification.problem.framework.learns() {
                         law.push(log_return);
                     }
-                    let of = |&action: &f64| gain(&State { wealth: wealth(action, log_return), law: law.clone() });
-                    table.extend(actions.iter().map(of));
+                    let next =
+                        |trade: &Trade| State { wealth: wealth(trade, log_return), holding: 0.0, law: law.clone() };
+                    table.extend(trades.iter().flat_map(|trade| gains(&next(trade))));
                 }
             }
         }
         table
     }
 
-    /// Turns predictions into floor gains, in place; `wealths` are those of their states.
-    pub fn gains(&self, predictions: &mut [f64], wealths: impl Iterator<Item = f64>) {
+    /// Turns predictions into floor gains, in place; `floors` are the wealths that their states would have after selling all.
+    pub fn gains(&self, predictions: &mut [f64], floors: impl Iterator<Item = f64>) {
         match self {
             NextValue::Terminal | NextValue::Constant(_) => {}
             NextValue::Surrogate(surrogate) => {
-                for (prediction, wealth) in predictions.iter_mut().zip(wealths) {
-                    *prediction = surrogate.clamped_gain(*prediction, wealth);
+                for (prediction, floor) in predictions.iter_mut().zip(floors) {
+                    *prediction = surrogate.clamped_gain(*prediction, floor);
                 }
             }
-            NextValue::Exact(_) => predictions.iter_mut().for_each(|gain| *gain = gain.max(0.0)),
+            NextValue::Exact(..) => predictions.iter_mut().for_each(|gain| *gain = gain.max(0.0)),
         }
     }
 }

@@ -10,6 +10,7 @@
 use super::Pricing;
 use super::gain_field::{FieldRows, GainField};
 use super::solution::{Adversary, LOSS_OF_ROUNDING, WorstExpectation};
+use crate::control::problem::dynamics::Trade;
 use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw, Quadrature, WorstNormal};
 
 /// The worst law of every action is itself found to 1e-6 of an angle: a finer action would be noise.
@@ -29,47 +30,47 @@ impl<'f> NormalPricing<'f> {
         NormalPricing { region, field, rows: field.at(&nodes), quadrature: Quadrature::default() }
     }
 
-    fn expectation(&self, law: NormalLaw, action: f64) -> f64 {
+    fn expectation(&self, law: NormalLaw, trade: Trade) -> f64 {
         let nodes: Vec<f64> = law.nodes().collect();
-        self.quadrature.expectation(&self.field.at(&nodes).payoff(action))
+        self.quadrature.expectation(&self.field.at(&nodes).payoff(trade))
     }
 
     /// Expected relative utility under the laws that every action is tried against.
-    fn tried(&self, action: f64) -> Vec<f64> {
-        let payoff = self.rows.payoff(action);
+    fn tried(&self, trade: Trade) -> Vec<f64> {
+        let payoff = self.rows.payoff(trade);
         payoff.chunks_exact(self.quadrature.count()).map(|payoff| self.quadrature.expectation(payoff)).collect()
     }
 
-    fn worst_normal(&self, action: f64) -> WorstNormal {
-        self.region.worst(&self.tried(action), |law| self.expectation(law, action))
+    fn worst_normal(&self, trade: Trade) -> WorstNormal {
+        self.region.worst(&self.tried(trade), |law| self.expectation(law, trade))
     }
 }
 
 impl Pricing for NormalPricing<'_> {
-    fn value(&self, action: f64) -> f64 {
-        self.worst_normal(action).expectation
+    fn value(&self, trade: Trade) -> f64 {
+        self.worst_normal(trade).expectation
     }
 
-    fn rough_value(&self, action: f64) -> f64 {
-        self.tried(action).into_iter().fold(f64::INFINITY, f64::min)
+    fn rough_value(&self, trade: Trade) -> f64 {
+        self.tried(trade).into_iter().fold(f64::INFINITY, f64::min)
     }
 
     fn tolerance(&self) -> f64 {
         ACTION_TOLERANCE
     }
 
-    fn refine(&mut self, _: f64) -> bool {
+    fn refine(&mut self, _: &[Trade]) -> bool {
         false
     }
 
-    fn worst(&self, action: f64) -> WorstExpectation {
-        let (worst, estimate) = (self.worst_normal(action), self.region.estimate);
-        let loss = self.expectation(estimate, action) - worst.expectation;
+    fn worst(&self, trade: Trade) -> WorstExpectation {
+        let (worst, estimate) = (self.worst_normal(trade), self.region.estimate);
+        let loss = self.expectation(estimate, trade) - worst.expectation;
         let reported = if loss > LOSS_OF_ROUNDING { worst.law } else { estimate };
         WorstExpectation {
             value: worst.expectation,
             dual: worst.expectation,
-            multiplier: self.region.multiplier(&worst, |law| self.expectation(law, action)),
+            multiplier: self.region.multiplier(&worst, |law| self.expectation(law, trade)),
             adversary: Adversary::Normal { worst: reported, estimate },
             certified: true,
         }

@@ -5,7 +5,9 @@ use std::sync::OnceLock;
 
 use crate::control::kept::Kept;
 use crate::control::problem::actions::ActionInterval;
-use crate::control::problem::state::{State, floor};
+use crate::control::problem::dynamics::Dynamics;
+use crate::control::problem::holdings::Holdings;
+use crate::control::problem::state::State;
 use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::specification::{ProblemSpecification, Specification};
 use crate::control::surrogate::features::{FeatureSelection, Features, LawSummary};
@@ -50,16 +52,25 @@ impl Problem {
         Problem { specification: specification.clone(), sets, selection, frozen: OnceLock::new() }
     }
 
+    /// So many holdings where trading costs; else the holding does not matter, and one is enough.
+    pub fn holdings(&self, count: usize) -> Holdings {
+        Holdings::new(if self.dynamics().trading_cost > 0.0 { count } else { 1 })
+    }
+
     /// A, the shares of wealth that may be held.
     pub fn actions(&self) -> ActionInterval {
         let [lowest, highest] = self.specification.problem.action_interval;
         ActionInterval { lowest, highest }
     }
 
+    /// S, period by period.
+    pub fn dynamics(&self) -> Dynamics {
+        Dynamics::of(&self.specification.problem)
+    }
+
     /// Terminal all-bank wealth from a state at `step`.
     pub fn floor(&self, step: usize, state: &State) -> f64 {
-        let problem = &self.specification.problem;
-        floor(state.wealth, problem.rate_per_step, problem.horizon - step)
+        self.dynamics().floor(state.wealth, state.holding, self.specification.problem.horizon - step)
     }
 
     /// The most that the floor gain of a state at `step` can be: that of the best return of its centre in every period. The
@@ -72,7 +83,7 @@ impl Problem {
             (true, true) => LOG_RETURN,
             (true, false) => state.law.atoms().last().copied().unwrap_or(LOG_RETURN),
         };
-        largest_gain(problem, step, best)
+        largest_gain(problem, step, best) - self.dynamics().liquidation(state.holding).ln()
     }
 
     /// The uncertainty set at a state: of the state's law where the framework learns.
@@ -190,6 +201,8 @@ impl Problem {
 /// The floor gain from `step` of the highest allocation where every period earns `best_return`:
 ///
 ///   (T - t) ln(1 + a ((e^z / (1 + r)) - 1)),   a the highest allocation, z the best return
+///
+/// Who holds something before trading has gained, beside it, what selling that would cost.
 pub fn largest_gain(problem: &ProblemSpecification, step: usize, best_return: f64) -> f64 {
     let bank = problem.rate_per_step.ln_1p();
     let excess = (best_return - bank).exp_m1().max(0.0);

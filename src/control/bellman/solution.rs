@@ -1,5 +1,6 @@
 //! What a robust step answers.
 
+use crate::control::problem::actions::Band;
 use crate::numerics::confidence_region::NormalLaw;
 use crate::numerics::wasserstein::Move;
 
@@ -9,14 +10,18 @@ pub(super) const LOSS_OF_ROUNDING: f64 = 1e-14;
 /// The solution of the robust step at one state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobustSolution {
-    /// The best action, a share of wealth.
+    /// The best action, a share of wealth: where the band brings the holding to.
     pub action: f64,
+    /// The holdings that are best kept; where trading costs nothing both ends are the action.
+    pub band: Band,
     /// Log certainty equivalent over the all-bank floor.
     pub floor_gain: f64,
     /// Primal minus dual value, in log certainty equivalent; 0 over normal laws, which are searched without a dual.
     pub duality_gap: f64,
     /// Lost relative utility per unit of radius.
     pub multiplier: f64,
+    /// The same in log certainty equivalent.
+    pub radius_cost: f64,
     /// The worst law for the action.
     pub adversary: Adversary,
     /// True where the multiplier proves that no mass wants to leave the window, and over normal laws, which have none.

@@ -3,7 +3,7 @@
 use super::Pricing;
 use super::gain_field::{FieldRows, GainField};
 use super::solution::{Adversary, LOSS_OF_ROUNDING, WorstExpectation};
-use crate::control::problem::state::growth;
+use crate::control::problem::dynamics::Trade;
 use crate::control::uncertainty::COINCIDENT;
 use crate::control::uncertainty::centre::Centre;
 use crate::numerics::wasserstein::{WassersteinBall, WorstLaw};
@@ -63,9 +63,9 @@ impl<'f> TransportPricing<'f> {
     }
 
     /// Support points that receive mass from elsewhere.
-    fn destinations(&self, action: f64) -> Vec<bool> {
+    fn destinations(&self, trades: &[Trade]) -> Vec<bool> {
         let mut near = vec![false; self.grid.support.len()];
-        for moved in self.ball().worst_law(&self.rows.payoff(action)).moves {
+        for moved in trades.iter().flat_map(|trade| self.ball().worst_law(&self.rows.payoff(*trade)).moves) {
             near[moved.to] |= moved.to != moved.from;
         }
         near
@@ -80,15 +80,14 @@ impl<'f> TransportPricing<'f> {
     ///
     /// Below the window, an interval [first - far, first - near] passes if u0(first - far) + gamma near >= max_j { E_j -
     /// gamma (z_j - first) }, since |z - z_j| = (first - z) + (z_j - first); above it, the window's own edge decides.
-    fn certified(&self, payoff: &[f64], worst: &WorstLaw, action: f64) -> bool {
+    fn certified(&self, payoff: &[f64], worst: &WorstLaw, trade: Trade) -> bool {
         // A ball of radius 0 holds its centre alone, all of whose returns are in the window.
         if self.radius <= 0.0 {
             return true;
         }
         let Grid { support, masses } = &self.grid;
         let (Some(&first), Some(&last)) = (support.first(), support.last()) else { return true };
-        let rate = self.field.rate_per_step();
-        let lowest = |z: f64| self.field.utility().value(growth(action, z, rate).ln() - rate.ln_1p());
+        let lowest = |z: f64| self.field.least_payoff(trade, z);
         let gamma = worst.multiplier;
         let envelope = self.ball().envelope(payoff, gamma);
         let (mut below, mut above) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
@@ -111,20 +110,21 @@ impl<'f> TransportPricing<'f> {
 }
 
 impl Pricing for TransportPricing<'_> {
-    fn value(&self, action: f64) -> f64 {
-        self.ball().worst_expectation(&self.rows.payoff(action)).0
+    fn value(&self, trade: Trade) -> f64 {
+        self.ball().worst_expectation(&self.rows.payoff(trade)).0
     }
 
     fn tolerance(&self) -> f64 {
         if self.radius > 0.0 && self.refined < REFINEMENTS { PLACING_TOLERANCE } else { ACTION_TOLERANCE }
     }
 
-    fn refine(&mut self, action: f64) -> bool {
+    fn refine(&mut self, trades: &[Trade]) -> bool {
         // No law can hurt all-bank: its mass need not be placed.
-        if self.radius <= 0.0 || self.refined == REFINEMENTS || (self.refined == 0 && action <= 0.0) {
+        let is_bank = trades.iter().all(|trade| trade.action <= 0.0);
+        if self.radius <= 0.0 || self.refined == REFINEMENTS || (self.refined == 0 && is_bank) {
             return false;
         }
-        let near = self.destinations(action);
+        let near = self.destinations(trades);
         let support = subdivided(&self.grid.support, REFINED_PARTS, |interval| near[interval] || near[interval + 1]);
         self.grid = grid(self.centre, self.radius, support);
         self.rows = self.field.at(&self.grid.support);
@@ -132,14 +132,14 @@ impl Pricing for TransportPricing<'_> {
         true
     }
 
-    fn worst(&self, action: f64) -> WorstExpectation {
-        let payoff = self.rows.payoff(action);
+    fn worst(&self, trade: Trade) -> WorstExpectation {
+        let payoff = self.rows.payoff(trade);
         let worst = self.worst_law(&payoff);
         WorstExpectation {
             value: worst.expectation,
             dual: worst.dual,
             multiplier: worst.multiplier,
-            certified: self.certified(&payoff, &worst, action),
+            certified: self.certified(&payoff, &worst, trade),
             adversary: Adversary::Transport { support: self.grid.support.clone(), moves: worst.moves },
         }
     }

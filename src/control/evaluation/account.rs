@@ -1,7 +1,8 @@
 //! What became of wealth, and in figures.
 
 use crate::control::evaluation::rolling::Period;
-use crate::control::problem::state::growth;
+use crate::control::problem::actions::Band;
+use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::utility::{certainty_equivalent, utility};
 use crate::control::request::specification::UtilitySpecification;
 
@@ -10,29 +11,28 @@ use crate::control::request::specification::UtilitySpecification;
 pub struct Account {
     /// Wealth at the start of each period, and at the end of the last.
     pub wealth: Vec<f64>,
+    /// Share of wealth held through each period.
+    pub allocations: Vec<f64>,
     /// Share of wealth that changed between bank and asset at the start of each period.
     pub traded: Vec<f64>,
 }
 
-/// Keeps the books. At the start of a period the holding, which the last return moved, is brought to the allocation;
-/// what is traded costs `cost` of it, at once:
-///
-///   traded = |a - a_before|,   x' = x (1 - cost traded) ((1-a)(1+r) + a e^z),
-///   a_before of the next = a e^z / ((1-a)(1+r) + a e^z).
-///
-/// Wealth starts in the bank. r is what the bank really paid.
-pub fn keep(allocations: impl IntoIterator<Item = f64>, periods: &[Period], cost: f64, initial_wealth: f64) -> Account {
+/// Keeps the books. At the start of a period the holding, which the last return moved, is brought into the band of the
+/// strategy; what is traded costs `cost` of it, at once ([`Dynamics`]). Wealth starts in the bank; the rate is what the bank
+/// really paid.
+pub fn keep(bands: impl IntoIterator<Item = Band>, periods: &[Period], cost: f64, initial_wealth: f64) -> Account {
     let (mut wealth, mut traded) = (vec![initial_wealth], Vec::with_capacity(periods.len()));
-    let (mut now, mut before) = (initial_wealth, 0.0);
-    for (allocation, period) in allocations.into_iter().zip(periods) {
-        let change = f64::abs(allocation - before);
-        let grown = growth(allocation, period.log_return, period.bank_return);
-        now = now * (1.0 - cost * change) * grown;
-        before = allocation * period.log_return.exp() / grown;
+    let (mut allocations, mut now, mut holding) = (Vec::with_capacity(periods.len()), initial_wealth, 0.0);
+    for (band, period) in bands.into_iter().zip(periods) {
+        let dynamics = Dynamics { rate_per_step: period.bank_return, trading_cost: cost };
+        let allocation = band.nearest(holding);
+        traded.push(f64::abs(allocation - holding));
+        now = dynamics.next_wealth(now, holding, allocation, period.log_return);
+        holding = dynamics.drifted(allocation, period.log_return);
         wealth.push(now);
-        traded.push(change);
+        allocations.push(allocation);
     }
-    Account { wealth, traded }
+    Account { wealth, allocations, traded }
 }
 
 impl Account {
@@ -111,7 +111,7 @@ mod tests {
     #[test]
     fn three_months_agree_with_pencil_and_paper() {
         let period = |simple: f64| Period { log_return: simple.ln_1p(), bank_return: 0.01 };
-        let account = keep([0.5; 3], &[period(0.2), period(-0.1), period(0.05)], 0.01, 100.0);
+        let account = keep([Band::of(&[0.5]); 3], &[period(0.2), period(-0.1), period(0.05)], 0.01, 100.0);
         let traded = [0.5, 0.042_986_425_339_366_5, 0.028_795_811_518_324_6];
         let second = 109.9475 * (1.0 - 0.000_429_864_253_393_665) * 0.955;
         let wealth = [100.0, 109.9475, second, second * (1.0 - 0.000_287_958_115_183_246) * 1.03];

@@ -12,8 +12,8 @@ use crate::control::error::{FieldError, TrainError};
 use crate::control::kept::Kept;
 use crate::control::policy::advice::AdviceSource;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
+use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::sampling_law::{admissible, continuous_law};
-use crate::control::problem::state::next_wealth;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::evaluation::{EvaluationRequest, InitialHistories};
 use crate::control::request::framework::Framework;
@@ -246,6 +246,7 @@ impl Simulator<'_> {
     ) -> Result<(Outcome, f64), TrainError> {
         self.watch.go_on()?;
         let problem = &self.evaluation.request.problem;
+        let dynamics = Dynamics::of(problem);
         let returns = self.evaluation.returns(history, path);
         let distances = self.distances_along(sample, &returns);
         let mut outcome = Outcome { wealth: Vec::new(), lived: Vec::with_capacity(advisors.len() * returns.len()) };
@@ -261,8 +262,10 @@ impl Simulator<'_> {
             )?);
         }
         for &mix in self.evaluation.request.mixes() {
-            let step = |wealth: f64, &log_return: &f64| next_wealth(wealth, mix, log_return, problem.rate_per_step);
-            outcome.wealth.push(returns.iter().fold(problem.initial_wealth, step));
+            let step = |(wealth, holding): (f64, f64), &log_return: &f64| {
+                (dynamics.next_wealth(wealth, holding, mix, log_return), dynamics.drifted(mix, log_return))
+            };
+            outcome.wealth.push(returns.iter().fold((problem.initial_wealth, 0.0), step).0);
         }
         self.report_path();
         Ok((outcome, seconds))

@@ -1,16 +1,18 @@
 //! Walk-forward: every year a policy is trained on the window of returns before it, and lived by through the year.
 //!
-//! Decisions and accounts are apart: under power and log utility no advice depends on wealth, so the years can be
-//! decided side by side, and what wealth became is counted afterwards ([`crate::control::evaluation::account`]).
+//! Decisions and accounts are apart: under power and log utility no band depends on wealth or on what is held, so the years
+//! can be decided side by side, and what wealth became is counted afterwards ([`crate::control::evaluation::account`]).
 
 use crate::control::error::TrainError;
 use crate::control::policy::advice::{Advice, AdviceSource};
 use crate::control::policy::advisor::Advisor;
 use crate::control::pool;
+use crate::control::problem::actions::Band;
 use crate::control::progress::Watch;
 use crate::control::request::framework::Framework;
+use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{
-    DesignSpecification, ProblemSpecification, RadiusRule, Specification, SurrogateSpecification, UtilitySpecification,
+    DesignSpecification, ProblemSpecification, Specification, SurrogateSpecification, UtilitySpecification,
 };
 use crate::control::training::Training;
 
@@ -31,6 +33,11 @@ pub enum Strategy {
         /// Miscoverage of its ball.
         alpha: f64,
     },
+    /// The same, trained as if trading were free.
+    CostBlind {
+        /// Miscoverage of its ball.
+        alpha: f64,
+    },
     /// A ball frozen at the window.
     Static {
         /// Miscoverage of its ball.
@@ -45,11 +52,11 @@ pub enum Strategy {
     },
 }
 
-/// What was held through one period, and why.
+/// What was decided for one period, and why.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decision {
-    /// Share of wealth in the risky asset.
-    pub allocation: f64,
+    /// The holdings that are kept as they are.
+    pub band: Band,
     /// Radius of the ball then; 0 where there is none.
     pub radius: f64,
     /// Absent where nothing was trained.
@@ -65,6 +72,8 @@ pub struct WalkForward {
     pub year: usize,
     /// Relative risk aversion: log utility at 1, power utility above.
     pub risk_aversion: f64,
+    /// That policies reckon with, of what is traded.
+    pub trading_cost: f64,
     /// Design points a step.
     pub count: usize,
     /// Of every training.
@@ -74,7 +83,7 @@ pub struct WalkForward {
 impl Strategy {
     fn framework(self) -> Option<(Framework, f64)> {
         match self {
-            Strategy::Adaptive { alpha } => Some((Framework::Adaptive, alpha)),
+            Strategy::Adaptive { alpha } | Strategy::CostBlind { alpha } => Some((Framework::Adaptive, alpha)),
             Strategy::Static { alpha } => Some((Framework::Static, alpha)),
             // Its radius is zero whatever the rule says.
             Strategy::PlugIn => Some((Framework::PlugIn, 0.1)),
@@ -105,6 +114,7 @@ impl WalkForward {
                 framework,
                 horizon: self.year,
                 rate_per_step: past.last().map_or(0.0, |last| last.bank_return),
+                trading_cost: self.trading_cost,
                 utility: self.utility(),
                 radius: Some(RadiusRule::bridge(alpha)),
                 ..ProblemSpecification::of(past.iter().map(|period| period.log_return).collect())
@@ -155,12 +165,15 @@ impl WalkForward {
         let year = &periods[start..periods.len().min(start + self.year)];
         let Some((framework, alpha)) = strategy.framework() else {
             let Strategy::Mix { share } = strategy else { return Ok(Vec::new()) };
-            return Ok(vec![Decision { allocation: share, radius: 0.0, source: None }; year.len()]);
+            return Ok(vec![Decision { band: Band::of(&[share]), radius: 0.0, source: None }; year.len()]);
         };
-        let specification = self.specification(framework, alpha, &periods[start - self.window..start]);
+        let mut specification = self.specification(framework, alpha, &periods[start - self.window..start]);
+        if matches!(strategy, Strategy::CostBlind { .. }) {
+            specification.problem.trading_cost = 0.0;
+        }
         let advisor = Advisor::new(Training::new(&specification)?.run(watch)?);
         let returns: Vec<f64> = year.iter().map(|period| period.log_return).collect();
-        let decided = |Advice { allocation, radius, source, .. }| Decision { allocation, radius, source: Some(source) };
+        let decided = |Advice { band, radius, source, .. }| Decision { band, radius, source: Some(source) };
         Ok(advisor.walk(advisor.initial_state(None, None)?, &returns).map(decided).collect())
     }
 }

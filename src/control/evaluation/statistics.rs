@@ -8,7 +8,7 @@ use crate::control::evaluation::report::{
     Spread, StrategyReport, UtilityReport, WealthReport,
 };
 use crate::control::policy::content_hash;
-use crate::control::problem::state::floor;
+use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::utility::{RelativeUtility, utility};
 use crate::control::request::framework::Framework;
 use crate::numerics::summary::{Clustered, Estimate, interpolated_quantile};
@@ -143,7 +143,7 @@ impl Table<'_> {
         let linear = |index: usize| {
             let values = self.relative_utilities(index);
             let mean = self.sample.mean(&values).value;
-            let slope = floor * inverse_slope(relative, mean);
+            let slope = floor * wealth_slope(relative, mean);
             let found = self.certainty_equivalent(index).value;
             values.into_iter().map(move |value| found + slope * (value - mean))
         };
@@ -156,7 +156,7 @@ impl Table<'_> {
     /// Utility in units of the terminal wealth of all-bank, and that wealth.
     fn relative_utility(&self) -> (RelativeUtility, f64) {
         let problem = &self.evaluation.request.problem;
-        let floor = floor(problem.initial_wealth, problem.rate_per_step, problem.horizon);
+        let floor = Dynamics::of(problem).floor(problem.initial_wealth, 0.0, problem.horizon);
         (RelativeUtility::new(problem.utility, floor), floor)
     }
 
@@ -250,12 +250,8 @@ fn mix_name(mix: f64) -> String {
 }
 
 /// The derivative at `value` of wealth over the floor, exp(u^{-1}).
-fn inverse_slope(relative: RelativeUtility, value: f64) -> f64 {
-    match relative {
-        RelativeUtility::Exponential { k } => 1.0 / (1.0 - k * value),
-        RelativeUtility::Power { eta } => (eta * relative.inverse(value)).exp(),
-        RelativeUtility::Log => value.exp(),
-    }
+fn wealth_slope(relative: RelativeUtility, value: f64) -> f64 {
+    relative.inverse_slope(value) * relative.inverse(value).exp()
 }
 
 fn share<'a>(steps: impl Iterator<Item = &'a Lived>, holds: impl Fn(&Lived) -> bool) -> f64 {

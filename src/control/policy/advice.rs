@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::problem::actions::Band;
+
 /// Where an advice came from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -22,11 +24,18 @@ pub enum AdviceSource {
 /// The robust allocation for the coming period and what it is worth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Advice {
-    /// Share of wealth to hold in the risky asset.
+    /// Share of wealth to hold in the risky asset: the holding, brought to the nearer end of the band.
     pub allocation: f64,
+    /// Share of wealth in the risky asset before trading.
+    pub holding: f64,
+    /// The holdings that are best kept as they are; where trading costs nothing both ends are the allocation.
+    #[schema(value_type = [f64; 2])]
+    pub band: Band,
+    /// The allocation less the holding: the share of wealth to buy, or where it is negative to sell.
+    pub trade: f64,
     /// Certainty equivalent of the robust value, in terminal wealth.
     pub certainty_equivalent: f64,
-    /// Terminal wealth of all-bank: no law can take it away.
+    /// Terminal wealth of selling everything now and staying in the bank: no law can take it away.
     pub floor: f64,
     /// Radius of the uncertainty set: of the Wasserstein ball, in log-return; in the parametric frameworks half the width
     /// of the confidence region in the mean, in estimated standard deviations of a return.

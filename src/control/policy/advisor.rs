@@ -13,7 +13,9 @@ use crate::control::bellman::solution::RobustSolution;
 use crate::control::error::FieldError;
 use crate::control::kept::Kept;
 use crate::control::policy::worst_case::WorstCase;
-use crate::control::problem::state::{State, next_state};
+use crate::control::problem::actions::Band;
+use crate::control::problem::holdings::Holdings;
+use crate::control::problem::state::State;
 use crate::control::problem::utility::depends_on_wealth;
 use crate::control::request::specification::{Specification, UtilitySpecification};
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
@@ -51,7 +53,7 @@ struct Asked<'a> {
 
 /// What the surrogates say of a state.
 struct Prediction {
-    action: f64,
+    band: Band,
     floor_gain: f64,
     deviation: f64,
     in_design: bool,
@@ -94,10 +96,11 @@ impl Advisor {
         self.policy.specification()
     }
 
-    /// The state a session starts from: `history` and `wealth` default to the specification's.
+    /// The state a session starts from: `history` and `wealth` default to the specification's, and all of it is
+    /// in the bank.
     ///
     /// # Errors
-    /// A history or wealth that breaks a rule; a history other than the policy's own under a static framework, whose
+    /// A history or a wealth that breaks a rule; a history other than the policy's own under a static framework, whose
     /// uncertainty set is frozen at it.
     pub fn initial_state(&self, history: Option<&[f64]>, wealth: Option<f64>) -> Result<State, FieldError> {
         let problem = &self.specification().problem;
@@ -133,7 +136,7 @@ impl Advisor {
     /// prepared, and small.
     pub fn is_prompt(&self, step: usize, state: &State) -> bool {
         let (points, is_ready) = match self.surrogates(step) {
-            Some((stored, prepared)) => (stored.value.weights.len(), prepared.factor.is_in(&self.kept)),
+            Some((stored, prepared)) => (stored.count(), prepared.factor.is_in(&self.kept)),
             None => (0, true),
         };
         let cost = self.problem.cost(state);
@@ -162,7 +165,7 @@ impl Advisor {
 
     fn predicted(&self, step: usize, state: &State, radius: f64, predicted: &Prediction) -> Advice {
         let asked = Asked { step, state, radius, source: AdviceSource::PolicySurrogate };
-        self.advice(&asked, predicted.action, predicted.floor_gain, predicted)
+        self.advice(&asked, predicted.band, predicted.floor_gain, predicted)
     }
 
     /// The re-solved advice and the worst-case law behind it.
@@ -199,17 +202,22 @@ impl Advisor {
         let step = BellmanStep { problem: &self.problem, step: asked.step, next: &next };
         let solution = step.solve_within(asked.state, asked.radius);
         if solution.action.is_finite() && solution.floor_gain.is_finite() {
-            return (self.advice(asked, solution.action, solution.floor_gain, predicted), Some(solution));
+            return (self.advice(asked, solution.band, solution.floor_gain, predicted), Some(solution));
         }
         // All-bank is feasible and no law can hurt it.
         let unsolved = Asked { source: AdviceSource::Unsolved, ..*asked };
-        (self.advice(&unsolved, 0.0, 0.0, predicted), None)
+        (self.advice(&unsolved, Band::of(&[0.0]), 0.0, predicted), None)
     }
 
-    fn advice(&self, asked: &Asked, allocation: f64, floor_gain: f64, predicted: &Prediction) -> Advice {
+    fn advice(&self, asked: &Asked, band: Band, floor_gain: f64, predicted: &Prediction) -> Advice {
         let floor = self.problem.floor(asked.step, asked.state);
+        let holding = asked.state.holding;
+        let allocation = band.nearest(holding);
         Advice {
             allocation,
+            holding,
+            band,
+            trade: allocation - holding,
             certainty_equivalent: floor * floor_gain.exp(),
             floor,
             radius: asked.radius,
@@ -227,8 +235,8 @@ impl Advisor {
         match &self.policy.steps()[step].solution {
             Solution::Single(single) => {
                 let in_design = self.is_single_state(step, state);
-                let floor_gain = single.floor_gain.min(largest);
-                Prediction { action: single.action, floor_gain, deviation: 0.0, in_design }
+                let floor_gain = Holdings::at(&single.floor_gains, state.holding).max(0.0).min(largest);
+                Prediction { band: single.band, floor_gain, deviation: 0.0, in_design }
             }
             Solution::Surrogates(stored) => {
                 let PreparedStep { value, policy, factor } = self.prepared_from(step, stored);
@@ -237,12 +245,16 @@ impl Advisor {
                 let deviation =
                     process.as_ref().as_ref().map_or(f64::INFINITY, |found| found.latent_variance(&input).sqrt());
                 let highest = self.specification().problem.action_interval[1];
-                let (action, prediction) = (policy.at(&input), value.surrogate.at(&input));
+                let (ends, predictions) = (policy.at(&input), value.surrogate.at(&input));
+                let is_finite = ends.iter().all(|end| end.is_finite());
+                let ends: Vec<f64> = ends.into_iter().map(|end| end.clamp(0.0, highest)).collect();
+                let prediction = Holdings::at(&predictions, state.holding);
+                let floor = state.wealth * self.problem.dynamics().liquidation(state.holding);
                 Prediction {
-                    action: action.clamp(0.0, highest),
-                    floor_gain: value.clamped_gain(prediction, state.wealth).min(largest),
-                    deviation: value.gain_spread(prediction, deviation * stored.value.scale, state.wealth).min(largest),
-                    in_design: deviation <= stored.deviation_limit && action.is_finite(),
+                    band: Band::of(&ends),
+                    floor_gain: value.clamped_gain(prediction, floor).min(largest),
+                    deviation: value.gain_spread(prediction, deviation * stored.value.scale, floor).min(largest),
+                    in_design: deviation <= stored.deviation_limit && is_finite,
                 }
             }
         }
@@ -282,7 +294,7 @@ impl Advisor {
 
     /// The state after holding `allocation` through `log_return`.
     pub fn advance(&self, state: &State, allocation: f64, log_return: f64) -> State {
-        next_state(state, allocation, log_return, self.specification().problem.rate_per_step)
+        self.problem.dynamics().next_state(state, allocation, log_return)
     }
 
     /// The advice before each of `returns`, followed; at most `horizon` returns are used.

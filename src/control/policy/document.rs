@@ -6,6 +6,8 @@ use sha2::{Digest, Sha256};
 use crate::control::bellman::problem::{Problem, largest_gain};
 use crate::control::error::{FieldError, PolicyError};
 use crate::control::kept::Kept;
+use crate::control::problem::actions::Band;
+use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::rules;
 use crate::control::request::specification::Specification;
 use crate::control::solved_step::{FORMAT, StepDiagnostics, StepSolution};
@@ -93,6 +95,7 @@ impl Policy {
                 Solution::Single(single) => check_single(&field, index, single, &self.specification)?,
                 Solution::Surrogates(stored) => {
                     check_surrogates(&field, stored, feature_count)?;
+                    check_functions(&field, stored, &self.specification)?;
                     let largest = credible_gain(&self.specification, index);
                     rules::within(&format!("{field}.largest_gain"), stored.largest_gain, 0.0, largest)?;
                 }
@@ -109,8 +112,23 @@ fn check_single(
     specification: &Specification,
 ) -> Result<(), FieldError> {
     let highest = specification.problem.action_interval[1];
-    rules::within(&format!("{field}.action"), single.action, 0.0, highest)?;
-    rules::within(&format!("{field}.floor_gain"), single.floor_gain, 0.0, credible_gain(specification, step))
+    let (field_of, Band { low, high }) = (|name: &str| format!("{field}.{name}"), single.band);
+    rules::within(&field_of("band[0]"), low, 0.0, highest)?;
+    rules::within(&field_of("band[1]"), high, low, highest)?;
+    check_holdings(&field_of("floor_gains"), single.floor_gains.len(), specification)?;
+    let largest = credible_gain(specification, step);
+    single.floor_gains.iter().try_for_each(|&gain| rules::within(&field_of("floor_gains"), gain, 0.0, largest))
+}
+
+/// Holdings at which a step may know its value, where trading costs.
+const HOLDINGS: std::ops::RangeInclusive<usize> = 4..=1025;
+
+/// One function of the law where trading costs nothing; else one for each of so many holdings.
+fn check_holdings(field: &str, count: usize, specification: &Specification) -> Result<(), FieldError> {
+    match specification.problem.trading_cost > 0.0 {
+        true => rules::whole(field, count, &HOLDINGS),
+        false => rules::whole(field, count, &(1..=1)),
+    }
 }
 
 /// Rounding forgiven to a gain at its bound.
@@ -118,7 +136,8 @@ const ROUNDING: f64 = 1e-9;
 
 /// The floor gain of a step were every return the best that is accepted: no state is worth more.
 fn credible_gain(specification: &Specification, step: usize) -> f64 {
-    largest_gain(&specification.problem, step, rules::LOG_RETURN) * (1.0 + ROUNDING)
+    let unsold = Dynamics::of(&specification.problem).liquidation(1.0).ln();
+    (largest_gain(&specification.problem, step, rules::LOG_RETURN) - unsold) * (1.0 + ROUNDING)
 }
 
 /// Bound on every other stored number.
@@ -132,24 +151,25 @@ fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) 
         let rule = format!("must name distinct features below {feature_count}, ascending");
         return Err(FieldError::new(format!("{field}.scaling.active"), format!("{:?}", scaling.active), rule));
     }
-    let points = stored.value.weights.len();
+    let points = stored.count();
     let shapes = [
         ("scaling.centre", scaling.centre.len(), inputs),
         ("scaling.spread", scaling.spread.len(), inputs),
         ("inputs", stored.inputs.len(), inputs),
         ("value.hyperparameters.lengthscales", stored.value.hyperparameters.lengthscales.len(), inputs),
         ("policy.hyperparameters.lengthscales", stored.policy.hyperparameters.lengthscales.len(), inputs),
-        ("policy.weights", stored.policy.weights.len(), points),
-        ("value.weights", points, points.clamp(2, rules::LARGEST_COUNT)),
+        ("inputs[0]", points, points.clamp(2, rules::LARGEST_COUNT)),
     ];
+    let weights = || stored.value.weights.iter().chain(&stored.policy.weights);
     let columns = stored.inputs.iter().map(|column| ("inputs", column.len(), points));
-    for (name, found, expected) in shapes.into_iter().chain(columns) {
+    let functions = weights().map(|weights| ("weights", weights.len(), points));
+    for (name, found, expected) in shapes.into_iter().chain(columns).chain(functions) {
         if found != expected {
             return Err(FieldError::new(format!("{field}.{name}"), found, format!("must have {expected} entries")));
         }
     }
     let plain = scaling.centre.iter().chain(stored.inputs.iter().flatten());
-    for &number in plain.chain(&stored.value.weights).chain(&stored.policy.weights) {
+    for &number in plain.chain(weights().flatten()) {
         rules::within(field, number, -LARGEST_NUMBER, LARGEST_NUMBER)?;
     }
     for surrogate in [&stored.value, &stored.policy] {
@@ -162,6 +182,13 @@ fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) 
         }
     }
     rules::within(&format!("{field}.deviation_limit"), stored.deviation_limit, 0.0, LARGEST_NUMBER)
+}
+
+/// A value for each holding, and either end of the band, where trading costs.
+fn check_functions(field: &str, stored: &StepSurrogates, specification: &Specification) -> Result<(), FieldError> {
+    check_holdings(&format!("{field}.value.weights"), stored.value.weights.len(), specification)?;
+    let ends = Dynamics::of(&specification.problem).sides().len();
+    rules::whole(&format!("{field}.policy.weights"), stored.policy.weights.len(), &(ends..=ends))
 }
 
 /// SHA-256 of a policy's portable form, in lower-case hexadecimal: the policy's name.

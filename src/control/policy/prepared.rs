@@ -45,7 +45,7 @@ impl Factor {
     fn of(stored: &StepSurrogates) -> Self {
         let scales = &stored.value.hyperparameters;
         let numbers = stored.inputs.iter().flatten().chain(&scales.lengthscales);
-        let mut hash = Sha256::new_with_prefix((stored.value.weights.len() as u64).to_le_bytes());
+        let mut hash = Sha256::new_with_prefix((stored.count() as u64).to_le_bytes());
         for number in numbers.chain([&scales.signal_variance, &scales.noise_variance]) {
             hash.update(number.to_le_bytes());
         }
@@ -60,7 +60,7 @@ impl Factor {
     /// `None` where the matrix does not factor.
     pub fn process(&self, kept: &Kept, stored: &StepSurrogates) -> Arc<Option<GaussianProcess>> {
         kept.get_or_make(&self.0, factor_bytes(stored), || {
-            let zeros = vec![0.0; stored.value.weights.len()];
+            let zeros = vec![0.0; stored.count()];
             GaussianProcess::condition(&stored.matrix(), &zeros, &stored.value.hyperparameters).ok()
         })
     }
@@ -68,22 +68,27 @@ impl Factor {
 
 /// Bytes of the process of a step.
 pub fn factor_bytes(stored: &StepSurrogates) -> usize {
-    GaussianProcess::bytes_of(stored.value.weights.len(), stored.inputs.len())
+    GaussianProcess::bytes_of(stored.count(), stored.inputs.len())
 }
 
 /// Bytes of a prepared policy, without bridges and factors.
 pub fn prepared_bytes(policy: &Policy) -> usize {
     let designs = policy.steps().iter().map(|step| match &step.solution {
-        Solution::Single(_) => (0, 0),
-        Solution::Surrogates(stored) => (stored.value.weights.len(), stored.inputs.len()),
+        Solution::Single(_) => (0, 0, 0),
+        Solution::Surrogates(stored) => {
+            let functions = stored.value.weights.len() + stored.policy.weights.len();
+            (stored.count(), stored.inputs.len(), functions)
+        }
     });
-    let (points, inputs) = designs.fold((0, 0), |(sum, most), (points, inputs)| (sum + points, most.max(inputs)));
-    bytes_ready(policy.steps().len(), points, inputs)
+    let (points, inputs, functions) = designs.fold((0, 0, 0), |(sum, inputs, most), (points, own, functions)| {
+        (sum + points, inputs.max(own), most.max(functions))
+    });
+    bytes_ready(policy.steps().len(), points, inputs, functions)
 }
 
 /// Of so many steps with so many design points in all: the inputs as stored and for either surrogate, and the weights of
-/// both as stored and ready to evaluate.
-pub fn bytes_ready(steps: usize, points: usize, inputs: usize) -> usize {
-    let numbers = points.saturating_mul(3 * inputs + 4);
+/// every function as stored and ready to evaluate.
+pub fn bytes_ready(steps: usize, points: usize, inputs: usize, functions: usize) -> usize {
+    let numbers = points.saturating_mul(3 * inputs + 2 * functions);
     numbers.saturating_mul(size_of::<f64>()).saturating_add(POLICY_BYTES + STEP_BYTES * steps)
 }

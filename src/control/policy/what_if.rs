@@ -1,4 +1,4 @@
-//! What a policy would advise were something else the case: another wealth, another radius, another return.
+//! What a policy would advise were something else the case: another wealth, another holding, another radius, another return.
 
 use super::advice::Advice;
 use super::advisor::{AdviceMode, Advisor};
@@ -12,6 +12,8 @@ use crate::control::request::rules;
 pub struct Hypothesis {
     /// Wealth now.
     pub wealth: Option<f64>,
+    /// Share of wealth in the risky asset now.
+    pub holding: Option<f64>,
     /// Return of the coming period, through which the advised allocation is held; the advice is for the period after.
     pub log_return: Option<f64>,
     /// The uncertainty set of the period advised; later ones keep their own.
@@ -48,6 +50,9 @@ impl Hypothesis {
     pub fn check(&self) -> Result<(), FieldError> {
         if let Some(wealth) = self.wealth {
             rules::wealth("wealth", wealth)?;
+        }
+        if let Some(holding) = self.holding {
+            rules::share("holding", holding)?;
         }
         if let Some(log_return) = self.log_return {
             rules::log_return("log_return", log_return)?;
@@ -104,7 +109,9 @@ impl Advisor {
         state: &State,
         hypothesis: &Hypothesis,
     ) -> Result<(usize, State), FieldError> {
-        let now = State { wealth: hypothesis.wealth.unwrap_or(state.wealth), law: state.law.clone() };
+        let wealth = hypothesis.wealth.unwrap_or(state.wealth);
+        let holding = hypothesis.holding.unwrap_or(state.holding);
+        let now = State { wealth, holding, law: state.law.clone() };
         let Some(log_return) = hypothesis.log_return else { return Ok((step, now)) };
         let horizon = self.specification().problem.horizon;
         if step + 1 >= horizon {

@@ -8,12 +8,17 @@ use crate::control::policy::advice::Advice;
 use crate::numerics::confidence_region::NormalLaw;
 use crate::numerics::wasserstein::Move;
 
+/// Radius, in log-return, whose price the sentence tells.
+const RADIUS_UNIT: f64 = 0.001;
+
 /// The law that is worst for the advised allocation: a transport of the empirical law, or, in the parametric frameworks, a
 /// normal law.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WorstCase {
     /// Lagrange multiplier of the uncertainty set: utility lost per unit of extra radius.
     pub multiplier: f64,
+    /// The same in log certainty equivalent: what one more unit of radius would cost.
+    pub radius_cost: f64,
     /// Empty in the parametric frameworks.
     pub transport: Vec<TransportedMass>,
     /// The worst normal law and the estimated one; absent in the other frameworks.
@@ -88,7 +93,7 @@ impl WorstCase {
     pub fn unknown() -> Self {
         let sentence =
             "The robust step has no finite solution at this state, so all wealth stays in the bank.".to_owned();
-        WorstCase { multiplier: 0.0, transport: Vec::new(), normal: None, duality_gap: 0.0, sentence }
+        WorstCase { multiplier: 0.0, radius_cost: 0.0, transport: Vec::new(), normal: None, duality_gap: 0.0, sentence }
     }
 
     /// The worst law of a solved step. `utility_scale` turns relative utility into utility.
@@ -97,7 +102,7 @@ impl WorstCase {
             Adversary::Transport { support, moves } => {
                 let mass = |m: &Move| TransportedMass { atom: support[m.from], moved_to: support[m.to], mass: m.mass };
                 let transport: Vec<TransportedMass> = moves.iter().map(mass).collect();
-                let sentence = transport_sentence(&transport, advice);
+                let sentence = transport_sentence(&transport, advice, solution.radius_cost);
                 (transport, None, sentence)
             }
             Adversary::Normal { worst, estimate } => {
@@ -111,7 +116,8 @@ impl WorstCase {
             }
         };
         let multiplier = solution.multiplier * utility_scale;
-        WorstCase { multiplier, transport, normal, duality_gap: solution.duality_gap, sentence }
+        let RobustSolution { radius_cost, duality_gap, .. } = *solution;
+        WorstCase { multiplier, radius_cost, transport, normal, duality_gap, sentence }
     }
 }
 
@@ -121,21 +127,23 @@ fn moved(transport: &[TransportedMass]) -> (f64, Option<f64>) {
     (moved().map(|mass| mass.mass).sum(), moved().map(|mass| mass.moved_to).reduce(f64::min))
 }
 
-fn transport_sentence(transport: &[TransportedMass], advice: &Advice) -> String {
+fn transport_sentence(transport: &[TransportedMass], advice: &Advice, radius_cost: f64) -> String {
     if let (share, Some(lowest)) = moved(transport)
         && share > 0.0
     {
         format!(
             "Against an allocation of {:.1} %, the worst law within distance {:.4} of the {} returns seen moves {:.1} % of \
              the probability, down to a return of {:.1} % in one period; against that law the allocation is still worth \
-             {:.2} for certain at the horizon, and all-bank {:.2}.",
+             {:.2} for certain at the horizon, and all-bank {:.2}. A radius wider by {RADIUS_UNIT} would cost {:.1} basis \
+             points of that.",
             100.0 * advice.allocation,
             advice.radius,
             advice.sample_size,
             100.0 * share,
             100.0 * lowest.exp_m1(),
             advice.certainty_equivalent,
-            advice.floor
+            advice.floor,
+            1e4 * RADIUS_UNIT * radius_cost
         )
     } else {
         format!(

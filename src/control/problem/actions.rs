@@ -1,4 +1,6 @@
-//! The set A of actions: what share of wealth may be held in the risky asset.
+//! The set A of actions: what share of wealth may be held in the risky asset; and the band, in which a policy leaves it.
+
+use serde::{Deserialize, Serialize};
 
 /// Equal parts of the interval that are tried before a search between the best one's neighbours: robust values are concave
 /// in the action but for the error of the surrogate, whose dents are narrower than an eighth.
@@ -11,6 +13,42 @@ pub struct ActionInterval {
     pub lowest: f64,
     /// A share of wealth.
     pub highest: f64,
+}
+
+/// The policy at one state: a holding within is kept, one outside is brought to the nearer end. Where trading costs nothing
+/// both ends are the action.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(from = "[f64; 2]", into = "[f64; 2]")]
+pub struct Band {
+    /// A share of wealth.
+    pub low: f64,
+    /// A share of wealth, at least the lower one.
+    pub high: f64,
+}
+
+impl Band {
+    /// From its ends, or the one action that is both; an upper end below the lower one is moved up to it.
+    pub fn of(ends: &[f64]) -> Self {
+        let [low, high] = [ends.first(), ends.last()].map(|end| end.copied().unwrap_or_default());
+        Band { low, high: high.max(low) }
+    }
+
+    /// Where a holding is brought to.
+    pub fn nearest(self, holding: f64) -> f64 {
+        holding.max(self.low).min(self.high)
+    }
+}
+
+impl From<[f64; 2]> for Band {
+    fn from([low, high]: [f64; 2]) -> Self {
+        Band { low, high }
+    }
+}
+
+impl From<Band> for [f64; 2] {
+    fn from(Band { low, high }: Band) -> Self {
+        [low, high]
+    }
 }
 
 impl ActionInterval {

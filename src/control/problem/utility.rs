@@ -84,6 +84,15 @@ impl RelativeUtility {
         }
     }
 
+    /// The derivative of [`Self::inverse`] at `value`: log gain per unit of utility.
+    pub fn inverse_slope(self, value: f64) -> f64 {
+        match self {
+            RelativeUtility::Exponential { k } => 1.0 / ((1.0 - k * value) * (1.0 - (-k * value).ln_1p() / k)),
+            RelativeUtility::Power { eta } => 1.0 / (1.0 + (1.0 - eta) * value),
+            RelativeUtility::Log => 1.0,
+        }
+    }
+
     /// Relative risk aversion at the floor, `-u''(0) + 1` in log wealth.
     pub fn relative_risk_aversion(self) -> f64 {
         match self {

@@ -7,10 +7,10 @@ use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
 use crate::control::request::framework::Framework;
+use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules::{self, DEFAULT_COUNT_WEALTH_ALONE, within};
 use crate::control::request::specification::{
-    DesignSpecification, InitialLaws, ProblemSpecification, RadiusRule, SamplingLaw, Specification,
-    SurrogateSpecification,
+    DesignSpecification, InitialLaws, ProblemSpecification, SamplingLaw, Specification, SurrogateSpecification,
 };
 
 /// Simulated paths of one history.

@@ -2,5 +2,6 @@
 
 pub mod evaluation;
 pub mod framework;
+pub mod radius_rule;
 pub mod rules;
 pub mod specification;

@@ -2,8 +2,9 @@
 
 use crate::control::error::FieldError;
 use crate::control::request::framework::Framework;
+use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{
-    InitialLaws, Interval, ProblemSpecification, RadiusRule, SamplingLaw, Specification, SurrogateSpecification,
+    InitialLaws, Interval, ProblemSpecification, SamplingLaw, Specification, SurrogateSpecification,
     UtilitySpecification,
 };
 
@@ -33,6 +34,8 @@ const DESIGN_NUMBERS: usize = 100_000_000;
 const EXPONENTIAL_SCALE: f64 = 300.0;
 /// Actions closer than 1e-7 are one to the search: an interval must be wider.
 const SMALLEST_HIGHEST_ACTION: f64 = 1e-4;
+/// Trading costs, shares of what is traded.
+pub const TRADING_COST: (f64, f64) = (0.0, 0.1);
 /// Smallest and largest wealth.
 pub const WEALTH: (f64, f64) = (1e-6, 1e15);
 /// Moments of the law among the features.
@@ -79,6 +82,7 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
         ));
     }
     within("problem.action_interval[1]", highest, SMALLEST_HIGHEST_ACTION, 1.0)?;
+    within("problem.trading_cost", problem.trading_cost, TRADING_COST.0, TRADING_COST.1)?;
     utility(problem)?;
     radius(&problem.radius_rule(), problem)?;
     if let Some(support) = problem.support {
@@ -198,6 +202,11 @@ pub fn history(field: &str, values: &[f64]) -> Result<(), FieldError> {
 /// Checks a wealth, named `field` in messages.
 pub fn wealth(field: &str, value: f64) -> Result<(), FieldError> {
     within(field, value, WEALTH.0, WEALTH.1)
+}
+
+/// Checks a share of wealth, named `field` in messages.
+pub fn share(field: &str, value: f64) -> Result<(), FieldError> {
+    within(field, value, 0.0, 1.0)
 }
 
 /// Checks one log-return, named `field` in messages.

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::request::framework::Framework;
+use crate::control::request::radius_rule::RadiusRule;
 
 /// A whole training job: the problem, the design that samples its states, the surrogates, one seed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -44,6 +45,9 @@ pub struct ProblemSpecification {
     /// Share of wealth that may be held in the risky asset: `[0, highest]`.
     #[serde(default = "defaults::action_interval")]
     pub action_interval: [f64; 2],
+    /// Lost of what is moved between bank and asset, as a share of it, both ways alike.
+    #[serde(default)]
+    pub trading_cost: f64,
     /// Of terminal wealth.
     #[serde(default)]
     pub utility: UtilitySpecification,
@@ -85,71 +89,6 @@ impl Default for UtilitySpecification {
     }
 }
 
-/// How the radius of the uncertainty set follows from the sample of size n: `chi_square` of the parametric frameworks'
-/// confidence region, every other of the Wasserstein ball.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(tag = "rule", rename_all = "snake_case", deny_unknown_fields)]
-pub enum RadiusRule {
-    /// `scale Q / sqrt(n)`, Q the (1 - alpha)-quantile of the bridge statistic over simulated paths.
-    Bridge {
-        /// Miscoverage, the probability that the ball misses the true law.
-        #[serde(default = "defaults::alpha")]
-        alpha: f64,
-        /// Simulated paths.
-        #[serde(default = "defaults::paths")]
-        paths: usize,
-        /// A factor on the radius.
-        #[serde(default = "defaults::scale")]
-        scale: f64,
-    },
-    /// `sqrt(ln(C / alpha) / (c n))`, the concentration inequality of Fournier and Guillin.
-    Concentration {
-        /// Miscoverage.
-        #[serde(default = "defaults::alpha")]
-        alpha: f64,
-        /// C of the inequality.
-        #[serde(rename = "C")]
-        numerator: f64,
-        /// c of the inequality, per squared log-return.
-        #[serde(rename = "c")]
-        rate: f64,
-    },
-    /// `kappa / sqrt(n)`.
-    RootN {
-        /// In log-return.
-        kappa: f64,
-    },
-    /// The same radius at every sample size.
-    Fixed {
-        /// In log-return.
-        radius: f64,
-    },
-    /// `sqrt(kappa / n)` estimated standard deviations, kappa the (1 - alpha)-quantile of chi-square with two degrees
-    /// of freedom: `n (mu - m)^2 / v + n (s2 - v)^2 / (2 v^2) <= kappa`, m and v the sample's mean and variance.
-    ChiSquare {
-        /// Miscoverage.
-        #[serde(default = "defaults::alpha")]
-        alpha: f64,
-    },
-}
-
-impl RadiusRule {
-    /// The bridge rule at this miscoverage, with the default number of paths and no factor.
-    pub fn bridge(alpha: f64) -> Self {
-        RadiusRule::Bridge { alpha, paths: defaults::paths(), scale: defaults::scale() }
-    }
-
-    /// The level of the rules that have one.
-    pub fn alpha(&self) -> Option<f64> {
-        match *self {
-            RadiusRule::Bridge { alpha, .. }
-            | RadiusRule::Concentration { alpha, .. }
-            | RadiusRule::ChiSquare { alpha } => Some(alpha),
-            RadiusRule::RootN { .. } | RadiusRule::Fixed { .. } => None,
-        }
-    }
-}
-
 impl ProblemSpecification {
     /// The problem of an investor who has seen `history`, every default taken: the paper's.
     pub fn of(history: Vec<f64>) -> Self {
@@ -159,6 +98,7 @@ impl ProblemSpecification {
             rate_per_step: defaults::rate_per_step(),
             initial_wealth: defaults::initial_wealth(),
             action_interval: defaults::action_interval(),
+            trading_cost: 0.0,
             utility: UtilitySpecification::default(),
             radius: None,
             support: None,
@@ -169,9 +109,7 @@ impl ProblemSpecification {
 
     /// The radius rule given, or the framework's default.
     pub fn radius_rule(&self) -> RadiusRule {
-        let (alpha, is_parametric) = (defaults::alpha(), self.framework.is_parametric());
-        let default = if is_parametric { RadiusRule::ChiSquare { alpha } } else { RadiusRule::bridge(alpha) };
-        self.radius.unwrap_or(default)
+        self.radius.unwrap_or_else(|| RadiusRule::default_of(self.framework))
     }
 }
 
@@ -334,15 +272,6 @@ mod defaults {
     }
     pub fn action_interval() -> [f64; 2] {
         [0.0, 1.0]
-    }
-    pub fn alpha() -> f64 {
-        0.1
-    }
-    pub fn paths() -> usize {
-        2000
-    }
-    pub fn scale() -> f64 {
-        1.0
     }
     pub fn moment_count() -> usize {
         4

@@ -9,13 +9,13 @@ use std::ops::Range;
 
 use rand::RngExt;
 
+use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::sampling_law::{admissible, continuous_law};
-use crate::control::problem::state::{State, next_wealth};
+use crate::control::problem::state::State;
 use crate::control::problem::utility::depends_on_wealth;
+use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules::DEFAULT_COUNT;
-use crate::control::request::specification::{
-    InitialLaws, Interval, ProblemSpecification, RadiusRule, SamplingLaw, Specification,
-};
+use crate::control::request::specification::{InitialLaws, Interval, ProblemSpecification, SamplingLaw, Specification};
 use crate::control::uncertainty::centre::Centre;
 use crate::numerics::confidence_region::{self, ConfidenceRegion, NormalLaw};
 use crate::numerics::empirical::EmpiricalDistribution;
@@ -95,9 +95,9 @@ impl Design {
     /// State `index` of `step`; those beyond the candidates are independent draws of the same law. Streams:
     /// ("initial", 0, index) for the start, ("design", t, index) for each step. Cost O((history + step) ln(..)).
     pub fn state(&self, step: usize, index: usize) -> State {
-        let problem = &self.problem;
+        let (problem, dynamics) = (&self.problem, Dynamics::of(&self.problem));
         if let Some(wealths) = self.ladder.get(index) {
-            return State { wealth: wealths[step], law: EmpiricalDistribution::new(&problem.history) };
+            return self.holding_half(wealths[step], EmpiricalDistribution::new(&problem.history));
         }
         let mut generator = stream(self.seed, "initial", 0, index);
         let mut wealth = self.start.min * (self.start.max / self.start.min).powf(generator.random::<f64>());
@@ -109,10 +109,15 @@ impl Design {
             let mut generator = stream(self.seed, "design", earlier, index);
             let action = problem.action_interval[1] * generator.random::<f64>();
             let log_return = admissible(self.law.draw(&mut generator), problem);
-            wealth = next_wealth(wealth, action, log_return, problem.rate_per_step);
+            wealth *= dynamics.growth(action, log_return);
             sample.push(log_return);
         }
-        State { wealth, law: EmpiricalDistribution::new(&sample) }
+        self.holding_half(wealth, EmpiricalDistribution::new(&sample))
+    }
+
+    /// The band and the value are found for every holding from any one, best from one in the middle.
+    fn holding_half(&self, wealth: f64, law: EmpiricalDistribution) -> State {
+        State { wealth, holding: 0.5, law }
     }
 }
 

@@ -4,9 +4,10 @@ use super::features::Features;
 use super::scaling::Scaling;
 use super::stored::{StepSurrogates, StoredSurrogate};
 use super::target::TargetMap;
+use crate::control::problem::holdings::Holdings;
 use crate::numerics::gp::GpMean;
 
-/// A Gaussian process whose prediction at scaled input x is
+/// A Gaussian process of one or more functions of the inputs. The prediction of each at scaled input x is
 ///
 ///   offset + scale k(x)^T K^-1 targets.
 pub struct Surrogate {
@@ -22,9 +23,14 @@ impl Surrogate {
         Surrogate { mean, offset: own.offset, scale: own.scale }
     }
 
-    /// The prediction at a scaled input. Cost O(N d).
-    pub fn at(&self, input: &[f64]) -> f64 {
-        self.offset + self.scale * self.mean.mean(input)
+    /// The prediction of every function at a scaled input. Cost O(N (d + functions)).
+    pub fn at(&self, input: &[f64]) -> Vec<f64> {
+        self.unscaled(self.mean.means(input))
+    }
+
+    fn unscaled(&self, mut means: Vec<f64>) -> Vec<f64> {
+        means.iter_mut().for_each(|mean| *mean = self.offset + self.scale * *mean);
+        means
     }
 }
 
@@ -38,6 +44,7 @@ pub struct ValueSurrogate {
     pub largest_gain: f64,
     /// From targets to floor gains.
     pub target: TargetMap,
+    holdings: Holdings,
 }
 
 impl ValueSurrogate {
@@ -48,18 +55,24 @@ impl ValueSurrogate {
             surrogate: Surrogate::new(stored, &stored.value),
             largest_gain: stored.largest_gain,
             target,
+            holdings: Holdings::new(stored.value.weights.len()),
         }
     }
 
-    /// The predicted target at `features`. Cost O(N d).
-    pub fn prediction(&self, features: &Features) -> f64 {
+    /// The holdings whose values are predicted.
+    pub fn holdings(&self) -> Holdings {
+        self.holdings
+    }
+
+    /// The predicted targets at `features`, holding by holding. Cost O(N (d + holdings)).
+    pub fn prediction(&self, features: &Features) -> Vec<f64> {
         self.surrogate.at(&self.scaling.apply(features))
     }
 
-    /// Predictions that differ from `features` in the first feature alone, wealth, which must be an input. Cost O(N) each:
-    /// what the law is away from the design points is computed once.
+    /// Predictions that differ from `features` in the first feature alone, wealth, which must be an input: wealth by wealth,
+    /// holding by holding. Cost O(N) each: what the law is away from the design points is computed once.
     pub fn predictions(&self, features: &Features, wealths: impl Iterator<Item = f64>) -> Vec<f64> {
-        let Surrogate { mean, offset, scale } = &self.surrogate;
+        let mean = &self.surrogate.mean;
         let mut input = self.scaling.apply(features);
         let mut from_law = vec![0.0; mean.input_count()];
         mean.squared_distances(&input, 1..input.len(), &mut from_law);
@@ -68,9 +81,9 @@ impl ValueSurrogate {
             input[0] = (wealth - self.scaling.centre[0]) / self.scaling.spread[0];
             mean.squared_distances(&input, 0..1, &mut squared);
             squared.iter_mut().zip(&from_law).for_each(|(total, law)| *total += law);
-            offset + scale * mean.mean_from_squared(&squared)
+            self.surrogate.unscaled(mean.means_from_squared(&mut squared))
         };
-        wealths.map(at).collect()
+        wealths.flat_map(at).collect()
     }
 
     /// The deviation of the floor gain that a deviation of the target makes, around `prediction` at `wealth`; the

@@ -8,6 +8,8 @@ use super::scaling::Scaling;
 use super::stored::{Solution, StepSurrogates, StoredSurrogate};
 use super::target::TargetMap;
 use crate::control::error::TrainError;
+use crate::control::problem::dynamics::Dynamics;
+use crate::control::problem::holdings::Holdings;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::specification::Specification;
 use crate::control::solved_step::{StepDiagnostics, SurrogateDiagnostics};
@@ -33,12 +35,14 @@ pub struct DesignPoint {
     pub wealth: f64,
     /// y-check.
     pub features: Features,
-    /// The best action, a share of wealth.
+    /// The solution at the state's own holding.
     pub action: f64,
-    /// Log certainty equivalent over the all-bank floor.
+    /// Log certainty equivalent over the all-bank floor, at that holding.
     pub floor_gain: f64,
-    /// The action, continued past the bounds of the interval.
-    pub policy_target: f64,
+    /// The same at every holding where the value is to be known, one where the holding does not matter.
+    pub floor_gains: Vec<f64>,
+    /// The action, or either end of the band, continued past the bounds of the interval.
+    pub policy_targets: Vec<f64>,
     /// Of the robust step, in log certainty equivalent.
     pub duality_gap: f64,
     /// Of the robust step.
@@ -67,24 +71,30 @@ pub struct Fitting<'a> {
     pub watch: &'a Watch<'a>,
 }
 
-/// A regression problem: targets of zero prior mean and unit size.
+/// A regression problem: functions of zero prior mean and, together, of unit size.
 struct Targets {
-    scaled: Vec<f64>,
+    scaled: Vec<Vec<f64>>,
     offset: f64,
     scale: f64,
 }
 
 impl Targets {
     /// Divides by the root mean square about the offset, which is the mean of the values or 0.
-    fn new(values: &[f64], prior_mean: PriorMean) -> Self {
-        let count = values.len() as f64;
+    fn new(functions: &[Vec<f64>], prior_mean: PriorMean) -> Self {
+        let all = || functions.iter().flatten();
+        let count = all().count() as f64;
         let offset = match prior_mean {
             PriorMean::Zero => 0.0,
-            PriorMean::OfTargets => values.iter().sum::<f64>() / count,
+            PriorMean::OfTargets => all().sum::<f64>() / count,
         };
-        let size = (values.iter().map(|value| (value - offset).powi(2)).sum::<f64>() / count).sqrt();
+        let size = (all().map(|value| (value - offset).powi(2)).sum::<f64>() / count).sqrt();
         let scale = if size > 1e-12 { size } else { 1.0 };
-        Targets { scaled: values.iter().map(|value| (value - offset) / scale).collect(), offset, scale }
+        let scaled = |values: &Vec<f64>| values.iter().map(|value| (value - offset) / scale).collect();
+        Targets { scaled: functions.iter().map(scaled).collect(), offset, scale }
+    }
+
+    fn of_one(values: Vec<f64>, prior_mean: PriorMean) -> Self {
+        Targets::new(&[values], prior_mean)
     }
 }
 
@@ -133,14 +143,15 @@ impl Fitting<'_> {
         inputs: &[Vec<f64>],
     ) -> Result<Vec<f64>, TrainError> {
         let drawn = self.inputs(solved);
-        let condition = |targets: &[f64], hyper: &Hyperparameters| {
-            GaussianProcess::condition(&drawn, targets, hyper).map_err(|error| self.singular("value", error.jitter))
+        let condition = |targets: &[Vec<f64>], hyper: &Hyperparameters| {
+            let process = GaussianProcess::condition(&drawn, &targets[0], hyper);
+            process.map_err(|error| self.singular("value", error.jitter))
         };
-        let gains: Vec<f64> = solved.iter().map(|point| point.floor_gain).collect();
-        let gains = Targets::new(&gains, PriorMean::Zero).scaled;
+        let gains = solved.iter().map(|point| point.floor_gain).collect();
+        let gains = Targets::of_one(gains, PriorMean::Zero).scaled;
         let errors = condition(&gains, hyper)?.leave_one_out(&gains).errors;
-        let errors =
-            Targets::new(&errors.iter().map(|error| error.abs()).collect::<Vec<f64>>(), PriorMean::Zero).scaled;
+        let errors = errors.iter().flatten().map(|error| error.abs()).collect();
+        let errors = Targets::of_one(errors, PriorMean::Zero).scaled;
         let smooth = Hyperparameters { noise_variance: NOISE_OF_ERRORS * hyper.signal_variance, ..hyper.clone() };
         let expected = condition(&errors, &smooth)?;
         let weight = |input: &Vec<f64>| 1.0 + WEIGHT_OF_ERROR * expected.mean(input).max(0.0).sqrt();
@@ -184,7 +195,7 @@ impl Fitting<'_> {
             inputs: inputs.column_iter().map(|column| column.iter().copied().collect()).collect(),
             scaling: self.scaling.clone(),
             deviation_limit: quantile(&deviations, GUARDED_SHARE),
-            largest_gain: solved.iter().map(|point| point.floor_gain).fold(0.0, f64::max),
+            largest_gain: solved.iter().flat_map(|point| &point.floor_gains).copied().fold(0.0, f64::max),
             value: value.stored,
             policy: policy.stored,
         })))
@@ -198,8 +209,17 @@ impl Fitting<'_> {
     /// The value's targets, then the policy's.
     fn targets(&self, solved: &[DesignPoint]) -> [Targets; 2] {
         let map = TargetMap::new(self.specification, self.step);
-        let gains: Vec<f64> = solved.iter().map(|point| map.target(point.floor_gain, point.wealth)).collect();
-        let actions: Vec<f64> = solved.iter().map(|point| point.policy_target).collect();
+        let dynamics = Dynamics::of(&self.specification.problem);
+        let floors = |point: &DesignPoint| {
+            let holdings = Holdings::new(point.floor_gains.len());
+            holdings.nodes().map(|holding| point.wealth * dynamics.liquidation(holding)).collect::<Vec<f64>>()
+        };
+        let gains = |point: &DesignPoint| -> Vec<f64> {
+            let gains = point.floor_gains.iter().zip(floors(point));
+            gains.map(|(&gain, floor)| map.target(gain, floor)).collect()
+        };
+        let gains = by_function(solved, gains);
+        let actions = by_function(solved, |point| point.policy_targets.clone());
         let prior_mean = if map.is_value() { PriorMean::OfTargets } else { PriorMean::Zero };
         [Targets::new(&gains, prior_mean), Targets::new(&actions, PriorMean::OfTargets)]
     }
@@ -208,7 +228,7 @@ impl Fitting<'_> {
         &self,
         surrogate: &'static str,
         inputs: &DMatrix<f64>,
-        targets: &[f64],
+        targets: &[Vec<f64>],
         start: Option<&Hyperparameters>,
     ) -> Result<gp_fit::Fit, TrainError> {
         let bounds = self.specification.surrogate.bounds;
@@ -235,21 +255,28 @@ impl Fitting<'_> {
         start: &Hyperparameters,
     ) -> Result<Fitted, TrainError> {
         let found = self.search(surrogate, inputs, &targets.scaled, Some(start))?;
-        let process = GaussianProcess::condition(inputs, &targets.scaled, &found.hyperparameters)
+        let process = GaussianProcess::condition(inputs, &targets.scaled[0], &found.hyperparameters)
             .map_err(|error| self.singular(surrogate, error.jitter))?;
         Ok(Fitted {
             left_out: process.leave_one_out(&targets.scaled),
-            log_likelihood_per_point: found.log_likelihood / targets.scaled.len() as f64,
+            log_likelihood_per_point: found.log_likelihood / targets.scaled.iter().map(Vec::len).sum::<usize>() as f64,
             search: format!("{:?}", found.outcome),
             stored: StoredSurrogate {
                 hyperparameters: found.hyperparameters,
-                weights: process.weights().to_vec(),
+                weights: targets.scaled.iter().map(|values| process.weights_of(values)).collect(),
                 offset: targets.offset,
                 scale: targets.scale,
             },
             process,
         })
     }
+}
+
+/// What `of` says of every design point, turned around: a function of the design points for each of its entries.
+fn by_function(solved: &[DesignPoint], of: impl Fn(&DesignPoint) -> Vec<f64>) -> Vec<Vec<f64>> {
+    let rows: Vec<Vec<f64>> = solved.iter().map(of).collect();
+    let functions = rows.first().map_or(0, Vec::len);
+    (0..functions).map(|function| rows.iter().map(|row| row[function]).collect()).collect()
 }
 
 /// A fitted surrogate with the figures that describe the fit.
@@ -263,14 +290,15 @@ struct Fitted {
 
 impl Fitted {
     fn diagnostics(&self, features: &[String]) -> SurrogateDiagnostics {
-        let squares: f64 = self.left_out.errors.iter().map(|error| error * error).sum();
+        let errors = || self.left_out.errors.iter().flatten();
+        let squares: f64 = errors().map(|error| error * error).sum();
         SurrogateDiagnostics {
             features: features.to_vec(),
             lengthscales: self.stored.hyperparameters.lengthscales.clone(),
             signal_variance: self.stored.hyperparameters.signal_variance,
             noise_variance: self.stored.hyperparameters.noise_variance,
             log_likelihood_per_point: self.log_likelihood_per_point,
-            leave_one_out_error: self.stored.scale * (squares / self.left_out.errors.len() as f64).sqrt(),
+            leave_one_out_error: self.stored.scale * (squares / errors().count() as f64).sqrt(),
             jitter: self.process.jitter(),
             search: self.search.clone(),
         }

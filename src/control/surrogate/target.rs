@@ -1,6 +1,6 @@
 //! What the value surrogate regresses, and the way back to the floor gain.
 
-use crate::control::problem::state::floor;
+use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::utility::{certainty_equivalent, depends_on_wealth, utility};
 use crate::control::request::specification::{Specification, SurrogateTarget, UtilitySpecification};
 
@@ -9,7 +9,7 @@ use crate::control::request::specification::{Specification, SurrogateTarget, Uti
 pub struct TargetMap {
     target: SurrogateTarget,
     utility: UtilitySpecification,
-    rate_per_step: f64,
+    dynamics: Dynamics,
     steps_left: usize,
 }
 
@@ -19,15 +19,16 @@ impl TargetMap {
         TargetMap {
             target: specification.surrogate.target,
             utility: specification.problem.utility,
-            rate_per_step: specification.problem.rate_per_step,
+            dynamics: Dynamics::of(&specification.problem),
             steps_left: specification.problem.horizon - step,
         }
     }
 
-    /// Terminal all-bank wealth in whose units the value is taken: of unit wealth where wealth does not matter.
+    /// Terminal all-bank wealth in whose units the value is taken: of unit wealth where wealth does not matter. `wealth` is in
+    /// the bank.
     fn floor(&self, wealth: f64) -> f64 {
         let wealth = if depends_on_wealth(self.utility) { wealth } else { 1.0 };
-        floor(wealth, self.rate_per_step, self.steps_left)
+        self.dynamics.floor(wealth, 0.0, self.steps_left)
     }
 
     /// True where the value itself is regressed.
@@ -35,7 +36,7 @@ impl TargetMap {
         self.target == SurrogateTarget::Value
     }
 
-    /// The regression target at a state with `wealth` and this floor gain.
+    /// The regression target of a floor gain, at a state that selling everything leaves with `wealth`.
     pub fn target(&self, gain: f64, wealth: f64) -> f64 {
         match self.target {
             SurrogateTarget::FloorGain => gain,

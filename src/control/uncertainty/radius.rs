@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use crate::control::kept::{Kept, Key};
 use crate::control::request::framework::Framework;
-use crate::control::request::specification::{RadiusRule, Specification};
+use crate::control::request::radius_rule::RadiusRule;
+use crate::control::request::specification::Specification;
 use crate::numerics::bridge::{Quantile, Statistic};
 use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
 use crate::numerics::confidence_region;

@@ -25,6 +25,7 @@ export const agrees = (one, other) => Math.abs(one - other) <= TOLERANCE;
  */
 export function adviceView(action, horizon, rest) {
   const amount = h("strong", {}, allocation(action.allocation));
+  const order = h("p", { class: "sentence" }, trade(action));
   const sentence = h("p", { class: "sentence" }, why(action));
   const read = action.source === "policy_surrogate";
   const note = h(
@@ -35,7 +36,7 @@ export function adviceView(action, horizon, rest) {
   const big = h("p", { class: "big" }, h("span", {}, "Hold "), amount, h("span", {}, " in the risky asset"));
   const element = section(
     `Period ${action.period} of ${horizon}`,
-    h("div", { class: "advice", id: "advice", tabindex: -1 }, big, sentence, note),
+    h("div", { class: "advice", id: "advice", tabindex: -1 }, big, order, sentence, note),
     rest,
   );
   const checked = (anew) => {
@@ -45,6 +46,7 @@ export function adviceView(action, horizon, rest) {
       return action;
     }
     amount.textContent = allocation(anew.allocation);
+    order.textContent = trade(anew);
     sentence.replaceChildren(...why(anew));
     const apart = percent(Math.abs(anew.allocation - action.allocation)).replace("%", "points");
     const found = anew.source === "unsolved" ? exactly(anew) : "Solved anew";
@@ -57,6 +59,14 @@ export function adviceView(action, horizon, rest) {
 }
 
 const exactly = ({ allocation, source }) => `Allocation ${significant(allocation, 4)}, ${SOURCES[source]}`;
+
+/** What to do about the share held now. Less than the advice is told to is nothing. */
+function trade({ holding, band: [low, high], trade: change }) {
+  const kept = low < high ? ` Anything from ${allocation(low)} to ${allocation(high)} is best kept as it is.` : "";
+  const now = `${allocation(holding)} is held now: `;
+  if (Math.abs(change) < TOLERANCE / 2) return `${now}nothing to trade.${kept}`;
+  return `${now}${change > 0 ? "buy" : "sell"} ${percent(Math.abs(change))} of wealth.${kept}`;
+}
 
 function why({ allocation, certainty_equivalent, floor }) {
   if (allocation === 0)

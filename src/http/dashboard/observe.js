@@ -16,7 +16,7 @@ function fraction(text) {
 
 /** `{element, advise(allocation)}`: what is held where nothing else is said is the advice, or another that took its place. */
 export function observeForm(action, { id, session, policy, refresh }) {
-  const { rate_per_step } = policy.specification.problem;
+  const { rate_per_step, trading_cost } = policy.specification.problem;
   const preview = h("output", { class: "note" });
   let [advised, replaced] = [action.allocation, false];
   const read = () => {
@@ -24,7 +24,8 @@ export function observeForm(action, { id, session, policy, refresh }) {
     const executed = held.control.value.trim() === "" ? advised : fraction(held.control.value);
     if (value === null || executed === null) return (preview.textContent = "");
     const growth = kind.control.value === "log_return" ? Math.exp(value) : 1 + value;
-    const next = session.wealth * ((1 - executed) * (1 + rate_per_step) + executed * growth);
+    const traded = 1 - trading_cost * Math.abs(executed - session.holding);
+    const next = session.wealth * traded * ((1 - executed) * (1 + rate_per_step) + executed * growth);
     preview.textContent = `Log-return ${significant(Math.log(growth), 4)}; wealth ${wealth(session.wealth)} \u2192 ${wealth(next)} at ${allocation(executed)} held.`;
   };
   const given = input({

@@ -11,6 +11,9 @@ import { surfaceView } from "./surface_view.js";
 const READY_BYTES = 15e6;
 /** Digits of one number in the document. */
 const NUMBER_BYTES = 20;
+/** Numbers a design point keeps beside its inputs: one for the value and one for the action, or the value at 17 holdings and
+ * either end of the band. */
+const FUNCTIONS = { free: 2, costly: 19 };
 
 export async function view(id, leaving) {
   const policy = await get(`/policies/${id}`, leaving);
@@ -70,8 +73,9 @@ function deletion(id) {
 }
 
 function surface({ policy: id, specification, diagnostics }, leaving) {
+  const functions = specification.problem.trading_cost > 0 ? FUNCTIONS.costly : FUNCTIONS.free;
   const size = diagnostics.reduce(
-    (sum, step) => sum + NUMBER_BYTES * step.design_count * (2 + (step.policy?.features.length ?? 0)),
+    (sum, step) => sum + NUMBER_BYTES * step.design_count * (functions + (step.policy?.features.length ?? 0)),
     0,
   );
   const holder = h("div", {});

@@ -82,8 +82,9 @@ function figures({ session, history }, action) {
   const change = session.wealth / history.initial_wealth - 1;
   return facts([
     ["Wealth", wealth(session.wealth), `${change >= 0 ? "+" : ""}${percent(change)} since the start`],
+    ["Held", allocation(session.holding), "of wealth, before trading"],
     action && ["Certainty equivalent", wealth(action.certainty_equivalent), "for certain at the horizon"],
-    action && ["Floor", wealth(action.floor), "all in the bank until then"],
+    action && ["Floor", wealth(action.floor), "all sold now, and in the bank until then"],
     action && ["Radius", significant(action.radius, 3), "of the set of laws guarded against"],
     [
       "Returns seen",
@@ -170,7 +171,7 @@ function worstCase({ id, leaving }, advice, settled) {
     const { worst_case } = anew;
     const sentence = h("p", { class: "sentence" }, worstWords(anew));
     if (worst_case.transport.length === 0) return [sentence];
-    const told = `Multiplier of the ball ${significant(worst_case.multiplier, 3)} (utility lost per unit of radius); duality gap ${significant(1e4 * Math.abs(worst_case.duality_gap), 2)} bp.`;
+    const told = `A radius wider by 0.001 would cost ${significant(10 * worst_case.radius_cost, 2)} basis points of the certainty equivalent. Multiplier of the ball ${significant(worst_case.multiplier, 3)} (utility lost per unit of radius); duality gap ${significant(1e4 * Math.abs(worst_case.duality_gap), 2)} bp.`;
     return [sentence, lawChart(worst_case), h("p", { class: "note" }, told)];
   };
   told().then(

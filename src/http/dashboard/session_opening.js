@@ -4,7 +4,7 @@ import { post } from "./api.js";
 import { h } from "./dom.js";
 import { fieldset, input, select, showProblem } from "./form.js";
 import { moment, short } from "./format.js";
-import { typed } from "./number_text.js";
+import { hundredth, typed } from "./number_text.js";
 import { all } from "./pages.js";
 import { returnsField } from "./returns_field.js";
 
@@ -20,6 +20,12 @@ function opening(policies, asked) {
   const policy = select({ name: "policy", label: "Policy", choices: policyChoices(policies) });
   if (policies.some(({ policy }) => policy === asked)) policy.control.value = asked;
   const stake = input({ name: "wealth", label: "Wealth", note: "Blank: the policy\u2019s initial wealth." });
+  const holding = input({
+    name: "holding",
+    label: "Share of it held already, %",
+    note: "In the risky asset. Blank: nothing.",
+    unit: "percent",
+  });
   let known = [];
   const history = returnsField({
     name: "history",
@@ -37,7 +43,7 @@ function opening(policies, asked) {
   const form = h(
     "form",
     { novalidate: true },
-    fieldset("Whose session", [policy, stake]),
+    fieldset("Whose session", [policy, stake, holding]),
     other,
     message,
     h("p", { class: "send" }, h("button", { type: "submit" }, "Open")),
@@ -50,6 +56,8 @@ function opening(policies, asked) {
     if (known.length > 0) request.history = known;
     const wealth = typed(stake.control.value);
     if (wealth !== null) request.wealth = wealth;
+    const share = typed(holding.control.value.replace(/\s*%$/, ""));
+    if (share !== null) request.holding = typeof share === "number" ? hundredth(share) : share;
     try {
       const { session } = await post("/sessions", request);
       location.hash = `#/sessions/${session}`;

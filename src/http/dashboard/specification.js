@@ -27,6 +27,10 @@ export function utility({ kind, risk_aversion }) {
   return `${kind} utility, risk aversion ${significant(risk_aversion)}${kind === "exponential" ? " per unit of wealth" : ""}`;
 }
 
+/** What trading costs, in a sentence. */
+const trading = ({ trading_cost: cost }) =>
+  cost > 0 ? `Trading costs ${percent(cost, 2)} of what is traded.` : "Trading is free.";
+
 /** The wealth whose utility is `value`. */
 export function worth({ kind, risk_aversion: aversion }, value) {
   if (kind === "log") return Math.exp(value);
@@ -75,7 +79,7 @@ export function inWords({ problem, design, surrogate, seed }) {
   const laws = design.initial_laws === "resampled" ? "starting from resampled histories" : "starting from this history";
   return [
     `${MEANINGS[problem.framework]}${ball}`,
-    `${counted(problem.horizon, "decision")} with ${utility(problem.utility)}; the bank pays ${percent(problem.rate_per_step, 2)} a period, and up to ${percent(limit, 0)} of wealth may be at risk. It starts with ${wealth(problem.initial_wealth)}.`,
+    `${counted(problem.horizon, "decision")} with ${utility(problem.utility)}; the bank pays ${percent(problem.rate_per_step, 2)} a period, and up to ${percent(limit, 0)} of wealth may be at risk. It starts with ${wealth(problem.initial_wealth)}. ${trading(problem)}`,
     `The history holds ${counted(problem.history.length, "log-return")}: mean ${percent(mean, 2)}, standard deviation ${percent(deviation, 2)} a period.`,
     `Each step was solved at ${counted(design.count, "state")} simulated under ${law(design.sampling_law)}, ${laws}; surrogates of the ${surrogate.target === "value" ? "value" : "gain over the floor"} on ${surrogate.features === "raw_moments" ? "raw" : "standardised"} features. Seed ${count(seed)}.`,
   ];

@@ -37,8 +37,8 @@ export function feature(name, { wealth, law, radius, rate, riskAversion }) {
   return order % 2 === 0 ? Math.log(law.standardised(order)) : law.standardised(order);
 }
 
-/** The mean of a stored process at scaled inputs. */
-export function predicted({ hyperparameters, weights, offset, scale }, inputs, x) {
+/** The mean of a stored process' first function at scaled inputs. */
+export function predicted({ hyperparameters, weights: [weights], offset, scale }, inputs, x) {
   const lengths = hyperparameters.lengthscales;
   let sum = 0;
   for (let j = 0; j < weights.length; j++) {
@@ -50,7 +50,8 @@ export function predicted({ hyperparameters, weights, offset, scale }, inputs, x
   return offset + scale * hyperparameters.signal_variance * sum;
 }
 
-/** Allocation at unscaled features, in the order of `names`. */
+/** Allocation of who holds nothing yet, at unscaled features in the order of `names`: where trading costs, the lower end of
+ * the band. */
 export function allocation(solution, features, highest) {
   const { centre, spread } = solution.scaling;
   const x = features.map((value, index) => (value - centre[index]) / spread[index]);

@@ -15,8 +15,8 @@ export function picture(policy, shape, surfaces, { step, across, radius }) {
   if (!surfaces.has(step)) surfaces.set(step, stepSurface(policy, shape, step));
   const found = surfaces.get(step);
   if (found === null) {
-    const { action, floor_gain } = policy.steps[step].solution;
-    return { kind: "single", action, floor_gain };
+    const { band, floor_gains } = policy.steps[step].solution;
+    return { kind: "single", band, floor_gain: floor_gains[0] };
   }
   const axes = AXES.filter((axis) => axis in found.ranges);
   if (axes.length === 1) return along(found, axes[0]);

@@ -97,15 +97,16 @@ function explorer(horizon, ask) {
 
 const DRAWN = { single, line: alongOne, field: overTwo };
 
-function single({ action, floor_gain }) {
+function single({ band: [low, high], floor_gain }) {
+  const held = low === high ? [percent(low)] : [percent(low), " to ", percent(high)];
   return h(
     "p",
     { class: "single" },
-    "At this step every session of this policy is in one and the same state: hold ",
-    h("strong", {}, percent(action)),
+    "At this step every session of this policy knows one and the same law: hold ",
+    h("strong", {}, held),
     ", worth ",
     h("strong", {}, basisPoints(floor_gain)),
-    " more than the bank.",
+    " more than the bank to who starts in the bank.",
   );
 }
 

@@ -19,7 +19,7 @@ const FRAMEWORKS = {
 };
 
 /** Fields that are parts of one, and may be given in percent. */
-const SHARES = ["problem.rate_per_step", "problem.radius.alpha"];
+const SHARES = ["problem.rate_per_step", "problem.trading_cost", "problem.radius.alpha"];
 
 /** What the form starts from. */
 const initial = () => ({
@@ -28,6 +28,7 @@ const initial = () => ({
     horizon: 12,
     rate_per_step: 0.002,
     initial_wealth: 100,
+    trading_cost: 0,
     utility: { kind: "exponential", risk_aversion: AVERSION.exponential },
     radius: { rule: "bridge", alpha: 0.1, scale: 1 },
     history: [],
@@ -170,6 +171,7 @@ function mainFields(changed) {
     number("problem.horizon", "Decisions", "Periods to live through, 1 to 520."),
     number("problem.rate_per_step", "Bank return per period", "0.002 or 0.2 % a period."),
     number("problem.initial_wealth", "Initial wealth", "In any unit."),
+    number("problem.trading_cost", "Trading cost", "Of what is traded: 0.002 or 0.2 %; 0 is free."),
     select({
       name: "problem.utility.kind",
       label: "Utility",
@@ -190,9 +192,9 @@ function mainFields(changed) {
     }
   };
   const elements = [
-    fieldset("The investor", parts.slice(1, 6)),
-    fieldset("What he guards against", [parts[0], parts[6], parts[7]]),
-    fieldset("Precision", parts.slice(8)),
+    fieldset("The investor", parts.slice(1, 7)),
+    fieldset("What he guards against", [parts[0], parts[7], parts[8]]),
+    fieldset("Precision", parts.slice(9)),
   ];
   return { elements, show };
 }

@@ -39,15 +39,17 @@ class Policy:
         history: Returns | None = None,
         kind: Kind = "log",
         wealth: float | None = None,
+        holding: float | None = None,
         idempotency_key: str | None = None,
     ) -> Session:
         """Opens a session of an investor.
 
-        ``history`` is what the investor has seen, ``wealth`` what he has; by default both are the policy's own. The
+        ``history`` is what the investor has seen, ``wealth`` what he has; by default both are the policy's own.
+        ``holding`` is the share of it in the risky asset, by default none. The
         same ``idempotency_key`` and arguments again, even from another process, give the same session, at its first
         period; ``Session.refresh`` tells how far it is.
         """
-        request: wire.OpenSession = {"policy": self.id, "wealth": wealth}
+        request: wire.OpenSession = {"policy": self.id, "wealth": wealth, "holding": holding}
         if history is not None:
             request["history"] = log_returns(history, kind)
         headers = idempotent(idempotency_key)

@@ -27,6 +27,8 @@ class Session:
         #: The coming period, from 1; ``horizon + 1`` once completed.
         self.period = session["period"]
         self.wealth = session["wealth"]
+        #: Share of it in the risky asset, before trading.
+        self.holding = session["holding"]
         #: The answer to the last ``observe``: wealth, sample size, moments, quantile, radius.
         self.observed: wire.Observed | None = None
 
@@ -80,12 +82,14 @@ class Session:
         self.observed = observed
         if observed["period"] >= self.period:
             self.period, self.wealth = observed["period"] + 1, observed["wealth"]
+            self.holding = observed["holding"]
         return self
 
     def what_if(
         self,
         *,
         wealth: float | None = None,
+        holding: float | None = None,
         radius_scale: float | None = None,
         radius: float | None = None,
         log_return: float | None = None,
@@ -93,13 +97,14 @@ class Session:
         explain: Literal["worst_case"] | None = None,
         sweep: wire.Sweep | None = None,
     ) -> wire.WhatIfAnswer:
-        """The advice for a hypothetical wealth, radius or next return, or for a ``sweep`` of one of them.
+        """The advice for a hypothetical wealth, holding, radius or next return, or for a ``sweep`` of one of them.
 
         Touches nothing: the session stays as it is.
         """
         supposed: wire.WhatIf = {
             "session": self.id,
             "wealth": wealth,
+            "holding": holding,
             "radius_scale": radius_scale,
             "radius": radius,
             "log_return": log_return,
@@ -114,9 +119,9 @@ class Session:
         return cast(wire.SessionHistory, self._transport.json("GET", f"{self._path}/history"))
 
     def refresh(self) -> Session:
-        """Reads the period and the wealth from the service."""
+        """Reads the period, the wealth and the holding from the service."""
         session: wire.Session = self._transport.json("GET", self._path)
-        self.period, self.wealth = session["period"], session["wealth"]
+        self.period, self.wealth, self.holding = session["period"], session["wealth"], session["holding"]
         return self
 
     def delete(self) -> None:

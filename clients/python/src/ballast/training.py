@@ -112,12 +112,15 @@ class Training(Job):
         history: Returns | None = None,
         kind: Kind = "log",
         wealth: float | None = None,
+        holding: float | None = None,
         idempotency_key: str | None = None,
         watch: Watch | None = None,
     ) -> Session:
         """Waits for the policy and opens a session of it, as :meth:`Policy.session` does."""
         policy = self.policy(watch)
-        return policy.session(history=history, kind=kind, wealth=wealth, idempotency_key=idempotency_key)
+        return policy.session(
+            history=history, kind=kind, wealth=wealth, holding=holding, idempotency_key=idempotency_key
+        )
 
 
 class Evaluation(Job):

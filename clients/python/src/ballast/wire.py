@@ -181,6 +181,8 @@ class Observation(TypedDict):
     executed_allocation: float
     wealth: float
     """Wealth at the end of the period."""
+    holding: float
+    """Share of it in the risky asset, as the return left it."""
     radius: float
     """Radius of the uncertainty set after the period, in the unit of an advice's."""
     observed_ms: int
@@ -217,6 +219,8 @@ class OpenSession(TypedDict):
     """Log-returns known at the start. Default: the policy's."""
     wealth: NotRequired[float | None]
     """Default: the policy's initial wealth."""
+    holding: NotRequired[float | None]
+    """Share of wealth in the risky asset at the start. Default: 0."""
 
 
 Phase: TypeAlias = Literal["solving", "fitting", "simulating"]
@@ -369,6 +373,8 @@ class SessionHistory(TypedDict):
     session: str
     policy: str
     initial_wealth: float
+    initial_holding: float
+    """Share of it in the risky asset."""
     history: list[float]
     """Log-returns known at the start."""
     observations: list[Observation]
@@ -529,11 +535,17 @@ class Advice(TypedDict):
     """The robust allocation for the coming period and what it is worth."""
 
     allocation: float
-    """Share of wealth to hold in the risky asset."""
+    """Share of wealth to hold in the risky asset: the holding, brought to the nearer end of the band."""
+    holding: float
+    """Share of wealth in the risky asset before trading."""
+    band: list[float]
+    """The holdings that are best kept as they are; where trading costs nothing both ends are the allocation."""
+    trade: float
+    """The allocation less the holding: the share of wealth to buy, or where it is negative to sell."""
     certainty_equivalent: float
     """Certainty equivalent of the robust value, in terminal wealth."""
     floor: float
-    """Terminal wealth of all-bank: no law can take it away."""
+    """Terminal wealth of selling everything now and staying in the bank: no law can take it away."""
     radius: float
     """
     Radius of the uncertainty set: of the Wasserstein ball, in log-return; in the parametric frameworks half the width
@@ -603,6 +615,8 @@ class Observed(Uncertainty):
     """The price reported, if one was."""
     wealth: float
     """Wealth at the end of the period."""
+    holding: float
+    """Share of it in the risky asset, as the return left it."""
     completed: bool
     """Whether the horizon is reached."""
 
@@ -634,6 +648,8 @@ class ProblemSpecification(TypedDict):
     """x_0, in any currency."""
     action_interval: NotRequired[list[ActionIntervalItem]]
     """Share of wealth that may be held in the risky asset: `[0, highest]`."""
+    trading_cost: NotRequired[float]
+    """Lost of what is moved between bank and asset, as a share of it, both ways alike."""
     utility: NotRequired[UtilitySpecification]
     """Of terminal wealth."""
     radius: NotRequired[RadiusRule | None]
@@ -653,6 +669,8 @@ class Session(TypedDict):
     horizon: int
     state: SessionState
     wealth: float
+    holding: float
+    """Share of wealth in the risky asset, before trading."""
     sample_size: int
     created_ms: int
 
@@ -713,6 +731,7 @@ class SurrogateSpecification(TypedDict):
 class Sweep(TypedDict):
     """Exactly one range."""
 
+    holding: NotRequired[SweepRange | None]
     log_return: NotRequired[SweepRange | None]
     radius: NotRequired[SweepRange | None]
     radius_scale: NotRequired[SweepRange | None]
@@ -726,6 +745,8 @@ class WhatIf(TypedDict):
     session: str
     wealth: NotRequired[float | None]
     """Wealth now."""
+    holding: NotRequired[float | None]
+    """Share of wealth in the risky asset now, before trading."""
     radius_scale: NotRequired[float | None]
     """Factor on the radius of the uncertainty set of the period advised; later periods keep their own."""
     radius: NotRequired[float | None]

@@ -86,6 +86,7 @@ CREATE TABLE sessions (
     tenant          TEXT NOT NULL,
     policy          TEXT NOT NULL REFERENCES policies (policy) ON DELETE RESTRICT,
     initial_wealth  DOUBLE PRECISION NOT NULL,
+    initial_holding DOUBLE PRECISION NOT NULL,
     -- Doubles, little-endian, eight bytes each.
     initial_history BYTEA NOT NULL,
     horizon         BIGINT NOT NULL,

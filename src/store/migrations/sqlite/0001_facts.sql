@@ -87,6 +87,7 @@ CREATE TABLE sessions (
     tenant          TEXT NOT NULL,
     policy          TEXT NOT NULL REFERENCES policies (policy) ON DELETE RESTRICT,
     initial_wealth  ANY NOT NULL,
+    initial_holding ANY NOT NULL,
     -- Doubles, little-endian, eight bytes each.
     initial_history BLOB NOT NULL,
     horizon         INTEGER NOT NULL,

@@ -1,0 +1,90 @@
+//! How the radius of an uncertainty set follows from the sample.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::control::request::framework::Framework;
+
+/// How the radius of the uncertainty set follows from the sample of size n: `chi_square` of the parametric frameworks'
+/// confidence region, every other of the Wasserstein ball.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "rule", rename_all = "snake_case", deny_unknown_fields)]
+pub enum RadiusRule {
+    /// `scale Q / sqrt(n)`, Q the (1 - alpha)-quantile of the bridge statistic over simulated paths.
+    Bridge {
+        /// Miscoverage, the probability that the ball misses the true law.
+        #[serde(default = "defaults::alpha")]
+        alpha: f64,
+        /// Simulated paths.
+        #[serde(default = "defaults::paths")]
+        paths: usize,
+        /// A factor on the radius.
+        #[serde(default = "defaults::scale")]
+        scale: f64,
+    },
+    /// `sqrt(ln(C / alpha) / (c n))`, the concentration inequality of Fournier and Guillin.
+    Concentration {
+        /// Miscoverage.
+        #[serde(default = "defaults::alpha")]
+        alpha: f64,
+        /// C of the inequality.
+        #[serde(rename = "C")]
+        numerator: f64,
+        /// c of the inequality, per squared log-return.
+        #[serde(rename = "c")]
+        rate: f64,
+    },
+    /// `kappa / sqrt(n)`.
+    RootN {
+        /// In log-return.
+        kappa: f64,
+    },
+    /// The same radius at every sample size.
+    Fixed {
+        /// In log-return.
+        radius: f64,
+    },
+    /// `sqrt(kappa / n)` estimated standard deviations, kappa the (1 - alpha)-quantile of chi-square with two degrees
+    /// of freedom: `n (mu - m)^2 / v + n (s2 - v)^2 / (2 v^2) <= kappa`, m and v the sample's mean and variance.
+    ChiSquare {
+        /// Miscoverage.
+        #[serde(default = "defaults::alpha")]
+        alpha: f64,
+    },
+}
+
+impl RadiusRule {
+    /// The rule of a request that names none.
+    pub fn default_of(framework: Framework) -> Self {
+        let alpha = defaults::alpha();
+        if framework.is_parametric() { RadiusRule::ChiSquare { alpha } } else { RadiusRule::bridge(alpha) }
+    }
+
+    /// The bridge rule at this miscoverage, with the default number of paths and no factor.
+    pub fn bridge(alpha: f64) -> Self {
+        RadiusRule::Bridge { alpha, paths: defaults::paths(), scale: defaults::scale() }
+    }
+
+    /// The level of the rules that have one.
+    pub fn alpha(&self) -> Option<f64> {
+        match *self {
+            RadiusRule::Bridge { alpha, .. }
+            | RadiusRule::Concentration { alpha, .. }
+            | RadiusRule::ChiSquare { alpha } => Some(alpha),
+            RadiusRule::RootN { .. } | RadiusRule::Fixed { .. } => None,
+        }
+    }
+}
+
+/// The paper's configuration.
+mod defaults {
+    pub fn alpha() -> f64 {
+        0.1
+    }
+    pub fn paths() -> usize {
+        2000
+    }
+    pub fn scale() -> f64 {
+        1.0
+    }
+}
