@@ -130,12 +130,13 @@ pub async fn observe(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Live>,
     JsonBody(report): JsonBody<Observe>,
-) -> Result<Json<Observed>, Problem> {
+) -> Result<Response, Problem> {
     let started = Instant::now();
     let report = Observe { reported_by: caller.key().clone(), ..report };
     let observed = service.sessions.observe(&caller.tenant, &report, &caller.turn).await?;
     metrics::histogram!(OBSERVE_SECONDS).record(started.elapsed().as_secs_f64());
-    Ok(Json(observed))
+    let media = [(header::CONTENT_TYPE, "application/json")];
+    Ok((media, observed).into_response())
 }
 
 /// Query of `/action`.

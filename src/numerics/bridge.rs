@@ -174,17 +174,16 @@ const NODES: usize = 4;
 #[inline(always)]
 fn add_nodes(gaps: &[f64], nodes: &[f32], statistic: &mut [f64]) {
     let paths = statistic.len();
-    for (gaps, nodes) in gaps.chunks(NODES).zip(nodes.chunks(NODES * paths)) {
-        if let ([a, b, c, d], (near, far)) = (gaps, nodes.split_at(nodes.len() / 2)) {
-            let ((first, second), (third, fourth)) = (near.split_at(paths), far.split_at(paths));
-            for ((((sum, p), q), r), s) in statistic.iter_mut().zip(first).zip(second).zip(third).zip(fourth) {
-                *sum = *sum + a * f64::from(*p) + b * f64::from(*q) + c * f64::from(*r) + d * f64::from(*s);
-            }
-        } else {
-            for (gap, node) in gaps.iter().zip(nodes.chunks_exact(paths)) {
-                statistic.iter_mut().zip(node).for_each(|(sum, value)| *sum += gap * f64::from(*value));
-            }
+    let (whole, rest) = gaps.as_chunks::<NODES>();
+    let (many, few) = nodes.split_at(whole.len() * NODES * paths);
+    for (gaps, nodes) in whole.iter().zip(many.chunks_exact(NODES * paths)) {
+        let columns: [&[f32]; NODES] = std::array::from_fn(|node| &nodes[node * paths..][..paths]);
+        for (path, sum) in statistic.iter_mut().enumerate() {
+            *sum = gaps.iter().zip(columns).fold(*sum, |sum, (gap, column)| sum + gap * f64::from(column[path]));
         }
+    }
+    for (gap, node) in rest.iter().zip(few.chunks_exact(paths)) {
+        statistic.iter_mut().zip(node).for_each(|(sum, value)| *sum += gap * f64::from(*value));
     }
 }
 

@@ -7,7 +7,7 @@ use super::bounded::Bounded;
 use super::error::ServiceError;
 use super::observation::{Observe, Observed};
 use crate::control::policy::advice::{Advice, Uncertainty};
-use crate::control::policy::advisor::{AdviceMode, Advisor};
+use crate::control::policy::advisor::{Advisor, OutsideDesign};
 use crate::control::problem::state::State;
 use crate::control::request::rules as limits;
 use crate::store::{Seen, SessionFacts, SessionRow};
@@ -83,20 +83,20 @@ impl Live {
         let advice = match self.advice.take() {
             Some(advice) => advice,
             None => match self.predicted(step, means).await? {
-                Some(advice) => advice,
-                None => {
+                Ok(advice) => advice,
+                Err(outside) => {
                     means.turn.begin()?;
                     let (advisor, state) = (means.advisor.clone(), self.state.clone());
                     let tenant = &self.row.tenant;
-                    means.resolving.run(tenant, move || advisor.advise(step, &state, AdviceMode::Surrogate)).await?
+                    means.resolving.run(tenant, move || advisor.advise_outside(step, &state, &outside)).await?
                 }
             },
         };
         Ok(self.advice.insert(advice))
     }
 
-    /// What the surrogate says of the state; `None` where it lies outside the design.
-    async fn predicted(&self, step: usize, means: &Means<'_>) -> Result<Option<Advice>, ServiceError> {
+    /// What the surrogate says of the state, unless that lies outside the design.
+    async fn predicted(&self, step: usize, means: &Means<'_>) -> Result<Result<Advice, OutsideDesign>, ServiceError> {
         let predict = move |advisor: &Advisor, state: &State, radius: Option<f64>| {
             let radius = radius.unwrap_or_else(|| advisor.radius(state));
             advisor.advise_from_surrogate(step, state, radius)

@@ -23,7 +23,7 @@ use super::identity;
 use super::keys::Caller;
 use super::live::{Live, Means, SESSION_BYTES};
 use super::memory::Memory;
-use super::observation::{Observe, Observed};
+use super::observation::Observe;
 use super::policies::Policies;
 use super::slots::{Generation, Held, Slots, Source};
 use super::spans;
@@ -192,12 +192,13 @@ impl Sessions {
         if deleted { Ok(()) } else { Err(ServiceError::unknown("session", session)) }
     }
 
-    /// Records the return of a period, durably before it is answered, exactly once. Where the caller goes away meanwhile
+    /// Records the return of a period, durably before it is answered, exactly once, and answers with an
+    /// [`Observed`](super::observation::Observed) in JSON as it was recorded. Where the caller goes away meanwhile
     /// the store may or may not record it, and nothing of it stays in memory.
     ///
     /// # Errors
     /// A field breaks a rule; the period was observed with other content, is not the next, or lies past the horizon.
-    pub async fn observe(&self, tenant: &Tenant, report: &Observe, turn: &HeavyTurn) -> Result<Observed, ServiceError> {
+    pub async fn observe(&self, tenant: &Tenant, report: &Observe, turn: &HeavyTurn) -> Result<String, ServiceError> {
         let mut held = self.hold(tenant, &report.session).await;
         let live = held.current(&Rows { sessions: self, tenant, session: &report.session }).await?;
         let content_hash = report.content_hash().map_err(ServiceError::internal)?;
@@ -211,6 +212,7 @@ impl Sessions {
         let log_return = report.checked_log_return(live.price)?;
         let means = self.means(tenant, live, turn).await?;
         let (state, answer) = live.after(report, log_return, &means).await?;
+        let answer_json = serde_json::to_string(&answer).map_err(ServiceError::internal)?;
         let new = ObservationRow {
             session: report.session.clone(),
             period: report.period,
@@ -219,7 +221,7 @@ impl Sessions {
             executed_allocation: answer.executed_allocation,
             advised_allocation: live.advice.as_ref().map_or(answer.executed_allocation, |advice| advice.allocation),
             wealth_after: answer.wealth,
-            answer_json: serde_json::to_string(&answer).map_err(ServiceError::internal)?,
+            answer_json: answer_json.clone(),
             created_ms: self.clock.now_milliseconds(),
             key: report.reported_by.to_string(),
         };
@@ -228,9 +230,9 @@ impl Sessions {
         match self.store.append_observation(new).instrument(spans::of_write("append an observation")).await? {
             Append::Appended => {
                 held.put(next);
-                Ok(answer)
+                Ok(answer_json)
             }
-            Append::Repeated { answer_json } => serde_json::from_str(&answer_json).map_err(ServiceError::internal),
+            Append::Repeated { answer_json } => Ok(answer_json),
             Append::Conflict => Err(ServiceError::PeriodConflict { period: report.period }),
             Append::OutOfOrder { expected } => Err(ServiceError::PeriodGap { given: report.period, expected }),
             Append::NoSession => Err(ServiceError::unknown("session", &report.session)),
@@ -238,11 +240,9 @@ impl Sessions {
     }
 
     /// The first answer to a period already observed.
-    async fn repeat(&self, report: &Observe, content_hash: &str) -> Result<Observed, ServiceError> {
+    async fn repeat(&self, report: &Observe, content_hash: &str) -> Result<String, ServiceError> {
         match self.store.observation(&report.session, report.period).await? {
-            Some(row) if row.content_hash == content_hash => {
-                serde_json::from_str(&row.answer_json).map_err(ServiceError::internal)
-            }
+            Some(row) if row.content_hash == content_hash => Ok(row.answer_json),
             _ => Err(ServiceError::PeriodConflict { period: report.period }),
         }
     }

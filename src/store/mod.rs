@@ -49,6 +49,7 @@ mod turns;
 
 use std::path::Path;
 
+use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
 
 use error::Failure;
@@ -72,6 +73,9 @@ pub use sessions::{CreateSession, Seen, SessionFacts, SessionRow, SessionSummary
 pub use tenant::Tenant;
 
 /// The durable facts of one folder or one database. Clones share the connections.
+///
+/// What waits for a database is boxed: it takes kilobytes, which every call that may wait would carry along, though most
+/// calls over a folder read nothing.
 #[derive(Clone)]
 pub struct Store {
     engine: Engine,
@@ -164,7 +168,7 @@ impl Store {
     {
         match &self.engine {
             Engine::Sqlite(folder) => folder.write(doing, work).await,
-            Engine::Postgres(database) => database.write(doing, work).await,
+            Engine::Postgres(database) => database.write(doing, work).boxed().await,
         }
     }
 
@@ -176,7 +180,7 @@ impl Store {
     {
         match &self.engine {
             Engine::Sqlite(folder) => folder.write_to(session, doing, work).await,
-            Engine::Postgres(database) => database.write(doing, work).await,
+            Engine::Postgres(database) => database.write(doing, work).boxed().await,
         }
     }
 
@@ -218,8 +222,8 @@ impl Store {
         decode: impl FnOnce(&[Row]) -> Result<T, Failure>,
     ) -> Result<T, StoreError> {
         let rows = match &self.engine {
-            Engine::Sqlite(folder) => folder.read(purpose, doing, query).await?,
-            Engine::Postgres(database) => database.read(purpose, doing, query).await?,
+            Engine::Sqlite(folder) => folder.read(purpose, doing, query).boxed().await?,
+            Engine::Postgres(database) => database.read(purpose, doing, query).boxed().await?,
         };
         decode(&rows).map_err(|failure| failure.during(doing))
     }

@@ -50,7 +50,7 @@ impl Store {
     pub async fn append_observation(&self, new: ObservationRow) -> Result<Append, StoreError> {
         match &self.engine {
             Engine::Sqlite(folder) => folder.append(new).await,
-            Engine::Postgres(database) => append_shared(database, new).await,
+            Engine::Postgres(database) => append_shared(database, new).boxed().await,
         }
     }
 

@@ -51,6 +51,12 @@ struct Asked<'a> {
     source: AdviceSource,
 }
 
+/// A state outside the design, where the surrogate gives no advice, and what was found on the way there.
+pub struct OutsideDesign {
+    radius: f64,
+    predicted: Prediction,
+}
+
 /// What the surrogates say of a state.
 struct Prediction {
     band: Band,
@@ -117,19 +123,35 @@ impl Advisor {
     /// Cost: two kernel sums and one triangular solve; a robust step where it re-solves.
     pub fn advise(&self, step: usize, state: &State, mode: AdviceMode) -> Advice {
         let radius = self.radius(state);
-        let predicted = self.predict(step, state, radius);
-        let source = match mode {
-            AdviceMode::Resolve => AdviceSource::Resolved,
-            AdviceMode::Surrogate if predicted.in_design => return self.predicted(step, state, radius, &predicted),
-            AdviceMode::Surrogate => AdviceSource::ResolvedOutsideDesign,
-        };
-        self.resolved(&Asked { step, state, radius, source }, &predicted).0
+        match mode {
+            AdviceMode::Resolve => {
+                let asked = Asked { step, state, radius, source: AdviceSource::Resolved };
+                self.resolved(&asked, &self.predict(step, state, radius)).0
+            }
+            AdviceMode::Surrogate => self
+                .advise_from_surrogate(step, state, radius)
+                .unwrap_or_else(|outside| self.advise_outside(step, state, &outside)),
+        }
     }
 
-    /// [`Self::advise`] from the policy surrogate where the radius of the state is known; `None` outside the design.
-    pub fn advise_from_surrogate(&self, step: usize, state: &State, radius: f64) -> Option<Advice> {
+    /// [`Self::advise`] from the policy surrogate where the radius of the state is known.
+    ///
+    /// # Errors
+    /// The state lies outside the design: [`Self::advise_outside`] goes on from what is returned.
+    pub fn advise_from_surrogate(&self, step: usize, state: &State, radius: f64) -> Result<Advice, OutsideDesign> {
         let predicted = self.predict(step, state, radius);
-        predicted.in_design.then(|| self.predicted(step, state, radius, &predicted))
+        if predicted.in_design {
+            Ok(self.predicted(step, state, radius, &predicted))
+        } else {
+            Err(OutsideDesign { radius, predicted })
+        }
+    }
+
+    /// [`Self::advise`] by re-solving, where [`Self::advise_from_surrogate`] found the state outside the design.
+    pub fn advise_outside(&self, step: usize, state: &State, outside: &OutsideDesign) -> Advice {
+        let OutsideDesign { radius, predicted } = outside;
+        let asked = Asked { step, state, radius: *radius, source: AdviceSource::ResolvedOutsideDesign };
+        self.resolved(&asked, predicted).0
     }
 
     /// Whether [`Self::advise_from_surrogate`] and [`Self::uncertainty`] take well below a millisecond: what they need is
