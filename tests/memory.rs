@@ -74,7 +74,7 @@ fn inflated(policy: &[u8], points: usize, seed: u64) -> Value {
     let inputs = solution["inputs"].as_array().unwrap().len();
     solution["inputs"] = json!((0..inputs).map(noise).collect::<Vec<_>>());
     for surrogate in ["value", "policy"] {
-        solution[surrogate]["weights"] = json!(noise(inputs));
+        solution[surrogate]["weights"] = json!([noise(inputs)]);
         solution[surrogate]["hyperparameters"]["noise_variance"] = json!(0.1);
     }
     policy
