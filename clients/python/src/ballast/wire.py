@@ -767,6 +767,8 @@ class WorstCase(TypedDict):
 
     multiplier: float
     """Lagrange multiplier of the uncertainty set: utility lost per unit of extra radius."""
+    radius_cost: float
+    """The same in log certainty equivalent: what one more unit of radius would cost."""
     transport: list[TransportedMass]
     """Empty in the parametric frameworks."""
     normal: NotRequired[WorstNormalLaw | None]
