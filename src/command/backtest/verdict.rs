@@ -121,9 +121,11 @@ fn guard(backtest: &Backtest, main: usize) -> String {
 }
 
 fn cost(backtest: &Backtest) -> String {
-    let basis_points = backtest.args.cost_bp;
+    let (basis_points, blind) = (backtest.args.cost_bp, backtest.args.cost_blind);
     if basis_points > 0.0 {
-        format!("Trading costs {basis_points} bp of what is traded in every account; no policy knows of it.")
+        let known =
+            if blind { "no policy knows of it" } else { "policies are trained with it, but for the cost-blind one" };
+        format!("Trading costs {basis_points} bp of what is traded in every account; {known}.")
     } else {
         "Trading costs nothing here: strategies that trade much look better than they would be.".into()
     }
