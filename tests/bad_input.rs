@@ -23,6 +23,7 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
         ("/problem/action_interval", json!([0.0, 5e-324]), "problem.action_interval[1]"),
         ("/problem/trading_cost", json!(-0.001), "problem.trading_cost"),
         ("/problem/trading_cost", json!(0.5), "problem.trading_cost"),
+        ("/problem/trading_cost", json!(1e-17), "problem.trading_cost"),
         ("/problem/utility", json!({"kind": "exponential", "risk_aversion": 0.0}), "problem.utility.risk_aversion"),
         ("/problem/utility", json!({"kind": "power", "risk_aversion": 1.0}), "problem.utility.risk_aversion"),
         ("/problem/radius", json!({"rule": "bridge", "alpha": 0.0}), "problem.radius.alpha"),

@@ -8,7 +8,6 @@ use ballast::control::bellman::next_value::NextValue;
 use ballast::control::bellman::problem::Problem;
 use ballast::control::bellman::solution::{Adversary, RobustSolution};
 use ballast::control::problem::dynamics::Trade;
-use ballast::control::problem::holdings::Holdings;
 use ballast::control::problem::state::State;
 use ballast::control::problem::utility::{RelativeUtility, utility};
 use ballast::control::request::specification::Specification;
@@ -100,7 +99,7 @@ fn first_step(problem: &Problem) -> RobustSolution {
         vec![0.05 * (10.0 * atoms.iter().sum::<f64>() / atoms.len() as f64).tanh().max(0.0)]
     };
     let state = State::new(&HISTORY, 100.0).unwrap();
-    BellmanStep { problem, step: 0, next: &NextValue::Exact(Holdings::new(1), Box::new(gain)) }.solve(&state)
+    BellmanStep { problem, step: 0, next: &NextValue::Exact(problem.holdings(1), Box::new(gain)) }.solve(&state)
 }
 
 #[test]

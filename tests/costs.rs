@@ -166,6 +166,27 @@ fn the_floor_is_selling_everything_and_never_undercut() {
     }
 }
 
+/// What is read off the policy is what is solved anew, of any holding, also of one beyond the highest action.
+#[test]
+fn what_is_read_off_the_policy_is_what_is_solved_anew() {
+    // Keeping everything looks best in the window of returns that is wide enough for half of it.
+    let tempting = json!({ "horizon": 1, "history": HISTORY, "trading_cost": 0.02, "rate_per_step": 0.002,
+        "utility": { "kind": "power", "risk_aversion": 2.0 }, "radius": { "rule": "fixed", "radius": 0.003 } });
+    let bounded = json!({ "horizon": 2, "history": HISTORY, "trading_cost": 0.05, "action_interval": [0.0, 0.53],
+        "utility": { "kind": "log" }, "radius": { "rule": "fixed", "radius": 0.001 } });
+    for (problem, design) in [(tempting, 10), (bounded, 60)] {
+        let solved = support::policies::advisor(json!({ "problem": problem, "design": { "count": design } }));
+        for index in 0..=20 {
+            let state = state(&solved, 100.0, 0.05 * f64::from(index));
+            let [read, anew] = [AdviceMode::Surrogate, AdviceMode::Resolve].map(|mode| solved.advise(0, &state, mode));
+            let error = BASIS_POINTS * (gain(&read) - gain(&anew));
+            // The value at 257 holdings, the ends of the band at one of them.
+            let off = read.allocation - anew.allocation;
+            assert!(error.abs() < 0.1 && off.abs() < 0.01, "{index}: {error} bp, {off} of {read:?} {anew:?}");
+        }
+    }
+}
+
 #[test]
 fn no_cost_is_the_problem_without_one() {
     let mut request = json!({ "problem": { "horizon": 2, "history": HISTORY }, "design": { "count": 20 } });

@@ -148,31 +148,35 @@ def certainty_equivalent(utility, value):
 def evaluate(policy, question):
     specification, step = policy["specification"], question["step"]
     problem, holding = specification["problem"], question["holding"]
-    # What selling everything leaves.
-    wealth = question["wealth"] * (1 - problem["trading_cost"] * holding)
+    cost, highest = problem["trading_cost"], problem["action_interval"][1]
+    known = min(holding, highest)
+    # What selling everything leaves, and what it would leave of the highest share at which the value is known.
+    liquidated = question["wealth"] * (1 - cost * holding)
+    wealth = question["wealth"] * (1 - cost * known)
+    beyond = math.log((1 - cost * (holding - known)) * (1 - cost * known) / (1 - cost * holding))
     solution = policy["steps"][step]["solution"]
-    floor = wealth * (1 + problem["rate_per_step"]) ** (problem["horizon"] - step)
+    bank = (1 + problem["rate_per_step"]) ** (problem["horizon"] - step)
     if solution["kind"] == "single":
-        gain = max(at_holding(solution["floor_gains"], holding), 0.0)
+        gain = max(at_holding(solution["floor_gains"], known / highest), 0.0) + beyond
         allocation = into(solution["band"], holding)
-        return {"allocation": allocation, "floor_gain": gain, "certainty_equivalent": floor * math.exp(gain)}
+        return {"allocation": allocation, "floor_gain": gain, "certainty_equivalent": liquidated * bank * math.exp(gain)}
     found, scaling = features(specification, question), solution["scaling"]
     scales = zip(scaling["active"], scaling["centre"], scaling["spread"])
     x = [(found[feature] - centre) / spread for feature, centre, spread in scales]
     points = list(zip(*solution["inputs"]))
-    value = at_holding(predictions(solution["value"], points, x), holding)
+    value = at_holding(predictions(solution["value"], points, x), known / highest)
     if specification["surrogate"]["target"] == "value":
         # Under power and log utility of a wealth of 1, for whose multiples the policy is the same.
         unit = 1.0 if problem["utility"]["kind"] == "exponential" else wealth
-        value = math.log(certainty_equivalent(problem["utility"], value) * unit / floor)
-    gain = min(max(value, 0.0), solution["largest_gain"])
+        value = math.log(certainty_equivalent(problem["utility"], value) * unit / (wealth * bank))
+    gain = min(max(value, 0.0), solution["largest_gain"]) + beyond
     low, high = problem["action_interval"]
     deviation = math.sqrt(predicted_variance(solution["value"]["hyperparameters"], points, x))
     band = [min(max(end, low), high) for end in predictions(solution["policy"], points, x)]
     return {
         "allocation": into([band[0], max(band[-1], band[0])], holding),
         "floor_gain": gain,
-        "certainty_equivalent": floor * math.exp(gain),
+        "certainty_equivalent": liquidated * bank * math.exp(gain),
         "deviation": deviation,
         "in_design": deviation <= solution["deviation_limit"],
     }

@@ -8,7 +8,6 @@ use ballast::control::bellman::problem::Problem;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::policy::what_if::{Hypothesis, HypotheticalRadius};
-use ballast::control::problem::holdings::Holdings;
 use ballast::control::problem::state::State;
 use serde_json::{Value, json};
 use support::App;
@@ -103,7 +102,7 @@ fn exact_first_of_two(request: Value) -> (f64, f64) {
         vec![BellmanStep { problem: &last, step: 1, next: &NextValue::Terminal }.solve(state).floor_gain]
     };
     let state = State::new(&specification.problem.history, specification.problem.initial_wealth).unwrap();
-    let next = NextValue::Exact(Holdings::new(1), Box::new(gain));
+    let next = NextValue::Exact(problem.holdings(1), Box::new(gain));
     let found = BellmanStep { problem: &problem, step: 0, next: &next }.solve(&state);
     (found.floor_gain, found.action)
 }

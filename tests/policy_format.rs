@@ -55,6 +55,7 @@ fn policies() -> Vec<Value> {
     let costly = |framework: &str, utility: Value, surrogate: Value| {
         let mut costly = policy(framework, utility, bridge(), surrogate);
         costly["problem"]["trading_cost"] = json!(0.01);
+        costly["problem"]["action_interval"] = json!([0.0, 0.7]);
         costly
     };
     vec![
@@ -82,7 +83,7 @@ fn policies() -> Vec<Value> {
 fn states(solved: &Advisor) -> Vec<(usize, State)> {
     let start = solved.initial_state(None, None).unwrap();
     let first = solved.advance(&start, 0.6, 0.03);
-    let other = State { wealth: 91.0, holding: 0.15, ..first.clone() };
+    let other = State { wealth: 91.0, holding: 0.83, ..first.clone() };
     let second = solved.advance(&first, 0.3, -0.02);
     vec![(0, start), (1, first), (1, other), (2, second)]
 }

@@ -10,7 +10,6 @@ use ballast::control::bellman::next_value::NextValue;
 use ballast::control::bellman::problem::Problem;
 use ballast::control::policy::advice::AdviceSource;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
-use ballast::control::problem::holdings::Holdings;
 use ballast::control::problem::state::State;
 use ballast::control::surrogate::design::Design;
 use serde_json::{Value, json};
@@ -60,7 +59,7 @@ fn judged(step: usize, count: usize) -> Vec<Judged> {
         _ => {
             let last = Problem::new(TRAINED.specification());
             NextValue::Exact(
-                Holdings::new(1),
+                problem.holdings(1),
                 Box::new(move |state: &State| {
                     vec![BellmanStep { problem: &last, step: 1, next: &NextValue::Terminal }.solve(state).floor_gain]
                 }),

@@ -7,7 +7,7 @@
 use super::bellman::problem::Problem;
 use super::policy::Policy;
 use super::policy::prepared::{bytes_ready, factor_bytes, prepared_bytes};
-use super::problem::holdings::HOLDINGS;
+use super::problem::holdings::{HOLDINGS, HOLDINGS_OF_ONE_LAW};
 use super::problem::utility::depends_on_wealth;
 use super::request::evaluation::EvaluationRequest;
 use super::request::framework::Framework;
@@ -31,6 +31,9 @@ const POLICY_NUMBER_BYTES: usize = 80;
 const STATISTICS: usize = 8;
 /// Numbers a value of the history that a thread holds while it solves a robust step.
 const STEP_NUMBERS: usize = 64;
+/// Predictions a function beyond those, where trading costs: at eight trades, while a refined table is made beside the one before.
+const TABLES: usize = 16;
+const FUNCTIONS_WITHOUT_COST: usize = 2;
 /// A simulated path: wealth of a strategy, and a step as a framework lived it, with the copies that a report sorts.
 const WEALTH_BYTES: usize = 48;
 const LIVED_BYTES: usize = 48;
@@ -108,7 +111,9 @@ impl Sizes {
             _ => 0,
         };
         let bridges = framed.sets.heaviest(history, horizon);
-        let (inputs, functions) = (framed.selection.names().len(), functions(&framed));
+        let holdings = framed.holdings(if single { HOLDINGS_OF_ONE_LAW } else { HOLDINGS });
+        let functions = holdings.count() + framed.dynamics().sides().len();
+        let inputs = framed.selection.names().len();
         Sizes { horizon, history, count, inputs, functions, paths, bridges }
     }
 
@@ -135,17 +140,13 @@ impl Sizes {
 
     /// Bytes that threads hold while they solve robust steps.
     fn solving(&self, threads: usize) -> usize {
-        product(&[threads, self.history + self.horizon, STEP_NUMBERS, NUMBER])
+        let tabulated = TABLES * self.functions.saturating_sub(FUNCTIONS_WITHOUT_COST);
+        product(&[threads, self.history + self.horizon, STEP_NUMBERS + tabulated, NUMBER])
     }
 
     fn statistics(&self, threads: usize) -> usize {
         product(&[threads, self.paths, STATISTICS, NUMBER])
     }
-}
-
-/// The value at every holding, and the policy's ends.
-fn functions(problem: &Problem) -> usize {
-    problem.holdings(HOLDINGS).count() + problem.dynamics().sides().len()
 }
 
 /// What a training of a completed specification takes on so many threads.

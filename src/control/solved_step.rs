@@ -28,7 +28,7 @@ pub struct StepDiagnostics {
     pub step: usize,
     /// Design points solved.
     pub design_count: usize,
-    /// Share of the design points at which the robust allocation is zero.
+    /// Share of the design points at which the robust allocation of who holds nothing yet is zero.
     pub all_bank_share: f64,
     /// Share of the design points whose window could not be certified: mass might want to leave it.
     pub uncertified_share: f64,

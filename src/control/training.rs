@@ -207,7 +207,8 @@ impl DesignSolver<'_> {
 /// What a solved state tells the surrogates.
 fn design_point(wealth: f64, features: Features, found: DesignSolution) -> DesignPoint {
     let DesignSolution { solution, floor_gains, policy_targets } = found;
-    let RobustSolution { action, floor_gain, duality_gap, certified, .. } = solution;
+    let RobustSolution { band, floor_gain, duality_gap, certified, .. } = solution;
+    let action = band.low;
     DesignPoint { wealth, features, action, floor_gain, floor_gains, policy_targets, duality_gap, certified }
 }
 

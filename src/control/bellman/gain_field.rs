@@ -30,7 +30,8 @@ pub struct GainField<'a> {
     bank: f64,
     returns: Vec<f64>,
     action_nodes: Chebyshev,
-    /// What the trades that are tabulated keep: the least and the most, or nothing where one serves all.
+    /// What the trades that are tabulated keep, the most and the least of those that are made, or nothing where one serves all.
+    /// Between them, and a little beyond for a side whose cost is paid both ways, predictions are read along a line.
     kept_nodes: Option<[f64; 2]>,
     holdings: Holdings,
     /// `table[(i * nodes + m) * holdings + j]`: the prediction at return i, trade m and holding j; empty where the gain is
@@ -61,7 +62,7 @@ impl<'a> GainField<'a> {
         };
         let table = next.tabulate(problem, state, &returns, &trades);
         let bank = state.wealth * liquidation * (1.0 + dynamics.rate_per_step);
-        let holdings = next.holdings();
+        let holdings = next.holdings(problem);
         GainField { problem, next, utility, dynamics, bank, returns, action_nodes, kept_nodes, holdings, table }
     }
 
@@ -147,14 +148,33 @@ impl FieldRows<'_> {
             self.excesses.iter().map(|excess| trade.kept * (1.0 + trade.action * excess)).collect();
         let gains = match next {
             NextValue::Terminal => vec![0.0; relative.len()],
-            NextValue::Constant(gains) => self.holdings(trade).map(|holding| Holdings::at(gains, holding)).collect(),
+            NextValue::Constant(holdings, gains) => {
+                self.holdings(trade).map(|holding| holdings.gain(gains, holding)).collect()
+            }
             NextValue::Surrogate(_) | NextValue::Exact(..) => {
                 let mut gains = self.interpolated(trade);
-                next.gains(&mut gains, relative.iter().map(|relative| bank * relative));
+                let wealths = relative.iter().map(|relative| bank * relative);
+                if self.field.holdings.matter() {
+                    self.gains_beyond(trade, &mut gains, wealths);
+                } else {
+                    next.gains(&mut gains, wealths);
+                }
                 gains
             }
         };
         utility.values(relative, &gains)
+    }
+
+    /// Turns predictions into gains where the holding may have drifted beyond the highest action.
+    fn gains_beyond(&self, trade: Trade, predictions: &mut [f64], wealths: impl Iterator<Item = f64>) {
+        let GainField { next, holdings, dynamics, .. } = self.field;
+        let liquidated = wealths.zip(self.holdings(trade)).map(|(wealth, holding)| {
+            wealth * (dynamics.liquidation(holdings.within(holding)) / dynamics.liquidation(holding))
+        });
+        next.gains(predictions, liquidated);
+        for (gain, holding) in predictions.iter_mut().zip(self.holdings(trade)) {
+            *gain += holdings.beyond(holding);
+        }
     }
 
     /// The share held after each return: `a e^z / ((1-a)(1+r) + a e^z)`.

@@ -157,7 +157,11 @@ impl BellmanStep<'_> {
             };
             let band = best_band(pricing.as_mut(), actions, dynamics, state.holding);
             let trade = dynamics.trade_into(band, state.holding);
-            let solution = solution(band, trade.action, pricing.worst(trade), utility, largest);
+            let mut solution = solution(band, trade.action, pricing.worst(trade), utility, largest);
+            // Other holdings are brought to the ends of the band, and what they are worth is told as well.
+            let ends = [band.low, band.high].into_iter().filter(|end| *end != trade.action);
+            let mut ends = ends.map(|end| dynamics.trade_to(state.holding, end));
+            solution.certified = solution.certified && ends.all(|end| pricing.worst(end).certified);
             if solution.certified || !set.has_window() || growths == WINDOW_GROWTHS {
                 let more = then(pricing.as_ref(), &solution);
                 return (solution, more);

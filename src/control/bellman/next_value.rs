@@ -8,7 +8,6 @@ use crate::control::request::specification::Specification;
 use crate::control::surrogate::features::FeatureSelection;
 use crate::control::surrogate::fitted::ValueSurrogate;
 use crate::control::surrogate::stored::Solution;
-use crate::control::surrogate::target::TargetMap;
 
 /// The floor gains of a state, at even holdings.
 pub type ExactGains = dyn Fn(&State) -> Vec<f64> + Send + Sync;
@@ -18,7 +17,7 @@ pub enum NextValue {
     /// The horizon: no gain over the wealth reached, of which nothing is sold.
     Terminal,
     /// The same floor gains everywhere, at even holdings.
-    Constant(Vec<f64>),
+    Constant(Holdings, Vec<f64>),
     /// The clamped prediction of the step's value surrogate.
     Surrogate(Box<ValueSurrogate>),
     /// The floor gains themselves, however they are known: what a surrogate is measured against.
@@ -30,27 +29,29 @@ impl NextValue {
     pub fn new(specification: &Specification, step: usize, after: Option<&Solution>) -> Self {
         match after {
             None => NextValue::Terminal,
-            Some(Solution::Single(single)) => NextValue::Constant(single.floor_gains.clone()),
+            Some(Solution::Single(single)) => {
+                let gains = single.floor_gains.clone();
+                NextValue::Constant(Holdings::of(&specification.problem, gains.len()), gains)
+            }
             Some(Solution::Surrogates(stored)) => {
-                NextValue::Surrogate(Box::new(ValueSurrogate::new(stored, TargetMap::new(specification, step))))
+                NextValue::Surrogate(Box::new(ValueSurrogate::new(specification, step, stored)))
             }
         }
     }
 
     /// Where along the holding it is known.
-    pub fn holdings(&self) -> Holdings {
+    pub fn holdings(&self, problem: &Problem) -> Holdings {
         match self {
-            NextValue::Terminal => Holdings::new(1),
-            NextValue::Constant(gains) => Holdings::new(gains.len()),
+            NextValue::Terminal => problem.holdings(1),
             NextValue::Surrogate(surrogate) => surrogate.holdings(),
-            NextValue::Exact(holdings, _) => *holdings,
+            NextValue::Constant(holdings, _) | NextValue::Exact(holdings, _) => *holdings,
         }
     }
 
     /// True where wealth moves it.
     pub fn depends_on_wealth(&self, selection: &FeatureSelection) -> bool {
         match self {
-            NextValue::Terminal | NextValue::Constant(_) => false,
+            NextValue::Terminal | NextValue::Constant(..) => false,
             NextValue::Surrogate(surrogate) => selection.has_wealth() && surrogate.scaling.active.first() == Some(&0),
             NextValue::Exact(..) => selection.has_wealth(),
         }
@@ -63,9 +64,9 @@ impl NextValue {
         let dynamics = problem.dynamics();
         let start = state.wealth * dynamics.liquidation(state.holding);
         let wealth = |trade: &Trade, log_return: f64| start * trade.kept * dynamics.growth(trade.action, log_return);
-        let mut table = Vec::with_capacity(returns.len() * trades.len() * self.holdings().count());
+        let mut table = Vec::with_capacity(returns.len() * trades.len() * self.holdings(problem).count());
         match self {
-            NextValue::Terminal | NextValue::Constant(_) => {}
+            NextValue::Terminal | NextValue::Constant(..) => {}
             NextValue::Surrogate(surrogate) => {
                 let moves = self.depends_on_wealth(&problem.selection);
                 let features = problem.features_with(&state.law, state.wealth, returns);
@@ -93,13 +94,14 @@ impl NextValue {
         table
     }
 
-    /// Turns predictions into floor gains, in place; `floors` are the wealths that their states would have after selling all.
-    pub fn gains(&self, predictions: &mut [f64], floors: impl Iterator<Item = f64>) {
+    /// Turns predictions into floor gains, in place; `liquidated` is the wealth of each state after selling
+    /// all, of a holding no higher than any at which the value is known.
+    pub fn gains(&self, predictions: &mut [f64], liquidated: impl Iterator<Item = f64>) {
         match self {
-            NextValue::Terminal | NextValue::Constant(_) => {}
+            NextValue::Terminal | NextValue::Constant(..) => {}
             NextValue::Surrogate(surrogate) => {
-                for (prediction, floor) in predictions.iter_mut().zip(floors) {
-                    *prediction = surrogate.clamped_gain(*prediction, floor);
+                for (prediction, liquidated) in predictions.iter_mut().zip(liquidated) {
+                    *prediction = surrogate.clamped_gain(*prediction, liquidated);
                 }
             }
             NextValue::Exact(..) => predictions.iter_mut().for_each(|gain| *gain = gain.max(0.0)),

@@ -54,7 +54,7 @@ impl Problem {
 
     /// So many holdings where trading costs; else the holding does not matter, and one is enough.
     pub fn holdings(&self, count: usize) -> Holdings {
-        Holdings::new(if self.dynamics().trading_cost > 0.0 { count } else { 1 })
+        Holdings::of(&self.specification.problem, if self.dynamics().trading_cost > 0.0 { count } else { 1 })
     }
 
     /// A, the shares of wealth that may be held.

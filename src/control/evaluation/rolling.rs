@@ -1,7 +1,7 @@
 //! Walk-forward: every year a policy is trained on the window of returns before it, and lived by through the year.
 //!
-//! Decisions and accounts are apart: under power and log utility no band depends on wealth or on what is held, so the years
-//! can be decided side by side, and what wealth became is counted afterwards ([`crate::control::evaluation::account`]).
+//! Decisions and accounts are apart: under power and log utility no band depends on wealth, and hardly on what is held, so the
+//! years can be decided side by side, and what wealth became is counted afterwards ([`crate::control::evaluation::account`]).
 
 use crate::control::error::TrainError;
 use crate::control::policy::advice::{Advice, AdviceSource};

@@ -257,7 +257,8 @@ impl Advisor {
         match &self.policy.steps()[step].solution {
             Solution::Single(single) => {
                 let in_design = self.is_single_state(step, state);
-                let floor_gain = Holdings::at(&single.floor_gains, state.holding).max(0.0).min(largest);
+                let holdings = Holdings::of(&self.specification().problem, single.floor_gains.len());
+                let floor_gain = holdings.gain(&single.floor_gains, state.holding).min(largest);
                 Prediction { band: single.band, floor_gain, deviation: 0.0, in_design }
             }
             Solution::Surrogates(stored) => {
@@ -270,12 +271,14 @@ impl Advisor {
                 let (ends, predictions) = (policy.at(&input), value.surrogate.at(&input));
                 let is_finite = ends.iter().all(|end| end.is_finite());
                 let ends: Vec<f64> = ends.into_iter().map(|end| end.clamp(0.0, highest)).collect();
-                let prediction = Holdings::at(&predictions, state.holding);
-                let floor = state.wealth * self.problem.dynamics().liquidation(state.holding);
+                let (holdings, holding) = (value.holdings(), value.holdings().within(state.holding));
+                let prediction = holdings.at(&predictions, holding);
+                let liquidated = state.wealth * self.problem.dynamics().liquidation(holding);
+                let beyond = holdings.beyond(state.holding);
                 Prediction {
                     band: Band::of(&ends),
-                    floor_gain: value.clamped_gain(prediction, floor).min(largest),
-                    deviation: value.gain_spread(prediction, deviation * stored.value.scale, floor).min(largest),
+                    floor_gain: (value.clamped_gain(prediction, liquidated) + beyond).min(largest),
+                    deviation: value.gain_spread(prediction, deviation * stored.value.scale, liquidated).min(largest),
                     in_design: deviation <= stored.deviation_limit && is_finite,
                 }
             }

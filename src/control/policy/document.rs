@@ -1,5 +1,7 @@
 //! A trained policy: immutable, portable, named by the hash of its bytes.
 
+use std::ops::RangeInclusive;
+
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -115,18 +117,32 @@ fn check_single(
     let (field_of, Band { low, high }) = (|name: &str| format!("{field}.{name}"), single.band);
     rules::within(&field_of("band[0]"), low, 0.0, highest)?;
     rules::within(&field_of("band[1]"), high, low, highest)?;
-    check_holdings(&field_of("floor_gains"), single.floor_gains.len(), specification)?;
+    if specification.problem.trading_cost <= 0.0 && low != high {
+        return Err(FieldError::new(
+            field_of("band"),
+            format!("[{low}, {high}]"),
+            "must be one action where trading is free",
+        ));
+    }
+    check_holdings(&field_of("floor_gains"), single.floor_gains.len(), specification, &HOLDINGS_OF_ONE_LAW)?;
     let largest = credible_gain(specification, step);
     single.floor_gains.iter().try_for_each(|&gain| rules::within(&field_of("floor_gains"), gain, 0.0, largest))
 }
 
-/// Holdings at which a step may know its value, where trading costs.
-const HOLDINGS: std::ops::RangeInclusive<usize> = 4..=1025;
+/// Holdings at which a step of one law may know its value, where trading costs, and at which a surrogate may: a robust step
+/// tabulates those of a surrogate over all the returns it looks at.
+const HOLDINGS_OF_ONE_LAW: RangeInclusive<usize> = 4..=1025;
+const HOLDINGS_OF_A_SURROGATE: RangeInclusive<usize> = 4..=65;
 
 /// One function of the law where trading costs nothing; else one for each of so many holdings.
-fn check_holdings(field: &str, count: usize, specification: &Specification) -> Result<(), FieldError> {
+fn check_holdings(
+    field: &str,
+    count: usize,
+    specification: &Specification,
+    allowed: &RangeInclusive<usize>,
+) -> Result<(), FieldError> {
     match specification.problem.trading_cost > 0.0 {
-        true => rules::whole(field, count, &HOLDINGS),
+        true => rules::whole(field, count, allowed),
         false => rules::whole(field, count, &(1..=1)),
     }
 }
@@ -186,7 +202,8 @@ fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) 
 
 /// A value for each holding, and either end of the band, where trading costs.
 fn check_functions(field: &str, stored: &StepSurrogates, specification: &Specification) -> Result<(), FieldError> {
-    check_holdings(&format!("{field}.value.weights"), stored.value.weights.len(), specification)?;
+    let functions = stored.value.weights.len();
+    check_holdings(&format!("{field}.value.weights"), functions, specification, &HOLDINGS_OF_A_SURROGATE)?;
     let ends = Dynamics::of(&specification.problem).sides().len();
     rules::whole(&format!("{field}.policy.weights"), stored.policy.weights.len(), &(ends..=ends))
 }

@@ -9,7 +9,6 @@ use crate::control::kept::{Kept, Key};
 use crate::control::request::specification::Specification;
 use crate::control::surrogate::fitted::{Surrogate, ValueSurrogate};
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
-use crate::control::surrogate::target::TargetMap;
 use crate::numerics::gp::GaussianProcess;
 
 /// Bytes of a prepared policy without its numbers, and of each of its steps: names, diagnostics, scales.
@@ -33,7 +32,7 @@ impl PreparedStep {
     /// Of a step of a policy trained from `specification`.
     pub fn new(specification: &Specification, step: usize, stored: &StepSurrogates) -> Self {
         PreparedStep {
-            value: ValueSurrogate::new(stored, TargetMap::new(specification, step)),
+            value: ValueSurrogate::new(specification, step, stored),
             policy: Surrogate::new(stored, &stored.policy),
             factor: Factor::of(stored),
         }
@@ -74,7 +73,7 @@ pub fn factor_bytes(stored: &StepSurrogates) -> usize {
 /// Bytes of a prepared policy, without bridges and factors.
 pub fn prepared_bytes(policy: &Policy) -> usize {
     let designs = policy.steps().iter().map(|step| match &step.solution {
-        Solution::Single(_) => (0, 0, 0),
+        Solution::Single(single) => (1, 0, single.floor_gains.len()),
         Solution::Surrogates(stored) => {
             let functions = stored.value.weights.len() + stored.policy.weights.len();
             (stored.count(), stored.inputs.len(), functions)

@@ -4,8 +4,9 @@
 //!
 //!   x' = x (1 - c |a - h|) ((1-a)(1+r) + a e^z),     h' = a e^z / ((1-a)(1+r) + a e^z).
 //!
-//! The safe policy sells all now: its terminal wealth `x (1 - c h) (1+r)^n` is the floor. These formulas stand here alone; the
-//! robust step, the simulator, live sessions and the books of a backtest read them from here.
+//! The safe policy sells all now: its terminal wealth `x (1 - c h) (1+r)^n` is the floor. The simulator, live
+//! sessions and the books of a backtest call these functions; the tables of the robust step hold the same formulas over many
+//! returns at once (`control/bellman/gain_field.rs`), which `tests/bellman.rs` compares.
 
 use crate::control::problem::actions::Band;
 use crate::control::problem::state::State;

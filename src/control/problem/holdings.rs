@@ -1,25 +1,31 @@
 //! Shares of wealth held before trading, at which the value is known where trading costs.
 //!
-//! The value of a state depends on the share h that is held before trading only through what reaching the band costs: along h
-//! it is smooth but for a bend of the second derivative at either end of the band. It is kept at even holdings and read between
-//! them by the cubic through the four nearest. The error at a bend is below a twentieth of the jump of the second derivative,
-//! 2 c over the width of the band, times the square of the distance.
+//! The value of a state depends on the share h that is held before trading only through what reaching the band costs: up to
+//! the highest action it is smooth along h but for a bend of the second derivative at either end of the band. It is kept at
+//! even holdings and read between them by the cubic through the four nearest. The error at a bend is below a twentieth of the
+//! jump of the second derivative, 2 c over the width of the band, times the square of the distance. Beyond the highest action,
+//! where a holding may have drifted, what is too much must be sold, and a formula continues it.
+
+use crate::control::problem::dynamics::Dynamics;
+use crate::control::request::specification::ProblemSpecification;
 
 /// Holdings at which the value of a design point is found, where trading costs.
 pub const HOLDINGS: usize = 17;
 /// The same where one law is all there is, and hundreds of steps may follow each other.
 pub const HOLDINGS_OF_ONE_LAW: usize = 257;
 
-/// Even holdings from 0 to 1, at which a function of the holding is given.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Even holdings from 0 to the highest action, at which a function of the holding is given.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Holdings {
     count: usize,
+    highest: f64,
+    dynamics: Dynamics,
 }
 
 impl Holdings {
     /// Of `count` values: one for a function that does not depend on the holding, else at least four.
-    pub fn new(count: usize) -> Self {
-        Holdings { count }
+    pub fn of(problem: &ProblemSpecification, count: usize) -> Self {
+        Holdings { count, highest: problem.action_interval[1], dynamics: Dynamics::of(problem) }
     }
 
     /// How many.
@@ -35,25 +41,48 @@ impl Holdings {
     /// The holdings, ascending.
     pub fn nodes(self) -> impl Iterator<Item = f64> {
         let last = self.count.saturating_sub(1).max(1) as f64;
-        (0..self.count).map(move |index| index as f64 / last)
+        (0..self.count).map(move |index| self.highest * index as f64 / last)
+    }
+
+    /// The holding at which the function is read instead of `holding`, which may have drifted beyond the highest action.
+    pub fn within(self, holding: f64) -> f64 {
+        holding.max(0.0).min(self.highest)
+    }
+
+    /// What the floor gain of a holding beyond the highest action is more than that of the highest: what is beyond must be sold,
+    ///
+    ///   ln(1 - c (h - a)) - ln((1 - c h) / (1 - c a)),   a the highest action,
+    ///
+    /// good to c^2 where the band ends below a. 0 within, and where the holding does not matter.
+    pub fn beyond(self, holding: f64) -> f64 {
+        let (highest, dynamics) = (self.highest, self.dynamics);
+        if !self.matter() || holding <= highest {
+            return 0.0;
+        }
+        (dynamics.left(holding, highest) * dynamics.liquidation(highest) / dynamics.liquidation(holding)).ln()
     }
 
     /// The first of the four values to read at `holding`, and the weights of the cubic through them.
     pub fn cubic(self, holding: f64) -> (usize, [f64; 4]) {
-        let position = holding.clamp(0.0, 1.0) * (self.count - 1) as f64;
+        let position = self.within(holding) / self.highest * (self.count - 1) as f64;
         let first = (position as usize).saturating_sub(1).min(self.count - 4);
         let t = position - first as f64;
         let (t1, t2, t3) = (t - 1.0, t - 2.0, t - 3.0);
         (first, [-t1 * t2 * t3 / 6.0, 0.5 * t * t2 * t3, -0.5 * t * t1 * t3, t * t1 * t2 / 6.0])
     }
 
-    /// The function at `holding`, from its values.
-    pub fn at(values: &[f64], holding: f64) -> f64 {
+    /// The function at `holding`, from its values; of one beyond the highest action that of the highest.
+    pub fn at(self, values: &[f64], holding: f64) -> f64 {
         if let [only] = values {
             return *only;
         }
-        let (first, weights) = Holdings::new(values.len()).cubic(holding);
+        let (first, weights) = self.cubic(holding);
         weights.iter().zip(&values[first..]).map(|(weight, value)| weight * value).sum()
+    }
+
+    /// The floor gain at `holding`, from its values.
+    pub fn gain(self, values: &[f64], holding: f64) -> f64 {
+        self.at(values, holding).max(0.0) + self.beyond(holding)
     }
 }
 
@@ -61,14 +90,29 @@ impl Holdings {
 mod tests {
     use super::*;
 
+    fn holdings(count: usize, highest: f64) -> Holdings {
+        Holdings { count, highest, dynamics: Dynamics { rate_per_step: 0.0, trading_cost: 0.02 } }
+    }
+
+    /// Of 100, 70 are held and 50 may be: 20 are sold for 19.6. Selling all 70 would leave 98.6, all 50 of a hundred 99.
+    #[test]
+    fn beyond_the_highest_action_the_rest_is_sold() {
+        let (of_highest, holdings) = (0.03, holdings(5, 0.5));
+        let values = [0.0, 0.01, 0.02, 0.025, of_highest];
+        let expected = of_highest + (99.6_f64 / 100.0 * 99.0 / 98.6).ln();
+        assert!((holdings.gain(&values, 0.7) - expected).abs() < 1e-15);
+        assert!((holdings.gain(&values, 0.5) - of_highest).abs() < 1e-15 && holdings.beyond(0.5) == 0.0);
+    }
+
     #[test]
     fn a_cubic_is_read_exactly_everywhere() {
         let cubic = |h: f64| 0.3 - h + 2.0 * h * h - 0.7 * h * h * h;
         for count in [4, 5, 17] {
-            let values: Vec<f64> = Holdings::new(count).nodes().map(cubic).collect();
-            for step in 0..=100 {
+            let holdings = holdings(count, 0.8);
+            let values: Vec<f64> = holdings.nodes().map(cubic).collect();
+            for step in 0..=80 {
                 let holding = f64::from(step) / 100.0;
-                assert!((Holdings::at(&values, holding) - cubic(holding)).abs() < 1e-14, "{count} at {holding}");
+                assert!((holdings.at(&values, holding) - cubic(holding)).abs() < 1e-14, "{count} at {holding}");
             }
         }
     }
@@ -80,10 +124,11 @@ mod tests {
         for place in 0..1000 {
             let bend = 0.3 + f64::from(place) / 1000.0 / 16.0;
             let value = |h: f64| 0.5 * (h - bend).max(0.0).powi(2);
-            let values: Vec<f64> = Holdings::new(count).nodes().map(value).collect();
+            let holdings = holdings(count, 1.0);
+            let values: Vec<f64> = holdings.nodes().map(value).collect();
             for step in 0..=400 {
                 let holding = f64::from(step) / 400.0;
-                worst = worst.max((Holdings::at(&values, holding) - value(holding)).abs());
+                worst = worst.max((holdings.at(&values, holding) - value(holding)).abs());
             }
         }
         assert!(worst < 1.0 / 20.0 / 256.0 && worst > 1.0 / 200.0 / 256.0, "{worst}");
@@ -91,6 +136,6 @@ mod tests {
 
     #[test]
     fn one_value_is_read_at_any_holding() {
-        assert_eq!((Holdings::at(&[0.2], 0.7), Holdings::new(1).matter()), (0.2, false));
+        assert_eq!((holdings(1, 0.5).gain(&[0.2], 0.7), holdings(1, 0.5).matter()), (0.2, false));
     }
 }

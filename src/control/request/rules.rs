@@ -36,6 +36,8 @@ const EXPONENTIAL_SCALE: f64 = 300.0;
 const SMALLEST_HIGHEST_ACTION: f64 = 1e-4;
 /// Trading costs, shares of what is traded.
 pub const TRADING_COST: (f64, f64) = (0.0, 0.1);
+/// Below, what a trade keeps is lost in rounding.
+const SMALLEST_TRADING_COST: f64 = 1e-9;
 /// Smallest and largest wealth.
 pub const WEALTH: (f64, f64) = (1e-6, 1e15);
 /// Moments of the law among the features.
@@ -83,6 +85,10 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
     }
     within("problem.action_interval[1]", highest, SMALLEST_HIGHEST_ACTION, 1.0)?;
     within("problem.trading_cost", problem.trading_cost, TRADING_COST.0, TRADING_COST.1)?;
+    if problem.trading_cost > 0.0 && problem.trading_cost < SMALLEST_TRADING_COST {
+        let rule = format!("must be 0 or at least {SMALLEST_TRADING_COST:e}");
+        return Err(FieldError::new("problem.trading_cost", problem.trading_cost, rule));
+    }
     utility(problem)?;
     radius(&problem.radius_rule(), problem)?;
     if let Some(support) = problem.support {

@@ -101,6 +101,7 @@ impl Design {
         }
         let mut generator = stream(self.seed, "initial", 0, index);
         let mut wealth = self.start.min * (self.start.max / self.start.min).powf(generator.random::<f64>());
+        let mut holding = stream(self.seed, "initial holding", 0, index).random::<f64>();
         let mut sample = problem.history.clone();
         if self.resampled {
             sample.fill_with(|| admissible(self.law.draw(&mut generator), problem));
@@ -109,7 +110,8 @@ impl Design {
             let mut generator = stream(self.seed, "design", earlier, index);
             let action = problem.action_interval[1] * generator.random::<f64>();
             let log_return = admissible(self.law.draw(&mut generator), problem);
-            wealth *= dynamics.growth(action, log_return);
+            wealth = dynamics.next_wealth(wealth, holding, action, log_return);
+            holding = dynamics.drifted(action, log_return);
             sample.push(log_return);
         }
         self.holding_half(wealth, EmpiricalDistribution::new(&sample))
@@ -135,7 +137,8 @@ fn wealth_ladders(problem: &ProblemSpecification, start: Interval, count: usize)
         let elapsed = step as f64;
         let spread = REACHED_DEVIATIONS * problem.action_interval[1] * (elapsed * variance).sqrt();
         let bank = elapsed * problem.rate_per_step.ln_1p();
-        let low = start.min.ln() + bank.min(elapsed * mean) - spread;
+        let cost = if step > 0 { Dynamics::of(problem).liquidation(1.0).ln() } else { 0.0 };
+        let low = start.min.ln() + bank.min(elapsed * mean) - spread + cost;
         let high = start.max.ln() + bank.max(elapsed * mean) + spread;
         (low + (high - low) * point as f64 / (count - 1) as f64).exp()
     };

@@ -5,6 +5,7 @@ use super::scaling::Scaling;
 use super::stored::{StepSurrogates, StoredSurrogate};
 use super::target::TargetMap;
 use crate::control::problem::holdings::Holdings;
+use crate::control::request::specification::Specification;
 use crate::numerics::gp::GpMean;
 
 /// A Gaussian process of one or more functions of the inputs. The prediction of each at scaled input x is
@@ -48,14 +49,14 @@ pub struct ValueSurrogate {
 }
 
 impl ValueSurrogate {
-    /// Of a stored step, whose target maps as `target` does.
-    pub fn new(stored: &StepSurrogates, target: TargetMap) -> Self {
+    /// Of a stored step.
+    pub fn new(specification: &Specification, step: usize, stored: &StepSurrogates) -> Self {
         ValueSurrogate {
             scaling: stored.scaling.clone(),
             surrogate: Surrogate::new(stored, &stored.value),
             largest_gain: stored.largest_gain,
-            target,
-            holdings: Holdings::new(stored.value.weights.len()),
+            target: TargetMap::new(specification, step),
+            holdings: Holdings::of(&specification.problem, stored.value.weights.len()),
         }
     }
 

@@ -35,7 +35,7 @@ pub struct DesignPoint {
     pub wealth: f64,
     /// y-check.
     pub features: Features,
-    /// The solution at the state's own holding.
+    /// The best action of who holds nothing yet.
     pub action: f64,
     /// Log certainty equivalent over the all-bank floor, at that holding.
     pub floor_gain: f64,
@@ -211,7 +211,7 @@ impl Fitting<'_> {
         let map = TargetMap::new(self.specification, self.step);
         let dynamics = Dynamics::of(&self.specification.problem);
         let floors = |point: &DesignPoint| {
-            let holdings = Holdings::new(point.floor_gains.len());
+            let holdings = Holdings::of(&self.specification.problem, point.floor_gains.len());
             holdings.nodes().map(|holding| point.wealth * dynamics.liquidation(holding)).collect::<Vec<f64>>()
         };
         let gains = |point: &DesignPoint| -> Vec<f64> {

@@ -94,9 +94,13 @@ function figures({ session, history }, action) {
   ]);
 }
 
+/** What selling everything at the start would have left. */
+const banked = ({ initial_wealth, initial_holding }, { specification }) =>
+  initial_wealth * (1 - specification.problem.trading_cost * initial_holding);
+
 function completed({ session, history, policy }) {
   const { rate_per_step, horizon } = policy.specification.problem;
-  const bank = history.initial_wealth * (1 + rate_per_step) ** horizon;
+  const bank = banked(history, policy) * (1 + rate_per_step) ** horizon;
   return section(
     "Completed",
     h(
@@ -118,7 +122,8 @@ function course({ session, history, policy }, action) {
   const after = (period, read) => (observations[period - 1] ? read(observations[period - 1]) : null);
   const x = { values: periods, domain: [0, horizon], label: "After period", format: String, whole: true };
   const lived = periods.map((k) => (k === 0 ? initial_wealth : after(k, (row) => row.wealth)));
-  const bank = periods.map((k) => initial_wealth * (1 + rate_per_step) ** k);
+  const sold = banked(history, policy);
+  const bank = periods.map((k) => sold * (1 + rate_per_step) ** k);
   const held = periods.map((k) => after(k, (row) => row.executed_allocation));
   const advised = periods.map((k) =>
     action && k === action.period ? action.allocation : after(k, (row) => row.advised_allocation),

@@ -703,7 +703,7 @@ class StepDiagnostics(TypedDict):
     design_count: int
     """Design points solved."""
     all_bank_share: float
-    """Share of the design points at which the robust allocation is zero."""
+    """Share of the design points at which the robust allocation of who holds nothing yet is zero."""
     uncertified_share: float
     """Share of the design points whose window could not be certified: mass might want to leave it."""
     duality_gap: float
