@@ -268,16 +268,15 @@ impl Advisor {
                 let deviation =
                     process.as_ref().as_ref().map_or(f64::INFINITY, |found| found.latent_variance(&input).sqrt());
                 let highest = self.specification().problem.action_interval[1];
-                let (ends, predictions) = (policy.at(&input), value.surrogate.at(&input));
+                let (ends, predictions, holdings) = (policy.at(&input), value.surrogate.at(&input), value.holdings());
                 let is_finite = ends.iter().all(|end| end.is_finite());
                 let ends: Vec<f64> = ends.into_iter().map(|end| end.clamp(0.0, highest)).collect();
-                let (holdings, holding) = (value.holdings(), value.holdings().within(state.holding));
-                let prediction = holdings.at(&predictions, holding);
-                let liquidated = state.wealth * self.problem.dynamics().liquidation(holding);
-                let beyond = holdings.beyond(state.holding);
+                let prediction = holdings.at(&predictions, state.holding);
+                let liquidated = state.wealth * self.problem.dynamics().liquidation(holdings.within(state.holding));
+                let gain = value.clamped_gain(prediction, liquidated) + holdings.beyond(state.holding);
                 Prediction {
                     band: Band::of(&ends),
-                    floor_gain: (value.clamped_gain(prediction, liquidated) + beyond).min(largest),
+                    floor_gain: gain.min(largest),
                     deviation: value.gain_spread(prediction, deviation * stored.value.scale, liquidated).min(largest),
                     in_design: deviation <= stored.deviation_limit && is_finite,
                 }
