@@ -246,7 +246,7 @@ mod tests {
         assert_eq!(one.analysis.years, 1);
         let page = page::page(&one).html().unwrap();
         assert!(page.contains("adaptive, alpha 0.9") && page.contains("Trading costs 10 bp"), "{page}");
-        assert!(page.contains("fewer than 10"), "{page}");
+        assert!(page.contains("The whole years are 1, fewer than 10"), "{page}");
     }
 
     #[test]

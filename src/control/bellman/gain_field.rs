@@ -151,30 +151,30 @@ impl FieldRows<'_> {
             NextValue::Constant(holdings, gains) => {
                 self.holdings(trade).map(|holding| holdings.gain(gains, holding)).collect()
             }
+            NextValue::Surrogate(_) | NextValue::Exact(..) if self.field.holdings.matter() => {
+                let wealths = relative.iter().map(|relative| bank * relative);
+                self.gains_by_holding(trade, wealths)
+            }
             NextValue::Surrogate(_) | NextValue::Exact(..) => {
                 let mut gains = self.interpolated(trade);
-                let wealths = relative.iter().map(|relative| bank * relative);
-                if self.field.holdings.matter() {
-                    self.gains_beyond(trade, &mut gains, wealths);
-                } else {
-                    next.gains(&mut gains, wealths);
-                }
+                next.gains(&mut gains, relative.iter().map(|relative| bank * relative));
                 gains
             }
         };
         utility.values(relative, &gains)
     }
 
-    /// Turns predictions into gains where the holding may have drifted beyond the highest action.
-    fn gains_beyond(&self, trade: Trade, predictions: &mut [f64], wealths: impl Iterator<Item = f64>) {
+    /// The gains where the holding matters, which may have drifted beyond the highest action.
+    fn gains_by_holding(&self, trade: Trade, wealths: impl Iterator<Item = f64>) -> Vec<f64> {
         let GainField { next, holdings, dynamics, .. } = self.field;
-        let liquidated = wealths.zip(self.holdings(trade)).map(|(wealth, holding)| {
+        let held: Vec<f64> = self.holdings(trade).collect();
+        let mut gains = self.interpolated_at(trade, &held);
+        let liquidated = wealths.zip(&held).map(|(wealth, &holding)| {
             wealth * (dynamics.liquidation(holdings.within(holding)) / dynamics.liquidation(holding))
         });
-        next.gains(predictions, liquidated);
-        for (gain, holding) in predictions.iter_mut().zip(self.holdings(trade)) {
-            *gain += holdings.beyond(holding);
-        }
+        next.gains(&mut gains, liquidated);
+        gains.iter_mut().zip(&held).for_each(|(gain, &holding)| *gain += holdings.beyond(holding));
+        gains
     }
 
     /// The share held after each return: `a e^z / ((1-a)(1+r) + a e^z)`.
@@ -182,18 +182,22 @@ impl FieldRows<'_> {
         self.growths.iter().map(move |growth| trade.action * growth / (1.0 - trade.action + trade.action * growth))
     }
 
-    /// The tabulated predictions, along trades and holdings.
+    /// The tabulated predictions, along trades.
     fn interpolated(&self, trade: Trade) -> Vec<f64> {
+        let count = self.growths.len();
+        let mut predictions = vec![0.0; count];
+        for (weight, row) in self.field.basis(trade).iter().zip(self.rows.chunks_exact(count)) {
+            predictions.iter_mut().zip(row).for_each(|(prediction, value)| *prediction += weight * value);
+        }
+        predictions
+    }
+
+    /// The tabulated predictions, along trades and at the share `held` after each return.
+    fn interpolated_at(&self, trade: Trade, held: &[f64]) -> Vec<f64> {
         let (count, holdings) = (self.growths.len(), self.field.holdings);
         let basis = self.field.basis(trade);
         let mut predictions = vec![0.0; count];
-        if !holdings.matter() {
-            for (weight, row) in basis.iter().zip(self.rows.chunks_exact(count)) {
-                predictions.iter_mut().zip(row).for_each(|(prediction, value)| *prediction += weight * value);
-            }
-            return predictions;
-        }
-        let cubics: Vec<(usize, [f64; 4])> = self.holdings(trade).map(|holding| holdings.cubic(holding)).collect();
+        let cubics: Vec<(usize, [f64; 4])> = held.iter().map(|&holding| holdings.cubic(holding)).collect();
         for (weight, block) in basis.iter().zip(self.rows.chunks_exact(count * holdings.count())) {
             let read = cubics.iter().zip(block.chunks_exact(holdings.count()));
             for (prediction, ((first, cubic), values)) in predictions.iter_mut().zip(read) {

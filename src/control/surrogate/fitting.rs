@@ -210,13 +210,13 @@ impl Fitting<'_> {
     fn targets(&self, solved: &[DesignPoint]) -> [Targets; 2] {
         let map = TargetMap::new(self.specification, self.step);
         let dynamics = Dynamics::of(&self.specification.problem);
-        let floors = |point: &DesignPoint| {
+        let liquidated = |point: &DesignPoint| {
             let holdings = Holdings::of(&self.specification.problem, point.floor_gains.len());
             holdings.nodes().map(|holding| point.wealth * dynamics.liquidation(holding)).collect::<Vec<f64>>()
         };
         let gains = |point: &DesignPoint| -> Vec<f64> {
-            let gains = point.floor_gains.iter().zip(floors(point));
-            gains.map(|(&gain, floor)| map.target(gain, floor)).collect()
+            let gains = point.floor_gains.iter().zip(liquidated(point));
+            gains.map(|(&gain, wealth)| map.target(gain, wealth)).collect()
         };
         let gains = by_function(solved, gains);
         let actions = by_function(solved, |point| point.policy_targets.clone());

@@ -57,6 +57,12 @@ export function typed(text, { shares = false } = {}) {
   return hasPercent(text) ? hundredth(values[0]) : values[0];
 }
 
+/** A number typed in percent, as a fraction; null where it is none. */
+export function fraction(text) {
+  const value = typed(text.replace(/\s*%$/, ""));
+  return typeof value === "number" ? hundredth(value) : null;
+}
+
 /** Percent to a fraction without a rounding of its own: the decimal point moves in the text. */
 export function hundredth(percent) {
   const [digits, power = "0"] = String(percent).split("e");

@@ -4,15 +4,9 @@ import { get, post } from "./api.js";
 import { h } from "./dom.js";
 import { clear, input, select, showProblem } from "./form.js";
 import { allocation, significant, wealth } from "./format.js";
-import { hundredth, typed } from "./number_text.js";
+import { fraction } from "./number_text.js";
 
 const KINDS = { simple_return: "Simple return", log_return: "Log-return" };
-
-/** A number typed in percent, as a fraction; null where it is none. */
-function fraction(text) {
-  const value = typed(text.replace(/\s*%$/, ""));
-  return typeof value === "number" ? hundredth(value) : null;
-}
 
 /** `{element, advise(allocation)}`: what is held where nothing else is said is the advice, or another that took its place. */
 export function observeForm(action, { id, session, policy, refresh }) {

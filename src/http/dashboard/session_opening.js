@@ -4,7 +4,7 @@ import { post } from "./api.js";
 import { h } from "./dom.js";
 import { fieldset, input, select, showProblem } from "./form.js";
 import { moment, short } from "./format.js";
-import { hundredth, typed } from "./number_text.js";
+import { fraction, typed } from "./number_text.js";
 import { all } from "./pages.js";
 import { returnsField } from "./returns_field.js";
 
@@ -56,8 +56,8 @@ function opening(policies, asked) {
     if (known.length > 0) request.history = known;
     const wealth = typed(stake.control.value);
     if (wealth !== null) request.wealth = wealth;
-    const share = typed(holding.control.value.replace(/\s*%$/, ""));
-    if (share !== null) request.holding = typeof share === "number" ? hundredth(share) : share;
+    const held = holding.control.value;
+    if (held.trim() !== "") request.holding = fraction(held) ?? held;
     try {
       const { session } = await post("/sessions", request);
       location.hash = `#/sessions/${session}`;
