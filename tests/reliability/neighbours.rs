@@ -13,7 +13,7 @@ use tokio::net::TcpStream;
 use crate::caller::Caller;
 use crate::scene::{HORIZON, Outcome, Tally, import, specification, undisturbed};
 use crate::server::Site;
-use crate::support::patience::within;
+use crate::support::patience::{patience, within};
 use crate::tenants::{Tenants, sessions};
 
 /// How long an attack lasts.
@@ -246,17 +246,17 @@ pub async fn crowds(trials: usize) -> Outcome {
     Tenants::attacked(Site::new(), trials, Attack::Crowd).await
 }
 
-/// Trainings and explanations of one tenant, as many as it may: the other's training ends before they do, and his questions
-/// that must be solved are never turned away.
+/// Trainings and explanations of one tenant, as many as it may: the other's trainings take turns with them, and his
+/// questions that must be solved are never turned away.
 async fn crowd(tenants: &mut Tenants, tally: &mut Tally) -> Result<usize, String> {
     const TRAININGS: usize = 30;
+    const CROWD_STEPS: usize = 10;
     let neighbour = &tenants.neighbour.clone();
     let policy = import(neighbour).await;
     let session = neighbour.open(&policy).await.ok_or("no session")?;
     for number in 0..TRAININGS {
-        neighbour.train(&format!("crowd-{}-{number}", tally.trials), &specification(HORIZON)).await;
+        neighbour.train(&format!("crowd-{}-{number}", tally.trials), &specification(CROWD_STEPS)).await;
     }
-    let queued = Instant::now();
     let own = tenants.owner.train(&format!("own-{}", tally.trials), &specification(2)).await;
     tenants.trainings += 1;
     let own = own.and_then(|(_, job)| job["job"].as_str().map(str::to_owned)).ok_or("no job of the owner's")?;
@@ -264,16 +264,31 @@ async fn crowd(tenants: &mut Tenants, tally: &mut Tally) -> Result<usize, String
     let path = format!("/action?session={session}&explain=worst_case");
     let calls = until(Instant::now() + ATTACK, neighbour, &path).await;
     pulse.stop().await.told(2 * within(ANSWERED), tally);
-    while !matches!(tenants.owner.get(&format!("/jobs/{own}")).await, Some((200, job)) if job["finished_ms"].is_i64()) {
-        if queued.elapsed() > Duration::from_secs(30) {
-            tally.complain("the owner's training still waits");
-            break;
-        }
-        tokio::time::sleep(Duration::from_millis(50)).await;
+    until_ended(&tenants.owner, &own, tally).await;
+    let ahead = neighbour.jobs().await.ok_or("no jobs of the neighbour's")?.iter().filter(has_succeeded).count();
+    let turns = tenants.owner.jobs().await.ok_or("no jobs of the owner's")?.iter().filter(has_succeeded).count();
+    // In each trial the one that ran when the first of the owner's came, and one for each of the owner's.
+    if ahead > turns + tally.trials + 1 {
+        tally.complain(format!("{ahead} trainings of the neighbour's ended before {turns} of the owner's"));
     }
     for job in neighbour.jobs().await.unwrap_or_default() {
         let path = format!("/jobs/{}/cancel", job["job"].as_str().unwrap_or_default());
         neighbour.post(&path, &Value::Null).await;
     }
     Ok(calls + TRAININGS)
+}
+
+fn has_succeeded(job: &&Value) -> bool {
+    job["state"] == "succeeded"
+}
+
+/// Waits for a job: a training gets what the load leaves of the processors, and may take long.
+async fn until_ended(caller: &Caller, job: &str, tally: &mut Tally) {
+    let asked = Instant::now();
+    while !matches!(caller.get(&format!("/jobs/{job}")).await, Some((200, job)) if job["finished_ms"].is_i64()) {
+        if asked.elapsed() > patience() {
+            return tally.complain(format!("job {job} has not ended"));
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
 }

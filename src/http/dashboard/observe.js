@@ -4,7 +4,7 @@ import { get, post } from "./api.js";
 import { h } from "./dom.js";
 import { clear, input, select, showProblem } from "./form.js";
 import { allocation, significant, wealth } from "./format.js";
-import { fraction } from "./number_text.js";
+import { fraction, typed } from "./number_text.js";
 
 const KINDS = { simple_return: "Simple return", log_return: "Log-return" };
 
