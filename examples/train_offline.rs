@@ -20,7 +20,6 @@ use serde_json::json;
 
 const HISTORY: [f64; 4] = [-0.20, -0.02, 0.06, 0.20];
 const RATE: f64 = 0.002;
-const DYNAMICS: Dynamics = Dynamics { rate_per_step: RATE, trading_cost: 0.0 };
 /// The radius shrinks as the sample grows: kappa / sqrt(n).
 const KAPPA: f64 = 0.02;
 /// Log-returns that the adversary may use.
@@ -51,7 +50,7 @@ impl Ball {
         let ball = WassersteinBall { support: &self.support, masses: &self.masses, radius: self.radius };
         let later: Vec<f64> = self.support.iter().map(|&z| next(z)).collect();
         let payoff = |action: f64| -> Vec<f64> {
-            let gain = |z: &f64| (DYNAMICS.growth(action, *z) / (1.0 + RATE)).ln();
+            let gain = |z: &f64| (Dynamics::plain(RATE, 0.0).growth(action, *z) / (1.0 + RATE)).ln();
             self.support.iter().zip(&later).map(|(z, later)| gain(z) + later).collect()
         };
         let (action, _) = maximise_concave_scalar(|a| ball.worst_expectation(&payoff(a)).0, 0.0, 1.0, 1e-9);

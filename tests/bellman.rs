@@ -214,28 +214,29 @@ fn a_support_bounds_where_mass_may_go() {
 
 #[test]
 fn the_tabulated_field_is_the_value_of_the_next_state() {
-    for (utility, cost) in utilities().into_iter().flat_map(|utility| [(utility.clone(), 0.0), (utility, 0.01)]) {
+    let flows = [(0.0, 0.0), (0.01, 0.0), (0.0, 30.0), (0.01, -30.0)];
+    for (utility, (cost, flow)) in utilities().iter().flat_map(|utility| flows.map(|flow| (utility, flow))) {
         let request = json!({ "problem": { "horizon": 2, "history": HISTORY, "utility": utility, "trading_cost": cost,
-            "radius": { "rule": "fixed", "radius": 0.004 } }, "design": { "count": 60 } });
+            "contributions": [flow, -0.7 * flow], "radius": { "rule": "fixed", "radius": 0.004 } }, "design": { "count": 60 } });
         let solved = support::policies::advisor(request);
         let (problem, after) = (solved.policy().problem(Default::default()), &solved.policy().steps()[1].solution);
         let next = NextValue::new(solved.specification(), 1, Some(after));
         let state = State::new(&HISTORY, 100.0).unwrap().with_holding(0.4).unwrap();
-        let (dynamics, floor) = (problem.dynamics(), problem.floor(0, &state));
+        let (dynamics, floor) = (problem.dynamics(0), problem.floor(0, &state));
         let relative = RelativeUtility::new(solved.specification().problem.utility, floor);
         let exact_at: Vec<f64> = (0..=40).map(|k| -0.06 + 0.0035 * f64::from(k)).collect();
-        let field = GainField::tabulate(&problem, &next, relative, &state, exact_at);
+        let field = GainField::tabulate(&problem, 0, &next, relative, &state, exact_at);
         // Between the returns and the actions at which it is tabulated.
         let returns: Vec<f64> = (0..20).map(|k| -0.055 + 0.0061 * f64::from(k)).collect();
-        for action in [0.0, 0.13, 0.5, 0.77, 1.0] {
+        for action in [0.0, 0.13, 0.5, 0.77, 1.0].map(|share| share * problem.actions(0, &state).highest) {
             let trade = dynamics.trade_to(state.holding, action);
             for (z, found) in returns.iter().zip(field.at(&returns).payoff(trade)) {
-                let then = solved.advance(&state, action, *z);
+                let then = solved.advance(0, &state, action, *z);
                 let gain = (problem.floor(1, &then) / floor).ln() + solved.surrogate_gain(1, &then);
                 // The cubics are good to 1e-6 of the gain; where trading costs, a value bends where its law's band passes the
                 // holding, and they are good to a tenth of the half basis point that a surrogate may err by.
                 let (error, tolerance) = (found - relative.value(gain), if cost > 0.0 { 5e-6 } else { 1e-6 });
-                assert!(error.abs() < tolerance, "{utility} {cost} {action} {z}: {found} {gain}");
+                assert!(error.abs() < tolerance, "{utility} {cost} {flow} {action} {z}: {found} {gain}");
             }
         }
     }

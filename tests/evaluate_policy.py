@@ -59,7 +59,7 @@ def moment_features(returns, count):
 def merton_features(problem, returns, radius):
     utility, bank = problem["utility"], 1 + problem["rate_per_step"]
     rho = {
-        "exponential": lambda: utility["risk_aversion"] * problem["initial_wealth"],
+        "exponential": lambda: utility["risk_aversion"] * (problem["initial_wealth"] + to_come(problem, 0)[0]),
         "power": lambda: utility["risk_aversion"],
         "log": lambda: 1.0,
     }[utility["kind"]]()
@@ -72,18 +72,36 @@ def merton_features(problem, returns, radius):
     return [math.asinh(e / (rho * s2)), math.asinh(e / (rho * max(v, s2 / 100)))]
 
 
+def contributions(problem):
+    """One amount for each period."""
+    given = problem["contributions"]
+    return given if isinstance(given, list) else [given] * problem["horizon"]
+
+
+def to_come(problem, step):
+    """K and R: what the contributions from a step on are worth, and what must stay in the bank for them."""
+    worth, reserve, bank = 0.0, 0.0, 1 + problem["rate_per_step"]
+    for amount in reversed(contributions(problem)[step:]):
+        worth, reserve = (worth + amount) / bank, max(0.0, (reserve - amount) / bank)
+    return worth, reserve
+
+
+def sees_wealth(problem):
+    return problem["utility"]["kind"] == "exponential" or any(contributions(problem))
+
+
 def features(specification, question):
     problem, surrogate = specification["problem"], specification["surrogate"]
-    framework, returns, wealth = problem["framework"], question["returns"], question["wealth"]
-    sees_wealth = problem["utility"]["kind"] == "exponential"
+    framework, returns = problem["framework"], question["returns"]
+    wealth = question["wealth"] + to_come(problem, question["step"])[0]
     learns = framework in ("adaptive", "plug_in", "parametric_adaptive")
     count = surrogate["moment_count"] if learns else 0
     if framework == "parametric_adaptive":
         count = min(count, 2)
     if surrogate["features"] == "raw_moments":
         raw = [mean([z**order for z in returns]) for order in range(1, count + 1)]
-        return ([wealth] if sees_wealth else []) + raw
-    found = [math.log(wealth)] if sees_wealth else []
+        return ([wealth] if sees_wealth(problem) else []) + raw
+    found = [math.log(wealth)] if sees_wealth(problem) else []
     if not learns:
         return found
     found += moment_features(returns, count)
@@ -150,10 +168,13 @@ def evaluate(policy, question):
     problem, holding = specification["problem"], question["holding"]
     cost, highest = problem["trading_cost"], problem["action_interval"][1]
     known = min(holding, highest)
-    # What selling everything leaves, and what it would leave of the highest share at which the value is known.
-    liquidated = question["wealth"] * (1 - cost * holding)
-    wealth = question["wealth"] * (1 - cost * known)
-    beyond = math.log((1 - cost * (holding - known)) * (1 - cost * known) / (1 - cost * holding))
+    # Total wealth once everything is sold, and of the highest share at which the value is known.
+    later, reserve = to_come(problem, step)
+    liquidated = question["wealth"] * (1 - cost * holding) + later
+    wealth = question["wealth"] * (1 - cost * known) + later
+    in_hand = (liquidated - later) / liquidated
+    kept = (1 - cost * (holding - known)) * (1 - cost * known) / (1 - cost * holding)
+    beyond = math.log(in_hand * kept + 1 - in_hand)
     solution = policy["steps"][step]["solution"]
     bank = (1 + problem["rate_per_step"]) ** (problem["horizon"] - step)
     if solution["kind"] == "single":
@@ -167,12 +188,14 @@ def evaluate(policy, question):
     value = at_holding(predictions(solution["value"], points, x), known / highest)
     if specification["surrogate"]["target"] == "value":
         # Under power and log utility of a wealth of 1, for whose multiples the policy is the same.
-        unit = 1.0 if problem["utility"]["kind"] == "exponential" else wealth
+        unit = 1.0 if sees_wealth(problem) else wealth
         value = math.log(certainty_equivalent(problem["utility"], value) * unit / (wealth * bank))
     gain = min(max(value, 0.0), solution["largest_gain"]) + beyond
-    low, high = problem["action_interval"]
+    free = 1 - reserve / (question["wealth"] * (1 - cost))
+    low, high = 0.0, max(0.0, min(problem["action_interval"][1], free))
+    share = question["wealth"] / (question["wealth"] + later)
     deviation = math.sqrt(predicted_variance(solution["value"]["hyperparameters"], points, x))
-    band = [min(max(end, low), high) for end in predictions(solution["policy"], points, x)]
+    band = [min(max(end / share, low), high) for end in predictions(solution["policy"], points, x)]
     return {
         "allocation": into([band[0], max(band[-1], band[0])], holding),
         "floor_gain": gain,

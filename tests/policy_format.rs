@@ -58,7 +58,18 @@ fn policies() -> Vec<Value> {
         costly["problem"]["action_interval"] = json!([0.0, 0.7]);
         costly
     };
+    let flowing = |mut of: Value, contributions: Value| {
+        of["problem"]["contributions"] = contributions;
+        of
+    };
     vec![
+        flowing(policy("adaptive", power(), bridge(), json!({})), json!(12.0)),
+        flowing(policy("adaptive", exponential(), bridge(), value.clone()), json!([30.0, -60.0, 10.0])),
+        flowing(
+            policy("static", json!({ "kind": "log" }), bridge(), json!({ "features": "raw_moments" })),
+            json!(-8.0),
+        ),
+        flowing(costly("adaptive", power(), value.clone()), json!([-20.0, -5.0, 30.0])),
         costly("adaptive", power(), json!({})),
         costly("adaptive", exponential(), json!({})),
         costly("plug_in", power(), value.clone()),
@@ -82,9 +93,9 @@ fn policies() -> Vec<Value> {
 /// States of every step: along a path, and one of another wealth.
 fn states(solved: &Advisor) -> Vec<(usize, State)> {
     let start = solved.initial_state(None, None).unwrap();
-    let first = solved.advance(&start, 0.6, 0.03);
+    let first = solved.advance(0, &start, 0.6, 0.03);
     let other = State { wealth: 91.0, holding: 0.83, ..first.clone() };
-    let second = solved.advance(&first, 0.3, -0.02);
+    let second = solved.advance(1, &first, 0.3, -0.02);
     vec![(0, start), (1, first), (1, other), (2, second)]
 }
 

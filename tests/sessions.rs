@@ -36,14 +36,17 @@ fn assert_refused(answer: &(reqwest::StatusCode, Value), status: u16, field: &st
 #[tokio::test(flavor = "multi_thread")]
 async fn a_live_session_equals_the_simulator_bit_for_bit() {
     let mut held = 0;
-    for cost in [0.0, 0.004] {
+    for (cost, contributions) in
+        [(0.0, json!(0.0)), (0.004, json!(0.0)), (0.0, json!(-7.0)), (0.004, json!([5.0, -9.0, 0.0, 2.5]))]
+    {
         let mut request = specification(HORIZON);
         // A radius small enough that the robust allocation is not always zero.
         request["problem"]["radius"]["scale"] = json!(0.1);
         request["problem"]["trading_cost"] = json!(cost);
+        request["problem"]["contributions"] = contributions;
         held += lived_as_simulated(trained(&request).await).await;
     }
-    assert!(held > 3, "the sessions hold nothing");
+    assert!(held > 9, "the sessions hold nothing");
 }
 
 /// Compares every period of two sessions; how many of them hold anything.
@@ -77,7 +80,8 @@ async fn lived_as_simulated(mut app: App) -> usize {
             assert_eq!(number(&action["allocation"]), advice.allocation);
             assert_eq!(number(&action["certainty_equivalent"]), advice.certainty_equivalent);
             assert_eq!(number(&action["floor"]), advice.floor);
-            assert_eq!(action["band"], json!(advice.band));
+            assert_eq!((&action["band"], &observed["band"]), (&json!(advice.band), &json!(advice.band)));
+            assert_eq!(number(&action["contribution"]), advice.contribution);
             assert_eq!((number(&action["holding"]), number(&action["trade"])), (advice.holding, advice.trade));
             assert_eq!(number(&observed["holding"]), state.holding);
             assert_eq!(number(&action["radius"]), advice.radius);
@@ -112,8 +116,8 @@ async fn what_was_executed_and_what_was_reached_are_taken_as_stated() {
     let (_, action) = app.action().await;
     let advisor = advisor(&app).await;
     let mut state = advisor.initial_state(None, None).unwrap();
-    state = advisor.advance(&state, allocation, log_return);
-    state = advisor.advance(&state, number(&second["executed_allocation"]), 0.01);
+    state = advisor.advance(0, &state, allocation, log_return);
+    state = advisor.advance(1, &state, number(&second["executed_allocation"]), 0.01);
     state.wealth = 77.5;
     let advice = advisor.advise(2, &state, ballast::control::policy::advisor::AdviceMode::Surrogate);
     assert_eq!(number(&action["allocation"]), advice.allocation);
@@ -121,6 +125,29 @@ async fn what_was_executed_and_what_was_reached_are_taken_as_stated() {
     let (_, third) = app.report(3, json!({ "log_return": 0.01, "executed_allocation": 1.0 })).await;
     let bought = 1.0 - cost * (1.0 - state.holding);
     assert_eq!(number(&third["wealth"]), 77.5 * bought * (0.0 * (1.0 + rate) + 1.0 * 0.01_f64.exp()));
+}
+
+/// A policy that withdraws 40 at the end of each of two periods: 79.80 in the bank pay for them, and nothing less.
+#[tokio::test(flavor = "multi_thread")]
+async fn wealth_that_does_not_pay_for_the_withdrawals_is_refused_with_the_period() {
+    let mut request = specification(3);
+    request["problem"]["contributions"] = json!([-40.0, -40.0, 0.0]);
+    let mut app = trained(&request).await;
+    let dry = |(status, problem): (reqwest::StatusCode, Value), value: f64| {
+        assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("wealth")), "{problem}");
+        assert_eq!(number(&problem["value"]), value, "{problem}");
+        assert!(problem["detail"].as_str().unwrap().contains("the end of period 2"), "{problem}");
+    };
+    dry(app.post("/sessions", &json!({ "policy": app.policy, "wealth": 79.0 })).await, 79.0);
+    app.open_with(json!({ "wealth": 80.0 })).await;
+    dry(app.report(1, json!({ "log_return": 0.01, "wealth": 39.0 })).await, 39.0);
+    let what_if = json!({ "session": app.session, "wealth": 70.0 });
+    dry(app.post("/what-if", &what_if).await, 70.0);
+    // Everything held in an asset that falls: the loss is refused as any wealth is that cannot pay.
+    let (status, problem) = app.report(1, json!({ "log_return": -0.5, "executed_allocation": 1.0 })).await;
+    assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("wealth")), "{problem}");
+    let (status, observed) = app.report(1, json!({ "log_return": 0.01 })).await;
+    assert_eq!(status, 200, "{observed}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

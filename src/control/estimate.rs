@@ -8,7 +8,6 @@ use super::bellman::problem::Problem;
 use super::policy::Policy;
 use super::policy::prepared::{bytes_ready, factor_bytes, prepared_bytes};
 use super::problem::holdings::{HOLDINGS, HOLDINGS_OF_ONE_LAW};
-use super::problem::utility::depends_on_wealth;
 use super::request::evaluation::EvaluationRequest;
 use super::request::framework::Framework;
 use super::request::radius_rule::RadiusRule;
@@ -103,7 +102,7 @@ impl Sizes {
     fn of(specification: &Specification) -> Self {
         let problem = &specification.problem;
         let (horizon, history) = (problem.horizon, problem.history.len());
-        let single = !problem.framework.learns() && !depends_on_wealth(problem.utility);
+        let single = !problem.framework.learns() && !problem.depends_on_wealth();
         let count = if single { 1 } else { specification.design.count.unwrap_or(DEFAULT_COUNT) };
         let framed = Problem::new(specification);
         let paths = match problem.radius_rule() {
@@ -112,7 +111,7 @@ impl Sizes {
         };
         let bridges = framed.sets.heaviest(history, horizon);
         let holdings = framed.holdings(if single { HOLDINGS_OF_ONE_LAW } else { HOLDINGS });
-        let functions = holdings.count() + framed.dynamics().sides().len();
+        let functions = holdings.count() + framed.dynamics(0).sides().len();
         let inputs = framed.selection.names().len();
         Sizes { horizon, history, count, inputs, functions, paths, bridges }
     }

@@ -11,13 +11,13 @@
 //!
 //! | paper | name | printed as | file | checked by |
 //! |---|---|---|---|---|
-//! | S | `next_wealth` | (2.1) | `control/problem/dynamics.rs` | `src/control/evaluation/account.rs::three_months_agree_with_pencil_and_paper` |
+//! | S | `next` | (2.1) | `control/problem/dynamics.rs` | `src/control/evaluation/account.rs::three_months_agree_with_pencil_and_paper` |
 //! | F^, R | `EmpiricalDistribution` | (2.3) | `numerics/empirical.rs` | `tests/parametric.rs::the_order_of_returns_and_the_way_they_arrive_change_nothing` |
 //! | H | `directional_statistic` | 2.1, after (2.4) | `numerics/bridge.rs` | `src/numerics/bridge.rs::the_statistic_is_the_plain_sum_to_the_last_bit` |
 //! | Q^H(1 - alpha) | `bridge_quantile` | 2.1, after (2.4) | `numerics/bridge.rs` | `tests/control.rs::the_bridge_quantile_agrees_with_a_million_paths` |
 //! | radius of C | `RadiusEstimator` | (2.5), (2.7) | `control/uncertainty/radius.rs` | `src/control/uncertainty/radius.rs::every_rule_of_the_sample_size_has_its_formula` |
 //! | C | `UncertaintySet` | (2.5) | `control/uncertainty/mod.rs` | `tests/evaluate.rs::a_ball_holds_the_true_law_where_it_is_wide_enough` |
-//! | y, G | `next_state` | (2.8) | `control/problem/dynamics.rs` | `tests/sessions.rs::a_live_session_equals_the_simulator_bit_for_bit` |
+//! | y, G | `next_state` | (2.8) | `control/problem/state.rs` | `tests/sessions.rs::a_live_session_equals_the_simulator_bit_for_bit` |
 //! | V_T | `utility` | (3.1) | `control/problem/utility.rs` | `src/control/problem/utility.rs::relative_utility_is_an_affine_map_of_the_utility` |
 //! | V_t | `BellmanStep` | (3.2) | `control/bellman/mod.rs` | `tests/control.rs::the_last_step_agrees_with_a_direct_solve` |
 //! | min over C | `worst_expectation` | (3.3) | `numerics/wasserstein.rs` | `tests/transport.rs::worst_expectation_agrees_with_the_transport_programme` |

@@ -133,7 +133,7 @@ impl DesignSolver<'_> {
     fn features(&self, states: Range<usize>) -> Result<Vec<Features>, TrainError> {
         let features = |index| {
             self.watch.go_on()?;
-            Ok(self.bellman.problem.features(&self.state(index)))
+            Ok(self.bellman.problem.features(self.bellman.step, &self.state(index)))
         };
         states.into_par_iter().map(features).collect()
     }
@@ -175,7 +175,7 @@ impl DesignSolver<'_> {
         let found = self.solved(0, &only, problem.holdings(HOLDINGS_OF_ONE_LAW))?;
         self.report(1, 1);
         let single = SingleSolution { floor_gains: found.floor_gains.clone(), band: found.solution.band };
-        let point = design_point(only.wealth, problem.features(&only), found);
+        let point = design_point(only.wealth, problem.features(step, &only), found);
         Ok(StepSolution { step, solution: Solution::Single(single), diagnostics: diagnostics(step, &[point]) })
     }
 

@@ -43,6 +43,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "evaluation.js": SCRIPT,
         "evaluation_asking.js": SCRIPT,
         "evaluations.js": SCRIPT,
+        "flows.js": SCRIPT,
         "form.js": SCRIPT,
         "format.js": SCRIPT,
         "heatmap.js": SCRIPT,

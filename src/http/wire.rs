@@ -5,6 +5,7 @@ use utoipa::ToSchema;
 
 use crate::control::policy::advice::Advice;
 use crate::control::policy::worst_case::WorstCase;
+use crate::control::problem::actions::Band;
 use crate::control::progress::Phase;
 use crate::control::request::framework::Framework;
 use crate::control::request::specification::Specification;
@@ -236,6 +237,9 @@ pub struct SessionHistory {
 pub struct Observation {
     pub period: usize,
     pub log_return: f64,
+    /// The holdings that were best kept at the start of the period.
+    #[schema(value_type = [f64; 2])]
+    pub band: Band,
     pub advised_allocation: f64,
     pub executed_allocation: f64,
     /// Wealth at the end of the period.
@@ -255,6 +259,7 @@ impl TryFrom<ObservationRow> for Observation {
         Ok(Observation {
             period: row.period,
             log_return: row.log_return,
+            band: answer.band,
             advised_allocation: row.advised_allocation,
             executed_allocation: row.executed_allocation,
             wealth: row.wealth_after,

@@ -45,8 +45,8 @@ impl Live {
         let SessionFacts { row, observations, seen } = facts;
         let start = advisor.initial_state(Some(&row.initial_history), Some(row.initial_wealth))?;
         let mut state = start.with_holding(row.initial_holding)?;
-        for observation in &observations {
-            state = advisor.advance(&state, observation.executed_allocation, observation.log_return);
+        for (step, observation) in observations.iter().enumerate() {
+            state = advisor.advance(step, &state, observation.executed_allocation, observation.log_return);
             state.wealth = observation.wealth_after;
         }
         let last = observations.last().and_then(|row| serde_json::from_str::<Observed>(&row.answer_json).ok());
@@ -115,16 +115,18 @@ impl Live {
         log_return: f64,
         means: &Means<'_>,
     ) -> Result<(State, Observed), ServiceError> {
-        let advised = self.surrogate_advice(means).await?.allocation;
-        let executed_allocation = report.executed_allocation.unwrap_or(advised);
-        let mut state = means.advisor.advance(&self.state, executed_allocation, log_return);
+        let Advice { allocation, band, .. } = *self.surrogate_advice(means).await?;
+        let executed_allocation = report.executed_allocation.unwrap_or(allocation);
+        let mut state = means.advisor.advance(self.observed(), &self.state, executed_allocation, log_return);
         state.wealth = report.wealth.unwrap_or(state.wealth);
         limits::within("wealth", state.wealth, limits::WEALTH.0, limits::WEALTH.1)?;
+        means.advisor.check_withdrawals(self.observed() + 1, &state)?;
         let (state, uncertainty) = self.measured(state, &means.advisor, means.advising).await?;
         let answer = Observed {
             session: report.session.clone(),
             period: report.period,
             log_return,
+            band,
             executed_allocation,
             price: report.price,
             wealth: state.wealth,

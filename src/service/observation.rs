@@ -8,6 +8,7 @@ use utoipa::ToSchema;
 use crate::control::error::FieldError;
 use crate::control::policy::advice::Uncertainty;
 use crate::control::policy::content_hash;
+use crate::control::problem::actions::Band;
 use crate::control::request::rules as limits;
 
 /// Prices taken: any currency, any quantity.
@@ -33,7 +34,8 @@ pub struct Observe {
     pub previous_price: Option<f64>,
     /// Share of wealth held in the risky asset through the period. Default: the allocation advised for it.
     pub executed_allocation: Option<f64>,
-    /// Wealth reached, where fees or flows made it differ from what the return and the allocation give.
+    /// Wealth reached, with what was added, where it differs from what the return, the allocation and the policy's
+    /// contributions give.
     pub wealth: Option<f64>,
     /// The name of the key that reports it, which no body says; empty where none was asked for.
     #[serde(skip)]
@@ -46,11 +48,15 @@ pub struct Observed {
     pub session: String,
     pub period: usize,
     pub log_return: f64,
+    /// The holdings that were best kept at the start of the period; where trading costs nothing both ends are the advised
+    /// allocation.
+    #[schema(value_type = [f64; 2])]
+    pub band: Band,
     pub executed_allocation: f64,
     /// The price reported, if one was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub price: Option<f64>,
-    /// Wealth at the end of the period.
+    /// Wealth at the end of the period, with what was added to it.
     pub wealth: f64,
     /// Share of it in the risky asset, as the return left it.
     pub holding: f64,

@@ -104,6 +104,7 @@ impl Sessions {
         let Start { policy, history, wealth, holding } = start;
         let advisor = self.policies.advisor(tenant, &policy).await?;
         let state = advisor.initial_state(history.as_deref(), wealth)?.with_holding(holding.unwrap_or(0.0))?;
+        advisor.check_withdrawals(0, &state)?;
         self.policies.starts_from(&advisor, state.law.sample_size())?;
         let problem = &advisor.specification().problem;
         let row = SessionRow {

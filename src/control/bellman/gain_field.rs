@@ -7,6 +7,9 @@
 //! the surrogate again: a product a node and return.
 //!
 //! Where trading costs, wealth depends on what the trade keeps of it as well, by a few percent at most: nearly linearly.
+//!
+//! Where money is to come, everything is relative to total wealth: a trade moves the share of it that is in hand, and the rest
+//! grows as the bank does.
 
 use super::next_value::NextValue;
 use super::problem::Problem;
@@ -22,12 +25,16 @@ const ACTION_NODES: usize = 4;
 
 /// Predictions tabulated over returns and trades, for one state.
 pub struct GainField<'a> {
-    problem: &'a Problem,
     next: &'a NextValue,
     utility: RelativeUtility,
     dynamics: Dynamics,
-    /// What selling everything grows to in one period.
+    /// Of the period after.
+    after: Dynamics,
+    /// What total wealth grows to in one period once everything is sold, and the share of it that is in hand now.
     bank: f64,
+    in_hand: f64,
+    /// No higher action is priced.
+    highest: f64,
     returns: Vec<f64>,
     action_nodes: Chebyshev,
     /// What the trades that are tabulated keep, the most and the least of those that are made, or nothing where one serves all.
@@ -42,28 +49,43 @@ pub struct GainField<'a> {
 impl<'a> GainField<'a> {
     /// `returns` ascending and distinct, `utility` relative to the floor of `state`. Cost O(returns x nodes x design count).
     pub fn tabulate(
-        problem: &'a Problem,
+        problem: &Problem,
+        step: usize,
         next: &'a NextValue,
         utility: RelativeUtility,
         state: &State,
         returns: Vec<f64>,
     ) -> Self {
-        let dynamics = problem.dynamics();
+        let [dynamics, after] = [step, step + 1].map(|step| problem.dynamics(step));
         let wealth_matters = next.depends_on_wealth(&problem.selection);
         let action_nodes = Chebyshev::new(if wealth_matters { ACTION_NODES } else { 1 });
         let liquidation = dynamics.liquidation(state.holding);
         let kept_nodes = (wealth_matters && dynamics.trading_cost > 0.0)
             .then(|| [1.0, dynamics.liquidation(1.0)].map(|left| left / liquidation));
-        let highest = problem.actions().highest;
+        let highest = problem.actions(step, state).highest.max(f64::MIN_POSITIVE);
         let trades = |kept: f64| action_nodes.nodes().iter().map(move |share| Trade { action: share * highest, kept });
         let trades: Vec<Trade> = match kept_nodes {
             Some(nodes) => nodes.into_iter().flat_map(trades).collect(),
             None => trades(1.0).collect(),
         };
-        let table = next.tabulate(problem, state, &returns, &trades);
-        let bank = state.wealth * liquidation * (1.0 + dynamics.rate_per_step);
+        let table = next.tabulate(problem, step, state, &returns, &trades);
+        let bank = dynamics.total(state.wealth, state.holding) * (1.0 + dynamics.rate_per_step);
+        let in_hand = dynamics.in_hand(state.wealth, state.holding);
         let holdings = next.holdings(problem);
-        GainField { problem, next, utility, dynamics, bank, returns, action_nodes, kept_nodes, holdings, table }
+        GainField {
+            next,
+            utility,
+            dynamics,
+            after,
+            bank,
+            in_hand,
+            highest,
+            returns,
+            action_nodes,
+            kept_nodes,
+            holdings,
+            table,
+        }
     }
 
     /// The returns at which it is exact, ascending.
@@ -76,12 +98,22 @@ impl<'a> GainField<'a> {
         let Dynamics { rate_per_step, .. } = self.dynamics;
         let sold = self.cost_of_selling() * trade.action * log_return.exp();
         let growth = self.dynamics.growth(trade.action, log_return) - sold;
-        self.utility.value(growth.ln() - rate_per_step.ln_1p() + trade.kept.ln())
+        self.utility.value(self.with_what_is_to_come(trade.kept * growth / (1.0 + rate_per_step)).ln())
+    }
+
+    /// Total wealth from wealth in hand, each over what selling everything at once would grow it to.
+    fn with_what_is_to_come(&self, relative: f64) -> f64 {
+        self.in_hand * relative + (1.0 - self.in_hand)
     }
 
     /// What the wealth that a floor stands for has paid of the holding: nothing at the horizon.
     fn cost_of_selling(&self) -> f64 {
         if matches!(self.next, NextValue::Terminal) { 0.0 } else { self.dynamics.trading_cost }
+    }
+
+    /// The share in hand of total wealth after the period.
+    fn in_hand_after(&self, total: f64) -> f64 {
+        (total - self.after.to_come) / total
     }
 
     /// Prepares evaluation at fixed returns.
@@ -113,7 +145,7 @@ impl<'a> GainField<'a> {
 
     /// The weights of the trades tabulated in what is read for `trade`.
     fn basis(&self, trade: Trade) -> Vec<f64> {
-        let actions = self.action_nodes.basis(trade.action / self.problem.actions().highest);
+        let actions = self.action_nodes.basis(trade.action / self.highest);
         match self.kept_nodes {
             None => actions,
             Some([most, least]) => {
@@ -143,17 +175,22 @@ impl FieldRows<'_> {
     /// Relative utility of the next state's certainty equivalent, return by return: `u(w(a, z))`. Cost O(returns x nodes).
     pub fn payoff(&self, trade: Trade) -> Vec<f64> {
         let GainField { next, utility, bank, .. } = self.field;
-        // S(x, a, z), all of it sold, over what selling at once would grow to.
-        let relative: Vec<f64> =
-            self.excesses.iter().map(|excess| trade.kept * (1.0 + trade.action * excess)).collect();
+        // S(x, a, z), all of it sold, with what is to come, over what selling at once would grow to.
+        let sold = self.excesses.iter().map(|excess| trade.kept * (1.0 + trade.action * excess));
+        let relative: Vec<f64> = sold.map(|relative| self.field.with_what_is_to_come(relative)).collect();
         let gains = match next {
             NextValue::Terminal => vec![0.0; relative.len()],
-            NextValue::Constant(holdings, gains) => {
-                self.holdings(trade).map(|holding| holdings.gain(gains, holding)).collect()
+            NextValue::Constant(holdings, gains) if holdings.matter() => {
+                let gain = |(holding, relative)| {
+                    let in_hand = self.field.in_hand_after(bank * relative);
+                    holdings.gain(gains, self.field.after, holding, in_hand)
+                };
+                self.holdings(trade).zip(&relative).map(gain).collect()
             }
+            NextValue::Constant(_, gains) => vec![gains[0].max(0.0); relative.len()],
             NextValue::Surrogate(_) | NextValue::Exact(..) if self.field.holdings.matter() => {
-                let wealths = relative.iter().map(|relative| bank * relative);
-                self.gains_by_holding(trade, wealths)
+                let totals: Vec<f64> = relative.iter().map(|relative| bank * relative).collect();
+                self.gains_by_holding(trade, &totals)
             }
             NextValue::Surrogate(_) | NextValue::Exact(..) => {
                 let mut gains = self.interpolated(trade);
@@ -164,22 +201,31 @@ impl FieldRows<'_> {
         utility.values(relative, &gains)
     }
 
-    /// The gains where the holding matters, which may have drifted beyond the highest action.
-    fn gains_by_holding(&self, trade: Trade, wealths: impl Iterator<Item = f64>) -> Vec<f64> {
-        let GainField { next, holdings, dynamics, .. } = self.field;
+    /// The gains where the holding matters, which may have drifted beyond the highest action; `totals` are of total wealth.
+    fn gains_by_holding(&self, trade: Trade, totals: &[f64]) -> Vec<f64> {
+        let GainField { next, holdings, after, .. } = self.field;
         let held: Vec<f64> = self.holdings(trade).collect();
         let mut gains = self.interpolated_at(trade, &held);
-        let liquidated = wealths.zip(&held).map(|(wealth, &holding)| {
-            wealth * (dynamics.liquidation(holdings.within(holding)) / dynamics.liquidation(holding))
+        let within = totals.iter().zip(&held).map(|(total, &holding)| {
+            let liquidation = after.liquidation(holdings.within(holding)) / after.liquidation(holding);
+            (total - after.to_come) * liquidation + after.to_come
         });
-        next.gains(&mut gains, liquidated);
-        gains.iter_mut().zip(&held).for_each(|(gain, &holding)| *gain += holdings.beyond(holding));
+        next.gains(&mut gains, within);
+        for ((gain, &holding), total) in gains.iter_mut().zip(&held).zip(totals) {
+            *gain += holdings.beyond(*after, holding, self.field.in_hand_after(*total));
+        }
         gains
     }
 
-    /// The share held after each return: `a e^z / ((1-a)(1+r) + a e^z)`.
+    /// The share held after each return.
     fn holdings(&self, trade: Trade) -> impl Iterator<Item = f64> {
-        self.growths.iter().map(move |growth| trade.action * growth / (1.0 - trade.action + trade.action * growth))
+        let GainField { bank, in_hand, dynamics: Dynamics { contribution, .. }, .. } = self.field;
+        let before = bank * in_hand * trade.kept;
+        self.growths.iter().map(move |growth| {
+            let relative = 1.0 - trade.action + trade.action * growth;
+            let grown = before * relative;
+            trade.action * growth / relative * (grown / (grown + contribution))
+        })
     }
 
     /// The tabulated predictions, along trades.

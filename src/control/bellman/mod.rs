@@ -12,6 +12,9 @@
 //! itself, as if its cost were paid both ways, which leaves no kink. The best action is the nearer end of the band between the
 //! two optima, or the holding inside it. Source: Davis and Norman (1990), Portfolio selection with transaction costs.
 //!
+//! Where money comes and goes, wealth is total wealth throughout, of which a trade moves the part in hand
+//! (`control/problem/dynamics.rs`).
+//!
 //! What differs between uncertainty sets is how an action is priced (`Pricing`); the search for the best one is the same.
 
 pub mod gain_field;
@@ -76,7 +79,8 @@ pub struct DesignSolution {
     pub solution: RobustSolution,
     /// Floor gains at the holdings asked for, or the solution's own alone where the holding does not matter.
     pub floor_gains: Vec<f64>,
-    /// Either end of the band, or the action where both are one, continued past the bounds of the interval.
+    /// Either end of the band, or the action where both are one, continued past the bounds of the interval, as shares of total
+    /// wealth.
     pub policy_targets: Vec<f64>,
 }
 
@@ -84,19 +88,20 @@ impl BellmanStep<'_> {
     /// Solves the step at `state`. Cost: the gain field, and some thirty actions priced, twice as many where trading costs.
     pub fn solve(&self, state: &State) -> RobustSolution {
         let set = self.problem.uncertainty_set(state);
-        self.optimum(state, &set, self.problem.actions(), |_, _| ()).0.at_least_the_bank()
+        self.optimum(state, &set, self.actions(state), |_, _| ()).0.at_least_the_bank()
     }
 
     /// The same were the uncertainty set of this step alone of another radius; the value of the step after stays.
     pub fn solve_within(&self, state: &State, radius: f64) -> RobustSolution {
         let set = self.problem.uncertainty_set_within(state, radius);
-        self.optimum(state, &set, self.problem.actions(), |_, _| ()).0.at_least_the_bank()
+        self.optimum(state, &set, self.actions(state), |_, _| ()).0.at_least_the_bank()
     }
 
     /// [`Self::solve`] with what the surrogates learn: the floor gains of the state with any of `holdings`, and the band.
     pub fn solve_for_design(&self, state: &State, holdings: Holdings) -> DesignSolution {
-        let (set, actions) = (self.problem.uncertainty_set(state), self.problem.actions());
-        let (utility, dynamics) = (self.utility(state), self.problem.dynamics());
+        let (set, actions) = (self.problem.uncertainty_set(state), self.actions(state));
+        let (utility, dynamics) = (self.utility(state), self.problem.dynamics(self.step));
+        let in_hand = self.problem.in_hand(self.step, state);
         let curvature = utility.relative_risk_aversion() * set.variance();
         let largest = self.problem.largest_gain(self.step, state);
         let (solution, (floor_gains, policy_targets)) = self.optimum(state, &set, actions, |pricing, found| {
@@ -106,16 +111,17 @@ impl BellmanStep<'_> {
                     Side::Buying => found.band.low,
                     Side::Selling => found.band.high,
                 };
-                let gain_at = |action: f64| gain(dynamics.trade(side, state.holding, action));
+                let gain_at = |share: f64| gain(dynamics.trade(side, state.holding, share / in_hand));
                 // Where both sides are one, that is known.
-                let own = if dynamics.trading_cost > 0.0 { gain_at(end) } else { found.floor_gain };
-                policy_target(end, actions.highest, own, curvature, gain_at)
+                let own = if dynamics.trading_cost > 0.0 { gain_at(end * in_hand) } else { found.floor_gain };
+                policy_target(end * in_hand, actions.highest * in_hand, own, curvature, gain_at)
             };
             // Of another holding the floor is another, and so is what the trade keeps.
             let gain_of = |holding: f64| {
                 let Trade { action, kept } = dynamics.trade_into(found.band, holding);
-                let floors = dynamics.liquidation(holding) / dynamics.liquidation(state.holding);
-                not_above(largest, gain(Trade { action, kept: kept * floors })) - floors.ln()
+                let liquidated = dynamics.liquidation(holding) / dynamics.liquidation(state.holding);
+                let [floor, own] = [holding, state.holding].map(|holding| dynamics.total(state.wealth, holding));
+                not_above(largest, gain(Trade { action, kept: kept * liquidated })) - (floor / own).ln()
             };
             let gains = match holdings.matter() {
                 true => holdings.nodes().map(|holding| not_below_zero(gain_of(holding))).collect(),
@@ -132,6 +138,10 @@ impl BellmanStep<'_> {
         self.optimum(state, &self.problem.uncertainty_set(state), only, |_, _| ()).0
     }
 
+    fn actions(&self, state: &State) -> ActionInterval {
+        self.problem.actions(self.step, state)
+    }
+
     fn utility(&self, state: &State) -> RelativeUtility {
         RelativeUtility::new(self.problem.specification.problem.utility, self.problem.floor(self.step, state))
     }
@@ -145,11 +155,12 @@ impl BellmanStep<'_> {
         actions: ActionInterval,
         then: impl Fn(&dyn Pricing, &RobustSolution) -> T,
     ) -> (RobustSolution, T) {
-        let (utility, dynamics) = (self.utility(state), self.problem.dynamics());
+        let (utility, dynamics) = (self.utility(state), self.problem.dynamics(self.step));
         let largest = self.problem.largest_gain(self.step, state);
         let (mut reach, mut growths) = (Reach::FIRST, 0);
         loop {
-            let field = GainField::tabulate(self.problem, self.next, utility, state, set.exact_returns(reach));
+            let returns = set.exact_returns(reach);
+            let field = GainField::tabulate(self.problem, self.step, self.next, utility, state, returns);
             let mut pricing: Box<dyn Pricing + '_> = match set {
                 UncertaintySet::Point(centre) => Box::new(TransportPricing::new(centre, 0.0, &field)),
                 UncertaintySet::Ball { centre, radius, .. } => Box::new(TransportPricing::new(centre, *radius, &field)),

@@ -31,7 +31,7 @@ impl NextValue {
             None => NextValue::Terminal,
             Some(Solution::Single(single)) => {
                 let gains = single.floor_gains.clone();
-                NextValue::Constant(Holdings::of(&specification.problem, gains.len()), gains)
+                NextValue::Constant(Holdings::new(gains.len(), specification.problem.action_interval[1]), gains)
             }
             Some(Solution::Surrogates(stored)) => {
                 NextValue::Surrogate(Box::new(ValueSurrogate::new(specification, step, stored)))
@@ -57,23 +57,32 @@ impl NextValue {
         }
     }
 
-    /// Predictions at every state that follows from `state` through one of `returns` (ascending) after one of `trades`,
+    /// Predictions at every state that follows from `state` at `step` through one of `returns` (ascending) after one of `trades`,
     /// return by return, trade by trade, holding by holding; nothing where the value is constant. Without wealth in it, of one
     /// trade alone. Cost O(returns x trades x design points x holdings).
-    pub fn tabulate(&self, problem: &Problem, state: &State, returns: &[f64], trades: &[Trade]) -> Vec<f64> {
-        let dynamics = problem.dynamics();
+    pub fn tabulate(
+        &self,
+        problem: &Problem,
+        step: usize,
+        state: &State,
+        returns: &[f64],
+        trades: &[Trade],
+    ) -> Vec<f64> {
+        let [dynamics, after] = [step, step + 1].map(|step| problem.dynamics(step));
         let start = state.wealth * dynamics.liquidation(state.holding);
-        let wealth = |trade: &Trade, log_return: f64| start * trade.kept * dynamics.growth(trade.action, log_return);
+        let wealth = |trade: &Trade, log_return: f64| {
+            start * trade.kept * dynamics.growth(trade.action, log_return) + dynamics.contribution
+        };
         let mut table = Vec::with_capacity(returns.len() * trades.len() * self.holdings(problem).count());
         match self {
             NextValue::Terminal | NextValue::Constant(..) => {}
             NextValue::Surrogate(surrogate) => {
                 let moves = self.depends_on_wealth(&problem.selection);
-                let features = problem.features_with(&state.law, state.wealth, returns);
+                let features = problem.features_with(&state.law, dynamics.total(state.wealth, 0.0), returns);
                 for (features, &log_return) in features.iter().zip(returns) {
                     if moves {
-                        let wealths = trades.iter().map(|trade| wealth(trade, log_return));
-                        table.extend(surrogate.predictions(features, wealths.map(|x| problem.selection.wealth(x))));
+                        let totals = trades.iter().map(|trade| after.total(wealth(trade, log_return), 0.0));
+                        table.extend(surrogate.predictions(features, totals.map(|x| problem.selection.wealth(x))));
                     } else {
                         table.extend(surrogate.prediction(features));
                     }
@@ -94,14 +103,14 @@ impl NextValue {
         table
     }
 
-    /// Turns predictions into floor gains, in place; `liquidated` is the wealth of each state after selling
-    /// all, of a holding no higher than any at which the value is known.
-    pub fn gains(&self, predictions: &mut [f64], liquidated: impl Iterator<Item = f64>) {
+    /// Turns predictions into floor gains, in place; `totals` is the total wealth of each state after selling all, of a
+    /// holding no higher than any at which the value is known.
+    pub fn gains(&self, predictions: &mut [f64], totals: impl Iterator<Item = f64>) {
         match self {
             NextValue::Terminal | NextValue::Constant(..) => {}
             NextValue::Surrogate(surrogate) => {
-                for (prediction, liquidated) in predictions.iter_mut().zip(liquidated) {
-                    *prediction = surrogate.clamped_gain(*prediction, liquidated);
+                for (prediction, total) in predictions.iter_mut().zip(totals) {
+                    *prediction = surrogate.clamped_gain(*prediction, total);
                 }
             }
             NextValue::Exact(..) => predictions.iter_mut().for_each(|gain| *gain = gain.max(0.0)),

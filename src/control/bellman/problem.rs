@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
+use crate::control::error::FieldError;
 use crate::control::kept::Kept;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::dynamics::Dynamics;
@@ -10,6 +11,7 @@ use crate::control::problem::holdings::Holdings;
 use crate::control::problem::state::State;
 use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::specification::{ProblemSpecification, Specification};
+use crate::control::request::withdrawals::check_bank;
 use crate::control::surrogate::features::{FeatureSelection, Features, LawSummary};
 use crate::control::uncertainty::UncertaintySet;
 use crate::control::uncertainty::centre::Centre;
@@ -30,6 +32,8 @@ pub struct Problem {
     pub sets: RadiusEstimator,
     /// What of a state the surrogates see.
     pub selection: FeatureSelection,
+    /// Of every period, and of the time after the last.
+    periods: Vec<Dynamics>,
     /// The uncertainty set of every state, where nothing is learned; computed once.
     frozen: OnceLock<Frozen>,
 }
@@ -49,28 +53,45 @@ impl Problem {
     pub fn with(specification: &Specification, kept: Kept) -> Self {
         let sets = RadiusEstimator::new(specification, kept);
         let selection = FeatureSelection::new(specification, sets.varies());
-        Problem { specification: specification.clone(), sets, selection, frozen: OnceLock::new() }
+        let periods = Dynamics::of(&specification.problem);
+        Problem { specification: specification.clone(), sets, selection, periods, frozen: OnceLock::new() }
     }
 
     /// So many holdings where trading costs; else the holding does not matter, and one is enough.
     pub fn holdings(&self, count: usize) -> Holdings {
-        Holdings::of(&self.specification.problem, if self.dynamics().trading_cost > 0.0 { count } else { 1 })
+        let problem = &self.specification.problem;
+        Holdings::new(if problem.trading_cost > 0.0 { count } else { 1 }, problem.action_interval[1])
     }
 
-    /// A, the shares of wealth that may be held.
-    pub fn actions(&self) -> ActionInterval {
+    /// A, the shares of wealth that may be held in the period after `step`.
+    pub fn actions(&self, step: usize, state: &State) -> ActionInterval {
         let [lowest, highest] = self.specification.problem.action_interval;
-        ActionInterval { lowest, highest }
+        ActionInterval { lowest, highest: self.dynamics(step).highest_action(state.wealth, highest) }
     }
 
-    /// S, period by period.
-    pub fn dynamics(&self) -> Dynamics {
-        Dynamics::of(&self.specification.problem)
+    /// S of the period after `step`, which is at most the horizon.
+    pub fn dynamics(&self, step: usize) -> Dynamics {
+        self.periods[step]
+    }
+
+    /// The share of total wealth, before anything is sold, that is in hand: in its unit the surrogates know actions.
+    pub fn in_hand(&self, step: usize, state: &State) -> f64 {
+        self.dynamics(step).in_hand(state.wealth, 0.0)
     }
 
     /// Terminal all-bank wealth from a state at `step`.
     pub fn floor(&self, step: usize, state: &State) -> f64 {
-        self.dynamics().floor(state.wealth, state.holding, self.specification.problem.horizon - step)
+        self.dynamics(step).floor(state.wealth, state.holding, self.specification.problem.horizon - step)
+    }
+
+    /// Checks that the bank alone pays for everything that is withdrawn after `step`, from all that selling `state` leaves.
+    ///
+    /// # Errors
+    /// It runs dry, under the name `wealth`.
+    pub fn check_withdrawals(&self, step: usize, state: &State) -> Result<(), FieldError> {
+        let liquidated = state.wealth * self.dynamics(step).liquidation(state.holding);
+        let periods = &self.periods[step..self.periods.len() - 1];
+        check_bank(periods, step, liquidated).map_err(|rule| FieldError::new("wealth", state.wealth, rule))
     }
 
     /// The most that the floor gain of a state at `step` can be: that of the best return of its centre in every period. The
@@ -83,7 +104,8 @@ impl Problem {
             (true, true) => LOG_RETURN,
             (true, false) => state.law.atoms().last().copied().unwrap_or(LOG_RETURN),
         };
-        largest_gain(problem, step, best) - self.dynamics().liquidation(state.holding).ln()
+        let [all, unsold] = [state.holding, 0.0].map(|holding| self.dynamics(step).total(state.wealth, holding));
+        largest_gain(problem, step, best) + (unsold / all).ln()
     }
 
     /// The uncertainty set at a state: of the state's law where the framework learns.
@@ -154,35 +176,35 @@ impl Problem {
     }
 
     /// The features of a state, unscaled.
-    pub fn features(&self, state: &State) -> Features {
-        self.features_within(state, if self.selection.has_ball() { self.radius(state) } else { 0.0 })
+    pub fn features(&self, step: usize, state: &State) -> Features {
+        self.features_within(step, state, if self.selection.has_ball() { self.radius(state) } else { 0.0 })
     }
 
     /// The same where the radius of the state is known already.
-    pub fn features_within(&self, state: &State, radius: f64) -> Features {
-        let moments = CentralMoments::of(&state.law);
+    pub fn features_within(&self, step: usize, state: &State, radius: f64) -> Features {
+        let (moments, total) = (CentralMoments::of(&state.law), self.dynamics(step).total(state.wealth, 0.0));
         if !self.selection.has_ball() {
-            return self.selection.of(state.wealth, &without_ball(moments));
+            return self.selection.of(total, &without_ball(moments));
         }
         let radii = self.sets.radii(&state.law, radius);
         let worst = ExponentialMean::of(&state.law, self.lowest_return()).worst(radii.radius);
-        self.selection.of(state.wealth, &self.summary(moments, radii, worst))
+        self.selection.of(total, &self.summary(moments, radii, worst))
     }
 
-    /// Features of the laws that follow from `law` when each of `returns` (ascending) is learned, for one wealth.
-    pub fn features_with(&self, law: &EmpiricalDistribution, wealth: f64, returns: &[f64]) -> Vec<Features> {
+    /// Features of the laws that follow from `law` when each of `returns` (ascending) is learned, for one total wealth.
+    pub fn features_with(&self, law: &EmpiricalDistribution, total: f64, returns: &[f64]) -> Vec<Features> {
         let before = CentralMoments::of(law);
         if !self.learns() {
-            return vec![self.selection.of(wealth, &without_ball(before)); returns.len()];
+            return vec![self.selection.of(total, &without_ball(before)); returns.len()];
         }
         if !self.selection.has_ball() {
-            let features = |&log_return: &f64| self.selection.of(wealth, &without_ball(before.with(log_return)));
+            let features = |&log_return: &f64| self.selection.of(total, &without_ball(before.with(log_return)));
             return returns.iter().map(features).collect();
         }
         let mean = ExponentialMean::of(law, self.lowest_return());
         let features = |(&log_return, radii): (&f64, Radii)| {
             let worst = mean.worst_with(log_return, radii.radius);
-            self.selection.of(wealth, &self.summary(before.with(log_return), radii, worst))
+            self.selection.of(total, &self.summary(before.with(log_return), radii, worst))
         };
         returns.iter().zip(self.sets.radii_with(law, returns)).map(features).collect()
     }
@@ -200,13 +222,15 @@ impl Problem {
 
 /// The floor gain from `step` of the highest allocation where every period earns `best_return`:
 ///
-///   (T - t) ln(1 + a ((e^z / (1 + r)) - 1)),   a the highest allocation, z the best return
+///   (T - t) ln(1 + a ((e^z / (1 + r)) - 1)),   z the best return,
 ///
-/// Who holds something before trading has gained, beside it, what selling that would cost.
+/// a the highest allocation, and where money comes and goes 1, the most of total wealth that an action can be. Who holds
+/// something before trading has gained, beside it, what selling that would cost.
 pub fn largest_gain(problem: &ProblemSpecification, step: usize, best_return: f64) -> f64 {
     let bank = problem.rate_per_step.ln_1p();
     let excess = (best_return - bank).exp_m1().max(0.0);
-    (problem.horizon - step) as f64 * (problem.action_interval[1] * excess).ln_1p()
+    let highest = if problem.contributions.are_none() { problem.action_interval[1] } else { 1.0 };
+    (problem.horizon - step) as f64 * (highest * excess).ln_1p()
 }
 
 fn without_ball(moments: CentralMoments) -> LawSummary {

@@ -24,11 +24,10 @@ pub fn keep(bands: impl IntoIterator<Item = Band>, periods: &[Period], cost: f64
     let (mut wealth, mut traded) = (vec![initial_wealth], Vec::with_capacity(periods.len()));
     let (mut allocations, mut now, mut holding) = (Vec::with_capacity(periods.len()), initial_wealth, 0.0);
     for (band, period) in bands.into_iter().zip(periods) {
-        let dynamics = Dynamics { rate_per_step: period.bank_return, trading_cost: cost };
+        let dynamics = Dynamics::plain(period.bank_return, cost);
         let allocation = band.nearest(holding);
         traded.push(f64::abs(allocation - holding));
-        now = dynamics.next_wealth(now, holding, allocation, period.log_return);
-        holding = dynamics.drifted(allocation, period.log_return);
+        (now, holding) = dynamics.next(now, holding, allocation, period.log_return);
         wealth.push(now);
         allocations.push(allocation);
     }

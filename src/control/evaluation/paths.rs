@@ -246,7 +246,7 @@ impl Simulator<'_> {
     ) -> Result<(Outcome, f64), TrainError> {
         self.watch.go_on()?;
         let problem = &self.evaluation.request.problem;
-        let dynamics = Dynamics::of(problem);
+        let periods = Dynamics::of(problem);
         let returns = self.evaluation.returns(history, path);
         let distances = self.distances_along(sample, &returns);
         let mut outcome = Outcome { wealth: Vec::new(), lived: Vec::with_capacity(advisors.len() * returns.len()) };
@@ -262,10 +262,10 @@ impl Simulator<'_> {
             )?);
         }
         for &mix in self.evaluation.request.mixes() {
-            let step = |(wealth, holding): (f64, f64), &log_return: &f64| {
-                (dynamics.next_wealth(wealth, holding, mix, log_return), dynamics.drifted(mix, log_return))
+            let step = |(wealth, holding): (f64, f64), (dynamics, &log_return): (&Dynamics, &f64)| {
+                dynamics.next(wealth, holding, dynamics.highest_action(wealth, mix), log_return)
             };
-            outcome.wealth.push(returns.iter().fold((problem.initial_wealth, 0.0), step).0);
+            outcome.wealth.push(periods.iter().zip(&returns).fold((problem.initial_wealth, 0.0), step).0);
         }
         self.report_path();
         Ok((outcome, seconds))

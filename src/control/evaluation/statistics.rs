@@ -156,7 +156,7 @@ impl Table<'_> {
     /// Utility in units of the terminal wealth of all-bank, and that wealth.
     fn relative_utility(&self) -> (RelativeUtility, f64) {
         let problem = &self.evaluation.request.problem;
-        let floor = Dynamics::of(problem).floor(problem.initial_wealth, 0.0, problem.horizon);
+        let floor = Dynamics::of(problem)[0].floor(problem.initial_wealth, 0.0, problem.horizon);
         (RelativeUtility::new(problem.utility, floor), floor)
     }
 

@@ -33,9 +33,12 @@ pub struct Advice {
     pub band: Band,
     /// The allocation less the holding: the share of wealth to buy, or where it is negative to sell.
     pub trade: f64,
+    /// Money added at the end of the period, withdrawn where it is negative.
+    pub contribution: f64,
     /// Certainty equivalent of the robust value, in terminal wealth.
     pub certainty_equivalent: f64,
-    /// Terminal wealth of selling everything now and staying in the bank: no law can take it away.
+    /// Terminal wealth of selling everything now and staying in the bank, with all that is added and withdrawn until then: no
+    /// law can take it away.
     pub floor: f64,
     /// Radius of the uncertainty set: of the Wasserstein ball, in log-return; in the parametric frameworks half the width
     /// of the confidence region in the mean, in estimated standard deviations of a return.

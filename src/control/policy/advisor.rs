@@ -16,7 +16,6 @@ use crate::control::policy::worst_case::WorstCase;
 use crate::control::problem::actions::Band;
 use crate::control::problem::holdings::Holdings;
 use crate::control::problem::state::State;
-use crate::control::problem::utility::depends_on_wealth;
 use crate::control::request::specification::{Specification, UtilitySpecification};
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
 use crate::control::uncertainty::radius::Measure;
@@ -117,6 +116,14 @@ impl Advisor {
             return Err(FieldError::new("history", value, "must be the policy's own under a static framework"));
         }
         State::new(history, wealth.unwrap_or(problem.initial_wealth))
+    }
+
+    /// Checks that a state after `step` observed periods can pay for every withdrawal to come.
+    ///
+    /// # Errors
+    /// The bank alone runs dry, under the name `wealth`.
+    pub fn check_withdrawals(&self, step: usize, state: &State) -> Result<(), FieldError> {
+        self.problem.check_withdrawals(step, state)
     }
 
     /// The advice for the period after `step` observed periods. `step` must be below the horizon.
@@ -240,6 +247,7 @@ impl Advisor {
             holding,
             band,
             trade: allocation - holding,
+            contribution: self.problem.dynamics(asked.step).contribution,
             certainty_equivalent: floor * floor_gain.exp(),
             floor,
             radius: asked.radius,
@@ -254,30 +262,32 @@ impl Advisor {
     fn predict(&self, step: usize, state: &State, radius: f64) -> Prediction {
         // An imported policy may claim anything.
         let largest = self.problem.largest_gain(step, state);
+        let (dynamics, highest) = (self.problem.dynamics(step), self.specification().problem.action_interval[1]);
+        let in_hand = dynamics.in_hand(state.wealth, state.holding);
         match &self.policy.steps()[step].solution {
             Solution::Single(single) => {
                 let in_design = self.is_single_state(step, state);
-                let holdings = Holdings::of(&self.specification().problem, single.floor_gains.len());
-                let floor_gain = holdings.gain(&single.floor_gains, state.holding).min(largest);
-                Prediction { band: single.band, floor_gain, deviation: 0.0, in_design }
+                let holdings = Holdings::new(single.floor_gains.len(), highest);
+                let gain = holdings.gain(&single.floor_gains, dynamics, state.holding, in_hand);
+                Prediction { band: single.band, floor_gain: gain.min(largest), deviation: 0.0, in_design }
             }
             Solution::Surrogates(stored) => {
                 let PreparedStep { value, policy, factor } = self.prepared_from(step, stored);
-                let input = value.scaling.apply(&self.problem.features_within(state, radius));
+                let input = value.scaling.apply(&self.problem.features_within(step, state, radius));
                 let process = factor.process(&self.kept, stored);
                 let deviation =
                     process.as_ref().as_ref().map_or(f64::INFINITY, |found| found.latent_variance(&input).sqrt());
-                let highest = self.specification().problem.action_interval[1];
                 let (ends, predictions, holdings) = (policy.at(&input), value.surrogate.at(&input), value.holdings());
                 let is_finite = ends.iter().all(|end| end.is_finite());
-                let ends: Vec<f64> = ends.into_iter().map(|end| end.clamp(0.0, highest)).collect();
+                let (unit, highest) = (self.problem.in_hand(step, state), self.problem.actions(step, state).highest);
+                let ends: Vec<f64> = ends.into_iter().map(|end| (end / unit).clamp(0.0, highest)).collect();
                 let prediction = holdings.at(&predictions, state.holding);
-                let liquidated = state.wealth * self.problem.dynamics().liquidation(holdings.within(state.holding));
-                let gain = value.clamped_gain(prediction, liquidated) + holdings.beyond(state.holding);
+                let total = dynamics.total(state.wealth, holdings.within(state.holding));
+                let gain = value.clamped_gain(prediction, total) + holdings.beyond(dynamics, state.holding, in_hand);
                 Prediction {
                     band: Band::of(&ends),
                     floor_gain: gain.min(largest),
-                    deviation: value.gain_spread(prediction, deviation * stored.value.scale, liquidated).min(largest),
+                    deviation: value.gain_spread(prediction, deviation * stored.value.scale, total).min(largest),
                     in_design: deviation <= stored.deviation_limit && is_finite,
                 }
             }
@@ -290,7 +300,7 @@ impl Advisor {
         let start = EmpiricalDistribution::new(&problem.history);
         let same_law = !problem.framework.learns() || (step == 0 && state.law == start);
         let trained = self.specification().design.wealth.map_or(problem.initial_wealth, |wealth| wealth.min);
-        let same_wealth = !depends_on_wealth(problem.utility) || state.wealth == trained;
+        let same_wealth = !problem.depends_on_wealth() || state.wealth == trained;
         same_law && same_wealth
     }
 
@@ -316,35 +326,8 @@ impl Advisor {
         }
     }
 
-    /// The state after holding `allocation` through `log_return`.
-    pub fn advance(&self, state: &State, allocation: f64, log_return: f64) -> State {
-        self.problem.dynamics().next_state(state, allocation, log_return)
-    }
-
-    /// The advice before each of `returns`, followed; at most `horizon` returns are used.
-    pub fn walk<'a>(&'a self, start: State, returns: &'a [f64]) -> Walk<'a> {
-        let horizon = self.specification().problem.horizon;
-        Walk { advisor: self, returns: &returns[..returns.len().min(horizon)], step: 0, state: start }
-    }
-}
-
-/// An investor who follows a policy through given returns.
-pub struct Walk<'a> {
-    advisor: &'a Advisor,
-    returns: &'a [f64],
-    step: usize,
-    /// Where he is now.
-    pub state: State,
-}
-
-impl Iterator for Walk<'_> {
-    type Item = Advice;
-
-    fn next(&mut self) -> Option<Advice> {
-        let log_return = *self.returns.get(self.step)?;
-        let advice = self.advisor.advise(self.step, &self.state, AdviceMode::Surrogate);
-        self.state = self.advisor.advance(&self.state, advice.allocation, log_return);
-        self.step += 1;
-        Some(advice)
+    /// The state after holding `allocation` through `log_return`, from a state after `step` observed periods.
+    pub fn advance(&self, step: usize, state: &State, allocation: f64, log_return: f64) -> State {
+        state.next_state(self.problem.dynamics(step), allocation, log_return)
     }
 }

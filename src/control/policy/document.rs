@@ -152,8 +152,13 @@ const ROUNDING: f64 = 1e-9;
 
 /// The floor gain of a step were every return the best that is accepted: no state is worth more.
 fn credible_gain(specification: &Specification, step: usize) -> f64 {
-    let unsold = Dynamics::of(&specification.problem).liquidation(1.0).ln();
-    (largest_gain(&specification.problem, step, rules::LOG_RETURN) - unsold) * (1.0 + ROUNDING)
+    let problem = &specification.problem;
+    // Of what withdrawals leave, selling may take nearly everything.
+    let unsold = match problem.contributions.are_none() {
+        true => Dynamics::plain(problem.rate_per_step, problem.trading_cost).liquidation(1.0).ln(),
+        false => (rules::WEALTH.0 / rules::WEALTH.1).ln(),
+    };
+    (largest_gain(problem, step, rules::LOG_RETURN) - unsold) * (1.0 + ROUNDING)
 }
 
 /// Bound on every other stored number.
@@ -204,7 +209,7 @@ fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) 
 fn check_functions(field: &str, stored: &StepSurrogates, specification: &Specification) -> Result<(), FieldError> {
     let functions = stored.value.weights.len();
     check_holdings(&format!("{field}.value.weights"), functions, specification, &HOLDINGS_OF_A_SURROGATE)?;
-    let ends = Dynamics::of(&specification.problem).sides().len();
+    let ends = Dynamics::of(&specification.problem)[0].sides().len();
     rules::whole(&format!("{field}.policy.weights"), stored.policy.weights.len(), &(ends..=ends))
 }
 

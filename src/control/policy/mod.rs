@@ -4,6 +4,7 @@ pub mod advice;
 pub mod advisor;
 mod document;
 pub mod prepared;
+pub mod walk;
 pub mod what_if;
 pub mod worst_case;
 

@@ -112,6 +112,7 @@ impl Advisor {
         let wealth = hypothesis.wealth.unwrap_or(state.wealth);
         let holding = hypothesis.holding.unwrap_or(state.holding);
         let now = State { wealth, holding, law: state.law.clone() };
+        self.check_withdrawals(step, &now)?;
         let Some(log_return) = hypothesis.log_return else { return Ok((step, now)) };
         let horizon = self.specification().problem.horizon;
         if step + 1 >= horizon {
@@ -119,7 +120,7 @@ impl Advisor {
             return Err(FieldError::new("log_return", log_return, rule));
         }
         let advised = self.advise(step, &now, AdviceMode::Surrogate).allocation;
-        let then = self.advance(&now, advised, log_return);
+        let then = self.advance(step, &now, advised, log_return);
         let (low, high) = rules::WEALTH;
         if !(low..=high).contains(&then.wealth) {
             let rule = format!("must leave a wealth in [{low}, {high}]");

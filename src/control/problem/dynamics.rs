@@ -1,24 +1,37 @@
-//! What becomes of money in a period: the paper's S, with the share held and the cost of changing it.
+//! What becomes of money in a period: the paper's S, with the share held, the cost of changing it, and what is added.
 //!
-//! Who holds the share h and wants a pays `c |a - h|` of wealth x, and the return z then moves both:
+//! Who holds the share h and wants a pays `c |a - h|` of wealth x; the return z then moves both, and C is added to the bank:
 //!
-//!   x' = x (1 - c |a - h|) ((1-a)(1+r) + a e^z),     h' = a e^z / ((1-a)(1+r) + a e^z).
+//!   x' = x (1 - c |a - h|) ((1-a)(1+r) + a e^z) + C,     h' = x (1 - c |a - h|) a e^z / x'.
 //!
-//! The safe policy sells all now: its terminal wealth `x (1 - c h) (1+r)^n` is the floor. The simulator, live
-//! sessions and the books of a backtest call these functions; the tables of the robust step hold the same formulas over many
-//! returns at once (`control/bellman/gain_field.rs`), which `tests/bellman.rs` compares.
+//! What is still to come is worth K now, by the bank: `K = (C + K') / (1 + r)`, K' that of the period after and 0 after the
+//! last. With it, total wealth `X = x + K` moves as wealth does that nothing is added to, by the share a x / X of it:
+//!
+//!   X' = X ((1 - a x / X)(1+r) + (a x / X) e^z)     where trading costs nothing.
+//!
+//! The safe policy sells all now: `(x (1 - c h) + K) (1+r)^n` at the horizon is the floor. Where K is negative, and on the way
+//! to what is added late, withdrawals must be paid whatever the asset does: `R = max(0, (R' - C) / (1 + r))` stays in the
+//! bank, and bounds the actions.
+//!
+//! The simulator, live sessions and the books of a backtest call these functions; the tables of the robust step hold the same
+//! formulas over many returns at once (`control/bellman/gain_field.rs`), which `tests/bellman.rs` compares.
 
 use crate::control::problem::actions::Band;
-use crate::control::problem::state::State;
 use crate::control::request::specification::ProblemSpecification;
 
-/// Bank return and trading cost of a period.
+/// Rates, costs and flows of a period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dynamics {
     /// r, per step.
     pub rate_per_step: f64,
     /// c, of the wealth that is moved between bank and asset.
     pub trading_cost: f64,
+    /// C, money added at the end of the period; negative where it is withdrawn.
+    pub contribution: f64,
+    /// K, the present value of this contribution and all later ones, by the bank.
+    pub to_come: f64,
+    /// R, what must stay in the bank through the period for it to pay every withdrawal to come.
+    pub reserve: f64,
 }
 
 /// A holding brought to an action.
@@ -40,12 +53,27 @@ pub enum Side {
 }
 
 impl Dynamics {
-    /// Of every period of a problem.
-    pub fn of(problem: &ProblemSpecification) -> Self {
-        Dynamics { rate_per_step: problem.rate_per_step, trading_cost: problem.trading_cost }
+    /// Of every period of a problem, and of the time after the last, when nothing is to come.
+    pub fn of(problem: &ProblemSpecification) -> Vec<Self> {
+        let mut after = Dynamics::plain(problem.rate_per_step, problem.trading_cost);
+        let mut periods = vec![after];
+        for step in (0..problem.horizon).rev() {
+            let (contribution, bank) = (problem.contributions.at(step), 1.0 + problem.rate_per_step);
+            let to_come = (contribution + after.to_come) / bank;
+            let reserve = ((after.reserve - contribution) / bank).max(0.0);
+            after = Dynamics { contribution, to_come, reserve, ..after };
+            periods.push(after);
+        }
+        periods.reverse();
+        periods
     }
 
-    /// Wealth after a period, per unit of wealth at its start after trading: `(1-a)(1+r) + a e^z`.
+    /// Of a period to whose wealth nothing is ever added.
+    pub fn plain(rate_per_step: f64, trading_cost: f64) -> Self {
+        Dynamics { rate_per_step, trading_cost, contribution: 0.0, to_come: 0.0, reserve: 0.0 }
+    }
+
+    /// What a unit of wealth after trading grows to: `(1-a)(1+r) + a e^z`.
     pub fn growth(self, action: f64, log_return: f64) -> f64 {
         (1.0 - action) * (1.0 + self.rate_per_step) + action * log_return.exp()
     }
@@ -60,30 +88,33 @@ impl Dynamics {
         1.0 - self.trading_cost * holding
     }
 
-    /// S(x, a, z): wealth after the holding was brought to `action` and held through `log_return`.
-    pub fn next_wealth(self, wealth: f64, holding: f64, action: f64, log_return: f64) -> f64 {
-        wealth * self.left(holding, action) * self.growth(action, log_return)
+    /// S(x, a, z): wealth and the share of it held, after the holding was brought to `action` and held through `log_return`.
+    pub fn next(self, wealth: f64, holding: f64, action: f64, log_return: f64) -> (f64, f64) {
+        let growth = self.growth(action, log_return);
+        let grown = wealth * self.left(holding, action) * growth;
+        let next = grown + self.contribution;
+        (next, action * log_return.exp() / growth * (grown / next))
     }
 
-    /// The share held after `log_return`.
-    pub fn drifted(self, action: f64, log_return: f64) -> f64 {
-        action * log_return.exp() / self.growth(action, log_return)
+    /// Total wealth: what selling everything leaves, and what is to come, `x (1 - c h) + K`.
+    pub fn total(self, wealth: f64, holding: f64) -> f64 {
+        wealth * self.liquidation(holding) + self.to_come
     }
 
-    /// G(y, a, z): next wealth and holding, and the law with the return learned.
-    pub fn next_state(self, state: &State, action: f64, log_return: f64) -> State {
-        let mut law = state.law.clone();
-        law.push(log_return);
-        State {
-            wealth: self.next_wealth(state.wealth, state.holding, action, log_return),
-            holding: self.drifted(action, log_return),
-            law,
-        }
+    /// The share of total wealth that selling everything leaves: 1 where nothing is to come.
+    pub fn in_hand(self, wealth: f64, holding: f64) -> f64 {
+        wealth * self.liquidation(holding) / self.total(wealth, holding)
     }
 
     /// Terminal wealth of selling everything and staying in the bank for `steps` steps.
     pub fn floor(self, wealth: f64, holding: f64, steps: usize) -> f64 {
-        wealth * self.liquidation(holding) * (1.0 + self.rate_per_step).powf(steps as f64)
+        self.total(wealth, holding) * (1.0 + self.rate_per_step).powf(steps as f64)
+    }
+
+    /// The highest action up to `highest` that leaves the reserve in the bank, whatever of the holding must be traded.
+    pub fn highest_action(self, wealth: f64, highest: f64) -> f64 {
+        let free = 1.0 - self.reserve / (wealth * self.liquidation(1.0));
+        highest.min(free).max(0.0)
     }
 
     /// The ways in which a holding is worth changing: one where that costs nothing.
@@ -114,28 +145,59 @@ impl Dynamics {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::request::contributions::Contributions;
+    use crate::control::request::withdrawals::check_bank;
 
-    const COSTLY: Dynamics = Dynamics { rate_per_step: 0.01, trading_cost: 0.02 };
+    fn costly() -> Dynamics {
+        Dynamics::plain(0.01, 0.02)
+    }
 
     /// 100 with 30 in the asset. Buying 20 more costs 0.4; of the 99.6 left half is held, and the asset rises by a fifth:
     /// 49.8 x 1.01 + 49.8 x 1.2 = 110.058, of which 59.76 are in the asset.
     #[test]
     fn a_period_agrees_with_pencil_and_paper() {
         let rise = 1.2_f64.ln();
-        assert!((COSTLY.next_wealth(100.0, 0.3, 0.5, rise) - 110.058).abs() < 1e-12);
-        assert!((COSTLY.drifted(0.5, rise) - 59.76 / 110.058).abs() < 1e-15);
+        let (wealth, holding) = costly().next(100.0, 0.3, 0.5, rise);
+        assert!((wealth - 110.058).abs() < 1e-12 && (holding - 59.76 / 110.058).abs() < 1e-15);
         // 30 sold for 29.4, two years in the bank.
-        assert!((COSTLY.floor(100.0, 0.3, 2) - 99.4 * 1.01 * 1.01).abs() < 1e-12);
+        assert!((costly().floor(100.0, 0.3, 2) - 99.4 * 1.01 * 1.01).abs() < 1e-12);
+    }
+
+    /// The same with 5 added at the end, and 21 withdrawn a year later: 5 / 1.01 - 21 / 1.01^2 = -15.6357... is to come, and
+    /// as much must stay in the bank. The 99.4 that selling leaves pay for both.
+    #[test]
+    fn what_is_added_and_withdrawn_agrees_with_pencil_and_paper() {
+        let problem = ProblemSpecification {
+            horizon: 2,
+            rate_per_step: 0.01,
+            trading_cost: 0.02,
+            contributions: Contributions::Listed(vec![5.0, -21.0]),
+            ..ProblemSpecification::of(vec![0.01, -0.01])
+        };
+        let periods = Dynamics::of(&problem);
+        let (wealth, holding) = periods[0].next(100.0, 0.3, 0.5, 1.2_f64.ln());
+        assert!((wealth - 115.058).abs() < 1e-12 && (holding - 59.76 / 115.058).abs() < 1e-15);
+        let to_come = 5.0 / 1.01 - 21.0 / (1.01 * 1.01);
+        assert!((periods[0].to_come - to_come).abs() < 1e-14 && (periods[0].reserve + to_come).abs() < 1e-14);
+        assert!((periods[1].reserve - 21.0 / 1.01).abs() < 1e-14 && periods[2] == Dynamics::plain(0.01, 0.02));
+        let floor = (99.4 * 1.01 + 5.0) * 1.01 - 21.0;
+        assert!((periods[0].floor(100.0, 0.3, 2) - floor).abs() < 1e-12);
+        // Of 98, after the dearest trade, the reserve is kept.
+        let free = periods[0].highest_action(100.0, 1.0);
+        assert!((98.0 * (1.0 - free) + to_come).abs() < 1e-12, "{free}");
+        assert!(check_bank(&periods, 0, 15.6).unwrap_err().contains("the end of period 2"));
+        assert!(check_bank(&periods[1..], 1, 20.7).unwrap_err().contains("the end of period 2"));
+        assert_eq!((check_bank(&periods, 0, 15.7), check_bank(&periods[1..], 1, 20.8)), (Ok(()), Ok(())));
     }
 
     #[test]
     fn what_a_trade_keeps_is_measured_by_what_selling_all_keeps() {
-        assert_eq!(COSTLY.trade_to(0.3, 0.0), Trade { action: 0.0, kept: 1.0 });
-        let bought = COSTLY.trade_into(Band { low: 0.5, high: 0.7 }, 0.3);
+        assert_eq!(costly().trade_to(0.3, 0.0), Trade { action: 0.0, kept: 1.0 });
+        let bought = costly().trade_into(Band { low: 0.5, high: 0.7 }, 0.3);
         assert!((bought.kept - 99.6 / 99.4).abs() < 1e-15 && bought.action == 0.5);
-        let stayed = COSTLY.trade_into(Band { low: 0.2, high: 0.7 }, 0.3);
+        let stayed = costly().trade_into(Band { low: 0.2, high: 0.7 }, 0.3);
         assert!((stayed.kept - 100.0 / 99.4).abs() < 1e-15 && stayed.action == 0.3);
-        let free = Dynamics { trading_cost: 0.0, ..COSTLY };
+        let free = Dynamics::plain(0.01, 0.0);
         assert_eq!((free.trade_to(0.3, 0.9).kept, free.sides().len()), (1.0, 1));
     }
 }

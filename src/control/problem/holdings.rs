@@ -7,7 +7,6 @@
 //! where a holding may have drifted, what is too much must be sold, and a formula continues it.
 
 use crate::control::problem::dynamics::Dynamics;
-use crate::control::request::specification::ProblemSpecification;
 
 /// Holdings at which the value of a design point is found, where trading costs.
 pub const HOLDINGS: usize = 17;
@@ -19,13 +18,12 @@ pub const HOLDINGS_OF_ONE_LAW: usize = 257;
 pub struct Holdings {
     count: usize,
     highest: f64,
-    dynamics: Dynamics,
 }
 
 impl Holdings {
-    /// Of `count` values: one for a function that does not depend on the holding, else at least four.
-    pub fn of(problem: &ProblemSpecification, count: usize) -> Self {
-        Holdings { count, highest: problem.action_interval[1], dynamics: Dynamics::of(problem) }
+    /// Up to the highest action, of `count` values: one for a function that does not depend on the holding, else at least four.
+    pub fn new(count: usize, highest: f64) -> Self {
+        Holdings { count, highest }
     }
 
     /// How many.
@@ -51,15 +49,17 @@ impl Holdings {
 
     /// What the floor gain of a holding beyond the highest action is more than that of the highest: what is beyond must be sold,
     ///
-    ///   ln(1 - c (h - a)) - ln((1 - c h) / (1 - c a)),   a the highest action,
+    ///   ln(s (1 - c (h - a)) (1 - c a) / (1 - c h) + 1 - s),   a the highest action,
     ///
-    /// good to c^2 where the band ends below a. 0 within, and where the holding does not matter.
-    pub fn beyond(self, holding: f64) -> f64 {
-        let (highest, dynamics) = (self.highest, self.dynamics);
+    /// s the share of total wealth `in_hand`; good to c^2 where the band ends below a. 0 within, and where the holding does not
+    /// matter.
+    pub fn beyond(self, dynamics: Dynamics, holding: f64, in_hand: f64) -> f64 {
+        let highest = self.highest;
         if !self.matter() || holding <= highest {
             return 0.0;
         }
-        (dynamics.left(holding, highest) * dynamics.liquidation(highest) / dynamics.liquidation(holding)).ln()
+        let kept = dynamics.left(holding, highest) * dynamics.liquidation(highest) / dynamics.liquidation(holding);
+        (in_hand * kept + (1.0 - in_hand)).ln()
     }
 
     /// The first of the four values to read at `holding`, and the weights of the cubic through them.
@@ -81,8 +81,8 @@ impl Holdings {
     }
 
     /// The floor gain at `holding`, from its values.
-    pub fn gain(self, values: &[f64], holding: f64) -> f64 {
-        self.at(values, holding).max(0.0) + self.beyond(holding)
+    pub fn gain(self, values: &[f64], dynamics: Dynamics, holding: f64, in_hand: f64) -> f64 {
+        self.at(values, holding).max(0.0) + self.beyond(dynamics, holding, in_hand)
     }
 }
 
@@ -90,25 +90,28 @@ impl Holdings {
 mod tests {
     use super::*;
 
-    fn holdings(count: usize, highest: f64) -> Holdings {
-        Holdings { count, highest, dynamics: Dynamics { rate_per_step: 0.0, trading_cost: 0.02 } }
+    fn costly() -> Dynamics {
+        Dynamics::plain(0.0, 0.02)
     }
 
     /// Of 100, 70 are held and 50 may be: 20 are sold for 19.6. Selling all 70 would leave 98.6, all 50 of a hundred 99.
     #[test]
     fn beyond_the_highest_action_the_rest_is_sold() {
-        let (of_highest, holdings) = (0.03, holdings(5, 0.5));
+        let (of_highest, holdings) = (0.03, Holdings::new(5, 0.5));
         let values = [0.0, 0.01, 0.02, 0.025, of_highest];
         let expected = of_highest + (99.6_f64 / 100.0 * 99.0 / 98.6).ln();
-        assert!((holdings.gain(&values, 0.7) - expected).abs() < 1e-15);
-        assert!((holdings.gain(&values, 0.5) - of_highest).abs() < 1e-15 && holdings.beyond(0.5) == 0.0);
+        let gain = |holding, in_hand| holdings.gain(&values, costly(), holding, in_hand);
+        assert!((gain(0.7, 1.0) - expected).abs() < 1e-15 && (gain(0.5, 1.0) - of_highest).abs() < 1e-15);
+        // As much again is to come: 198.6 after selling all, 99.6 / 100 of 99 and 100 after selling 20.
+        let with_more = of_highest + ((99.6_f64 / 100.0 * 99.0 + 100.0) / 198.6).ln();
+        assert!((gain(0.7, 98.6 / 198.6) - with_more).abs() < 1e-15);
     }
 
     #[test]
     fn a_cubic_is_read_exactly_everywhere() {
         let cubic = |h: f64| 0.3 - h + 2.0 * h * h - 0.7 * h * h * h;
         for count in [4, 5, 17] {
-            let holdings = holdings(count, 0.8);
+            let holdings = Holdings::new(count, 0.8);
             let values: Vec<f64> = holdings.nodes().map(cubic).collect();
             for step in 0..=80 {
                 let holding = f64::from(step) / 100.0;
@@ -124,7 +127,7 @@ mod tests {
         for place in 0..1000 {
             let bend = 0.3 + f64::from(place) / 1000.0 / 16.0;
             let value = |h: f64| 0.5 * (h - bend).max(0.0).powi(2);
-            let holdings = holdings(count, 1.0);
+            let holdings = Holdings::new(count, 1.0);
             let values: Vec<f64> = holdings.nodes().map(value).collect();
             for step in 0..=400 {
                 let holding = f64::from(step) / 400.0;
@@ -136,6 +139,7 @@ mod tests {
 
     #[test]
     fn one_value_is_read_at_any_holding() {
-        assert_eq!((holdings(1, 0.5).gain(&[0.2], 0.7), holdings(1, 0.5).matter()), (0.2, false));
+        let one = Holdings::new(1, 0.5);
+        assert_eq!((one.gain(&[0.2], costly(), 0.7, 1.0), one.matter()), (0.2, false));
     }
 }

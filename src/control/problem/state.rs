@@ -1,6 +1,7 @@
 //! The state y = (x, h, F^).
 
 use crate::control::error::FieldError;
+use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::rules;
 use crate::numerics::empirical::EmpiricalDistribution;
 
@@ -33,5 +34,13 @@ impl State {
     pub fn with_holding(self, holding: f64) -> Result<Self, FieldError> {
         rules::share("holding", holding)?;
         Ok(State { holding, ..self })
+    }
+
+    /// G(y, a, z): next wealth and holding after a period of `dynamics`, and the law with the return learned.
+    pub fn next_state(&self, dynamics: Dynamics, action: f64, log_return: f64) -> State {
+        let (wealth, holding) = dynamics.next(self.wealth, self.holding, action, log_return);
+        let mut law = self.law.clone();
+        law.push(log_return);
+        State { wealth, holding, law }
     }
 }

@@ -123,11 +123,6 @@ pub fn certainty_equivalent(utility: UtilitySpecification, value: f64) -> f64 {
     }
 }
 
-/// True where the floor gain depends on wealth: power and log utility are homogeneous.
-pub fn depends_on_wealth(utility: UtilitySpecification) -> bool {
-    matches!(utility, UtilitySpecification::Exponential { .. })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

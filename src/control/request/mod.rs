@@ -1,7 +1,9 @@
 //! What may be asked: the requests, their defaults, and every rule they must keep. No mathematics.
 
+pub mod contributions;
 pub mod evaluation;
 pub mod framework;
 pub mod radius_rule;
 pub mod rules;
 pub mod specification;
+pub mod withdrawals;

@@ -54,6 +54,17 @@ pub enum RadiusRule {
 }
 
 impl RadiusRule {
+    /// As on the wire.
+    pub fn name(&self) -> &'static str {
+        match self {
+            RadiusRule::Bridge { .. } => "bridge",
+            RadiusRule::Concentration { .. } => "concentration",
+            RadiusRule::RootN { .. } => "root_n",
+            RadiusRule::Fixed { .. } => "fixed",
+            RadiusRule::ChiSquare { .. } => "chi_square",
+        }
+    }
+
     /// The rule of a request that names none.
     pub fn default_of(framework: Framework) -> Self {
         let alpha = defaults::alpha();

@@ -1,12 +1,14 @@
 //! Every rule a specification must satisfy, checked before any work.
 
 use crate::control::error::FieldError;
+use crate::control::request::contributions::Contributions;
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{
     InitialLaws, Interval, ProblemSpecification, SamplingLaw, Specification, SurrogateSpecification,
     UtilitySpecification,
 };
+use crate::control::request::withdrawals;
 
 /// The covariance matrix of 10,000 points takes 800 MB.
 pub const LARGEST_COUNT: usize = 10_000;
@@ -89,6 +91,7 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
         let rule = format!("must be 0 or at least {SMALLEST_TRADING_COST:e}");
         return Err(FieldError::new("problem.trading_cost", problem.trading_cost, rule));
     }
+    contributions(problem)?;
     utility(problem)?;
     radius(&problem.radius_rule(), problem)?;
     if let Some(support) = problem.support {
@@ -120,6 +123,22 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
     Ok(())
 }
 
+fn contributions(problem: &ProblemSpecification) -> Result<(), FieldError> {
+    const FIELD: &str = "problem.contributions";
+    let amount = |field: &str, amount: f64| within(field, amount, -WEALTH.1, WEALTH.1);
+    match &problem.contributions {
+        Contributions::Each(each) => amount(FIELD, *each)?,
+        Contributions::Listed(all) if all.len() != problem.horizon => {
+            let rule = format!("must hold problem.horizon = {} numbers, or be one number", problem.horizon);
+            return Err(FieldError::new(FIELD, format!("{} numbers", all.len()), rule));
+        }
+        Contributions::Listed(all) => {
+            all.iter().enumerate().try_for_each(|(index, each)| amount(&format!("{FIELD}[{index}]"), *each))?;
+        }
+    }
+    withdrawals::check_start(problem, "problem.initial_wealth", problem.initial_wealth)
+}
+
 fn outside(history: &[f64], support: Option<Interval>) -> Option<(usize, f64)> {
     let support = support?;
     history.iter().copied().enumerate().find(|&(_, z)| z < support.min || z > support.max)
@@ -130,11 +149,7 @@ fn utility(problem: &ProblemSpecification) -> Result<(), FieldError> {
     match problem.utility {
         UtilitySpecification::Exponential { risk_aversion } => {
             within(FIELD, risk_aversion, 1e-12, 1e9)?;
-            if risk_aversion * problem.initial_wealth > EXPONENTIAL_SCALE {
-                let rule = format!("times problem.initial_wealth must be at most {EXPONENTIAL_SCALE}");
-                return Err(FieldError::new(FIELD, risk_aversion, rule));
-            }
-            Ok(())
+            not_flat(problem, "problem.initial_wealth", problem.initial_wealth)
         }
         UtilitySpecification::Power { risk_aversion } if !(risk_aversion > 1.0 && risk_aversion <= 100.0) => {
             Err(FieldError::new(FIELD, risk_aversion, "must lie in (1, 100]; at 1 use the log utility"))
@@ -143,14 +158,24 @@ fn utility(problem: &ProblemSpecification) -> Result<(), FieldError> {
     }
 }
 
+/// Checks that utility still grows at a wealth that a problem starts with.
+fn not_flat(problem: &ProblemSpecification, field: &str, wealth: f64) -> Result<(), FieldError> {
+    match problem.utility {
+        UtilitySpecification::Exponential { risk_aversion }
+            if risk_aversion * withdrawals::total_wealth(problem, wealth) > EXPONENTIAL_SCALE =>
+        {
+            let rule = format!(
+                "must be less: with what problem.contributions are worth now, times problem.utility.risk_aversion, it must be at \
+                 most {EXPONENTIAL_SCALE}"
+            );
+            Err(FieldError::new(field, wealth, rule))
+        }
+        _ => Ok(()),
+    }
+}
+
 fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), FieldError> {
-    let name = match rule {
-        RadiusRule::Bridge { .. } => "bridge",
-        RadiusRule::Concentration { .. } => "concentration",
-        RadiusRule::RootN { .. } => "root_n",
-        RadiusRule::Fixed { .. } => "fixed",
-        RadiusRule::ChiSquare { .. } => "chi_square",
-    };
+    let name = rule.name();
     match (problem.framework.is_parametric(), name == "chi_square") {
         (true, false) => {
             return Err(FieldError::new(
@@ -239,12 +264,8 @@ fn design(specification: &Specification) -> Result<(), FieldError> {
         if max < min {
             return Err(FieldError::new("design.wealth.max", max, "must be at least design.wealth.min"));
         }
-        if let UtilitySpecification::Exponential { risk_aversion } = specification.problem.utility
-            && risk_aversion * max > EXPONENTIAL_SCALE
-        {
-            let rule = format!("times problem.utility.risk_aversion must be at most {EXPONENTIAL_SCALE}");
-            return Err(FieldError::new("design.wealth.max", max, rule));
-        }
+        withdrawals::check_start(&specification.problem, "design.wealth.min", min)?;
+        not_flat(&specification.problem, "design.wealth.max", max)?;
     }
     Ok(())
 }

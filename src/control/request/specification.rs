@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::request::contributions::Contributions;
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 
@@ -48,6 +49,9 @@ pub struct ProblemSpecification {
     /// Lost of what is moved between bank and asset, as a share of it, both ways alike.
     #[serde(default)]
     pub trading_cost: f64,
+    /// Money added at the end of each period, withdrawn where it is negative: one number for all, or `horizon` numbers.
+    #[serde(default)]
+    pub contributions: Contributions,
     /// Of terminal wealth.
     #[serde(default)]
     pub utility: UtilitySpecification,
@@ -99,12 +103,18 @@ impl ProblemSpecification {
             initial_wealth: defaults::initial_wealth(),
             action_interval: defaults::action_interval(),
             trading_cost: 0.0,
+            contributions: Contributions::default(),
             utility: UtilitySpecification::default(),
             radius: None,
             support: None,
             law: None,
             history,
         }
+    }
+
+    /// False where a state's worth is proportional to its wealth, and the best action does not depend on it.
+    pub fn depends_on_wealth(&self) -> bool {
+        matches!(self.utility, UtilitySpecification::Exponential { .. }) || !self.contributions.are_none()
     }
 
     /// The radius rule given, or the framework's default.

@@ -12,7 +12,6 @@ use rand::RngExt;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::sampling_law::{admissible, continuous_law};
 use crate::control::problem::state::State;
-use crate::control::problem::utility::depends_on_wealth;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules::DEFAULT_COUNT;
 use crate::control::request::specification::{InitialLaws, Interval, ProblemSpecification, SamplingLaw, Specification};
@@ -28,10 +27,14 @@ pub const CANDIDATES_PER_POINT: usize = 3;
 pub const GUARDS: usize = 1000;
 /// One design point in this many is taken as drawn.
 const AS_DRAWN: usize = 4;
+/// Of what must stay in the bank, what a state of the design has more at least.
+const SPARE: f64 = 0.01;
 
 /// The states that a training may be asked to solve.
 pub struct Design {
     problem: ProblemSpecification,
+    /// Of every period, and of the time after the last.
+    periods: Vec<Dynamics>,
     law: ContinuousLaw,
     seed: u64,
     count: usize,
@@ -55,7 +58,7 @@ impl Design {
         let start = design.wealth.unwrap_or(Interval { min: problem.initial_wealth, max: problem.initial_wealth });
         let learns = problem.framework.learns();
         let resampled = learns && design.initial_laws == InitialLaws::Resampled;
-        let wealth_matters = depends_on_wealth(problem.utility);
+        let wealth_matters = problem.depends_on_wealth();
         Design {
             law: continuous_law(design.sampling_law.as_ref().unwrap_or(&bootstrap), &problem.history),
             seed: specification.seed,
@@ -65,6 +68,7 @@ impl Design {
             ladder: if learns { Vec::new() } else { wealth_ladders(problem, start, count) },
             constant: !learns && !wealth_matters,
             start_is_single: !resampled && (start.min == start.max || !wealth_matters),
+            periods: Dynamics::of(problem),
             problem: problem.clone(),
         }
     }
@@ -95,7 +99,7 @@ impl Design {
     /// State `index` of `step`; those beyond the candidates are independent draws of the same law. Streams:
     /// ("initial", 0, index) for the start, ("design", t, index) for each step. Cost O((history + step) ln(..)).
     pub fn state(&self, step: usize, index: usize) -> State {
-        let (problem, dynamics) = (&self.problem, Dynamics::of(&self.problem));
+        let problem = &self.problem;
         if let Some(wealths) = self.ladder.get(index) {
             return self.holding_half(wealths[step], EmpiricalDistribution::new(&problem.history));
         }
@@ -106,15 +110,14 @@ impl Design {
         if self.resampled {
             sample.fill_with(|| admissible(self.law.draw(&mut generator), problem));
         }
-        for earlier in 0..step {
+        for (earlier, dynamics) in self.periods[..step].iter().enumerate() {
             let mut generator = stream(self.seed, "design", earlier, index);
-            let action = problem.action_interval[1] * generator.random::<f64>();
+            let action = dynamics.highest_action(wealth, problem.action_interval[1]) * generator.random::<f64>();
             let log_return = admissible(self.law.draw(&mut generator), problem);
-            wealth = dynamics.next_wealth(wealth, holding, action, log_return);
-            holding = dynamics.drifted(action, log_return);
+            (wealth, holding) = dynamics.next(wealth, holding, action, log_return);
             sample.push(log_return);
         }
-        self.holding_half(wealth, EmpiricalDistribution::new(&sample))
+        self.holding_half(wealth.max(least_wealth(self.periods[step])), EmpiricalDistribution::new(&sample))
     }
 
     /// The band and the value are found for every holding from any one, best from one in the middle.
@@ -123,7 +126,12 @@ impl Design {
     }
 }
 
-/// Wealths of a design whose state is wealth alone: evenly in log wealth, over what holding any allocation can reach
+/// Wealth that pays for every withdrawal to come, with a little to spare, whatever of it is held and must be sold.
+fn least_wealth(dynamics: Dynamics) -> f64 {
+    (1.0 + SPARE) * dynamics.reserve / dynamics.liquidation(1.0)
+}
+
+/// Wealths of a design whose state is wealth alone: evenly in log total wealth, over what holding any allocation can reach
 /// within [`REACHED_DEVIATIONS`] of the centre. A simulated design would leave its edges, which the robust step visits,
 /// to extrapolation.
 fn wealth_ladders(problem: &ProblemSpecification, start: Interval, count: usize) -> Vec<Vec<f64>> {
@@ -133,14 +141,31 @@ fn wealth_ladders(problem: &ProblemSpecification, start: Interval, count: usize)
         let radius = confidence_region::radius(alpha, problem.history.len());
         variance = ConfidenceRegion { estimate: NormalLaw { mean, variance }, radius }.largest_variance();
     }
-    let ladder = |point: usize, step: usize| {
+    let periods = Dynamics::of(problem);
+    // The log growth of what is held from the start, least and most.
+    let growth = |step: usize| {
         let elapsed = step as f64;
         let spread = REACHED_DEVIATIONS * problem.action_interval[1] * (elapsed * variance).sqrt();
         let bank = elapsed * problem.rate_per_step.ln_1p();
-        let cost = if step > 0 { Dynamics::of(problem).liquidation(1.0).ln() } else { 0.0 };
-        let low = start.min.ln() + bank.min(elapsed * mean) - spread + cost;
-        let high = start.max.ln() + bank.max(elapsed * mean) + spread;
-        (low + (high - low) * point as f64 / (count - 1) as f64).exp()
+        let cost = if step > 0 { periods[0].liquidation(1.0).ln() } else { 0.0 };
+        [bank.min(elapsed * mean) - spread + cost, bank.max(elapsed * mean) + spread]
+    };
+    let total = |step: usize, end: usize, wealth: f64| periods[0].total(wealth, 0.0).ln() + growth(step)[end];
+    // What is in hand need not grow as total wealth does: money that is still to come cannot be lost.
+    let in_hand = |step: usize, end: usize, wealth: f64| {
+        let grown = |wealth: f64, period: usize| {
+            wealth * (growth(period + 1)[end] - growth(period)[end]).exp() + periods[period].contribution
+        };
+        periods[step].total((0..step).fold(wealth, grown), 0.0).max(f64::MIN_POSITIVE).ln()
+    };
+    let ladder = |point: usize, step: usize| {
+        let [mut low, mut high] = [total(step, 0, start.min), total(step, 1, start.max)];
+        if !problem.contributions.are_none() {
+            low = low.max(in_hand(step, 0, start.min));
+            high = high.min(in_hand(step, 1, start.max));
+        }
+        let total = (low + (high - low) * point as f64 / (count - 1) as f64).exp();
+        (total - periods[step].to_come).max(least_wealth(periods[step]))
     };
     (0..count).map(|point| (0..problem.horizon).map(|step| ladder(point, step)).collect()).collect()
 }

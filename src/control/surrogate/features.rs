@@ -1,6 +1,7 @@
 //! From a state to the inputs of a surrogate.
 
-use crate::control::problem::utility::{RelativeUtility, depends_on_wealth};
+use crate::control::problem::dynamics::Dynamics;
+use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::specification::{FeatureMap, Specification};
 use crate::control::uncertainty::radius::Radii;
 use crate::numerics::moments::CentralMoments;
@@ -14,7 +15,7 @@ const SMALLEST_RADIUS: f64 = 1e-12;
 /// A worst law whose variance is below this share of the centre's counts as having it: the ratio stays finite.
 const SMALLEST_VARIANCE_LEFT: f64 = 0.01;
 
-/// Which features a specification has, in order: wealth first, then the law, then its uncertainty set.
+/// Which features a specification has, in order: total wealth first, then the law, then its uncertainty set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FeatureSelection {
     map: FeatureMap,
@@ -22,7 +23,7 @@ pub struct FeatureSelection {
     moments: usize,
     radius: bool,
     ball: bool,
-    /// Relative risk aversion at the initial wealth.
+    /// Relative risk aversion at the initial total wealth.
     risk_aversion: f64,
 }
 
@@ -52,13 +53,14 @@ impl FeatureSelection {
         let parametric = problem.framework.is_parametric();
         let most = if parametric { NORMAL_MOMENTS } else { usize::MAX };
         let map = specification.surrogate.features;
+        let total = Dynamics::of(problem)[0].total(problem.initial_wealth, 0.0);
         FeatureSelection {
             map,
-            wealth: depends_on_wealth(problem.utility),
+            wealth: problem.depends_on_wealth(),
             moments: if learns { specification.surrogate.moment_count.min(most) } else { 0 },
             radius: learns && radius_varies && map == FeatureMap::Standardized,
             ball: learns && !parametric && map == FeatureMap::Standardized,
-            risk_aversion: RelativeUtility::new(problem.utility, problem.initial_wealth).relative_risk_aversion(),
+            risk_aversion: RelativeUtility::new(problem.utility, total).relative_risk_aversion(),
         }
     }
 
@@ -100,22 +102,22 @@ impl FeatureSelection {
     }
 
     /// The wealth feature.
-    pub fn wealth(&self, wealth: f64) -> f64 {
-        if self.map == FeatureMap::Standardized { wealth.ln() } else { wealth }
+    pub fn wealth(&self, total: f64) -> f64 {
+        if self.map == FeatureMap::Standardized { total.ln() } else { total }
     }
 
     /// All features of a state, unscaled. The last two are Merton's ratio against the worst law of the ball,
     ///
-    ///   asinh(robust_excess / (rho v)),   rho the relative risk aversion at the initial wealth,
+    ///   asinh(robust_excess / (rho v)),   rho the relative risk aversion at the initial total wealth,
     ///
     /// v the law's own variance in the first and `robust_variance` in the second: to second order the allocation of an
     /// investor who thinks of one period alone. The robust allocation and its value change most where the ratio passes 0
     /// and 1; asinh draws its ends, which matter less, together.
-    pub fn of(&self, wealth: f64, law: &LawSummary) -> Features {
+    pub fn of(&self, total: f64, law: &LawSummary) -> Features {
         let LawSummary { moments, radii, robust_excess, robust_variance } = law;
         let mut features = Vec::with_capacity(self.moments + 5);
         if self.wealth {
-            features.push(self.wealth(wealth));
+            features.push(self.wealth(total));
         }
         for order in 1..=self.moments {
             features.push(match self.map {

@@ -56,7 +56,7 @@ impl ValueSurrogate {
             surrogate: Surrogate::new(stored, &stored.value),
             largest_gain: stored.largest_gain,
             target: TargetMap::new(specification, step),
-            holdings: Holdings::of(&specification.problem, stored.value.weights.len()),
+            holdings: Holdings::new(stored.value.weights.len(), specification.problem.action_interval[1]),
         }
     }
 
@@ -87,16 +87,16 @@ impl ValueSurrogate {
         wealths.flat_map(at).collect()
     }
 
-    /// The deviation of the floor gain that a deviation of the target makes, around `prediction` at `wealth`; the
+    /// The deviation of the floor gain that a deviation of the target makes, around `prediction` at total wealth; the
     /// largest gain where it leads out of the target's range.
-    pub fn gain_spread(&self, prediction: f64, deviation: f64, wealth: f64) -> f64 {
-        let gain = |target| self.target.gain(target, wealth);
+    pub fn gain_spread(&self, prediction: f64, deviation: f64, total: f64) -> f64 {
+        let gain = |target| self.target.gain(target, total);
         let spread = 0.5 * (gain(prediction + deviation) - gain(prediction - deviation)).abs();
         if spread.is_finite() { spread } else { self.largest_gain }
     }
 
-    /// The floor gain of a predicted target at `wealth`, clamped to what is true (0) and seen (the largest).
-    pub fn clamped_gain(&self, prediction: f64, wealth: f64) -> f64 {
-        self.target.gain(prediction, wealth).clamp(0.0, self.largest_gain)
+    /// The floor gain of a predicted target at total wealth, clamped to what is true (0) and seen (the largest).
+    pub fn clamped_gain(&self, prediction: f64, total: f64) -> f64 {
+        self.target.gain(prediction, total).clamp(0.0, self.largest_gain)
     }
 }

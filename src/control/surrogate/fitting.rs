@@ -209,14 +209,12 @@ impl Fitting<'_> {
     /// The value's targets, then the policy's.
     fn targets(&self, solved: &[DesignPoint]) -> [Targets; 2] {
         let map = TargetMap::new(self.specification, self.step);
-        let dynamics = Dynamics::of(&self.specification.problem);
-        let liquidated = |point: &DesignPoint| {
-            let holdings = Holdings::of(&self.specification.problem, point.floor_gains.len());
-            holdings.nodes().map(|holding| point.wealth * dynamics.liquidation(holding)).collect::<Vec<f64>>()
-        };
+        let problem = &self.specification.problem;
+        let dynamics = Dynamics::of(problem)[self.step];
         let gains = |point: &DesignPoint| -> Vec<f64> {
-            let gains = point.floor_gains.iter().zip(liquidated(point));
-            gains.map(|(&gain, wealth)| map.target(gain, wealth)).collect()
+            let holdings = Holdings::new(point.floor_gains.len(), problem.action_interval[1]);
+            let totals = holdings.nodes().map(|holding| dynamics.total(point.wealth, holding));
+            point.floor_gains.iter().zip(totals).map(|(&gain, total)| map.target(gain, total)).collect()
         };
         let gains = by_function(solved, gains);
         let actions = by_function(solved, |point| point.policy_targets.clone());

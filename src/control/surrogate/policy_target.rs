@@ -3,7 +3,8 @@
 //! Actions stick to a bound over whole regions of states, and a surrogate of them would be wrong on either side of the edge
 //! of the region. Continued, they cross the bound without a kink, and a prediction is moved into the interval afterwards.
 
-/// Step of the one-sided derivatives at a bound, in action: wide enough to see past the error of the value surrogate.
+/// Step of the one-sided derivatives at a bound, in action: wide enough to see past the error of the value surrogate, but
+/// where the interval itself is no wider than four of them.
 const DERIVATIVE_STEP: f64 = 5e-2;
 /// The curvature there is taken to lie within this factor of relative risk aversion times variance.
 const CURVATURE_RANGE: f64 = 4.0;
@@ -15,20 +16,24 @@ const LARGEST_EXTENSION: f64 = 2.0;
 /// robust gain at the bound, so that the target crosses the bound without a kink. `gain` is the robust gain of `action`,
 /// `reference` is the curvature expected: relative risk aversion times variance.
 pub fn policy_target(action: f64, highest: f64, gain: f64, reference: f64, gain_at: impl Fn(f64) -> f64) -> f64 {
-    let (bound, inward) = if action < DERIVATIVE_STEP {
+    let step = DERIVATIVE_STEP.min(highest / 4.0);
+    if step <= 0.0 {
+        return action;
+    }
+    let (bound, inward) = if action < step {
         (0.0, 1.0)
-    } else if action > highest - DERIVATIVE_STEP {
+    } else if action > highest - step {
         (highest, -1.0)
     } else {
         return action;
     };
     let gain = if action == bound { gain } else { gain_at(bound) };
-    let [near, far] = [1.0, 2.0].map(|steps| gain_at(bound + inward * steps * DERIVATIVE_STEP));
-    let slope = (4.0 * near - far - 3.0 * gain) / (2.0 * DERIVATIVE_STEP);
+    let [near, far] = [1.0, 2.0].map(|steps| gain_at(bound + inward * steps * step));
+    let slope = (4.0 * near - far - 3.0 * gain) / (2.0 * step);
     if slope > 0.0 {
         return action;
     }
-    let curvature = (2.0 * near - far - gain) / (DERIVATIVE_STEP * DERIVATIVE_STEP);
+    let curvature = (2.0 * near - far - gain) / (step * step);
     let curvature = curvature.clamp(reference / CURVATURE_RANGE, reference * CURVATURE_RANGE);
     // Far beyond the bound the target levels off, smoothly, for what is never wanted needs no resolution.
     bound + inward * LARGEST_EXTENSION * (slope / curvature / LARGEST_EXTENSION).tanh()

@@ -2,6 +2,7 @@
 // takes its place where the two differ by more than the page says.
 
 import { announce, h, section } from "./dom.js";
+import { endWords } from "./flows.js";
 import { allocation, percent, significant, wealth } from "./format.js";
 
 /** The advice is told to a tenth of a percent, so this far the policy and the step solved anew say the same. */
@@ -27,6 +28,7 @@ export function adviceView(action, horizon, rest) {
   const amount = h("strong", {}, allocation(action.allocation));
   const order = h("p", { class: "sentence" }, trade(action));
   const sentence = h("p", { class: "sentence" }, why(action));
+  const end = action.contribution === 0 ? "" : h("p", { class: "sentence" }, endWords(action.contribution));
   const read = action.source === "policy_surrogate";
   const note = h(
     "p",
@@ -36,7 +38,7 @@ export function adviceView(action, horizon, rest) {
   const big = h("p", { class: "big" }, h("span", {}, "Hold "), amount, h("span", {}, " in the risky asset"));
   const element = section(
     `Period ${action.period} of ${horizon}`,
-    h("div", { class: "advice", id: "advice", tabindex: -1 }, big, order, sentence, note),
+    h("div", { class: "advice", id: "advice", tabindex: -1 }, big, order, sentence, end, note),
     rest,
   );
   const checked = (anew) => {

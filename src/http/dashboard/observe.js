@@ -2,6 +2,7 @@
 
 import { get, post } from "./api.js";
 import { h } from "./dom.js";
+import { endWords } from "./flows.js";
 import { clear, input, select, showProblem } from "./form.js";
 import { allocation, significant, wealth } from "./format.js";
 import { fraction, typed } from "./number_text.js";
@@ -11,6 +12,7 @@ const KINDS = { simple_return: "Simple return", log_return: "Log-return" };
 /** `{element, advise(allocation)}`: what is held where nothing else is said is the advice, or another that took its place. */
 export function observeForm(action, { id, session, policy, refresh }) {
   const { rate_per_step, trading_cost } = policy.specification.problem;
+  const { contribution } = action;
   const preview = h("output", { class: "note" });
   let [advised, replaced] = [action.allocation, false];
   const read = () => {
@@ -19,8 +21,8 @@ export function observeForm(action, { id, session, policy, refresh }) {
     if (value === null || executed === null) return (preview.textContent = "");
     const growth = kind.control.value === "log_return" ? Math.exp(value) : 1 + value;
     const traded = 1 - trading_cost * Math.abs(executed - session.holding);
-    const next = session.wealth * traded * ((1 - executed) * (1 + rate_per_step) + executed * growth);
-    preview.textContent = `Log-return ${significant(Math.log(growth), 4)}; wealth ${wealth(session.wealth)} \u2192 ${wealth(next)} at ${allocation(executed)} held.`;
+    const grown = session.wealth * traded * ((1 - executed) * (1 + rate_per_step) + executed * growth);
+    preview.textContent = `Log-return ${significant(Math.log(growth), 4)}; wealth ${wealth(session.wealth)} \u2192 ${wealth(grown + contribution)} at ${allocation(executed)} held. ${endWords(contribution)}`;
   };
   const given = input({
     name: "return",
@@ -37,7 +39,7 @@ export function observeForm(action, { id, session, policy, refresh }) {
     note: blankShare(advised),
     changed: () => read(),
   });
-  const reached = input({ name: "wealth", label: "Wealth reached", note: "Blank: what return and share give." });
+  const reached = input({ name: "wealth", label: "Wealth reached", note: "Blank: what return and share give, and what is added." });
   const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
   const button = h("button", { type: "submit" }, `Report period ${action.period}`);
   const more = h(

@@ -4,6 +4,7 @@ import { adviceView } from "./advice.js";
 import { get, offers, remove } from "./api.js";
 import { lineChart } from "./chart.js";
 import { announce, disclosure, facts, h, section, table } from "./dom.js";
+import { banked, netAdded } from "./flows.js";
 import {
   allocation,
   count,
@@ -78,10 +79,12 @@ async function fill(holder, shown) {
   );
 }
 
-function figures({ session, history }, action) {
-  const change = session.wealth / history.initial_wealth - 1;
+function figures({ session, history, policy }, action) {
+  const put = netAdded(policy.specification.problem, session.period - 1);
+  const change = (session.wealth - put) / history.initial_wealth - 1;
+  const apart = put === 0 ? "" : `, ${put > 0 ? "beside" : "after"} ${wealth(Math.abs(put))} ${put > 0 ? "added" : "withdrawn"}`;
   return facts([
-    ["Wealth", wealth(session.wealth), `${change >= 0 ? "+" : ""}${percent(change)} since the start`],
+    ["Wealth", wealth(session.wealth), `${change >= 0 ? "+" : ""}${percent(change)} since the start${apart}`],
     ["Held", allocation(session.holding), "of wealth, before trading"],
     action && ["Certainty equivalent", wealth(action.certainty_equivalent), "for certain at the horizon"],
     action && ["Floor", wealth(action.floor), "all sold now, and in the bank until then"],
@@ -94,13 +97,12 @@ function figures({ session, history }, action) {
   ]);
 }
 
-/** What selling everything at the start would have left. */
-const banked = ({ initial_wealth, initial_holding }, { specification }) =>
-  initial_wealth * (1 - specification.problem.trading_cost * initial_holding);
+/** Wealth of selling everything at the start, and staying in the bank. */
+const allBank = ({ initial_wealth, initial_holding }, { specification: { problem } }) =>
+  banked(problem, initial_wealth * (1 - problem.trading_cost * initial_holding));
 
 function completed({ session, history, policy }) {
-  const { rate_per_step, horizon } = policy.specification.problem;
-  const bank = banked(history, policy) * (1 + rate_per_step) ** horizon;
+  const bank = allBank(history, policy).at(-1);
   return section(
     "Completed",
     h(
@@ -115,19 +117,29 @@ function completed({ session, history, policy }) {
 
 /** Wealth, allocation and radius through time. */
 function course({ session, history, policy }, action) {
-  const { rate_per_step } = policy.specification.problem;
+  const { trading_cost } = policy.specification.problem;
   const { observations, initial_wealth } = history;
   const { horizon } = session;
   const periods = Array.from({ length: horizon + 1 }, (_, k) => k);
   const after = (period, read) => (observations[period - 1] ? read(observations[period - 1]) : null);
   const x = { values: periods, domain: [0, horizon], label: "After period", format: String, whole: true };
   const lived = periods.map((k) => (k === 0 ? initial_wealth : after(k, (row) => row.wealth)));
-  const sold = banked(history, policy);
-  const bank = periods.map((k) => sold * (1 + rate_per_step) ** k);
+  const bank = allBank(history, policy);
   const held = periods.map((k) => after(k, (row) => row.executed_allocation));
-  const advised = periods.map((k) =>
-    action && k === action.period ? action.allocation : after(k, (row) => row.advised_allocation),
+  const told = (now, then) =>
+    periods.map((k) => (action && k === action.period ? now(action) : after(k, then)));
+  const advised = told(
+    ({ allocation }) => allocation,
+    (row) => row.advised_allocation,
   );
+  const ends = ["low", "high"].map((name, end) => ({
+    name: `Band, ${name} end`,
+    kind: "levels",
+    values: told(
+      ({ band }) => band[end],
+      ({ band }) => band[end],
+    ),
+  }));
   const radii = periods.map((k) =>
     k === session.period - 1 && action ? action.radius : after(k, (row) => row.radius),
   );
@@ -153,7 +165,7 @@ function course({ session, history, policy }, action) {
       y: { format: allocation, tick: percentTick, also: [0] },
       series: [
         { name: "Held", kind: "bars", values: held },
-        { name: "Advised", kind: "levels", values: advised },
+        ...(trading_cost > 0 ? ends : [{ name: "Advised", kind: "levels", values: advised }]),
       ],
     }),
     lineChart({

@@ -1,5 +1,6 @@
 // A training request in words.
 
+import * as flows from "./flows.js";
 import { count, counted, percent, significant, wealth } from "./format.js";
 
 export const FRAMEWORKS = {
@@ -79,7 +80,7 @@ export function inWords({ problem, design, surrogate, seed }) {
   const laws = design.initial_laws === "resampled" ? "starting from resampled histories" : "starting from this history";
   return [
     `${MEANINGS[problem.framework]}${ball}`,
-    `${counted(problem.horizon, "decision")} with ${utility(problem.utility)}; the bank pays ${percent(problem.rate_per_step, 2)} a period, and up to ${percent(limit, 0)} of wealth may be at risk. It starts with ${wealth(problem.initial_wealth)}. ${trading(problem)}`,
+    `${counted(problem.horizon, "decision")} with ${utility(problem.utility)}; the bank pays ${percent(problem.rate_per_step, 2)} a period, and up to ${percent(limit, 0)} of wealth may be at risk. It starts with ${wealth(problem.initial_wealth)}. ${trading(problem)} ${flows.inWords(problem)}`.trim(),
     `The history holds ${counted(problem.history.length, "log-return")}: mean ${percent(mean, 2)}, standard deviation ${percent(deviation, 2)} a period.`,
     `Each step was solved at ${counted(design.count, "state")} simulated under ${law(design.sampling_law)}, ${laws}; surrogates of the ${surrogate.target === "value" ? "value" : "gain over the floor"} on ${surrogate.features === "raw_moments" ? "raw" : "standardised"} features. Seed ${count(seed)}.`,
   ];

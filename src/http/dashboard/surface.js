@@ -4,7 +4,9 @@
 // and stretched to another standard deviation. All features of it follow, the robust excess return among them; what the
 // history's shape does not settle (skewness, kurtosis, the level of the rest) stays at the centre of the step's design.
 
-/** One named feature of a state `{wealth, law, radius, rate, riskAversion}`, the last relative. */
+import { flowsAfter } from "./flows.js";
+
+/** One named feature of a state `{wealth, law, radius, rate, riskAversion}`: total wealth, and the last relative. */
 export function feature(name, { wealth, law, radius, rate, riskAversion }) {
   const mertonRatio = (excess, variance) => Math.asinh(excess / (riskAversion * variance));
   switch (name) {
@@ -51,11 +53,11 @@ export function predicted({ hyperparameters, weights: [weights], offset, scale }
 }
 
 /** Allocation of who holds nothing yet, at unscaled features in the order of `names`: where trading costs, the lower end of
- * the band. */
-export function allocation(solution, features, highest) {
+ * the band. Processes know it as a share of total wealth, of which the share `inHand` can be held. */
+export function allocation(solution, features, highest, inHand = 1) {
   const { centre, spread } = solution.scaling;
   const x = features.map((value, index) => (value - centre[index]) / spread[index]);
-  return Math.max(0, Math.min(highest, predicted(solution.policy, solution.inputs, x)));
+  return Math.max(0, Math.min(highest, predicted(solution.policy, solution.inputs, x) / inHand));
 }
 
 /** One step of an exported policy over laws of its history's `shape`; null where the step holds a single state. */
@@ -69,8 +71,9 @@ export function stepSurface(policy, shape, step) {
     names.map((name, index) => [name, { centre: centre[index], spread: spread[index] }]),
   );
   const middle = centres(level, problem, step, shape);
+  const { toCome, reserve } = flowsAfter(problem, step);
   const state = ({ wealth, mean, deviation, radius }) => ({
-    wealth,
+    wealth: wealth + toCome,
     radius,
     rate: problem.rate_per_step,
     riskAversion: relativeRiskAversion(problem),
@@ -78,20 +81,26 @@ export function stepSurface(policy, shape, step) {
   });
   const base = features(names, state(middle));
   const at = (place) => {
-    const moved = features(names, state({ ...middle, ...place }));
+    const there = { ...middle, ...place };
+    const moved = features(names, state(there));
+    const free = 1 - reserve / (there.wealth * (1 - problem.trading_cost));
     return allocation(
       solution,
       moved.map((value, index) => centre[index] + value - base[index]),
-      problem.action_interval[1],
+      Math.min(problem.action_interval[1], free),
+      there.wealth / (there.wealth + toCome),
     );
   };
-  return { at, middle, ranges: ranges(level, middle), dots: (axis) => designValues(axis, solution, names) };
+  const dots = (axis) => designValues(axis, solution, names).map((value) => (axis === "wealth" ? value - toCome : value));
+  return { at, middle, ranges: ranges(level, middle, toCome), dots };
 }
 
-/** At the initial wealth. */
-function relativeRiskAversion({ utility, initial_wealth }) {
+/** At the initial wealth, with what is to come. */
+function relativeRiskAversion(problem) {
+  const { utility, initial_wealth } = problem;
   if (utility.kind === "log") return 1;
-  return utility.kind === "exponential" ? utility.risk_aversion * initial_wealth : utility.risk_aversion;
+  if (utility.kind === "power") return utility.risk_aversion;
+  return utility.risk_aversion * (initial_wealth + flowsAfter(problem, 0).toCome);
 }
 
 const features = (names, state) => names.map((name) => feature(name, state));
@@ -104,9 +113,10 @@ function centres(level, problem, step, own) {
   const variance = of("moment_2") === undefined ? undefined : of("moment_2") - mean ** 2;
   const deviation =
     logDeviation !== undefined ? Math.exp(logDeviation) : variance > 0 ? Math.sqrt(variance) : own.deviation;
-  const wealth = of("log_wealth") !== undefined ? Math.exp(of("log_wealth")) : (of("wealth") ?? problem.initial_wealth);
+  const { toCome } = flowsAfter(problem, step);
+  const total = of("log_wealth") !== undefined ? Math.exp(of("log_wealth")) : of("wealth");
   return {
-    wealth,
+    wealth: total === undefined ? problem.initial_wealth : total - toCome,
     mean,
     deviation,
     radius: of("log_radius") !== undefined ? Math.exp(of("log_radius")) : ruledRadius(problem, step),
@@ -132,7 +142,7 @@ function ruledRadius({ framework, radius, history }, step) {
 }
 
 /** Two and a half standard deviations of the design around its centre, for each axis the step depends on. */
-function ranges(level, middle) {
+function ranges(level, middle, toCome) {
   const WIDE = 2.5;
   const plain = (name, lowest = -Infinity) =>
     level[name] && [
@@ -140,9 +150,9 @@ function ranges(level, middle) {
       level[name].centre + WIDE * level[name].spread,
     ];
   const logarithmic = (name) => plain(name)?.map(Math.exp);
-  const wealth = logarithmic("log_wealth") ?? plain("wealth", 0.01 * middle.wealth);
+  const total = logarithmic("log_wealth") ?? plain("wealth");
   const found = {
-    wealth,
+    wealth: total?.map((value) => Math.max(value - toCome, 0.01 * middle.wealth)),
     mean: plain("mean") ?? plain("moment_1"),
     radius: logarithmic("log_radius"),
     deviation: logarithmic("log_standard_deviation"),

@@ -29,6 +29,7 @@ const initial = () => ({
     rate_per_step: 0.002,
     initial_wealth: 100,
     trading_cost: 0,
+    contributions: 0,
     utility: { kind: "exponential", risk_aversion: AVERSION.exponential },
     radius: { rule: "bridge", alpha: 0.1, scale: 1 },
     history: [],
@@ -151,6 +152,12 @@ function compact(request) {
   );
 }
 
+/** One number, or several that spaces or semicolons keep apart. */
+function amounts(text) {
+  const each = text.split(/[\s;]+/).filter(Boolean).map((part) => typed(part));
+  return each.length > 1 ? each : (each[0] ?? 0);
+}
+
 function mainFields(changed) {
   const number = (path, label, note, options = {}) =>
     input({
@@ -172,6 +179,12 @@ function mainFields(changed) {
     number("problem.rate_per_step", "Bank return per period", "0.002 or 0.2 % a period."),
     number("problem.initial_wealth", "Initial wealth", "In any unit."),
     number("problem.trading_cost", "Trading cost", "Of what is traded: 0.002 or 0.2 %; 0 is free."),
+    input({
+      name: "problem.contributions",
+      label: "Added each period",
+      note: "At its end; negative is withdrawn. One number, or one for each period, apart by spaces.",
+      changed: (text) => changed("problem.contributions", amounts(text)),
+    }),
     select({
       name: "problem.utility.kind",
       label: "Utility",
@@ -187,14 +200,14 @@ function mainFields(changed) {
   const show = (request) => {
     for (const part of parts) {
       const value = at(request, part.name);
-      if (part.control !== document.activeElement) part.control.value = value ?? "";
+      if (part.control !== document.activeElement) part.control.value = [value ?? ""].flat().join(" ");
       part.element.hidden = value === undefined;
     }
   };
   const elements = [
-    fieldset("The investor", parts.slice(1, 7)),
-    fieldset("What he guards against", [parts[0], parts[7], parts[8]]),
-    fieldset("Precision", parts.slice(9)),
+    fieldset("The investor", parts.slice(1, 8)),
+    fieldset("What he guards against", [parts[0], parts[8], parts[9]]),
+    fieldset("Precision", parts.slice(10)),
   ];
   return { elements, show };
 }

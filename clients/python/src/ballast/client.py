@@ -54,6 +54,7 @@ class Ballast:
         initial_wealth: float | None = None,
         action_interval: Sequence[float] | None = None,
         trading_cost: float | None = None,
+        contributions: float | Sequence[float] | None = None,
         utility: wire.UtilitySpecification | None = None,
         radius: wire.RadiusRule | None = None,
         support: wire.Interval | None = None,
@@ -77,6 +78,7 @@ class Ballast:
             "initial_wealth": initial_wealth,
             "action_interval": None if action_interval is None else list(action_interval),
             "trading_cost": trading_cost,
+            "contributions": _amounts(contributions),
             "utility": utility,
             "radius": radius,
             "support": support,
@@ -164,6 +166,10 @@ class Ballast:
 
 #: Entries asked for at a time.
 _PAGE = 200
+
+
+def _amounts(contributions: float | Sequence[float] | None) -> float | list[float] | None:
+    return list(contributions) if isinstance(contributions, Sequence) else contributions
 
 
 def _given(fields: Mapping[str, Any]) -> dict[str, Any]:

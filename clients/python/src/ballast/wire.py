@@ -38,6 +38,10 @@ class AuditPage(TypedDict):
     """Give it as `after` for the next page; null on the last."""
 
 
+Contributions: TypeAlias = float | list[float]
+"""C, money added at the end of each period."""
+
+
 class Costs(TypedDict):
     """What the evaluation cost; the only part that differs between two runs."""
 
@@ -177,6 +181,8 @@ class Observation(TypedDict):
 
     period: int
     log_return: float
+    band: list[float]
+    """The holdings that were best kept at the start of the period."""
     advised_allocation: float
     executed_allocation: float
     wealth: float
@@ -204,7 +210,10 @@ class Observe(TypedDict):
     executed_allocation: NotRequired[float | None]
     """Share of wealth held in the risky asset through the period. Default: the allocation advised for it."""
     wealth: NotRequired[float | None]
-    """Wealth reached, where fees or flows made it differ from what the return and the allocation give."""
+    """
+    Wealth reached, with what was added, where it differs from what the return, the allocation and the policy's
+    contributions give.
+    """
 
 
 HistoryItem: TypeAlias = float
@@ -542,10 +551,15 @@ class Advice(TypedDict):
     """The holdings that are best kept as they are; where trading costs nothing both ends are the allocation."""
     trade: float
     """The allocation less the holding: the share of wealth to buy, or where it is negative to sell."""
+    contribution: float
+    """Money added at the end of the period, withdrawn where it is negative."""
     certainty_equivalent: float
     """Certainty equivalent of the robust value, in terminal wealth."""
     floor: float
-    """Terminal wealth of selling everything now and staying in the bank: no law can take it away."""
+    """
+    Terminal wealth of selling everything now and staying in the bank, with all that is added and withdrawn until then: no
+    law can take it away.
+    """
     radius: float
     """
     Radius of the uncertainty set: of the Wasserstein ball, in log-return; in the parametric frameworks half the width
@@ -610,11 +624,16 @@ class Observed(Uncertainty):
     session: str
     period: int
     log_return: float
+    band: list[float]
+    """
+    The holdings that were best kept at the start of the period; where trading costs nothing both ends are the advised
+    allocation.
+    """
     executed_allocation: float
     price: NotRequired[float | None]
     """The price reported, if one was."""
     wealth: float
-    """Wealth at the end of the period."""
+    """Wealth at the end of the period, with what was added to it."""
     holding: float
     """Share of it in the risky asset, as the return left it."""
     completed: bool
@@ -650,6 +669,8 @@ class ProblemSpecification(TypedDict):
     """Share of wealth that may be held in the risky asset: `[0, highest]`."""
     trading_cost: NotRequired[float]
     """Lost of what is moved between bank and asset, as a share of it, both ways alike."""
+    contributions: NotRequired[Contributions]
+    """Money added at the end of each period, withdrawn where it is negative: one number for all, or `horizon` numbers."""
     utility: NotRequired[UtilitySpecification]
     """Of terminal wealth."""
     radius: NotRequired[RadiusRule | None]

@@ -1,0 +1,38 @@
+//! Money that is added and withdrawn.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// C, money added at the end of each period.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(untagged, expecting = "must be a number or a list of numbers")]
+pub enum Contributions {
+    /// The same in every period.
+    Each(f64),
+    /// One for each period.
+    Listed(Vec<f64>),
+}
+
+impl Default for Contributions {
+    fn default() -> Self {
+        Contributions::Each(0.0)
+    }
+}
+
+impl Contributions {
+    /// What is added at the end of period `step + 1`.
+    pub fn at(&self, step: usize) -> f64 {
+        match self {
+            Contributions::Each(amount) => *amount,
+            Contributions::Listed(amounts) => amounts.get(step).copied().unwrap_or_default(),
+        }
+    }
+
+    /// True where nothing is ever added or withdrawn.
+    pub fn are_none(&self) -> bool {
+        match self {
+            Contributions::Each(amount) => *amount == 0.0,
+            Contributions::Listed(amounts) => amounts.iter().all(|amount| *amount == 0.0),
+        }
+    }
+}

@@ -1,0 +1,54 @@
+// Money that comes and goes: what is added in each period, what all of it is worth now, what the bank alone makes of a start.
+
+import { wealth } from "./format.js";
+
+/** What is added at the end of `period`, counted from 1; negative where it is withdrawn. */
+const added = ({ contributions }, period) =>
+  Array.isArray(contributions) ? contributions[period - 1] : contributions;
+
+/** True where nothing is ever added or withdrawn. */
+const none = ({ contributions }) => [contributions].flat().every((amount) => amount === 0);
+
+/** Wealth in the bank alone, at the start and after each period. */
+export function banked(problem, start) {
+  const held = [start];
+  for (let period = 1; period <= problem.horizon; period++)
+    held.push(held[period - 1] * (1 + problem.rate_per_step) + added(problem, period));
+  return held;
+}
+
+/** `{toCome, reserve}` after `step` periods: what later contributions are worth now, and what must stay in the bank for them. */
+export function flowsAfter(problem, step) {
+  const bank = 1 + problem.rate_per_step;
+  let [toCome, reserve] = [0, 0];
+  for (let period = problem.horizon; period > step; period--) {
+    const amount = added(problem, period);
+    [toCome, reserve] = [(amount + toCome) / bank, Math.max(0, (reserve - amount) / bank)];
+  }
+  return { toCome, reserve };
+}
+
+/** What happens at the end of a period, in words; nothing where nothing does. */
+export function endWords(amount) {
+  if (amount === 0) return "";
+  return `At the end of the period ${wealth(Math.abs(amount))} is ${amount > 0 ? "added" : "withdrawn"}.`;
+}
+
+/** All contributions, in a sentence. */
+export function inWords(problem) {
+  const { contributions } = problem;
+  if (none(problem)) return "";
+  if (Array.isArray(contributions)) {
+    const [into, out] = [contributions.filter((amount) => amount > 0), contributions.filter((amount) => amount < 0)];
+    const total = (amounts) => wealth(Math.abs(amounts.reduce((sum, amount) => sum + amount, 0)));
+    return `In ${into.length} of the periods money is added, ${total(into)} in all, and in ${out.length} withdrawn, ${total(out)} in all.`;
+  }
+  return endWords(contributions).replace("the period", "each period");
+}
+
+/** What was added and withdrawn in the first `periods`, in all. */
+export function netAdded(problem, periods) {
+  let net = 0;
+  for (let period = 1; period <= periods; period++) net += added(problem, period);
+  return net;
+}
