@@ -3,6 +3,7 @@
 mod support;
 
 use ballast::control::bellman::BellmanStep;
+use ballast::control::bellman::field::Field;
 use ballast::control::bellman::gain_field::GainField;
 use ballast::control::bellman::next_value::NextValue;
 use ballast::control::bellman::problem::Problem;

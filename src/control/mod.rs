@@ -11,6 +11,7 @@
 //!
 //! | paper | name | printed as | file | checked by |
 //! |---|---|---|---|---|
+//! | X, A, S, the loss | `Controlled` | 2 | `control/problem/controlled.rs` | `tests/controlled.rs::the_investor_s_problem_is_solved_alike_by_the_general_solver` |
 //! | S | `next` | (2.1) | `control/problem/dynamics.rs` | `src/control/evaluation/account.rs::three_months_agree_with_pencil_and_paper` |
 //! | F^, R | `EmpiricalDistribution` | (2.3) | `numerics/empirical.rs` | `tests/parametric.rs::the_order_of_returns_and_the_way_they_arrive_change_nothing` |
 //! | H | `directional_statistic` | 2.1, after (2.4) | `numerics/bridge.rs` | `src/numerics/bridge.rs::the_statistic_is_the_plain_sum_to_the_last_bit` |
@@ -36,6 +37,7 @@
 //!
 //! - `request`, `error`: a request comes in, and a field of it may be refused;
 //! - `training`, `progress`, `solved_step`: it is solved step by step, with what a step reports and leaves behind;
+//!   `controlled_training` does so for any controlled problem, and no higher floor needs it;
 //! - `policy`, `problem`: the document answers in a state;
 //! - `evaluation`: strategies are compared;
 //! - `estimate`, `kept`, `pool`: what work costs, and the memory and threads that its caller lends.
@@ -48,6 +50,7 @@
 //! parametric frameworks (`bellman::normal`).
 
 pub mod bellman;
+pub mod controlled_training;
 pub mod error;
 pub mod estimate;
 pub mod evaluation;

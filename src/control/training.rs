@@ -3,11 +3,6 @@
 //! optimise (the robust step at every design point), train (both surrogates), go one step back. A step depends on
 //! the specification and the step after it alone, so a checkpoint per step resumes to the same bits.
 
-use std::ops::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-use rayon::prelude::*;
-
 use crate::control::bellman::next_value::NextValue;
 use crate::control::bellman::problem::Problem;
 use crate::control::bellman::solution::RobustSolution;
@@ -19,16 +14,12 @@ use crate::control::problem::holdings::{HOLDINGS, HOLDINGS_OF_ONE_LAW, Holdings}
 use crate::control::problem::state::State;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::specification::Specification;
-use crate::control::solved_step::{StepDiagnostics, StepSolution};
+use crate::control::solved_step::StepSolution;
 use crate::control::surrogate::design::Design;
 use crate::control::surrogate::features::Features;
-use crate::control::surrogate::fitting::{DesignPoint, Fitting};
-use crate::control::surrogate::scaling::Scaling;
+use crate::control::surrogate::fitting::DesignPoint;
+use crate::control::surrogate::learning::{Candidates, Counts, Learning, diagnostics};
 use crate::control::surrogate::stored::{SingleSolution, Solution};
-use crate::numerics::farthest::farthest_points;
-
-/// Progress is reported about this often a step.
-const REPORTS_PER_STEP: usize = 100;
 
 /// A prepared training job: the completed specification and its simulated design.
 pub struct Training {
@@ -73,32 +64,22 @@ impl Training {
     ) -> Result<StepSolution, TrainError> {
         let next = NextValue::new(&self.problem.specification, step + 1, after.map(|after| &after.solution));
         let bellman = BellmanStep { problem: &self.problem, step, next: &next };
-        let solver = DesignSolver { bellman, design: &self.design, watch };
+        let solver = DesignSolver { bellman, design: &self.design };
         let count = self.design.count(step);
         if count == 1 {
-            return solver.solve_the_only();
+            watch.go_on()?;
+            let solved = solver.solve_the_only()?;
+            (watch.progress)(StepProgress { step, phase: Phase::Solving, done: 1, total: 1 });
+            return Ok(solved);
         }
-        let candidates = solver.features(0..self.design.candidate_count(step))?;
-        let scaling = Scaling::of(&candidates);
-        let names = self.problem.selection.names();
-        let specification = &self.problem.specification;
-        let fitting = Fitting { specification, names: &names, step, scaling: &scaling, watch };
-        let as_drawn: Vec<usize> = (0..self.design.as_drawn_count(step)).collect();
-        let mut solved = solver.solve(&as_drawn, &candidates, Vec::new())?;
-        let start = match after.and_then(|after| fitting.start_from(&after.solution)) {
-            Some(start) => start,
-            None => fitting.coarse(&solved)?,
+        let counts = Counts {
+            design: count,
+            as_drawn: self.design.as_drawn_count(step),
+            candidates: self.design.candidate_count(step),
+            guards: self.design.guards(step),
         };
-        if count > as_drawn.len() {
-            let inputs: Vec<Vec<f64>> = candidates.iter().map(|features| scaling.apply(features)).collect();
-            let weights = fitting.weights(&solved, &start.value, &inputs)?;
-            let chosen = farthest_points(&inputs, &start.value.lengthscales, &weights, as_drawn.len(), count);
-            solved = solver.solve(&chosen[as_drawn.len()..], &candidates, solved)?;
-        }
-        let guards = solver.features(self.design.guards(step))?;
-        let mut diagnostics = diagnostics(step, &solved);
-        let solution = fitting.surrogates(&solved, &start, &guards, &mut diagnostics)?;
-        Ok(StepSolution { step, solution, diagnostics })
+        let (specification, names) = (&self.problem.specification, &self.problem.selection.names());
+        Learning { specification, names, step, counts, watch }.run(&solver, after.map(|after| &after.solution))
     }
 
     /// The policy made of all steps, in ascending order of step.
@@ -125,66 +106,29 @@ impl Training {
 struct DesignSolver<'a> {
     bellman: BellmanStep<'a>,
     design: &'a Design,
-    watch: &'a Watch<'a>,
+}
+
+impl Candidates for DesignSolver<'_> {
+    fn features(&self, index: usize) -> Features {
+        self.bellman.problem.features(self.bellman.step, &self.state(index))
+    }
+
+    fn solve(&self, index: usize, features: Features) -> Result<DesignPoint, TrainError> {
+        let state = self.state(index);
+        let found = self.solved(index, &state, self.bellman.problem.holdings(HOLDINGS))?;
+        Ok(design_point(state.wealth, features, found))
+    }
 }
 
 impl DesignSolver<'_> {
-    /// The unscaled features of some states.
-    fn features(&self, states: Range<usize>) -> Result<Vec<Features>, TrainError> {
-        let features = |index| {
-            self.watch.go_on()?;
-            Ok(self.bellman.problem.features(self.bellman.step, &self.state(index)))
-        };
-        states.into_par_iter().map(features).collect()
-    }
-
-    /// Solves the robust step at the design points named, after those solved before. `features` are those of all
-    /// candidates.
-    fn solve(
-        &self,
-        points: &[usize],
-        features: &[Features],
-        before: Vec<DesignPoint>,
-    ) -> Result<Vec<DesignPoint>, TrainError> {
-        let (total, first) = (self.design.count(self.bellman.step), before.len());
-        let every = (total / REPORTS_PER_STEP).max(1);
-        let done = AtomicUsize::new(first);
-        self.report(first, total);
-        let solve = |&point: &usize| {
-            let solved = self.solve_point(point, features[point].clone())?;
-            let finished = done.fetch_add(1, Ordering::Relaxed) + 1;
-            if finished.is_multiple_of(every) || finished == total {
-                self.report(finished, total);
-            }
-            Ok(solved)
-        };
-        let found: Result<Vec<DesignPoint>, TrainError> = points.par_iter().map(solve).collect();
-        let mut solved = before;
-        solved.extend(found?);
-        Ok(solved)
-    }
-
-    fn report(&self, done: usize, total: usize) {
-        (self.watch.progress)(StepProgress { step: self.bellman.step, phase: Phase::Solving, done, total });
-    }
-
     /// Solves the robust step where all states are one but for the holding, of which there can then be many.
     fn solve_the_only(&self) -> Result<StepSolution, TrainError> {
         let (step, problem) = (self.bellman.step, self.bellman.problem);
         let only = self.state(0);
         let found = self.solved(0, &only, problem.holdings(HOLDINGS_OF_ONE_LAW))?;
-        self.report(1, 1);
         let single = SingleSolution { floor_gains: found.floor_gains.clone(), band: found.solution.band };
         let point = design_point(only.wealth, problem.features(step, &only), found);
         Ok(StepSolution { step, solution: Solution::Single(single), diagnostics: diagnostics(step, &[point]) })
-    }
-
-    /// Solves the robust step at one design point.
-    fn solve_point(&self, point: usize, features: Features) -> Result<DesignPoint, TrainError> {
-        self.watch.go_on()?;
-        let state = self.state(point);
-        let found = self.solved(point, &state, self.bellman.problem.holdings(HOLDINGS))?;
-        Ok(design_point(state.wealth, features, found))
     }
 
     fn solved(&self, point: usize, state: &State, holdings: Holdings) -> Result<DesignSolution, TrainError> {
@@ -210,19 +154,4 @@ fn design_point(wealth: f64, features: Features, found: DesignSolution) -> Desig
     let RobustSolution { band, floor_gain, duality_gap, certified, .. } = solution;
     let action = band.low;
     DesignPoint { wealth, features, action, floor_gain, floor_gains, policy_targets, duality_gap, certified }
-}
-
-fn diagnostics(step: usize, solved: &[DesignPoint]) -> StepDiagnostics {
-    let share = |holds: &dyn Fn(&DesignPoint) -> bool| {
-        solved.iter().filter(|point| holds(point)).count() as f64 / solved.len() as f64
-    };
-    StepDiagnostics {
-        step,
-        design_count: solved.len(),
-        all_bank_share: share(&|point| point.action <= 0.0),
-        uncertified_share: share(&|point| !point.certified),
-        duality_gap: solved.iter().map(|point| point.duality_gap.abs()).fold(0.0, f64::max),
-        value: None,
-        policy: None,
-    }
 }

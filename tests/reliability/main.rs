@@ -134,7 +134,7 @@ fn report(row: &Row, outcome: Outcome) -> Verdict {
             return Verdict::Unsound;
         }
     };
-    let Tally { trials, faults, audit, stale, panics, ready, complaints, note } = &tally;
+    let Tally { trials, faults, audit, stale, panics, ready, complaints, note, .. } = &tally;
     println!(
         "{:<30}{trials:>7}{faults:>8}{:>14}{:>6}{:>9}{stale:>7}{panics:>8}{:>8} ms  {note}",
         row.fault,

@@ -11,6 +11,7 @@
 //! Where money is to come, everything is relative to total wealth: a trade moves the share of it that is in hand, and the rest
 //! grows as the bank does.
 
+use super::field::{Field, Payoffs};
 use super::next_value::NextValue;
 use super::problem::Problem;
 use crate::control::problem::dynamics::{Dynamics, Trade};
@@ -88,19 +89,6 @@ impl<'a> GainField<'a> {
         }
     }
 
-    /// The returns at which it is exact, ascending.
-    pub fn returns(&self) -> &[f64] {
-        &self.returns
-    }
-
-    /// What a payoff is at least: the relative utility of selling everything after `log_return`. It increases with the return.
-    pub fn least_payoff(&self, trade: Trade, log_return: f64) -> f64 {
-        let Dynamics { rate_per_step, .. } = self.dynamics;
-        let sold = self.cost_of_selling() * trade.action * log_return.exp();
-        let growth = self.dynamics.growth(trade.action, log_return) - sold;
-        self.utility.value(self.with_what_is_to_come(trade.kept * growth / (1.0 + rate_per_step)).ln())
-    }
-
     /// Total wealth from wealth in hand, each over what selling everything at once would grow it to.
     fn with_what_is_to_come(&self, relative: f64) -> f64 {
         self.in_hand * relative + (1.0 - self.in_hand)
@@ -117,7 +105,7 @@ impl<'a> GainField<'a> {
     }
 
     /// Prepares evaluation at fixed returns.
-    pub fn at(&self, returns: &[f64]) -> FieldRows<'_> {
+    fn rows(&self, returns: &[f64]) -> FieldRows<'_> {
         let (nodes, holdings) = (self.trade_count(), self.holdings.count());
         let mut rows = vec![0.0; if self.table.is_empty() { 0 } else { nodes * returns.len() * holdings }];
         if !self.table.is_empty() {
@@ -159,8 +147,26 @@ impl<'a> GainField<'a> {
     }
 }
 
+impl Field for GainField<'_> {
+    fn returns(&self) -> &[f64] {
+        &self.returns
+    }
+
+    fn at(&self, returns: &[f64]) -> Box<dyn Payoffs + '_> {
+        Box::new(self.rows(returns))
+    }
+
+    /// The relative utility of selling everything after `log_return`.
+    fn least_payoff(&self, trade: Trade, log_return: f64) -> f64 {
+        let Dynamics { rate_per_step, .. } = self.dynamics;
+        let sold = self.cost_of_selling() * trade.action * log_return.exp();
+        let growth = self.dynamics.growth(trade.action, log_return) - sold;
+        self.utility.value(self.with_what_is_to_come(trade.kept * growth / (1.0 + rate_per_step)).ln())
+    }
+}
+
 /// A field restricted to fixed returns.
-pub struct FieldRows<'f> {
+struct FieldRows<'f> {
     field: &'f GainField<'f>,
     /// `rows[(m * returns + k) * holdings + j]`: the prediction at trade m, return k and holding j; empty where the gain is
     /// constant.
@@ -171,9 +177,9 @@ pub struct FieldRows<'f> {
     excesses: Vec<f64>,
 }
 
-impl FieldRows<'_> {
-    /// Relative utility of the next state's certainty equivalent, return by return: `u(w(a, z))`. Cost O(returns x nodes).
-    pub fn payoff(&self, trade: Trade) -> Vec<f64> {
+impl Payoffs for FieldRows<'_> {
+    /// `u(w(a, z))`. Cost O(returns x nodes).
+    fn payoff(&self, trade: Trade) -> Vec<f64> {
         let GainField { next, utility, bank, .. } = self.field;
         // S(x, a, z), all of it sold, with what is to come, over what selling at once would grow to.
         let sold = self.excesses.iter().map(|excess| trade.kept * (1.0 + trade.action * excess));
@@ -200,7 +206,9 @@ impl FieldRows<'_> {
         };
         utility.values(relative, &gains)
     }
+}
 
+impl FieldRows<'_> {
     /// The gains where the holding matters, which may have drifted beyond the highest action; `totals` are of total wealth.
     fn gains_by_holding(&self, trade: Trade, totals: &[f64]) -> Vec<f64> {
         let GainField { next, holdings, after, .. } = self.field;

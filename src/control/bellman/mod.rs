@@ -17,6 +17,8 @@
 //!
 //! What differs between uncertainty sets is how an action is priced (`Pricing`); the search for the best one is the same.
 
+pub mod controlled;
+pub mod field;
 pub mod gain_field;
 pub mod next_value;
 mod normal;
@@ -24,6 +26,7 @@ pub mod problem;
 pub mod solution;
 mod transport;
 
+use self::field::Field;
 use self::gain_field::GainField;
 use self::next_value::NextValue;
 use self::normal::NormalPricing;
@@ -146,8 +149,7 @@ impl BellmanStep<'_> {
         RelativeUtility::new(self.problem.specification.problem.utility, self.problem.floor(self.step, state))
     }
 
-    /// The best of `actions`, and what `then` makes of it and of the prices around it. Windows of returns grow until the
-    /// worst law provably stays inside.
+    /// The best of `actions`, and what `then` makes of it and of the prices around it.
     fn optimum<T>(
         &self,
         state: &State,
@@ -157,28 +159,50 @@ impl BellmanStep<'_> {
     ) -> (RobustSolution, T) {
         let (utility, dynamics) = (self.utility(state), self.problem.dynamics(self.step));
         let largest = self.problem.largest_gain(self.step, state);
-        let (mut reach, mut growths) = (Reach::FIRST, 0);
-        loop {
-            let returns = set.exact_returns(reach);
-            let field = GainField::tabulate(self.problem, self.step, self.next, utility, state, returns);
-            let mut pricing: Box<dyn Pricing + '_> = match set {
-                UncertaintySet::Point(centre) => Box::new(TransportPricing::new(centre, 0.0, &field)),
-                UncertaintySet::Ball { centre, radius, .. } => Box::new(TransportPricing::new(centre, *radius, &field)),
-                UncertaintySet::Region(region) => Box::new(NormalPricing::new(*region, &field)),
-            };
-            let band = best_band(pricing.as_mut(), actions, dynamics, state.holding);
-            let trade = dynamics.trade_into(band, state.holding);
-            let mut solution = solution(band, trade.action, pricing.worst(trade), utility, largest);
-            // Other holdings are brought to the ends of the band, and what they are worth is told as well.
-            let ends = [band.low, band.high].into_iter().filter(|end| *end != trade.action);
-            let mut ends = ends.map(|end| dynamics.trade_to(state.holding, end));
-            solution.certified = solution.certified && ends.all(|end| pricing.worst(end).certified);
-            if solution.certified || !set.has_window() || growths == WINDOW_GROWTHS {
-                let more = then(pricing.as_ref(), &solution);
-                return (solution, more);
-            }
-            (reach, growths) = (reach.doubled(), growths + 1);
+        let field = |returns| GainField::tabulate(self.problem, self.step, self.next, utility, state, returns);
+        best_response(set, actions, (dynamics, state.holding), field, |pricing, best| {
+            let solution = solution(best, utility, largest);
+            let more = then(pricing, &solution);
+            (solution, more)
+        })
+    }
+}
+
+/// The trade that is best against the worst law for it.
+struct BestResponse {
+    band: Band,
+    trade: Trade,
+    worst: WorstExpectation,
+}
+
+/// Finds the best of `actions` from a holding against the worst law of a set, and gives what `then` makes of it and of the
+/// prices around it. Windows of returns grow until the worst law provably stays inside.
+fn best_response<F: Field, T>(
+    set: &UncertaintySet,
+    actions: ActionInterval,
+    (dynamics, holding): (Dynamics, f64),
+    field_at: impl Fn(Vec<f64>) -> F,
+    then: impl Fn(&dyn Pricing, BestResponse) -> T,
+) -> T {
+    let (mut reach, mut growths) = (Reach::FIRST, 0);
+    loop {
+        let field = field_at(set.exact_returns(reach));
+        let mut pricing: Box<dyn Pricing + '_> = match set {
+            UncertaintySet::Point(centre) => Box::new(TransportPricing::new(centre, 0.0, &field)),
+            UncertaintySet::Ball { centre, radius, .. } => Box::new(TransportPricing::new(centre, *radius, &field)),
+            UncertaintySet::Region(region) => Box::new(NormalPricing::new(*region, &field)),
+        };
+        let band = best_band(pricing.as_mut(), actions, dynamics, holding);
+        let trade = dynamics.trade_into(band, holding);
+        let mut worst = pricing.worst(trade);
+        // Other holdings are brought to the ends of the band, and what they are worth is told as well.
+        let ends = [band.low, band.high].into_iter().filter(|end| *end != trade.action);
+        let mut ends = ends.map(|end| dynamics.trade_to(holding, end));
+        worst.certified = worst.certified && ends.all(|end| pricing.worst(end).certified);
+        if worst.certified || !set.has_window() || growths == WINDOW_GROWTHS {
+            return then(pricing.as_ref(), BestResponse { band, trade, worst });
         }
+        (reach, growths) = (reach.doubled(), growths + 1);
     }
 }
 
@@ -223,17 +247,12 @@ fn not_above(largest: f64, gain: f64) -> f64 {
 
 /// The primal and the dual value as gains. Neither is above the `largest` gain, for no law of the set is better in every
 /// period than its best return; where wealth is so large that its utility no longer grows, both may be that.
-fn solution(
-    band: Band,
-    action: f64,
-    worst: WorstExpectation,
-    utility: RelativeUtility,
-    largest: f64,
-) -> RobustSolution {
+fn solution(best: BestResponse, utility: RelativeUtility, largest: f64) -> RobustSolution {
+    let BestResponse { band, trade, worst } = best;
     let gain = |value: f64| not_above(largest, utility.inverse(value));
     let floor_gain = gain(worst.value);
     RobustSolution {
-        action,
+        action: trade.action,
         band,
         floor_gain,
         duality_gap: floor_gain - gain(worst.dual),

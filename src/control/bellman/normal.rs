@@ -8,7 +8,7 @@
 //! Control Optim. 57.
 
 use super::Pricing;
-use super::gain_field::{FieldRows, GainField};
+use super::field::{Field, Payoffs};
 use super::solution::{Adversary, LOSS_OF_ROUNDING, WorstExpectation};
 use crate::control::problem::dynamics::Trade;
 use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw, Quadrature, WorstNormal};
@@ -19,13 +19,13 @@ const ACTION_TOLERANCE: f64 = 1e-6;
 /// A region, with the field at the nodes of the laws that every action is tried against.
 pub(super) struct NormalPricing<'f> {
     region: ConfidenceRegion,
-    field: &'f GainField<'f>,
-    rows: FieldRows<'f>,
+    field: &'f dyn Field,
+    rows: Box<dyn Payoffs + 'f>,
     quadrature: Quadrature,
 }
 
 impl<'f> NormalPricing<'f> {
-    pub fn new(region: ConfidenceRegion, field: &'f GainField<'f>) -> Self {
+    pub fn new(region: ConfidenceRegion, field: &'f dyn Field) -> Self {
         let nodes: Vec<f64> = region.angles().flat_map(|angle| region.at(angle).nodes()).collect();
         NormalPricing { region, field, rows: field.at(&nodes), quadrature: Quadrature::default() }
     }

@@ -1,7 +1,7 @@
 //! Prices of actions against a Wasserstein ball: the worst law moves the centre's masses about a support.
 
 use super::Pricing;
-use super::gain_field::{FieldRows, GainField};
+use super::field::{Field, Payoffs};
 use super::solution::{Adversary, LOSS_OF_ROUNDING, WorstExpectation};
 use crate::control::problem::dynamics::Trade;
 use crate::control::uncertainty::COINCIDENT;
@@ -30,9 +30,9 @@ const PROOF_SLACK: f64 = 1e-12;
 pub(super) struct TransportPricing<'f> {
     centre: &'f Centre,
     radius: f64,
-    field: &'f GainField<'f>,
+    field: &'f dyn Field,
     grid: Grid,
-    rows: FieldRows<'f>,
+    rows: Box<dyn Payoffs + 'f>,
     refined: usize,
 }
 
@@ -44,7 +44,7 @@ struct Grid {
 
 impl<'f> TransportPricing<'f> {
     /// Without a radius the centre's atoms alone are the support.
-    pub fn new(centre: &'f Centre, radius: f64, field: &'f GainField<'f>) -> Self {
+    pub fn new(centre: &'f Centre, radius: f64, field: &'f dyn Field) -> Self {
         let grid = grid(centre, radius, subdivided(field.returns(), SUPPORT_PARTS, |_| true));
         let rows = field.at(&grid.support);
         TransportPricing { centre, radius, field, grid, rows, refined: 0 }

@@ -149,7 +149,7 @@ fn utility(problem: &ProblemSpecification) -> Result<(), FieldError> {
     match problem.utility {
         UtilitySpecification::Exponential { risk_aversion } => {
             within(FIELD, risk_aversion, 1e-12, 1e9)?;
-            not_flat(problem, "problem.initial_wealth", problem.initial_wealth)
+            not_flat(problem, problem.initial_wealth, (FIELD, risk_aversion), "problem.initial_wealth")
         }
         UtilitySpecification::Power { risk_aversion } if !(risk_aversion > 1.0 && risk_aversion <= 100.0) => {
             Err(FieldError::new(FIELD, risk_aversion, "must lie in (1, 100]; at 1 use the log utility"))
@@ -158,20 +158,14 @@ fn utility(problem: &ProblemSpecification) -> Result<(), FieldError> {
     }
 }
 
-/// Checks that utility still grows at a wealth that a problem starts with.
-fn not_flat(problem: &ProblemSpecification, field: &str, wealth: f64) -> Result<(), FieldError> {
-    match problem.utility {
-        UtilitySpecification::Exponential { risk_aversion }
-            if risk_aversion * withdrawals::total_wealth(problem, wealth) > EXPONENTIAL_SCALE =>
-        {
-            let rule = format!(
-                "must be less: with what problem.contributions are worth now, times problem.utility.risk_aversion, it must be at \
-                 most {EXPONENTIAL_SCALE}"
-            );
-            Err(FieldError::new(field, wealth, rule))
-        }
-        _ => Ok(()),
+/// Checks that utility still grows at a wealth that a problem starts with; else `refused` is, for its product with `other`.
+fn not_flat(problem: &ProblemSpecification, wealth: f64, refused: (&str, f64), other: &str) -> Result<(), FieldError> {
+    let UtilitySpecification::Exponential { risk_aversion } = problem.utility else { return Ok(()) };
+    if risk_aversion * withdrawals::total_wealth(problem, wealth) <= EXPONENTIAL_SCALE {
+        return Ok(());
     }
+    let rule = format!("times {other} must be at most {EXPONENTIAL_SCALE}, wealth taken with what is to come");
+    Err(FieldError::new(refused.0, refused.1, rule))
 }
 
 fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), FieldError> {
@@ -265,7 +259,7 @@ fn design(specification: &Specification) -> Result<(), FieldError> {
             return Err(FieldError::new("design.wealth.max", max, "must be at least design.wealth.min"));
         }
         withdrawals::check_start(&specification.problem, "design.wealth.min", min)?;
-        not_flat(&specification.problem, "design.wealth.max", max)?;
+        not_flat(&specification.problem, max, ("design.wealth.max", max), "problem.utility.risk_aversion")?;
     }
     Ok(())
 }

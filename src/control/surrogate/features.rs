@@ -31,6 +31,14 @@ pub struct FeatureSelection {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Features(pub(super) Vec<f64>);
 
+impl Features {
+    /// The features of a law after those of a physical state.
+    pub fn after(self, mut described: Vec<f64>) -> Features {
+        described.extend(self.0);
+        Features(described)
+    }
+}
+
 /// What of an empirical law and its ball the features are made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LawSummary {

@@ -4,6 +4,7 @@ pub mod design;
 pub mod features;
 pub mod fitted;
 pub mod fitting;
+pub mod learning;
 pub mod policy_target;
 pub mod scaling;
 pub mod stored;

@@ -1,0 +1,158 @@
+//! One robust step of any controlled problem:
+//!
+//!   V_t(x, F^) = max_a  min_{F in C(F^)}  E_F[ V_(t+1)( S(x, a, Z), R(F^, Z) ) ].
+//!
+//! Gains of the next state are predicted at every return of the support and, where its description depends on the action, at even
+//! actions, between which they are read along cubics; the dynamics themselves are followed for every action. The investor's own step
+//! (`super::BellmanStep`) knows that wealth is affine in the action, and predicts at fewer returns.
+
+use super::field::{Field, Payoffs};
+use super::problem::Problem;
+use super::{BestResponse, best_response};
+use crate::control::problem::controlled::Controlled;
+use crate::control::problem::dynamics::{Dynamics, Trade};
+use crate::control::problem::state::State;
+use crate::control::surrogate::features::Features;
+use crate::control::surrogate::fitted::ValueSurrogate;
+use crate::numerics::chebyshev::local_cubic;
+use crate::numerics::empirical::EmpiricalDistribution;
+
+/// Even actions at which gains are predicted, where the description of the next state depends on the action: where changing
+/// it costs, a value bends, and cubics are good to a twentieth of the jump of its second derivative times the distance's square.
+const EVEN_ACTIONS: usize = 33;
+/// A law has no wealth.
+const NO_WEALTH: f64 = 1.0;
+
+/// The robust step of a controlled problem at every state of one step.
+pub struct ControlledStep<'a, P> {
+    /// What is controlled.
+    pub problem: &'a P,
+    /// The uncertainty sets and the features of laws.
+    pub laws: &'a Problem,
+    /// Periods observed before it.
+    pub step: usize,
+    /// The value of the step after; `None` at the horizon.
+    pub next: Option<&'a ValueSurrogate>,
+}
+
+/// The solution of a controlled problem's robust step at one state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ControlledSolution {
+    /// The best action.
+    pub action: f64,
+    /// Its certainty equivalent against the worst law, an amount at the horizon.
+    pub certainty_equivalent: f64,
+    /// The same over the state's baseline.
+    pub gain: f64,
+    /// Primal minus dual value, in certainty equivalent.
+    pub duality_gap: f64,
+    /// True where no mass wants to leave the window of returns.
+    pub certified: bool,
+}
+
+impl<P: Controlled> ControlledStep<'_, P> {
+    /// What the surrogates see of a state and its law: the description, then the features of the law.
+    pub fn features(&self, state: &P::State, law: &EmpiricalDistribution) -> Features {
+        let law = State { wealth: NO_WEALTH, holding: 0.0, law: law.clone() };
+        self.laws.features(self.step, &law).after(self.problem.describe(self.step, state))
+    }
+
+    /// Solves the step. Cost: a prediction at each of some hundreds of returns, and some thirty actions priced.
+    pub fn solve(&self, state: &P::State, law: &EmpiricalDistribution) -> ControlledSolution {
+        let set = self.laws.uncertainty_set(&State { wealth: NO_WEALTH, holding: 0.0, law: law.clone() });
+        let (problem, actions) = (self.problem, self.problem.actions(self.step, state));
+        let baseline = problem.baseline(self.step, state);
+        let field = |returns: Vec<f64>| {
+            let [low, high] = [actions.lowest, actions.highest].map(|action| {
+                let next = problem.next(self.step, state, action, returns.first().copied().unwrap_or_default());
+                problem.describe(self.step + 1, &next)
+            });
+            let count = if low == high { 1 } else { EVEN_ACTIONS };
+            let even =
+                |index| actions.lowest + (actions.highest - actions.lowest) * index as f64 / (count - 1).max(1) as f64;
+            let actions = (0..count).map(even).collect();
+            ControlledField { step: self, state, law, actions, baseline, returns }
+        };
+        // What trading costs is the problem's own matter.
+        let free = (Dynamics::plain(0.0, 0.0), 0.0);
+        best_response(&set, actions, free, field, |_, BestResponse { trade, worst, .. }| {
+            let certain = |value: f64| problem.certainty_equivalent(value, baseline);
+            let certainty_equivalent = certain(worst.value);
+            ControlledSolution {
+                action: trade.action,
+                certainty_equivalent,
+                gain: problem.gain(certainty_equivalent, baseline),
+                duality_gap: certainty_equivalent - certain(worst.dual),
+                certified: worst.certified,
+            }
+        })
+    }
+}
+
+/// The next state's value, from one state.
+struct ControlledField<'a, P: Controlled> {
+    step: &'a ControlledStep<'a, P>,
+    state: &'a P::State,
+    law: &'a EmpiricalDistribution,
+    /// At which gains are predicted, ascending.
+    actions: Vec<f64>,
+    /// Of this state.
+    baseline: f64,
+    returns: Vec<f64>,
+}
+
+impl<P: Controlled> ControlledField<'_, P> {
+    fn next(&self, action: f64, log_return: f64) -> P::State {
+        self.step.problem.next(self.step.step, self.state, action, log_return)
+    }
+
+    fn utility(&self, gain: f64, next: &P::State) -> f64 {
+        let problem = self.step.problem;
+        let worth = problem.worth(gain, problem.baseline(self.step.step + 1, next));
+        problem.utility(worth, self.baseline)
+    }
+}
+
+impl<P: Controlled> Field for ControlledField<'_, P> {
+    fn returns(&self) -> &[f64] {
+        &self.returns
+    }
+
+    fn at(&self, returns: &[f64]) -> Box<dyn Payoffs + '_> {
+        let ControlledStep { problem, laws, step, next } = *self.step;
+        let mut gains = Vec::new();
+        if let Some(surrogate) = next {
+            for (law, &log_return) in laws.features_with(self.law, NO_WEALTH, returns).into_iter().zip(returns) {
+                for &action in &self.actions {
+                    let next = self.next(action, log_return);
+                    let gain = surrogate.prediction(&law.clone().after(problem.describe(step + 1, &next)))[0];
+                    gains.push(if problem.has_floor() { gain.max(0.0) } else { gain });
+                }
+            }
+        }
+        Box::new(ControlledRows { field: self, returns: returns.to_vec(), gains })
+    }
+
+    fn least_payoff(&self, trade: Trade, log_return: f64) -> f64 {
+        self.utility(0.0, &self.next(trade.action, log_return))
+    }
+}
+
+struct ControlledRows<'f, P: Controlled> {
+    field: &'f ControlledField<'f, P>,
+    returns: Vec<f64>,
+    /// Return by return, action by action; empty at the horizon.
+    gains: Vec<f64>,
+}
+
+impl<P: Controlled> Payoffs for ControlledRows<'_, P> {
+    fn payoff(&self, trade: Trade) -> Vec<f64> {
+        let (first, weights) = local_cubic(&self.field.actions, trade.action);
+        let gain = |index: usize| {
+            let along = self.gains.get(index * self.field.actions.len() + first..).unwrap_or_default();
+            along.iter().zip(weights).map(|(gain, weight)| gain * weight).sum()
+        };
+        let payoff = |(index, &log_return)| self.field.utility(gain(index), &self.field.next(trade.action, log_return));
+        self.returns.iter().enumerate().map(payoff).collect()
+    }
+}

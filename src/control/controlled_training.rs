@@ -1,0 +1,137 @@
+//! Backward induction for any controlled problem: the method of `training`, without what only the investor's problem allows.
+
+use crate::control::bellman::controlled::{ControlledSolution, ControlledStep};
+use crate::control::bellman::problem::Problem;
+use crate::control::error::TrainError;
+use crate::control::problem::controlled::Controlled;
+use crate::control::problem::sampling_law::{admissible, continuous_law};
+use crate::control::progress::Watch;
+use crate::control::request::contributions::Contributions;
+use crate::control::request::rules::DEFAULT_COUNT;
+use crate::control::request::specification::{SamplingLaw, Specification, SurrogateTarget, UtilitySpecification};
+use crate::control::surrogate::design::{CANDIDATES_PER_POINT, GUARDS};
+use crate::control::surrogate::features::Features;
+use crate::control::surrogate::fitted::ValueSurrogate;
+use crate::control::surrogate::fitting::DesignPoint;
+use crate::control::surrogate::learning::{Candidates, Counts, Learning};
+use crate::control::surrogate::stored::Solution;
+use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::law::ContinuousLaw;
+use crate::numerics::streams::stream;
+use rand::RngExt;
+
+/// One design point in this many is taken as drawn.
+const AS_DRAWN: usize = 4;
+
+/// A controlled problem with the value of every step but the first, which is solved where it is asked.
+pub struct ControlledPolicy<'a, P> {
+    problem: &'a P,
+    laws: Problem,
+    /// Of steps 1, 2 and so on.
+    values: Vec<ValueSurrogate>,
+}
+
+impl<'a, P: Controlled> ControlledPolicy<'a, P> {
+    /// Trains from `start` on the current rayon pool. The specification says what is known of the noise (framework, horizon,
+    /// history, radius, support, known law), the design and the surrogates; what it says of an investor is not read.
+    ///
+    /// # Errors
+    /// A specification that breaks a rule; a robust step that is not finite; a covariance matrix that stays singular;
+    /// [`TrainError::Stopped`] soon after the stop signal.
+    pub fn train(
+        problem: &'a P,
+        start: &P::State,
+        specification: &Specification,
+        watch: &Watch,
+    ) -> Result<Self, TrainError> {
+        let mut specification = specification.clone();
+        specification.problem.utility = UtilitySpecification::Log {};
+        specification.problem.trading_cost = 0.0;
+        specification.problem.contributions = Contributions::default();
+        specification.surrogate.target = SurrogateTarget::FloorGain;
+        let specification = specification.completed()?;
+        let laws = Problem::new(&specification);
+        let sampling_law = specification.design.sampling_law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
+        let law = continuous_law(sampling_law, &specification.problem.history);
+        let history = EmpiricalDistribution::new(&specification.problem.history);
+        let described = problem.describe(0, start).len();
+        let mut names: Vec<String> = (0..described).map(|index| format!("state_{index}")).collect();
+        names.extend(laws.selection.names());
+        let design = specification.design.count.unwrap_or(DEFAULT_COUNT);
+        let candidates = CANDIDATES_PER_POINT * design;
+        let counts =
+            Counts { design, as_drawn: design.div_ceil(AS_DRAWN), candidates, guards: candidates..candidates + GUARDS };
+        let (mut values, mut after): (Vec<ValueSurrogate>, Option<Solution>) = (Vec::new(), None);
+        for step in (1..specification.problem.horizon).rev() {
+            let bellman = ControlledStep { problem, laws: &laws, step, next: values.last() };
+            let states = Simulated { bellman, start, history: &history, law: &law };
+            let (specification, names, counts) = (&specification, &names, counts.clone());
+            let learned = Learning { specification, names, step, counts, watch }.run(&states, after.as_ref())?;
+            if let Solution::Surrogates(stored) = &learned.solution {
+                values.push(ValueSurrogate::new(specification, step, stored));
+            }
+            after = Some(learned.solution);
+        }
+        values.reverse();
+        Ok(ControlledPolicy { problem, laws, values })
+    }
+
+    /// Solves the robust step at a state with what is known of the noise by then, against the value of the step after.
+    /// `step` must be below the horizon.
+    pub fn solve(&self, step: usize, state: &P::State, law: &EmpiricalDistribution) -> ControlledSolution {
+        ControlledStep { problem: self.problem, laws: &self.laws, step, next: self.values.get(step) }.solve(state, law)
+    }
+}
+
+/// States of one step under randomised actions and the sampling law.
+struct Simulated<'a, P: Controlled> {
+    bellman: ControlledStep<'a, P>,
+    start: &'a P::State,
+    history: &'a EmpiricalDistribution,
+    law: &'a ContinuousLaw,
+}
+
+impl<P: Controlled> Simulated<'_, P> {
+    /// Streams: ("controlled", t, index) for each step.
+    fn state(&self, index: usize) -> (P::State, EmpiricalDistribution) {
+        let (ControlledStep { problem, laws, .. }, mut state) = (&self.bellman, self.start.clone());
+        let mut law = self.history.clone();
+        let learns = laws.specification.problem.framework.learns();
+        for earlier in 0..self.bellman.step {
+            let mut generator = stream(laws.specification.seed, "controlled", earlier, index);
+            let actions = problem.actions(earlier, &state);
+            let action = actions.lowest + (actions.highest - actions.lowest) * generator.random::<f64>();
+            let log_return = admissible(self.law.draw(&mut generator), &laws.specification.problem);
+            state = problem.next(earlier, &state, action, log_return);
+            if learns {
+                law.push(log_return);
+            }
+        }
+        (state, law)
+    }
+}
+
+impl<P: Controlled> Candidates for Simulated<'_, P> {
+    fn features(&self, index: usize) -> Features {
+        let (state, law) = self.state(index);
+        self.bellman.features(&state, &law)
+    }
+
+    fn solve(&self, index: usize, features: Features) -> Result<DesignPoint, TrainError> {
+        let (state, law) = self.state(index);
+        let ControlledSolution { action, gain, duality_gap, certified, .. } = self.bellman.solve(&state, &law);
+        if !gain.is_finite() || !action.is_finite() {
+            return Err(TrainError::NotFinite { step: self.bellman.step, point: index, gain, action });
+        }
+        Ok(DesignPoint {
+            wealth: 1.0,
+            features,
+            action,
+            floor_gain: gain,
+            floor_gains: vec![gain],
+            policy_targets: vec![action],
+            duality_gap,
+            certified,
+        })
+    }
+}
