@@ -17,6 +17,7 @@ use ballast::control::pool::{self, TrainingPool};
 use ballast::control::problem::actions::Band;
 use ballast::control::problem::state::State;
 use ballast::control::progress::Watch;
+use ballast::control::request::contributions::Contributions;
 use ballast::control::request::radius_rule::RadiusRule;
 use ballast::control::request::specification::{
     FeatureMap, InitialLaws, Specification, SurrogateTarget, UtilitySpecification,
@@ -51,6 +52,9 @@ pub struct AccuracyBench {
     /// As a share of what is traded; fresh states then hold anything
     #[arg(long, default_value_t = 0.0)]
     trading_cost: f64,
+    /// Added at the end of each period, to a wealth of 100 at the start; withdrawn where negative
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    contribution: f64,
     /// Of the design and the surrogates; fresh states have one of their own
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -86,13 +90,15 @@ fn compare(bench: &AccuracyBench) -> Result<(), TrainError> {
     let mut base = paper::specification(bench.sample_size, bench.horizon, 1000, InitialLaws::Resampled).completed()?;
     base.problem.radius = Some(RadiusRule::Bridge { alpha: bench.alpha, paths: 2000, scale: 1.0 });
     base.problem.trading_cost = bench.trading_cost;
+    base.problem.contributions = Contributions::Each(bench.contribution);
     base.seed = bench.seed;
     if let Some(risk_aversion) = bench.power {
         base.problem.utility = UtilitySpecification::Power { risk_aversion };
     }
     let base = base.completed()?;
     println!("paper's mixture, t0 = {}, T = {}, alpha = {}", bench.sample_size, bench.horizon, bench.alpha);
-    println!("{:?}, trading cost {}", base.problem.utility, bench.trading_cost);
+    let AccuracyBench { trading_cost, contribution, .. } = bench;
+    println!("{:?}, trading cost {trading_cost}, {contribution} added each period", base.problem.utility);
     let problem = Problem::new(&base);
     let last = bench.horizon - 1;
     let mut truths = vec![(last, last_truth(&problem, bench.states))];
