@@ -207,8 +207,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{:<28}{apart:>12.3} basis points of the premium", "apart");
     let costly =
         premium(&|calls| by_the_library(&Seller { calls, cost }), &format!("with a cost of {:.2} %", 100.0 * cost))?;
-    if apart.abs() > 0.5 || costly < solved {
-        return Err("the two do not agree, or a cost makes the call cheaper".into());
-    }
-    Ok(())
+    let holds = apart.abs() <= 0.5 && costly >= solved;
+    if holds { Ok(()) } else { Err("the two do not agree, or a cost makes the call cheaper".into()) }
 }

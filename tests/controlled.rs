@@ -40,6 +40,7 @@ fn the_investor_s_problem_is_solved_alike_by_the_general_solver() {
         || json!({ "kind": "gaussian_mixture", "components": [{ "weight": 1.0, "mean": 0.006, "variance": 0.002 }] });
     for (problem, holding) in [
         (json!({ "framework": "adaptive", "utility": power() }), 0.0),
+        (json!({ "framework": "static", "support": bounded(), "utility": power() }), 0.0),
         (json!({ "framework": "adaptive", "utility": power(), "contributions": 8.0 }), 0.0),
         (
             json!({ "framework": "static", "support": bounded(), "utility": { "kind": "exponential", "risk_aversion": 0.15 } }),

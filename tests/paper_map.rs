@@ -23,7 +23,8 @@ fn every_entry_of_the_table_exists() {
     for row in rows {
         let [symbol, name, _, file, test] = row.as_slice() else { panic!("five cells a row: {row:?}") };
         let code = read(&format!("src/{file}"));
-        let is_defined = ["fn", "struct", "enum", "trait"].iter().any(|kind| code.contains(&format!("pub {kind} {name}")));
+        let is_defined =
+            ["fn", "struct", "enum", "trait"].iter().any(|kind| code.contains(&format!("pub {kind} {name}")));
         assert!(is_defined || code.contains(&format!("fn {name}(")), "{symbol}: {file} defines no {name}");
         let (test_file, test_name) =
             test.split_once("::").unwrap_or_else(|| panic!("{symbol}: {test} is no file::test"));

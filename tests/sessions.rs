@@ -127,27 +127,43 @@ async fn what_was_executed_and_what_was_reached_are_taken_as_stated() {
     assert_eq!(number(&third["wealth"]), 77.5 * bought * (0.0 * (1.0 + rate) + 1.0 * 0.01_f64.exp()));
 }
 
-/// A policy that withdraws 40 at the end of each of two periods: 79.80 in the bank pay for them, and nothing less.
+/// A policy that withdraws 40 at the end of each of two periods: 79.84 in the bank pay for them, and nothing less.
 #[tokio::test(flavor = "multi_thread")]
-async fn wealth_that_does_not_pay_for_the_withdrawals_is_refused_with_the_period() {
+async fn a_session_whose_wealth_does_not_last_is_not_opened_and_one_that_comes_to_it_goes_on_in_the_bank() {
     let mut request = specification(3);
     request["problem"]["contributions"] = json!([-40.0, -40.0, 0.0]);
+    request["problem"]["trading_cost"] = json!(0.05);
+    request["problem"]["initial_wealth"] = json!(85.0);
     let mut app = trained(&request).await;
-    let dry = |(status, problem): (reqwest::StatusCode, Value), value: f64| {
-        assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("wealth")), "{problem}");
-        assert_eq!(number(&problem["value"]), value, "{problem}");
+    for (wealth, holding) in [(79.5, 0.0), (80.5, 0.5)] {
+        let start = json!({ "policy": app.policy, "wealth": wealth, "holding": holding });
+        let (status, problem) = app.post("/sessions", &start).await;
+        assert_eq!((status.as_u16(), &problem["field"], &problem["value"]), (422, &json!("wealth"), &json!(wealth)));
         assert!(problem["detail"].as_str().unwrap().contains("the end of period 2"), "{problem}");
-    };
-    dry(app.post("/sessions", &json!({ "policy": app.policy, "wealth": 79.0 })).await, 79.0);
+    }
+    app.open_with(json!({ "holding": 1.0 })).await;
     app.open_with(json!({ "wealth": 80.0 })).await;
-    dry(app.report(1, json!({ "log_return": 0.01, "wealth": 39.0 })).await, 39.0);
-    let what_if = json!({ "session": app.session, "wealth": 70.0 });
-    dry(app.post("/what-if", &what_if).await, 70.0);
-    // Everything held in an asset that falls: the loss is refused as any wealth is that cannot pay.
-    let (status, problem) = app.report(1, json!({ "log_return": -0.5, "executed_allocation": 1.0 })).await;
-    assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("wealth")), "{problem}");
-    let (status, observed) = app.report(1, json!({ "log_return": 0.01 })).await;
+    // Everything held in an asset that falls, whatever was advised: what is left is recorded, and stays in the bank.
+    let (status, observed) = app.report(1, json!({ "log_return": -0.2, "executed_allocation": 1.0 })).await;
     assert_eq!(status, 200, "{observed}");
+    let left = 80.0 * 0.95 * (-0.2_f64).exp() - 40.0;
+    assert!((number(&observed["wealth"]) - left).abs() < 1e-12 && number(&observed["holding"]) == 1.0, "{observed}");
+    app.restart().await;
+    let (status, action) = app.action().await;
+    assert_eq!((status.as_u16(), &action["allocation"], &action["source"]), (200, &json!(0.0), &json!("unsolved")));
+    assert!(
+        ["certainty_equivalent", "surrogate_sd", "floor"].iter().all(|field| action[field].is_number()),
+        "{action}"
+    );
+    // What no contributions can explain must be told.
+    let (status, problem) = app.report(2, json!({ "log_return": -0.2 })).await;
+    assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("wealth")), "{problem}");
+    let (status, observed) = app.report(2, json!({ "log_return": -0.2, "wealth": 15.0 })).await;
+    assert_eq!((status.as_u16(), number(&observed["wealth"])), (200, 15.0), "{observed}");
+    let (_, action) = app.action().await;
+    assert!(number(&action["certainty_equivalent"]) >= 15.0, "nothing more is withdrawn: {action}");
+    let what_if = json!({ "session": app.session, "sweep": { "wealth": { "from": 1.0, "to": 30.0, "points": 3 } } });
+    assert_eq!(app.post("/what-if", &what_if).await.0, 200);
 }
 
 #[tokio::test(flavor = "multi_thread")]

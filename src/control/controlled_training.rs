@@ -1,15 +1,19 @@
 //! Backward induction for any controlled problem: the method of `training`, without what only the investor's problem allows.
 
-use crate::control::bellman::controlled::{ControlledSolution, ControlledStep};
+use rand::RngExt;
+
+use crate::control::bellman::controlled::{ControlledSolution, ControlledStep, ControlledValue};
 use crate::control::bellman::problem::Problem;
-use crate::control::error::TrainError;
+use crate::control::error::{FieldError, TrainError};
 use crate::control::problem::controlled::Controlled;
 use crate::control::problem::sampling_law::{admissible, continuous_law};
 use crate::control::progress::Watch;
 use crate::control::request::contributions::Contributions;
 use crate::control::request::rules::DEFAULT_COUNT;
-use crate::control::request::specification::{SamplingLaw, Specification, SurrogateTarget, UtilitySpecification};
-use crate::control::surrogate::design::{CANDIDATES_PER_POINT, GUARDS};
+use crate::control::request::specification::{
+    InitialLaws, SamplingLaw, Specification, SurrogateTarget, UtilitySpecification,
+};
+use crate::control::surrogate::design::{AS_DRAWN, CANDIDATES_PER_POINT, GUARDS};
 use crate::control::surrogate::features::Features;
 use crate::control::surrogate::fitted::ValueSurrogate;
 use crate::control::surrogate::fitting::DesignPoint;
@@ -18,17 +22,13 @@ use crate::control::surrogate::stored::Solution;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::streams::stream;
-use rand::RngExt;
-
-/// One design point in this many is taken as drawn.
-const AS_DRAWN: usize = 4;
 
 /// A controlled problem with the value of every step but the first, which is solved where it is asked.
 pub struct ControlledPolicy<'a, P> {
     problem: &'a P,
     laws: Problem,
     /// Of steps 1, 2 and so on.
-    values: Vec<ValueSurrogate>,
+    values: Vec<ControlledValue>,
 }
 
 impl<'a, P: Controlled> ControlledPolicy<'a, P> {
@@ -36,7 +36,7 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
     /// history, radius, support, known law), the design and the surrogates; what it says of an investor is not read.
     ///
     /// # Errors
-    /// A specification that breaks a rule; a robust step that is not finite; a covariance matrix that stays singular;
+    /// A specification that breaks a rule, no support for a problem without a floor, a design of resampled laws; a robust step that is not finite; a covariance matrix that stays singular;
     /// [`TrainError::Stopped`] soon after the stop signal.
     pub fn train(
         problem: &'a P,
@@ -50,6 +50,13 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         specification.problem.contributions = Contributions::default();
         specification.surrogate.target = SurrogateTarget::FloorGain;
         let specification = specification.completed()?;
+        if specification.design.initial_laws == InitialLaws::Resampled {
+            return Err(FieldError::new("design.initial_laws", "resampled", "must be given here").into());
+        }
+        if !problem.has_floor() && specification.problem.support.is_none() {
+            let rule = "must be given for a problem without a floor";
+            return Err(FieldError::new("problem.support", "null", rule).into());
+        }
         let laws = Problem::new(&specification);
         let sampling_law = specification.design.sampling_law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
         let law = continuous_law(sampling_law, &specification.problem.history);
@@ -61,14 +68,19 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         let candidates = CANDIDATES_PER_POINT * design;
         let counts =
             Counts { design, as_drawn: design.div_ceil(AS_DRAWN), candidates, guards: candidates..candidates + GUARDS };
-        let (mut values, mut after): (Vec<ValueSurrogate>, Option<Solution>) = (Vec::new(), None);
+        let (mut values, mut after): (Vec<ControlledValue>, Option<Solution>) = (Vec::new(), None);
         for step in (1..specification.problem.horizon).rev() {
             let bellman = ControlledStep { problem, laws: &laws, step, next: values.last() };
             let states = Simulated { bellman, start, history: &history, law: &law };
+            if names.is_empty() {
+                values.push(ControlledValue::Constant(states.solve(0, states.features(0))?.floor_gain));
+                continue;
+            }
             let (specification, names, counts) = (&specification, &names, counts.clone());
             let learned = Learning { specification, names, step, counts, watch }.run(&states, after.as_ref())?;
             if let Solution::Surrogates(stored) = &learned.solution {
-                values.push(ValueSurrogate::new(specification, step, stored));
+                let surrogate = ValueSurrogate::new(specification, step, stored);
+                values.push(ControlledValue::Surrogate(Box::new(surrogate)));
             }
             after = Some(learned.solution);
         }

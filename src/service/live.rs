@@ -6,6 +6,7 @@ use super::allowance::HeavyTurn;
 use super::bounded::Bounded;
 use super::error::ServiceError;
 use super::observation::{Observe, Observed};
+use crate::control::error::FieldError;
 use crate::control::policy::advice::{Advice, Uncertainty};
 use crate::control::policy::advisor::{Advisor, OutsideDesign};
 use crate::control::problem::state::State;
@@ -33,6 +34,18 @@ pub struct Live {
     pub(super) price: Option<f64>,
     /// The surrogate's advice for the coming period, once computed.
     pub(super) advice: Option<Advice>,
+}
+
+/// Wealth as return, allocation and contributions give it.
+fn reached(wealth: f64) -> Result<f64, FieldError> {
+    let (low, high) = limits::WEALTH;
+    if (low..=high).contains(&wealth) {
+        return Ok(wealth);
+    }
+    let rule = format!(
+        "must be reported: what the return, the allocation and the contributions give is {wealth}, and a wealth lies in [{low}, {high}]"
+    );
+    Err(FieldError::new("wealth", "null", rule))
 }
 
 /// Bytes of a session in memory, and of each of its returns, in the law and in the history.
@@ -118,9 +131,10 @@ impl Live {
         let Advice { allocation, band, .. } = *self.surrogate_advice(means).await?;
         let executed_allocation = report.executed_allocation.unwrap_or(allocation);
         let mut state = means.advisor.advance(self.observed(), &self.state, executed_allocation, log_return);
-        state.wealth = report.wealth.unwrap_or(state.wealth);
-        limits::within("wealth", state.wealth, limits::WEALTH.0, limits::WEALTH.1)?;
-        means.advisor.check_withdrawals(self.observed() + 1, &state)?;
+        state.wealth = match report.wealth {
+            Some(reported) => reported,
+            None => reached(state.wealth)?,
+        };
         let (state, uncertainty) = self.measured(state, &means.advisor, means.advising).await?;
         let answer = Observed {
             session: report.session.clone(),

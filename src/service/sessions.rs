@@ -104,7 +104,8 @@ impl Sessions {
         let Start { policy, history, wealth, holding } = start;
         let advisor = self.policies.advisor(tenant, &policy).await?;
         let state = advisor.initial_state(history.as_deref(), wealth)?.with_holding(holding.unwrap_or(0.0))?;
-        advisor.check_withdrawals(0, &state)?;
+        // The policy's own wealth pays, whatever is held.
+        advisor.check_withdrawals(&state)?;
         self.policies.starts_from(&advisor, state.law.sample_size())?;
         let problem = &advisor.specification().problem;
         let row = SessionRow {

@@ -32,7 +32,24 @@ pub struct ControlledStep<'a, P> {
     /// Periods observed before it.
     pub step: usize,
     /// The value of the step after; `None` at the horizon.
-    pub next: Option<&'a ValueSurrogate>,
+    pub next: Option<&'a ControlledValue>,
+}
+
+/// The gain of a step over its baseline.
+pub enum ControlledValue {
+    /// Where nothing is seen of a state: all are one.
+    Constant(f64),
+    /// By what is seen of it.
+    Surrogate(Box<ValueSurrogate>),
+}
+
+impl ControlledValue {
+    fn gain(&self, features: &Features) -> f64 {
+        match self {
+            ControlledValue::Constant(gain) => *gain,
+            ControlledValue::Surrogate(surrogate) => surrogate.prediction(features)[0],
+        }
+    }
 }
 
 /// The solution of a controlled problem's robust step at one state.
@@ -63,15 +80,18 @@ impl<P: Controlled> ControlledStep<'_, P> {
         let (problem, actions) = (self.problem, self.problem.actions(self.step, state));
         let baseline = problem.baseline(self.step, state);
         let field = |returns: Vec<f64>| {
-            let [low, high] = [actions.lowest, actions.highest].map(|action| {
-                let next = problem.next(self.step, state, action, returns.first().copied().unwrap_or_default());
-                problem.describe(self.step + 1, &next)
-            });
-            let count = if low == high { 1 } else { EVEN_ACTIONS };
-            let even =
-                |index| actions.lowest + (actions.highest - actions.lowest) * index as f64 / (count - 1).max(1) as f64;
-            let actions = (0..count).map(even).collect();
-            ControlledField { step: self, state, law, actions, baseline, returns }
+            let part = (actions.highest - actions.lowest) / (EVEN_ACTIONS - 1) as f64;
+            let mut even: Vec<f64> = (0..EVEN_ACTIONS).map(|index| actions.lowest + index as f64 * part).collect();
+            let described = |action: f64, log_return: f64| {
+                problem.describe(self.step + 1, &problem.next(self.step, state, action, log_return))
+            };
+            // One action serves all where none of them moves what is described.
+            let ends = [returns.first(), returns.last()].map(|end| end.copied().unwrap_or_default());
+            let moves = |z: f64| even.iter().any(|&action| described(action, z) != described(actions.lowest, z));
+            if part <= 0.0 || !ends.into_iter().any(moves) {
+                even.truncate(1);
+            }
+            ControlledField { step: self, state, law, actions: even, baseline, returns }
         };
         // What trading costs is the problem's own matter.
         let free = (Dynamics::plain(0.0, 0.0), 0.0);
@@ -121,11 +141,11 @@ impl<P: Controlled> Field for ControlledField<'_, P> {
     fn at(&self, returns: &[f64]) -> Box<dyn Payoffs + '_> {
         let ControlledStep { problem, laws, step, next } = *self.step;
         let mut gains = Vec::new();
-        if let Some(surrogate) = next {
+        if let Some(value) = next {
             for (law, &log_return) in laws.features_with(self.law, NO_WEALTH, returns).into_iter().zip(returns) {
                 for &action in &self.actions {
                     let next = self.next(action, log_return);
-                    let gain = surrogate.prediction(&law.clone().after(problem.describe(step + 1, &next)))[0];
+                    let gain = value.gain(&law.clone().after(problem.describe(step + 1, &next)));
                     gains.push(if problem.has_floor() { gain.max(0.0) } else { gain });
                 }
             }

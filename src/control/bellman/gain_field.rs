@@ -6,7 +6,8 @@
 //! action, where wealth matters, times the holdings at which the value is known. Every action is then priced without touching
 //! the surrogate again: a product a node and return.
 //!
-//! Where trading costs, wealth depends on what the trade keeps of it as well, by a few percent at most: nearly linearly.
+//! Where trading costs, wealth depends on what the trade keeps of it as well, by a few percent at most: nearly linearly, but
+//! where withdrawals leave little of it.
 //!
 //! Where money is to come, everything is relative to total wealth: a trade moves the share of it that is in hand, and the rest
 //! grows as the bank does.

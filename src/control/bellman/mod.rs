@@ -104,7 +104,7 @@ impl BellmanStep<'_> {
     pub fn solve_for_design(&self, state: &State, holdings: Holdings) -> DesignSolution {
         let (set, actions) = (self.problem.uncertainty_set(state), self.actions(state));
         let (utility, dynamics) = (self.utility(state), self.problem.dynamics(self.step));
-        let in_hand = self.problem.in_hand(self.step, state);
+        let unit = self.problem.unit_of_action(self.step, state);
         let curvature = utility.relative_risk_aversion() * set.variance();
         let largest = self.problem.largest_gain(self.step, state);
         let (solution, (floor_gains, policy_targets)) = self.optimum(state, &set, actions, |pricing, found| {
@@ -114,10 +114,10 @@ impl BellmanStep<'_> {
                     Side::Buying => found.band.low,
                     Side::Selling => found.band.high,
                 };
-                let gain_at = |share: f64| gain(dynamics.trade(side, state.holding, share / in_hand));
+                let gain_at = |share: f64| gain(dynamics.trade(side, state.holding, share / unit));
                 // Where both sides are one, that is known.
-                let own = if dynamics.trading_cost > 0.0 { gain_at(end * in_hand) } else { found.floor_gain };
-                policy_target(end * in_hand, actions.highest * in_hand, own, curvature, gain_at)
+                let own = if dynamics.trading_cost > 0.0 { gain_at(end * unit) } else { found.floor_gain };
+                policy_target(end * unit, actions.highest * unit, own, curvature, gain_at)
             };
             // Of another holding the floor is another, and so is what the trade keeps.
             let gain_of = |holding: f64| {

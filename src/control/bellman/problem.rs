@@ -71,11 +71,11 @@ impl Problem {
 
     /// S of the period after `step`, which is at most the horizon.
     pub fn dynamics(&self, step: usize) -> Dynamics {
-        self.periods[step]
+        self.periods[step.min(self.periods.len() - 1)]
     }
 
-    /// The share of total wealth, before anything is sold, that is in hand: in its unit the surrogates know actions.
-    pub fn in_hand(&self, step: usize, state: &State) -> f64 {
+    /// What an action of 1 is of total wealth, before anything is sold: the surrogates know actions as shares of that.
+    pub fn unit_of_action(&self, step: usize, state: &State) -> f64 {
         self.dynamics(step).in_hand(state.wealth, 0.0)
     }
 
@@ -84,14 +84,14 @@ impl Problem {
         self.dynamics(step).floor(state.wealth, state.holding, self.specification.problem.horizon - step)
     }
 
-    /// Checks that the bank alone pays for everything that is withdrawn after `step`, from all that selling `state` leaves.
+    /// Checks that the bank alone pays for everything that is withdrawn, from all that selling a first state leaves.
     ///
     /// # Errors
     /// It runs dry, under the name `wealth`.
-    pub fn check_withdrawals(&self, step: usize, state: &State) -> Result<(), FieldError> {
-        let liquidated = state.wealth * self.dynamics(step).liquidation(state.holding);
-        let periods = &self.periods[step..self.periods.len() - 1];
-        check_bank(periods, step, liquidated).map_err(|rule| FieldError::new("wealth", state.wealth, rule))
+    pub fn check_withdrawals(&self, state: &State) -> Result<(), FieldError> {
+        let liquidated = state.wealth * self.dynamics(0).liquidation(state.holding);
+        let periods = &self.periods[..self.periods.len() - 1];
+        check_bank(periods, liquidated).map_err(|rule| FieldError::new("wealth", state.wealth, rule))
     }
 
     /// The most that the floor gain of a state at `step` can be: that of the best return of its centre in every period. The

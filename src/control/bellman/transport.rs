@@ -100,7 +100,8 @@ impl<'f> TransportPricing<'f> {
         let mut near = 0.0;
         while near < PROOF_REACH {
             let far = near + PROOF_INTERVAL + PROOF_GROWTH * near;
-            if lowest(first - far) + gamma * near < below - PROOF_SLACK {
+            let proved = lowest(first - far) + gamma * near >= below - PROOF_SLACK;
+            if !proved {
                 return false;
             }
             near = far;

@@ -17,7 +17,8 @@ pub enum AdviceSource {
     ResolvedOutsideDesign,
     /// Re-solved for a hypothetical radius, which the policy surrogate was not trained for.
     ResolvedOtherRadius,
-    /// The robust step has no finite solution at the state: all wealth stays in the bank, which no law can hurt.
+    /// The robust step has no finite solution at the state, or its wealth does not pay for what is withdrawn: all of it stays in
+    /// the bank, which no law can hurt.
     Unsolved,
 }
 

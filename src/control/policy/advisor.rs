@@ -14,7 +14,6 @@ use crate::control::error::FieldError;
 use crate::control::kept::Kept;
 use crate::control::policy::worst_case::WorstCase;
 use crate::control::problem::actions::Band;
-use crate::control::problem::holdings::Holdings;
 use crate::control::problem::state::State;
 use crate::control::request::specification::{Specification, UtilitySpecification};
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
@@ -118,12 +117,12 @@ impl Advisor {
         State::new(history, wealth.unwrap_or(problem.initial_wealth))
     }
 
-    /// Checks that a state after `step` observed periods can pay for every withdrawal to come.
+    /// Checks that a state at the start can pay for every withdrawal to come.
     ///
     /// # Errors
     /// The bank alone runs dry, under the name `wealth`.
-    pub fn check_withdrawals(&self, step: usize, state: &State) -> Result<(), FieldError> {
-        self.problem.check_withdrawals(step, state)
+    pub fn check_withdrawals(&self, state: &State) -> Result<(), FieldError> {
+        self.problem.check_withdrawals(state)
     }
 
     /// The advice for the period after `step` observed periods. `step` must be below the horizon.
@@ -226,16 +225,23 @@ impl Advisor {
     }
 
     fn resolved(&self, asked: &Asked, predicted: &Prediction) -> (Advice, Option<RobustSolution>) {
-        let after = self.policy.steps().get(asked.step + 1).map(|after| &after.solution);
-        let next = NextValue::new(self.specification(), asked.step + 1, after);
-        let step = BellmanStep { problem: &self.problem, step: asked.step, next: &next };
-        let solution = step.solve_within(asked.state, asked.radius);
-        if solution.action.is_finite() && solution.floor_gain.is_finite() {
-            return (self.advice(asked, solution.band, solution.floor_gain, predicted), Some(solution));
+        if self.pays(asked.step, asked.state) {
+            let after = self.policy.steps().get(asked.step + 1).map(|after| &after.solution);
+            let next = NextValue::new(self.specification(), asked.step + 1, after);
+            let step = BellmanStep { problem: &self.problem, step: asked.step, next: &next };
+            let solution = step.solve_within(asked.state, asked.radius);
+            if solution.action.is_finite() && solution.floor_gain.is_finite() {
+                return (self.advice(asked, solution.band, solution.floor_gain, predicted), Some(solution));
+            }
         }
         // All-bank is feasible and no law can hurt it.
         let unsolved = Asked { source: AdviceSource::Unsolved, ..*asked };
         (self.advice(&unsolved, Band::of(&[0.0]), 0.0, predicted), None)
+    }
+
+    /// Whether all that a state has, and what is to come, pays for every withdrawal.
+    fn pays(&self, step: usize, state: &State) -> bool {
+        self.problem.floor(step, state) > 0.0
     }
 
     fn advice(&self, asked: &Asked, band: Band, floor_gain: f64, predicted: &Prediction) -> Advice {
@@ -262,14 +268,15 @@ impl Advisor {
     fn predict(&self, step: usize, state: &State, radius: f64) -> Prediction {
         // An imported policy may claim anything.
         let largest = self.problem.largest_gain(step, state);
-        let (dynamics, highest) = (self.problem.dynamics(step), self.specification().problem.action_interval[1]);
+        let (dynamics, highest) = (self.problem.dynamics(step), self.problem.actions(step, state).highest);
         let in_hand = dynamics.in_hand(state.wealth, state.holding);
         match &self.policy.steps()[step].solution {
             Solution::Single(single) => {
-                let in_design = self.is_single_state(step, state);
-                let holdings = Holdings::new(single.floor_gains.len(), highest);
+                let in_design = self.is_single_state(step, state) && self.pays(step, state);
+                let holdings = self.problem.holdings(single.floor_gains.len());
                 let gain = holdings.gain(&single.floor_gains, dynamics, state.holding, in_hand);
-                Prediction { band: single.band, floor_gain: gain.min(largest), deviation: 0.0, in_design }
+                let band = Band { low: single.band.low.min(highest), high: single.band.high.min(highest) };
+                Prediction { band, floor_gain: gain.min(largest), deviation: 0.0, in_design }
             }
             Solution::Surrogates(stored) => {
                 let PreparedStep { value, policy, factor } = self.prepared_from(step, stored);
@@ -279,7 +286,7 @@ impl Advisor {
                     process.as_ref().as_ref().map_or(f64::INFINITY, |found| found.latent_variance(&input).sqrt());
                 let (ends, predictions, holdings) = (policy.at(&input), value.surrogate.at(&input), value.holdings());
                 let is_finite = ends.iter().all(|end| end.is_finite());
-                let (unit, highest) = (self.problem.in_hand(step, state), self.problem.actions(step, state).highest);
+                let unit = self.problem.unit_of_action(step, state);
                 let ends: Vec<f64> = ends.into_iter().map(|end| (end / unit).clamp(0.0, highest)).collect();
                 let prediction = holdings.at(&predictions, state.holding);
                 let total = dynamics.total(state.wealth, holdings.within(state.holding));
@@ -288,7 +295,7 @@ impl Advisor {
                     band: Band::of(&ends),
                     floor_gain: gain.min(largest),
                     deviation: value.gain_spread(prediction, deviation * stored.value.scale, total).min(largest),
-                    in_design: deviation <= stored.deviation_limit && is_finite,
+                    in_design: deviation <= stored.deviation_limit && is_finite && self.pays(step, state),
                 }
             }
         }

@@ -112,7 +112,6 @@ impl Advisor {
         let wealth = hypothesis.wealth.unwrap_or(state.wealth);
         let holding = hypothesis.holding.unwrap_or(state.holding);
         let now = State { wealth, holding, law: state.law.clone() };
-        self.check_withdrawals(step, &now)?;
         let Some(log_return) = hypothesis.log_return else { return Ok((step, now)) };
         let horizon = self.specification().problem.horizon;
         if step + 1 >= horizon {

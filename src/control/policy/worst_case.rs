@@ -92,7 +92,7 @@ impl WorstCase {
     /// Where the robust step has no finite solution.
     pub fn unknown() -> Self {
         let sentence =
-            "The robust step has no finite solution at this state, so all wealth stays in the bank.".to_owned();
+            "The robust step has no finite solution at this state, or its wealth does not pay for what is withdrawn, so all of it stays in the bank.".to_owned();
         WorstCase { multiplier: 0.0, radius_cost: 0.0, transport: Vec::new(), normal: None, duality_gap: 0.0, sentence }
     }
 

@@ -26,7 +26,8 @@ pub trait Controlled: Sync {
     /// is safe.
     fn baseline(&self, step: usize, state: &Self::State) -> f64;
 
-    /// Whether the baseline is worth having for certain. Where it is not, the support of the noise must be bounded.
+    /// Whether the baseline is worth having for certain, and no less after a higher noise: then laws may put mass anywhere, and
+    /// where it goes is proved. Where it is not, the support of the noise must be bounded.
     fn has_floor(&self) -> bool {
         true
     }

@@ -19,6 +19,10 @@
 use crate::control::problem::actions::Band;
 use crate::control::request::specification::ProblemSpecification;
 
+/// Part of what must stay in the bank that a wealth to start from has more at least: at the reserve itself nothing is left to
+/// decide, and total wealth may be rounding.
+const SPARE: f64 = 0.01;
+
 /// Rates, costs and flows of a period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dynamics {
@@ -92,8 +96,9 @@ impl Dynamics {
     pub fn next(self, wealth: f64, holding: f64, action: f64, log_return: f64) -> (f64, f64) {
         let growth = self.growth(action, log_return);
         let grown = wealth * self.left(holding, action) * growth;
-        let next = grown + self.contribution;
-        (next, action * log_return.exp() / growth * (grown / next))
+        let (next, share) = (grown + self.contribution, action * log_return.exp() / growth);
+        // Of what cannot pay for a withdrawal nothing is left, and of what hardly can the asset is sold as well.
+        (next, if next > 0.0 { (share * (grown / next)).min(1.0) } else { share })
     }
 
     /// Total wealth: what selling everything leaves, and what is to come, `x (1 - c h) + K`.
@@ -109,6 +114,11 @@ impl Dynamics {
     /// Terminal wealth of selling everything and staying in the bank for `steps` steps.
     pub fn floor(self, wealth: f64, holding: f64, steps: usize) -> f64 {
         self.total(wealth, holding) * (1.0 + self.rate_per_step).powf(steps as f64)
+    }
+
+    /// Wealth that pays for every withdrawal to come, with a hundredth to spare, whatever of it is held and must be sold.
+    pub fn least_wealth(self) -> f64 {
+        (1.0 + SPARE) * self.reserve / self.liquidation(1.0)
     }
 
     /// The highest action up to `highest` that leaves the reserve in the bank, whatever of the holding must be traded.
@@ -185,9 +195,12 @@ mod tests {
         // Of 98, after the dearest trade, the reserve is kept.
         let free = periods[0].highest_action(100.0, 1.0);
         assert!((98.0 * (1.0 - free) + to_come).abs() < 1e-12, "{free}");
-        assert!(check_bank(&periods, 0, 15.6).unwrap_err().contains("the end of period 2"));
-        assert!(check_bank(&periods[1..], 1, 20.7).unwrap_err().contains("the end of period 2"));
-        assert_eq!((check_bank(&periods, 0, 15.7), check_bank(&periods[1..], 1, 20.8)), (Ok(()), Ok(())));
+        assert!(check_bank(&periods, 15.6).unwrap_err().contains("the end of period 2"));
+        assert!(check_bank(&periods[1..], 20.7).unwrap_err().contains("the end of period 1"));
+        assert_eq!((check_bank(&periods, 15.7), check_bank(&periods[1..], 20.8)), (Ok(()), Ok(())));
+        // Of what cannot pay, and of what can only with the asset itself.
+        assert!(periods[1].next(40.0, 1.0, 1.0, -0.8).0 < 0.0 && periods[1].next(40.0, 1.0, 1.0, -0.8).1 == 1.0);
+        assert_eq!(periods[1].next(40.0, 0.9, 0.9, 0.0).1, 1.0);
     }
 
     #[test]

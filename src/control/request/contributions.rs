@@ -28,6 +28,18 @@ impl Contributions {
         }
     }
 
+    /// One number where all are the same.
+    #[must_use]
+    pub fn canonical(self) -> Self {
+        match &self {
+            Contributions::Listed(amounts) => match amounts.split_first() {
+                Some((first, rest)) if rest.iter().all(|amount| amount == first) => Contributions::Each(*first),
+                _ => self,
+            },
+            Contributions::Each(_) => self,
+        }
+    }
+
     /// True where nothing is ever added or withdrawn.
     pub fn are_none(&self) -> bool {
         match self {

@@ -105,6 +105,7 @@ impl EvaluationRequest {
         }
         let sampling_law = self.design.sampling_law.get_or_insert(SamplingLaw::Bootstrap {}).clone();
         self.problem.law.get_or_insert(sampling_law);
+        self.problem.contributions = std::mem::take(&mut self.problem.contributions).canonical();
         self.specification(Framework::KnownLaw, None).completed()?;
         self.check_frameworks()?;
         self.complete_mixes()?;

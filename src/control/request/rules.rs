@@ -58,6 +58,7 @@ impl Specification {
     pub fn completed(mut self) -> Result<Self, FieldError> {
         check(&self)?;
         let learns = self.problem.framework.learns();
+        self.problem.contributions = self.problem.contributions.canonical();
         self.problem.radius = Some(self.problem.radius_rule());
         self.design.count.get_or_insert(if learns { DEFAULT_COUNT } else { DEFAULT_COUNT_WEALTH_ALONE });
         self.design.sampling_law.get_or_insert(SamplingLaw::Bootstrap {});
@@ -161,11 +162,18 @@ fn utility(problem: &ProblemSpecification) -> Result<(), FieldError> {
 /// Checks that utility still grows at a wealth that a problem starts with; else `refused` is, for its product with `other`.
 fn not_flat(problem: &ProblemSpecification, wealth: f64, refused: (&str, f64), other: &str) -> Result<(), FieldError> {
     let UtilitySpecification::Exponential { risk_aversion } = problem.utility else { return Ok(()) };
-    if risk_aversion * withdrawals::total_wealth(problem, wealth) <= EXPONENTIAL_SCALE {
-        return Ok(());
+    if risk_aversion * wealth > EXPONENTIAL_SCALE {
+        let rule = format!("times {other} must be at most {EXPONENTIAL_SCALE}");
+        return Err(FieldError::new(refused.0, refused.1, rule));
     }
-    let rule = format!("times {other} must be at most {EXPONENTIAL_SCALE}, wealth taken with what is to come");
-    Err(FieldError::new(refused.0, refused.1, rule))
+    let total = withdrawals::total_wealth(problem, wealth);
+    if risk_aversion * total > EXPONENTIAL_SCALE {
+        let rule = format!(
+            "must be less: with wealth they are worth {total} now, which times problem.utility.risk_aversion must be at most {EXPONENTIAL_SCALE}"
+        );
+        return Err(FieldError::new("problem.contributions", "money to come", rule));
+    }
+    Ok(())
 }
 
 fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), FieldError> {

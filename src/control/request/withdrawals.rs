@@ -4,31 +4,42 @@ use crate::control::error::FieldError;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::specification::ProblemSpecification;
 
+/// A bank with less than this part of what it had is empty.
+const ROUNDING: f64 = 1e-9;
+
 /// Checks that a wealth at the start, left in the bank, pays for everything that is withdrawn.
 ///
 /// # Errors
 /// It runs dry.
 pub fn check_start(problem: &ProblemSpecification, field: &str, wealth: f64) -> Result<(), FieldError> {
-    check_bank(&Dynamics::of(problem)[..problem.horizon], 0, wealth)
-        .map_err(|rule| FieldError::new(field, wealth, rule))
+    let periods = Dynamics::of(problem);
+    let refused = |rule: String| Err(FieldError::new(field, wealth, rule));
+    match (check_bank(&periods[..problem.horizon], wealth), periods[0].least_wealth()) {
+        (Err(rule), _) => refused(rule),
+        (Ok(()), least) if wealth < least => refused(format!(
+            "must be at least {least}, so that a hundredth is to spare of what must stay in the bank for what \
+             problem.contributions withdraws"
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// Checks that what selling everything leaves, `liquidated`, left in the bank, pays for everything that is withdrawn in
-/// `periods`, before which `passed` others have passed.
+/// `periods`.
 ///
 /// # Errors
 /// What must be, where it runs dry.
-pub fn check_bank(periods: &[Dynamics], passed: usize, liquidated: f64) -> Result<(), String> {
+pub fn check_bank(periods: &[Dynamics], liquidated: f64) -> Result<(), String> {
     let mut bank = liquidated;
     let is_empty = |period: &Dynamics| {
         bank = bank * (1.0 + period.rate_per_step) + period.contribution;
-        bank <= 0.0
+        bank <= ROUNDING * liquidated
     };
     match periods.iter().position(is_empty) {
         None => Ok(()),
         Some(index) => Err(format!(
             "must be more: all sold and left in the bank, it does not last to the end of period {}, for what problem.contributions withdraws",
-            passed + index + 1
+            index + 1
         )),
     }
 }

@@ -26,9 +26,7 @@ pub const CANDIDATES_PER_POINT: usize = 3;
 /// States that set the guard: 10 of them lie beyond a guard that 99 % pass.
 pub const GUARDS: usize = 1000;
 /// One design point in this many is taken as drawn.
-const AS_DRAWN: usize = 4;
-/// Of what must stay in the bank, what a state of the design has more at least.
-const SPARE: f64 = 0.01;
+pub const AS_DRAWN: usize = 4;
 
 /// The states that a training may be asked to solve.
 pub struct Design {
@@ -117,18 +115,13 @@ impl Design {
             (wealth, holding) = dynamics.next(wealth, holding, action, log_return);
             sample.push(log_return);
         }
-        self.holding_half(wealth.max(least_wealth(self.periods[step])), EmpiricalDistribution::new(&sample))
+        self.holding_half(wealth.max(self.periods[step].least_wealth()), EmpiricalDistribution::new(&sample))
     }
 
     /// The band and the value are found for every holding from any one, best from one in the middle.
     fn holding_half(&self, wealth: f64, law: EmpiricalDistribution) -> State {
         State { wealth, holding: 0.5, law }
     }
-}
-
-/// Wealth that pays for every withdrawal to come, with a little to spare, whatever of it is held and must be sold.
-fn least_wealth(dynamics: Dynamics) -> f64 {
-    (1.0 + SPARE) * dynamics.reserve / dynamics.liquidation(1.0)
 }
 
 /// Wealths of a design whose state is wealth alone: evenly in log total wealth, over what holding any allocation can reach
@@ -142,30 +135,38 @@ fn wealth_ladders(problem: &ProblemSpecification, start: Interval, count: usize)
         variance = ConfidenceRegion { estimate: NormalLaw { mean, variance }, radius }.largest_variance();
     }
     let periods = Dynamics::of(problem);
+    let comes_and_goes = !problem.contributions.are_none();
+    // Of total wealth an action can be more than of wealth in hand.
+    let highest = if comes_and_goes { 1.0 } else { problem.action_interval[1] };
     // The log growth of what is held from the start, least and most.
-    let growth = |step: usize| {
+    let growth = |step: usize, highest: f64| {
         let elapsed = step as f64;
-        let spread = REACHED_DEVIATIONS * problem.action_interval[1] * (elapsed * variance).sqrt();
+        let spread = REACHED_DEVIATIONS * highest * (elapsed * variance).sqrt();
         let bank = elapsed * problem.rate_per_step.ln_1p();
         let cost = if step > 0 { periods[0].liquidation(1.0).ln() } else { 0.0 };
         [bank.min(elapsed * mean) - spread + cost, bank.max(elapsed * mean) + spread]
     };
-    let total = |step: usize, end: usize, wealth: f64| periods[0].total(wealth, 0.0).ln() + growth(step)[end];
-    // What is in hand need not grow as total wealth does: money that is still to come cannot be lost.
-    let in_hand = |step: usize, end: usize, wealth: f64| {
-        let grown = |wealth: f64, period: usize| {
-            wealth * (growth(period + 1)[end] - growth(period)[end]).exp() + periods[period].contribution
-        };
-        periods[step].total((0..step).fold(wealth, grown), 0.0).max(f64::MIN_POSITIVE).ln()
-    };
-    let ladder = |point: usize, step: usize| {
-        let [mut low, mut high] = [total(step, 0, start.min), total(step, 1, start.max)];
-        if !problem.contributions.are_none() {
-            low = low.max(in_hand(step, 0, start.min));
-            high = high.min(in_hand(step, 1, start.max));
+    let mut in_hand = [start.min, start.max];
+    let reached = |step: usize| {
+        let [low, high] = growth(step, highest);
+        let [least, most] = [start.min, start.max].map(|wealth| periods[0].total(wealth, 0.0).ln());
+        let (mut low, mut high) = (least + low, most + high);
+        if comes_and_goes {
+            // Money that is still to come cannot be lost, nor does it grow but by the bank.
+            let totals = in_hand.map(|wealth| periods[step].total(wealth, 0.0).max(f64::MIN_POSITIVE).ln());
+            (low, high) = (low.max(totals[0]), high.min(totals[1]));
+            let [now, then] = [step, step + 1].map(|step| growth(step, problem.action_interval[1]));
+            for (end, wealth) in in_hand.iter_mut().enumerate() {
+                *wealth = *wealth * (then[end] - now[end]).exp() + periods[step].contribution;
+            }
         }
+        [low, high]
+    };
+    let ranges: Vec<[f64; 2]> = (0..problem.horizon).map(reached).collect();
+    let ladder = |point: usize, step: usize| {
+        let [low, high] = ranges[step];
         let total = (low + (high - low) * point as f64 / (count - 1) as f64).exp();
-        (total - periods[step].to_come).max(least_wealth(periods[step]))
+        (total - periods[step].to_come).max(periods[step].least_wealth())
     };
     (0..count).map(|point| (0..problem.horizon).map(|step| ladder(point, step)).collect()).collect()
 }

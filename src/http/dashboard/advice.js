@@ -14,7 +14,8 @@ export const SOURCES = {
   resolved: "solved anew on request",
   resolved_other_radius: "solved anew for another radius",
   resolved_outside_design: "solved anew, because this state lies outside the policy\u2019s design",
-  unsolved: "because the step has no finite solution here: all stays in the bank, which no law can hurt",
+  unsolved:
+    "because the step has no finite solution here, or wealth does not last for what is withdrawn: all stays in the bank, which no law can hurt",
 };
 
 /** Whether two allocations are the same advice. */

@@ -152,9 +152,9 @@ function compact(request) {
   );
 }
 
-/** One number, or several that spaces or semicolons keep apart. */
+/** One number, or several that semicolons keep apart. */
 function amounts(text) {
-  const each = text.split(/[\s;]+/).filter(Boolean).map((part) => typed(part));
+  const each = text.split(";").map((part) => typed(part)).filter((part) => part !== null);
   return each.length > 1 ? each : (each[0] ?? 0);
 }
 
@@ -182,7 +182,7 @@ function mainFields(changed) {
     input({
       name: "problem.contributions",
       label: "Added each period",
-      note: "At its end; negative is withdrawn. One number, or one for each period, apart by spaces.",
+      note: "At its end; negative is withdrawn. One number, or one for each period, apart by semicolons.",
       changed: (text) => changed("problem.contributions", amounts(text)),
     }),
     select({
@@ -200,7 +200,7 @@ function mainFields(changed) {
   const show = (request) => {
     for (const part of parts) {
       const value = at(request, part.name);
-      if (part.control !== document.activeElement) part.control.value = [value ?? ""].flat().join(" ");
+      if (part.control !== document.activeElement) part.control.value = [value ?? ""].flat().join("; ");
       part.element.hidden = value === undefined;
     }
   };
