@@ -1,0 +1,66 @@
+// Money that comes and goes, and trading that costs, on the pages of a policy and of its session.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { browser, call, service } from "./ballast.js";
+
+const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
+
+let ballast, chromium, page;
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  page.setDefaultTimeout(20_000);
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
+const main = async () => plain(await page.locator("main").innerText());
+
+test("a policy is trained with what is added and withdrawn as the form says", async () => {
+  await page.goto(`${ballast.url}/#/train`);
+  await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
+  await page.getByLabel("Decisions").fill("3");
+  await page.getByLabel("Trading cost").fill("1 %");
+  await page.getByLabel("Added each period").fill("12 500; -20; 3,5");
+  const sent = page.waitForRequest((request) => request.url().endsWith("/train"));
+  await page.getByRole("button", { name: "Train" }).click();
+  const { problem } = (await sent).postDataJSON();
+  assert.deepEqual([problem.contributions, problem.trading_cost], [[12500, -20, 3.5], 0.01]);
+});
+
+test("a session says what is added at the end of the period, reckons with it, and draws the band", async () => {
+  const { job } = await call(ballast.url, "/train", {
+    problem: {
+      horizon: 3,
+      history: HISTORY,
+      utility: { kind: "power", risk_aversion: 3 },
+      radius: { rule: "bridge", alpha: 0.5, scale: 0.05 },
+      trading_cost: 0.01,
+      contributions: [5, -8.25, 0],
+    },
+    design: { count: 40 },
+  });
+  let now;
+  do now = await call(ballast.url, `/jobs/${job}`);
+  while (now.finished_ms === null);
+  await page.goto(`${ballast.url}/#/policies/${now.policy}`);
+  await page.getByText(/In 1 of the periods money is added, 5\.00 in all, and in 1 withdrawn, 8\.25 in all\./).waitFor();
+  const { session } = await call(ballast.url, "/sessions", { policy: now.policy, holding: 0.2 });
+  await page.goto(`${ballast.url}/#/sessions/${session}`);
+  await page.getByText("At the end of the period 5.00 is added.").first().waitFor();
+  assert.match(await main(), /Band, low end/);
+  await page.getByLabel("Return in period 1").fill("2");
+  const foretold = /wealth 100\.00 \u2192 ([\d.]+) at/.exec(await main())[1];
+  await page.getByRole("button", { name: "Report period 1" }).click();
+  await page.getByRole("heading", { name: "Period 2 of 3" }).waitFor();
+  const { wealth } = await call(ballast.url, `/sessions/${session}`);
+  assert.equal(wealth.toFixed(2), foretold);
+  await page.getByText("At the end of the period 8.25 is withdrawn.").first().waitFor();
+  assert.match(await main(), /beside 5\.00 added/);
+});
