@@ -23,7 +23,7 @@ use crate::numerics::streams::stream;
 
 /// Candidates simulated for each design point.
 pub const CANDIDATES_PER_POINT: usize = 3;
-/// States that set the guard: 10 of them lie beyond a guard that 99 % pass.
+/// States that set the guard: 5 of them lie beyond a guard that 99.5 % pass.
 pub const GUARDS: usize = 1000;
 /// One design point in this many is taken as drawn.
 pub const AS_DRAWN: usize = 4;

@@ -17,8 +17,9 @@ use crate::numerics::gp::{GaussianProcess, Hyperparameters, LeaveOneOut};
 use crate::numerics::gp_fit::{self, Bounds, FitError};
 use crate::numerics::summary::quantile;
 
-/// Share of the states of the design's own law that lie within the guard.
-const GUARDED_SHARE: f64 = 0.99;
+/// Share of the states of the design's own law that lie within the guard. The limit is itself the quantile of few states beyond:
+/// over six seeds 98.8 to 99.6 % of fresh states pass, where a share of 0.99 let 97.7 to 99.4 % pass, with errors as small.
+const GUARDED_SHARE: f64 = 0.995;
 
 /// Weight that an expected error of the root mean square adds to a candidate. At 1,000 points of the paper's problem with
 /// alpha 0.5, 2 to 6 leave 0.10 basis points of error at the last step where weights by the floor gain left 0.15.

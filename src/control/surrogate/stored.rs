@@ -39,7 +39,7 @@ pub struct StepSurrogates {
     /// Largest floor gain on the design: predictions are clamped to it.
     pub largest_gain: f64,
     /// States whose predicted standard deviation of the value target exceeds this, in units of the value's `scale`, lie
-    /// outside the design: the 99 % quantile of the deviations at fresh states of the design's own law where the law is part of
+    /// outside the design: the 99.5 % quantile of the deviations at fresh states of the design's own law where the law is part of
     /// the state, of the leave-one-out deviations at the design points where it is not.
     pub deviation_limit: f64,
 }
