@@ -218,6 +218,9 @@ fn a_bank_that_runs_dry_is_refused_with_its_period() {
     refused(json!(-25.0), 100.0, "problem.initial_wealth", 5);
     refused(json!([-30.0, -75.0, 400.0, 0.0, 0.0]), 100.0, "problem.initial_wealth", 2);
     refused(json!(-12.0), 100.0, "design.wealth.min", 5);
+    // A bank that takes half of what it holds each period leaves next to nothing, but nothing is withdrawn from it.
+    let shrinking = json!({ "problem": { "horizon": 60, "history": HISTORY, "rate_per_step": -0.5 } });
+    serde_json::from_value::<Specification>(shrinking).unwrap().completed().unwrap();
     // 99.50 in the bank pay for 99.495 with nothing to spare.
     let request = json!({ "problem": { "horizon": 1, "history": HISTORY, "rate_per_step": 0.01, "initial_wealth": 99.5,
         "contributions": -100.49 } });

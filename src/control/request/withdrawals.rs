@@ -4,7 +4,7 @@ use crate::control::error::FieldError;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::specification::ProblemSpecification;
 
-/// A bank with less than this part of what it had is empty.
+/// A bank is empty once less than this part of what it began with is not withdrawn, all at present value.
 const ROUNDING: f64 = 1e-9;
 
 /// Checks that a wealth at the start, left in the bank, pays for everything that is withdrawn.
@@ -30,10 +30,11 @@ pub fn check_start(problem: &ProblemSpecification, field: &str, wealth: f64) -> 
 /// # Errors
 /// What must be, where it runs dry.
 pub fn check_bank(periods: &[Dynamics], liquidated: f64) -> Result<(), String> {
-    let mut bank = liquidated;
+    let (mut left, mut discount) = (liquidated, 1.0);
     let is_empty = |period: &Dynamics| {
-        bank = bank * (1.0 + period.rate_per_step) + period.contribution;
-        bank <= ROUNDING * liquidated
+        discount /= 1.0 + period.rate_per_step;
+        left += discount * period.contribution;
+        left <= ROUNDING * liquidated
     };
     match periods.iter().position(is_empty) {
         None => Ok(()),
