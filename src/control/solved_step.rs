@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::control::surrogate::stored::Solution;
+use crate::control::problem::actions::Band;
+use crate::control::surrogate::stored::{SingleSolution, Solution};
 
 /// Name and version of the portable form, which fixes the features and the radii that a policy was trained with.
 pub const FORMAT: &str = "ballast-policy-1";
@@ -72,6 +73,23 @@ struct Checkpoint<F, S> {
 }
 
 impl StepSolution {
+    /// In the place of a step that is never asked for its own: it holds nothing, and gains nothing.
+    pub fn unsolved(step: usize) -> Self {
+        StepSolution {
+            step,
+            solution: Solution::Single(SingleSolution { floor_gains: vec![0.0], band: Band::of(&[0.0]) }),
+            diagnostics: StepDiagnostics {
+                step,
+                design_count: 1,
+                all_bank_share: 1.0,
+                uncertified_share: 0.0,
+                duality_gap: 0.0,
+                value: None,
+                policy: None,
+            },
+        }
+    }
+
     /// JSON whose numbers parse back to the same bits, with the format of the policy it is to be part of.
     ///
     /// # Errors

@@ -80,6 +80,8 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("Observe", "previous_price", price),
         ("Observe", "executed_allocation", within(0.0, 1.0)),
         ("Observe", "wealth", wealth.clone()),
+        ("Advise", "wealth", wealth.clone()),
+        ("Advise", "holding", within(0.0, 1.0)),
         ("WhatIf", "session", json!({ "minLength": 1 })),
         ("WhatIf", "wealth", wealth),
         ("WhatIf", "holding", within(0.0, 1.0)),

@@ -21,8 +21,8 @@ use super::documentation::Published;
 use super::hosts::Hosts;
 use super::problem::{Problem, ProblemKind};
 use super::{
-    access, audit, bounds, dashboard, defaults, described, documentation, evaluations, events, jobs, operations,
-    policies, sessions, telemetry, what_if,
+    access, advise, audit, bounds, dashboard, defaults, described, documentation, evaluations, events, jobs,
+    operations, policies, sessions, telemetry, what_if,
 };
 use crate::service::Service;
 use crate::service::config::Config;
@@ -64,6 +64,7 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(sessions::observe))
         .routes(routes!(sessions::action))
         .routes(routes!(what_if::what_if))
+        .routes(routes!(advise::advise))
 }
 
 fn operators() -> OpenApiRouter<Arc<Service>> {

@@ -11,7 +11,9 @@ use crate::control::error::FieldError;
 use crate::control::estimate::{self, Footprint};
 use crate::control::kept::{Kept, Key};
 use crate::control::policy::advisor::Advisor;
+use crate::control::policy::one_period::OnePeriod;
 use crate::control::policy::{Policy, content_hash};
+use crate::control::request::specification::Specification;
 use crate::store::{DeletePolicy, PolicyRow, PolicySummary, Store, Tenant};
 
 /// Policies read and prepared at a time: a document takes several times its bytes while it is read.
@@ -62,6 +64,17 @@ impl Policies {
     /// The bridges that they would ask for are too large to be kept ready.
     pub(super) fn starts_from(&self, advisor: &Advisor, returns: usize) -> Result<(), FieldError> {
         self.memory.keeps(&[Footprint::of("history", returns, advisor.heaviest_bridges(returns))])
+    }
+
+    /// The investor of one period of a completed specification.
+    ///
+    /// # Errors
+    /// The bridges that his radius asks for are too large to be kept ready.
+    pub(super) fn one_period(&self, specification: &Specification) -> Result<OnePeriod, FieldError> {
+        let investor = OnePeriod::new(specification, self.kept.clone());
+        let returns = specification.problem.history.len();
+        self.memory.keeps(&[Footprint::of("problem.history", returns, investor.bridges())])?;
+        Ok(investor)
     }
 
     /// At most `limit` policies, newest first, after the policy with sequence `after`.

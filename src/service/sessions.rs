@@ -77,7 +77,7 @@ impl Start {
 pub struct Sessions {
     store: Store,
     clock: Clock,
-    policies: Arc<Policies>,
+    pub(super) policies: Arc<Policies>,
     slots: Arc<Slots<Name, Live>>,
     pub(super) advising: Bounded,
     pub(super) resolving: Bounded,

@@ -45,6 +45,23 @@ def test_the_chain_of_the_readme(ballast: Ballast) -> None:
     assert worst is not None and sum(move["mass"] for move in worst["transport"]) == pytest.approx(1.0)
 
 
+def test_advice_without_a_policy(ballast: Ballast) -> None:
+    simple = [math.expm1(value) for value in RETURNS]
+    advised = ballast.advise(
+        simple,
+        kind="simple",
+        wealth=250.0,
+        holding=0.5,
+        utility={"kind": "log"},
+        radius={"rule": "fixed", "radius": 1e-4},
+    )
+    assert advised["trade"] == pytest.approx(advised["allocation"] - 0.5)
+    assert advised["certainty_equivalent"] >= advised["floor"] and advised["worst_case"]["sentence"]
+    with pytest.raises(package.InvalidField) as refusal:
+        ballast.advise(simple, kind="simple", horizon=3)
+    assert refusal.value.field == "problem.horizon"
+
+
 def test_prices_and_what_was_really_done(session: Session) -> None:
     session.observe(price=103.0, previous_price=100.0, executed_allocation=0.5)
     assert session.wealth == pytest.approx(100.0 * (0.5 * 1.001 + 0.5 * 1.03), rel=1e-12)
@@ -75,6 +92,7 @@ def test_a_policy_travels_and_its_specification_trains_it_again(ballast: Ballast
 
 def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, session: Session) -> None:
     """Compares what goes over the network with api/openapi.json: an operation the service gains is missed here."""
+    ballast.advise(RETURNS, kind="log", rate_per_step=0.001)
     training = train(ballast, seed=8)
     policy = training.policy()
     own = policy.session(history=RETURNS[:5])

@@ -14,7 +14,6 @@ use ballast::control::policy::Policy;
 use ballast::control::policy::advice::Advice;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::pool::{self, TrainingPool};
-use ballast::control::problem::actions::Band;
 use ballast::control::problem::state::State;
 use ballast::control::progress::Watch;
 use ballast::control::request::contributions::Contributions;
@@ -22,10 +21,8 @@ use ballast::control::request::radius_rule::RadiusRule;
 use ballast::control::request::specification::{
     FeatureMap, InitialLaws, Specification, SurrogateTarget, UtilitySpecification,
 };
-use ballast::control::solved_step::StepDiagnostics;
 use ballast::control::solved_step::StepSolution;
 use ballast::control::surrogate::design::Design;
-use ballast::control::surrogate::stored::{SingleSolution, Solution};
 use ballast::control::training::Training;
 use ballast::numerics::streams::stream;
 use ballast::numerics::summary::quantile;
@@ -169,29 +166,15 @@ fn trained(specification: &Specification, steps: usize) -> Result<Advisor, Train
     let watch = Watch::unwatched();
     let mut solutions: Vec<StepSolution> = Vec::new();
     for step in (0..training.horizon()).rev() {
-        let solution =
-            if solutions.len() < steps { training.solve_step(step, solutions.last(), &watch)? } else { unsolved(step) };
+        let solution = if solutions.len() < steps {
+            training.solve_step(step, solutions.last(), &watch)?
+        } else {
+            StepSolution::unsolved(step)
+        };
         solutions.push(solution);
     }
     solutions.reverse();
     Ok(Advisor::new(Policy::new(specification.clone(), solutions)))
-}
-
-fn unsolved(step: usize) -> StepSolution {
-    let diagnostics = StepDiagnostics {
-        step,
-        design_count: 1,
-        all_bank_share: 1.0,
-        uncertified_share: 0.0,
-        duality_gap: 0.0,
-        value: None,
-        policy: None,
-    };
-    StepSolution {
-        step,
-        solution: Solution::Single(SingleSolution { floor_gains: vec![0.0], band: Band::of(&[0.0]) }),
-        diagnostics,
-    }
 }
 
 fn heading() {

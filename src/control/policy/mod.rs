@@ -3,6 +3,7 @@
 pub mod advice;
 pub mod advisor;
 mod document;
+pub mod one_period;
 pub mod prepared;
 pub mod walk;
 pub mod what_if;

@@ -27,6 +27,18 @@ pub struct Specification {
     pub seed: u64,
 }
 
+impl Specification {
+    /// Of a problem, with the defaults of all else.
+    pub fn of(problem: ProblemSpecification, seed: u64) -> Self {
+        Specification {
+            problem,
+            design: DesignSpecification::default(),
+            surrogate: SurrogateSpecification::default(),
+            seed,
+        }
+    }
+}
+
 /// The investor, the asset, and what is known of its returns.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]

@@ -87,6 +87,28 @@ class Ballast:
         whole = {"problem": _given(problem), "design": design, "surrogate": surrogate, "seed": seed}
         return self.submit(cast(wire.Specification, _given(whole)), idempotency_key=idempotency_key)
 
+    def advise(
+        self,
+        returns: Returns,
+        *,
+        kind: Kind,
+        wealth: float | None = None,
+        holding: float | None = None,
+        **problem: Any,
+    ) -> wire.Advised:
+        """What to hold through one period, given the returns seen so far. Nothing is trained or stored.
+
+        ``returns`` and ``kind`` are as in ``train``, and so is every field of the problem that is given by name, such
+        as ``rate_per_step``, ``utility`` or ``trading_cost``. ``wealth`` and ``holding`` are what the investor has, and
+        what share of it is in the asset already.
+        """
+        question = {
+            "problem": {"history": log_returns(returns, kind), **_given(problem)},
+            "wealth": wealth,
+            "holding": holding,
+        }
+        return cast(wire.Advised, self._transport.json("POST", "/advise", body=_given(question)))
+
     def submit(self, specification: wire.Specification, *, idempotency_key: str | None = None) -> Training:
         """Queues the training of a whole specification, such as ``Policy.detail`` shows."""
         return Training(self._transport, self._queued("/train", specification, idempotency_key))

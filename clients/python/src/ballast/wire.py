@@ -807,6 +807,25 @@ class Action(Advice):
     worst_case: NotRequired[WorstCase | None]
 
 
+class Advise(TypedDict):
+    """A question for one period."""
+
+    problem: ProblemSpecification
+    """As in a training, for a horizon of 1, which may be left out."""
+    wealth: NotRequired[float | None]
+    """Wealth now. Default: the problem's initial wealth."""
+    holding: NotRequired[float | None]
+    """Share of wealth in the risky asset now, before trading. Default: 0."""
+    seed: NotRequired[int]
+    """Of the simulated bridges."""
+
+
+class Advised(Advice):
+    """The advice, and the law that is worst for it."""
+
+    worst_case: WorstCase
+
+
 class Coverage(TypedDict):
     """How often the ball held the true law."""
 
