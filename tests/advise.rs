@@ -49,6 +49,18 @@ async fn it_is_what_a_policy_for_one_period_advises_to_the_last_bit() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_key_that_may_read_may_ask() {
+    let mut app = App::start().await;
+    let key = app.key("north", "read").await;
+    app.restart().await;
+    let question = json!({ "problem": { "history": HISTORY } });
+    for (held, expected) in [(key.as_str(), 200), ("", 401)] {
+        app.hold(held);
+        assert_eq!(app.post("/advise", &question).await.0, expected);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn what_cannot_be_advised_is_refused_by_field_and_nothing_is_stored() {
     let app = App::start().await;
     let ask = |change: Value, problem: Value| {

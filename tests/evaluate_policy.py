@@ -79,7 +79,7 @@ def contributions(problem):
 
 
 def to_come(problem, step):
-    """K and R: what the contributions from a step on are worth, and what must stay in the bank for them."""
+    """P and D: what the contributions from a step on are worth, and what must stay in the bank for them."""
     worth, reserve, bank = 0.0, 0.0, 1 + problem["rate_per_step"]
     for amount in reversed(contributions(problem)[step:]):
         worth, reserve = (worth + amount) / bank, max(0.0, (reserve - amount) / bank)

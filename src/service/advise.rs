@@ -9,7 +9,7 @@ use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::worst_case::WorstCase;
 use crate::control::request::rules;
-use crate::control::request::specification::{ProblemSpecification, Specification};
+use crate::control::request::specification::{ProblemSpecification, Specification, default_seed};
 use crate::store::Tenant;
 
 /// A question for one period.
@@ -23,12 +23,8 @@ pub struct Advise {
     /// Share of wealth in the risky asset now, before trading. Default: 0.
     pub holding: Option<f64>,
     /// Of the simulated bridges.
-    #[serde(default = "first_seed")]
+    #[serde(default = "default_seed")]
     pub seed: u64,
-}
-
-fn first_seed() -> u64 {
-    1
 }
 
 /// The advice, and the law that is worst for it.

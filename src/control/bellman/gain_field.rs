@@ -90,7 +90,8 @@ impl<'a> GainField<'a> {
         }
     }
 
-    /// Total wealth from wealth in hand, each over what selling everything at once would grow it to.
+    /// Total wealth from wealth in hand, each over what selling everything at once would grow it to: `s w + 1 - s`, s the share
+    /// in hand.
     fn with_what_is_to_come(&self, relative: f64) -> f64 {
         self.in_hand * relative + (1.0 - self.in_hand)
     }

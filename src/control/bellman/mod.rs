@@ -12,8 +12,9 @@
 //! itself, as if its cost were paid both ways, which leaves no kink. The best action is the nearer end of the band between the
 //! two optima, or the holding inside it. Source: Davis and Norman (1990), Portfolio selection with transaction costs.
 //!
-//! Where money comes and goes, wealth is total wealth throughout, of which a trade moves the part in hand
-//! (`control/problem/dynamics.rs`).
+//! Where money comes and goes, wealth is total wealth, of which the share s is in hand and moves (`control/problem/dynamics.rs`):
+//!
+//!   w(a, z) = ln( s ((1-a)(1+r) + a e^z) / (1+r) + 1 - s ) + g_next( G(y, a, z) ).
 //!
 //! What differs between uncertainty sets is how an action is priced (`Pricing`); the search for the best one is the same.
 

@@ -167,7 +167,8 @@ impl Evaluation {
     ) -> Result<Outcomes, TrainError> {
         let first = self.request.problem.history.len();
         let distances = LawDistance::new(self.law.clone(), first..first + self.request.problem.horizon);
-        let simulator = Simulator { evaluation: self, followers, watch, clock, distances, done: AtomicUsize::new(0) };
+        let (periods, done) = (Dynamics::of(&self.request.problem), AtomicUsize::new(0));
+        let simulator = Simulator { evaluation: self, followers, watch, clock, periods, distances, done };
         let found: Result<Vec<_>, TrainError> =
             (0..self.histories.len()).into_par_iter().map(|history| simulator.history(history)).collect();
         let mut all = Outcomes { starts: Vec::new(), outcomes: Vec::new(), resolve_seconds: 0.0 };
@@ -199,6 +200,7 @@ struct Simulator<'a> {
     followers: &'a [Follower],
     watch: &'a Watch<'a>,
     clock: &'a (dyn Fn() -> f64 + Sync),
+    periods: Vec<Dynamics>,
     distances: LawDistance,
     done: AtomicUsize,
 }
@@ -246,7 +248,6 @@ impl Simulator<'_> {
     ) -> Result<(Outcome, f64), TrainError> {
         self.watch.go_on()?;
         let problem = &self.evaluation.request.problem;
-        let periods = Dynamics::of(problem);
         let returns = self.evaluation.returns(history, path);
         let distances = self.distances_along(sample, &returns);
         let mut outcome = Outcome { wealth: Vec::new(), lived: Vec::with_capacity(advisors.len() * returns.len()) };
@@ -265,7 +266,7 @@ impl Simulator<'_> {
             let step = |(wealth, holding): (f64, f64), (dynamics, &log_return): (&Dynamics, &f64)| {
                 dynamics.next(wealth, holding, dynamics.highest_action(wealth, mix), log_return)
             };
-            outcome.wealth.push(periods.iter().zip(&returns).fold((problem.initial_wealth, 0.0), step).0);
+            outcome.wealth.push(self.periods.iter().zip(&returns).fold((problem.initial_wealth, 0.0), step).0);
         }
         self.report_path();
         Ok((outcome, seconds))

@@ -198,12 +198,17 @@ impl Advisor {
 
     /// The re-solved advice and the worst-case law behind it.
     pub fn explain(&self, step: usize, state: &State) -> (Advice, WorstCase) {
-        self.explain_within(step, state, self.radius(state))
+        let own = self.radius(state);
+        self.explain_knowing(step, state, own, own)
     }
 
     /// The same were the radius of the coming period `radius`, whatever the law says; later periods keep their own.
     pub fn explain_within(&self, step: usize, state: &State, radius: f64) -> (Advice, WorstCase) {
-        let own = self.radius(state);
+        self.explain_knowing(step, state, self.radius(state), radius)
+    }
+
+    /// The same where the radius of the state, `own`, is known.
+    pub(super) fn explain_knowing(&self, step: usize, state: &State, own: f64, radius: f64) -> (Advice, WorstCase) {
         let source = if radius == own { AdviceSource::Resolved } else { AdviceSource::ResolvedOtherRadius };
         let predicted = self.predict(step, state, own);
         let (advice, solution) = self.resolved(&Asked { step, state, radius, source }, &predicted);

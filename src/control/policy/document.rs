@@ -209,7 +209,7 @@ fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) 
 fn check_functions(field: &str, stored: &StepSurrogates, specification: &Specification) -> Result<(), FieldError> {
     let functions = stored.value.weights.len();
     check_holdings(&format!("{field}.value.weights"), functions, specification, &HOLDINGS_OF_A_SURROGATE)?;
-    let ends = Dynamics::of(&specification.problem)[0].sides().len();
+    let ends = Dynamics::plain(specification.problem.rate_per_step, specification.problem.trading_cost).sides().len();
     rules::whole(&format!("{field}.policy.weights"), stored.policy.weights.len(), &(ends..=ends))
 }
 

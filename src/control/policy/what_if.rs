@@ -86,18 +86,17 @@ impl Advisor {
         hypothesis.check()?;
         let (step, state) = self.supposed_state(step, state, hypothesis)?;
         let wealth = state.wealth;
-        let radius = match hypothesis.radius {
-            Some(HypotheticalRadius::Fixed(radius)) => Some(radius),
-            Some(HypotheticalRadius::Scaled(scale)) => Some(scale * self.radius(&state)),
-            None if mode == AdviceMode::Resolve => Some(self.radius(&state)),
-            None => None,
-        };
-        let (advice, worst_case) = match radius {
-            Some(radius) => {
-                let (advice, worst_case) = self.explain_within(step, &state, radius);
-                (advice, Some(worst_case))
-            }
-            None => (self.advise(step, &state, AdviceMode::Surrogate), None),
+        let (advice, worst_case) = if hypothesis.radius.is_none() && mode == AdviceMode::Surrogate {
+            (self.advise(step, &state, AdviceMode::Surrogate), None)
+        } else {
+            let own = self.radius(&state);
+            let radius = match hypothesis.radius {
+                Some(HypotheticalRadius::Fixed(radius)) => radius,
+                Some(HypotheticalRadius::Scaled(scale)) => scale * own,
+                None => own,
+            };
+            let (advice, worst_case) = self.explain_knowing(step, &state, own, radius);
+            (advice, Some(worst_case))
         };
         Ok(Supposed { step, wealth, advice, worst_case })
     }

@@ -4,14 +4,14 @@
 //!
 //!   x' = x (1 - c |a - h|) ((1-a)(1+r) + a e^z) + C,     h' = x (1 - c |a - h|) a e^z / x'.
 //!
-//! What is still to come is worth K now, by the bank: `K = (C + K') / (1 + r)`, K' that of the period after and 0 after the
-//! last. With it, total wealth `X = x + K` moves as wealth does that nothing is added to, by the share a x / X of it:
+//! What is still to come has the present value P, by the bank: `P = (C + P') / (1 + r)`, P' that of the period after and 0 after
+//! the last. With it, total wealth x + P moves as wealth does that nothing is added to, by the share b of it:
 //!
-//!   X' = X ((1 - a x / X)(1+r) + (a x / X) e^z)     where trading costs nothing.
+//!   x' + P' = (x + P) ((1 - b)(1+r) + b e^z),   b = a x / (x + P),     where trading costs nothing.
 //!
-//! The safe policy sells all now: `(x (1 - c h) + K) (1+r)^n` at the horizon is the floor. Where K is negative, and on the way
-//! to what is added late, withdrawals must be paid whatever the asset does: `R = max(0, (R' - C) / (1 + r))` stays in the
-//! bank, and bounds the actions.
+//! The safe policy sells all now: `(x (1 - c h) + P) (1+r)^n` at the horizon is the floor. Where P is negative, and on the way
+//! to what is added late, withdrawals must be paid whatever the asset does: the reserve `D = max(0, (D' - C) / (1 + r))` stays
+//! in the bank, and bounds the actions by `1 - D / (x (1 - c))`.
 //!
 //! The simulator, live sessions and the books of a backtest call these functions; the tables of the robust step hold the same
 //! formulas over many returns at once (`control/bellman/gain_field.rs`), which `tests/bellman.rs` compares.
@@ -32,9 +32,9 @@ pub struct Dynamics {
     pub trading_cost: f64,
     /// C, money added at the end of the period; negative where it is withdrawn.
     pub contribution: f64,
-    /// K, the present value of this contribution and all later ones, by the bank.
+    /// P, the present value of this contribution and all later ones, by the bank.
     pub to_come: f64,
-    /// R, what must stay in the bank through the period for it to pay every withdrawal to come.
+    /// D, what must stay in the bank through the period for it to pay every withdrawal to come.
     pub reserve: f64,
 }
 
@@ -101,12 +101,12 @@ impl Dynamics {
         (next, if next > 0.0 { (share * (grown / next)).min(1.0) } else { share })
     }
 
-    /// Total wealth: what selling everything leaves, and what is to come, `x (1 - c h) + K`.
+    /// Total wealth: what selling everything leaves, and what is to come, `x (1 - c h) + P`.
     pub fn total(self, wealth: f64, holding: f64) -> f64 {
         wealth * self.liquidation(holding) + self.to_come
     }
 
-    /// The share of total wealth that selling everything leaves: 1 where nothing is to come.
+    /// The share of total wealth that selling everything leaves, `x (1 - c h) / (x (1 - c h) + P)`: 1 where nothing is to come.
     pub fn in_hand(self, wealth: f64, holding: f64) -> f64 {
         wealth * self.liquidation(holding) / self.total(wealth, holding)
     }
@@ -121,7 +121,8 @@ impl Dynamics {
         (1.0 + SPARE) * self.reserve / self.liquidation(1.0)
     }
 
-    /// The highest action up to `highest` that leaves the reserve in the bank, whatever of the holding must be traded.
+    /// The highest action up to `highest` that leaves the reserve in the bank, whatever of the holding must be traded:
+    /// `1 - D / (x (1 - c))`, and at least 0.
     pub fn highest_action(self, wealth: f64, highest: f64) -> f64 {
         let free = 1.0 - self.reserve / (wealth * self.liquidation(1.0));
         highest.min(free).max(0.0)

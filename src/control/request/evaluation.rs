@@ -11,6 +11,7 @@ use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules::{self, DEFAULT_COUNT_WEALTH_ALONE, within};
 use crate::control::request::specification::{
     DesignSpecification, InitialLaws, ProblemSpecification, SamplingLaw, Specification, SurrogateSpecification,
+    default_seed,
 };
 
 /// Simulated paths of one history.
@@ -38,7 +39,7 @@ pub struct EvaluationRequest {
     #[serde(default)]
     pub surrogate: SurrogateSpecification,
     /// The same request and seed give the same report, but for its costs.
-    #[serde(default = "defaults::seed")]
+    #[serde(default = "default_seed")]
     pub seed: u64,
     /// Frameworks to compare.
     #[serde(default = "defaults::frameworks")]
@@ -78,9 +79,6 @@ pub enum InitialHistories {
 mod defaults {
     use super::Framework;
 
-    pub fn seed() -> u64 {
-        1
-    }
     pub fn frameworks() -> Vec<Framework> {
         use Framework::*;
         vec![Adaptive, Static, KnownLaw, PlugIn, ParametricStatic, ParametricAdaptive]

@@ -23,7 +23,7 @@ pub struct Specification {
     #[serde(default)]
     pub surrogate: SurrogateSpecification,
     /// The same specification and seed give the same policy, bit for bit.
-    #[serde(default = "defaults::seed")]
+    #[serde(default = "default_seed")]
     pub seed: u64,
 }
 
@@ -278,11 +278,13 @@ impl Default for HyperparameterBounds {
     }
 }
 
+/// Of every request that has a seed.
+pub fn default_seed() -> u64 {
+    1
+}
+
 /// Defaults that do not depend on other fields: the paper's configuration.
 mod defaults {
-    pub fn seed() -> u64 {
-        1
-    }
     pub fn horizon() -> usize {
         10
     }
