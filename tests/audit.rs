@@ -178,7 +178,7 @@ async fn every_change_over_http_names_its_key_and_a_refused_one_is_no_entry() {
     let deeds = ["session.delete", "job.cancel", "job.queue", "session.open", "job.queue"];
     assert_eq!(made, deeds.map(|deed| (key, deed)));
     let (_, of_session) = app.get(&format!("/audit?object={session}")).await;
-    assert_eq!(of_session["entries"][0]["outcome"], "deleted, with 1 observations");
+    assert_eq!(of_session["entries"][0]["outcome"], "deleted, with 1 entries");
     let (_, of_policy) = app.get(&format!("/audit?object={policy}")).await;
     assert_eq!(
         entries(&of_policy).iter().map(|entry| (entry[0], entry[2])).collect::<Vec<_>>(),
@@ -218,7 +218,7 @@ async fn an_observation_is_shown_with_the_key_that_reported_it() {
     let keys: Vec<_> = entries(&page).iter().map(|entry| entry[1]).collect();
     assert!(keys[0].starts_with("key_") && keys.iter().all(|key| *key == keys[0]), "{page}");
     let folder = app.folder().to_owned();
-    app.restart_after("UPDATE observations SET access_key = 'key_of_another' WHERE period = 1").await;
+    app.restart_after("UPDATE entries SET access_key = 'key_of_another' WHERE entry = 1").await;
     app.enter(&key).await;
     assert_eq!(app.action().await.0, 500);
     let inspection = Inspection::of_folder(&folder).await.unwrap();

@@ -203,8 +203,8 @@ const DAMAGES: [(&str, &str); 7] = [
     ("UPDATE policies SET json = x'7b7d'", "policy "),
     ("UPDATE jobs SET kind = 'dream'", "the kind of job"),
     ("UPDATE sessions SET initial_wealth = 1e6", "the start of session"),
-    ("UPDATE observations SET log_return = 0.5 WHERE period = 2", "period 2 of session"),
-    ("DELETE FROM observations WHERE period = 1", "period 1 of session"),
+    ("UPDATE entries SET content_json = '{}' WHERE entry = 2", "entry 2 of session"),
+    ("DELETE FROM entries WHERE entry = 1", "entry 1 of session"),
     ("UPDATE usage SET bytes = bytes + 1", "the total of tenant"),
     ("UPDATE access_keys SET roles = 'root'", "the roles of key"),
 ];
@@ -220,7 +220,7 @@ async fn a_check_finds_every_kind_of_damage() {
     app.key("north", "read").await;
     let data = text(app.folder());
     let printed = succeeds(&["check", "--data", data]);
-    for line in ["policies: 1,", "jobs: 1,", "sessions: 1, with 2 observations", "keys: 1,", "sound"] {
+    for line in ["policies: 1,", "jobs: 1,", "sessions: 1, with 2 entries", "keys: 1,", "sound"] {
         assert!(printed.contains(line), "{printed}");
     }
     let copies = tempfile::tempdir().unwrap();

@@ -9,7 +9,7 @@ use ballast::control::bellman::next_value::NextValue;
 use ballast::control::bellman::problem::Problem;
 use ballast::control::bellman::solution::{Adversary, RobustSolution};
 use ballast::control::policy::advisor::Advisor;
-use ballast::control::problem::state::State;
+use ballast::control::problem::state::{Realised, State};
 use ballast::control::problem::utility::{RelativeUtility, utility};
 use ballast::control::request::specification::{Specification, UtilitySpecification};
 use serde_json::{Value, json};
@@ -232,7 +232,7 @@ fn the_tabulated_field_is_the_value_of_the_next_state() {
         for action in [0.0, 0.13, 0.5, 0.77, 1.0].map(|share| share * problem.actions(0, &state).highest) {
             let trade = dynamics.trade_to(state.holding, action);
             for (z, found) in returns.iter().zip(field.at(&returns).payoff(trade)) {
-                let then = solved.advance(0, &state, action, *z);
+                let then = solved.advance(0, &state, &Realised::of(action, *z));
                 let gain = (problem.floor(1, &then) / floor).ln() + solved.surrogate_gain(1, &then);
                 // The cubics are good to 1e-6 of the gain; where trading costs, a value bends where its law's band passes the
                 // holding, and they are good to a tenth of the half basis point that a surrogate may err by.

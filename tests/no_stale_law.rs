@@ -53,7 +53,7 @@ impl Outside {
         while !over.load(Ordering::Relaxed) {
             tokio::time::sleep(SOUND).await;
             match &self {
-                Outside::File(file) => hide_observations(file).await,
+                Outside::File(file) => hide_entries(file).await,
                 Outside::Server(url) => end_a_connection(url).await,
             }
             faults.fetch_add(1, Ordering::Relaxed);
@@ -61,12 +61,12 @@ impl Outside {
     }
 }
 
-async fn hide_observations(file: &PathBuf) {
+async fn hide_entries(file: &PathBuf) {
     let options = SqliteConnectOptions::new().filename(file).busy_timeout(patience());
     let mut connection = SqliteConnection::connect_with(&options).await.unwrap();
-    sqlx::query("ALTER TABLE observations RENAME TO hidden").execute(&mut connection).await.unwrap();
+    sqlx::query("ALTER TABLE entries RENAME TO hidden").execute(&mut connection).await.unwrap();
     tokio::time::sleep(FAULTY).await;
-    sqlx::query("ALTER TABLE hidden RENAME TO observations").execute(&mut connection).await.unwrap();
+    sqlx::query("ALTER TABLE hidden RENAME TO entries").execute(&mut connection).await.unwrap();
     connection.close().await.unwrap();
 }
 
@@ -162,6 +162,9 @@ fn routes(session: &str, policy: &str) -> Vec<(Method, String, Option<Value>)> {
             let body = match path.as_str() {
                 "/sessions" => json!({ "policy": policy }),
                 "/observe" => json!({ "session": session, "period": 1, "log_return": 0.5 }),
+                "/sessions/{id}/corrections" => {
+                    json!({ "correction": 1, "period": 1, "log_return": 0.5, "reason": "not theirs" })
+                }
                 _ => json!({ "session": session, "wealth": 1.0 }),
             };
             let query = if path == "/action" { format!("?session={session}") } else { String::new() };

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 
 use ballast::control::policy::advice::AdviceSource;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
-use ballast::control::problem::state::State;
+use ballast::control::problem::state::{Realised, State};
 use ballast::numerics::empirical::EmpiricalDistribution;
 use serde_json::{Value, json};
 use support::policies::advisor;
@@ -93,9 +93,9 @@ fn policies() -> Vec<Value> {
 /// States of every step: along a path, and one of another wealth.
 fn states(solved: &Advisor) -> Vec<(usize, State)> {
     let start = solved.initial_state(None, None).unwrap();
-    let first = solved.advance(0, &start, 0.6, 0.03);
+    let first = solved.advance(0, &start, &Realised::of(0.6, 0.03));
     let other = State { wealth: 91.0, holding: 0.83, ..first.clone() };
-    let second = solved.advance(1, &first, 0.3, -0.02);
+    let second = solved.advance(1, &first, &Realised::of(0.3, -0.02));
     vec![(0, start), (1, first), (1, other), (2, second)]
 }
 

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
 use ballast::store::{JobRow, Store};
-use futures_util::future::join_all;
+use futures_util::future::{FutureExt, join_all};
 use reqwest::{Client, StatusCode};
 use serde_json::{Value, json};
 use support::patience::{assert_within, until};
@@ -170,7 +170,7 @@ async fn a_session_lives_on_two_replicas_at_once() {
         let (accepted, refused): (Vec<_>, Vec<_>) = answers.iter().partition(|(status, _)| *status == StatusCode::OK);
         assert_eq!(accepted.len(), if period % 2 == 1 { 8 } else { 1 }, "{answers:?}");
         assert!(accepted.iter().all(|(_, answer)| *answer == accepted[0].1), "{accepted:?}");
-        assert!(refused.iter().all(|(_, problem)| problem["type"] == "/problems/period-conflict"), "{refused:?}");
+        assert!(refused.iter().all(|(_, problem)| problem["type"] == "/problems/report-conflict"), "{refused:?}");
         returns.push(number(&accepted[0].1["log_return"]));
     }
     for app in apps {
@@ -182,6 +182,61 @@ async fn a_session_lives_on_two_replicas_at_once() {
     }
     assert_eq!(second.app.delete(&format!("/sessions/{}", second.app.session)).await, 204);
     assert_eq!(first.app.action().await.0, 404);
+}
+
+/// Eight contradicting corrections and the next period at once, through both replicas: each number has one winner, and the
+/// session is what one is that was reported as the history has it now.
+#[tokio::test(flavor = "multi_thread")]
+async fn corrections_and_observations_of_two_replicas_have_one_order() {
+    const HORIZON: usize = 6;
+    let Some(store) = database().await else { return };
+    let (mut first, mut second) = (Replica::start(&store, "all"), Replica::start(&store, "api"));
+    let mut request = specification(HORIZON);
+    request["problem"]["radius"]["scale"] = json!(0.1);
+    first.app.train(&request).await;
+    first.app.open().await;
+    second.app.session = first.app.session.clone();
+    assert_eq!(first.app.report(1, json!({ "log_return": 0.02, "executed_allocation": 0.5 })).await.0, 200);
+    let corrections = format!("/sessions/{}/corrections", first.app.session);
+    for round in 1..HORIZON - 1 {
+        let apps = [&first.app, &second.app];
+        let correcting = (0..8).map(|client| {
+            let (app, period, log_return) = (apps[client % 2], client % round + 1, 0.01 * (client as f64 - 3.5));
+            let body = json!({ "correction": round, "period": period, "log_return": log_return,
+                "executed_allocation": 0.5, "reason": "revised" });
+            let corrections = &corrections;
+            async move { app.post(corrections, &body).await }.boxed()
+        });
+        let observing = first.app.report(round + 1, json!({ "log_return": -0.01, "executed_allocation": 0.5 })).boxed();
+        let answers = join_all(correcting.chain([observing])).await;
+        let (corrected, observed) = answers.split_at(8);
+        assert_eq!(observed[0].0, 200, "{observed:?}");
+        let won = corrected.iter().filter(|(status, _)| *status == StatusCode::OK).count();
+        assert_eq!(won, 1, "{corrected:?}");
+        let refused = corrected.iter().filter(|(status, _)| *status != StatusCode::OK);
+        refused.for_each(|(_, problem)| assert_eq!(problem["type"], "/problems/report-conflict", "{problem}"));
+        assert_eq!(standing(&first.app).await, standing(&second.app).await, "round {round}");
+    }
+    let (_, history) = second.app.get(&format!("/sessions/{}/history", second.app.session)).await;
+    assert_eq!(history["corrections"].as_array().unwrap().len(), HORIZON - 2);
+    let corrected = standing(&second.app).await;
+    second.app.policy = first.app.policy.clone();
+    second.app.open().await;
+    for (row, period) in history["observations"].as_array().unwrap().iter().zip(1..) {
+        let log_return = if row["now"].is_object() { &row["now"]["log_return"] } else { &row["log_return"] };
+        let report = json!({ "log_return": log_return, "executed_allocation": 0.5 });
+        assert_eq!(second.app.report(period, report).await.0, 200);
+    }
+    assert_eq!(standing(&second.app).await, corrected);
+}
+
+/// What a session is advised, and its wealth.
+async fn standing(app: &App) -> Value {
+    let (_, session) = app.get(&format!("/sessions/{}", app.session)).await;
+    let (status, mut action) = app.action().await;
+    assert_eq!(status, 200, "{action}");
+    action["session"] = Value::Null;
+    json!([session["wealth"], session["period"], session["sample_size"], action])
 }
 
 /// Reports periods one after the other, each until it is acknowledged; the answers.

@@ -24,7 +24,7 @@ async fn an_investor_lives_to_the_horizon() {
     assert!(status == 200 && resolved["source"] == "resolved", "{resolved}");
 
     let (status, gap) = app.observe(2, 0.01).await;
-    assert!(status == 409 && gap["type"] == "/problems/period-gap" && gap["rule"] == "must be 1", "{gap}");
+    assert!(status == 409 && gap["type"] == "/problems/report-gap" && gap["rule"] == "must be 1", "{gap}");
     let (status, first) = app.observe(1, 0.012).await;
     assert_eq!(status, 200, "{first}");
     assert_eq!(first["executed_allocation"], action["allocation"]);

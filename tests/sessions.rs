@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
+use ballast::control::problem::state::Realised;
 use serde_json::{Value, json};
 use support::{App, specification};
 
@@ -116,8 +117,8 @@ async fn what_was_executed_and_what_was_reached_are_taken_as_stated() {
     let (_, action) = app.action().await;
     let advisor = advisor(&app).await;
     let mut state = advisor.initial_state(None, None).unwrap();
-    state = advisor.advance(0, &state, allocation, log_return);
-    state = advisor.advance(1, &state, number(&second["executed_allocation"]), 0.01);
+    state = advisor.advance(0, &state, &Realised::of(allocation, log_return));
+    state = advisor.advance(1, &state, &Realised::of(number(&second["executed_allocation"]), 0.01));
     state.wealth = 77.5;
     let advice = advisor.advise(2, &state, ballast::control::policy::advisor::AdviceMode::Surrogate);
     assert_eq!(number(&action["allocation"]), advice.allocation);
@@ -182,7 +183,7 @@ async fn a_period_has_one_content_and_the_horizon_is_the_end() {
     ] {
         let answer = app.report(1, other).await;
         assert_refused(&answer, 409, "period", 1);
-        assert_eq!(answer.1["type"], "/problems/period-conflict");
+        assert_eq!(answer.1["type"], "/problems/report-conflict");
     }
     assert_eq!(app.report(1, report).await, first);
     assert_refused(&app.observe(3, 0.01).await, 409, "period", 3);

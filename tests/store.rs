@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use ballast::control::policy::content_hash;
 use ballast::store::{
-    Append, CreateJob, CreateSession, DeletePolicy, JobCounts, JobKind, JobOutcome, JobRow, JobState, NewJob, NewKey,
-    ObservationRow, RequestKey, Rotate, SessionRow, Store, StoreError, Successor, Tenant,
+    Append, AuditFilter, AuditRow, CreateJob, CreateSession, DeletePolicy, EntryKind, EntryRow, JobCounts, JobKind,
+    JobOutcome, JobRow, JobState, NewJob, NewKey, RequestKey, Rotate, SessionRow, Store, StoreError, Successor, Tenant,
 };
 use futures_util::future::join_all;
 use support::place::Place;
@@ -38,7 +38,7 @@ on_both_engines!(
     a_session_needs_its_policy_and_a_free_name,
     a_restart_keeps_sessions_bit_for_bit,
     what_was_seen_is_current_until_somebody_writes,
-    every_observation_is_stored_once_and_in_order,
+    every_entry_is_stored_once_and_in_order,
     sixteen_reports_of_each_period_have_one_winner,
     many_sessions_commit_in_groups,
     damage_to_what_an_action_rests_on_is_detected,
@@ -89,15 +89,13 @@ async fn with_session(store: &Store, session: &str, history: &[f64]) {
     assert_eq!(store.create_session(new, None).await.unwrap(), CreateSession::Created);
 }
 
-fn observation(session: &str, period: usize, content: &str) -> ObservationRow {
-    ObservationRow {
+fn observation(session: &str, period: usize, content: &str) -> EntryRow {
+    EntryRow {
         session: session.into(),
-        period,
-        content_hash: content.into(),
-        log_return: -0.0,
-        executed_allocation: 0.1 + 0.2,
-        advised_allocation: 1.0 / 3.0,
-        wealth_after: 101.0,
+        entry: period,
+        kind: EntryKind::Observation,
+        number: period,
+        content_json: content.into(),
         answer_json: format!(r#"{{"answer":"{content}"}}"#),
         created_ms: 7,
         key: "key_1".into(),
@@ -156,7 +154,7 @@ async fn an_idempotency_key_opens_one_session(place: &Place) {
     let repeated = CreateSession::Repeated(new(&one.session));
     assert_eq!(opened.iter().filter(|outcome| **outcome == repeated).count(), 7, "{opened:?}");
 
-    store.append_observation(observation(&one.session, 1, "c")).await.unwrap();
+    store.append(observation(&one.session, 1, "c")).await.unwrap();
     let store = place.reopen(store).await;
     assert_eq!(store.create_session(new("s9"), key("a")).await.unwrap(), repeated, "as it started");
     assert_eq!(store.create_session(new("s9"), key("b")).await.unwrap(), CreateSession::KeyConflict);
@@ -386,20 +384,16 @@ async fn a_restart_keeps_sessions_bit_for_bit(place: &Place) {
     let history = [0.1, -0.0, 5e-324, -1.0 / 3.0, f64::MAX];
     with_session(&store, "s", &history).await;
     for period in 1..=3 {
-        let appended = store.append_observation(observation("s", period, "c")).await.unwrap();
+        let appended = store.append(observation("s", period, "c")).await.unwrap();
         assert_eq!(appended, Append::Appended);
     }
     let store = place.reopen(store).await;
     let row = store.session(&Tenant::default(), "s").await.unwrap().unwrap();
     assert_eq!(bits(&row.initial_history), bits(&history));
-    let read = store.observations("s").await.unwrap().unwrap();
-    assert_eq!(read.iter().map(|row| row.period).collect::<Vec<_>>(), [1, 2, 3]);
-    let (wrote, read) = (observation("s", 2, "c"), &read[1]);
-    assert_eq!(
-        bits(&[read.log_return, read.executed_allocation, read.advised_allocation, read.wealth_after]),
-        bits(&[wrote.log_return, wrote.executed_allocation, wrote.advised_allocation, wrote.wealth_after])
-    );
-    assert_eq!(store.observation("s", 2).await.unwrap().as_ref(), Some(read));
+    let read = store.entries("s").await.unwrap().unwrap();
+    assert_eq!(read, [1, 2, 3].map(|period| observation("s", period, "c")));
+    assert_eq!(store.entry("s", EntryKind::Observation, 2).await.unwrap().as_ref(), Some(&read[1]));
+    assert_eq!(store.entry("s", EntryKind::Correction, 2).await.unwrap(), None);
     assert_eq!(store.sessions(&Tenant::default(), 10, None).await.unwrap()[0].observations, 3);
 }
 
@@ -412,49 +406,68 @@ async fn what_was_seen_is_current_until_somebody_writes(place: &Place) {
     assert!(store.session_facts(&tenant("south"), "s").await.unwrap().is_none());
     let facts = store.session_facts(&here, "s").await.unwrap().unwrap();
     let (mut seen, mut opened) = (facts.seen, facts.row.as_opened());
-    assert!(facts.observations.is_empty());
+    assert!(facts.entries.is_empty());
     let own = observation("s", 1, "c");
     let mut next = seen.followed_by(&own);
-    store.append_observation(own).await.unwrap();
-    store.append_observation(observation("other", 1, "c")).await.unwrap();
+    store.append(own).await.unwrap();
+    store.append(observation("other", 1, "c")).await.unwrap();
     for (seen, is_current) in [(&mut seen, false), (&mut opened, false), (&mut next, true)] {
         assert_eq!(store.is_as_seen("s", seen).await.unwrap(), is_current, "{seen:?}");
         assert_eq!(store.is_as_seen("s", seen).await.unwrap(), is_current, "{seen:?}, asked again");
     }
     // A refused write changes nothing, though it might have.
     assert!(!second.delete_session(&tenant("south"), "s").await.unwrap());
-    assert_eq!(second.append_observation(observation("s", 1, "d")).await.unwrap(), Append::Conflict);
+    assert_eq!(second.append(observation("s", 1, "d")).await.unwrap(), Append::NotNext);
     assert!(store.is_as_seen("s", &mut next).await.unwrap());
-    second.append_observation(observation("s", 2, "c")).await.unwrap();
+    second.append(observation("s", 2, "c")).await.unwrap();
     assert!(!store.is_as_seen("s", &mut next).await.unwrap());
     let facts = store.session_facts(&here, "s").await.unwrap().unwrap();
     let mut seen = facts.seen;
-    assert_eq!((facts.observations.len(), seen.observed()), (2, 2));
+    assert_eq!((facts.entries.len(), seen.entries()), (2, 2));
     assert!(second.delete_session(&here, "s").await.unwrap());
     assert!(!store.is_as_seen("s", &mut seen).await.unwrap());
     assert!(store.session_facts(&here, "s").await.unwrap().is_none());
     // Nobody waits for the answer, and still the write shows, once one that came after it is answered.
     with_session(&store, "later", &[0.1, 0.2]).await;
     let mut seen = store.session_facts(&here, "other").await.unwrap().unwrap().seen;
-    drop(tokio::time::timeout(Duration::ZERO, store.append_observation(observation("other", 2, "c"))).await);
-    assert_eq!(store.append_observation(observation("later", 1, "c")).await.unwrap(), Append::Appended);
-    let is_written = store.observation("other", 2).await.unwrap().is_some();
+    drop(tokio::time::timeout(Duration::ZERO, store.append(observation("other", 2, "c"))).await);
+    assert_eq!(store.append(observation("later", 1, "c")).await.unwrap(), Append::Appended);
+    let is_written = store.entry("other", EntryKind::Observation, 2).await.unwrap().is_some();
     assert_eq!(store.is_as_seen("other", &mut seen).await.unwrap(), !is_written);
 }
 
-async fn every_observation_is_stored_once_and_in_order(place: &Place) {
+async fn every_entry_is_stored_once_and_in_order(place: &Place) {
     let store = place.open().await;
-    assert_eq!(store.append_observation(observation("s", 1, "a")).await.unwrap(), Append::NoSession);
+    assert_eq!(store.append(observation("s", 1, "a")).await.unwrap(), Append::NoSession);
     with_session(&store, "s", &[0.1, 0.2]).await;
-    let append = async |period, content| store.append_observation(observation("s", period, content)).await.unwrap();
-    assert_eq!(append(2, "a").await, Append::OutOfOrder { expected: 1 });
-    assert_eq!(append(0, "a").await, Append::OutOfOrder { expected: 1 });
-    assert_eq!(append(1, "a").await, Append::Appended);
-    assert_eq!(append(1, "a").await, Append::Repeated { answer_json: r#"{"answer":"a"}"#.into() });
-    assert_eq!(append(1, "b").await, Append::Conflict);
-    assert_eq!(append(3, "a").await, Append::OutOfOrder { expected: 2 });
+    let correction = |entry, number| EntryRow { kind: EntryKind::Correction, number, ..observation("s", entry, "a") };
+    assert_eq!(store.append(EntryRow { session: "t".into(), ..correction(1, 1) }).await.unwrap(), Append::NoSession);
+    let append = async |new| store.append(new).await.unwrap();
+    for (new, expected) in [
+        (observation("s", 2, "a"), Append::NotNext),
+        (observation("s", 0, "a"), Append::NotNext),
+        (observation("s", 1, "a"), Append::Appended),
+        (observation("s", 1, "a"), Append::NotNext),
+        (correction(1, 1), Append::NotNext),
+        (correction(2, 1), Append::Appended),
+        (observation("s", 2, "a"), Append::NotNext),
+        (EntryRow { number: 2, ..observation("s", 3, "a") }, Append::Appended),
+        (correction(5, 2), Append::NotNext),
+    ] {
+        assert_eq!(append(new.clone()).await, expected, "{new:?}");
+    }
+    // The second of its kind, and not the second entry.
+    let second = store.entry("s", EntryKind::Observation, 2).await.unwrap().unwrap();
+    assert_eq!((second.entry, second.number), (3, 2));
+    assert_eq!(store.sessions(&Tenant::default(), 10, None).await.unwrap()[0].observations, 2);
+    let told = |row: AuditRow| (row.deed, row.outcome);
+    let filter = AuditFilter { object: Some("s".into()), ..AuditFilter::default() };
+    let audit = store.deeds(&filter, 10, None).await.unwrap().into_iter().map(told);
+    let corrected = ("session.correct".to_owned(), "correction 1 recorded".to_owned());
+    assert_eq!(audit.filter(|told| *told == corrected).count(), 1);
     assert!(store.delete_session(&Tenant::default(), "s").await.unwrap());
-    assert_eq!(store.observations("s").await.unwrap(), None);
+    assert_eq!(store.entries("s").await.unwrap(), None);
+    assert_eq!(store.usage(&Tenant::default()).await.unwrap().sessions, 0);
 }
 
 async fn sixteen_reports_of_each_period_have_one_winner(place: &Place) {
@@ -466,13 +479,13 @@ async fn sixteen_reports_of_each_period_have_one_winner(place: &Place) {
         let reports = (0..16).map(|client| {
             let store = if client % 2 == 0 { store.clone() } else { second.clone() };
             let report = observation("s", period, &format!("c{client}"));
-            tokio::spawn(async move { store.append_observation(report).await.unwrap() })
+            tokio::spawn(async move { store.append(report).await.unwrap() })
         });
         let outcomes: Vec<_> = join_all(reports).await.into_iter().map(Result::unwrap).collect();
         let count = |wanted: Append| outcomes.iter().filter(|outcome| **outcome == wanted).count();
-        assert_eq!((count(Append::Appended), count(Append::Conflict)), (1, 15), "{outcomes:?}");
+        assert_eq!((count(Append::Appended), count(Append::NotNext)), (1, 15), "{outcomes:?}");
     }
-    assert_eq!(store.observations("s").await.unwrap().unwrap().len(), PERIODS);
+    assert_eq!(store.entries("s").await.unwrap().unwrap().len(), PERIODS);
 }
 
 async fn many_sessions_commit_in_groups(place: &Place) {
@@ -483,7 +496,7 @@ async fn many_sessions_commit_in_groups(place: &Place) {
     for period in 1..=4 {
         let appends = (0..50).map(|session| {
             let store = store.clone();
-            async move { store.append_observation(observation(&format!("s{session}"), period, "c")).await }
+            async move { store.append(observation(&format!("s{session}"), period, "c")).await }
         });
         let appends = futures_util::future::join_all(appends.map(tokio::spawn)).await;
         assert!(appends.into_iter().all(|append| append.unwrap().unwrap() == Append::Appended));
@@ -499,23 +512,25 @@ async fn damage_to_what_an_action_rests_on_is_detected(place: &Place) {
         "UPDATE sessions SET initial_history = substr(initial_history, 1, 8)",
         "UPDATE sessions SET initial_history = substr(initial_history, 1, 7)",
         "UPDATE sessions SET initial_wealth = 1e6",
-        "UPDATE observations SET log_return = 0.0 WHERE period = 2",
-        "UPDATE observations SET answer_json = '{}' WHERE period = 1",
-        "DELETE FROM observations WHERE period = 1",
+        "UPDATE entries SET content_json = '{}' WHERE entry = 2",
+        "UPDATE entries SET answer_json = '{}' WHERE entry = 1",
+        "UPDATE entries SET kind = 'correction' WHERE entry = 1",
+        "UPDATE entries SET number = 7 WHERE entry = 1",
+        "DELETE FROM entries WHERE entry = 1",
     ];
     for damage in damages {
         let store = place.open().await;
         store.delete_session(&Tenant::default(), "s").await.unwrap();
         with_session(&store, "s", &[0.1, 0.2]).await;
         for period in 1..=2 {
-            store.append_observation(observation("s", period, "c")).await.unwrap();
+            store.append(observation("s", period, "c")).await.unwrap();
         }
         store.close().await;
         place.tamper(damage).await;
         let store = place.open().await;
         let damaged = match damage.contains("sessions") {
             true => store.session(&Tenant::default(), "s").await.err(),
-            false => store.observations("s").await.err(),
+            false => store.entries("s").await.err(),
         };
         assert!(matches!(damaged, Some(StoreError::Corrupt { .. })), "{damage}: {damaged:?}");
         store.close().await;
@@ -532,7 +547,7 @@ async fn reads_run_on_any_thread(place: &Place) {
         store.policy(&Tenant::default(), &content_hash(POLICY)).await?;
         store.policies(&Tenant::default(), 1, None).await?;
         store.jobs(&Tenant::default(), 1, None).await?;
-        store.observations("s").await?;
+        store.entries("s").await?;
         store.sessions(&Tenant::default(), 1, None).await?;
         store.session(&Tenant::default(), "s").await
     });
@@ -610,12 +625,12 @@ async fn a_head_follows_the_rows(place: &Place) {
     for period in 1..=3 {
         let new = observation("s", period, "c");
         heads.push(new.head());
-        store.append_observation(new).await.unwrap();
+        store.append(new).await.unwrap();
         let head = second.head("s").await.unwrap();
-        assert_eq!((head.as_ref(), head.as_ref().map(|head| head.observed)), (heads.last(), Some(period)));
-        assert_eq!(store.observations("s").await.unwrap().unwrap()[period - 1].head(), heads[period]);
+        assert_eq!((head.as_ref(), head.as_ref().map(|head| head.entries)), (heads.last(), Some(period)));
+        assert_eq!(store.entries("s").await.unwrap().unwrap()[period - 1].head(), heads[period]);
     }
-    let other = ObservationRow { created_ms: 8, ..observation("s", 3, "c") };
+    let other = EntryRow { created_ms: 8, ..observation("s", 3, "c") };
     assert_ne!(other.head(), heads[3], "the same report at another time");
     assert!(second.delete_session(&Tenant::default(), "s").await.unwrap());
     assert_eq!(store.head("s").await.unwrap(), None);
@@ -629,7 +644,7 @@ async fn a_name_nobody_can_have_finds_nothing(place: &Place) {
         assert_eq!(store.policy(&Tenant::default(), name).await.unwrap(), None);
         assert_eq!(store.delete_policy(&Tenant::default(), name).await.unwrap(), DeletePolicy::Absent);
         assert_eq!(store.session(&Tenant::default(), name).await.unwrap(), None);
-        assert_eq!(store.append_observation(observation(name, 1, "c")).await.unwrap(), Append::NoSession);
+        assert_eq!(store.append(observation(name, 1, "c")).await.unwrap(), Append::NoSession);
     }
 }
 

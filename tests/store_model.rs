@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 
 use ballast::control::policy::content_hash;
 use ballast::store::{
-    Append, CreateJob, CreateSession, DeleteJob, DeletePolicy, JobKind, JobOutcome, JobRow, JobState, NewJob,
-    ObservationRow, OverQuota, Quota, Quotas, SessionRow, Store, StoreError, Tenant, Usage,
+    Append, CreateJob, CreateSession, DeleteJob, DeletePolicy, EntryKind, EntryRow, JobKind, JobOutcome, JobRow,
+    JobState, NewJob, OverQuota, Quota, Quotas, SessionRow, Store, StoreError, Tenant, Usage,
 };
 use proptest::prelude::*;
 use support::place::Place;
@@ -20,9 +20,9 @@ const LENGTH: usize = 60;
 const LEASE_MS: i64 = 10_000;
 const QUOTAS: Quotas = Quotas { queued_jobs: 2, sessions: 2, bytes: 0 };
 const TENANTS: u8 = 3;
-/// What a row takes beside what it holds, and what an observation takes.
+/// What a row takes beside what it holds, and what an entry of a session takes.
 const ROW: i64 = 1024;
-const OBSERVATION: i64 = 1024;
+const ENTRY: i64 = 1024;
 
 /// Names are drawn from so few that operations meet.
 #[derive(Debug, Clone)]
@@ -40,7 +40,7 @@ enum Operation {
     DeletePolicy { policy: u8 },
     CreateSession { session: u8, policy: u8 },
     DeleteSession { session: u8 },
-    Append { session: u8, period: usize, content: u8 },
+    Append { session: u8, entry: usize, content: u8 },
     Wait { seconds: i64 },
     Reopen,
 }
@@ -66,7 +66,7 @@ fn operation() -> impl Strategy<Value = Operation> {
         1 => policy.clone().prop_map(|policy| O::DeletePolicy { policy }),
         3 => (session.clone(), policy).prop_map(|(session, policy)| O::CreateSession { session, policy }),
         1 => session.clone().prop_map(|session| O::DeleteSession { session }),
-        8 => (session, 0..5usize, 0..2u8).prop_map(|(session, period, content)| O::Append { session, period, content }),
+        8 => (session, 0..5usize, 0..2u8).prop_map(|(session, entry, content)| O::Append { session, entry, content }),
         2 => (1..12i64).prop_map(|seconds| O::Wait { seconds }),
         1 => Just(O::Reopen),
     ]
@@ -99,7 +99,7 @@ struct Model {
     keys: BTreeMap<(u8, u8), (u8, String)>,
     /// Owner and content.
     policies: Vec<(u8, u8)>,
-    /// Name, policy and the contents of the periods from 1 on.
+    /// Name, policy and the contents of the entries from 1 on.
     sessions: Vec<(u8, u8, Vec<u8>)>,
 }
 
@@ -182,7 +182,8 @@ impl Model {
         usage.bytes += policies.map(|policy| ROW + policy_json(policy.1).len() as i64).sum::<i64>();
         if tenant == 0 {
             usage.sessions = self.sessions.len() as i64;
-            usage.bytes += usage.sessions * (ROW + 16 + 3 * OBSERVATION);
+            let corrections = self.sessions.iter().flat_map(|row| &row.2).filter(|&&content| content == 1).count();
+            usage.bytes += usage.sessions * (ROW + 16 + 3 * ENTRY) + corrections as i64 * ENTRY;
         }
         usage
     }
@@ -231,15 +232,14 @@ fn outcome(number: u8) -> JobOutcome {
     }
 }
 
-fn observation(session: u8, period: usize, content: u8) -> ObservationRow {
-    ObservationRow {
+/// A correction where the content is 1; store and model know nothing of what it corrects.
+fn entry_of(session: u8, entry: usize, content: u8) -> EntryRow {
+    EntryRow {
         session: session_name(session),
-        period,
-        content_hash: format!("content_{content}"),
-        log_return: f64::from(content) * -0.0,
-        executed_allocation: 0.1 + 0.2,
-        advised_allocation: f64::MIN_POSITIVE / 2.0,
-        wealth_after: 100.0 / 3.0 + period as f64,
+        entry,
+        kind: if content == 1 { EntryKind::Correction } else { EntryKind::Observation },
+        number: entry + 10,
+        content_json: format!("content_{content}"),
         answer_json: format!(r#"{{"answer":{content}}}"#),
         created_ms: 7,
         key: String::new(),
@@ -391,7 +391,7 @@ fn finish(model: &mut Model, job: u8, behind: i64, number: u8) -> bool {
     true
 }
 
-/// Policies, sessions and observations.
+/// Policies, sessions and entries.
 async fn live(store: &Store, model: &mut Model, operation: &Operation) {
     match *operation {
         Operation::InsertPolicy { policy } => {
@@ -447,22 +447,15 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
             let deleted = store.delete_session(&Tenant::default(), &session_name(session)).await.unwrap();
             assert_eq!(deleted, model.sessions.len() < before);
         }
-        Operation::Append { session, period, content } => {
-            let appended = store.append_observation(observation(session, period, content)).await.unwrap();
-            let Some((.., periods)) = model.sessions.iter_mut().find(|row| row.0 == session) else {
+        Operation::Append { session, entry, content } => {
+            let appended = store.append(entry_of(session, entry, content)).await.unwrap();
+            let Some((.., entries)) = model.sessions.iter_mut().find(|row| row.0 == session) else {
                 return assert_eq!(appended, Append::NoSession);
             };
-            let expected = match period.checked_sub(1).and_then(|index| periods.get(index)) {
-                Some(&first) if first == content => {
-                    Append::Repeated { answer_json: observation(session, period, first).answer_json }
-                }
-                Some(_) => Append::Conflict,
-                None if period == periods.len() + 1 => Append::Appended,
-                None => Append::OutOfOrder { expected: periods.len() + 1 },
-            };
-            assert_eq!(appended, expected);
-            if expected == Append::Appended {
-                periods.push(content);
+            let is_next = entry == entries.len() + 1;
+            assert_eq!(appended, if is_next { Append::Appended } else { Append::NotNext });
+            if is_next {
+                entries.push(content);
             }
         }
         _ => unreachable!("not an operation of live sessions"),
@@ -496,15 +489,13 @@ async fn compare(store: &Store, model: &Model) {
     assert_eq!(policies, owned.map(|policy| policy_name(policy.1)).collect::<Vec<_>>());
     let sessions = store.sessions(&Tenant::default(), 1000, None).await.unwrap();
     assert_eq!(sessions.len(), model.sessions.len());
-    for (row, (session, policy, periods)) in sessions.iter().rev().zip(&model.sessions) {
+    for (row, (session, policy, contents)) in sessions.iter().rev().zip(&model.sessions) {
         assert_eq!((&row.session, &row.policy), (&session_name(*session), &policy_name(*policy)));
-        let observations = store.observations(&row.session).await.unwrap().expect("the session listed");
-        assert_eq!(observations.len(), periods.len());
-        for (read, &content) in observations.iter().zip(periods) {
-            let wrote = observation(*session, read.period, content);
-            assert_eq!(read.head(), wrote.head());
-            assert_eq!(read.log_return.to_bits(), wrote.log_return.to_bits());
-        }
+        let entries = store.entries(&row.session).await.unwrap().expect("the session listed");
+        let wrote = |(&content, entry)| entry_of(*session, entry, content);
+        assert_eq!(entries, contents.iter().zip(1..).map(wrote).collect::<Vec<_>>());
+        let observed = entries.iter().rev().find(|entry| entry.kind == EntryKind::Observation);
+        assert_eq!(row.observations, observed.map_or(0, |entry| entry.number));
     }
 }
 
@@ -527,7 +518,7 @@ async fn replay(place: &Place, operations: &[Operation]) -> Result<(), TestCaseE
 }
 
 const TABLES: &str = "jobs, job_requests, job_reports, idempotency_keys, checkpoints, turns, usage, policies, \
-                      policy_owners, sessions, observations";
+                      policy_owners, sessions, entries";
 
 #[test]
 fn sqlite_does_what_the_model_does() {

@@ -119,7 +119,7 @@ async fn every_schema_is_opened_and_advises_as_it_did() {
         let restored = app.folder().join("restored");
         let mut tell = |line: String| told += &(line + "\n");
         restore(&name.with_extension("sqlite"), &restored, &mut tell).await.unwrap();
-        assert!(told.contains("sessions: 2, with 4 observations") && told.contains("keys: 1"), "{told}");
+        assert!(told.contains("sessions: 2, with 4 entries") && told.contains("keys: 1"), "{told}");
         app.move_to("restored").await;
 
         app.hold("");

@@ -16,7 +16,7 @@ use crate::service::advise::{Advise, Advised};
 use crate::service::metrics::ACTION_SECONDS;
 
 /// What to hold through one period, from a record of returns: solved exactly, nothing is stored.
-#[utoipa::path(post, path = "/advise", tag = "sessions",
+#[utoipa::path(post, path = "/advise", tag = "advice",
     request_body(content = Advise, example = json!({
         "problem": { "history": [0.012, -0.034, 0.021, 0.008, 0.017, -0.009], "rate_per_step": 0.001,
             "utility": { "kind": "power", "risk_aversion": 3.0 } },

@@ -40,7 +40,7 @@ pub struct AuditEntry {
     /// What it was done to.
     pub object: String,
     /// What came of it.
-    #[schema(example = "deleted, with 12 observations")]
+    #[schema(example = "deleted, with 12 entries")]
     pub outcome: String,
 }
 

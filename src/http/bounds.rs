@@ -8,9 +8,10 @@ use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
 use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
 use crate::control::request::rules::{
-    COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, RADIUS_SCALE, TRADING_COST, WEALTH,
+    COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, RADIUS_SCALE, RATE, TRADING_COST, WEALTH,
 };
-use crate::service::observation::PRICE;
+use crate::service::recording::MOST_CORRECTIONS;
+use crate::service::report::{LONGEST_REASON, PRICE};
 use crate::service::what_if::POINTS;
 
 /// Adds to every schema what its fields may hold.
@@ -37,10 +38,23 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
     let wealth = within(WEALTH.0, WEALTH.1);
     let probability = within(1e-3, 0.999);
     let action = json!({ "minItems": 2, "maxItems": 2, "items": within(0.0, 1.0) });
-    let price = within(PRICE.0, PRICE.1);
-    vec![
+    let reported = ["Observe", "Correct", "Report"].into_iter().flat_map(|schema| {
+        let price = within(PRICE.0, PRICE.1);
+        let fields = [
+            ("log_return", within(-LOG_RETURN, LOG_RETURN)),
+            ("simple_return", within((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())),
+            ("price", price.clone()),
+            ("previous_price", price),
+            ("rate", within(RATE.0, RATE.1)),
+            ("flow", within(-WEALTH.1, WEALTH.1)),
+            ("executed_allocation", within(0.0, 1.0)),
+            ("wealth", within(WEALTH.0, WEALTH.1)),
+        ];
+        fields.map(|(field, rule)| (schema, field, rule))
+    });
+    let rules = [
         ("ProblemSpecification", "horizon", whole(&HORIZON)),
-        ("ProblemSpecification", "rate_per_step", within(-0.5, 0.5)),
+        ("ProblemSpecification", "rate_per_step", within(RATE.0, RATE.1)),
         ("ProblemSpecification", "initial_wealth", wealth.clone()),
         ("ProblemSpecification", "action_interval", action),
         ("ProblemSpecification", "trading_cost", within(TRADING_COST.0, TRADING_COST.1)),
@@ -74,12 +88,9 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("OpenSession", "holding", within(0.0, 1.0)),
         ("Observe", "session", json!({ "minLength": 1 })),
         ("Observe", "period", json!({ "minimum": 1 })),
-        ("Observe", "log_return", within(-LOG_RETURN, LOG_RETURN)),
-        ("Observe", "simple_return", within((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())),
-        ("Observe", "price", price.clone()),
-        ("Observe", "previous_price", price),
-        ("Observe", "executed_allocation", within(0.0, 1.0)),
-        ("Observe", "wealth", wealth.clone()),
+        ("Correct", "correction", whole(&(1..=MOST_CORRECTIONS))),
+        ("Correct", "period", json!({ "minimum": 1 })),
+        ("Correct", "reason", json!({ "minLength": 1, "maxLength": LONGEST_REASON })),
         ("Advise", "wealth", wealth.clone()),
         ("Advise", "holding", within(0.0, 1.0)),
         ("WhatIf", "session", json!({ "minLength": 1 })),
@@ -94,7 +105,8 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("EvaluationRequest", "paths", whole(&evaluation::PATHS)),
         ("EvaluationRequest", "level", within(LEVEL.0, LEVEL.1)),
         ("InitialHistories", "count", whole(&HISTORIES)),
-    ]
+    ];
+    rules.into_iter().chain(reported).collect()
 }
 
 /// Changes the field, in `variant` or in every variant that has it.

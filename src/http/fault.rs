@@ -29,14 +29,13 @@ impl From<ServiceError> for Problem {
             ServiceError::Refused(Refused::TooManyStreams { most }) => {
                 problem(Kind::TooManyRequests).naming("streams", most, format!("must be at most {most} at a time"))
             }
-            ServiceError::PeriodConflict { period } => problem(Kind::PeriodConflict).naming(
-                "period",
-                period,
-                "must come with the content first reported for it",
-            ),
-            ServiceError::PeriodGap { given, expected } => {
-                problem(Kind::PeriodGap).naming("period", given, format!("must be {expected}"))
+            ServiceError::Conflict { what, number } => {
+                problem(Kind::ReportConflict).naming(what, number, "must come with the content first reported for it")
             }
+            ServiceError::Gap { what, given, expected } => {
+                problem(Kind::ReportGap).naming(what, given, format!("must be {expected}"))
+            }
+            ServiceError::UnusualReturn(field) => Problem::of_field(Kind::UnusualReturn, field),
             ServiceError::PastHorizon { given, horizon } => {
                 problem(Kind::SessionCompleted).naming("period", given, format!("must be at most {horizon}"))
             }

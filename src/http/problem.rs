@@ -29,8 +29,9 @@ pub enum ProblemKind {
     IdempotencyConflict,
     InUse,
     JobNotEnded,
-    PeriodConflict,
-    PeriodGap,
+    ReportConflict,
+    ReportGap,
+    UnusualReturn,
     SessionCompleted,
     BodyTooLarge,
     QuotaExceeded,
@@ -46,7 +47,7 @@ pub enum ProblemKind {
 
 impl ProblemKind {
     /// In ascending order of status.
-    pub const ALL: [ProblemKind; 24] = [
+    pub const ALL: [ProblemKind; 25] = [
         ProblemKind::MalformedJson,
         ProblemKind::InvalidQuery,
         ProblemKind::InvalidHeader,
@@ -58,8 +59,9 @@ impl ProblemKind {
         ProblemKind::IdempotencyConflict,
         ProblemKind::InUse,
         ProblemKind::JobNotEnded,
-        ProblemKind::PeriodConflict,
-        ProblemKind::PeriodGap,
+        ProblemKind::ReportConflict,
+        ProblemKind::ReportGap,
+        ProblemKind::UnusualReturn,
         ProblemKind::SessionCompleted,
         ProblemKind::BodyTooLarge,
         ProblemKind::QuotaExceeded,
@@ -90,8 +92,9 @@ impl ProblemKind {
             }
             Self::InUse => ("in-use", S::CONFLICT, "Something else depends on it"),
             Self::JobNotEnded => ("job-not-ended", S::CONFLICT, "The job is queued or runs"),
-            Self::PeriodConflict => ("period-conflict", S::CONFLICT, "The period was observed with other content"),
-            Self::PeriodGap => ("period-gap", S::CONFLICT, "The period is not the one expected"),
+            Self::ReportConflict => ("report-conflict", S::CONFLICT, "It was reported with other content"),
+            Self::ReportGap => ("report-gap", S::CONFLICT, "It is not the one expected"),
+            Self::UnusualReturn => ("unusual-return", S::CONFLICT, "The return is far from the record"),
             Self::SessionCompleted => ("session-completed", S::CONFLICT, "The session has reached its horizon"),
             Self::BodyTooLarge => ("body-too-large", S::PAYLOAD_TOO_LARGE, "The body is too large"),
             Self::QuotaExceeded => ("quota-exceeded", S::PAYLOAD_TOO_LARGE, "The tenant keeps as much as it may"),

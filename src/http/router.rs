@@ -34,6 +34,7 @@ const BODY_BYTES: usize = 4 << 20;
 #[openapi(
     info(title = "Ballast", description = "Nonparametric adaptive robust control of an investor. Every error is a problem document (RFC 9457)."),
     tags(
+        (name = "advice", description = "Ask now: nothing is trained, nothing is stored."),
         (name = "jobs", description = "Train and compare, offline."),
         (name = "policies", description = "What trainings give."),
         (name = "sessions", description = "Act, live."),
@@ -62,6 +63,7 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(sessions::get, sessions::delete))
         .routes(routes!(sessions::history))
         .routes(routes!(sessions::observe))
+        .routes(routes!(sessions::correct))
         .routes(routes!(sessions::action))
         .routes(routes!(what_if::what_if))
         .routes(routes!(advise::advise))

@@ -19,8 +19,10 @@ use super::wire;
 use crate::control::policy::advisor::AdviceMode;
 use crate::service::Service;
 use crate::service::allowance::Class;
+use crate::service::history::History;
 use crate::service::metrics::{ACTION_SECONDS, OBSERVE_SECONDS};
-use crate::service::observation::{Observe, Observed};
+use crate::service::periods::{Corrected, Observed};
+use crate::service::report::{Correct, Observe};
 use crate::service::sessions::{Question, Start};
 use crate::service::what_if::Explain;
 
@@ -81,28 +83,46 @@ pub async fn get(
     Ok(Json(service.sessions.get(&caller.tenant, &id).await?.into()))
 }
 
-/// Where a session started and everything it observed.
+/// Where a session started and everything recorded of it: what was reported, what was told then, what would be told now.
 #[utoipa::path(get, path = "/sessions/{id}/history", tag = "sessions", params(("id" = String, Path, description = "The session.")),
     responses(
-        (status = 200, description = "The history.", body = wire::SessionHistory),
+        (status = 200, description = "The history.", body = History),
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json")))]
 pub async fn history(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Read>,
     Id(id): Id,
-) -> Result<Json<wire::SessionHistory>, Problem> {
-    let (row, observations) = service.sessions.history(&caller.tenant, &id).await?;
-    Ok(Json(wire::SessionHistory {
-        session: row.session,
-        policy: row.policy,
-        initial_wealth: row.initial_wealth,
-        initial_holding: row.initial_holding,
-        history: row.initial_history,
-        observations: observations.into_iter().map(TryInto::try_into).collect::<Result<_, _>>()?,
-    }))
+) -> Result<Json<History>, Problem> {
+    Ok(Json(service.sessions.history(&caller.tenant, &id, &caller.turn).await?))
 }
 
-/// Delete a session and its observations.
+/// Put right what a period reported: exactly once, durable before it is answered. What was reported and told stays on record.
+#[utoipa::path(post, path = "/sessions/{id}/corrections", tag = "sessions",
+    params(("id" = String, Path, description = "The session.")),
+    request_body(content = Correct, example = json!({
+        "correction": 1, "period": 3, "simple_return": 0.011, "reason": "the index was revised"
+    })),
+    responses(
+        (status = 200, description = "Recorded; the same correction and content again give the same answer.", body = Corrected),
+        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "Other content, not the next correction, or an unusual return that nobody confirms.", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn correct(
+    State(service): State<Arc<Service>>,
+    By(caller, _): By<Live>,
+    Id(id): Id,
+    JsonBody(correction): JsonBody<Correct>,
+) -> Result<Response, Problem> {
+    let corrected = service.sessions.correct(&caller, &id, &correction, &caller.turn).await?;
+    Ok(as_recorded(corrected))
+}
+
+/// An answer as it is stored.
+fn as_recorded(json: String) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], json).into_response()
+}
+
+/// Delete a session and all that is recorded of it.
 #[utoipa::path(delete, path = "/sessions/{id}", tag = "sessions", params(("id" = String, Path, description = "The session.")),
     responses(
         (status = 204, description = "Deleted."),
@@ -124,7 +144,7 @@ pub async fn delete(
     responses(
         (status = 200, description = "Recorded; the same period and content again give the same answer.", body = Observed),
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "Other content, a gap, or past the horizon.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "Other content, a gap, past the horizon, or an unusual return that nobody confirms.", body = Problem, content_type = "application/problem+json"),
         (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn observe(
     State(service): State<Arc<Service>>,
@@ -135,8 +155,7 @@ pub async fn observe(
     let report = Observe { reported_by: caller.key().clone(), ..report };
     let observed = service.sessions.observe(&caller.tenant, &report, &caller.turn).await?;
     metrics::histogram!(OBSERVE_SECONDS).record(started.elapsed().as_secs_f64());
-    let media = [(header::CONTENT_TYPE, "application/json")];
-    Ok((media, observed).into_response())
+    Ok(as_recorded(observed))
 }
 
 /// Query of `/action`.

@@ -1,21 +1,19 @@
 //! Requests and answers as they travel.
 
+use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::policy::advice::Advice;
 use crate::control::policy::worst_case::WorstCase;
-use crate::control::problem::actions::Band;
 use crate::control::progress::Phase;
 use crate::control::request::framework::Framework;
 use crate::control::request::specification::Specification;
 use crate::control::solved_step::StepDiagnostics;
-use crate::service::error::ServiceError;
 use crate::service::jobs::Job as ServiceJob;
 use crate::service::live::Live;
-use crate::service::observation::Observed;
 use crate::service::sessions::Action as ServiceAction;
-use crate::store::{JobKind, JobState, ObservationRow, PolicySummary, SessionSummary};
+use crate::store::{JobKind, JobState, PolicySummary, SessionSummary};
 
 /// A job.
 #[derive(Debug, Serialize, ToSchema)]
@@ -158,10 +156,15 @@ pub struct Session {
     pub period: usize,
     pub horizon: usize,
     pub state: SessionState,
+    /// The last day of the last period that was reported with one.
+    #[schema(value_type = Option<String>, format = Date)]
+    pub date: Option<Date>,
     pub wealth: f64,
     /// Share of wealth in the risky asset, before trading.
     pub holding: f64,
     pub sample_size: usize,
+    /// Corrections of what periods reported; the next one is this and one more.
+    pub corrections: usize,
     pub created_ms: i64,
 }
 
@@ -172,11 +175,13 @@ fn session_state(observed: usize, horizon: usize) -> SessionState {
 impl From<Live> for Session {
     fn from(live: Live) -> Self {
         Session {
-            period: live.observed() + 1,
-            state: session_state(live.observed(), live.row.horizon),
-            wealth: live.state.wealth,
-            holding: live.state.holding,
-            sample_size: live.state.law.sample_size(),
+            period: live.observed + 1,
+            state: session_state(live.observed, live.row.horizon),
+            date: live.standing.date,
+            wealth: live.standing.state.wealth,
+            holding: live.standing.state.holding,
+            sample_size: live.standing.state.law.sample_size(),
+            corrections: live.corrections,
             session: live.row.session.clone(),
             policy: live.row.policy.clone(),
             horizon: live.row.horizon,
@@ -217,57 +222,6 @@ pub struct SessionPage {
     pub sessions: Vec<SessionEntry>,
     /// Give it as `after` for the next page; null on the last.
     pub next: Option<i64>,
-}
-
-/// Where a session started and everything it observed.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct SessionHistory {
-    pub session: String,
-    pub policy: String,
-    pub initial_wealth: f64,
-    /// Share of it in the risky asset.
-    pub initial_holding: f64,
-    /// Log-returns known at the start.
-    pub history: Vec<f64>,
-    pub observations: Vec<Observation>,
-}
-
-/// One observed period.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct Observation {
-    pub period: usize,
-    pub log_return: f64,
-    /// The holdings that were best kept at the start of the period.
-    #[schema(value_type = [f64; 2])]
-    pub band: Band,
-    pub advised_allocation: f64,
-    pub executed_allocation: f64,
-    /// Wealth at the end of the period.
-    pub wealth: f64,
-    /// Share of it in the risky asset, as the return left it.
-    pub holding: f64,
-    /// Radius of the uncertainty set after the period, in the unit of an advice's.
-    pub radius: f64,
-    pub observed_ms: i64,
-}
-
-impl TryFrom<ObservationRow> for Observation {
-    type Error = ServiceError;
-
-    fn try_from(row: ObservationRow) -> Result<Self, ServiceError> {
-        let answer: Observed = serde_json::from_str(&row.answer_json).map_err(ServiceError::internal)?;
-        Ok(Observation {
-            period: row.period,
-            log_return: row.log_return,
-            band: answer.band,
-            advised_allocation: row.advised_allocation,
-            executed_allocation: row.executed_allocation,
-            wealth: row.wealth_after,
-            holding: answer.holding,
-            radius: answer.uncertainty.radius,
-            observed_ms: row.created_ms,
-        })
-    }
 }
 
 /// The robust allocation for the coming period.

@@ -20,10 +20,12 @@ pub enum ServiceError {
     PolicyInUse { policy: String, sessions: u64 },
     #[error("the job '{job}' has not ended; cancel it first")]
     JobNotEnded { job: String },
-    #[error("period {period} was observed with other content")]
-    PeriodConflict { period: usize },
-    #[error("period {given} is not the one expected: report period {expected}")]
-    PeriodGap { given: usize, expected: usize },
+    #[error("{what} {number} was reported with other content")]
+    Conflict { what: &'static str, number: usize },
+    #[error("{what} {given} is not the one expected: report {what} {expected}")]
+    Gap { what: &'static str, given: usize, expected: usize },
+    #[error(transparent)]
+    UnusualReturn(FieldError),
     #[error("period {given} lies past the horizon of {horizon} periods")]
     PastHorizon { given: usize, horizon: usize },
     #[error("the session '{session}' has observed all {horizon} periods of its horizon")]

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use super::allowance::HeavyTurn;
 use super::bounded::Bounded;
 use super::error::ServiceError;
-use super::observation::{Observe, Observed};
+use super::periods::{self, Observed, Passed, Periods, Standing};
+use super::report::{Observe, Report};
 use crate::control::error::FieldError;
 use crate::control::policy::advice::{Advice, Uncertainty};
 use crate::control::policy::advisor::{Advisor, OutsideDesign};
 use crate::control::problem::state::State;
-use crate::control::request::rules as limits;
-use crate::store::{Seen, SessionFacts, SessionRow};
+use crate::store::{Seen, SessionFacts, SessionRow, Tenant};
 
 /// By what a call is answered, where its work is done, and what it must take before it solves.
 pub(super) struct Means<'a> {
@@ -21,31 +21,21 @@ pub(super) struct Means<'a> {
     pub turn: &'a HeavyTurn,
 }
 
-/// A session replayed from its rows. It holds no policy: what it is advised by is kept under its name, and may be dropped.
+/// A session replayed from its entries. It holds no policy: what it is advised by is kept under its name, and may be dropped.
 #[derive(Clone)]
 pub struct Live {
     pub row: Arc<SessionRow>,
-    pub state: State,
+    pub standing: Standing,
+    /// Periods observed.
+    pub observed: usize,
+    /// Corrections of them.
+    pub corrections: usize,
     /// The rows it was replayed from.
     pub(super) seen: Seen,
     /// Radius of the state, once computed.
     pub(super) radius: Option<f64>,
-    /// Price reported for the last period.
-    pub(super) price: Option<f64>,
     /// The surrogate's advice for the coming period, once computed.
     pub(super) advice: Option<Advice>,
-}
-
-/// Wealth as return, allocation and contributions give it.
-fn reached(wealth: f64) -> Result<f64, FieldError> {
-    let (low, high) = limits::WEALTH;
-    if (low..=high).contains(&wealth) {
-        return Ok(wealth);
-    }
-    let rule = format!(
-        "must be reported: what the return, the allocation and the contributions give is {wealth}, and a wealth lies in [{low}, {high}]"
-    );
-    Err(FieldError::new("wealth", "null", rule))
 }
 
 /// Bytes of a session in memory, and of each of its returns, in the law and in the history.
@@ -53,53 +43,56 @@ pub(super) const SESSION_BYTES: usize = 3000;
 const RETURN_BYTES: usize = 16;
 
 impl Live {
-    /// The session that its rows tell of.
+    /// The session that its entries tell of.
     pub(super) fn replayed(facts: SessionFacts, advisor: &Advisor) -> Result<Live, ServiceError> {
-        let SessionFacts { row, observations, seen } = facts;
-        let start = advisor.initial_state(Some(&row.initial_history), Some(row.initial_wealth))?;
-        let mut state = start.with_holding(row.initial_holding)?;
-        for (step, observation) in observations.iter().enumerate() {
-            state = advisor.advance(step, &state, observation.executed_allocation, observation.log_return);
-            state.wealth = observation.wealth_after;
-        }
-        let last = observations.last().and_then(|row| serde_json::from_str::<Observed>(&row.answer_json).ok());
-        let price = last.and_then(|answer| answer.price);
-        Ok(Live { row: Arc::new(row), state, seen, price, radius: None, advice: None })
+        let SessionFacts { row, entries, seen } = facts;
+        let periods = Periods::of(&entries)?;
+        let passed = periods.pass(advisor, started(&row, advisor)?, |_, _, _| ());
+        let standing = passed.map_err(|(period, error)| ServiceError::internal(format!("period {period}: {error}")))?;
+        Ok(Live {
+            row: Arc::new(row),
+            standing,
+            observed: periods.all.len(),
+            corrections: periods.corrections,
+            seen,
+            radius: None,
+            advice: None,
+        })
     }
 
     pub(super) fn bytes(&self) -> usize {
-        SESSION_BYTES + RETURN_BYTES * self.state.law.sample_size()
+        SESSION_BYTES + RETURN_BYTES * self.standing.state.law.sample_size()
     }
 
-    /// Periods observed.
-    pub fn observed(&self) -> usize {
-        self.seen.observed()
-    }
-
-    /// The session after an observation that left `state`, whose radius is `radius`.
-    pub(super) fn taken_to(&self, seen: Seen, state: State, price: Option<f64>, radius: f64) -> Live {
-        Live { row: self.row.clone(), state, seen, price, radius: Some(radius), advice: None }
+    /// # Errors
+    /// Every period of the horizon is observed.
+    pub(super) fn goes_on(&self) -> Result<(), ServiceError> {
+        let SessionRow { session, horizon, .. } = &*self.row;
+        if self.observed < *horizon {
+            return Ok(());
+        }
+        Err(ServiceError::Completed { session: session.clone(), horizon: *horizon })
     }
 
     pub(super) fn expects(&self, period: usize) -> Result<(), ServiceError> {
-        if self.observed() >= self.row.horizon {
+        if self.observed >= self.row.horizon {
             return Err(ServiceError::PastHorizon { given: period, horizon: self.row.horizon });
         }
-        let expected = self.observed() + 1;
-        if period == expected { Ok(()) } else { Err(ServiceError::PeriodGap { given: period, expected }) }
+        let expected = self.observed + 1;
+        if period == expected { Ok(()) } else { Err(ServiceError::Gap { what: "period", given: period, expected }) }
     }
 
     /// The surrogate's advice for the coming period, computed once: here where that takes less than a thread would, else
     /// on a thread that may block. A state outside the design is solved, which is heavy from there on.
     pub(super) async fn surrogate_advice(&mut self, means: &Means<'_>) -> Result<&Advice, ServiceError> {
-        let step = self.observed();
+        let step = self.observed;
         let advice = match self.advice.take() {
             Some(advice) => advice,
             None => match self.predicted(step, means).await? {
                 Ok(advice) => advice,
                 Err(outside) => {
                     means.turn.begin()?;
-                    let (advisor, state) = (means.advisor.clone(), self.state.clone());
+                    let (advisor, state) = (means.advisor.clone(), self.standing.state.clone());
                     let tenant = &self.row.tenant;
                     means.resolving.run(tenant, move || advisor.advise_outside(step, &state, &outside)).await?
                 }
@@ -114,60 +107,65 @@ impl Live {
             let radius = radius.unwrap_or_else(|| advisor.radius(state));
             advisor.advise_from_surrogate(step, state, radius)
         };
-        if means.advisor.is_prompt(step, &self.state) {
-            return Ok(predict(&means.advisor, &self.state, self.radius));
+        if means.advisor.is_prompt(step, &self.standing.state) {
+            return Ok(predict(&means.advisor, &self.standing.state, self.radius));
         }
-        let (advisor, state, radius) = (means.advisor.clone(), self.state.clone(), self.radius);
+        let (advisor, state, radius) = (means.advisor.clone(), self.standing.state.clone(), self.radius);
         means.advising.run(&self.row.tenant, move || predict(&advisor, &state, radius)).await
     }
 
-    /// The state after `log_return`, and the answer to it; nothing is changed yet but the memoised advice.
+    /// Where the report leads, and the answer to it; nothing is changed yet but the memoised advice.
     pub(super) async fn after(
         &mut self,
-        report: &Observe,
-        log_return: f64,
+        observe: &Observe,
+        report: &Report,
         means: &Means<'_>,
-    ) -> Result<(State, Observed), ServiceError> {
+    ) -> Result<(Standing, Observed), ServiceError> {
+        let log_return = self.standing.log_return(report)?;
+        periods::usual(report, &self.standing.state.law, log_return, observe.confirm)?;
         let Advice { allocation, band, .. } = *self.surrogate_advice(means).await?;
-        let executed_allocation = report.executed_allocation.unwrap_or(allocation);
-        let mut state = means.advisor.advance(self.observed(), &self.state, executed_allocation, log_return);
-        state.wealth = match report.wealth {
-            Some(reported) => reported,
-            None => reached(state.wealth)?,
-        };
-        let (state, uncertainty) = self.measured(state, &means.advisor, means.advising).await?;
+        let passed = self.standing.after(&means.advisor, self.observed, report, allocation)?;
+        let Passed { log_return, executed_allocation, standing } = passed;
+        let (standing, uncertainty) = means.measured(&self.row.tenant, self.observed + 1, standing).await?;
         let answer = Observed {
-            session: report.session.clone(),
-            period: report.period,
+            session: observe.session.clone(),
+            period: observe.period,
             log_return,
             band,
+            advised_allocation: allocation,
             executed_allocation,
-            price: report.price,
-            wealth: state.wealth,
-            holding: state.holding,
-            completed: report.period == self.row.horizon,
+            wealth: standing.state.wealth,
+            holding: standing.state.holding,
+            completed: observe.period == self.row.horizon,
             uncertainty,
         };
-        Ok((state, answer))
+        Ok((standing, answer))
     }
+}
 
-    async fn measured(
+/// Where a session starts.
+pub(super) fn started(row: &SessionRow, advisor: &Advisor) -> Result<State, FieldError> {
+    advisor.initial_state(Some(&row.initial_history), Some(row.initial_wealth))?.with_holding(row.initial_holding)
+}
+
+impl Means<'_> {
+    /// The uncertainty set after `step` periods.
+    pub(super) async fn measured(
         &self,
-        state: State,
-        advisor: &Arc<Advisor>,
-        advising: &Bounded,
-    ) -> Result<(State, Uncertainty), ServiceError> {
-        let step = self.observed() + 1;
-        if advisor.is_prompt(step, &state) {
-            let uncertainty = advisor.uncertainty(&state);
-            return Ok((state, uncertainty));
+        tenant: &Tenant,
+        step: usize,
+        standing: Standing,
+    ) -> Result<(Standing, Uncertainty), ServiceError> {
+        if self.advisor.is_prompt(step, &standing.state) {
+            let uncertainty = self.advisor.uncertainty(&standing.state);
+            return Ok((standing, uncertainty));
         }
-        let measuring = advisor.clone();
-        let measured = advising.run(&self.row.tenant, move || (measuring.uncertainty(&state), state)).await;
-        let (uncertainty, state) = measured?;
+        let measuring = self.advisor.clone();
+        let measure = move || (measuring.uncertainty(&standing.state), standing);
+        let (uncertainty, standing) = self.advising.run(tenant, measure).await?;
         // The first session to get this far: the next advice finds its common random numbers simulated.
-        let (advisor, reached) = (advisor.clone(), state.clone());
+        let (advisor, reached) = (self.advisor.clone(), standing.state.clone());
         tokio::task::spawn_blocking(move || advisor.prepare(step, &reached));
-        Ok((state, uncertainty))
+        Ok((standing, uncertainty))
     }
 }

@@ -23,21 +23,18 @@ use super::identity;
 use super::keys::Caller;
 use super::live::{Live, Means, SESSION_BYTES};
 use super::memory::Memory;
-use super::observation::Observe;
+use super::periods::Standing;
 use super::policies::Policies;
 use super::slots::{Generation, Held, Slots, Source};
 use super::spans;
-use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
 use crate::control::policy::content_hash;
 use crate::control::policy::worst_case::WorstCase;
-use crate::store::{
-    Append, CreateSession, ObservationRow, RequestKey, SessionFacts, SessionRow, SessionSummary, Store, Tenant,
-};
+use crate::store::{CreateSession, RequestKey, SessionFacts, SessionRow, SessionSummary, Store, Tenant};
 
 /// Whose session it is, and its name.
-type Name = (Tenant, String);
+pub(super) type Name = (Tenant, String);
 
 /// What [`Sessions::action`] found.
 pub struct Action {
@@ -75,8 +72,8 @@ impl Start {
 /// The sessions of the store.
 #[derive(Clone)]
 pub struct Sessions {
-    store: Store,
-    clock: Clock,
+    pub(super) store: Store,
+    pub(super) clock: Clock,
     pub(super) policies: Arc<Policies>,
     slots: Arc<Slots<Name, Live>>,
     pub(super) advising: Bounded,
@@ -131,7 +128,8 @@ impl Sessions {
             CreateSession::Exists => return Err(ServiceError::internal("a session of this random name exists")),
         };
         let seen = row.as_opened();
-        Ok(Live { row: Arc::new(row), state, seen, price: None, radius: None, advice: None })
+        let standing = Standing::at(state);
+        Ok(Live { row: Arc::new(row), standing, observed: 0, corrections: 0, seen, radius: None, advice: None })
     }
 
     /// Bytes of the sessions in memory.
@@ -148,7 +146,7 @@ impl Sessions {
     /// There is no such session.
     pub async fn get(&self, tenant: &Tenant, session: &str) -> Result<Live, ServiceError> {
         let mut held = self.hold(tenant, session).await;
-        held.current(&Rows { sessions: self, tenant, session }).await.cloned()
+        held.current(&self.rows(tenant, session)).await.cloned()
     }
 
     /// Requests that wait for their turn to be advised, and to have a step solved.
@@ -169,19 +167,6 @@ impl Sessions {
         Ok(self.store.sessions(tenant, limit, after).await?)
     }
 
-    /// The session's start and every observation.
-    ///
-    /// # Errors
-    /// There is no such session.
-    pub async fn history(
-        &self,
-        tenant: &Tenant,
-        session: &str,
-    ) -> Result<(SessionRow, Vec<ObservationRow>), ServiceError> {
-        let SessionFacts { row, observations, .. } = self.facts(tenant, session).await?;
-        Ok((row, observations))
-    }
-
     /// # Errors
     /// There is no such session.
     pub async fn delete(&self, caller: &Caller, session: &str) -> Result<(), ServiceError> {
@@ -192,61 +177,6 @@ impl Sessions {
         let deleting = deleting.delete_session(&caller.tenant, session);
         let deleted = deleting.instrument(spans::of_write("delete a session")).await?;
         if deleted { Ok(()) } else { Err(ServiceError::unknown("session", session)) }
-    }
-
-    /// Records the return of a period, durably before it is answered, exactly once, and answers with an
-    /// [`Observed`](super::observation::Observed) in JSON as it was recorded. Where the caller goes away meanwhile
-    /// the store may or may not record it, and nothing of it stays in memory.
-    ///
-    /// # Errors
-    /// A field breaks a rule; the period was observed with other content, is not the next, or lies past the horizon.
-    pub async fn observe(&self, tenant: &Tenant, report: &Observe, turn: &HeavyTurn) -> Result<String, ServiceError> {
-        let mut held = self.hold(tenant, &report.session).await;
-        let live = held.current(&Rows { sessions: self, tenant, session: &report.session }).await?;
-        let content_hash = report.content_hash().map_err(ServiceError::internal)?;
-        if report.period == 0 {
-            return Err(FieldError::new("period", 0, "must be at least 1").into());
-        }
-        if report.period <= live.observed() {
-            return self.repeat(report, &content_hash).await;
-        }
-        live.expects(report.period)?;
-        let log_return = report.checked_log_return(live.price)?;
-        let means = self.means(tenant, live, turn).await?;
-        let (state, answer) = live.after(report, log_return, &means).await?;
-        let answer_json = serde_json::to_string(&answer).map_err(ServiceError::internal)?;
-        let new = ObservationRow {
-            session: report.session.clone(),
-            period: report.period,
-            content_hash,
-            log_return,
-            executed_allocation: answer.executed_allocation,
-            advised_allocation: live.advice.as_ref().map_or(answer.executed_allocation, |advice| advice.allocation),
-            wealth_after: answer.wealth,
-            answer_json: answer_json.clone(),
-            created_ms: self.clock.now_milliseconds(),
-            key: report.reported_by.to_string(),
-        };
-        let next = live.taken_to(live.seen.followed_by(&new), state, report.price, answer.uncertainty.radius);
-        held.clear();
-        match self.store.append_observation(new).instrument(spans::of_write("append an observation")).await? {
-            Append::Appended => {
-                held.put(next);
-                Ok(answer_json)
-            }
-            Append::Repeated { answer_json } => Ok(answer_json),
-            Append::Conflict => Err(ServiceError::PeriodConflict { period: report.period }),
-            Append::OutOfOrder { expected } => Err(ServiceError::PeriodGap { given: report.period, expected }),
-            Append::NoSession => Err(ServiceError::unknown("session", &report.session)),
-        }
-    }
-
-    /// The first answer to a period already observed.
-    async fn repeat(&self, report: &Observe, content_hash: &str) -> Result<String, ServiceError> {
-        match self.store.observation(&report.session, report.period).await? {
-            Some(row) if row.content_hash == content_hash => Ok(row.answer_json),
-            _ => Err(ServiceError::PeriodConflict { period: report.period }),
-        }
     }
 
     /// The robust allocation for the coming period.
@@ -261,11 +191,9 @@ impl Sessions {
         turn: &HeavyTurn,
     ) -> Result<Action, ServiceError> {
         let mut held = self.hold(tenant, session).await;
-        let live = held.current(&Rows { sessions: self, tenant, session }).await?;
-        if live.observed() >= live.row.horizon {
-            return Err(ServiceError::Completed { session: session.to_owned(), horizon: live.row.horizon });
-        }
-        let period = live.observed() + 1;
+        let live = held.current(&self.rows(tenant, session)).await?;
+        live.goes_on()?;
+        let period = live.observed + 1;
         let surrogate = question == Question::Advise(AdviceMode::Surrogate);
         if let Some(advice) = live.advice.clone().filter(|_| surrogate) {
             return Ok(Action { period, advice, worst_case: None });
@@ -276,7 +204,7 @@ impl Sessions {
             return Ok(Action { period, advice, worst_case: None });
         }
         let advisor = means.advisor;
-        let (state, step) = (live.state.clone(), live.observed());
+        let (state, step) = (live.standing.state.clone(), live.observed);
         drop(held);
         turn.begin()?;
         let solving = self.resolving.run(tenant, move || match question {
@@ -295,23 +223,32 @@ impl Sessions {
         self.policies.advisor(tenant, &live.row.policy).await
     }
 
-    async fn means<'a>(&'a self, tenant: &Tenant, live: &Live, turn: &'a HeavyTurn) -> Result<Means<'a>, ServiceError> {
+    pub(super) async fn means<'a>(
+        &'a self,
+        tenant: &Tenant,
+        live: &Live,
+        turn: &'a HeavyTurn,
+    ) -> Result<Means<'a>, ServiceError> {
         let advisor = self.advisor(tenant, live).await?;
         Ok(Means { advisor, advising: &self.advising, resolving: &self.resolving, turn })
     }
 
-    async fn hold(&self, tenant: &Tenant, session: &str) -> Held<Name, Live> {
+    pub(super) fn rows<'a>(&'a self, tenant: &'a Tenant, session: &'a str) -> Rows<'a> {
+        Rows { sessions: self, tenant, session }
+    }
+
+    pub(super) async fn hold(&self, tenant: &Tenant, session: &str) -> Held<Name, Live> {
         self.slots.hold((tenant.clone(), session.to_owned())).await
     }
 
-    async fn facts(&self, tenant: &Tenant, session: &str) -> Result<SessionFacts, ServiceError> {
+    pub(super) async fn facts(&self, tenant: &Tenant, session: &str) -> Result<SessionFacts, ServiceError> {
         let facts = self.store.session_facts(tenant, session).await?;
         facts.ok_or_else(|| ServiceError::unknown("session", session))
     }
 }
 
 /// The rows of a tenant's session.
-struct Rows<'a> {
+pub(super) struct Rows<'a> {
     sessions: &'a Sessions,
     tenant: &'a Tenant,
     session: &'a str,

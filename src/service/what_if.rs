@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::error::ServiceError;
-use super::observation::log_return_of;
+use super::report::log_return_of;
 use super::sessions::Sessions;
 use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
@@ -205,15 +205,13 @@ impl Sessions {
     pub async fn what_if(&self, tenant: &Tenant, request: WhatIf) -> Result<WhatIfAnswer, ServiceError> {
         let hypotheses = request.hypotheses()?;
         let live = self.get(tenant, &request.session).await?;
-        if live.observed() >= live.row.horizon {
-            return Err(ServiceError::Completed { session: request.session, horizon: live.row.horizon });
-        }
+        live.goes_on()?;
         let advisor = self.advisor(tenant, &live).await?;
         let solves = request.sweep.is_some() || request.explain.is_some();
         let mode = if solves { AdviceMode::Resolve } else { AdviceMode::Surrogate };
         let mut points = Vec::with_capacity(hypotheses.len());
         for hypothesis in hypotheses {
-            let (advisor, state, step) = (advisor.clone(), live.state.clone(), live.observed());
+            let (advisor, state, step) = (advisor.clone(), live.standing.state.clone(), live.observed);
             let turns = if solves || hypothesis.radius.is_some() { &self.resolving } else { &self.advising };
             let supposed = turns.run(tenant, move || advisor.suppose(step, &state, &hypothesis, mode)).await?;
             points.push(WhatIfPoint::new(

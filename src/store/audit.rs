@@ -22,8 +22,8 @@ use std::sync::Arc;
 use futures_util::FutureExt;
 
 use super::codec::{Seal, to_sql};
+use super::entries::EntryRow;
 use super::error::Failure;
-use super::observations::ObservationRow;
 use super::query::{Connection, Row, query};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
@@ -55,6 +55,7 @@ impl Actor {
 pub enum Deed {
     OpenSession,
     Observe,
+    Correct,
     DeleteSession,
     QueueJob,
     CancelJob,
@@ -73,6 +74,7 @@ impl Deed {
         match self {
             Deed::OpenSession => "session.open",
             Deed::Observe => "session.observe",
+            Deed::Correct => "session.correct",
             Deed::DeleteSession => "session.delete",
             Deed::QueueJob => "job.queue",
             Deed::CancelJob => "job.cancel",
@@ -163,9 +165,8 @@ impl Store {
     /// The newest observations of a session, newest first, as entries; none where it is no session.
     async fn observed(&self, session: &str, limit: usize) -> Result<Vec<AuditRow>, StoreError> {
         let newest = query(
-            "SELECT observations.*, sessions.tenant FROM observations
-             JOIN sessions ON sessions.session = observations.session
-             WHERE observations.session = $1 ORDER BY period DESC LIMIT $2",
+            "SELECT entries.*, sessions.tenant FROM entries JOIN sessions ON sessions.session = entries.session
+             WHERE entries.session = $1 AND kind = 'observation' ORDER BY entry DESC LIMIT $2",
         );
         let decode = |rows: &[Row]| rows.iter().map(AuditRow::of_observation).collect();
         self.list("reading the audit", newest.bind(session).bind(to_sql(limit)), decode).await
@@ -285,7 +286,7 @@ impl AuditRow {
 
     /// An observation, its own seal verified.
     fn of_observation(row: &Row) -> Result<Self, Failure> {
-        let observation = ObservationRow::from_row(row)?;
+        let observation = EntryRow::from_row(row)?;
         Ok(AuditRow {
             sequence: 0,
             tenant: Tenant::stored(&row.get::<String>("tenant")?),
@@ -293,7 +294,7 @@ impl AuditRow {
             roles: String::new(),
             deed: Deed::Observe.as_str().to_owned(),
             object: observation.session,
-            outcome: format!("period {} recorded", observation.period),
+            outcome: format!("period {} recorded", observation.number),
             at_ms: observation.created_ms,
         })
     }

@@ -4,7 +4,7 @@
 //! is added or deleted meanwhile is sound or gone. It ends at the first damage, since what else is wrong is found after
 //! that is mended. Cost: one pass over the database, and memory for one policy or one session.
 //!
-//! Not found: a session that lost its last observations, whole rows and nothing else (see the head of [`super`]).
+//! Not found: a session that lost its last entries, whole rows and nothing else (see the head of [`super`]).
 
 use std::path::Path;
 
@@ -16,15 +16,15 @@ use super::error::{Failure, StoreError};
 use super::job::JobRow;
 use super::keys::KeyRow;
 use super::query::{Connection, Query, Row, query};
-use super::quotas::{OBSERVATION_BYTES, ROW_BYTES};
+use super::quotas::{ENTRY_BYTES, ROW_BYTES};
 use super::sessions::SessionRow;
-use super::{PostgresUrl, leases, migrations, observations, policies, postgres, sqlite};
+use super::{PostgresUrl, entries, leases, migrations, policies, postgres, sqlite};
 
 const DOING: &str = "checking the store";
 /// Rows of jobs, policies or sessions read at a time.
 const PAGE: i64 = 256;
 
-/// Each tenant with its totals and what its rows sum to; of a row $1 bytes beside what it holds, of an observation $2.
+/// Each tenant with its totals and what its rows sum to; of a row $1 bytes beside what it holds, of an entry $2.
 const TOTALS: &str = "
     WITH parts (tenant, sessions, bytes) AS (
         SELECT tenant, 0, $1 FROM jobs
@@ -32,7 +32,7 @@ const TOTALS: &str = "
         UNION ALL SELECT tenant, 0, octet_length(json) FROM job_reports JOIN jobs ON jobs.job = job_reports.job
         UNION ALL SELECT tenant, 0, $1 + octet_length(json)
             FROM policy_owners JOIN policies ON policies.policy = policy_owners.policy
-        UNION ALL SELECT tenant, 1, $1 + octet_length(initial_history) + horizon * $2 FROM sessions
+        UNION ALL SELECT tenant, 1, $1 + octet_length(initial_history) + room * $2 FROM sessions
     ), sums (tenant, sessions, bytes) AS (SELECT tenant, sum(sessions), sum(bytes) FROM parts GROUP BY tenant)
     SELECT coalesce(usage.tenant, sums.tenant) AS tenant, usage.sessions, CAST(sums.sessions AS BIGINT) AS counted,
            usage.bytes AS kept, CAST(sums.bytes AS BIGINT) AS summed
@@ -103,8 +103,8 @@ impl Inspection {
         tell(format!("policies: {policies}, each the bytes its name is the hash of"));
         let (jobs, checkpoints) = self.jobs().await?;
         tell(format!("jobs: {jobs}, with {checkpoints} checkpoints as sealed"));
-        let (sessions, observations) = self.sessions().await?;
-        tell(format!("sessions: {sessions}, with {observations} observations, as sealed and none missing between"));
+        let (sessions, entries) = self.sessions().await?;
+        tell(format!("sessions: {sessions}, with {entries} entries, as sealed and none missing between"));
         let tenants = self.totals().await?;
         tell(format!("totals: of {tenants} tenants, each the sum of what it keeps"));
         let keys = self.read(query("SELECT * FROM access_keys ORDER BY sequence")).await?;
@@ -174,16 +174,16 @@ impl Inspection {
     }
 
     async fn sessions(&mut self) -> Result<(usize, usize), Failure> {
-        let (mut after, mut sessions, mut observed) = (0, 0, 0);
+        let (mut after, mut sessions, mut recorded) = (0, 0, 0);
         loop {
             let next = query("SELECT * FROM sessions WHERE sequence > $1 ORDER BY sequence LIMIT $2");
             let page = self.read(next.bind(after).bind(PAGE)).await?;
-            let Some(last) = page.last() else { return Ok((sessions, observed)) };
+            let Some(last) = page.last() else { return Ok((sessions, recorded)) };
             after = last.get("sequence")?;
             for row in &page {
                 let session = SessionRow::from_row(row)?.session;
-                let rows = self.read(observations::all_of(&session)).await?;
-                observed += observations::numbered(&session, &rows)?.map_or(0, |rows| rows.len());
+                let rows = self.read(entries::all_of(&session)).await?;
+                recorded += entries::numbered(&session, &rows)?.map_or(0, |rows| rows.len());
             }
             sessions += page.len();
         }
@@ -191,7 +191,7 @@ impl Inspection {
 
     /// What quotas go by: the totals of each tenant against its rows.
     async fn totals(&mut self) -> Result<usize, Failure> {
-        let totals = self.read(query(TOTALS).bind(ROW_BYTES).bind(OBSERVATION_BYTES)).await?;
+        let totals = self.read(query(TOTALS).bind(ROW_BYTES).bind(ENTRY_BYTES)).await?;
         for row in &totals {
             let [kept, summed]: [Option<i64>; 2] = [row.get("kept")?, row.get("summed")?];
             let [sessions, counted]: [Option<i64>; 2] = [row.get("sessions")?, row.get("counted")?];

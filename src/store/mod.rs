@@ -3,22 +3,22 @@
 //! Promises, strongest first:
 //!
 //! 1. What was answered is on the disk: a write is answered after its commit, and the commit after its fsync.
-//! 2. What is read is what was written, bit for bit: policies, sessions and observations carry a SHA-256 that every read
+//! 2. What is read is what was written, bit for bit: policies, sessions and their entries carry a SHA-256 that every read
 //!    checks, so a damaged row is [`StoreError::Corrupt`], never an action.
 //! 3. A worker whose lease ran out changes nothing: every write of a job names the `attempt` it was claimed under.
 //! 4. Decisions about one thing follow each other, whoever makes them: over SQLite because one process holds the folder
-//!    and has one writer, over PostgreSQL because each decision first locks the row it rests on, or, of an observation that
+//!    and has one writer, over PostgreSQL because each decision first locks the row it rests on, or, of an entry that
 //!    is appended, because the table's keys admit one. Keys are the exception:
 //!    a [`KeyRing`] adds and revokes them beside the process that holds the folder, one statement each.
 //!
 //! What is decided is written once, in `jobs`, `keys`, `leases`, `turns`, `quotas`, `retention`, `policies`, `sessions` and
-//! `observations`; how a statement is run and how a group of writes is committed is the engine's, in `sqlite` and
+//! `entries`; how a statement is run and how a group of writes is committed is the engine's, in `sqlite` and
 //! `postgres`; what an engine's error means is said in `error`.
 //!
-//! Conflicts, repeats and gaps are outcomes, not errors. The store reads no clock: time enters as milliseconds since the
+//! Conflicts and repeats are outcomes, not errors. The store reads no clock: time enters as milliseconds since the
 //! epoch; leases are measured by [`Store::lease_time`]. Identifiers are opaque and made by the caller.
 //!
-//! Not done, and why: a digest over the end of a session's observations (a lost tail needs a lost file; a
+//! Not done, and why: a digest over the end of a session's entries (a lost tail needs a lost file; a
 //! write-ahead log that damage cut short is refused at the start); deleting old sessions and policies by age (an investor's
 //! record is not ours to expire).
 
@@ -27,6 +27,7 @@ mod audit_chain;
 mod backup;
 mod check;
 mod codec;
+mod entries;
 mod error;
 mod head;
 mod idempotency;
@@ -36,7 +37,6 @@ mod jobs;
 mod keys;
 mod leases;
 mod migrations;
-mod observations;
 mod policies;
 mod postgres;
 mod query;
@@ -58,13 +58,13 @@ use query::{Connection, Purpose, Query, Row};
 pub use audit::{Actor, AuditBounds, AuditFilter, AuditRow, Deed};
 pub use backup::{backup, restore};
 pub use check::Inspection;
+pub use entries::{Append, EntryKind, EntryRow};
 pub use error::{OverQuota, Quota, StoreError};
 pub use head::Head;
 pub use idempotency::RequestKey;
 pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, NewJob, OldestJobs};
 pub use job_state::{IllegalTransition, JobEvent, JobState};
 pub use keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, Successor};
-pub use observations::{Append, ObservationRow};
 pub use policies::{DeletePolicy, PolicyRow, PolicySummary};
 pub use postgres::{PostgresUrl, UrlError};
 pub use quotas::{Quotas, Usage};

@@ -19,9 +19,9 @@ use super::{Store, StoreError};
 
 /// What a row of jobs, policies or sessions takes with its index entries, beside what is counted by its length.
 pub(super) const ROW_BYTES: i64 = 1024;
-/// What one observation takes with its answer, its seal and its index entry: 723 bytes over SQLite and 804 over
-/// PostgreSQL (`docs/capacity.md`), and room for a longer answer.
-pub(super) const OBSERVATION_BYTES: i64 = 1024;
+/// What one entry of a session takes with its report, its answer, its seal and its index entry: less by a fifth and more
+/// (`docs/capacity.md`), so that there is room for a longer one.
+pub(super) const ENTRY_BYTES: i64 = 1024;
 
 /// What every tenant may keep; 0: any number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,10 +54,10 @@ impl Usage {
         Usage { sessions: 0, bytes }
     }
 
-    /// Of a session, with the observations it may come to have.
-    pub(super) fn of_session(history_bytes: i64, horizon: i64) -> Self {
-        let observations = horizon.saturating_mul(OBSERVATION_BYTES);
-        Usage { sessions: 1, bytes: ROW_BYTES.saturating_add(history_bytes).saturating_add(observations) }
+    /// Of a session, with `room` for so many entries.
+    pub(super) fn of_session(history_bytes: i64, room: i64) -> Self {
+        let entries = room.saturating_mul(ENTRY_BYTES);
+        Usage { sessions: 1, bytes: ROW_BYTES.saturating_add(history_bytes).saturating_add(entries) }
     }
 
     pub(super) fn given_back(self) -> Self {

@@ -4,10 +4,10 @@ use futures_util::FutureExt;
 
 use super::audit::{self, Actor, Deed};
 use super::codec::{Seal, decode_reals, encode_reals, from_sql, to_sql};
+use super::entries::EntryRow;
 use super::error::Failure;
 use super::head::Head;
 use super::idempotency::{self, RequestKey, Used};
-use super::observations::ObservationRow;
 use super::query::{Connection, Row, query};
 use super::quotas::{self, Quotas, Usage};
 use super::tenant::Tenant;
@@ -42,12 +42,12 @@ pub struct SessionRow {
     pub created_ms: i64,
 }
 
-/// A session as it was read: its start and every observation.
+/// A session as it was read: its start and every entry.
 #[derive(Debug, Clone)]
 pub struct SessionFacts {
     pub row: SessionRow,
-    /// Ascending by period.
-    pub observations: Vec<ObservationRow>,
+    /// In the order they were recorded.
+    pub entries: Vec<EntryRow>,
     pub seen: Seen,
 }
 
@@ -60,13 +60,13 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// Number of periods observed.
-    pub fn observed(&self) -> usize {
-        self.head.observed
+    /// Number of entries.
+    pub fn entries(&self) -> usize {
+        self.head.entries
     }
 
     /// The session as the caller knows it once `appended` is answered with [`Append::Appended`](super::Append).
-    pub fn followed_by(&self, appended: &ObservationRow) -> Seen {
+    pub fn followed_by(&self, appended: &EntryRow) -> Seen {
         // Whoever else wrote meanwhile raised the number too, so that it is not this one.
         Seen { head: appended.head(), change: self.change.map(|change| change + 1) }
     }
@@ -106,17 +106,17 @@ impl Store {
         self.read("reading a session", find, |rows| rows.first().map(SessionRow::from_row).transpose()).await
     }
 
-    /// A session of a tenant with all its observations.
+    /// A session of a tenant with all its entries.
     ///
     /// # Errors
-    /// [`StoreError::Corrupt`] where a row is not what was written or a period is missing.
+    /// [`StoreError::Corrupt`] where a row is not what was written or one is missing.
     pub async fn session_facts(&self, tenant: &Tenant, session: &str) -> Result<Option<SessionFacts>, StoreError> {
         // Before the rows: what is written from here on shows.
         let change = self.change(session);
         let Some(row) = self.session(tenant, session).await? else { return Ok(None) };
-        let Some(observations) = self.observations(session).await? else { return Ok(None) };
-        let head = observations.last().map_or_else(|| row.head(), ObservationRow::head);
-        Ok(Some(SessionFacts { row, observations, seen: Seen { head, change } }))
+        let Some(entries) = self.entries(session).await? else { return Ok(None) };
+        let head = entries.last().map_or_else(|| row.head(), EntryRow::head);
+        Ok(Some(SessionFacts { row, entries, seen: Seen { head, change } }))
     }
 
     /// Whether a session is still as it was `seen`: known without a read where a folder's session was not written to.
@@ -143,15 +143,15 @@ impl Store {
     /// The head of a session: where it is the one of what was read, that is still the session.
     pub async fn head(&self, session: &str) -> Result<Option<Head>, StoreError> {
         let last = query(
-            "SELECT sessions.seal AS start_seal, observations.period, observations.seal
-             FROM sessions LEFT JOIN observations ON observations.session = sessions.session
-             WHERE sessions.session = $1 ORDER BY observations.period DESC LIMIT 1",
+            "SELECT sessions.seal AS start_seal, entries.entry, entries.seal
+             FROM sessions LEFT JOIN entries ON entries.session = sessions.session
+             WHERE sessions.session = $1 ORDER BY entries.entry DESC LIMIT 1",
         );
         self.read("reading the head of a session", last.bind(session), |rows| {
             let Some(row) = rows.first() else { return Ok(None) };
-            Ok(Some(match row.get::<Option<i64>>("period")? {
-                Some(period) => Head { observed: from_sql(period)?, seal: row.get("seal")? },
-                None => Head { observed: 0, seal: row.get("start_seal")? },
+            Ok(Some(match row.get::<Option<i64>>("entry")? {
+                Some(entry) => Head { entries: from_sql(entry)?, seal: row.get("seal")? },
+                None => Head { entries: 0, seal: row.get("start_seal")? },
             }))
         })
         .await
@@ -166,14 +166,15 @@ impl Store {
     ) -> Result<Vec<SessionSummary>, StoreError> {
         let page = query(
             "SELECT sequence, session, policy, initial_wealth, horizon, created_ms,
-                    (SELECT count(*) FROM observations WHERE observations.session = sessions.session) AS observations
+                    coalesce((SELECT number FROM entries WHERE entries.session = sessions.session AND kind = 'observation'
+                              ORDER BY entry DESC LIMIT 1), 0) AS observations
              FROM sessions WHERE tenant = $1 AND sequence < $2 ORDER BY sequence DESC LIMIT $3",
         );
         let page = page.bind(tenant.as_str()).bind(after.unwrap_or(i64::MAX)).bind(to_sql(limit));
         self.list("listing sessions", page, |rows| rows.iter().map(SessionSummary::from_row).collect()).await
     }
 
-    /// Deletes a session of a tenant and its observations. False where there was none.
+    /// Deletes a session of a tenant and its entries. False where there was none.
     pub async fn delete_session(&self, tenant: &Tenant, session: &str) -> Result<bool, StoreError> {
         let (tenant, name, actor) = (tenant.clone(), session.to_owned(), self.actor.clone());
         self.write_to(session, "deleting a session", move |connection| delete(connection, tenant, name, actor).boxed())
@@ -246,9 +247,9 @@ async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<Cre
         return Ok(CreateSession::NoPolicy);
     }
     let insert = query(
-        "INSERT INTO sessions (session, policy, initial_wealth, initial_holding, initial_history, horizon, created_ms,
+        "INSERT INTO sessions (session, policy, initial_wealth, initial_holding, initial_history, horizon, room, created_ms,
                                seal, tenant)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9) ON CONFLICT (session) DO NOTHING",
+         VALUES ($1, $2, $3, $4, $5, $6, $6, $7, $8, $9) ON CONFLICT (session) DO NOTHING",
     );
     let insert = insert
         .bind(row.session.as_str())
@@ -264,7 +265,7 @@ async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<Cre
     Ok(if inserted > 0 { CreateSession::Created } else { CreateSession::Exists })
 }
 
-/// The entry says how many observations went with the session.
+/// The audit says how many entries went with the session.
 async fn delete(
     mut connection: Connection<'_>,
     tenant: Tenant,
@@ -272,28 +273,28 @@ async fn delete(
     actor: Actor,
 ) -> Result<bool, Failure> {
     let connection = &mut connection;
-    let count = query("SELECT count(*) AS observations FROM observations WHERE session = $1").bind(session.as_str());
-    let observations: i64 = connection.row(count).await?.map_or(Ok(0), |row| row.get("observations"))?;
+    let count = query("SELECT count(*) AS entries FROM entries WHERE session = $1").bind(session.as_str());
+    let entries: i64 = connection.row(count).await?.map_or(Ok(0), |row| row.get("entries"))?;
     let delete = query(
         "DELETE FROM sessions WHERE session = $1 AND tenant = $2
-         RETURNING CAST(octet_length(initial_history) AS BIGINT) AS history_bytes, horizon",
+         RETURNING CAST(octet_length(initial_history) AS BIGINT) AS history_bytes, room",
     );
     let deleted = connection.row(delete.bind(session.as_str()).bind(tenant.as_str())).await?;
     let Some(row) = deleted else { return Ok(false) };
-    let usage = Usage::of_session(row.get("history_bytes")?, row.get("horizon")?);
+    let usage = Usage::of_session(row.get("history_bytes")?, row.get("room")?);
     quotas::change(connection, &tenant, usage.given_back()).await?;
-    let outcome = format!("deleted, with {observations} observations");
+    let outcome = format!("deleted, with {entries} entries");
     audit::record(connection, &actor, &tenant, Deed::DeleteSession, &session, &outcome).await?;
     Ok(true)
 }
 
 impl SessionRow {
-    /// The head of the session before its first observation.
+    /// The head of the session before its first entry.
     pub fn head(&self) -> Head {
-        Head { observed: 0, seal: self.seal().finish() }
+        Head { entries: 0, seal: self.seal().finish() }
     }
 
-    /// The session before its first observation; whether it still is that is found out by a read.
+    /// The session before its first entry; whether it still is that is found out by a read.
     pub fn as_opened(&self) -> Seen {
         Seen { head: self.head(), change: None }
     }

@@ -21,7 +21,9 @@ pub struct Session {
     pub name: String,
     /// Each period's report and the answer to it.
     pub reports: Vec<(Value, Value)>,
-    /// Sent, but not acknowledged: it may be stored or not.
+    /// Each correction and the answer to it.
+    pub corrections: Vec<(Value, Value)>,
+    /// Sent, but not acknowledged: it may be stored or not. A correction has a number.
     pub pending: Option<Value>,
 }
 
@@ -72,33 +74,71 @@ impl Ledger {
 }
 
 impl Session {
+    pub fn opened(name: String) -> Session {
+        Session { name, reports: Vec::new(), corrections: Vec::new(), pending: None }
+    }
+
+    /// Sends a report or a correction.
+    pub async fn send(&self, caller: &Caller, entry: &Value) -> Option<(u16, Value)> {
+        if is_correction(entry) {
+            caller.post(&format!("/sessions/{}/corrections", self.name), entry).await
+        } else {
+            caller.post("/observe", entry).await
+        }
+    }
+
+    pub fn acknowledge(&mut self, entry: Value, answer: Value) {
+        let entries = if is_correction(&entry) { &mut self.corrections } else { &mut self.reports };
+        entries.push((entry, answer));
+    }
+
     async fn audit(&self, caller: &Caller) -> Audit {
-        let acknowledged = self.reports.len() + 1;
-        let Some(rows) = self.rows(caller).await else {
+        let acknowledged = self.reports.len() + self.corrections.len() + 1;
+        let Some((rows, corrections)) = self.rows(caller).await else {
             return Audit { acknowledged, lost: acknowledged, doubled: 0 };
         };
         let kept = |(index, (_, answer)): &(usize, &(Value, Value))| {
-            rows.get(*index).is_some_and(|row| says_the_same(row, answer))
+            rows.get(*index).is_some_and(|row| says_the_same(row, answer) && self.stands(row))
         };
         let mut lost = self.reports.iter().enumerate().filter(|report| !kept(report)).count();
-        for (report, answer) in &self.reports {
-            let again = caller.post("/observe", report).await;
+        let made = |(index, (sent, _)): &(usize, &(Value, Value))| {
+            let fields = ["correction", "period", "log_return", "reason"];
+            corrections.get(*index).is_some_and(|row| fields.iter().all(|field| row[field] == sent[field]))
+        };
+        lost += self.corrections.iter().enumerate().filter(|correction| !made(correction)).count();
+        for (entry, answer) in self.reports.iter().chain(&self.corrections) {
+            let again = self.send(caller, entry).await;
             lost += usize::from(again.as_ref() != Some(&(200, answer.clone())));
         }
-        let mut most = self.reports.len();
+        let mut most = self.reports.len() + self.corrections.len();
         if let Some(pending) = &self.pending {
             most += 1;
-            lost += usize::from(caller.post("/observe", pending).await.is_none_or(|(status, _)| status != 200));
+            lost += usize::from(self.send(caller, pending).await.is_none_or(|(status, _)| status != 200));
         }
-        let rows = self.rows(caller).await.map_or(0, |rows| rows.len());
-        Audit { acknowledged, lost: lost.min(acknowledged), doubled: rows.saturating_sub(most) }
+        let kept = self.rows(caller).await.map_or(0, |(rows, corrections)| rows.len() + corrections.len());
+        Audit { acknowledged, lost: lost.min(acknowledged), doubled: kept.saturating_sub(most) }
     }
 
-    /// What the server has of it.
-    pub async fn rows(&self, caller: &Caller) -> Option<Vec<Value>> {
-        let (status, mut history) = caller.get(&format!("/sessions/{}/history", self.name)).await?;
-        (status == 200).then(|| history["observations"].as_array_mut().map(std::mem::take))?
+    /// Whether a period's return is the one it was put right to last, where no other correction of it is under way.
+    fn stands(&self, row: &Value) -> bool {
+        let of_period = |entry: &&Value| entry["period"] == row["period"];
+        if self.pending.iter().filter(of_period).any(is_correction) {
+            return true;
+        }
+        let last = self.corrections.iter().rev().map(|(correction, _)| correction).find(of_period);
+        last.is_none_or(|correction| row["now"]["log_return"] == correction["log_return"])
     }
+
+    /// The periods and the corrections that the server has of it.
+    pub async fn rows(&self, caller: &Caller) -> Option<(Vec<Value>, Vec<Value>)> {
+        let (status, mut history) = caller.get(&format!("/sessions/{}/history", self.name)).await?;
+        let mut rows = |of: &str| history[of].as_array_mut().map(std::mem::take);
+        (status == 200).then(|| rows("observations").zip(rows("corrections")))?
+    }
+}
+
+fn is_correction(entry: &Value) -> bool {
+    entry["correction"].is_u64()
 }
 
 /// Whether a stored row is the fact that an answer acknowledged.

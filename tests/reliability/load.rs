@@ -108,21 +108,28 @@ impl Client {
         }
     }
 
-    /// Reports the next period of the last session, or opens another; a report without an answer is sent again.
+    /// Reports the next period of the last session, puts one of it right, or opens another session; what is without an
+    /// answer is sent again.
     async fn report(&mut self) -> bool {
-        let Some(session) = self.ledger.sessions.last_mut().filter(|session| session.reports.len() < HORIZON) else {
+        let goes_on = |session: &&mut Session| session.reports.len() < HORIZON || session.pending.is_some();
+        let Some(session) = self.ledger.sessions.last_mut().filter(goes_on) else {
             return self.open().await;
         };
-        let (period, log_return) = (session.reports.len() + 1, self.random.random_range(-0.05..0.05));
-        let new = json!({ "session": session.name, "period": period, "log_return": log_return });
-        let report = session.pending.get_or_insert(new).clone();
-        let answer = self.caller.post("/observe", &report).await;
+        let (observed, log_return) = (session.reports.len(), self.random.random_range(-0.05..0.05));
+        let new = if observed > 0 && self.random.random_bool(0.2) {
+            let (correction, period) = (session.corrections.len() + 1, self.random.random_range(1..=observed));
+            json!({ "correction": correction, "period": period, "log_return": log_return, "reason": "revised" })
+        } else {
+            json!({ "session": session.name, "period": observed + 1, "log_return": log_return })
+        };
+        let entry = session.pending.get_or_insert(new).clone();
+        let answer = session.send(&self.caller, &entry).await;
         if !self.expects(200, "a report", &answer) {
             return false;
         }
         if let (Some(session), Some((_, answer))) = (self.ledger.sessions.last_mut(), answer) {
             session.pending = None;
-            session.reports.push((report, answer));
+            session.acknowledge(entry, answer);
             self.answered.fetch_add(1, Ordering::Relaxed);
         }
         true
@@ -134,7 +141,7 @@ impl Client {
             return false;
         }
         let name = opened.and_then(|(_, session)| session["session"].as_str().map(str::to_owned)).unwrap_or_default();
-        self.ledger.sessions.push(Session { name, reports: Vec::new(), pending: None });
+        self.ledger.sessions.push(Session::opened(name));
         true
     }
 

@@ -56,7 +56,7 @@ pub async fn strangers(trials: usize) -> Outcome {
     Tenants::attacked(Site::new(), trials, Attack::Intrude).await
 }
 
-/// Every route of sessions by the owner's names, while the table of observations is away now and again.
+/// Every route of sessions by the owner's names, while the table of entries is away now and again.
 async fn intrude(tenants: &Tenants, tally: &mut Tally) -> Result<usize, String> {
     let end = Instant::now() + ATTACK;
     let strangers = (0..4).map(|_| intruder(tenants, end));
@@ -73,11 +73,13 @@ async fn intruder(tenants: &Tenants, end: Instant) -> (usize, Vec<String>) {
     while Instant::now() < end {
         for name in sessions(&tenants.owner).await {
             let report = json!({ "session": name, "period": 1, "log_return": 0.5 });
+            let correction = json!({ "correction": 1, "period": 1, "log_return": 0.5, "reason": "not theirs" });
             let answers = [
                 stranger.get(&format!("/action?session={name}")).await,
                 stranger.get(&format!("/sessions/{name}")).await,
                 stranger.get(&format!("/sessions/{name}/history")).await,
                 stranger.post("/observe", &report).await,
+                stranger.post(&format!("/sessions/{name}/corrections"), &correction).await,
                 stranger.post("/what-if", &json!({ "session": name, "wealth": 1.0 })).await,
                 stranger.delete(&format!("/sessions/{name}")).await,
             ];
@@ -89,16 +91,16 @@ async fn intruder(tenants: &Tenants, end: Instant) -> (usize, Vec<String>) {
     (calls, answered)
 }
 
-/// Takes the table of observations away for a moment, again and again; how often.
+/// Takes the table of entries away for a moment, again and again; how often.
 async fn hide(file: &std::path::Path, end: Instant) -> Result<usize, sqlx::Error> {
     let options = SqliteConnectOptions::new().filename(file).busy_timeout(Duration::from_secs(5));
     let mut times = 0;
     while Instant::now() < end {
         tokio::time::sleep(Duration::from_millis(50)).await;
         let mut connection: SqliteConnection = options.clone().disable_statement_logging().connect().await?;
-        sqlx::query("ALTER TABLE observations RENAME TO hidden").execute(&mut connection).await?;
+        sqlx::query("ALTER TABLE entries RENAME TO hidden").execute(&mut connection).await?;
         tokio::time::sleep(Duration::from_millis(3)).await;
-        sqlx::query("ALTER TABLE hidden RENAME TO observations").execute(&mut connection).await?;
+        sqlx::query("ALTER TABLE hidden RENAME TO entries").execute(&mut connection).await?;
         connection.close().await?;
         times += 1;
     }

@@ -70,7 +70,8 @@ pub async fn cut_without_fsync(trials: usize) -> Outcome {
         tally.audit += match site.start().await {
             Ok(server) => ledger.audit(&Caller::new(&[&server.url])).await,
             Err(_) => {
-                let acknowledged = ledger.sessions.iter().map(|session| session.reports.len() + 1).sum();
+                let acknowledged =
+                    ledger.sessions.iter().map(|session| session.reports.len() + session.corrections.len() + 1).sum();
                 Audit { acknowledged, lost: acknowledged, doubled: 0 }
             }
         };

@@ -69,10 +69,10 @@ impl Pest {
                     self.answers.push((period, answer));
                     open.retain(|&other| other != period);
                 }
-                Some((409, problem)) if problem["type"] == "/problems/period-conflict" => {
+                Some((409, problem)) if problem["type"] == "/problems/report-conflict" => {
                     open.retain(|&other| other != period);
                 }
-                Some((409, problem)) if problem["type"] == "/problems/period-gap" => {}
+                Some((409, problem)) if problem["type"] == "/problems/report-gap" => {}
                 None | Some((503, _)) => {}
                 Some((status, problem)) => return Err(format!("{status} {problem}")),
             }
@@ -111,8 +111,8 @@ fn one_answer_each(pests: &[Pest], rows: &[Value]) -> Audit {
 
 /// What the server has of a session.
 async fn rows(caller: &Caller, name: &str) -> Result<Vec<Value>, String> {
-    let session = Session { name: name.to_owned(), reports: Vec::new(), pending: None };
-    session.rows(caller).await.ok_or(format!("no rows of {name}"))
+    let rows = Session::opened(name.to_owned()).rows(caller).await;
+    rows.map(|(rows, _)| rows).ok_or(format!("no rows of {name}"))
 }
 
 /// The stored returns, reported once each and in order, give the same rows and the same action, bit for bit.
@@ -125,11 +125,11 @@ async fn equals_replay(caller: &Caller, session: &str, stormed: Vec<Value>, pati
             .filter(|(status, _)| *status == 200)
             .ok_or("a replayed report failed")?;
     }
-    let without_time = |mut rows: Vec<Value>| {
-        rows.iter_mut().for_each(|row| row["observed_ms"] = Value::Null);
+    let without_names = |mut rows: Vec<Value>| {
+        rows.iter_mut().for_each(|row| (row["observed_ms"], row["session"]) = (Value::Null, Value::Null));
         rows
     };
-    let (stormed, replayed) = (without_time(stormed), without_time(rows(caller, patient).await?));
+    let (stormed, replayed) = (without_names(stormed), without_names(rows(caller, patient).await?));
     if stormed.len() != PERIODS || stormed != replayed {
         return Err(format!("{} rows differ from their replay", stormed.len()));
     }

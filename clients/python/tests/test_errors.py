@@ -35,11 +35,11 @@ def test_unknown_things_are_not_found(ballast: Ballast) -> None:
 
 
 def test_conflicts_have_their_kinds(ballast: Ballast, session: Session) -> None:
-    with pytest.raises(package.PeriodGap) as gap:
+    with pytest.raises(package.ReportGap) as gap:
         session.observe(log_return=0.01, period=2)
     assert gap.value.rule == "must be 1"
     session.observe(log_return=0.01)
-    with pytest.raises(package.PeriodConflict) as conflict:
+    with pytest.raises(package.ReportConflict) as conflict:
         session.observe(log_return=0.02, period=1)
     assert (conflict.value.field, conflict.value.value) == ("period", 1)
     with pytest.raises(package.InUse):

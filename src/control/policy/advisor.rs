@@ -14,7 +14,7 @@ use crate::control::error::FieldError;
 use crate::control::kept::Kept;
 use crate::control::policy::worst_case::WorstCase;
 use crate::control::problem::actions::Band;
-use crate::control::problem::state::State;
+use crate::control::problem::state::{Realised, State};
 use crate::control::request::specification::{Specification, UtilitySpecification};
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
 use crate::control::uncertainty::radius::Measure;
@@ -338,8 +338,8 @@ impl Advisor {
         }
     }
 
-    /// The state after holding `allocation` through `log_return`, from a state after `step` observed periods.
-    pub fn advance(&self, step: usize, state: &State, allocation: f64, log_return: f64) -> State {
-        state.next_state(self.problem.dynamics(step), allocation, log_return)
+    /// The state after the period that follows `step` observed periods.
+    pub fn advance(&self, step: usize, state: &State, realised: &Realised) -> State {
+        state.next_state(self.problem.dynamics(step), realised)
     }
 }

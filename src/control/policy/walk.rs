@@ -2,7 +2,7 @@
 
 use super::advice::Advice;
 use super::advisor::{AdviceMode, Advisor};
-use crate::control::problem::state::State;
+use crate::control::problem::state::{Realised, State};
 
 /// An investor who follows a policy through given returns.
 pub struct Walk<'a> {
@@ -19,7 +19,7 @@ impl Iterator for Walk<'_> {
     fn next(&mut self) -> Option<Advice> {
         let log_return = *self.returns.get(self.step)?;
         let advice = self.advisor.advise(self.step, &self.state, AdviceMode::Surrogate);
-        self.state = self.advisor.advance(self.step, &self.state, advice.allocation, log_return);
+        self.state = self.advisor.advance(self.step, &self.state, &Realised::of(advice.allocation, log_return));
         self.step += 1;
         Some(advice)
     }

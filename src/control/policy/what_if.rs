@@ -4,7 +4,7 @@ use super::advice::Advice;
 use super::advisor::{AdviceMode, Advisor};
 use crate::control::error::FieldError;
 use crate::control::policy::worst_case::WorstCase;
-use crate::control::problem::state::State;
+use crate::control::problem::state::{Realised, State};
 use crate::control::request::rules;
 
 /// What is supposed; what is not stays as it is. The parts are taken in this order.
@@ -118,7 +118,7 @@ impl Advisor {
             return Err(FieldError::new("log_return", log_return, rule));
         }
         let advised = self.advise(step, &now, AdviceMode::Surrogate).allocation;
-        let then = self.advance(step, &now, advised, log_return);
+        let then = self.advance(step, &now, &Realised::of(advised, log_return));
         let (low, high) = rules::WEALTH;
         if !(low..=high).contains(&then.wealth) {
             let rule = format!("must leave a wealth in [{low}, {high}]");

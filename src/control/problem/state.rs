@@ -5,6 +5,26 @@ use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::rules;
 use crate::numerics::empirical::EmpiricalDistribution;
 
+/// What became of a period.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Realised {
+    /// Share of wealth held in the risky asset through it.
+    pub action: f64,
+    /// z; where it is not known the asset counts as unmoved, and nothing is learned.
+    pub log_return: Option<f64>,
+    /// What the bank paid, where it was not the rate of the problem.
+    pub rate: Option<f64>,
+    /// What was added at its end, where that was not the contribution of the problem.
+    pub flow: Option<f64>,
+}
+
+impl Realised {
+    /// A period as the problem has it.
+    pub fn of(action: f64, log_return: f64) -> Self {
+        Realised { action, log_return: Some(log_return), rate: None, flow: None }
+    }
+}
+
 /// Wealth, the share of it held, and the empirical law of log-returns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
@@ -36,11 +56,16 @@ impl State {
         Ok(State { holding, ..self })
     }
 
-    /// G(y, a, z): next wealth and holding after a period of `dynamics`, and the law with the return learned.
-    pub fn next_state(&self, dynamics: Dynamics, action: f64, log_return: f64) -> State {
-        let (wealth, holding) = dynamics.next(self.wealth, self.holding, action, log_return);
+    /// G(y, a, z): next wealth and holding after a period of `dynamics` that became `realised`, and the law with the return
+    /// learned.
+    pub fn next_state(&self, dynamics: Dynamics, realised: &Realised) -> State {
+        let Realised { action, log_return, rate, flow } = *realised;
+        let rate_per_step = rate.unwrap_or(dynamics.rate_per_step);
+        let contribution = flow.unwrap_or(dynamics.contribution);
+        let dynamics = Dynamics { rate_per_step, contribution, ..dynamics };
+        let (wealth, holding) = dynamics.next(self.wealth, self.holding, action, log_return.unwrap_or(0.0));
         let mut law = self.law.clone();
-        law.push(log_return);
+        log_return.into_iter().for_each(|seen| law.push(seen));
         State { wealth, holding, law }
     }
 }

@@ -40,6 +40,8 @@ const SMALLEST_HIGHEST_ACTION: f64 = 1e-4;
 pub const TRADING_COST: (f64, f64) = (0.0, 0.1);
 /// Below, what a trade keeps is lost in rounding.
 const SMALLEST_TRADING_COST: f64 = 1e-9;
+/// What a bank pays a step.
+pub const RATE: (f64, f64) = (-0.5, 0.5);
 /// Smallest and largest wealth.
 pub const WEALTH: (f64, f64) = (1e-6, 1e15);
 /// Moments of the law among the features.
@@ -76,7 +78,7 @@ fn check(specification: &Specification) -> Result<(), FieldError> {
 
 fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
     whole("problem.horizon", problem.horizon, &HORIZON)?;
-    within("problem.rate_per_step", problem.rate_per_step, -0.5, 0.5)?;
+    within("problem.rate_per_step", problem.rate_per_step, RATE.0, RATE.1)?;
     wealth("problem.initial_wealth", problem.initial_wealth)?;
     let [lowest, highest] = problem.action_interval;
     if lowest != 0.0 {
@@ -107,11 +109,8 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
             return Err(FieldError::new("problem.law", "null", "must be given in the known_law framework"));
         }
         (Some(_), framework) if framework != Framework::KnownLaw => {
-            return Err(FieldError::new(
-                "problem.law",
-                "an object",
-                "must be absent unless the framework is known_law",
-            ));
+            let rule = "must be absent unless the framework is known_law";
+            return Err(FieldError::new("problem.law", "an object", rule));
         }
         (Some(law), _) => sampling_law("problem.law", law)?,
         (None, _) => {}

@@ -9,11 +9,19 @@ const added = ({ contributions }, period) =>
 /** True where nothing is ever added or withdrawn. */
 const none = ({ contributions }) => [contributions].flat().every((amount) => amount === 0);
 
-/** Wealth in the bank alone, at the start and after each period. */
-export function banked(problem, start) {
+/** The report of an observed period as it stands. */
+export const standing = (observation) => observation?.now?.reported ?? observation?.reported ?? {};
+
+/** What was added at the end of a period as it is reported, and what would be of one that is not. */
+const addedIn = (problem, observations, period) => standing(observations[period - 1]).flow ?? added(problem, period);
+
+/** Wealth in the bank alone, at the start and after each period; of those observed as they were reported. */
+export function banked(problem, start, observations) {
   const held = [start];
-  for (let period = 1; period <= problem.horizon; period++)
-    held.push(held[period - 1] * (1 + problem.rate_per_step) + added(problem, period));
+  for (let period = 1; period <= problem.horizon; period++) {
+    const rate = standing(observations[period - 1]).rate ?? problem.rate_per_step;
+    held.push(held[period - 1] * (1 + rate) + addedIn(problem, observations, period));
+  }
   return held;
 }
 
@@ -46,9 +54,6 @@ export function inWords(problem) {
   return endWords(contributions).replace("the period", "each period");
 }
 
-/** What was added and withdrawn in the first `periods`, in all. */
-export function netAdded(problem, periods) {
-  let net = 0;
-  for (let period = 1; period <= periods; period++) net += added(problem, period);
-  return net;
-}
+/** What was added and withdrawn in the periods observed, in all. */
+export const netAdded = (problem, observations) =>
+  observations.reduce((net, _, index) => net + addedIn(problem, observations, index + 1), 0);

@@ -3,8 +3,9 @@
 import { adviceView } from "./advice.js";
 import { get, offers, remove } from "./api.js";
 import { lineChart } from "./chart.js";
+import { correctionForm } from "./correction.js";
 import { announce, disclosure, facts, h, section, table } from "./dom.js";
-import { banked, netAdded } from "./flows.js";
+import { banked, netAdded, standing } from "./flows.js";
 import {
   allocation,
   count,
@@ -80,7 +81,7 @@ async function fill(holder, shown) {
 }
 
 function figures({ session, history, policy }, action) {
-  const put = netAdded(policy.specification.problem, session.period - 1);
+  const put = netAdded(policy.specification.problem, history.observations);
   const change = (session.wealth - put) / history.initial_wealth - 1;
   const apart = put === 0 ? "" : `, ${put > 0 ? "beside" : "after"} ${wealth(Math.abs(put))} ${put > 0 ? "added" : "withdrawn"}`;
   return facts([
@@ -98,8 +99,8 @@ function figures({ session, history, policy }, action) {
 }
 
 /** Wealth of selling everything at the start, and staying in the bank. */
-const allBank = ({ initial_wealth, initial_holding }, { specification: { problem } }) =>
-  banked(problem, initial_wealth * (1 - problem.trading_cost * initial_holding));
+const allBank = ({ initial_wealth, initial_holding, observations }, { specification: { problem } }) =>
+  banked(problem, initial_wealth * (1 - problem.trading_cost * initial_holding), observations);
 
 function completed({ session, history, policy }) {
   const bank = allBank(history, policy).at(-1);
@@ -122,10 +123,11 @@ function course({ session, history, policy }, action) {
   const { horizon } = session;
   const periods = Array.from({ length: horizon + 1 }, (_, k) => k);
   const after = (period, read) => (observations[period - 1] ? read(observations[period - 1]) : null);
+  const stands = (period, name) => after(period, (row) => (row.now ?? row)[name]);
   const x = { values: periods, domain: [0, horizon], label: "After period", format: String, whole: true };
-  const lived = periods.map((k) => (k === 0 ? initial_wealth : after(k, (row) => row.wealth)));
+  const lived = periods.map((k) => (k === 0 ? initial_wealth : stands(k, "wealth")));
   const bank = allBank(history, policy);
-  const held = periods.map((k) => after(k, (row) => row.executed_allocation));
+  const held = periods.map((k) => stands(k, "executed_allocation"));
   const told = (now, then) =>
     periods.map((k) => (action && k === action.period ? now(action) : after(k, then)));
   const advised = told(
@@ -141,7 +143,7 @@ function course({ session, history, policy }, action) {
     ),
   }));
   const radii = periods.map((k) =>
-    k === session.period - 1 && action ? action.radius : after(k, (row) => row.radius),
+    k === session.period - 1 && action ? action.radius : stands(k, "radius"),
   );
   const gutter = 64;
   return section(
@@ -213,26 +215,43 @@ function worstWords({ worst_case: { transport, sentence }, radius, sample_size }
   return `Against this advice, the worst law ${among} moves ${percent(share)} of the probability, down to a return of ${percent(Math.expm1(lowest))} in one period.`;
 }
 
-function observed({ history }) {
+function observed(shown) {
+  const { history } = shown;
   if (history.observations.length === 0) return "";
   const rows = [...history.observations].reverse();
+  const dated = rows.some((row) => standing(row).date);
+  /** What stands, and beside it what was told where that was something else. */
+  const now = (name, words) => (row) => {
+    const [stands, told] = [(row.now ?? row)[name], row[name]].map((value) => (value === null ? "missing" : words(value)));
+    return stands === told ? stands : h("span", {}, stands, " ", h("s", { class: "note", title: "As it was told then" }, told));
+  };
   return section(
     "Observed",
     table(
       "Observed periods, newest first",
       [
         { name: "Period", cell: ({ period }) => count(period) },
-        { name: "Return", numeric: true, cell: ({ log_return }) => percent(Math.expm1(log_return), 2) },
-        { name: "Log-return", numeric: true, cell: ({ log_return }) => significant(log_return, 4) },
-        { name: "Advised", numeric: true, cell: ({ advised_allocation }) => allocation(advised_allocation) },
-        { name: "Held", numeric: true, cell: ({ executed_allocation }) => allocation(executed_allocation) },
-        { name: "Wealth", numeric: true, cell: (row) => wealth(row.wealth) },
-        { name: "Radius", numeric: true, cell: ({ radius }) => significant(radius, 3) },
+        ...(dated ? [{ name: "Last day", cell: (row) => standing(row).date ?? "" }] : []),
+        { name: "Return", numeric: true, cell: now("log_return", (value) => percent(Math.expm1(value), 2)) },
+        { name: "Log-return", numeric: true, cell: now("log_return", (value) => significant(value, 4)) },
+        { name: "Advised", numeric: true, cell: now("advised_allocation", allocation) },
+        { name: "Held", numeric: true, cell: now("executed_allocation", allocation) },
+        { name: "Wealth", numeric: true, cell: now("wealth", wealth) },
+        { name: "Radius", numeric: true, cell: now("radius", (value) => significant(value, 3)) },
         { name: "Reported", numeric: true, cell: ({ observed_ms }) => moment(observed_ms) },
       ],
       rows,
     ),
+    corrections(history),
+    disclosure("Put a period right", () => correctionForm(shown)),
   );
+}
+
+/** What was put right, newest first. */
+function corrections({ corrections }) {
+  if (corrections.length === 0) return "";
+  const words = ({ period, reason, corrected_ms }) => `Period ${period} was put right on ${moment(corrected_ms)}: ${reason}`;
+  return h("ul", { class: "corrections" }, [...corrections].reverse().map((made) => h("li", {}, words(made))));
 }
 
 function deletion(id) {

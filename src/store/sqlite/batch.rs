@@ -7,13 +7,13 @@ use futures_util::FutureExt;
 use sqlx::SqliteConnection;
 
 use super::operation::{Answer, Operation, Reply, Undo};
+use crate::store::entries::{self, APPENDING, Append, EntryRow, append};
 use crate::store::error::StoreError;
-use crate::store::observations::{self, APPENDING, Append, ObservationRow, append};
 use crate::store::query::Connection;
 
 /// An observation to append, and where its answer goes.
 pub(super) struct Appending {
-    pub new: ObservationRow,
+    pub new: EntryRow,
     pub reply: Reply<Append>,
 }
 
@@ -59,10 +59,10 @@ pub(super) async fn append_all(
     answers: &mut Vec<Answer>,
 ) -> Result<(), StoreError> {
     let batch = std::mem::take(&mut waiting.appends);
-    let rows: Vec<&ObservationRow> = batch.iter().map(|appending| &appending.new).collect();
+    let rows: Vec<&EntryRow> = batch.iter().map(|appending| &appending.new).collect();
     let end = match rows.as_slice() {
         [] => Ok(()),
-        rows => observations::append_all(&mut Connection::Sqlite(connection), rows).await,
+        rows => entries::append_all(&mut Connection::Sqlite(connection), rows).await,
     };
     match end.map_err(|failure| failure.during(APPENDING)) {
         Err(error) if !error.ends_group() => {

@@ -16,8 +16,8 @@ use futures_util::FutureExt;
 use futures_util::future::BoxFuture;
 use tokio::sync::{mpsc, oneshot, watch};
 
+use super::entries::{APPENDING, Append, EntryRow};
 use super::error::{Failure, StoreError};
-use super::observations::{APPENDING, Append, ObservationRow};
 use super::query::{Connection, Purpose, Query, Row, query};
 use batch::Appending;
 use changes::Changes;
@@ -104,7 +104,7 @@ impl Folder {
     }
 
     /// Appends in the writer, many observations to a statement, and answers after the commit.
-    pub(super) async fn append(&self, new: ObservationRow) -> Result<Append, StoreError> {
+    pub(super) async fn append(&self, new: EntryRow) -> Result<Append, StoreError> {
         let (reply, answer) = Reply::new(Some(self.changes.of(&new.session)));
         self.request(APPENDING, Request::Append(Appending { new, reply }), answer).await
     }

@@ -13,8 +13,8 @@ use tokio::sync::{mpsc, oneshot, watch};
 
 use super::batch::{self, Appending, Waiting};
 use super::operation::{Answer, Operation, Undo};
+use crate::store::entries::ROWS_AT_ONCE;
 use crate::store::error::{Failure, StoreError};
-use crate::store::observations::ROWS_AT_ONCE;
 
 /// Operations in one transaction: the observations that one statement takes. A row then costs a hundredth of what it costs
 /// alone; more only adds waiting.

@@ -30,8 +30,8 @@ from .errors import (
     Misdirected,
     NotFound,
     Overloaded,
-    PeriodConflict,
-    PeriodGap,
+    ReportConflict,
+    ReportGap,
     ProblemError,
     QueueFull,
     QuotaExceeded,
@@ -40,6 +40,7 @@ from .errors import (
     TooManyRequests,
     Unauthenticated,
     Unreachable,
+    UnusualReturn,
 )
 from .policy import Policy
 from .session import Session
@@ -63,8 +64,8 @@ __all__ = [
     "Misdirected",
     "NotFound",
     "Overloaded",
-    "PeriodConflict",
-    "PeriodGap",
+    "ReportConflict",
+    "ReportGap",
     "Policy",
     "ProblemError",
     "ProgressPrinter",
@@ -77,5 +78,6 @@ __all__ = [
     "Training",
     "Unauthenticated",
     "Unreachable",
+    "UnusualReturn",
     "wire",
 ]

@@ -96,12 +96,16 @@ class IdempotencyConflict(ProblemError, slug="idempotency-conflict"):
     """The idempotency key was used with another body."""
 
 
-class PeriodConflict(ProblemError, slug="period-conflict"):
-    """The period was observed with other content."""
+class ReportConflict(ProblemError, slug="report-conflict"):
+    """The period, or the correction, was reported with other content."""
 
 
-class PeriodGap(ProblemError, slug="period-gap"):
-    """The period is not the one expected; ``rule`` names that one."""
+class ReportGap(ProblemError, slug="report-gap"):
+    """The period, or the correction, is not the one expected; ``rule`` names that one."""
+
+
+class UnusualReturn(ProblemError, slug="unusual-return"):
+    """The return is far from the record; send it with ``confirm=True`` where it is meant."""
 
 
 class SessionCompleted(ProblemError, slug="session-completed"):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Literal, cast
 from urllib.parse import quote
 
+from typing_extensions import Unpack
+
 from . import wire
 from .transport import Transport
 
@@ -29,6 +31,8 @@ class Session:
         self.wealth = session["wealth"]
         #: Share of it in the risky asset, before trading.
         self.holding = session["holding"]
+        #: Corrections made of what periods reported.
+        self.corrections = session["corrections"]
         #: The answer to the last ``observe``: wealth, sample size, moments, quantile, radius.
         self.observed: wire.Observed | None = None
 
@@ -50,40 +54,53 @@ class Session:
         params = {"session": self.id, "mode": mode, "explain": explain}
         return cast(wire.Action, self._transport.json("GET", "/action", params=params))
 
-    def observe(
-        self,
-        *,
-        log_return: float | None = None,
-        simple_return: float | None = None,
-        price: float | None = None,
-        previous_price: float | None = None,
-        executed_allocation: float | None = None,
-        wealth: float | None = None,
-        period: int | None = None,
-    ) -> Session:
-        """Reports the return of the coming period, in exactly one of three ways; the answer is in ``observed``.
+    def observe(self, *, period: int | None = None, confirm: bool = False, **report: Unpack[wire.Report]) -> Session:
+        """Reports the coming period: its return in exactly one of three ways, or ``missing=True``; the answer is in
+        ``observed``.
 
-        ``executed_allocation`` is what was really held, by default what was advised; ``wealth`` is what was really
-        reached, where fees or flows made a difference. ``period`` is the coming one unless given: an earlier one with
-        the content first reported for it gets its first answer again. Raises :class:`PeriodConflict`,
-        :class:`PeriodGap` and :class:`SessionCompleted`.
+        :class:`wire.Report <ballast.wire.Report>` names all that can be said: ``executed_allocation`` is what was
+        really held, by default what was advised; ``rate`` what the bank paid, ``flow`` what was added, by default the
+        policy's; ``wealth`` what was really reached; ``date`` the last day. ``period`` is the coming one unless given:
+        an earlier one with the content first reported for it gets its first answer again. Raises
+        :class:`UnusualReturn` for a return far from the record, unless ``confirm`` says that it is meant, and
+        :class:`ReportConflict`, :class:`ReportGap` and :class:`SessionCompleted`.
         """
-        report: wire.Observe = {
-            "session": self.id,
-            "period": self.period if period is None else period,
-            "log_return": log_return,
-            "simple_return": simple_return,
-            "price": price,
-            "previous_price": previous_price,
-            "executed_allocation": executed_allocation,
-            "wealth": wealth,
-        }
-        observed: wire.Observed = self._transport.json("POST", "/observe", body=report)
+        number = self.period if period is None else period
+        body: wire.Observe = {"session": self.id, "period": number, "confirm": confirm, **report}
+        observed: wire.Observed = self._transport.json("POST", "/observe", body=body)
         self.observed = observed
         if observed["period"] >= self.period:
             self.period, self.wealth = observed["period"] + 1, observed["wealth"]
             self.holding = observed["holding"]
         return self
+
+    def correct(
+        self,
+        period: int,
+        reason: str,
+        *,
+        correction: int | None = None,
+        confirm: bool = False,
+        **report: Unpack[wire.Report],
+    ) -> wire.Corrected:
+        """Puts right what a period that passed reported: all of it, in the place of what was reported before.
+
+        What was reported and told stays on record; every advice from now on rests on the correction. Exactly once as
+        :meth:`observe` is: ``correction`` is the number after the last one made unless given, and one whose answer was
+        lost is sent again under the same number.
+        """
+        number = self.corrections + 1 if correction is None else correction
+        body: wire.Correct = {
+            "correction": number,
+            "period": period,
+            "reason": reason,
+            "confirm": confirm,
+            **report,
+        }
+        corrected: wire.Corrected = self._transport.json("POST", f"{self._path}/corrections", body=body)
+        if number > self.corrections:
+            self.corrections, self.wealth, self.holding = number, corrected["wealth"], corrected["holding"]
+        return corrected
 
     def what_if(
         self,
@@ -114,18 +131,19 @@ class Session:
         }
         return cast(wire.WhatIfAnswer, self._transport.json("POST", "/what-if", body=supposed))
 
-    def history(self) -> wire.SessionHistory:
-        """Where the session started and everything it observed."""
-        return cast(wire.SessionHistory, self._transport.json("GET", f"{self._path}/history"))
+    def history(self) -> wire.History:
+        """Where the session started, what was reported and told, and what would be told now."""
+        return cast(wire.History, self._transport.json("GET", f"{self._path}/history"))
 
     def refresh(self) -> Session:
-        """Reads the period, the wealth and the holding from the service."""
+        """Reads the period, the wealth, the holding and the number of corrections from the service."""
         session: wire.Session = self._transport.json("GET", self._path)
+        self.corrections = session["corrections"]
         self.period, self.wealth, self.holding = session["period"], session["wealth"], session["holding"]
         return self
 
     def delete(self) -> None:
-        """Deletes the session and its observations. Raises :class:`NotFound` where there is none."""
+        """Deletes the session and all that is recorded of it. Raises :class:`NotFound` where there is none."""
         self._transport.call("DELETE", self._path)
 
     def __repr__(self) -> str:

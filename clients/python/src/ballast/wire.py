@@ -42,6 +42,42 @@ Contributions: TypeAlias = float | list[float]
 """C, money added at the end of each period."""
 
 
+class Correct(TypedDict):
+    """What a period that passed reported, put right: all of it, in the place of what was reported before."""
+
+    correction: int
+    """Number of the correction, from 1."""
+    period: int
+    """The period that is put right."""
+    reason: str
+    """Why, in at most 200 letters."""
+    log_return: NotRequired[float | None]
+    simple_return: NotRequired[float | None]
+    """`price / previous price - 1`."""
+    price: NotRequired[float | None]
+    """Price at the end of the period."""
+    previous_price: NotRequired[float | None]
+    """Price at the start of the period. Default: the price reported for the period before."""
+    missing: NotRequired[bool]
+    """In the place of a return where none is known: the law stays as it is, and the asset counts as unmoved."""
+    date: NotRequired[str | None]
+    """The last day of the period, later than that of the period before."""
+    rate: NotRequired[float | None]
+    """What the bank paid in the period. Default: the policy's rate."""
+    flow: NotRequired[float | None]
+    """Money added at the end of the period, negative where it was taken. Default: the policy's contribution."""
+    executed_allocation: NotRequired[float | None]
+    """Share of wealth held in the risky asset through the period. Default: the allocation advised for it."""
+    wealth: NotRequired[float | None]
+    """Wealth reached, with what was added, where it differs from what all of the above gives."""
+
+
+class Correction(Correct):
+    """One correction, as it was made."""
+
+    corrected_ms: int
+
+
 class Costs(TypedDict):
     """What the evaluation cost; the only part that differs between two runs."""
 
@@ -176,26 +212,8 @@ class MixtureComponent(TypedDict):
     """In squared log-return."""
 
 
-class Observation(TypedDict):
-    """One observed period."""
-
-    period: int
-    log_return: float
-    band: list[float]
-    """The holdings that were best kept at the start of the period."""
-    advised_allocation: float
-    executed_allocation: float
-    wealth: float
-    """Wealth at the end of the period."""
-    holding: float
-    """Share of it in the risky asset, as the return left it."""
-    radius: float
-    """Radius of the uncertainty set after the period, in the unit of an advice's."""
-    observed_ms: int
-
-
 class Observe(TypedDict):
-    """The return of one period, given in exactly one of three ways, and what was done in it."""
+    """The return of one period, given in exactly one of three ways or as missing, and what was done in it."""
 
     session: str
     period: int
@@ -207,13 +225,18 @@ class Observe(TypedDict):
     """Price at the end of the period."""
     previous_price: NotRequired[float | None]
     """Price at the start of the period. Default: the price reported for the period before."""
+    missing: NotRequired[bool]
+    """In the place of a return where none is known: the law stays as it is, and the asset counts as unmoved."""
+    date: NotRequired[str | None]
+    """The last day of the period, later than that of the period before."""
+    rate: NotRequired[float | None]
+    """What the bank paid in the period. Default: the policy's rate."""
+    flow: NotRequired[float | None]
+    """Money added at the end of the period, negative where it was taken. Default: the policy's contribution."""
     executed_allocation: NotRequired[float | None]
     """Share of wealth held in the risky asset through the period. Default: the allocation advised for it."""
     wealth: NotRequired[float | None]
-    """
-    Wealth reached, with what was added, where it differs from what the return, the allocation and the policy's
-    contributions give.
-    """
+    """Wealth reached, with what was added, where it differs from what all of the above gives."""
 
 
 HistoryItem: TypeAlias = float
@@ -346,6 +369,30 @@ class RadiusSpread(TypedDict):
     """On the first path."""
 
 
+class Report(TypedDict):
+    """What is recorded of a period: its return, given in exactly one of three ways or as missing, and what was done in it."""
+
+    log_return: NotRequired[float | None]
+    simple_return: NotRequired[float | None]
+    """`price / previous price - 1`."""
+    price: NotRequired[float | None]
+    """Price at the end of the period."""
+    previous_price: NotRequired[float | None]
+    """Price at the start of the period. Default: the price reported for the period before."""
+    missing: NotRequired[bool]
+    """In the place of a return where none is known: the law stays as it is, and the asset counts as unmoved."""
+    date: NotRequired[str | None]
+    """The last day of the period, later than that of the period before."""
+    rate: NotRequired[float | None]
+    """What the bank paid in the period. Default: the policy's rate."""
+    flow: NotRequired[float | None]
+    """Money added at the end of the period, negative where it was taken. Default: the policy's contribution."""
+    executed_allocation: NotRequired[float | None]
+    """Share of wealth held in the risky asset through the period. Default: the allocation advised for it."""
+    wealth: NotRequired[float | None]
+    """Wealth reached, with what was added, where it differs from what all of the above gives."""
+
+
 class SamplingLaw1(TypedDict):
     """A mixture of normal laws."""
 
@@ -374,19 +421,6 @@ class SamplingLaw3(TypedDict):
 
 SamplingLaw: TypeAlias = SamplingLaw1 | SamplingLaw2 | SamplingLaw3
 """A law of log-returns that can be drawn from."""
-
-
-class SessionHistory(TypedDict):
-    """Where a session started and everything it observed."""
-
-    session: str
-    policy: str
-    initial_wealth: float
-    initial_holding: float
-    """Share of it in the risky asset."""
-    history: list[float]
-    """Log-returns known at the start."""
-    observations: list[Observation]
 
 
 SessionState: TypeAlias = Literal["active", "completed"]
@@ -575,6 +609,23 @@ class Advice(TypedDict):
     """How it was found."""
 
 
+class Corrected(Uncertainty):
+    """The session after a correction."""
+
+    session: str
+    correction: int
+    period: int
+    """The period put right."""
+    log_return: NotRequired[float | None]
+    """What it is now; null where it is missing."""
+    observed: int
+    """Periods observed, which is as before."""
+    wealth: float
+    """Wealth now."""
+    holding: float
+    """Share of it in the risky asset."""
+
+
 class CoverageAtSize(TypedDict):
     """How often the ball held the true law at one sample size."""
 
@@ -618,20 +669,37 @@ class JobProgress(TypedDict):
     seconds_left: NotRequired[float | None]
 
 
+class Now(TypedDict):
+    """A period with all corrections made."""
+
+    reported: NotRequired[Report | None]
+    log_return: NotRequired[float | None]
+    """Null where it is missing."""
+    advised_allocation: float
+    """What would have been advised for it."""
+    executed_allocation: float
+    wealth: float
+    """Wealth at its end."""
+    holding: float
+    """Share of it in the risky asset."""
+    radius: float
+    """Radius of the uncertainty set after it, in the unit of an advice's."""
+
+
 class Observed(Uncertainty):
     """The session after an observation."""
 
     session: str
     period: int
-    log_return: float
+    log_return: NotRequired[float | None]
+    """Null where it is missing."""
     band: list[float]
     """
     The holdings that were best kept at the start of the period; where trading costs nothing both ends are the advised
     allocation.
     """
+    advised_allocation: float
     executed_allocation: float
-    price: NotRequired[float | None]
-    """The price reported, if one was."""
     wealth: float
     """Wealth at the end of the period, with what was added to it."""
     holding: float
@@ -689,10 +757,14 @@ class Session(TypedDict):
     """The coming period, from 1; `horizon + 1` once completed."""
     horizon: int
     state: SessionState
+    date: NotRequired[str | None]
+    """The last day of the last period that was reported with one."""
     wealth: float
     holding: float
     """Share of wealth in the risky asset, before trading."""
     sample_size: int
+    corrections: int
+    """Corrections of what periods reported; the next one is this and one more."""
     created_ms: int
 
 
@@ -893,6 +965,15 @@ class JobPage(TypedDict):
     """Give it as `after` for the next page; null on the last."""
 
 
+class Observation(Observed):
+    """One observed period."""
+
+    reported: Report
+    """What was reported first."""
+    observed_ms: int
+    now: NotRequired[Now | None]
+
+
 class Specification(TypedDict):
     """A whole training job: the problem, the design that samples its states, the surrogates, one seed."""
 
@@ -966,6 +1047,20 @@ class EvaluationReport(TypedDict):
     """In the order they were drawn."""
     costs: Costs
     """What it took."""
+
+
+class History(TypedDict):
+    """Where a session started, and everything recorded of it."""
+
+    session: str
+    policy: str
+    initial_wealth: float
+    initial_holding: float
+    """Share of it in the risky asset."""
+    history: list[float]
+    """Log-returns known at the start."""
+    observations: list[Observation]
+    corrections: list[Correction]
 
 
 class PolicyDetail(TypedDict):

@@ -91,6 +91,8 @@ CREATE TABLE sessions (
     -- Doubles, little-endian, eight bytes each.
     initial_history BLOB NOT NULL,
     horizon         INTEGER NOT NULL,
+    -- Entries that its tenant's total counts it with; it grows, so no seal covers it.
+    room            INTEGER NOT NULL,
     created_ms      INTEGER NOT NULL,
     seal            BLOB NOT NULL
 ) STRICT;
@@ -112,20 +114,20 @@ CREATE TABLE idempotency_keys (
 CREATE INDEX idempotency_keys_by_job ON idempotency_keys (job);
 CREATE INDEX idempotency_keys_by_session ON idempotency_keys (session);
 
-CREATE TABLE observations (
-    session             TEXT NOT NULL REFERENCES sessions (session) ON DELETE CASCADE,
-    period              INTEGER NOT NULL,
-    content_hash        TEXT NOT NULL,
-    log_return          ANY NOT NULL,
-    executed_allocation ANY NOT NULL,
-    advised_allocation  ANY NOT NULL,
-    wealth_after        ANY NOT NULL,
-    answer_json         TEXT NOT NULL,
-    created_ms          INTEGER NOT NULL,
+-- What happened in a session, in the order it was recorded.
+CREATE TABLE entries (
+    session      TEXT NOT NULL REFERENCES sessions (session) ON DELETE CASCADE,
+    entry        INTEGER NOT NULL,
+    kind         TEXT NOT NULL CHECK (kind IN ('observation', 'correction')),
+    -- From 1 among those of its kind: the period, or which correction it is.
+    number       INTEGER NOT NULL,
+    content_json TEXT NOT NULL,
+    answer_json  TEXT NOT NULL,
+    created_ms   INTEGER NOT NULL,
     -- Of who reported it.
-    access_key          TEXT NOT NULL,
-    seal                BLOB NOT NULL,
-    PRIMARY KEY (session, period)
+    access_key   TEXT NOT NULL,
+    seal         BLOB NOT NULL,
+    PRIMARY KEY (session, entry)
 ) STRICT;
 
 -- Of a key the SHA-256 alone is kept. A revoked one stays: a store that ever had a key never again answers without one.

@@ -1,0 +1,96 @@
+// What is said of a period, in its report and in a correction of it: the return, and on demand how else it went.
+
+import { h } from "./dom.js";
+import { input, select, showProblem } from "./form.js";
+import { allocation, percent } from "./format.js";
+import { fraction, typed } from "./number_text.js";
+
+const KINDS = { simple_return: "Simple return", log_return: "Log-return", missing: "None is known" };
+
+/** The fields for a period, with the policy's rate and contribution as what they are where nothing is said. */
+export function reportFields({ label, rate, contribution, changed }) {
+  const edited = () => changed?.();
+  const given = input({
+    name: "return",
+    label,
+    note: "Of the risky asset: \u22122.5 is a loss of 2.5 %",
+    unit: "percent",
+    changed: edited,
+  });
+  const kind = select({
+    name: "kind",
+    label: "Given as",
+    choices: KINDS,
+    changed: () => {
+      given.control.disabled = kind.control.value === "missing";
+      edited();
+    },
+  });
+  const share = (name, label, note) => input({ name, label, note, unit: "percent", changed: edited });
+  const held = share("executed_allocation", "Share held, %", " ");
+  const paid = share("rate", "The bank paid, %", `Blank: ${percent(rate, 3)}, the policy\u2019s.`);
+  const flow = input({
+    name: "flow",
+    label: "Money added at the end",
+    note: `Blank: ${contribution}, the policy\u2019s. \u2212100 is 100 taken.`,
+    changed: edited,
+  });
+  const reached = input({ name: "wealth", label: "Wealth reached", note: "Blank: what all the rest gives." });
+  const date = input({ name: "date", label: "Last day", note: "Such as 2008-09-30.", inputmode: "text" });
+  const more = h(
+    "details",
+    {},
+    h("summary", {}, "It went differently"),
+    h("div", { class: "fields" }, [date, held, paid, flow, reached].map((field) => field.element)),
+  );
+  const isMissing = () => kind.control.value === "missing";
+  return {
+    element: h("div", {}, h("div", { class: "fields" }, given.element, kind.element), more),
+    edges: [kind.control],
+    /** The growth of the asset, what is held, what the bank pays and what is added; null where something cannot be read. */
+    read(advised) {
+      const blank = (field, otherwise, read) => (field.control.value.trim() === "" ? otherwise : read(field.control.value));
+      const value = isMissing() ? 0 : fraction(given.control.value);
+      const executed = blank(held, advised, fraction);
+      const [rateThen, added] = [blank(paid, rate, fraction), blank(flow, contribution, typed)];
+      if ([value, executed, rateThen, added].some((number) => typeof number !== "number")) return null;
+      const growth = kind.control.value === "log_return" ? Math.exp(value) : 1 + value;
+      return { growth, executed, rate: rateThen, added };
+    },
+    /** The report; fields that cannot be read go as they are typed, for the service to refuse by name. */
+    report() {
+      const report = isMissing() ? { missing: true } : { [kind.control.value]: fraction(given.control.value) };
+      const texts = [
+        [held, fraction],
+        [paid, fraction],
+        [flow, typed],
+        [reached, typed],
+        [date, (text) => text],
+      ];
+      for (const [{ name, control }, read] of texts)
+        if (control.value.trim() !== "") report[name] = read(control.value.trim()) ?? control.value;
+      return report;
+    },
+    /** What keeps it from being sent, if anything does. */
+    trouble() {
+      if (isMissing() || fraction(given.control.value) !== null) return null;
+      const text = given.control.value.trim();
+      const words = text === "" ? "The return is blank." : `\u201c${text}\u201d is not a number of percent.`;
+      return { message: words, field: "return" };
+    },
+    advised(allocated) {
+      held.element.querySelector(".note").textContent = allocated === null ? "Blank: as it was." : `Blank: the ${allocation(allocated)} advised.`;
+    },
+  };
+}
+
+/**
+ * Shows why a report was refused. True where it is an unusual return and the user says that it is meant: it is to be sent
+ * again with `confirm`.
+ */
+export function refusedReport(form, message, error) {
+  if (error.type === "/problems/unusual-return") return window.confirm(`${error.message}\n\nIs it meant?`);
+  const field = ["log_return", "simple_return"].includes(error.field) ? "return" : error.field;
+  showProblem(form, message, { ...error, message: error.message, field });
+  return false;
+}

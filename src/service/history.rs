@@ -1,0 +1,125 @@
+//! What a session was told, and what it would be told now.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::allowance::HeavyTurn;
+use super::error::ServiceError;
+use super::live;
+use super::periods::{Observed, Passed, Periods, read};
+use super::report::{Correct, Report};
+use super::sessions::Sessions;
+use crate::control::policy::advisor::{AdviceMode, Advisor};
+use crate::control::problem::state::State;
+use crate::store::{EntryKind, SessionRow, Tenant};
+
+/// Where a session started, and everything recorded of it.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct History {
+    pub session: String,
+    pub policy: String,
+    pub initial_wealth: f64,
+    /// Share of it in the risky asset.
+    pub initial_holding: f64,
+    /// Log-returns known at the start.
+    pub history: Vec<f64>,
+    pub observations: Vec<Observation>,
+    pub corrections: Vec<Correction>,
+}
+
+/// One observed period.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Observation {
+    /// What was answered when it was reported.
+    #[serde(flatten)]
+    pub told: Observed,
+    /// What was reported first.
+    pub reported: Report,
+    pub observed_ms: i64,
+    /// What would be told now; from the first period on that was put right.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub now: Option<Now>,
+}
+
+/// A period with all corrections made.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Now {
+    /// What is reported of it now, where it was put right.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reported: Option<Report>,
+    /// Null where it is missing.
+    pub log_return: Option<f64>,
+    /// What would have been advised for it.
+    pub advised_allocation: f64,
+    pub executed_allocation: f64,
+    /// Wealth at its end.
+    pub wealth: f64,
+    /// Share of it in the risky asset.
+    pub holding: f64,
+    /// Radius of the uncertainty set after it, in the unit of an advice's.
+    pub radius: f64,
+}
+
+/// One correction, as it was made.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Correction {
+    #[serde(flatten)]
+    pub correction: Correct,
+    pub corrected_ms: i64,
+}
+
+impl Sessions {
+    /// The session's start and every entry. Where a period was put right, those from it on are passed through and advised
+    /// again, which takes a turn of those that solve.
+    ///
+    /// # Errors
+    /// There is no such session; too much is solved already.
+    pub async fn history(&self, tenant: &Tenant, session: &str, turn: &HeavyTurn) -> Result<History, ServiceError> {
+        let facts = self.facts(tenant, session).await?;
+        let (mut observations, mut corrections) = (Vec::new(), Vec::new());
+        for entry in &facts.entries {
+            match entry.kind {
+                EntryKind::Observation => observations.push(Observation {
+                    told: read(&entry.answer_json)?,
+                    reported: read(&entry.content_json)?,
+                    observed_ms: entry.created_ms,
+                    now: None,
+                }),
+                EntryKind::Correction => corrections
+                    .push(Correction { correction: read(&entry.content_json)?, corrected_ms: entry.created_ms }),
+            }
+        }
+        if !corrections.is_empty() {
+            turn.begin()?;
+            let periods = Periods::of(&facts.entries)?;
+            let advisor = self.policies.advisor(tenant, &facts.row.policy).await?;
+            let start = live::started(&facts.row, &advisor)?;
+            let now = self.resolving.run(tenant, move || told_now(&periods, &advisor, start)).await??;
+            for (observation, now) in observations.iter_mut().zip(now) {
+                observation.now = now;
+            }
+        }
+        let SessionRow { session, policy, initial_wealth, initial_holding, initial_history: history, .. } = facts.row;
+        Ok(History { session, policy, initial_wealth, initial_holding, history, observations, corrections })
+    }
+}
+
+/// Of each period, from the first on that was put right.
+fn told_now(periods: &Periods, advisor: &Advisor, start: State) -> Result<Vec<Option<Now>>, ServiceError> {
+    let first = periods.all.iter().position(|period| period.is_corrected).unwrap_or(periods.all.len());
+    let mut told = Vec::with_capacity(periods.all.len());
+    let passed = periods.pass(advisor, start, |period, before, passed| {
+        let Passed { log_return, executed_allocation, standing } = passed;
+        told.push((period > first).then(|| Now {
+            reported: periods.all.get(period - 1).filter(|period| period.is_corrected).map(|period| period.report),
+            log_return: *log_return,
+            advised_allocation: advisor.advise(period - 1, &before.state, AdviceMode::Surrogate).allocation,
+            executed_allocation: *executed_allocation,
+            wealth: standing.state.wealth,
+            holding: standing.state.holding,
+            radius: advisor.radius(&standing.state),
+        }));
+    });
+    passed.map_err(|(period, error)| ServiceError::internal(format!("period {period}: {error}")))?;
+    Ok(told)
+}

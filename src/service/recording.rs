@@ -1,0 +1,198 @@
+//! What is recorded of a session: periods as they pass, and corrections of those that passed.
+//!
+//! An entry is decided on all entries before it, and appended as the one after them. Where another process wrote meanwhile it
+//! is not, and is decided anew on what is there now: observations and corrections of all processes have one order.
+
+use serde::Serialize;
+use tracing::Instrument;
+
+use super::allowance::HeavyTurn;
+use super::error::ServiceError;
+use super::keys::Caller;
+use super::live::{self, Live, Means};
+use super::periods::{self, Corrected, Periods};
+use super::report::{Correct, Observe};
+use super::sessions::{Name, Sessions};
+use super::slots::Held;
+use super::spans;
+use crate::control::error::FieldError;
+use crate::store::{Append, EntryKind, EntryRow, Store, Tenant};
+
+/// Corrections of a session: a replay passes through all of them.
+pub const MOST_CORRECTIONS: usize = 1_000;
+
+impl Sessions {
+    /// Records the return of a period, durably before it is answered, exactly once, and answers with an
+    /// [`Observed`](super::periods::Observed) in JSON as it was recorded. Where the caller goes away meanwhile
+    /// the store may or may not record it, and nothing of it stays in memory.
+    ///
+    /// # Errors
+    /// A field breaks a rule; the period was observed with other content, is not the next, or lies past the horizon.
+    pub async fn observe(&self, tenant: &Tenant, observe: &Observe, turn: &HeavyTurn) -> Result<String, ServiceError> {
+        let (session, period) = (&observe.session, numbered("period", observe.period)?);
+        let report = observe.report();
+        let content = json(&report)?;
+        let mut held = self.hold(tenant, session).await;
+        loop {
+            let live = held.current(&self.rows(tenant, session)).await?;
+            if period <= live.observed {
+                return self.repeat(session, EntryKind::Observation, period, &content).await;
+            }
+            live.expects(period)?;
+            let means = self.means(tenant, live, turn).await?;
+            let (standing, answer) = live.after(observe, &report, &means).await?;
+            let new = EntryRow {
+                session: session.clone(),
+                entry: live.seen.entries() + 1,
+                kind: EntryKind::Observation,
+                number: period,
+                content_json: content.clone(),
+                answer_json: json(&answer)?,
+                created_ms: self.clock.now_milliseconds(),
+                key: observe.reported_by.to_string(),
+            };
+            let next = Live {
+                row: live.row.clone(),
+                standing,
+                observed: period,
+                corrections: live.corrections,
+                seen: live.seen.followed_by(&new),
+                radius: Some(answer.uncertainty.radius),
+                advice: None,
+            };
+            if let Some(answer_json) = record(&self.store, &mut held, new, next).await? {
+                return Ok(answer_json);
+            }
+        }
+    }
+
+    /// Records another report of a period that passed, as durably and as often as [`Self::observe`] does, and answers with
+    /// a [`Corrected`] in JSON. Every advice from then on rests on the corrected returns.
+    ///
+    /// # Errors
+    /// A field breaks a rule, or makes a later period break one; the correction was made with other content, or is not the
+    /// next.
+    pub async fn correct(
+        &self,
+        caller: &Caller,
+        session: &str,
+        correct: &Correct,
+        turn: &HeavyTurn,
+    ) -> Result<String, ServiceError> {
+        let number = numbered("correction", correct.correction)?;
+        correct.check_reason()?;
+        let (tenant, content) = (&caller.tenant, json(correct)?);
+        let mut held = self.hold(tenant, session).await;
+        loop {
+            let facts = self.facts(tenant, session).await?;
+            let mut periods = Periods::of(&facts.entries)?;
+            if number <= periods.corrections {
+                return self.repeat(session, EntryKind::Correction, number, &content).await;
+            }
+            let expected = periods.corrections + 1;
+            if number > expected {
+                return Err(ServiceError::Gap { what: "correction", given: number, expected });
+            }
+            if number > MOST_CORRECTIONS {
+                let rule = format!("must be at most {MOST_CORRECTIONS}: open a session on the record as it is now");
+                return Err(FieldError::new("correction", number, rule).into());
+            }
+            periods.correct(correct)?;
+            let advisor = self.policies.advisor(tenant, &facts.row.policy).await?;
+            let start = live::started(&facts.row, &advisor)?;
+            let mut put_right = (None, Ok(()));
+            let passed = periods.pass(&advisor, start, |period, before, passed| {
+                if period == correct.period {
+                    let (law, log_return) = (&before.state.law, passed.log_return);
+                    put_right = (log_return, periods::usual(&correct.report(), law, log_return, correct.confirm));
+                }
+            });
+            let standing = passed.map_err(|(period, error)| in_period(period, correct, error))?;
+            let (log_return, is_usual) = put_right;
+            is_usual?;
+            let observed = periods.all.len();
+            let (advising, resolving) = (&self.advising, &self.resolving);
+            let means = Means { advisor, advising, resolving, turn };
+            let (standing, uncertainty) = means.measured(tenant, observed, standing).await?;
+            let radius = Some(uncertainty.radius);
+            let answer = Corrected {
+                session: session.to_owned(),
+                correction: number,
+                period: correct.period,
+                log_return,
+                observed,
+                wealth: standing.state.wealth,
+                holding: standing.state.holding,
+                uncertainty,
+            };
+            let new = EntryRow {
+                session: session.to_owned(),
+                entry: facts.seen.entries() + 1,
+                kind: EntryKind::Correction,
+                number,
+                content_json: content.clone(),
+                answer_json: json(&answer)?,
+                created_ms: self.clock.now_milliseconds(),
+                key: caller.key().to_string(),
+            };
+            let seen = facts.seen.followed_by(&new);
+            let next =
+                Live { row: facts.row.into(), standing, observed, corrections: number, seen, radius, advice: None };
+            let store = self.store.by(caller.actor());
+            if let Some(answer_json) = record(&store, &mut held, new, next).await? {
+                return Ok(answer_json);
+            }
+        }
+    }
+
+    /// The first answer to what was recorded already.
+    async fn repeat(
+        &self,
+        session: &str,
+        kind: EntryKind,
+        number: usize,
+        content: &str,
+    ) -> Result<String, ServiceError> {
+        match self.store.entry(session, kind, number).await? {
+            Some(row) if row.content_json == content => Ok(row.answer_json),
+            _ => Err(ServiceError::Conflict { what: kind.counted(), number }),
+        }
+    }
+}
+
+/// Appends the entry that leads to `next`, and gives its answer; `None` where another process wrote meanwhile. Memory is empty
+/// while it is under way, so that it never runs ahead of the disk.
+async fn record(
+    store: &Store,
+    held: &mut Held<Name, Live>,
+    new: EntryRow,
+    next: Live,
+) -> Result<Option<String>, ServiceError> {
+    held.clear();
+    let (session, answer_json) = (new.session.clone(), new.answer_json.clone());
+    match store.append(new).instrument(spans::of_write("append an entry")).await? {
+        Append::Appended => {
+            held.put(next);
+            Ok(Some(answer_json))
+        }
+        Append::NotNext => Ok(None),
+        Append::NoSession => Err(ServiceError::unknown("session", &session)),
+    }
+}
+
+fn numbered(field: &str, number: usize) -> Result<usize, FieldError> {
+    if number == 0 { Err(FieldError::new(field, 0, "must be at least 1")) } else { Ok(number) }
+}
+
+fn json(of: &impl Serialize) -> Result<String, ServiceError> {
+    serde_json::to_string(of).map_err(ServiceError::internal)
+}
+
+/// A field that breaks a rule in some period once another is put right.
+fn in_period(period: usize, correct: &Correct, error: FieldError) -> FieldError {
+    if period == correct.period {
+        return error;
+    }
+    let rule = format!("in period {period}, with period {} put right: {}", correct.period, error.rule);
+    FieldError { rule, ..error }
+}

@@ -1,0 +1,211 @@
+//! What an investor reports of a period, and how it is read.
+
+use std::sync::Arc;
+
+use jiff::civil::Date;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::control::error::FieldError;
+use crate::control::request::rules;
+
+/// Prices taken: any currency, any quantity.
+pub const PRICE: (f64, f64) = (1e-12, 1e15);
+/// Letters of a reason.
+pub const LONGEST_REASON: usize = 200;
+const ONE_RETURN: &str = "must be the only one of log_return, simple_return, price and missing";
+
+/// A struct with fields of its own and those of a report.
+///
+/// One struct each, since `serde` refuses unknown and repeated fields of a flat struct alone.
+macro_rules! reporting {
+    ($(#[$meta:meta])* $name:ident { $($(#[$attribute:meta])* $field:ident: $kind:ty,)* }) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            $($(#[$attribute])* pub $field: $kind,)*
+            #[schema(example = 0.012)]
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub log_return: Option<f64>,
+            /// `price / previous price - 1`.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub simple_return: Option<f64>,
+            /// Price at the end of the period.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub price: Option<f64>,
+            /// Price at the start of the period. Default: the price reported for the period before.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub previous_price: Option<f64>,
+            /// In the place of a return where none is known: the law stays as it is, and the asset counts as unmoved.
+            #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+            pub missing: bool,
+            /// The last day of the period, later than that of the period before.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            #[schema(value_type = Option<String>, format = Date, example = "2008-09-30")]
+            pub date: Option<Date>,
+            /// What the bank paid in the period. Default: the policy's rate.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub rate: Option<f64>,
+            /// Money added at the end of the period, negative where it was taken. Default: the policy's contribution.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub flow: Option<f64>,
+            /// Share of wealth held in the risky asset through the period. Default: the allocation advised for it.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub executed_allocation: Option<f64>,
+            /// Wealth reached, with what was added, where it differs from what all of the above gives.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub wealth: Option<f64>,
+        }
+    };
+}
+
+reporting! {
+    /// What is recorded of a period: its return, given in exactly one of three ways or as missing, and what was done in it.
+    #[derive(Copy)]
+    Report {}
+}
+
+reporting! {
+    /// The return of one period, given in exactly one of three ways or as missing, and what was done in it.
+    Observe {
+        #[schema(example = "session_0123456789abcdef0123456789abcdef")]
+        session: String,
+        /// Number of the period, from 1.
+        #[schema(example = 1)]
+        period: usize,
+        /// The return is meant, however unusual it is.
+        #[serde(default, skip_serializing)]
+        confirm: bool,
+        /// The name of the key that reports it, which no body says; empty where none was asked for.
+        #[serde(skip)]
+        reported_by: Arc<str>,
+    }
+}
+
+reporting! {
+    /// What a period that passed reported, put right: all of it, in the place of what was reported before.
+    Correct {
+        /// Number of the correction, from 1.
+        #[schema(example = 1)]
+        correction: usize,
+        /// The period that is put right.
+        #[schema(example = 3)]
+        period: usize,
+        /// Why, in at most 200 letters.
+        #[schema(example = "the index was revised", max_length = 200)]
+        reason: String,
+        /// The return is meant, however unusual it is.
+        #[serde(default, skip_serializing)]
+        confirm: bool,
+    }
+}
+
+/// What both structs have in common, by itself.
+macro_rules! report_of {
+    ($name:ident) => {
+        impl $name {
+            /// The report alone, as it is recorded.
+            pub(super) fn report(&self) -> Report {
+                let $name { log_return, simple_return, price, previous_price, missing, date, .. } = *self;
+                let $name { rate, flow, executed_allocation, wealth, .. } = *self;
+                let done = Report { rate, flow, executed_allocation, wealth, ..Report::default() };
+                Report { log_return, simple_return, price, previous_price, missing, date, ..done }
+            }
+        }
+    };
+}
+
+report_of!(Observe);
+report_of!(Correct);
+
+/// The log-return of a simple return, named `field` in messages.
+pub(super) fn log_return_of(field: &str, simple_return: f64) -> Result<f64, FieldError> {
+    rules::within(field, simple_return, (-rules::LOG_RETURN).exp_m1(), rules::LOG_RETURN.exp_m1())?;
+    Ok(simple_return.ln_1p().clamp(-rules::LOG_RETURN, rules::LOG_RETURN))
+}
+
+impl Report {
+    /// Checks everything that can be checked without the session, but the return.
+    ///
+    /// # Errors
+    /// The first field that breaks its rule.
+    pub(super) fn check(&self) -> Result<(), FieldError> {
+        if let Some(allocation) = self.executed_allocation {
+            rules::share("executed_allocation", allocation)?;
+        }
+        if let Some(rate) = self.rate {
+            rules::within("rate", rate, rules::RATE.0, rules::RATE.1)?;
+        }
+        if let Some(flow) = self.flow {
+            rules::within("flow", flow, -rules::WEALTH.1, rules::WEALTH.1)?;
+        }
+        if let Some(wealth) = self.wealth {
+            rules::wealth("wealth", wealth)?;
+        }
+        match (self.previous_price, self.price) {
+            (Some(value), None) => {
+                Err(FieldError::new("previous_price", value, "must be absent unless price is given"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The log-return, `None` where it is missing; `known_price` is the price reported for the period before.
+    ///
+    /// # Errors
+    /// None is given, or more than one, or one out of bounds.
+    pub(super) fn log_return(&self, known_price: Option<f64>) -> Result<Option<f64>, FieldError> {
+        match (self.log_return, self.simple_return, self.price, self.missing) {
+            (Some(value), None, None, false) => rules::log_return("log_return", value).map(|()| Some(value)),
+            (None, Some(value), None, false) => log_return_of("simple_return", value).map(Some),
+            (None, None, Some(price), false) => self.between_prices(price, known_price).map(Some),
+            (None, None, None, true) => Ok(None),
+            (None, None, None, false) => {
+                let rule = "must be given, or simple_return, price or missing instead of it";
+                Err(FieldError::new("log_return", "null", rule))
+            }
+            (.., true) => Err(FieldError::new("missing", true, ONE_RETURN)),
+            (Some(value), ..) => Err(FieldError::new("log_return", value, ONE_RETURN)),
+            (None, Some(value), ..) => Err(FieldError::new("simple_return", value, ONE_RETURN)),
+        }
+    }
+
+    /// What the return was given by, and its value.
+    pub(super) fn given(&self) -> (&'static str, f64) {
+        match (self.log_return, self.simple_return, self.price) {
+            (_, Some(value), _) => ("simple_return", value),
+            (_, _, Some(value)) => ("price", value),
+            (value, ..) => ("log_return", value.unwrap_or(0.0)),
+        }
+    }
+
+    fn between_prices(&self, price: f64, known: Option<f64>) -> Result<f64, FieldError> {
+        rules::within("price", price, PRICE.0, PRICE.1)?;
+        let before = self.previous_price.or(known).ok_or_else(|| {
+            FieldError::new(
+                "previous_price",
+                "null",
+                "must be given with price where the period before was not reported by its price",
+            )
+        })?;
+        rules::within("previous_price", before, PRICE.0, PRICE.1)?;
+        let log_return = (price / before).ln();
+        let rule = format!("must give a log-return in [-{0}, {0}] from {before}", rules::LOG_RETURN);
+        rules::log_return("price", log_return).map_err(|_| FieldError::new("price", price, rule))?;
+        Ok(log_return)
+    }
+}
+
+impl Correct {
+    /// # Errors
+    /// A reason that is empty or long.
+    pub(super) fn check_reason(&self) -> Result<(), FieldError> {
+        let letters = self.reason.chars().count();
+        if self.reason.trim().is_empty() || letters > LONGEST_REASON {
+            let rule = format!("must say in 1 to {LONGEST_REASON} letters why");
+            return Err(FieldError::new("reason", format!("{letters} letters"), rule));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,290 @@
+//! What happened in a session: append-only entries, numbered from 1 in the order they were recorded.
+//!
+//! An entry says what was reported and what was answered. It is appended by who knows all entries before it, since its
+//! number is theirs and one more: of two who append at once one does not, reads what the other wrote, and decides again.
+
+use std::sync::LazyLock;
+
+use futures_util::FutureExt;
+
+use super::audit::{self, Actor, Deed};
+use super::codec::{Seal, from_sql, to_sql};
+use super::error::Failure;
+use super::head::Head;
+use super::postgres::Database;
+use super::query::{Connection, Query, Row, query};
+use super::quotas::{self, ENTRY_BYTES, Quotas, Usage};
+use super::tenant::Tenant;
+use super::{Engine, Store, StoreError};
+
+/// What an entry is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EntryKind {
+    /// A period that passed.
+    Observation,
+    /// Another report of a period that passed before.
+    Correction,
+}
+
+/// One entry; as read, verified against its seal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EntryRow {
+    pub session: String,
+    pub entry: usize,
+    pub kind: EntryKind,
+    /// From 1 among those of its kind: the period, or which correction it is.
+    pub number: usize,
+    /// What was reported: the same content under the same number is a repeat.
+    pub content_json: String,
+    pub answer_json: String,
+    pub created_ms: i64,
+    /// The name of the key that reported it; empty where none was asked for.
+    pub key: String,
+}
+
+/// What became of an entry to append.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Append {
+    Appended,
+    /// Its number is not the one after the last entry's: somebody else wrote meanwhile.
+    NotNext,
+    NoSession,
+}
+
+impl EntryKind {
+    fn as_str(self) -> &'static str {
+        match self {
+            EntryKind::Observation => "observation",
+            EntryKind::Correction => "correction",
+        }
+    }
+
+    /// What numbers of its kind count.
+    pub fn counted(self) -> &'static str {
+        match self {
+            EntryKind::Observation => "period",
+            EntryKind::Correction => "correction",
+        }
+    }
+
+    fn stored(text: &str) -> Result<Self, Failure> {
+        let all = [EntryKind::Observation, EntryKind::Correction];
+        let found = all.into_iter().find(|kind| kind.as_str() == text);
+        found.ok_or_else(|| Failure::Corrupt(format!("an entry of the kind {text}")))
+    }
+}
+
+impl Store {
+    /// Appends the entry after the last, or says why not; decided and written in one transaction. An observation has its
+    /// room since the session was opened; every other entry takes its own, and is told of in the audit.
+    ///
+    /// # Errors
+    /// [`StoreError::OverQuota`] where there is no room for what is no observation.
+    pub async fn append(&self, new: EntryRow) -> Result<Append, StoreError> {
+        if new.kind != EntryKind::Observation {
+            let (quotas, actor, session) = (self.quotas, self.actor.clone(), new.session.clone());
+            return self
+                .write_to(&session, APPENDING, move |connection| {
+                    append_with_room(connection, new, quotas, actor).boxed()
+                })
+                .await;
+        }
+        match &self.engine {
+            Engine::Sqlite(folder) => folder.append(new).await,
+            Engine::Postgres(database) => append_shared(database, new).boxed().await,
+        }
+    }
+
+    /// The entry of a kind and number.
+    ///
+    /// # Errors
+    /// [`StoreError::Corrupt`] where the row is not what was written.
+    pub async fn entry(&self, session: &str, kind: EntryKind, number: usize) -> Result<Option<EntryRow>, StoreError> {
+        // No entry stands before as many of its kind.
+        let find = query("SELECT * FROM entries WHERE session = $1 AND entry >= $2 AND number = $2 AND kind = $3");
+        let find = find.bind(session).bind(to_sql(number)).bind(kind.as_str());
+        self.read("reading an entry", find, |rows| rows.first().map(EntryRow::from_row).transpose()).await
+    }
+
+    /// Every entry of the session, in order. `None` where there is no such session, by the same statement: a session that
+    /// is deleted meanwhile is never one without entries.
+    ///
+    /// # Errors
+    /// [`StoreError::Corrupt`] where a row is not what was written or one is missing.
+    pub async fn entries(&self, session: &str) -> Result<Option<Vec<EntryRow>>, StoreError> {
+        self.read("reading entries", all_of(session), |rows| numbered(session, rows)).await
+    }
+}
+
+pub(super) fn all_of(session: &str) -> Query {
+    let all = query(
+        "SELECT entries.* FROM sessions LEFT JOIN entries ON entries.session = sessions.session
+         WHERE sessions.session = $1 ORDER BY entries.entry",
+    );
+    all.bind(session)
+}
+
+/// What [`all_of`] finds, each row verified and none missing before the last.
+pub(super) fn numbered(session: &str, rows: &[Row]) -> Result<Option<Vec<EntryRow>>, Failure> {
+    let Some(first) = rows.first() else { return Ok(None) };
+    if first.get::<Option<i64>>("entry")?.is_none() {
+        return Ok(Some(Vec::new()));
+    }
+    let rows: Vec<_> = rows.iter().map(EntryRow::from_row).collect::<Result<_, Failure>>()?;
+    match rows.iter().zip(1..).find(|(row, entry)| row.entry != *entry) {
+        None => Ok(Some(rows)),
+        Some((_, entry)) => Err(Failure::Corrupt(format!("entry {entry} of session {session}"))),
+    }
+}
+
+/// Appends by one statement, which commits by itself: two that append the same entry, or one beside a deletion, meet at the
+/// table's keys. Why an entry is not appended is found out under the lock of its session.
+async fn append_shared(database: &Database, new: EntryRow) -> Result<Append, StoreError> {
+    match database.execute(APPENDING, bind_row(query(INSERT_ONE.as_str()), &new)).await {
+        Ok(rows) if rows > 0 => Ok(Append::Appended),
+        Ok(_) | Err(StoreError::Refused { .. }) => {
+            database.write(APPENDING, move |connection| append(connection, new).boxed()).await
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// What appending calls itself in errors.
+pub(super) const APPENDING: &str = "appending an entry";
+
+/// The row is inserted by a statement that decides itself whether it is the next one; why it was not is found out after.
+/// It changes rows by that statement only.
+pub(super) async fn append(mut connection: Connection<'_>, new: EntryRow) -> Result<Append, Failure> {
+    append_next(&mut connection, &new).await.map(|(append, _)| append)
+}
+
+/// As [`append`], and the tenant whose session it is.
+async fn append_next(connection: &mut Connection<'_>, new: &EntryRow) -> Result<(Append, Tenant), Failure> {
+    let session = query("SELECT tenant FROM sessions WHERE session = $1").bind(new.session.as_str());
+    let Some(found) = connection.row(session.for_update()).await? else {
+        return Ok((Append::NoSession, Tenant::default()));
+    };
+    let is_next = connection.execute(bind_row(query(INSERT_ONE.as_str()), new)).await? > 0;
+    let append = if is_next { Append::Appended } else { Append::NotNext };
+    Ok((append, Tenant::stored(&found.get::<String>("tenant")?)))
+}
+
+/// Appends an entry that was given no room when its session was opened, and tells of it in the audit.
+async fn append_with_room(
+    mut connection: Connection<'_>,
+    new: EntryRow,
+    quotas: Quotas,
+    actor: Actor,
+) -> Result<Append, Failure> {
+    let connection = &mut connection;
+    let (append, tenant) = append_next(connection, &new).await?;
+    if append == Append::Appended {
+        let widen = query("UPDATE sessions SET room = room + 1 WHERE session = $1");
+        connection.execute(widen.bind(new.session.as_str())).await?;
+        quotas::take(connection, &tenant, Usage::of_bytes(ENTRY_BYTES), quotas).await?;
+        let outcome = format!("{} {} recorded", new.kind.counted(), new.number);
+        audit::record(connection, &actor, &tenant, Deed::Correct, &new.session, &outcome).await?;
+    }
+    Ok(append)
+}
+
+const NAMES: &str = "session, entry, kind, number, content_json, answer_json, created_ms, access_key, seal";
+const COLUMNS: usize = 9;
+/// The entry after the last that `new.session` has.
+const NEXT: &str = "(SELECT coalesce(max(entry), 0) + 1 FROM entries WHERE entries.session = new.session)";
+
+/// Inserts a row whose entry is the one after the last of a session that exists.
+static INSERT_ONE: LazyLock<String> = LazyLock::new(|| {
+    let numbers: Vec<String> = (1..=COLUMNS).map(|column| format!("${column}")).collect();
+    format!(
+        "WITH new ({NAMES}) AS (VALUES ({}))
+         INSERT INTO entries ({NAMES}) SELECT new.* FROM new CROSS JOIN sessions
+         WHERE sessions.session = new.session AND new.entry = {NEXT}",
+        numbers.join(", ")
+    )
+});
+
+/// Powers of two, so that any number of rows finds a statement of less than twice its size.
+const SIZES: usize = 7;
+/// Rows that one statement takes at most.
+pub(super) const ROWS_AT_ONCE: usize = 1 << (SIZES - 1);
+
+static INSERT_MANY: [LazyLock<String>; SIZES] = [
+    LazyLock::new(|| insert_all(1)),
+    LazyLock::new(|| insert_all(2)),
+    LazyLock::new(|| insert_all(4)),
+    LazyLock::new(|| insert_all(8)),
+    LazyLock::new(|| insert_all(16)),
+    LazyLock::new(|| insert_all(32)),
+    LazyLock::new(|| insert_all(64)),
+];
+
+/// Inserts so many rows of SQLite, or none: one that is not the next of its session has no seal, which the table refuses,
+/// and a session that does not exist is refused as what it refers to. Values not bound are NULL, a row of them is none.
+fn insert_all(rows: usize) -> String {
+    let sealed = NAMES.replace("seal", &format!("CASE entry WHEN {NEXT} THEN seal END"));
+    let row = format!("({})", ["?"; COLUMNS].join(", "));
+    format!(
+        "INSERT INTO entries ({NAMES}) WITH new ({NAMES}) AS (VALUES {})
+         SELECT {sealed} FROM new WHERE session IS NOT NULL",
+        vec![row; rows].join(", ")
+    )
+}
+
+/// Inserts up to [`ROWS_AT_ONCE`] rows, all of them or none, by one statement of SQLite.
+///
+/// # Errors
+/// Also where not all of them are the next ones of sessions that exist.
+pub(super) async fn append_all(connection: &mut Connection<'_>, new: &[&EntryRow]) -> Result<(), Failure> {
+    let size = new.len().next_power_of_two().trailing_zeros() as usize;
+    let insert = new.iter().fold(query(INSERT_MANY[size].as_str()), |insert, new| bind_row(insert, new));
+    connection.execute(insert).await.map(drop)
+}
+
+fn bind_row(insert: Query, new: &EntryRow) -> Query {
+    insert
+        .bind(new.session.as_str())
+        .bind(to_sql(new.entry))
+        .bind(new.kind.as_str())
+        .bind(to_sql(new.number))
+        .bind(new.content_json.as_str())
+        .bind(new.answer_json.as_str())
+        .bind(new.created_ms)
+        .bind(new.key.as_str())
+        .bind(new.seal().finish())
+}
+
+impl EntryRow {
+    /// The head of its session where this is the last entry.
+    pub fn head(&self) -> Head {
+        Head { entries: self.entry, seal: self.seal().finish() }
+    }
+
+    fn seal(&self) -> Seal {
+        Seal::of("entry")
+            .text(&self.session)
+            .integer(to_sql(self.entry))
+            .text(self.kind.as_str())
+            .integer(to_sql(self.number))
+            .text(&self.content_json)
+            .text(&self.answer_json)
+            .integer(self.created_ms)
+            .text(&self.key)
+    }
+
+    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
+        let read = EntryRow {
+            session: row.get("session")?,
+            entry: from_sql(row.get("entry")?)?,
+            kind: EntryKind::stored(&row.get::<String>("kind")?)?,
+            number: from_sql(row.get("number")?)?,
+            content_json: row.get("content_json")?,
+            answer_json: row.get("answer_json")?,
+            created_ms: row.get("created_ms")?,
+            key: row.get("access_key")?,
+        };
+        let seal: Vec<u8> = row.get("seal")?;
+        read.seal().verify(&seal, || format!("entry {} of session {}", read.entry, read.session))?;
+        Ok(read)
+    }
+}
