@@ -8,7 +8,8 @@ use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
 use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
 use crate::control::request::rules::{
-    COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, RADIUS_SCALE, TRADING_COST, WEALTH,
+    COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR, RADIUS_SCALE,
+    RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST, WEALTH,
 };
 use crate::service::observation::PRICE;
 use crate::service::what_if::POINTS;
@@ -41,11 +42,17 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
     vec![
         ("ProblemSpecification", "horizon", whole(&HORIZON)),
         ("ProblemSpecification", "rate_per_step", within(-0.5, 0.5)),
+        ("ProblemSpecification", "periods_per_year", within(PERIODS_PER_YEAR.0, PERIODS_PER_YEAR.1)),
         ("ProblemSpecification", "initial_wealth", wealth.clone()),
         ("ProblemSpecification", "action_interval", action),
         ("ProblemSpecification", "trading_cost", within(TRADING_COST.0, TRADING_COST.1)),
         ("ProblemSpecification", "history", history.clone()),
-        ("UtilitySpecification exponential", "risk_aversion", within(1e-12, 1e9)),
+        ("UtilitySpecification exponential", "risk_aversion", within(RISK_AVERSION.0, RISK_AVERSION.1)),
+        (
+            "UtilitySpecification exponential",
+            "risk_aversion_relative",
+            within(RISK_AVERSION_RELATIVE.0, RISK_AVERSION_RELATIVE.1),
+        ),
         ("UtilitySpecification power", "risk_aversion", json!({ "exclusiveMinimum": 1, "maximum": 100 })),
         ("RadiusRule bridge", "alpha", probability.clone()),
         ("RadiusRule concentration", "alpha", probability),
@@ -155,8 +162,8 @@ mod tests {
     /// The field that the rules refuse in a sound specification with `value` at `pointer`.
     fn refused(pointer: &str, value: Value) -> Option<String> {
         let mut given = json!({
-            "problem": { "history": [0.1, -0.1, 0.05], "horizon": 3, "rate_per_step": 0.0, "initial_wealth": 100.0,
-                "trading_cost": 0.0, "utility": { "kind": "exponential", "risk_aversion": 0.01 },
+            "problem": { "history": [0.1, -0.1, 0.05], "horizon": 3, "rate_per_step": 0.0, "periods_per_year": 12.0,
+                "initial_wealth": 100.0, "trading_cost": 0.0, "utility": { "kind": "exponential", "risk_aversion": 0.01 },
                 "radius": { "rule": "bridge", "alpha": 0.1, "paths": 200, "scale": 1.0 } },
             "design": { "count": 20, "sampling_law": { "kind": "student_t", "location": 0.0, "scale": 0.1,
                 "degrees_of_freedom": 5.0 } },
@@ -178,6 +185,7 @@ mod tests {
         for (pointer, schema, step) in [
             ("/problem/horizon", of("ProblemSpecification", None, "horizon"), 1.0),
             ("/problem/rate_per_step", of("ProblemSpecification", None, "rate_per_step"), 1e-3),
+            ("/problem/periods_per_year", of("ProblemSpecification", None, "periods_per_year"), 1e-3),
             ("/problem/initial_wealth", of("ProblemSpecification", None, "initial_wealth"), 1e-7),
             ("/problem/trading_cost", of("ProblemSpecification", None, "trading_cost"), 1e-3),
             ("/problem/history/0", of("ProblemSpecification", None, "history")["items"].clone(), 1e-3),

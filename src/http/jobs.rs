@@ -15,7 +15,7 @@ use super::wire;
 use crate::control::error::FieldError;
 use crate::control::request::specification::Specification;
 use crate::service::Service;
-use crate::service::jobs::Job;
+use crate::service::jobs::Accepted;
 
 /// Queue a training.
 #[utoipa::path(post, path = "/train", tag = "jobs",
@@ -32,7 +32,7 @@ use crate::service::jobs::Job;
     })),
     params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
     responses(
-        (status = 202, description = "Queued; poll the Location or follow its events.", body = wire::Job, headers(
+        (status = 202, description = "Queued; poll the Location or follow its events.", body = wire::AcceptedJob, headers(
             ("Location" = String, description = "The job."),
             ("Retry-After" = u32, description = "Seconds to wait before asking for the job."))),
         (status = 400, description = "The body is not JSON.", body = Problem, content_type = "application/problem+json"),
@@ -48,10 +48,10 @@ pub async fn train(
 }
 
 /// The answer to a job that was queued.
-pub fn accepted(job: Job) -> Response {
-    let job = wire::Job::from(job);
-    let location = [(header::LOCATION, format!("/jobs/{}", job.job)), (header::RETRY_AFTER, "1".to_owned())];
-    (StatusCode::ACCEPTED, location, Json(job)).into_response()
+pub fn accepted(accepted: Accepted) -> Response {
+    let accepted = wire::AcceptedJob::from(accepted);
+    let location = [(header::LOCATION, format!("/jobs/{}", accepted.job.job)), (header::RETRY_AFTER, "1".to_owned())];
+    (StatusCode::ACCEPTED, location, Json(accepted)).into_response()
 }
 
 pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {

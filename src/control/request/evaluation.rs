@@ -103,8 +103,8 @@ impl EvaluationRequest {
         }
         let sampling_law = self.design.sampling_law.get_or_insert(SamplingLaw::Bootstrap {}).clone();
         self.problem.law.get_or_insert(sampling_law);
-        self.problem.contributions = std::mem::take(&mut self.problem.contributions).canonical();
-        self.specification(Framework::KnownLaw, None).completed()?;
+        let completed = self.specification(Framework::KnownLaw, None).completed()?.problem;
+        (self.problem.contributions, self.problem.utility) = (completed.contributions, completed.utility);
         self.check_frameworks()?;
         self.complete_mixes()?;
         if self.frameworks.is_empty() && self.mixes().is_empty() {
@@ -228,6 +228,7 @@ impl EvaluationRequest {
     /// The first part of the problem that differs, under `policies.<framework>`.
     pub fn accepts(&self, framework: Framework, found: &Specification) -> Result<(), FieldError> {
         let mut wanted = self.specification(framework, None).completed()?.problem;
+        wanted.periods_per_year = found.problem.periods_per_year;
         if !framework.is_frozen() {
             wanted.history.clone_from(&found.problem.history);
         }
