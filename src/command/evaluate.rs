@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use ballast::control::error::FieldError;
 use ballast::control::evaluation::paths::Evaluation;
 use ballast::control::request::evaluation::EvaluationRequest;
+use ballast::http::decode;
 use clap::Args;
 use serde_json::json;
 
@@ -60,7 +61,7 @@ pub fn run(arguments: &Evaluate) -> Result<(), Box<dyn Error>> {
 
 fn read(file: &Path) -> Result<EvaluationRequest, Box<dyn Error>> {
     let text = std::fs::read(file).map_err(|error| format!("reading {}: {error}", file.display()))?;
-    Ok(serde_json::from_slice(&text).map_err(|error| format!("{}: {error}", file.display()))?)
+    Ok(decode::json(&text).map_err(|problem| format!("{}: {}", file.display(), problem.detail))?)
 }
 
 /// Writes one file of the result.

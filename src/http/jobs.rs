@@ -21,8 +21,8 @@ use crate::service::jobs::Accepted;
 #[utoipa::path(post, path = "/train", tag = "jobs",
     request_body(content = Specification, example = json!({
         "problem": {
-            "framework": "adaptive", "horizon": 12, "rate_per_step": 0.0027, "initial_wealth": 100.0,
-            "action_interval": [0.0, 1.0], "utility": { "kind": "power", "risk_aversion": 3.0 },
+            "framework": "adaptive", "horizon": 12, "rate_per_step": 0.0027, "periods_per_year": 12,
+            "initial_wealth": 100.0, "action_interval": [0.0, 1.0], "utility": { "kind": "power", "risk_aversion": 3.0 },
             "radius": { "rule": "bridge", "alpha": 0.1, "paths": 2000, "scale": 1.0 },
             "history": [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008]
         },

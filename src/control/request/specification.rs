@@ -89,7 +89,7 @@ pub struct ProblemSpecification {
 pub enum UtilitySpecification {
     /// `(1 - exp(-risk_aversion x)) / risk_aversion`, risk aversion per unit of wealth. Exactly one of its fields is given.
     Exponential {
-        /// Absolute, per unit of wealth. Not a number where it is not given.
+        /// Absolute, per unit of wealth.
         #[serde(default = "defaults::not_given")]
         risk_aversion: f64,
         /// The same times the initial wealth, without unit; a completed specification has the absolute one.
@@ -315,7 +315,7 @@ mod defaults {
     pub fn horizon() -> usize {
         10
     }
-    /// No JSON says this number.
+    /// Stands for a number that is not given, which no JSON says.
     pub fn not_given() -> f64 {
         f64::NAN
     }
