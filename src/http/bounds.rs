@@ -31,6 +31,7 @@ pub fn tell(description: &mut OpenApi) {
 /// Schema, or schema and variant; field; rule.
 fn rules() -> Vec<(&'static str, &'static str, Value)> {
     let within = |low: f64, high: f64| json!({ "minimum": low, "maximum": high });
+    let between = |(low, high)| within(low, high);
     let whole = |range: &std::ops::RangeInclusive<usize>| json!({ "minimum": range.start(), "maximum": range.end() });
     let pair = json!({ "minItems": 2, "maxItems": 2, "items": { "minimum": 1e-12, "maximum": 1e12 } });
     let history = json!({ "minItems": HISTORY_LENGTH.start(), "maxItems": HISTORY_LENGTH.end(),
@@ -38,21 +39,16 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
     let wealth = within(WEALTH.0, WEALTH.1);
     let probability = within(1e-3, 0.999);
     let action = json!({ "minItems": 2, "maxItems": 2, "items": within(0.0, 1.0) });
-    let price = within(PRICE.0, PRICE.1);
     vec![
         ("ProblemSpecification", "horizon", whole(&HORIZON)),
         ("ProblemSpecification", "rate_per_step", within(-0.5, 0.5)),
-        ("ProblemSpecification", "periods_per_year", within(PERIODS_PER_YEAR.0, PERIODS_PER_YEAR.1)),
+        ("ProblemSpecification", "periods_per_year", between(PERIODS_PER_YEAR)),
         ("ProblemSpecification", "initial_wealth", wealth.clone()),
         ("ProblemSpecification", "action_interval", action),
         ("ProblemSpecification", "trading_cost", within(TRADING_COST.0, TRADING_COST.1)),
         ("ProblemSpecification", "history", history.clone()),
-        ("UtilitySpecification exponential", "risk_aversion", within(RISK_AVERSION.0, RISK_AVERSION.1)),
-        (
-            "UtilitySpecification exponential",
-            "risk_aversion_relative",
-            within(RISK_AVERSION_RELATIVE.0, RISK_AVERSION_RELATIVE.1),
-        ),
+        ("UtilitySpecification exponential", "risk_aversion", between(RISK_AVERSION)),
+        ("UtilitySpecification exponential", "risk_aversion_relative", between(RISK_AVERSION_RELATIVE)),
         ("UtilitySpecification power", "risk_aversion", json!({ "exclusiveMinimum": 1, "maximum": 100 })),
         ("RadiusRule bridge", "alpha", probability.clone()),
         ("RadiusRule concentration", "alpha", probability),
@@ -83,8 +79,8 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("Observe", "period", json!({ "minimum": 1 })),
         ("Observe", "log_return", within(-LOG_RETURN, LOG_RETURN)),
         ("Observe", "simple_return", within((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())),
-        ("Observe", "price", price.clone()),
-        ("Observe", "previous_price", price),
+        ("Observe", "price", between(PRICE)),
+        ("Observe", "previous_price", between(PRICE)),
         ("Observe", "executed_allocation", within(0.0, 1.0)),
         ("Observe", "wealth", wealth.clone()),
         ("Advise", "wealth", wealth.clone()),

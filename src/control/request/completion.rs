@@ -1,8 +1,13 @@
 //! What a specification leaves out, filled in.
 
 use crate::control::error::FieldError;
-use crate::control::request::rules::{self, DEFAULT_COUNT, DEFAULT_COUNT_WEALTH_ALONE};
+use crate::control::request::rules;
 use crate::control::request::specification::{Interval, SamplingLaw, Specification};
+
+/// Design points per step where the law is part of the state: the paper's count.
+pub const DEFAULT_COUNT: usize = 1000;
+/// Design points per step where the state is wealth alone: the paper's count.
+pub const DEFAULT_COUNT_WEALTH_ALONE: usize = 200;
 
 impl Specification {
     /// Checks every rule, and fills what depends on other fields.

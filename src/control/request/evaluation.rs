@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
+use crate::control::request::completion::DEFAULT_COUNT_WEALTH_ALONE;
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
-use crate::control::request::rules::{self, DEFAULT_COUNT_WEALTH_ALONE, within};
+use crate::control::request::rules::{self, within};
 use crate::control::request::specification::{
     DesignSpecification, InitialLaws, ProblemSpecification, SamplingLaw, Specification, SurrogateSpecification,
     default_seed,

@@ -14,10 +14,6 @@ use crate::control::request::withdrawals;
 pub const LARGEST_COUNT: usize = 10_000;
 /// Design points of a step.
 pub const COUNT: std::ops::RangeInclusive<usize> = 10..=LARGEST_COUNT;
-/// Design points per step where the law is part of the state: the paper's count.
-pub const DEFAULT_COUNT: usize = 1000;
-/// Design points per step where the state is wealth alone: the paper's count.
-pub const DEFAULT_COUNT_WEALTH_ALONE: usize = 200;
 /// Ten years of weeks.
 pub const HORIZON: std::ops::RangeInclusive<usize> = 1..=520;
 /// Log-returns of a history.
@@ -142,26 +138,24 @@ fn outside(history: &[f64], support: Option<Interval>) -> Option<(usize, f64)> {
 fn utility(problem: &ProblemSpecification) -> Result<(), FieldError> {
     const FIELD: &str = "problem.utility.risk_aversion";
     const RELATIVE: &str = "problem.utility.risk_aversion_relative";
-    match problem.utility {
+    let (field, given, (low, high)) = match problem.utility {
         UtilitySpecification::Exponential { risk_aversion, risk_aversion_relative: Some(relative) } => {
             if !risk_aversion.is_nan() {
                 return Err(FieldError::new(RELATIVE, relative, "must be left out where risk_aversion is given"));
             }
-            within(RELATIVE, relative, RISK_AVERSION_RELATIVE.0, RISK_AVERSION_RELATIVE.1)?;
-            not_flat(problem, problem.initial_wealth, (RELATIVE, relative), "problem.initial_wealth")
+            (RELATIVE, relative, RISK_AVERSION_RELATIVE)
         }
         UtilitySpecification::Exponential { risk_aversion, .. } if risk_aversion.is_nan() => {
-            Err(FieldError::new(FIELD, "null", "must be given, or risk_aversion_relative in its place"))
+            return Err(FieldError::new(FIELD, "null", "must be given, or risk_aversion_relative in its place"));
         }
-        UtilitySpecification::Exponential { risk_aversion, .. } => {
-            within(FIELD, risk_aversion, RISK_AVERSION.0, RISK_AVERSION.1)?;
-            not_flat(problem, problem.initial_wealth, (FIELD, risk_aversion), "problem.initial_wealth")
-        }
+        UtilitySpecification::Exponential { risk_aversion, .. } => (FIELD, risk_aversion, RISK_AVERSION),
         UtilitySpecification::Power { risk_aversion } if !(risk_aversion > 1.0 && risk_aversion <= 100.0) => {
-            Err(FieldError::new(FIELD, risk_aversion, "must lie in (1, 100]; at 1 use the log utility"))
+            return Err(FieldError::new(FIELD, risk_aversion, "must lie in (1, 100]; at 1 use the log utility"));
         }
-        UtilitySpecification::Power { .. } | UtilitySpecification::Log {} => Ok(()),
-    }
+        UtilitySpecification::Power { .. } | UtilitySpecification::Log {} => return Ok(()),
+    };
+    within(field, given, low, high)?;
+    not_flat(problem, problem.initial_wealth, (field, given), "problem.initial_wealth")
 }
 
 /// Checks that utility still grows at a wealth that a problem starts with; else `refused` is, for its product with `other`.
