@@ -108,7 +108,7 @@ fn mean_owed(price: f64, periods: usize) -> f64 {
 /// Certainty equivalent and first action by the library.
 fn by_the_library(seller: &Seller) -> Result<(f64, f64), Box<dyn Error>> {
     let specification: Specification = serde_json::from_value(json!({
-        "problem": { "framework": "static", "horizon": PERIODS, "history": HISTORY,
+        "problem": { "framework": "static", "horizon": PERIODS, "rate_per_step": RATE, "history": HISTORY,
             "radius": { "rule": "fixed", "radius": RADIUS }, "support": { "min": SUPPORT[0], "max": SUPPORT[1] } },
         // Wide enough for the design to reach wherever the adversary can.
         "design": { "count": 200, "sampling_law":

@@ -10,12 +10,12 @@ const HISTORY: [f64; 8] = [0.061, -0.034, 0.052, 0.013, -0.041, 0.083, -0.022, 0
 fn problems() -> Vec<Value> {
     let power = || json!({ "kind": "power", "risk_aversion": 12.0 });
     vec![
-        json!({ "history": HISTORY, "utility": power(), "radius": { "rule": "bridge", "alpha": 0.5, "paths": 500, "scale": 0.3 } }),
-        json!({ "history": HISTORY, "utility": { "kind": "exponential", "risk_aversion": 0.05 },
+        json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": power(), "radius": { "rule": "bridge", "alpha": 0.5, "paths": 500, "scale": 0.3 } }),
+        json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": { "kind": "exponential", "risk_aversion": 0.05 },
             "radius": { "rule": "root_n", "kappa": 0.01 }, "trading_cost": 0.004, "contributions": -3.0 }),
-        json!({ "history": HISTORY, "framework": "static", "utility": { "kind": "log" }, "action_interval": [0.0, 0.7],
+        json!({ "rate_per_step": 0.002, "history": HISTORY, "framework": "static", "utility": { "kind": "log" }, "action_interval": [0.0, 0.7],
             "radius": { "rule": "fixed", "radius": 0.003 } }),
-        json!({ "history": HISTORY, "framework": "parametric_static", "utility": power(),
+        json!({ "rate_per_step": 0.002, "history": HISTORY, "framework": "parametric_static", "utility": power(),
             "radius": { "rule": "chi_square", "alpha": 0.9 } }),
     ]
 }
@@ -53,7 +53,7 @@ async fn a_key_that_may_read_may_ask() {
     let mut app = App::start().await;
     let key = app.key("north", "read").await;
     app.restart().await;
-    let question = json!({ "problem": { "history": HISTORY } });
+    let question = json!({ "problem": { "rate_per_step": 0.002, "history": HISTORY } });
     for (held, expected) in [(key.as_str(), 200), ("", 401)] {
         app.hold(held);
         assert_eq!(app.post("/advise", &question).await.0, expected);
@@ -64,7 +64,7 @@ async fn a_key_that_may_read_may_ask() {
 async fn what_cannot_be_advised_is_refused_by_field_and_nothing_is_stored() {
     let app = App::start().await;
     let ask = |change: Value, problem: Value| {
-        let mut question = json!({ "problem": { "history": HISTORY } });
+        let mut question = json!({ "problem": { "rate_per_step": 0.002, "history": HISTORY } });
         question["problem"].as_object_mut().unwrap().extend(problem.as_object().unwrap().clone());
         question.as_object_mut().unwrap().extend(change.as_object().unwrap().clone());
         question
@@ -77,6 +77,7 @@ async fn what_cannot_be_advised_is_refused_by_field_and_nothing_is_stored() {
         (ask(json!({}), json!({ "history": [0.1] })), "problem.history"),
         (ask(json!({}), json!({ "rate_per_step": "a tenth" })), "problem.rate_per_step"),
         (ask(json!({ "wealth": 10.0 }), json!({ "contributions": -40.0 })), "problem.initial_wealth"),
+        (json!({ "problem": { "history": HISTORY } }), "problem.rate_per_step"),
         (json!({ "problem": 3 }), "problem"),
         (json!({}), "problem"),
     ] {
@@ -87,4 +88,64 @@ async fn what_cannot_be_advised_is_refused_by_field_and_nothing_is_stored() {
     let (_, jobs) = app.get("/jobs").await;
     let (_, policies) = app.get("/policies").await;
     assert_eq!((&jobs["jobs"], &policies["policies"]), (&json!([]), &json!([])));
+}
+
+/// The ratio of wealth to the wealth at the start is what such an investor cares for, in whatever money both are counted.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_relative_risk_aversion_is_of_the_wealth_at_the_start() {
+    let mut app = App::start().await;
+    let problem = |utility: Value| json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": utility, "radius": { "rule": "fixed", "radius": 0.003 } });
+    let relative = || problem(json!({ "kind": "exponential", "risk_aversion_relative": 5 }));
+    let absolute = |risk_aversion: f64| problem(json!({ "kind": "exponential", "risk_aversion": risk_aversion }));
+    let mut found = Vec::new();
+    for wealth in [100.0, 1e5, 1e15] {
+        let ask = |problem: Value| json!({ "problem": problem, "wealth": wealth });
+        let advised = app.post("/advise", &ask(relative())).await;
+        assert_eq!(advised, app.post("/advise", &ask(absolute(5.0 / wealth))).await, "to the last bit");
+        found.push((
+            advised.1["allocation"].as_f64().unwrap(),
+            advised.1["certainty_equivalent"].as_f64().unwrap() / wealth,
+        ));
+    }
+    assert!((0.1..0.9).contains(&found[0].0), "{found:?}");
+    for (allocation, worth) in &found {
+        // Nearer actions are one to the search, and its optimum is flat.
+        assert!((allocation - found[0].0).abs() < 1e-6 && (worth - found[0].1).abs() < 1e-12, "{found:?}");
+    }
+    // A policy is named by its bytes, which hold the absolute one.
+    let train = |mut problem: Value| {
+        problem["horizon"] = json!(2);
+        json!({ "problem": problem, "design": { "count": 20 } })
+    };
+    app.train(&train(relative())).await;
+    let policy = app.policy.clone();
+    app.train(&train(absolute(0.05))).await;
+    assert_eq!(app.policy, policy);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_answer_to_a_problem_says_what_may_be_a_mistake_and_its_rates_a_year() {
+    let mut app = App::start().await;
+    let problem = json!({ "rate_per_step": 0.03, "periods_per_year": 12, "history": HISTORY, "horizon": 1 });
+    let warned = |answer: &Value| -> Vec<Value> {
+        answer["warnings"].as_array().unwrap().iter().map(|warning| warning["code"].clone()).collect()
+    };
+    let (_, advised) = app.post("/advise", &json!({ "problem": problem })).await;
+    let (status, evaluated) = app.post("/evaluate", &json!({ "problem": problem, "frameworks": [] })).await;
+    assert_eq!(status, 202, "{evaluated}");
+    let request = json!({ "problem": problem, "design": { "count": 20 } });
+    let (_, accepted) = app.post("/train", &request).await;
+    app.train(&request).await;
+    let (_, detail) = app.get(&format!("/policies/{}", app.policy)).await;
+    for answer in [&advised, &evaluated, &accepted, &detail] {
+        assert_eq!(warned(answer), ["rate_high", "rate_above_record"], "{answer}");
+        assert_eq!(answer["warnings"][0]["field"], "problem.rate_per_step");
+    }
+    for answer in [&advised, &detail] {
+        // 1.03^12 by hand, to four digits.
+        assert!((answer["annualised"]["rate"].as_f64().unwrap() - 0.4258).abs() < 5e-5, "{answer}");
+    }
+    let usual = json!({ "problem": { "rate_per_step": 0.002, "history": HISTORY } });
+    let (_, advised) = app.post("/advise", &usual).await;
+    assert_eq!((warned(&advised), advised.get("annualised")), (vec![], None));
 }

@@ -19,7 +19,7 @@ const RADII: [f64; 6] = [0.0, 0.001, 0.004, 0.01, 0.03, 0.1];
 
 /// A part of wealth is always in the bank, so that every loss is bounded.
 fn problem(radius: f64, utility: &Value, support: Option<[f64; 2]>) -> Problem {
-    let mut request = json!({ "problem": { "horizon": 1, "history": HISTORY, "utility": utility,
+    let mut request = json!({ "problem": { "horizon": 1, "rate_per_step": 0.002, "history": HISTORY, "utility": utility,
         "action_interval": [0.0, 0.95], "radius": { "rule": "fixed", "radius": radius } } });
     if let Some([min, max]) = support {
         request["problem"]["support"] = json!({ "min": min, "max": max });
@@ -106,7 +106,7 @@ fn first_step(problem: &Problem) -> RobustSolution {
 #[test]
 fn a_certified_value_is_that_over_all_returns_where_steps_follow() {
     let problem = |radius: f64, support: Option<[f64; 2]>| {
-        let mut request = json!({ "problem": { "horizon": 2, "history": HISTORY, "action_interval": [0.0, 0.95],
+        let mut request = json!({ "problem": { "horizon": 2, "rate_per_step": 0.002, "history": HISTORY, "action_interval": [0.0, 0.95],
             "utility": { "kind": "power", "risk_aversion": 4.0 }, "radius": { "rule": "fixed", "radius": radius } } });
         if let Some([min, max]) = support {
             request["problem"]["support"] = json!({ "min": min, "max": max });
@@ -217,7 +217,7 @@ fn a_support_bounds_where_mass_may_go() {
 fn the_tabulated_field_is_the_value_of_the_next_state() {
     let flows = [(0.0, 0.0), (0.01, 0.0), (0.0, 30.0), (0.01, -30.0)];
     for (utility, (cost, flow)) in utilities().iter().flat_map(|utility| flows.map(|flow| (utility, flow))) {
-        let request = json!({ "problem": { "horizon": 2, "history": HISTORY, "utility": utility, "trading_cost": cost,
+        let request = json!({ "problem": { "horizon": 2, "rate_per_step": 0.002, "history": HISTORY, "utility": utility, "trading_cost": cost,
             "contributions": [flow, -0.7 * flow], "radius": { "rule": "fixed", "radius": 0.004 } }, "design": { "count": 60 } });
         let solved = support::policies::advisor(request);
         let (problem, after) = (solved.policy().problem(Default::default()), &solved.policy().steps()[1].solution);
@@ -245,7 +245,7 @@ fn the_tabulated_field_is_the_value_of_the_next_state() {
 
 /// An investor who holds the highest action, 0.3, under the radius given and under those near it.
 fn last_step_of_at_most_a_third(kind: &Value, radius: f64) -> (Advisor, State, UtilitySpecification) {
-    let request = json!({ "problem": { "horizon": 1, "history": HISTORY, "utility": kind,
+    let request = json!({ "problem": { "horizon": 1, "rate_per_step": 0.002, "history": HISTORY, "utility": kind,
         "action_interval": [0.0, 0.3], "radius": { "rule": "fixed", "radius": radius } } });
     let solved = support::policies::advisor(request);
     let utility_of = solved.specification().problem.utility;
@@ -318,7 +318,7 @@ fn another_radius_is_that_of_a_problem_that_has_it() {
 
 #[test]
 fn what_is_frozen_is_the_set_of_the_history_at_every_state() {
-    let request = json!({ "problem": { "framework": "static", "horizon": 3, "history": HISTORY,
+    let request = json!({ "problem": { "framework": "static", "horizon": 3, "rate_per_step": 0.002, "history": HISTORY,
         "radius": { "rule": "bridge", "alpha": 0.5, "paths": 200 } } });
     let specification = serde_json::from_value::<Specification>(request.clone()).unwrap().completed().unwrap();
     let frozen = Problem::new(&specification);

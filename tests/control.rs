@@ -122,7 +122,8 @@ fn twenty_returns() -> Vec<f64> {
 #[test]
 fn the_known_law_of_the_paper_is_worth_67_36() {
     let solved = advisor(json!({ "problem": {
-        "framework": "known_law", "horizon": 10, "history": twenty_returns(),
+        "framework": "known_law", "horizon": 10, "rate_per_step": 0.002,
+            "utility": { "kind": "exponential", "risk_aversion": 0.01 }, "history": twenty_returns(),
         "law": { "kind": "gaussian_mixture", "components": [
             { "weight": 0.4, "mean": 0.006, "variance": 0.016 },
             { "weight": 0.6, "mean": 0.016, "variance": 0.00625 } ] } } }));
@@ -134,7 +135,8 @@ fn the_known_law_of_the_paper_is_worth_67_36() {
 }
 
 fn small(radius: Value, framework: &str) -> Value {
-    json!({ "problem": { "framework": framework, "horizon": 3, "radius": radius, "history": twenty_returns() },
+    json!({ "problem": { "framework": framework, "horizon": 3, "radius": radius, "rate_per_step": 0.002,
+            "utility": { "kind": "exponential", "risk_aversion": 0.01 }, "history": twenty_returns() },
             "design": { "count": 60 } })
 }
 
@@ -195,9 +197,11 @@ fn values_stay_above_the_floor_and_actions_in_the_interval_everywhere() {
                 "power" => json!({ "kind": kind, "risk_aversion": 3.0 }),
                 _ => json!({ "kind": kind }),
             };
-            let solved = advisor(json!({ "problem": { "horizon": 2, "utility": utility, "history": twenty_returns(),
+            let solved = advisor(
+                json!({ "problem": { "horizon": 2, "utility": utility, "rate_per_step": 0.002, "history": twenty_returns(),
                 "radius": { "rule": "bridge", "alpha": 0.9, "paths": 200, "scale": 0.3 } },
-                "design": { "count": 40 }, "surrogate": { "target": target, "features": features } }));
+                "design": { "count": 40 }, "surrogate": { "target": target, "features": features } }),
+            );
             for (wealth, shift) in [(100.0, 0.0), (3.0, 0.4), (2000.0, -0.4), (100.0, 2.0)] {
                 let history: Vec<f64> = twenty_returns().iter().map(|z| z * (1.0 + shift) + shift).collect();
                 let state = State::new(&history, wealth).unwrap();
@@ -213,14 +217,17 @@ fn values_stay_above_the_floor_and_actions_in_the_interval_everywhere() {
 
 #[test]
 fn a_training_asked_to_stop_solves_nothing() {
-    let training = Training::new(&specification(json!({"problem": {"history": [0.01, -0.02, 0.03]}}))).unwrap();
+    let training = Training::new(&specification(json!({"problem": {"rate_per_step": 0.002,
+            "utility": { "kind": "exponential", "risk_aversion": 0.01 }, "history": [0.01, -0.02, 0.03]}})))
+    .unwrap();
     let watch = Watch { stop: &AtomicBool::new(true), progress: &|_| {} };
     assert!(matches!(training.solve_step(9, None, &watch), Err(TrainError::Stopped)));
 }
 
 #[test]
 fn a_checkpoint_of_another_format_is_not_gone_on_from() {
-    let specification = specification(json!({ "problem": { "horizon": 2, "history": twenty_returns() },
+    let specification = specification(json!({ "problem": { "horizon": 2, "rate_per_step": 0.002,
+            "utility": { "kind": "exponential", "risk_aversion": 0.01 }, "history": twenty_returns() },
         "design": { "count": 12, "initial_laws": "resampled" } }));
     let training = Training::new(&specification).unwrap();
     let watch = Watch::unwatched();
@@ -238,7 +245,7 @@ fn a_known_law_without_a_mean_of_its_exponential_is_solved_within_the_returns_ac
     let law = json!({ "kind": "student_t", "location": 0.0, "scale": 1.0, "degrees_of_freedom": 2.1 });
     for utility in [json!({ "kind": "log" }), json!({ "kind": "power", "risk_aversion": 5.0 })] {
         let solved = advisor(json!({
-            "problem": { "horizon": 2, "framework": "known_law", "law": law, "utility": utility, "history": [0.01, -0.02] },
+            "problem": { "horizon": 2, "framework": "known_law", "law": law, "utility": utility, "rate_per_step": 0.002, "history": [0.01, -0.02] },
             "design": { "count": 20 } }));
         let state = solved.initial_state(None, None).unwrap();
         for mode in [AdviceMode::Surrogate, AdviceMode::Resolve] {
@@ -255,9 +262,8 @@ fn a_known_law_without_a_mean_of_its_exponential_is_solved_within_the_returns_ac
 #[test]
 fn no_import_shows_more_than_the_best_return_earns_in_every_period() {
     let history = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008];
-    let policy = train(
-        json!({ "problem": { "horizon": 3, "rate_per_step": 0.002, "history": history }, "design": { "count": 20 } }),
-    );
+    let policy = train(json!({ "problem": { "horizon": 3, "rate_per_step": 0.002, "history": history,
+            "utility": { "kind": "exponential", "risk_aversion": 0.01 } }, "design": { "count": 20 } }));
     let mut claims: Value = serde_json::from_slice(&policy.to_json().unwrap()).unwrap();
     for step in [1, 2] {
         let solution = &mut claims["steps"][step]["solution"];

@@ -60,7 +60,7 @@ fn the_investor_s_problem_is_solved_alike_by_the_general_solver() {
     ] {
         let costly = problem["trading_cost"].is_number();
         let mut problem = problem;
-        (problem["horizon"], problem["history"]) = (json!(2), json!(HISTORY));
+        (problem["horizon"], problem["history"], problem["rate_per_step"]) = (json!(2), json!(HISTORY), json!(0.002));
         if problem["framework"] != "known_law" {
             problem["radius"] = ball();
         }

@@ -78,7 +78,7 @@ fn twenty_years_of_months_agree_with_share_grids() {
 
 fn of_cost(cost: f64, utility: Value) -> Advisor {
     support::policies::advisor(json!({
-        "problem": { "horizon": 2, "history": HISTORY, "utility": utility, "trading_cost": cost,
+        "problem": { "horizon": 2, "rate_per_step": 0.002, "history": HISTORY, "utility": utility, "trading_cost": cost,
             "radius": { "rule": "root_n", "kappa": 0.01 } },
         "design": { "count": 80 } }))
 }
@@ -172,7 +172,7 @@ fn what_is_read_off_the_policy_is_what_is_solved_anew() {
     // Keeping everything looks best in the window of returns that is wide enough for half of it.
     let tempting = json!({ "horizon": 1, "history": HISTORY, "trading_cost": 0.02, "rate_per_step": 0.002,
         "utility": { "kind": "power", "risk_aversion": 2.0 }, "radius": { "rule": "fixed", "radius": 0.003 } });
-    let bounded = json!({ "horizon": 2, "history": HISTORY, "trading_cost": 0.05, "action_interval": [0.0, 0.53],
+    let bounded = json!({ "horizon": 2, "rate_per_step": 0.002, "history": HISTORY, "trading_cost": 0.05, "action_interval": [0.0, 0.53],
         "utility": { "kind": "log" }, "radius": { "rule": "fixed", "radius": 0.001 } });
     for (problem, design) in [(tempting, 10), (bounded, 60)] {
         let solved = support::policies::advisor(json!({ "problem": problem, "design": { "count": design } }));
@@ -189,7 +189,8 @@ fn what_is_read_off_the_policy_is_what_is_solved_anew() {
 
 #[test]
 fn no_cost_is_the_problem_without_one() {
-    let mut request = json!({ "problem": { "horizon": 2, "history": HISTORY }, "design": { "count": 20 } });
+    let mut request = json!({ "problem": { "horizon": 2, "rate_per_step": 0.002,
+            "utility": { "kind": "exponential", "risk_aversion": 0.01 }, "history": HISTORY }, "design": { "count": 20 } });
     let without = support::policies::train(request.clone()).to_json().unwrap();
     request["problem"]["trading_cost"] = json!(0.0);
     assert!(support::policies::train(request).to_json().unwrap() == without);

@@ -10,7 +10,7 @@ use support::policies::specification;
 const HISTORY: [f64; 6] = [0.03, -0.05, 0.02, 0.06, -0.01, 0.04];
 
 fn request(framework: &str, utility: Value) -> Value {
-    json!({ "problem": { "framework": framework, "horizon": 4, "history": HISTORY, "utility": utility,
+    json!({ "problem": { "framework": framework, "horizon": 4, "rate_per_step": 0.002, "history": HISTORY, "utility": utility,
                 "radius": { "rule": "fixed", "radius": 0.01 } },
             "design": { "count": 20 } })
 }

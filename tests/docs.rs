@@ -326,7 +326,7 @@ fn every_example_fits_its_request() {
 
 #[test]
 fn the_defaults_are_those_of_a_training() {
-    let least = json!({ "problem": { "history": [0.01, -0.02, 0.03] } });
+    let least = json!({ "problem": { "rate_per_step": 0.002, "history": [0.01, -0.02, 0.03] } });
     let completed = serde_json::from_value::<Specification>(least).unwrap().completed().unwrap();
     let completed = serde_json::to_value(completed).unwrap();
     let section = section(&read("docs/requests.md"), "POST /train");
@@ -347,7 +347,7 @@ fn the_defaults_are_those_of_a_training() {
         all.extend(object.keys().map(|name| format!("{part}.{name}")));
     }
     // Required, a part itself, or another field's value.
-    let said_in_words = ["problem.history", "surrogate.bounds", "design.wealth"];
+    let said_in_words = ["problem.history", "problem.rate_per_step", "surrogate.bounds", "design.wealth"];
     all.retain(|name| !said_in_words.contains(&name.as_str()));
     let missing: Vec<&String> = all.iter().filter(|name| !compared.contains(*name)).collect();
     assert!(missing.is_empty(), "no default of {missing:?}");

@@ -65,7 +65,8 @@ fn specification(horizon: usize, length: usize, paths: usize, count: usize) -> S
         0 => json!({ "rule": "root_n", "kappa": 0.05 }),
         paths => json!({ "rule": "bridge", "alpha": 0.1, "paths": paths }),
     };
-    let problem = json!({ "horizon": horizon, "history": history(length), "radius": rule });
+    let problem = json!({ "horizon": horizon, "rate_per_step": 0.002,
+            "utility": { "kind": "exponential", "risk_aversion": 0.01 }, "history": history(length), "radius": rule });
     let value = json!({ "problem": problem, "design": { "count": count } });
     serde_json::from_value::<Specification>(value).unwrap().completed().unwrap()
 }
@@ -126,7 +127,8 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
 }
 
 fn evaluation(mut request: Value) -> EvaluationRequest {
-    request["problem"] = json!({ "horizon": 5, "history": history(40), "radius": { "rule": "bridge", "paths": 2000 } });
+    request["problem"] = json!({ "horizon": 5, "rate_per_step": 0.002,
+            "utility": { "kind": "exponential", "risk_aversion": 0.01 }, "history": history(40), "radius": { "rule": "bridge", "paths": 2000 } });
     request["design"] = json!({ "count": 300 });
     serde_json::from_value::<EvaluationRequest>(request).unwrap().completed().unwrap()
 }

@@ -11,6 +11,7 @@ use ballast::control::evaluation::report::{Costs, EvaluationReport};
 use ballast::control::pool::TrainingPool;
 use ballast::control::problem::utility::utility;
 use ballast::control::progress::Watch;
+use ballast::control::request::evaluation::EvaluationRequest;
 use reqwest::Method;
 use serde_json::{Value, json};
 use support::App;
@@ -20,7 +21,8 @@ use support::patience::assert_within;
 fn paper(rest: Value) -> Value {
     let history: Vec<f64> = (0..20).map(|k| 0.011 + 0.1 * f64::from(7 * k % 20 - 10) / 10.0).collect();
     let mut request = json!({
-        "problem": { "history": history },
+        "problem": { "rate_per_step": 0.002,
+            "utility": { "kind": "exponential", "risk_aversion": 0.01 }, "history": history },
         "design": { "count": 20, "sampling_law": { "kind": "gaussian_mixture", "components": [
             { "weight": 0.4, "mean": 0.006, "variance": 0.016 }, { "weight": 0.6, "mean": 0.016, "variance": 0.00625 } ] } }
     });
@@ -323,4 +325,17 @@ async fn a_key_makes_one_evaluation() {
     assert_eq!((other.0.as_u16(), &other.1["type"]), (409, &json!("/problems/idempotency-conflict")));
     let location = first.1["job"].as_str().unwrap();
     assert_eq!(app.send(Method::POST, &format!("/jobs/{location}/cancel"), None).await.0, 202);
+}
+
+#[test]
+fn a_relative_risk_aversion_and_the_absolute_one_it_stands_for_are_one_evaluation() {
+    let completed = |utility: Value| {
+        let mut request = small(json!({ "problem": { "initial_wealth": 250.0 } }));
+        request["problem"]["utility"] = utility;
+        serde_json::from_value::<EvaluationRequest>(request).unwrap().completed().unwrap()
+    };
+    assert_eq!(
+        completed(json!({ "kind": "exponential", "risk_aversion_relative": 3 })),
+        completed(json!({ "kind": "exponential", "risk_aversion": 3.0 / 250.0 }))
+    );
 }

@@ -41,7 +41,8 @@ fn start_confined(folder: &std::path::Path, arguments: &[&str]) -> (Child, Strin
 
 fn larger_than_memory() -> Value {
     let history = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008];
-    let problem = json!({ "horizon": 2, "history": history, "radius": { "rule": "fixed", "radius": 0.001 } });
+    let problem = json!({ "horizon": 2, "rate_per_step": 0.002,
+            "utility": { "kind": "exponential", "risk_aversion": 0.01 }, "history": history, "radius": { "rule": "fixed", "radius": 0.001 } });
     json!({ "problem": problem, "design": { "count": 6000 } })
 }
 
@@ -130,7 +131,7 @@ async fn policies_of_one_seed_share_their_bridges() {
         let utility = json!({ "kind": "power", "risk_aversion": risk_aversion });
         let radius = json!({ "rule": "bridge", "alpha": 0.1, "paths": 200 });
         let history = monthly_returns();
-        let problem = json!({ "horizon": PERIODS, "history": history, "utility": utility, "radius": radius });
+        let problem = json!({ "horizon": PERIODS, "rate_per_step": 0.002, "history": history, "utility": utility, "radius": radius });
         app.train(&json!({ "problem": problem, "design": { "count": 20 } })).await;
         app.open().await;
         for period in 1..=PERIODS {

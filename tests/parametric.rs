@@ -129,7 +129,7 @@ const HISTORY: [f64; 12] = [0.061, -0.034, 0.082, 0.043, -0.028, 0.017, 0.051, 0
 
 fn small(framework: &str, alpha: f64) -> Value {
     json!({
-        "problem": { "framework": framework, "horizon": 3, "history": HISTORY,
+        "problem": { "framework": framework, "horizon": 3, "rate_per_step": 0.002, "history": HISTORY,
                      "utility": { "kind": "exponential", "risk_aversion": 0.3 },
                      "radius": { "rule": "chi_square", "alpha": alpha } },
         "design": { "count": 60 }
@@ -337,7 +337,7 @@ async fn other_rules_and_bounds_are_refused_by_name() {
         assert_eq!(problem["value"].to_string().trim_matches('"'), shown, "{problem}");
     }
     for framework in FRAMEWORKS {
-        let request = json!({ "problem": { "framework": framework, "history": HISTORY } });
+        let request = json!({ "problem": { "framework": framework, "rate_per_step": 0.002, "history": HISTORY } });
         let completed = json!(specification(request));
         assert_eq!(completed["problem"]["radius"], json!({ "rule": "chi_square", "alpha": 0.1 }));
     }

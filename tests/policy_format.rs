@@ -30,7 +30,7 @@ fn python(arguments: &[&str], asked: &Value) -> Value {
 /// Two steps of 25 design points.
 fn policy(framework: &str, utility: Value, radius: Value, surrogate: Value) -> Value {
     json!({
-        "problem": { "framework": framework, "horizon": 3, "history": HISTORY, "utility": utility, "radius": radius },
+        "problem": { "framework": framework, "horizon": 3, "rate_per_step": 0.002, "history": HISTORY, "utility": utility, "radius": radius },
         "design": { "count": 25 }, "surrogate": surrogate
     })
 }

@@ -72,7 +72,8 @@ fn a_purpose_is_drawn_for_in_one_file() {
 
 fn request(count: usize, horizon: usize) -> Value {
     json!({
-        "problem": { "horizon": horizon, "history": [0.02, -0.03, 0.05, 0.01] },
+        "problem": { "horizon": horizon, "rate_per_step": 0.002,
+            "utility": { "kind": "exponential", "risk_aversion": 0.01 }, "history": [0.02, -0.03, 0.05, 0.01] },
         "design": { "count": count, "initial_laws": "resampled", "wealth": { "min": 50.0, "max": 200.0 } }
     })
 }
@@ -99,7 +100,8 @@ fn a_design_point_is_the_same_in_a_larger_design_and_a_longer_horizon() {
 fn a_path_is_the_same_beside_more_paths_histories_and_strategies() {
     let evaluation = |paths: usize, histories: usize, mixes: Value| {
         let request = json!({
-            "problem": { "horizon": 3, "history": [0.02, -0.03, 0.05, 0.01] }, "frameworks": [], "constant_mixes": mixes,
+            "problem": { "horizon": 3, "rate_per_step": 0.002,
+            "utility": { "kind": "exponential", "risk_aversion": 0.01 }, "history": [0.02, -0.03, 0.05, 0.01] }, "frameworks": [], "constant_mixes": mixes,
             "paths": paths, "histories": { "kind": "drawn", "count": histories } });
         Evaluation::new(serde_json::from_value(request).unwrap()).unwrap()
     };

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use ballast::control::error::FieldError;
 use ballast::control::evaluation::paths::Evaluation;
 use ballast::control::request::evaluation::EvaluationRequest;
+use ballast::http::decode;
 use clap::Args;
 use serde_json::json;
 
@@ -22,14 +23,15 @@ pub struct Evaluate {
     out: PathBuf,
 }
 
-/// Returns of the history where no request is given: the paper's t0.
+/// Returns of the history and steps where no request is given: the paper's t0 and T.
 const SAMPLE_SIZE: usize = 20;
+const HORIZON: usize = 10;
 
 pub fn run(arguments: &Evaluate) -> Result<(), Box<dyn Error>> {
     let request = match &arguments.file {
         Some(file) => read(file)?,
         None => serde_json::from_value(json!({
-            "problem": { "history": paper::history(SAMPLE_SIZE, 1) }, "design": { "sampling_law": paper::mixture() } }))?,
+            "problem": paper::problem(SAMPLE_SIZE, HORIZON), "design": { "sampling_law": paper::mixture() } }))?,
     };
     if let Some(policy) = request.policies.values().next() {
         return Err(
@@ -38,6 +40,9 @@ pub fn run(arguments: &Evaluate) -> Result<(), Box<dyn Error>> {
     }
     let workshop = Workshop::new()?;
     let evaluation = Evaluation::new(request)?;
+    for warning in evaluation.request.problem.warnings() {
+        eprintln!("{}", warning.message);
+    }
     let followers = workshop.train(&evaluation)?;
     let (_, report) = workshop.compare("simulating", &evaluation, &followers, workshop.seconds())?;
     workshop.finish();
@@ -56,7 +61,7 @@ pub fn run(arguments: &Evaluate) -> Result<(), Box<dyn Error>> {
 
 fn read(file: &Path) -> Result<EvaluationRequest, Box<dyn Error>> {
     let text = std::fs::read(file).map_err(|error| format!("reading {}: {error}", file.display()))?;
-    Ok(serde_json::from_slice(&text).map_err(|error| format!("{}: {error}", file.display()))?)
+    Ok(decode::json(&text).map_err(|problem| format!("{}: {}", file.display(), problem.detail))?)
 }
 
 /// Writes one file of the result.

@@ -8,8 +8,8 @@ use crate::control::error::{FieldError, TrainError};
 use crate::control::problem::controlled::Controlled;
 use crate::control::problem::sampling_law::{admissible, continuous_law};
 use crate::control::progress::Watch;
+use crate::control::request::completion::DEFAULT_COUNT;
 use crate::control::request::contributions::Contributions;
-use crate::control::request::rules::DEFAULT_COUNT;
 use crate::control::request::specification::{
     InitialLaws, SamplingLaw, Specification, SurrogateTarget, UtilitySpecification,
 };

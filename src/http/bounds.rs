@@ -8,7 +8,8 @@ use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
 use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
 use crate::control::request::rules::{
-    COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, RADIUS_SCALE, RATE, TRADING_COST, WEALTH,
+    COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR, RADIUS_SCALE, RATE,
+    RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST, WEALTH,
 };
 use crate::service::recording::MOST_CORRECTIONS;
 use crate::service::report::{LONGEST_REASON, PRICE};
@@ -31,6 +32,7 @@ pub fn tell(description: &mut OpenApi) {
 /// Schema, or schema and variant; field; rule.
 fn rules() -> Vec<(&'static str, &'static str, Value)> {
     let within = |low: f64, high: f64| json!({ "minimum": low, "maximum": high });
+    let between = |(low, high)| within(low, high);
     let whole = |range: &std::ops::RangeInclusive<usize>| json!({ "minimum": range.start(), "maximum": range.end() });
     let pair = json!({ "minItems": 2, "maxItems": 2, "items": { "minimum": 1e-12, "maximum": 1e12 } });
     let history = json!({ "minItems": HISTORY_LENGTH.start(), "maxItems": HISTORY_LENGTH.end(),
@@ -39,27 +41,28 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
     let probability = within(1e-3, 0.999);
     let action = json!({ "minItems": 2, "maxItems": 2, "items": within(0.0, 1.0) });
     let reported = ["Observe", "Correct", "Report"].into_iter().flat_map(|schema| {
-        let price = within(PRICE.0, PRICE.1);
         let fields = [
             ("log_return", within(-LOG_RETURN, LOG_RETURN)),
             ("simple_return", within((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())),
-            ("price", price.clone()),
-            ("previous_price", price),
-            ("rate", within(RATE.0, RATE.1)),
+            ("price", between(PRICE)),
+            ("previous_price", between(PRICE)),
+            ("rate", between(RATE)),
             ("flow", within(-WEALTH.1, WEALTH.1)),
             ("executed_allocation", within(0.0, 1.0)),
-            ("wealth", within(WEALTH.0, WEALTH.1)),
+            ("wealth", between(WEALTH)),
         ];
         fields.map(|(field, rule)| (schema, field, rule))
     });
     let rules = [
         ("ProblemSpecification", "horizon", whole(&HORIZON)),
-        ("ProblemSpecification", "rate_per_step", within(RATE.0, RATE.1)),
+        ("ProblemSpecification", "rate_per_step", between(RATE)),
+        ("ProblemSpecification", "periods_per_year", between(PERIODS_PER_YEAR)),
         ("ProblemSpecification", "initial_wealth", wealth.clone()),
         ("ProblemSpecification", "action_interval", action),
         ("ProblemSpecification", "trading_cost", within(TRADING_COST.0, TRADING_COST.1)),
         ("ProblemSpecification", "history", history.clone()),
-        ("UtilitySpecification exponential", "risk_aversion", within(1e-12, 1e9)),
+        ("UtilitySpecification exponential", "risk_aversion", between(RISK_AVERSION)),
+        ("UtilitySpecification exponential", "risk_aversion_relative", between(RISK_AVERSION_RELATIVE)),
         ("UtilitySpecification power", "risk_aversion", json!({ "exclusiveMinimum": 1, "maximum": 100 })),
         ("RadiusRule bridge", "alpha", probability.clone()),
         ("RadiusRule concentration", "alpha", probability),
@@ -167,8 +170,8 @@ mod tests {
     /// The field that the rules refuse in a sound specification with `value` at `pointer`.
     fn refused(pointer: &str, value: Value) -> Option<String> {
         let mut given = json!({
-            "problem": { "history": [0.1, -0.1, 0.05], "horizon": 3, "rate_per_step": 0.0, "initial_wealth": 100.0,
-                "trading_cost": 0.0, "utility": { "kind": "exponential", "risk_aversion": 0.01 },
+            "problem": { "history": [0.1, -0.1, 0.05], "horizon": 3, "rate_per_step": 0.0, "periods_per_year": 12.0,
+                "initial_wealth": 100.0, "trading_cost": 0.0, "utility": { "kind": "exponential", "risk_aversion": 0.01 },
                 "radius": { "rule": "bridge", "alpha": 0.1, "paths": 200, "scale": 1.0 } },
             "design": { "count": 20, "sampling_law": { "kind": "student_t", "location": 0.0, "scale": 0.1,
                 "degrees_of_freedom": 5.0 } },
@@ -190,6 +193,7 @@ mod tests {
         for (pointer, schema, step) in [
             ("/problem/horizon", of("ProblemSpecification", None, "horizon"), 1.0),
             ("/problem/rate_per_step", of("ProblemSpecification", None, "rate_per_step"), 1e-3),
+            ("/problem/periods_per_year", of("ProblemSpecification", None, "periods_per_year"), 1e-3),
             ("/problem/initial_wealth", of("ProblemSpecification", None, "initial_wealth"), 1e-7),
             ("/problem/trading_cost", of("ProblemSpecification", None, "trading_cost"), 1e-3),
             ("/problem/history/0", of("ProblemSpecification", None, "history")["items"].clone(), 1e-3),

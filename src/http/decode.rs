@@ -7,6 +7,12 @@ use serde_path_to_error::{Path, Segment};
 use super::problem::{Problem, ProblemKind};
 use crate::control::error::FieldError;
 
+/// What is meant by fields that must be given because no default is right for all.
+const MEANT: [(&str, &str); 1] = [(
+    "problem.rate_per_step",
+    "it is what the bank pays per period of problem.history, as a fraction; 3 % a year are 0.00247 where periods are months",
+)];
+
 /// Parses a JSON body. Refuses NaN, infinities, numbers beyond double precision, unknown fields (where the type
 /// does), trailing bytes and nesting deeper than 128.
 pub fn json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
@@ -111,7 +117,10 @@ fn located(given: &Value, path: String, message: &str) -> FieldError {
         }
         rule = match message.split_once("`, ") {
             Some((_, expected)) => format!("{meaning}: {expected}"),
-            None => meaning.to_owned(),
+            None => match MEANT.iter().find(|(named, _)| *named == field) {
+                Some((_, meant)) => format!("{meaning}: {meant}"),
+                None => meaning.to_owned(),
+            },
         };
     }
     let value = lookup(given, &field).map_or("null".to_owned(), Value::to_string);
@@ -191,7 +200,10 @@ mod tests {
     fn unknown_and_missing_fields_are_named() {
         let (field, value, _) = refused(r#"{"problem": {"history": [0.1], "colour": 3}}"#);
         assert_eq!((field.as_str(), value), ("problem.colour", Value::from(3)));
-        assert_eq!(refused(r#"{"problem": {}}"#).0, "problem.history");
+        assert_eq!(refused(r#"{"problem": {"rate_per_step": 0.001}}"#).0, "problem.history");
+        let (field, value, rule) = refused(r#"{"problem": {"history": [0.1]}}"#);
+        assert_eq!((field.as_str(), value), ("problem.rate_per_step", Value::Null));
+        assert!(rule.starts_with("must be given: it is what the bank pays per period"), "{rule}");
         assert_eq!(
             refused(r#"{"problem": {"history": [], "utility": {"kind": "log", "x": 1}}}"#).0,
             "problem.utility.x"
@@ -241,8 +253,11 @@ mod tests {
     #[test]
     fn a_whole_number_may_be_written_with_a_point() {
         let read = |body: &str| json::<Specification>(body.as_bytes());
-        let dotted = read(r#"{"problem": {"history": [1.0, -0.0], "horizon": 3.0}, "seed": 7.0}"#).unwrap();
-        assert_eq!(dotted, read(r#"{"problem": {"history": [1, -0.0], "horizon": 3}, "seed": 7}"#).unwrap());
+        let dotted =
+            read(r#"{"problem": {"history": [1.0, -0.0], "rate_per_step": 0.0, "horizon": 3.0}, "seed": 7.0}"#)
+                .unwrap();
+        let whole = r#"{"problem": {"history": [1, -0.0], "rate_per_step": 0, "horizon": 3}, "seed": 7}"#;
+        assert_eq!(dotted, read(whole).unwrap());
         assert_eq!(refused(r#"{"problem": {"history": [1.0], "horizon": 3.5}}"#).0, "problem.horizon");
         let twice = r#"{"problem": {"history": [1.0], "horizon": 3.0, "horizon": 3}}"#;
         assert!(read(twice).is_err(), "a field given twice");

@@ -27,15 +27,15 @@ pub fn tell(description: &mut OpenApi) {
 }
 
 fn told() -> [(&'static str, Map<String, Value>); 7] {
-    let history = json!({ "history": [] });
+    let least = json!({ "history": [], "rate_per_step": 0.0 });
     [
-        ("Specification", of::<Specification>(json!({ "problem": history }))),
-        ("ProblemSpecification", of::<ProblemSpecification>(history.clone())),
+        ("Specification", of::<Specification>(json!({ "problem": least }))),
+        ("ProblemSpecification", of::<ProblemSpecification>(least.clone())),
         ("DesignSpecification", of::<DesignSpecification>(json!({}))),
         ("SurrogateSpecification", of::<SurrogateSpecification>(json!({}))),
         ("HyperparameterBounds", of::<HyperparameterBounds>(json!({}))),
         ("RadiusRule", of::<RadiusRule>(json!({ "rule": "bridge" }))),
-        ("EvaluationRequest", of::<EvaluationRequest>(json!({ "problem": history }))),
+        ("EvaluationRequest", of::<EvaluationRequest>(json!({ "problem": least }))),
     ]
 }
 

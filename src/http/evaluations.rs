@@ -19,7 +19,7 @@ use crate::service::Service;
 #[utoipa::path(post, path = "/evaluate", tag = "jobs",
     request_body(content = EvaluationRequest, example = json!({
         "problem": {
-            "history": [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008],
+            "rate_per_step": 0.0027, "history": [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008],
             "law": { "kind": "gaussian_mixture", "components": [
                 { "weight": 0.4, "mean": 0.006, "variance": 0.016 }, { "weight": 0.6, "mean": 0.016, "variance": 0.00625 }
             ] }
@@ -32,7 +32,7 @@ use crate::service::Service;
     })),
     params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
     responses(
-        (status = 202, description = "Queued; poll the Location or follow its events.", body = wire::Job, headers(
+        (status = 202, description = "Queued; poll the Location or follow its events.", body = wire::AcceptedJob, headers(
             ("Location" = String, description = "The job."),
             ("Retry-After" = u32, description = "Seconds to wait before asking for the job."))),
         (status = 400, description = "The body is not JSON.", body = Problem, content_type = "application/problem+json"),

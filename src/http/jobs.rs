@@ -15,14 +15,14 @@ use super::wire;
 use crate::control::error::FieldError;
 use crate::control::request::specification::Specification;
 use crate::service::Service;
-use crate::service::jobs::Job;
+use crate::service::jobs::Accepted;
 
 /// Queue a training.
 #[utoipa::path(post, path = "/train", tag = "jobs",
     request_body(content = Specification, example = json!({
         "problem": {
-            "framework": "adaptive", "horizon": 12, "rate_per_step": 0.0027, "initial_wealth": 100.0,
-            "action_interval": [0.0, 1.0], "utility": { "kind": "power", "risk_aversion": 3.0 },
+            "framework": "adaptive", "horizon": 12, "rate_per_step": 0.0027, "periods_per_year": 12,
+            "initial_wealth": 100.0, "action_interval": [0.0, 1.0], "utility": { "kind": "power", "risk_aversion": 3.0 },
             "radius": { "rule": "bridge", "alpha": 0.1, "paths": 2000, "scale": 1.0 },
             "history": [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008]
         },
@@ -32,7 +32,7 @@ use crate::service::jobs::Job;
     })),
     params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
     responses(
-        (status = 202, description = "Queued; poll the Location or follow its events.", body = wire::Job, headers(
+        (status = 202, description = "Queued; poll the Location or follow its events.", body = wire::AcceptedJob, headers(
             ("Location" = String, description = "The job."),
             ("Retry-After" = u32, description = "Seconds to wait before asking for the job."))),
         (status = 400, description = "The body is not JSON.", body = Problem, content_type = "application/problem+json"),
@@ -48,10 +48,10 @@ pub async fn train(
 }
 
 /// The answer to a job that was queued.
-pub fn accepted(job: Job) -> Response {
-    let job = wire::Job::from(job);
-    let location = [(header::LOCATION, format!("/jobs/{}", job.job)), (header::RETRY_AFTER, "1".to_owned())];
-    (StatusCode::ACCEPTED, location, Json(job)).into_response()
+pub fn accepted(accepted: Accepted) -> Response {
+    let accepted = wire::AcceptedJob::from(accepted);
+    let location = [(header::LOCATION, format!("/jobs/{}", accepted.job.job)), (header::RETRY_AFTER, "1".to_owned())];
+    (StatusCode::ACCEPTED, location, Json(accepted)).into_response()
 }
 
 pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, Problem> {

@@ -53,6 +53,8 @@ pub async fn get(
         created_ms: row.created_ms,
         framework: specification.problem.framework,
         horizon: specification.problem.horizon,
+        annualised: specification.problem.annualised(),
+        warnings: specification.problem.warnings(),
         diagnostics: advisor.policy().diagnostics().cloned().collect(),
         specification,
     }))

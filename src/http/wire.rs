@@ -7,10 +7,12 @@ use utoipa::ToSchema;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::worst_case::WorstCase;
 use crate::control::progress::Phase;
+use crate::control::request::annualised::Annualised;
 use crate::control::request::framework::Framework;
 use crate::control::request::specification::Specification;
+use crate::control::request::warnings::Warning;
 use crate::control::solved_step::StepDiagnostics;
-use crate::service::jobs::Job as ServiceJob;
+use crate::service::jobs::{Accepted, Job as ServiceJob};
 use crate::service::live::Live;
 use crate::service::sessions::Action as ServiceAction;
 use crate::store::{JobKind, JobState, PolicySummary, SessionSummary};
@@ -77,6 +79,21 @@ impl From<ServiceJob> for Job {
     }
 }
 
+/// A job that was accepted.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct AcceptedJob {
+    #[serde(flatten)]
+    pub job: Job,
+    /// What in the request may be a mistake.
+    pub warnings: Vec<Warning>,
+}
+
+impl From<Accepted> for AcceptedJob {
+    fn from(Accepted { job, warnings }: Accepted) -> Self {
+        AcceptedJob { job: job.into(), warnings }
+    }
+}
+
 /// A page of jobs, newest first.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct JobPage {
@@ -116,6 +133,11 @@ pub struct PolicyDetail {
     pub framework: Framework,
     pub horizon: usize,
     pub specification: Specification,
+    /// Where `problem.periods_per_year` was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub annualised: Option<Annualised>,
+    /// What in the specification may be a mistake.
+    pub warnings: Vec<Warning>,
     pub diagnostics: Vec<StepDiagnostics>,
 }
 

@@ -8,8 +8,10 @@ use super::sessions::Sessions;
 use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::worst_case::WorstCase;
+use crate::control::request::annualised::Annualised;
 use crate::control::request::rules;
 use crate::control::request::specification::{ProblemSpecification, Specification, default_seed};
+use crate::control::request::warnings::Warning;
 use crate::store::Tenant;
 
 /// A question for one period.
@@ -33,6 +35,11 @@ pub struct Advised {
     #[serde(flatten)]
     pub advice: Advice,
     pub worst_case: WorstCase,
+    /// Where `problem.periods_per_year` is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub annualised: Option<Annualised>,
+    /// What in the question may be a mistake.
+    pub warnings: Vec<Warning>,
 }
 
 impl Advise {
@@ -59,6 +66,7 @@ impl Sessions {
         let specification = question.specification()?;
         let investor = self.policies.one_period(&specification)?;
         let (advice, worst_case) = self.resolving.run(tenant, move || investor.advise(holding)).await??;
-        Ok(Advised { advice, worst_case })
+        let problem = &specification.problem;
+        Ok(Advised { advice, worst_case, annualised: problem.annualised(), warnings: problem.warnings() })
     }
 }

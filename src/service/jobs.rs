@@ -15,6 +15,7 @@ use crate::control::estimate;
 use crate::control::policy::content_hash;
 use crate::control::request::evaluation::EvaluationRequest;
 use crate::control::request::specification::Specification;
+use crate::control::request::warnings::Warning;
 use crate::store::{CreateJob, DeleteJob, JobKind, JobRow, NewJob, Store, Tenant};
 
 /// A job as stored, and how far it is where it runs in this process.
@@ -22,6 +23,13 @@ use crate::store::{CreateJob, DeleteJob, JobKind, JobRow, NewJob, Store, Tenant}
 pub struct Job {
     pub row: JobRow,
     pub progress: Option<Progress>,
+}
+
+/// A job that was accepted, and what in its request may be a mistake.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Accepted {
+    pub job: Job,
+    pub warnings: Vec<Warning>,
 }
 
 /// The jobs of the store.
@@ -52,13 +60,14 @@ impl Jobs {
         caller: &Caller,
         specification: Specification,
         key: Option<String>,
-    ) -> Result<Job, ServiceError> {
+    ) -> Result<Accepted, ServiceError> {
         let sent = serde_json::to_vec(&specification).map_err(ServiceError::internal)?;
         let completed = specification.completed()?;
         self.memory.admits(&estimate::training(&completed, self.threads))?;
         self.memory.keeps(&estimate::advising(&completed))?;
         let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
-        self.queue(caller, JobKind::Train, &sent, request_json, completed.problem.horizon, key).await
+        let job = self.queue(caller, JobKind::Train, &sent, request_json, completed.problem.horizon, key).await?;
+        Ok(Accepted { job, warnings: completed.problem.warnings() })
     }
 
     /// Queues an evaluation, whose policies the caller has looked at. The same key and request again give the same job.
@@ -70,12 +79,13 @@ impl Jobs {
         caller: &Caller,
         request: EvaluationRequest,
         key: Option<String>,
-    ) -> Result<Job, ServiceError> {
+    ) -> Result<Accepted, ServiceError> {
         let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
         let completed = request.completed()?;
         self.memory.admits(&estimate::evaluation(&completed, self.threads))?;
         let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
-        self.queue(caller, JobKind::Evaluate, &sent, request_json, completed.step_count(), key).await
+        let job = self.queue(caller, JobKind::Evaluate, &sent, request_json, completed.step_count(), key).await?;
+        Ok(Accepted { job, warnings: completed.problem.warnings() })
     }
 
     async fn queue(

@@ -40,7 +40,7 @@ use audit::Audit;
 use clock::Clock;
 use config::{Config, Role, StoreLocation};
 use error::ServiceError;
-use jobs::{Job, Jobs};
+use jobs::{Accepted, Jobs};
 use keys::{Caller, Keys};
 use memory::Memory;
 use policies::Policies;
@@ -113,7 +113,7 @@ impl Service {
         caller: &Caller,
         request: EvaluationRequest,
         key: Option<String>,
-    ) -> Result<Job, ServiceError> {
+    ) -> Result<Accepted, ServiceError> {
         let completed = request.clone().completed()?;
         for (framework, policy) in &completed.policies {
             let advisor = self.policies.advisor(&caller.tenant, policy).await.map_err(|error| match error {

@@ -14,7 +14,7 @@ before(async () => {
   page.setDefaultTimeout(20_000);
   const radius = { rule: "bridge", alpha: 0.1, scale: 0.2 };
   const { job } = await call(ballast.url, "/train", {
-    problem: { horizon: 4, history: HISTORY, radius },
+    problem: { horizon: 4, rate_per_step: 0.002, utility: { kind: "exponential", risk_aversion: 0.01 }, history: HISTORY, radius },
     design: { count: 100 },
   });
   let now;

@@ -58,6 +58,9 @@ test("an empty service says what to do first", async () => {
 
 test("a refusal is told at the field it names", async () => {
   await page.getByLabel("Returns or prices").fill("0.01 -0.02 0.03");
+  await page.getByRole("button", { name: "Train", exact: true }).click();
+  await page.getByText(/^Bank return per period is blank; it must be a number/).waitFor();
+  await page.getByLabel("Bank return per period").fill("0,2 %");
   await page.getByLabel("Decisions").fill("0");
   await page.getByRole("button", { name: "Train", exact: true }).click();
   const field = page.getByLabel("Decisions");
@@ -84,11 +87,14 @@ test("a training from a file, watched to its end", async () => {
     .waitFor();
   assert.equal(await page.getByLabel("They are").inputValue(), "simple");
   assert.equal(await page.getByLabel("In", { exact: true }).inputValue(), "percent");
+  await page.getByLabel("Utility").selectOption("exponential");
+  await page.getByLabel("Relative risk aversion").fill("1");
   await page.getByLabel("Radius scale").fill("0.2");
   await page.getByLabel("Design points").fill("400");
   await page.getByText("Every field, as JSON").click();
   const request = JSON.parse(await page.getByLabel("Training request as JSON").inputValue());
   assert.equal(request.problem.radius.scale, 0.2);
+  assert.deepEqual(request.problem.utility, { kind: "exponential", risk_aversion_relative: 1 });
   assert.ok(Math.abs(request.problem.history[1] - Math.log(1 - 0.0442)) < 1e-12);
   request.design.sampling_law = { kind: "student_t", location: 0.005, scale: 0.02, degrees_of_freedom: 5 };
   await page.getByLabel("Training request as JSON").fill(JSON.stringify(request));
@@ -197,7 +203,7 @@ test("the surface is what the service advises", async () => {
 
 test("a long training is cancelled", async () => {
   await call(ballast.url, "/train", {
-    problem: { horizon: 60, history: RETURNS.map((value) => value / 100) },
+    problem: { horizon: 60, rate_per_step: 0.002, history: RETURNS.map((value) => value / 100) },
     design: { count: 3000 },
   });
   await go("#/jobs");

@@ -26,6 +26,7 @@ test("a policy is trained with what is added and withdrawn as the form says", as
   await page.goto(`${ballast.url}/#/train`);
   await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
   await page.getByLabel("Decisions").fill("3");
+  await page.getByLabel("Bank return per period").fill("0.2 %");
   await page.getByLabel("Trading cost").fill("1 %");
   await page.getByLabel("Added each period").fill("12 500; -20; 3,5");
   const sent = page.waitForRequest((request) => request.url().endsWith("/train"));
@@ -38,6 +39,7 @@ test("a session says what is added at the end of the period, reckons with it, an
   const { job } = await call(ballast.url, "/train", {
     problem: {
       horizon: 3,
+      rate_per_step: 0.002,
       history: HISTORY,
       utility: { kind: "power", risk_aversion: 3 },
       radius: { rule: "bridge", alpha: 0.5, scale: 0.05 },

@@ -23,7 +23,7 @@ before(async () => {
   [ballast, chromium] = await Promise.all([service(), browser()]);
   page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
   page.setDefaultTimeout(20_000);
-  const problem = { horizon: 2, history: HISTORY };
+  const problem = { horizon: 2, rate_per_step: 0.002, history: HISTORY };
   const design = { count: 20 };
   ({ policy } = await ended((await call(ballast.url, "/train", { problem, design })).job));
   ({ job: evaluation } = await call(ballast.url, "/evaluate", {

@@ -19,7 +19,7 @@ before(async () => {
     (_, k) => 0.005 + 0.03 * Math.sin(7 * k) + 0.02 * Math.cos(3 * k) ** 3,
   );
   const { job } = await call(ballast.url, "/train", {
-    problem: { horizon: 3, history },
+    problem: { horizon: 3, rate_per_step: 0.002, utility: { kind: "exponential", risk_aversion: 0.01 }, history },
     design: { count: 100 },
   });
   for (;;) {

@@ -60,10 +60,11 @@ def table(text: str) -> list[str]:
 CALLS = [
     ('session.action()["allocation"] + 1.0', None),
     ('session.action()["alocation"]', "typeddict-item"),
-    ('ballast.train([0.1, 0.2], kind="price")', None),
-    ('ballast.train([0.1, 0.2], kind="prices")', "arg-type"),
-    ('ballast.train([0.1, 0.2], kind="log", radius={"rule": "fixed", "radius": 0.01})', None),
-    ('ballast.train([0.1, 0.2], kind="log", radius={"rule": "fixed", "kappa": 0.01})', "arg-type"),
+    ('ballast.train([0.1, 0.2], kind="price", rate_per_step=0.0)', None),
+    ('ballast.train([0.1, 0.2], kind="prices", rate_per_step=0.0)', "arg-type"),
+    ('ballast.train([0.1, 0.2], kind="price")', "call-arg"),
+    ('ballast.train([0.1, 0.2], kind="log", rate_per_step=0.0, radius={"rule": "fixed", "radius": 0.01})', None),
+    ('ballast.train([0.1, 0.2], kind="log", rate_per_step=0.0, radius={"rule": "fixed", "kappa": 0.01})', "arg-type"),
     ("session.observe(simple_return=0.01).action()", None),
     ("session.observe(0.01)", "misc"),
 ]

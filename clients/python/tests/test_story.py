@@ -50,6 +50,7 @@ def test_advice_without_a_policy(ballast: Ballast) -> None:
     advised = ballast.advise(
         simple,
         kind="simple",
+        rate_per_step=0.002,
         wealth=250.0,
         holding=0.5,
         utility={"kind": "log"},
@@ -58,8 +59,18 @@ def test_advice_without_a_policy(ballast: Ballast) -> None:
     assert advised["trade"] == pytest.approx(advised["allocation"] - 0.5)
     assert advised["certainty_equivalent"] >= advised["floor"] and advised["worst_case"]["sentence"]
     with pytest.raises(package.InvalidField) as refusal:
-        ballast.advise(simple, kind="simple", horizon=3)
+        ballast.advise(simple, kind="simple", rate_per_step=0.002, horizon=3)
     assert refusal.value.field == "problem.horizon"
+
+
+def test_what_may_be_a_mistake_is_said(ballast: Ballast) -> None:
+    training = train(ballast, rate_per_step=0.03, periods_per_year=12)
+    assert [warning["code"] for warning in training.warnings] == ["rate_high", "rate_above_record"]
+    detail = training.policy().detail()
+    assert detail["warnings"] == training.warnings
+    annualised = detail.get("annualised")
+    assert annualised is not None and annualised["rate"] == pytest.approx(1.03**12 - 1)
+    assert train(ballast).warnings == ballast.training(training.id).warnings == []
 
 
 def test_prices_and_what_was_really_done(session: Session) -> None:
@@ -124,7 +135,7 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
 
 def compare(ballast: Ballast) -> Evaluation:
     """Constant mixes alone, which need no training."""
-    problem: wire.ProblemSpecification = {"history": RETURNS, "horizon": 2}
+    problem: wire.ProblemSpecification = {"history": RETURNS, "rate_per_step": 0.002, "horizon": 2}
     return ballast.evaluate({"problem": problem, "frameworks": [], "constant_mixes": [0.0, 0.5], "paths": 200})
 
 

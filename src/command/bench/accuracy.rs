@@ -28,6 +28,7 @@ use ballast::numerics::streams::stream;
 use ballast::numerics::summary::quantile;
 use clap::Args;
 use rand::RngExt;
+use serde_json::json;
 
 use super::paper;
 
@@ -95,7 +96,7 @@ fn compare(bench: &AccuracyBench) -> Result<(), TrainError> {
     let base = base.completed()?;
     println!("paper's mixture, t0 = {}, T = {}, alpha = {}", bench.sample_size, bench.horizon, bench.alpha);
     let AccuracyBench { trading_cost, contribution, .. } = bench;
-    println!("{:?}, trading cost {trading_cost}, {contribution} added each period", base.problem.utility);
+    println!("{}, trading cost {trading_cost}, {contribution} added each period", json!(base.problem.utility));
     let problem = Problem::new(&base);
     let last = bench.horizon - 1;
     let mut truths = vec![(last, last_truth(&problem, bench.states))];

@@ -73,7 +73,7 @@ pub fn run(bench: &HorizonsBench) -> Result<(), Box<dyn Error>> {
         specification.problem.radius = Some(RadiusRule::RootN { kappa });
         // Where the paper's investor is all in or all out, a more averse one is in between.
         let risk_aversion = if draw % 2 == 0 { 0.01 } else { 0.05 };
-        specification.problem.utility = UtilitySpecification::Exponential { risk_aversion };
+        specification.problem.utility = UtilitySpecification::exponential(risk_aversion);
         let specification = specification.completed()?;
         let found = pool.install(|| trained(&specification))?;
         let truth = pool.install(|| nested(&specification))?;

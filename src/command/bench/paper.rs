@@ -2,7 +2,7 @@
 
 use ballast::control::problem::sampling_law::continuous_law;
 use ballast::control::request::specification::{
-    InitialLaws, MixtureComponent, ProblemSpecification, SamplingLaw, Specification,
+    InitialLaws, MixtureComponent, ProblemSpecification, SamplingLaw, Specification, UtilitySpecification,
 };
 use ballast::numerics::law::ContinuousLaw;
 use ballast::numerics::streams::stream;
@@ -24,10 +24,19 @@ pub fn history(count: usize, seed: u64) -> Vec<f64> {
     (0..count).map(|_| law.draw(&mut generator)).collect()
 }
 
+/// The paper's investor after `sample_size` returns: exponential utility, a bank that pays 0.2 % a step.
+pub fn problem(sample_size: usize, horizon: usize) -> ProblemSpecification {
+    ProblemSpecification {
+        horizon,
+        utility: UtilitySpecification::exponential(0.01),
+        ..ProblemSpecification::of(history(sample_size, 1), 0.002)
+    }
+}
+
 /// The request of the paper with a history of `sample_size` draws.
 pub fn specification(sample_size: usize, horizon: usize, count: usize, initial_laws: InitialLaws) -> Specification {
     let mut specification = Specification {
-        problem: ProblemSpecification { horizon, ..ProblemSpecification::of(history(sample_size, 1)) },
+        problem: problem(sample_size, horizon),
         design: Default::default(),
         surrogate: Default::default(),
         seed: 1,

@@ -64,7 +64,7 @@ pub struct Section {
 /// The request of the paper's problem, for drawn histories of `sample_size` returns.
 pub fn request(plan: &Plan, sample_size: usize, frameworks: &[Framework]) -> Result<EvaluationRequest, Box<dyn Error>> {
     let mut request = json!({
-        "problem": { "horizon": plan.horizon, "history": paper::history(sample_size, 1) },
+        "problem": paper::problem(sample_size, plan.horizon),
         "design": { "sampling_law": paper::mixture(), "count": plan.count },
         "frameworks": frameworks, "paths": plan.paths,
         "histories": { "kind": "drawn", "count": plan.histories },

@@ -113,11 +113,13 @@ impl WalkForward {
             problem: ProblemSpecification {
                 framework,
                 horizon: self.year,
-                rate_per_step: past.last().map_or(0.0, |last| last.bank_return),
                 trading_cost: self.trading_cost,
                 utility: self.utility(),
                 radius: Some(RadiusRule::bridge(alpha)),
-                ..ProblemSpecification::of(past.iter().map(|period| period.log_return).collect())
+                ..ProblemSpecification::of(
+                    past.iter().map(|period| period.log_return).collect(),
+                    past.last().map_or(0.0, |last| last.bank_return),
+                )
             },
             design: DesignSpecification { count: Some(self.count), ..DesignSpecification::default() },
             surrogate: SurrogateSpecification::default(),

@@ -320,7 +320,7 @@ impl Advisor {
     fn utility_per_radius(&self, step: usize, state: &State) -> f64 {
         let floor = self.problem.floor(step, state);
         match self.specification().problem.utility {
-            UtilitySpecification::Exponential { risk_aversion } => floor * (-risk_aversion * floor).exp(),
+            UtilitySpecification::Exponential { risk_aversion, .. } => floor * (-risk_aversion * floor).exp(),
             UtilitySpecification::Power { risk_aversion } => floor.powf(1.0 - risk_aversion),
             UtilitySpecification::Log {} => 1.0,
         }

@@ -180,10 +180,9 @@ mod tests {
     fn what_is_added_and_withdrawn_agrees_with_pencil_and_paper() {
         let problem = ProblemSpecification {
             horizon: 2,
-            rate_per_step: 0.01,
             trading_cost: 0.02,
             contributions: Contributions::Listed(vec![5.0, -21.0]),
-            ..ProblemSpecification::of(vec![0.01, -0.01])
+            ..ProblemSpecification::of(vec![0.01, -0.01], 0.01)
         };
         let periods = Dynamics::of(&problem);
         let (wealth, holding) = periods[0].next(100.0, 0.3, 0.5, 1.2_f64.ln());

@@ -32,7 +32,7 @@ impl RelativeUtility {
     /// The utility seen from a floor of terminal wealth `floor`.
     pub fn new(utility: UtilitySpecification, floor: f64) -> Self {
         match utility {
-            UtilitySpecification::Exponential { risk_aversion } => {
+            UtilitySpecification::Exponential { risk_aversion, .. } => {
                 RelativeUtility::Exponential { k: risk_aversion * floor }
             }
             UtilitySpecification::Power { risk_aversion } => RelativeUtility::Power { eta: risk_aversion },
@@ -106,7 +106,7 @@ impl RelativeUtility {
 /// U(x), as the request defines it.
 pub fn utility(utility: UtilitySpecification, wealth: f64) -> f64 {
     match utility {
-        UtilitySpecification::Exponential { risk_aversion } => -(-risk_aversion * wealth).exp_m1() / risk_aversion,
+        UtilitySpecification::Exponential { risk_aversion, .. } => -(-risk_aversion * wealth).exp_m1() / risk_aversion,
         UtilitySpecification::Power { risk_aversion } => {
             ((1.0 - risk_aversion) * wealth.ln()).exp_m1() / (1.0 - risk_aversion)
         }
@@ -117,7 +117,7 @@ pub fn utility(utility: UtilitySpecification, wealth: f64) -> f64 {
 /// U^{-1}(v): the certainty equivalent of the value v.
 pub fn certainty_equivalent(utility: UtilitySpecification, value: f64) -> f64 {
     match utility {
-        UtilitySpecification::Exponential { risk_aversion } => -(-risk_aversion * value).ln_1p() / risk_aversion,
+        UtilitySpecification::Exponential { risk_aversion, .. } => -(-risk_aversion * value).ln_1p() / risk_aversion,
         // Of unit wealth these are the relative ones.
         _ => RelativeUtility::new(utility, 1.0).inverse(value).exp(),
     }
@@ -130,9 +130,12 @@ mod tests {
     #[test]
     fn many_values_equal_one_by_one() {
         let (relative, gains): (Vec<f64>, [f64; 5]) = (vec![0.01, 0.7, 1.0, 1.2, 3.0], [0.0, 0.01, 0.0, 0.2, 0.5]);
-        for utility in
-            [RelativeUtility::Exponential { k: 1.2 }, RelativeUtility::Power { eta: 3.0 }, RelativeUtility::Log]
-        {
+        for utility in [
+            RelativeUtility::Exponential { k: 1.2 },
+            RelativeUtility::Exponential { k: 1e-16 },
+            RelativeUtility::Power { eta: 3.0 },
+            RelativeUtility::Log,
+        ] {
             let expected = relative.iter().zip(gains).map(|(relative, gain)| utility.value(relative.ln() + gain));
             for (found, expected) in utility.values(relative.clone(), &gains).iter().zip(expected) {
                 // Relative error of two exponentials, and the rounding of 1.
@@ -148,7 +151,7 @@ mod tests {
     fn relative_utility_is_an_affine_map_of_the_utility() {
         let floor = 120.0_f64;
         for (kind, slope) in [
-            (UtilitySpecification::Exponential { risk_aversion: 0.02 }, floor * (-0.02 * floor).exp()),
+            (UtilitySpecification::exponential(0.02), floor * (-0.02 * floor).exp()),
             (UtilitySpecification::Power { risk_aversion: 3.0 }, floor.powi(-2)),
             (UtilitySpecification::Log {}, 1.0),
         ] {

@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
+use crate::control::request::completion::DEFAULT_COUNT_WEALTH_ALONE;
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
-use crate::control::request::rules::{self, DEFAULT_COUNT_WEALTH_ALONE, within};
+use crate::control::request::rules::{self, within};
 use crate::control::request::specification::{
     DesignSpecification, InitialLaws, ProblemSpecification, SamplingLaw, Specification, SurrogateSpecification,
     default_seed,
@@ -103,8 +104,8 @@ impl EvaluationRequest {
         }
         let sampling_law = self.design.sampling_law.get_or_insert(SamplingLaw::Bootstrap {}).clone();
         self.problem.law.get_or_insert(sampling_law);
-        self.problem.contributions = std::mem::take(&mut self.problem.contributions).canonical();
-        self.specification(Framework::KnownLaw, None).completed()?;
+        let completed = self.specification(Framework::KnownLaw, None).completed()?.problem;
+        (self.problem.contributions, self.problem.utility) = (completed.contributions, completed.utility);
         self.check_frameworks()?;
         self.complete_mixes()?;
         if self.frameworks.is_empty() && self.mixes().is_empty() {
@@ -228,6 +229,7 @@ impl EvaluationRequest {
     /// The first part of the problem that differs, under `policies.<framework>`.
     pub fn accepts(&self, framework: Framework, found: &Specification) -> Result<(), FieldError> {
         let mut wanted = self.specification(framework, None).completed()?.problem;
+        wanted.periods_per_year = found.problem.periods_per_year;
         if !framework.is_frozen() {
             wanted.history.clone_from(&found.problem.history);
         }

@@ -14,10 +14,6 @@ use crate::control::request::withdrawals;
 pub const LARGEST_COUNT: usize = 10_000;
 /// Design points of a step.
 pub const COUNT: std::ops::RangeInclusive<usize> = 10..=LARGEST_COUNT;
-/// Design points per step where the law is part of the state: the paper's count.
-pub const DEFAULT_COUNT: usize = 1000;
-/// Design points per step where the state is wealth alone: the paper's count.
-pub const DEFAULT_COUNT_WEALTH_ALONE: usize = 200;
 /// Ten years of weeks.
 pub const HORIZON: std::ops::RangeInclusive<usize> = 1..=520;
 /// Log-returns of a history.
@@ -36,6 +32,12 @@ const DESIGN_NUMBERS: usize = 100_000_000;
 const EXPONENTIAL_SCALE: f64 = 300.0;
 /// Actions closer than 1e-7 are one to the search: an interval must be wider.
 const SMALLEST_HIGHEST_ACTION: f64 = 1e-4;
+/// A period is a year at most and a day at least.
+pub const PERIODS_PER_YEAR: (f64, f64) = (1.0, 366.0);
+/// Absolute risk aversions of exponential utility, per unit of wealth: every relative one at every initial wealth is among them.
+pub const RISK_AVERSION: (f64, f64) = (1e-18, 1e9);
+/// Risk aversions of exponential utility in multiples of one over the initial wealth.
+pub const RISK_AVERSION_RELATIVE: (f64, f64) = (1e-3, 100.0);
 /// Trading costs, shares of what is traded.
 pub const TRADING_COST: (f64, f64) = (0.0, 0.1);
 /// Below, what a trade keeps is lost in rounding.
@@ -52,25 +54,11 @@ pub const RADIUS_SCALE: (f64, f64) = (0.0, 100.0);
 /// Fixed radii, in log-return.
 pub const FIXED_RADIUS: (f64, f64) = (0.0, 10.0);
 
-impl Specification {
-    /// Fills the defaults that depend on other fields and checks every rule.
-    ///
-    /// # Errors
-    /// The first field, in the order of the request, that breaks its rule.
-    pub fn completed(mut self) -> Result<Self, FieldError> {
-        check(&self)?;
-        let learns = self.problem.framework.learns();
-        self.problem.contributions = self.problem.contributions.canonical();
-        self.problem.radius = Some(self.problem.radius_rule());
-        self.design.count.get_or_insert(if learns { DEFAULT_COUNT } else { DEFAULT_COUNT_WEALTH_ALONE });
-        self.design.sampling_law.get_or_insert(SamplingLaw::Bootstrap {});
-        let wealth = self.problem.initial_wealth;
-        self.design.wealth.get_or_insert(Interval { min: wealth, max: wealth });
-        Ok(self)
-    }
-}
-
-fn check(specification: &Specification) -> Result<(), FieldError> {
+/// Checks every rule.
+///
+/// # Errors
+/// The first field, in the order of the request, that breaks its rule.
+pub fn check(specification: &Specification) -> Result<(), FieldError> {
     problem(&specification.problem)?;
     design(specification)?;
     surrogate(&specification.surrogate)
@@ -79,6 +67,8 @@ fn check(specification: &Specification) -> Result<(), FieldError> {
 fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
     whole("problem.horizon", problem.horizon, &HORIZON)?;
     within("problem.rate_per_step", problem.rate_per_step, RATE.0, RATE.1)?;
+    let (fewest, most) = PERIODS_PER_YEAR;
+    problem.periods_per_year.map_or(Ok(()), |count| within("problem.periods_per_year", count, fewest, most))?;
     wealth("problem.initial_wealth", problem.initial_wealth)?;
     let [lowest, highest] = problem.action_interval;
     if lowest != 0.0 {
@@ -146,21 +136,31 @@ fn outside(history: &[f64], support: Option<Interval>) -> Option<(usize, f64)> {
 
 fn utility(problem: &ProblemSpecification) -> Result<(), FieldError> {
     const FIELD: &str = "problem.utility.risk_aversion";
-    match problem.utility {
-        UtilitySpecification::Exponential { risk_aversion } => {
-            within(FIELD, risk_aversion, 1e-12, 1e9)?;
-            not_flat(problem, problem.initial_wealth, (FIELD, risk_aversion), "problem.initial_wealth")
+    const RELATIVE: &str = "problem.utility.risk_aversion_relative";
+    let (field, given, (low, high)) = match problem.utility {
+        UtilitySpecification::Exponential { risk_aversion, risk_aversion_relative: Some(relative) } => {
+            if !risk_aversion.is_nan() {
+                return Err(FieldError::new(RELATIVE, relative, "must be left out where risk_aversion is given"));
+            }
+            (RELATIVE, relative, RISK_AVERSION_RELATIVE)
         }
+        UtilitySpecification::Exponential { risk_aversion, .. } if risk_aversion.is_nan() => {
+            return Err(FieldError::new(FIELD, "null", "must be given, or risk_aversion_relative in its place"));
+        }
+        UtilitySpecification::Exponential { risk_aversion, .. } => (FIELD, risk_aversion, RISK_AVERSION),
         UtilitySpecification::Power { risk_aversion } if !(risk_aversion > 1.0 && risk_aversion <= 100.0) => {
-            Err(FieldError::new(FIELD, risk_aversion, "must lie in (1, 100]; at 1 use the log utility"))
+            return Err(FieldError::new(FIELD, risk_aversion, "must lie in (1, 100]; at 1 use the log utility"));
         }
-        UtilitySpecification::Power { .. } | UtilitySpecification::Log {} => Ok(()),
-    }
+        UtilitySpecification::Power { .. } | UtilitySpecification::Log {} => return Ok(()),
+    };
+    within(field, given, low, high)?;
+    not_flat(problem, problem.initial_wealth, (field, given), "problem.initial_wealth")
 }
 
 /// Checks that utility still grows at a wealth that a problem starts with; else `refused` is, for its product with `other`.
 fn not_flat(problem: &ProblemSpecification, wealth: f64, refused: (&str, f64), other: &str) -> Result<(), FieldError> {
-    let UtilitySpecification::Exponential { risk_aversion } = problem.utility else { return Ok(()) };
+    let utility = problem.utility.absolute(problem.initial_wealth);
+    let UtilitySpecification::Exponential { risk_aversion, .. } = utility else { return Ok(()) };
     if risk_aversion * wealth > EXPONENTIAL_SCALE {
         let rule = format!("times {other} must be at most {EXPONENTIAL_SCALE}");
         return Err(FieldError::new(refused.0, refused.1, rule));

@@ -1,7 +1,7 @@
 //! The training request: every choice a user has, its default and its rule.
 //!
-//! A [`Specification`] arrives with holes; `Specification::completed` fills the defaults that depend on other fields and
-//! checks every rule (`rules.rs`). Only a completed one is stored, hashed and solved.
+//! A [`Specification`] arrives with holes; `Specification::completed` checks every rule (`rules.rs`) and fills what depends on
+//! other fields (`completion.rs`). Only a completed one is stored, hashed and solved.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -49,9 +49,11 @@ pub struct ProblemSpecification {
     /// Number of allocation decisions, T.
     #[serde(default = "defaults::horizon")]
     pub horizon: usize,
-    /// Bank return per step, r: wealth in the bank grows by the factor 1 + r.
-    #[serde(default = "defaults::rate_per_step")]
+    /// Bank return per step, r, as a fraction: wealth in the bank grows by the factor 1 + r. 3 % a year are 0.00247 a month.
     pub rate_per_step: f64,
+    /// Periods of the history in a year, 12 where they are months: what is said a year is said with it. It changes no advice.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub periods_per_year: Option<f64>,
     /// x_0, in any currency.
     #[serde(default = "defaults::initial_wealth")]
     pub initial_wealth: f64,
@@ -85,10 +87,14 @@ pub struct ProblemSpecification {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum UtilitySpecification {
-    /// `(1 - exp(-risk_aversion x)) / risk_aversion`, risk aversion per unit of wealth.
+    /// `(1 - exp(-risk_aversion x)) / risk_aversion`, risk aversion per unit of wealth. Exactly one of its fields is given.
     Exponential {
         /// Absolute, per unit of wealth.
+        #[serde(default = "defaults::not_given")]
         risk_aversion: f64,
+        /// The same times the initial wealth, without unit; a completed specification has the absolute one.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        risk_aversion_relative: Option<f64>,
     },
     /// `(x^(1 - risk_aversion) - 1) / (1 - risk_aversion)`, risk aversion above 1.
     Power {
@@ -101,17 +107,38 @@ pub enum UtilitySpecification {
 
 impl Default for UtilitySpecification {
     fn default() -> Self {
-        UtilitySpecification::Exponential { risk_aversion: 0.01 }
+        UtilitySpecification::Power { risk_aversion: 3.0 }
+    }
+}
+
+impl UtilitySpecification {
+    /// Exponential utility of this absolute risk aversion.
+    pub fn exponential(risk_aversion: f64) -> Self {
+        UtilitySpecification::Exponential { risk_aversion, risk_aversion_relative: None }
+    }
+
+    /// The same with its risk aversion per unit of wealth, for who starts with `initial_wealth`:
+    /// `risk_aversion = risk_aversion_relative / initial_wealth`.
+    /// Checked by: `tests/advise.rs::a_relative_risk_aversion_is_of_the_wealth_at_the_start`.
+    #[must_use]
+    pub fn absolute(self, initial_wealth: f64) -> Self {
+        match self {
+            UtilitySpecification::Exponential { risk_aversion_relative: Some(relative), .. } => {
+                UtilitySpecification::exponential(relative / initial_wealth)
+            }
+            absolute => absolute,
+        }
     }
 }
 
 impl ProblemSpecification {
-    /// The problem of an investor who has seen `history`, every default taken: the paper's.
-    pub fn of(history: Vec<f64>) -> Self {
+    /// The problem of an investor who has seen `history` and whose bank pays `rate_per_step`, every default taken.
+    pub fn of(history: Vec<f64>, rate_per_step: f64) -> Self {
         ProblemSpecification {
             framework: Framework::default(),
             horizon: defaults::horizon(),
-            rate_per_step: defaults::rate_per_step(),
+            rate_per_step,
+            periods_per_year: None,
             initial_wealth: defaults::initial_wealth(),
             action_interval: defaults::action_interval(),
             trading_cost: 0.0,
@@ -283,13 +310,14 @@ pub fn default_seed() -> u64 {
     1
 }
 
-/// Defaults that do not depend on other fields: the paper's configuration.
+/// Defaults that do not depend on other fields.
 mod defaults {
     pub fn horizon() -> usize {
         10
     }
-    pub fn rate_per_step() -> f64 {
-        0.002
+    /// Stands for a number that is not given, which no JSON says.
+    pub fn not_given() -> f64 {
+        f64::NAN
     }
     pub fn initial_wealth() -> f64 {
         100.0

@@ -190,8 +190,7 @@ mod tests {
 
     fn estimator(framework: &str, rule: Value) -> RadiusEstimator {
         let history = [0.01, -0.02, 0.03, 0.005];
-        let request =
-            json!({ "problem": { "framework": framework, "horizon": 3, "radius": rule, "history": history } });
+        let request = json!({ "problem": { "framework": framework, "horizon": 3, "rate_per_step": 0.0, "radius": rule, "history": history } });
         let specification = serde_json::from_value::<Specification>(request).unwrap();
         RadiusEstimator::new(&specification, Kept::default())
     }

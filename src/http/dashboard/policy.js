@@ -4,7 +4,7 @@ import { download, get, offers, remove } from "./api.js";
 import { lineChart } from "./chart.js";
 import { announce, disclosure, h, section, table } from "./dom.js";
 import { basisPoints, count, moment, percent, percentTick, short, significant } from "./format.js";
-import { FRAMEWORKS, inWords } from "./specification.js";
+import { FRAMEWORKS, inWords, warningList } from "./specification.js";
 import { surfaceView } from "./surface_view.js";
 
 /** Documents larger than this, in bytes, are fetched for the surface when asked only. */
@@ -17,12 +17,13 @@ const FUNCTIONS = { free: 2, costly: 19 };
 
 export async function view(id, leaving) {
   const policy = await get(`/policies/${id}`, leaving);
-  const { specification, diagnostics } = policy;
+  const { specification, diagnostics, annualised, warnings } = policy;
   const body = [
     h(
       "div",
       { class: "words" },
-      inWords(specification).map((sentence) => h("p", {}, sentence)),
+      inWords(specification, annualised).map((sentence) => h("p", {}, sentence)),
+      warningList(warnings),
     ),
     disclosure("The whole specification", () => h("pre", { tabindex: 0 }, JSON.stringify(specification, null, 1))),
     surface(policy, leaving),

@@ -1,5 +1,6 @@
 // A training request in words.
 
+import { h } from "./dom.js";
 import * as flows from "./flows.js";
 import { count, counted, percent, significant, wealth } from "./format.js";
 
@@ -72,16 +73,21 @@ export const hasBall = ({ framework }) => framework === "adaptive" || framework 
 /** True where the uncertainty set is a confidence region of a normal law. */
 export const isParametric = (framework) => framework.startsWith("parametric");
 
-/** The whole specification, a sentence a choice. */
-export function inWords({ problem, design, surrogate, seed }) {
+/** What may be a mistake in a request. */
+export function warningList(warnings) {
+  return warnings.map(({ message }) => h("p", { class: "note wrong" }, message));
+}
+
+/** The whole specification, a sentence a choice; `annualised` is what the service says by the year, where it does. */
+export function inWords({ problem, design, surrogate, seed }, annualised) {
   const { mean, deviation } = moments(problem.history);
   const limit = problem.action_interval[1];
   const ball = hasBall(problem) ? ` The radius of the ball is ${radiusRule(problem.radius)}.` : "";
   const laws = design.initial_laws === "resampled" ? "starting from resampled histories" : "starting from this history";
   return [
     `${MEANINGS[problem.framework]}${ball}`,
-    `${counted(problem.horizon, "decision")} with ${utility(problem.utility)}; the bank pays ${percent(problem.rate_per_step, 2)} a period, and up to ${percent(limit, 0)} of wealth may be at risk. It starts with ${wealth(problem.initial_wealth)}. ${trading(problem)} ${flows.inWords(problem)}`.trim(),
-    `The history holds ${counted(problem.history.length, "log-return")}: mean ${percent(mean, 2)}, standard deviation ${percent(deviation, 2)} a period.`,
+    `${counted(problem.horizon, "decision")} with ${utility(problem.utility)}; the bank pays ${percent(problem.rate_per_step, 2)} a period${annualised ? ` (${percent(annualised.rate, 2)} a year)` : ""}, and up to ${percent(limit, 0)} of wealth may be at risk. It starts with ${wealth(problem.initial_wealth)}. ${trading(problem)} ${flows.inWords(problem)}`.trim(),
+    `The history holds ${counted(problem.history.length, "log-return")}: mean ${percent(mean, 2)}, standard deviation ${percent(deviation, 2)} a period.${annualised ? ` By the year the asset returned ${percent(annualised.mean_return)} on average, with a standard deviation of ${percent(annualised.deviation)}.` : ""}`,
     `Each step was solved at ${counted(design.count, "state")} simulated under ${law(design.sampling_law)}, ${laws}; surrogates of the ${surrogate.target === "value" ? "value" : "gain over the floor"} on ${surrogate.features === "raw_moments" ? "raw" : "standardised"} features. Seed ${count(seed)}.`,
   ];
 }

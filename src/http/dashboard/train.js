@@ -5,11 +5,15 @@ import { announce, h } from "./dom.js";
 import { fieldset, input, select, showProblem } from "./form.js";
 import { typed } from "./number_text.js";
 import { returnsField } from "./returns_field.js";
-import { isParametric } from "./specification.js";
+import { isParametric, warningList } from "./specification.js";
 
 const UTILITIES = { exponential: "Exponential", power: "Power", log: "Log" };
-/** Risk aversions to start from: the paper's, and a usual one. */
-const AVERSION = { exponential: 0.01, power: 3 };
+/** Each kind with a usual risk aversion, in multiples of one over the initial wealth where that is meant. */
+const UTILITY = {
+  exponential: { kind: "exponential", risk_aversion_relative: 3 },
+  power: { kind: "power", risk_aversion: 3 },
+  log: { kind: "log" },
+};
 const FRAMEWORKS = {
   adaptive: "Adaptive robust",
   static: "Static robust",
@@ -21,16 +25,17 @@ const FRAMEWORKS = {
 /** Fields that are parts of one, and may be given in percent. */
 const SHARES = ["problem.rate_per_step", "problem.trading_cost", "problem.radius.alpha"];
 
-/** What the form starts from. */
+/** What the form starts from; what is null is to be filled in, or may be left out. */
 const initial = () => ({
   problem: {
     framework: "adaptive",
     horizon: 12,
-    rate_per_step: 0.002,
+    rate_per_step: null,
+    periods_per_year: null,
     initial_wealth: 100,
     trading_cost: 0,
     contributions: 0,
-    utility: { kind: "exponential", risk_aversion: AVERSION.exponential },
+    utility: { ...UTILITY.power },
     radius: { rule: "bridge", alpha: 0.1, scale: 1 },
     history: [],
   },
@@ -62,12 +67,7 @@ export async function view(_, leaving) {
     },
   });
   const fields = mainFields((path, value) => {
-    if (path === "problem.utility.kind")
-      put(
-        request,
-        "problem.utility",
-        value === "log" ? { kind: value } : { kind: value, risk_aversion: AVERSION[value] },
-      );
+    if (path === "problem.utility.kind") put(request, "problem.utility", { ...UTILITY[value] });
     else put(request, path, value);
     if (path === "problem.framework") {
       const { alpha = 0.1 } = request.problem.radius ?? {};
@@ -131,7 +131,8 @@ export async function view(_, leaving) {
     try {
       const job = await post("/train", json.value);
       announce(`Training ${job.job} is queued.`);
-      location.hash = "#/jobs";
+      if (job.warnings.length > 0) form.replaceWith(warned(job.warnings));
+      else location.hash = "#/jobs";
     } catch (error) {
       if (error.field === "body") advanced.open = true;
       showProblem(form, message, error, json);
@@ -142,6 +143,17 @@ export async function view(_, leaving) {
   written();
   const trail = h("p", { class: "trail" }, h("a", { href: "#/jobs" }, "Jobs"));
   return { title: "Train a policy", trail, body: form };
+}
+
+/** What stands in the place of the form once a training is queued whose request may be a mistake. */
+function warned(warnings) {
+  return h(
+    "div",
+    { class: "words", role: "status" },
+    h("p", {}, "The training is queued. Is this meant?"),
+    warningList(warnings),
+    h("p", {}, "If not, cancel it among the ", h("a", { href: "#/jobs" }, "jobs"), " and train anew."),
+  );
 }
 
 /** JSON with a line a field, numbers of the history side by side. */
@@ -176,7 +188,12 @@ function mainFields(changed) {
       changed: (value) => changed("problem.framework", value),
     }),
     number("problem.horizon", "Decisions", "Periods to live through, 1 to 520."),
-    number("problem.rate_per_step", "Bank return per period", "0.002 or 0.2 % a period."),
+    number(
+      "problem.rate_per_step",
+      "Bank return per period",
+      "Of one period of the returns: 3 % a year are 0.247 % a month, or 0.00247.",
+    ),
+    number("problem.periods_per_year", "Periods a year", "May be blank. 12 of months; rates are then told a year, too."),
     number("problem.initial_wealth", "Initial wealth", "In any unit."),
     number("problem.trading_cost", "Trading cost", "Of what is traded: 0.002 or 0.2 %; 0 is free."),
     input({
@@ -192,6 +209,11 @@ function mainFields(changed) {
       changed: (value) => changed("problem.utility.kind", value),
     }),
     number("problem.utility.risk_aversion", "Risk aversion", "Exponential: per unit of wealth. Power: above 1."),
+    number(
+      "problem.utility.risk_aversion_relative",
+      "Relative risk aversion",
+      "Over the initial wealth: of one who starts with 100, 3 is 0.03 per unit of wealth.",
+    ),
     number("problem.radius.alpha", "Miscoverage alpha", "Smaller guards against more: 0.1 takes the 90 % quantile."),
     number("problem.radius.scale", "Radius scale", "Multiplies the radius; 0 trusts the returns seen."),
     number("design.count", "Design points", "States solved per step: more is finer and slower, 10 to 10,000."),
@@ -205,9 +227,9 @@ function mainFields(changed) {
     }
   };
   const elements = [
-    fieldset("The investor", parts.slice(1, 8)),
-    fieldset("What he guards against", [parts[0], parts[8], parts[9]]),
-    fieldset("Precision", parts.slice(10)),
+    fieldset("The investor", parts.slice(1, 10)),
+    fieldset("What he guards against", [parts[0], parts[10], parts[11]]),
+    fieldset("Precision", parts.slice(12)),
   ];
   return { elements, show };
 }

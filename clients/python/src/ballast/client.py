@@ -48,9 +48,10 @@ class Ballast:
         returns: Returns,
         *,
         kind: Kind,
+        rate_per_step: float,
+        periods_per_year: float | None = None,
         framework: wire.Framework | None = None,
         horizon: int | None = None,
-        rate_per_step: float | None = None,
         initial_wealth: float | None = None,
         action_interval: Sequence[float] | None = None,
         trading_cost: float | None = None,
@@ -67,7 +68,8 @@ class Ballast:
         """Queues a training on the returns seen so far, and does not wait for it.
 
         ``returns`` is a list, an array, a Series or a DataFrame of one column, and ``kind`` says of what: ``"simple"``
-        or ``"log"`` returns or ``"price"``. What is left out the service chooses, and ``Policy.detail`` tells. The
+        or ``"log"`` returns or ``"price"``. ``rate_per_step`` is what the bank pays per period of the returns, as a
+        fraction: 0.00247 a month for 3 % a year. What is left out the service chooses, and ``Policy.detail`` tells. The
         same ``idempotency_key`` and arguments again, even from another process, give the same job.
         """
         problem = {
@@ -75,6 +77,7 @@ class Ballast:
             "framework": framework,
             "horizon": horizon,
             "rate_per_step": rate_per_step,
+            "periods_per_year": periods_per_year,
             "initial_wealth": initial_wealth,
             "action_interval": None if action_interval is None else list(action_interval),
             "trading_cost": trading_cost,
@@ -92,18 +95,19 @@ class Ballast:
         returns: Returns,
         *,
         kind: Kind,
+        rate_per_step: float,
         wealth: float | None = None,
         holding: float | None = None,
         **problem: Any,
     ) -> wire.Advised:
         """What to hold through one period, given the returns seen so far. Nothing is trained or stored.
 
-        ``returns`` and ``kind`` are as in ``train``, and so is every field of the problem that is given by name, such
-        as ``rate_per_step``, ``utility`` or ``trading_cost``. ``wealth`` and ``holding`` are what the investor has, and
-        what share of it is in the asset already.
+        ``returns``, ``kind`` and ``rate_per_step`` are as in ``train``, and so is every other field of the problem that
+        is given by name, such as ``utility`` or ``trading_cost``. ``wealth`` and ``holding`` are what the investor has,
+        and what share of it is in the asset already.
         """
         question = {
-            "problem": {"history": log_returns(returns, kind), **_given(problem)},
+            "problem": {"history": log_returns(returns, kind), "rate_per_step": rate_per_step, **_given(problem)},
             "wealth": wealth,
             "holding": holding,
         }

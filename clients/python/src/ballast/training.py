@@ -34,6 +34,8 @@ class Job:
         self._path = f"/jobs/{quote(job['job'], safe='')}"
         #: The job as last seen.
         self.job = job
+        #: What in the request may be a mistake, as the service said when it took it; empty for a job found again.
+        self.warnings: list[wire.Warning] = list(cast(wire.AcceptedJob, job).get("warnings", []))
 
     @property
     def id(self) -> str:

@@ -10,6 +10,17 @@ AdviceSource: TypeAlias = Literal["policy_surrogate", "resolved", "resolved_outs
 """Where an advice came from."""
 
 
+class Annualised(TypedDict):
+    """The problem's rate and record by the year, with p periods in one. Fractions, each at most the largest double."""
+
+    rate: float
+    """What the bank pays, compounded: `(1 + r)^p - 1`."""
+    mean_return: float
+    """What the asset paid, compounded: `m^p - 1`, m the mean of `e^z` over the log-returns z of the history."""
+    deviation: float
+    """Standard deviation of the history's log-returns, of independent periods: `sqrt(p)` times that of one."""
+
+
 class AuditEntry(TypedDict):
     """One thing that was done."""
 
@@ -516,10 +527,12 @@ class UtilityReport(TypedDict):
 
 
 class UtilitySpecification1(TypedDict):
-    """`(1 - exp(-risk_aversion x)) / risk_aversion`, risk aversion per unit of wealth."""
+    """`(1 - exp(-risk_aversion x)) / risk_aversion`, risk aversion per unit of wealth. Exactly one of its fields is given."""
 
-    risk_aversion: float
+    risk_aversion: NotRequired[float]
     """Absolute, per unit of wealth."""
+    risk_aversion_relative: NotRequired[float | None]
+    """The same times the initial wealth, without unit; a completed specification has the absolute one."""
     kind: Literal["exponential"]
 
 
@@ -539,6 +552,10 @@ class UtilitySpecification3(TypedDict):
 
 UtilitySpecification: TypeAlias = UtilitySpecification1 | UtilitySpecification2 | UtilitySpecification3
 """Utility of terminal wealth, always maximised."""
+
+
+WarningCode: TypeAlias = Literal["rate_high", "rate_above_record", "record_in_percent", "trading_cost_high"]
+"""What is warned of."""
 
 
 class WealthReport(TypedDict):
@@ -729,8 +746,10 @@ class ProblemSpecification(TypedDict):
     """What the investor is robust against."""
     horizon: NotRequired[int]
     """Number of allocation decisions, T."""
-    rate_per_step: NotRequired[float]
-    """Bank return per step, r: wealth in the bank grows by the factor 1 + r."""
+    rate_per_step: float
+    """Bank return per step, r, as a fraction: wealth in the bank grows by the factor 1 + r. 3 % a year are 0.00247 a month."""
+    periods_per_year: NotRequired[float | None]
+    """Periods of the history in a year, 12 where they are months: what is said a year is said with it. It changes no advice."""
     initial_wealth: NotRequired[float]
     """x_0, in any currency."""
     action_interval: NotRequired[list[ActionIntervalItem]]
@@ -832,6 +851,17 @@ class Sweep(TypedDict):
     wealth: NotRequired[SweepRange | None]
 
 
+class Warning(TypedDict):
+    """Something in a sound request that may be a mistake."""
+
+    code: WarningCode
+    """What is warned of."""
+    field: str
+    """Dotted path in the request."""
+    message: str
+    """What it holds, what that means, and what it should hold if something else was meant, in sentences."""
+
+
 class WhatIf(TypedDict):
     """What is supposed of a session. What is not given stays as it is."""
 
@@ -896,6 +926,9 @@ class Advised(Advice):
     """The advice, and the law that is worst for it."""
 
     worst_case: WorstCase
+    annualised: NotRequired[Annualised | None]
+    warnings: list[Warning]
+    """What in the question may be a mistake."""
 
 
 class Coverage(TypedDict):
@@ -1030,6 +1063,13 @@ class WhatIfPoint(Advice):
     worst_case: NotRequired[WorstCase | None]
 
 
+class AcceptedJob(Job):
+    """A job that was accepted."""
+
+    warnings: list[Warning]
+    """What in the request may be a mistake."""
+
+
 class EvaluationReport(TypedDict):
     """Strategies compared on common returns. `docs/evaluation.md` says where the intervals come from."""
 
@@ -1071,6 +1111,9 @@ class PolicyDetail(TypedDict):
     framework: Framework
     horizon: int
     specification: Specification
+    annualised: NotRequired[Annualised | None]
+    warnings: list[Warning]
+    """What in the specification may be a mistake."""
     diagnostics: list[StepDiagnostics]
 
 

@@ -1,0 +1,74 @@
+//! Rates and returns by the year.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::control::request::specification::ProblemSpecification;
+use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::moments::CentralMoments;
+
+/// The problem's rate and record by the year, with p periods in one. Fractions, each at most the largest double.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Annualised {
+    /// What the bank pays, compounded: `(1 + r)^p - 1`.
+    pub rate: f64,
+    /// What the asset paid, compounded: `m^p - 1`, m the mean of `e^z` over the log-returns z of the history.
+    pub mean_return: f64,
+    /// Standard deviation of the history's log-returns, of independent periods: `sqrt(p)` times that of one.
+    pub deviation: f64,
+}
+
+impl ProblemSpecification {
+    /// By the year, where it is said how many periods that has. Cost O(n ln n) for n returns.
+    ///
+    /// Checked by: `a_year_of_known_periods_is_what_its_prices_say`.
+    pub fn annualised(&self) -> Option<Annualised> {
+        let periods = self.periods_per_year?;
+        Some(Annualised {
+            rate: compounded(self.rate_per_step, periods),
+            mean_return: compounded(self.mean_return(), periods),
+            deviation: periods.sqrt() * self.deviation(),
+        })
+    }
+
+    /// Mean of the history's simple returns, `e^z - 1`, of one period.
+    pub fn mean_return(&self) -> f64 {
+        self.history.iter().map(|z| z.exp_m1()).sum::<f64>() / self.history.len() as f64
+    }
+
+    /// Standard deviation of the history's log-returns, of one period, with the divisor n.
+    pub fn deviation(&self) -> f64 {
+        CentralMoments::of(&EmpiricalDistribution::new(&self.history)).variance().sqrt()
+    }
+}
+
+/// A simple return earned `periods` times over.
+pub fn compounded(simple_return: f64, periods: f64) -> f64 {
+    (periods * simple_return.ln_1p()).exp_m1().min(f64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Prices that go up by a fifth or down by a tenth, each half of the time: 5 % on average. In two periods wealth grows by
+    /// 1.05^2, the bank's by 1.01^2; the log-return lies half of ln(1.2 / 0.9) off its mean.
+    #[test]
+    fn a_year_of_known_periods_is_what_its_prices_say() {
+        let mut problem = ProblemSpecification::of(vec![1.2_f64.ln(), 0.9_f64.ln()], 0.01);
+        assert_eq!(problem.annualised(), None);
+        problem.periods_per_year = Some(2.0);
+        let Annualised { rate, mean_return, deviation } = problem.annualised().unwrap();
+        // Roundings of numbers near 1.
+        assert!((rate - 0.0201).abs() < 1e-15 && (mean_return - 0.1025).abs() < 1e-15, "{rate} {mean_return}");
+        assert!((deviation - 0.5_f64.sqrt() * (1.2_f64 / 0.9).ln()).abs() < 1e-15, "{deviation}");
+    }
+
+    #[test]
+    fn the_largest_of_what_is_accepted_is_a_number() {
+        let problem =
+            ProblemSpecification { periods_per_year: Some(366.0), ..ProblemSpecification::of(vec![5.0, 4.0], 0.5) };
+        let Annualised { rate, mean_return, deviation } = problem.annualised().unwrap();
+        assert!(rate.is_finite() && mean_return == f64::MAX && deviation.is_finite());
+    }
+}

@@ -1,0 +1,29 @@
+//! What a specification leaves out, filled in.
+
+use crate::control::error::FieldError;
+use crate::control::request::rules;
+use crate::control::request::specification::{Interval, SamplingLaw, Specification};
+
+/// Design points per step where the law is part of the state: the paper's count.
+pub const DEFAULT_COUNT: usize = 1000;
+/// Design points per step where the state is wealth alone: the paper's count.
+pub const DEFAULT_COUNT_WEALTH_ALONE: usize = 200;
+
+impl Specification {
+    /// Checks every rule, and fills what depends on other fields.
+    ///
+    /// # Errors
+    /// The first field, in the order of the request, that breaks its rule.
+    pub fn completed(mut self) -> Result<Self, FieldError> {
+        rules::check(&self)?;
+        let learns = self.problem.framework.learns();
+        let wealth = self.problem.initial_wealth;
+        self.problem.contributions = self.problem.contributions.canonical();
+        self.problem.utility = self.problem.utility.absolute(wealth);
+        self.problem.radius = Some(self.problem.radius_rule());
+        self.design.count.get_or_insert(if learns { DEFAULT_COUNT } else { DEFAULT_COUNT_WEALTH_ALONE });
+        self.design.sampling_law.get_or_insert(SamplingLaw::Bootstrap {});
+        self.design.wealth.get_or_insert(Interval { min: wealth, max: wealth });
+        Ok(self)
+    }
+}

@@ -1,0 +1,152 @@
+//! What a request that keeps every rule may all the same have meant otherwise: a unit mistaken, above all.
+//!
+//! A warning refuses nothing, since each of these requests can be meant: banks have paid 50 % a year, and coins have moved as
+//! much in a day.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::control::request::annualised::compounded;
+use crate::control::request::specification::ProblemSpecification;
+
+/// Rates a year beyond it are rarely paid in a currency that keeps its worth.
+const HIGH_RATE_A_YEAR: f64 = 0.15;
+/// Deviations of log-returns a year beyond it are those of daily or monthly returns in percent. Shares have 0.15 to 1, coins up
+/// to 2.5; the returns of an index in percent have from 10 (months) to 16 (days).
+const LARGE_DEVIATION_A_YEAR: f64 = 3.0;
+/// The same of one period, where nobody says how long it is: more than most shares move in a year.
+const LARGE_DEVIATION: f64 = 0.5;
+/// Costs beyond it are those of houses, not of what is traded every period.
+const HIGH_TRADING_COST: f64 = 0.02;
+
+/// Something in a sound request that may be a mistake.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Warning {
+    /// What is warned of.
+    pub code: WarningCode,
+    /// Dotted path in the request.
+    pub field: &'static str,
+    /// What it holds, what that means, and what it should hold if something else was meant, in sentences.
+    pub message: String,
+}
+
+/// What is warned of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WarningCode {
+    /// The bank pays more than 15 % a year. Without `periods_per_year` a period is taken for a year, which it is at most.
+    RateHigh,
+    /// The bank pays more than the mean of the record's simple returns.
+    RateAboveRecord,
+    /// The record's log-returns deviate by more than 3 a year, or by more than 0.5 a period where `periods_per_year` is not
+    /// given.
+    RecordInPercent,
+    /// Trading costs more than 2 %.
+    TradingCostHigh,
+}
+
+impl ProblemSpecification {
+    /// What may be a mistake, in the order of the request. Cost O(n ln n) for n returns.
+    ///
+    /// Checked by: `what_is_mistaken_is_warned_of_and_what_is_usual_is_not`.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let (rate, cost, periods) = (self.rate_per_step, self.trading_cost, self.periods_per_year);
+        let (mean, deviation) = (self.mean_return(), self.deviation());
+        let a_year = compounded(rate, periods.unwrap_or(1.0));
+        let year =
+            periods.map_or("if a period is a year, and more if it is less".into(), |p| format!("of {p} periods"));
+        let large = periods.map_or(LARGE_DEVIATION, |periods| LARGE_DEVIATION_A_YEAR / periods.sqrt());
+        let rate_high = || {
+            let a_year = percent(a_year);
+            format!(
+                "is {rate}, which is {a_year} a year {year}. It is meant as a fraction of one period, not of a year"
+            )
+        };
+        let rate_above = || {
+            format!(
+                "is {rate}, above the mean simple return of problem.history, {mean:.6}: through the record the bank paid \
+                 more than the asset. It is meant as a fraction of one period, not of a year"
+            )
+        };
+        let in_percent = || {
+            format!(
+                "has log-returns of the standard deviation {deviation:.4} a period: are they in percent? They are meant \
+                 as fractions, 0.012 for a rise of 1.2 %"
+            )
+        };
+        let cost_high = || {
+            let share = percent(cost);
+            format!("is {cost}, which is {share} of all that is traded. It is meant as a fraction, 0.002 for 0.2 %")
+        };
+        [
+            (a_year > HIGH_RATE_A_YEAR).then(|| warning(WarningCode::RateHigh, "problem.rate_per_step", rate_high())),
+            (rate > mean).then(|| warning(WarningCode::RateAboveRecord, "problem.rate_per_step", rate_above())),
+            (cost > HIGH_TRADING_COST)
+                .then(|| warning(WarningCode::TradingCostHigh, "problem.trading_cost", cost_high())),
+            (deviation > large).then(|| warning(WarningCode::RecordInPercent, "problem.history", in_percent())),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+}
+
+fn warning(code: WarningCode, field: &'static str, said: String) -> Warning {
+    Warning { code, field, message: format!("{field} {said}.") }
+}
+
+/// A share in percent, to a tenth of it.
+fn percent(share: f64) -> String {
+    let shown = 100.0 * share;
+    if shown < 1e6 { format!("{} %", (10.0 * shown).round() / 10.0) } else { "over a million %".into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rate, periods a year, trading cost, and the deviation of returns whose mean is 1 %.
+    fn warned(rate: f64, periods_per_year: Option<f64>, trading_cost: f64, deviation: f64) -> Vec<WarningCode> {
+        // Two simple returns of mean 1 %, their logarithms about `deviation` off it.
+        let history = vec![(1.01 * (1.0 + deviation.tanh())).ln(), (1.01 * (1.0 - deviation.tanh())).ln()];
+        let problem =
+            ProblemSpecification { periods_per_year, trading_cost, ..ProblemSpecification::of(history, rate) };
+        assert!((problem.mean_return() - 0.01).abs() < 1e-12 && (problem.deviation() - deviation).abs() < 1e-12);
+        problem.warnings().iter().map(|warning| warning.code).collect()
+    }
+
+    #[test]
+    fn what_is_mistaken_is_warned_of_and_what_is_usual_is_not() {
+        use WarningCode::{RateAboveRecord, RateHigh, RecordInPercent, TradingCostHigh};
+        let (months, days) = (Some(12.0), Some(252.0));
+        // Shares by the month, by the day, and by a year of nobody knows how long; a coin by the day; a currency of 14 % a year.
+        for (rate, periods, cost, deviation) in [
+            (0.0025, months, 0.002, 0.045),
+            (0.0001, days, 0.0005, 0.0125),
+            (0.0095, None, 0.02, 0.45),
+            (0.0001, Some(365.0), 0.0, 0.13),
+            (0.0095, Some(14.0), 0.0, 0.045),
+        ] {
+            assert_eq!(warned(rate, periods, cost, deviation), [], "{rate} {periods:?} {cost} {deviation}");
+        }
+        // The rate of a year for that of a month, and with nothing said of it; returns of days in percent; a cost in percent.
+        assert_eq!(warned(0.03, months, 0.0, 0.045), [RateHigh, RateAboveRecord]);
+        assert_eq!(warned(0.16, None, 0.0, 0.045), [RateHigh, RateAboveRecord]);
+        assert_eq!(warned(0.03, None, 0.0, 0.045), [RateAboveRecord]);
+        assert_eq!(warned(0.0001, days, 0.0, 0.4), [RecordInPercent]);
+        assert_eq!(warned(0.0001, None, 0.0, 1.1), [RecordInPercent]);
+        assert_eq!(warned(0.0025, months, 0.05, 0.045), [TradingCostHigh]);
+        assert_eq!(warned(0.2, months, 0.05, 1.5), [RateHigh, RateAboveRecord, TradingCostHigh, RecordInPercent]);
+    }
+
+    /// 1.03^12 is 1.4258 by hand.
+    #[test]
+    fn a_warning_says_what_was_typed_and_what_it_means() {
+        let problem = ProblemSpecification {
+            periods_per_year: Some(12.0),
+            ..ProblemSpecification::of(vec![0.08, -0.01, 0.05], 0.03)
+        };
+        let [warning] = &problem.warnings()[..] else { panic!("{:?}", problem.warnings()) };
+        assert!(warning.message.starts_with("problem.rate_per_step is 0.03, which is 42.6 % a year of 12 periods."));
+    }
+}
