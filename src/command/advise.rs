@@ -1,0 +1,83 @@
+//! `ballast advise`: what to hold through the coming period, from a file of returns or prices. No server runs; the answer is
+//! that of `POST /advise`.
+
+use std::error::Error;
+
+use ballast::control::error::FieldError;
+use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification, default_seed};
+use ballast::service::advise::Advise;
+use clap::Args;
+
+use super::returns::{Returns, ReturnsFile};
+
+mod words;
+
+#[derive(Debug, Clone, Args)]
+pub struct AdviseArgs {
+    #[command(flatten)]
+    returns: ReturnsFile,
+    /// Use the last so many returns; all of them unless given
+    #[arg(long)]
+    window: Option<usize>,
+    /// Relative risk aversion: 1 is log utility, more is more careful
+    #[arg(long, default_value_t = 3.0)]
+    risk_aversion: f64,
+    /// Wealth now, in any currency
+    #[arg(long, default_value_t = 100.0)]
+    wealth: f64,
+    /// Share of wealth in the risky asset now
+    #[arg(long, default_value_t = 0.0)]
+    holding: f64,
+    /// Lost of what is bought or sold, as a fraction: 0.001 is 0.1 %
+    #[arg(long, default_value_t = 0.0)]
+    trading_cost: f64,
+    /// Print what POST /advise answers, and what was read on the standard error
+    #[arg(long)]
+    json: bool,
+}
+
+/// The option that says what a field of the question is.
+const OPTIONS: [(&str, &str); 5] = [
+    ("problem.utility.risk_aversion", "--risk-aversion"),
+    ("problem.trading_cost", "--trading-cost"),
+    ("problem.rate_per_step", "--rate"),
+    ("wealth", "--wealth"),
+    ("holding", "--holding"),
+];
+
+pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
+    let mut returns = arguments.returns.read()?;
+    if let Some(window) = arguments.window {
+        returns = returns.last(window)?;
+    }
+    let advised = arguments.question(&returns).answer().map_err(by_option)?;
+    if arguments.json {
+        eprintln!("{}", returns.sentence());
+        println!("{}", serde_json::to_string_pretty(&advised)?);
+    } else {
+        println!("{}\n\n{}", returns.sentence(), words::told(&advised, arguments.wealth, returns.frequency));
+    }
+    Ok(())
+}
+
+impl AdviseArgs {
+    fn question(&self, returns: &Returns) -> Advise {
+        let history = returns.rows().iter().map(|row| row.period().log_return).collect();
+        let problem = ProblemSpecification {
+            horizon: 1,
+            rate_per_step: returns.rate(),
+            trading_cost: self.trading_cost,
+            utility: UtilitySpecification::relative(self.risk_aversion),
+            ..ProblemSpecification::of(history)
+        };
+        Advise { problem, wealth: Some(self.wealth), holding: Some(self.holding), seed: default_seed() }
+    }
+}
+
+/// The same error under the name by which the user knows the field.
+fn by_option(error: FieldError) -> FieldError {
+    match OPTIONS.iter().find(|(field, _)| *field == error.field) {
+        Some((_, option)) => FieldError { field: (*option).into(), ..error },
+        None => error,
+    }
+}
