@@ -65,7 +65,7 @@ pub struct Returns {
     pub periods_per_year: usize,
     /// What the returns were read from.
     source: String,
-    /// The column of what the bank pays, or the option that says so.
+    /// Where it is said what the bank pays.
     bank: String,
 }
 
@@ -101,7 +101,7 @@ impl Returns {
         let columns = Columns::of(reader.headers()?)?;
         let bank = match (rate, &columns.bank) {
             (Some(_), _) => "--rate".to_owned(),
-            (None, Some((_, name))) => format!("column {name}"),
+            (None, Some((_, name))) => format!("the last row of column {name}"),
             (None, None) => return Err(ReturnsError::NoBank),
         };
         let records: Vec<StringRecord> = reader.records().collect::<Result<_, _>>()?;
@@ -123,7 +123,7 @@ impl Returns {
         };
         let rows = rows.map(row).collect::<Result<Vec<Row>, ReturnsError>>()?;
         let periods_per_year = periods_per_year.unwrap_or_else(|| frequency.periods_per_year(&dates));
-        let source = format!("{} in column {}", columns.kind.name(), columns.name);
+        let source = format!("{} column {}", columns.kind.source(), columns.name);
         let returns = Returns { rows, frequency, periods_per_year, source, bank };
         let deviation = returns.annual().volatility / (periods_per_year as f64).sqrt();
         if columns.kind == Kind::Return && deviation > LARGEST_DEVIATION {
@@ -183,17 +183,17 @@ impl Returns {
         let date = |row: Option<&Row>| row.map_or(String::new(), |row| row.date.clone());
         let noun = self.frequency.noun();
         format!(
-            "{} {} returns, {} to {}, of {}: a mean of {:.1} % and a deviation of {:.1} % a year of {} {noun}{}.\n\
+            "{} {} returns, {} to {}, {}.\nA year of {} {noun}{} has a mean of {:.1} % and a deviation of {:.1} %. \
              The bank pays {:.3} % a {noun}, {:.1} % a year, by {}.",
             self.rows.len(),
             self.frequency.adjective(),
             date(self.rows.first()),
             date(self.rows.last()),
             self.source,
-            100.0 * mean,
-            100.0 * volatility,
             self.periods_per_year,
             if self.periods_per_year == 1 { "" } else { "s" },
+            100.0 * mean,
+            100.0 * volatility,
             100.0 * self.rate(),
             100.0 * self.rate() * self.periods_per_year as f64,
             self.bank

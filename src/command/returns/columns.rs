@@ -104,10 +104,11 @@ impl Columns {
 }
 
 impl Kind {
-    pub fn name(self) -> &'static str {
+    /// What stands before the name of a column that returns come from.
+    pub fn source(self) -> &'static str {
         match self {
-            Kind::Return => "simple returns",
-            Kind::Price => "prices",
+            Kind::Return => "as in",
+            Kind::Price => "of prices in",
         }
     }
 

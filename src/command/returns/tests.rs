@@ -25,25 +25,21 @@ fn the_bundled_file_is_whole() {
 /// Files that mean the same three returns of the year 2008, +1 %, -2 % and +3 %, at one frequency or another: the text, then
 /// the frequency, the first and last date and the column as they are to be told.
 const GOOD: [(&str, &str, &str); 18] = [
-    (
-        "date,return\n2008-01,0.01\n2008-02,-0.02\n2008-03,0.03\n",
-        "monthly",
-        "2008-01 to 2008-03, of simple returns in column return",
-    ),
+    ("date,return\n2008-01,0.01\n2008-02,-0.02\n2008-03,0.03\n", "monthly", "2008-01 to 2008-03, as in column return"),
     (
         "Month;Market_Return\n2008-01-31; 0.01\n2008-02-29; -0.02\n2008-03-31; 0.03",
         "monthly",
-        "2008-01 to 2008-03, of simple returns in column Market_Return",
+        "2008-01 to 2008-03, as in column Market_Return",
     ),
     (
         "\u{feff}DATE\tRisky Return\r\n2008/01\t0.01\r\n2008/02\t-.02\r\n2008/03\t3e-2\r\n",
         "monthly",
-        "2008-01 to 2008-03, of simple returns in column Risky Return",
+        "2008-01 to 2008-03, as in column Risky Return",
     ),
     (
         "open,ret,\"timestamp\"\n7,\"0.01\",2008-01-31T00:00:00\n7,-0.02,2008-02-29T00:00:00\n7,+0.03,2008-03-31T00:00:00\n",
         "monthly",
-        "2008-01 to 2008-03, of simple returns in column ret",
+        "2008-01 to 2008-03, as in column ret",
     ),
     // The last days on which exchanges were open, as some programs write them.
     (
@@ -59,7 +55,7 @@ const GOOD: [(&str, &str, &str); 18] = [
     (
         "price,return,date\n1,0.01,2008-01\n1,-0.02,2008-02\n1,0.03,2008-03\n",
         "monthly",
-        "2008-01 to 2008-03, of simple returns in column return",
+        "2008-01 to 2008-03, as in column return",
     ),
     // Thursday, Friday, and a Tuesday after a Monday's holiday.
     (
@@ -70,37 +66,37 @@ const GOOD: [(&str, &str, &str); 18] = [
     (
         "day,return\n2008-01-21,0.01\n2008-01-22,-0.02\n2008-01-23,0.03\n",
         "daily",
-        "2008-01-21 to 2008-01-23, of simple returns in column return",
+        "2008-01-21 to 2008-01-23, as in column return",
     ),
     // An exchange rests for the longest of holidays.
     (
         "date,return\n2008-09-29,0.01\n2008-09-30,-0.02\n2008-10-12,0.03\n",
         "daily",
-        "2008-09-29 to 2008-10-12, of simple returns in column return",
+        "2008-09-29 to 2008-10-12, as in column return",
     ),
     // Saturday and Sunday among the days: a market that never closes.
     (
         "date,return\n2008-01-19,0.01\n2008-01-20,-0.02\n2008-01-21,0.03\n",
         "daily",
-        "2008-01-19 to 2008-01-21, of simple returns in column return",
+        "2008-01-19 to 2008-01-21, as in column return",
     ),
     // Fridays, and the Thursday before Good Friday.
     (
         "week,returns\n2008-03-14,0.01\n2008-03-20,-0.02\n2008-03-28,0.03\n",
         "weekly",
-        "2008-03-14 to 2008-03-28, of simple returns in column returns",
+        "2008-03-14 to 2008-03-28, as in column returns",
     ),
     (
         "quarter,simple_return\n2008-03-31,0.01\n2008-06-30,-0.02\n2008-09-30,0.03\n",
         "quarterly",
-        "2008-03 to 2008-09, of simple returns in column simple_return",
+        "2008-03 to 2008-09, as in column simple_return",
     ),
     (
         "date,total return\n2008-01,0.01\n2008-04,-0.02\n2008-07,0.03\n",
         "quarterly",
-        "2008-01 to 2008-07, of simple returns in column total return",
+        "2008-01 to 2008-07, as in column total return",
     ),
-    ("year,return\n2006,0.01\n2007,-0.02\n2008,0.03\n", "yearly", "2006 to 2008, of simple returns in column return"),
+    ("year,return\n2006,0.01\n2007,-0.02\n2008,0.03\n", "yearly", "2006 to 2008, as in column return"),
     (
         "date,NAV\n2005-12-30,100\n2006-12-29,101\n2007-12-31,98.98\n2008-12-31,101.9494\n",
         "yearly",
@@ -110,7 +106,7 @@ const GOOD: [(&str, &str, &str); 18] = [
     (
         "note,date,return\n?,2008-01,0.01\n\n%,2008-02,-0.02\n\"a,b\",2008-03,0.03\n\n",
         "monthly",
-        "2008-01 to 2008-03, of simple returns in column return",
+        "2008-01 to 2008-03, as in column return",
     ),
     (
         "date,Adjusted_Close\n20071231,100\n20080131,101\n20080229,98.98\n20080331,101.9494\n",
@@ -130,7 +126,7 @@ fn the_same_returns_are_read_from_many_files() {
             assert_eq!(row.risk_free_return, 0.0);
         }
         let sentence = returns.sentence();
-        assert!(sentence.starts_with(&format!("3 {adjective} returns, {said}: ")), "{sentence} of {text}");
+        assert!(sentence.starts_with(&format!("3 {adjective} returns, {said}.\n")), "{sentence} of {text}");
     }
 }
 
@@ -262,7 +258,7 @@ fn the_bank_is_a_column_or_an_option_and_never_left_out() {
         let returns = read(&file(&format!(",{name}"))).unwrap();
         let paid: Vec<f64> = returns.rows.iter().map(|row| row.risk_free_return).collect();
         assert_eq!((&paid[..], returns.rate()), (&[0.002, 0.001][..], 0.001));
-        let said = format!("The bank pays 0.100 % a month, 1.2 % a year, by column {name}.");
+        let said = format!("The bank pays 0.100 % a month, 1.2 % a year, by the last row of column {name}.");
         assert!(returns.sentence().ends_with(&said), "{}", returns.sentence());
     }
     let message = read(&file(",other")).unwrap_err().to_string();
@@ -299,7 +295,7 @@ fn figures_of_a_year_count_the_periods_of_the_frequency() {
         let returns = Returns::parse(&file(dates), Some(0.001), said).unwrap();
         assert_eq!(returns.periods_per_year, periods, "{dates:?}");
         let deviation = (4.0 / 3.0 * periods as f64).sqrt();
-        let expected = format!(": a mean of 0.0 % and a deviation of {deviation:.1} % a year of {periods} ");
+        let expected = format!(" has a mean of 0.0 % and a deviation of {deviation:.1} %. ");
         assert!(returns.sentence().replace("-0.0", "0.0").contains(&expected), "{}: {expected}", returns.sentence());
     }
     for periods in [0, 367] {
