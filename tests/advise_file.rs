@@ -67,7 +67,7 @@ fn what_is_wrong_is_said_by_line_or_option() {
         (&["advise", MARKET, "--holding", "1.5"], "--holding is 1.5: must be a number in [0, 1]"),
         (&["advise", MARKET, "--wealth", "0"], "--wealth is 0: must be a number in"),
         (&["advise", MARKET, "--trading-cost", "0.2"], "--trading-cost is 0.2: must be a number in [0, 0.1]"),
-        (&["advise", MARKET, "--risk-aversion", "0.5"], "--risk-aversion is 0.5: must lie in"),
+        (&["advise", MARKET, "--risk-aversion", "0.5"], "--risk-aversion is 0.5: must lie in [1, 100]"),
         (
             &["backtest", MARKET, "--out", file, "--window", "1100"],
             "the file holds 1109 months: must hold at least 1112",
@@ -77,6 +77,25 @@ fn what_is_wrong_is_said_by_line_or_option() {
         assert_eq!(output.status.code(), Some(1), "{output:?}");
         assert!(text(&output.stderr).starts_with(&format!("ballast: {said}")), "{output:?}");
     }
+}
+
+#[test]
+fn more_days_than_a_radius_is_simulated_for_need_a_window() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("days.csv");
+    let first = jiff::civil::date(1970, 1, 1);
+    let day = |day: i64| {
+        format!("{},{}\n", first.checked_add(jiff::Span::new().days(day)).unwrap(), 0.001 * (day % 7 - 2) as f64)
+    };
+    std::fs::write(&path, format!("date,return\n{}", (0..15_000).map(day).collect::<String>())).unwrap();
+    let asked = ["advise", path.to_str().unwrap(), "--rate", "0"];
+    let refused = ballast(&asked);
+    assert_eq!(
+        text(&refused.stderr),
+        "ballast: --window is 15000 returns: must be fewer: the radius is not simulated for so many\n"
+    );
+    let answered = ballast(&[&asked[..], &["--window", "14999"]].concat());
+    assert!(text(&answered.stdout).starts_with("14999 daily returns, 1970-01-02 to 2011-01-25, "), "{answered:?}");
 }
 
 #[test]

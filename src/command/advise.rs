@@ -37,20 +37,19 @@ pub struct AdviseArgs {
 }
 
 /// The option that says what a field of the question is.
-const OPTIONS: [(&str, &str); 5] = [
-    ("problem.utility.risk_aversion", "--risk-aversion"),
-    ("problem.trading_cost", "--trading-cost"),
-    ("problem.rate_per_step", "--rate"),
-    ("wealth", "--wealth"),
-    ("holding", "--holding"),
-];
+const OPTIONS: [(&str, &str); 3] =
+    [("problem.trading_cost", "--trading-cost"), ("wealth", "--wealth"), ("holding", "--holding")];
 
 pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
+    if !(1.0..=100.0).contains(&arguments.risk_aversion) {
+        return Err(FieldError::new("--risk-aversion", arguments.risk_aversion, "must lie in [1, 100]").into());
+    }
     let mut returns = arguments.returns.read()?;
     if let Some(window) = arguments.window {
         returns = returns.last(window)?;
     }
-    let advised = arguments.question(&returns).answer().map_err(by_option)?;
+    let count = returns.rows().len();
+    let advised = arguments.question(&returns).answer().map_err(|error| by_option(error, count))?;
     if arguments.json {
         eprintln!("{}", returns.sentence());
         println!("{}", serde_json::to_string_pretty(&advised)?);
@@ -74,8 +73,12 @@ impl AdviseArgs {
     }
 }
 
-/// The same error under the name by which the user knows the field.
-fn by_option(error: FieldError) -> FieldError {
+/// The same error of a question about `count` returns, under the name by which the user knows the field.
+fn by_option(error: FieldError, count: usize) -> FieldError {
+    if error.field == "problem.radius.paths" {
+        let rule = "must be fewer: the radius is not simulated for so many";
+        return FieldError::new("--window", format!("{count} returns"), rule);
+    }
     match OPTIONS.iter().find(|(field, _)| *field == error.field) {
         Some((_, option)) => FieldError { field: (*option).into(), ..error },
         None => error,
