@@ -7,7 +7,9 @@ mod command;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use command::{audit, backtest, backup, bench, check, demo, evaluate, healthcheck, keys, loadtest, reproduce, serve};
+use command::{
+    advise, audit, backtest, backup, bench, check, demo, evaluate, healthcheck, keys, loadtest, reproduce, serve,
+};
 
 /// Nonparametric adaptive robust control of an investor, as a service.
 #[derive(Debug, Parser)]
@@ -25,6 +27,8 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 enum Command {
     /// Train on real returns and advise a live session through 2008.
     Demo(demo::DemoArgs),
+    /// Say what to hold through the coming period, from a file of returns or prices.
+    Advise(advise::AdviseArgs),
     /// Run the service.
     Serve(serve::Serve),
     /// Train on the past, live through the next year, roll: a report on real returns.
@@ -60,6 +64,7 @@ async fn main() -> ExitCode {
     let outcome = match CommandLine::parse().command {
         Command::Demo(arguments) => demo::run(arguments).await.map_err(Into::into),
         Command::Serve(arguments) => serve::run(arguments).await,
+        Command::Advise(arguments) => tokio::task::block_in_place(|| advise::run(&arguments)),
         Command::Backtest(arguments) => tokio::task::block_in_place(|| backtest::run(&arguments)).map_err(Into::into),
         Command::Evaluate(arguments) => tokio::task::block_in_place(|| evaluate::run(&arguments)),
         Command::Reproduce(arguments) => tokio::task::block_in_place(|| reproduce::run(&arguments)),

@@ -13,7 +13,7 @@ use ballast::control::training::Training;
 
 const YEAR: usize = 4;
 const WALK: WalkForward =
-    WalkForward { window: 24, year: YEAR, risk_aversion: 3.0, trading_cost: 0.0, count: 20, seed: 5 };
+    WalkForward { window: 24, every: YEAR, horizon: YEAR, risk_aversion: 3.0, trading_cost: 0.0, count: 20, seed: 5 };
 
 /// Returns that pay enough beyond the bank to be held at a wide level.
 fn periods(count: usize) -> Vec<Period> {

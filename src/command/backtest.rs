@@ -1,7 +1,8 @@
 //! `ballast backtest`: the walk-forward report on real returns.
 //!
-//! Every year a policy is trained on the window of months before it and lived by for twelve months; nothing later than a
-//! month is used for its allocation. What comes out is a page to read, and the same as JSON and CSV.
+//! Every so many periods, a year of them unless chosen otherwise, a policy is trained on the window before and lived by
+//! until the next one; nothing later than a period is used for its allocation. What comes out is a page to read, and the
+//! same as JSON and CSV.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -12,29 +13,37 @@ use ballast::control::pool::{PoolError, TrainingPool};
 use ballast::control::progress::Watch;
 use ballast::report::ChartError;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use thiserror::Error;
 
-use super::monthly_returns::{Month, MonthlyReturns, ReturnsError};
-use analysis::{Analysis, Line};
+use super::returns::{Returns, ReturnsError, ReturnsFile, Row};
+use analysis::{Analysis, Line, Scale};
+use progress::Trainings;
 
 mod analysis;
 mod files;
 mod page;
+mod progress;
 mod verdict;
 
-pub const MONTHS_PER_YEAR: usize = 12;
+/// Years of history that a policy is trained on.
+const WINDOW_YEARS: usize = 20;
 
 #[derive(Debug, Clone, Args)]
 pub struct BacktestArgs {
-    /// Monthly returns: date,risky_return[,risk_free_return]; simple, as fractions, oldest first
-    file: PathBuf,
-    /// Folder for report.html, report.json, months.csv and strategies.csv; made if absent
+    #[command(flatten)]
+    returns: ReturnsFile,
+    /// Folder for report.html, report.json, periods.csv and strategies.csv; made if absent
     #[arg(long)]
     out: PathBuf,
-    /// Months of history that each year's policy is trained on
-    #[arg(long, default_value_t = 240)]
-    window: usize,
+    /// Periods of history that each policy is trained on; 20 years of them unless given
+    #[arg(long)]
+    window: Option<usize>,
+    /// Periods from one training to the next; a year of them unless given
+    #[arg(long)]
+    every: Option<usize>,
+    /// Periods that a policy looks ahead; those to the next training unless given
+    #[arg(long)]
+    horizon: Option<usize>,
     /// Levels of the adaptive strategies; the static one takes the second, or the first of one
     #[arg(long, value_delimiter = ',', default_values_t = [0.05, 0.1, 0.5])]
     alpha: Vec<f64>,
@@ -61,8 +70,8 @@ pub struct BacktestArgs {
 pub enum BacktestError {
     #[error("the returns cannot be used")]
     Returns(#[from] ReturnsError),
-    #[error("the file holds {found} months: must hold at least {wanted}, the window and a year")]
-    TooShort { found: usize, wanted: usize },
+    #[error("the file holds {found} {noun}s: must hold at least {wanted}, the window (--window) and a year")]
+    TooShort { found: usize, noun: &'static str, wanted: usize },
     #[error("{option} is {value}: {rule}")]
     Option { option: &'static str, value: String, rule: &'static str },
     #[error(transparent)]
@@ -80,9 +89,8 @@ pub enum BacktestError {
 /// Everything the report is made from.
 pub struct Backtest {
     pub args: BacktestArgs,
+    pub returns: Returns,
     pub walk: WalkForward,
-    /// The months decided about, after the first window.
-    pub months: Vec<Month>,
     pub lines: Vec<Line>,
     pub analysis: Analysis,
     pub seconds: f64,
@@ -90,8 +98,9 @@ pub struct Backtest {
 
 /// Trains, counts and writes.
 pub fn run(args: &BacktestArgs) -> Result<(), BacktestError> {
-    let returns = MonthlyReturns::read(&args.file)?;
-    let backtest = walk(args, returns.months())?;
+    let returns = args.returns.read()?;
+    println!("{}\n", returns.sentence());
+    let backtest = walk(args, returns)?;
     files::write(&backtest, &args.out)?;
     let sentences = verdict::sentences(&backtest);
     sentences.iter().for_each(|sentence| println!("{sentence}"));
@@ -100,11 +109,27 @@ pub fn run(args: &BacktestArgs) -> Result<(), BacktestError> {
 }
 
 impl BacktestArgs {
-    fn check(&self, months: usize) -> Result<(), BacktestError> {
-        let wanted = self.window.max(2) + MONTHS_PER_YEAR;
-        if months < wanted {
-            return Err(BacktestError::TooShort { found: months, wanted });
+    /// How these returns are walked through.
+    fn walk(&self, returns: &Returns) -> Result<WalkForward, BacktestError> {
+        self.check()?;
+        let year = returns.periods_per_year;
+        let every = self.every.unwrap_or_else(|| self.horizon.map_or(year, |horizon| year.min(horizon)));
+        let horizon = self.horizon.unwrap_or(every);
+        if !(1..=horizon).contains(&every) {
+            let rule = "must be at least 1, and at most --horizon: a policy is lived by until the next is trained";
+            return Err(BacktestError::Option { option: "--every", value: every.to_string(), rule });
         }
+        let window = self.window.unwrap_or(WINDOW_YEARS * year);
+        let (found, wanted) = (returns.rows().len(), window.max(2).saturating_add(year));
+        if found < wanted {
+            return Err(BacktestError::TooShort { found, noun: returns.frequency.noun(), wanted });
+        }
+        let (risk_aversion, count, seed) = (self.risk_aversion, self.count, self.seed);
+        let trading_cost = if self.cost_blind { 0.0 } else { self.cost() };
+        Ok(WalkForward { window, every, horizon, risk_aversion, trading_cost, count, seed })
+    }
+
+    fn check(&self) -> Result<(), BacktestError> {
         if !(0.0..=1000.0).contains(&self.cost_bp) {
             let rule = "must lie in [0, 1000]";
             return Err(BacktestError::Option { option: "--cost-bp", value: self.cost_bp.to_string(), rule });
@@ -165,23 +190,26 @@ impl BacktestArgs {
     }
 }
 
-/// Decides every month, keeps the books, and measures them.
-fn walk(args: &BacktestArgs, months: &[Month]) -> Result<Backtest, BacktestError> {
-    args.check(months.len())?;
+impl Backtest {
+    /// The periods decided about, after the first window.
+    pub fn rows(&self) -> &[Row] {
+        &self.returns.rows()[self.walk.window..]
+    }
+}
+
+/// Decides every period, keeps the books, and measures them.
+fn walk(args: &BacktestArgs, returns: Returns) -> Result<Backtest, BacktestError> {
+    let walk = args.walk(&returns)?;
     let started = Instant::now();
-    let (window, risk_aversion, count, seed) = (args.window, args.risk_aversion, args.count, args.seed);
-    let trading_cost = if args.cost_blind { 0.0 } else { args.cost() };
-    let walk = WalkForward { window, year: MONTHS_PER_YEAR, risk_aversion, trading_cost, count, seed };
-    let period = |month: &Month| Period { log_return: month.risky_return.ln_1p(), bank_return: month.risk_free_return };
-    let periods: Vec<Period> = months.iter().map(period).collect();
+    let periods: Vec<Period> = returns.rows().iter().map(Row::period).collect();
     let (names, strategies): (Vec<String>, Vec<Strategy>) = args.strategies().into_iter().unzip();
     let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let pool = TrainingPool::new(threads)?;
-    let bar = progress_bar(walk.trainings(&strategies, &periods));
+    let trainings = Trainings::new(walk.trainings(&strategies, &periods));
     let watch = Watch::unwatched();
-    let decisions = pool.install(|| walk.decide(&strategies, &periods, &watch, &|| bar.inc(1)))?;
-    bar.finish_and_clear();
-    let lived = &periods[window..];
+    let decisions = pool.install(|| walk.decide(&strategies, &periods, &watch, &|| trainings.one_more()))?;
+    trainings.finish();
+    let lived = &periods[walk.window..];
     let mut lines: Vec<Line> = names
         .into_iter()
         .zip(decisions)
@@ -189,17 +217,10 @@ fn walk(args: &BacktestArgs, months: &[Month]) -> Result<Backtest, BacktestError
         .collect();
     let main = args.main_line();
     lines.push(lines[main].hindsight(lived, args.cost()));
-    let analysis = Analysis::of(&lines, main, lived, &walk);
-    let (args, months, seconds) = (args.clone(), months[window..].to_vec(), started.elapsed().as_secs_f64());
-    Ok(Backtest { args, walk, months, lines, analysis, seconds })
-}
-
-fn progress_bar(trainings: usize) -> ProgressBar {
-    let bar = ProgressBar::new(trainings as u64);
-    if let Ok(style) = ProgressStyle::with_template("  [{bar:32}] {pos} of {len} trainings, {eta} left") {
-        bar.set_style(style.progress_chars("=> "));
-    }
-    bar
+    let scale = Scale { periods_per_year: returns.periods_per_year, utility: walk.utility(), seed: walk.seed };
+    let analysis = Analysis::of(&lines, main, lived, &scale);
+    let seconds = started.elapsed().as_secs_f64();
+    Ok(Backtest { args: args.clone(), returns, walk, lines, analysis, seconds })
 }
 
 fn file(folder: &Path, name: &str, text: &str) -> Result<(), BacktestError> {
@@ -224,41 +245,80 @@ mod tests {
         Line::try_parse_from(usual.iter().chain(more)).unwrap().args
     }
 
-    /// Two years after a window of 24 months.
-    fn months() -> Vec<Month> {
-        let risky_return = |index: usize| 0.02 + 0.03 * (1.7 * index as f64).sin();
-        let month = |index: usize| Month {
-            month: format!("{:04}-{:02}", 2000 + index / 12, index % 12 + 1),
-            risky_return: risky_return(index),
-            risk_free_return: 0.002,
-        };
-        (0..24 + 24).map(month).collect()
+    fn risky_return(index: usize) -> f64 {
+        0.02 + 0.03 * (1.7 * index as f64).sin()
+    }
+
+    fn months(count: usize) -> Returns {
+        let month = |index| format!("{:04}-{:02},{}\n", 2000 + index / 12, index % 12 + 1, risky_return(index));
+        let text: String = (0..count).map(month).collect();
+        Returns::parse(&format!("date,return\n{text}"), Some(0.002), None).unwrap()
+    }
+
+    fn quarters(count: usize) -> Returns {
+        let quarter = |index| format!("{:04}-{:02},{}\n", 2000 + index / 4, 3 * (index % 4) + 3, risky_return(index));
+        let text: String = (0..count).map(quarter).collect();
+        Returns::parse(&format!("date,return\n{text}"), Some(0.006), None).unwrap()
     }
 
     #[test]
     fn the_same_arguments_give_the_same_report() {
-        let year = &months()[..36];
-        let made = || walk(&arguments(&["--alpha", "0.3,0.9,0.5", "--cost-bp", "10"]), year).unwrap();
+        let made = || walk(&arguments(&["--alpha", "0.3,0.9,0.5", "--cost-bp", "10"]), months(36)).unwrap();
         let (one, other) = (made(), made());
-        assert_eq!(files::months(&one), files::months(&other));
+        assert_eq!(files::periods(&one), files::periods(&other));
         assert_eq!(files::summary(&one), files::summary(&other));
-        assert_eq!(files::months(&one).lines().count(), 1 + 12 * one.lines.len());
+        assert_eq!(files::periods(&one).lines().count(), 1 + 12 * one.lines.len());
         assert_eq!(one.analysis.years, 1);
         let page = page::page(&one).html().unwrap();
         assert!(page.contains("adaptive, alpha 0.9") && page.contains("Trading costs 10 bp"), "{page}");
         assert!(page.contains("The whole years are 1, fewer than 10"), "{page}");
     }
 
+    /// Two trainings make the year after the window; figures of a year count its four quarters.
+    #[test]
+    fn quarters_are_walked_through_and_told_as_quarters() {
+        let args = arguments(&["--every", "2", "--horizon", "3", "--alpha", "0.5"]);
+        let backtest = walk(&args, quarters(24 + 4)).unwrap();
+        let WalkForward { window, every, horizon, .. } = backtest.walk;
+        assert_eq!((window, every, horizon, backtest.analysis.years), (24, 2, 3, 1));
+        let stock = backtest.analysis.figures.iter().find(|figures| figures.strategy == "all-stock").unwrap();
+        let mean = (24..28).map(risky_return).sum::<f64>() / 4.0;
+        assert!((stock.annual_mean.value - 4.0 * mean).abs() < 1e-12, "{stock:?}");
+        assert_eq!(files::periods(&backtest).lines().nth(1).unwrap().split(',').next(), Some("2006-03"));
+        let page = page::page(&backtest).html().unwrap();
+        assert!(page.contains("Every 2 quarters a policy is trained on the 24 quarters before"), "{page}");
+        assert!(!page.contains("month"), "{page}");
+    }
+
+    #[test]
+    fn what_is_not_said_follows_from_the_frequency_and_from_what_is() {
+        let returns = quarters(24 + 4);
+        let said = |more: &[&str]| {
+            let line = ["backtest", "returns.csv", "--out", "report"];
+            let walk = Line::try_parse_from(line.iter().chain(more)).unwrap().args.walk(&returns);
+            walk.map(|WalkForward { window, every, horizon, .. }| (window, every, horizon)).map_err(|e| e.to_string())
+        };
+        let short = "the file holds 28 quarters: must hold at least 84, the window (--window) and a year";
+        assert_eq!(said(&[]), Err(short.into()));
+        assert_eq!(said(&["--window", "20"]), Ok((20, 4, 4)));
+        assert_eq!(said(&["--window", "20", "--every", "6"]), Ok((20, 6, 6)));
+        assert_eq!(said(&["--window", "20", "--horizon", "3"]), Ok((20, 3, 3)));
+        assert_eq!(said(&["--window", "20", "--horizon", "9"]), Ok((20, 4, 9)));
+    }
+
     #[test]
     fn options_that_break_a_rule_are_named() {
-        let message = |more: &[&str]| walk(&arguments(more), &months()).err().unwrap().to_string();
+        let message = |more: &[&str]| walk(&arguments(more), months(48)).err().unwrap().to_string();
         assert_eq!(message(&["--cost-bp", "2000"]), "--cost-bp is 2000: must lie in [0, 1000]");
         assert_eq!(message(&["--risk-aversion", "0.5"]), "--risk-aversion is 0.5: must lie in [1, 100]");
         assert_eq!(message(&["--alpha", "0.1,0.2,0.3,0.4"]), "--alpha is 4 levels: must be 1 to 3");
-        let long = BacktestArgs { window: 50, ..arguments(&[]) };
-        let short = walk(&long, &months()).err().unwrap().to_string();
-        assert_eq!(short, "the file holds 48 months: must hold at least 62, the window and a year");
+        let every = "must be at least 1, and at most --horizon: a policy is lived by until the next is trained";
+        assert_eq!(message(&["--every", "0"]), format!("--every is 0: {every}"));
+        assert_eq!(message(&["--every", "7", "--horizon", "6"]), format!("--every is 7: {every}"));
+        let long = BacktestArgs { window: Some(50), ..arguments(&[]) };
+        let short = walk(&long, months(48)).err().unwrap().to_string();
+        assert_eq!(short, "the file holds 48 months: must hold at least 62, the window (--window) and a year");
         let few = BacktestArgs { count: 3, ..arguments(&[]) };
-        assert!(matches!(walk(&few, &months()), Err(BacktestError::Train(TrainError::Specification(_)))));
+        assert!(matches!(walk(&few, months(48)), Err(BacktestError::Train(TrainError::Specification(_)))));
     }
 }

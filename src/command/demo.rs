@@ -11,7 +11,7 @@ use thiserror::Error;
 
 use super::api_client::{ApiClient, ApiError};
 use super::host::{Host, HostError};
-use super::monthly_returns::ReturnsError;
+use super::returns::ReturnsError;
 
 mod calls;
 mod past;

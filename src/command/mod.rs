@@ -1,5 +1,6 @@
 //! What the binary can be asked to do.
 
+pub mod advise;
 mod api_client;
 pub mod audit;
 pub mod backtest;
@@ -14,8 +15,8 @@ mod host;
 pub mod keys;
 pub mod loadtest;
 mod moments;
-mod monthly_returns;
 pub mod reproduce;
+mod returns;
 pub mod serve;
 mod store_location;
 mod tables;

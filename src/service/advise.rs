@@ -6,7 +6,9 @@ use utoipa::ToSchema;
 use super::error::ServiceError;
 use super::sessions::Sessions;
 use crate::control::error::FieldError;
+use crate::control::kept::Kept;
 use crate::control::policy::advice::Advice;
+use crate::control::policy::one_period::OnePeriod;
 use crate::control::policy::worst_case::WorstCase;
 use crate::control::request::annualised::Annualised;
 use crate::control::request::rules;
@@ -43,6 +45,24 @@ pub struct Advised {
 }
 
 impl Advise {
+    /// The answer, found in this process for its own user: no store, no turns, and the memory that it takes.
+    /// Checked by: `tests/advise_file.rs`.
+    ///
+    /// # Errors
+    /// A field breaks a rule.
+    pub fn answer(self) -> Result<Advised, FieldError> {
+        let (holding, specification) = self.checked()?;
+        let (advice, worst_case) = OnePeriod::new(&specification, Kept::default()).advise(holding)?;
+        Ok(Advised { advice, worst_case })
+    }
+
+    /// The holding, and the training request of one step.
+    fn checked(self) -> Result<(f64, Specification), FieldError> {
+        let holding = self.holding.unwrap_or(0.0);
+        rules::share("holding", holding)?;
+        Ok((holding, self.specification()?))
+    }
+
     /// The training request of which it asks the one step.
     fn specification(mut self) -> Result<Specification, FieldError> {
         if self.problem.horizon != 1 {
@@ -61,9 +81,7 @@ impl Sessions {
     /// # Errors
     /// A field breaks a rule; the radius asks for more memory than can be kept; no turn to solve.
     pub async fn advise(&self, tenant: &Tenant, question: Advise) -> Result<Advised, ServiceError> {
-        let holding = question.holding.unwrap_or(0.0);
-        rules::share("holding", holding)?;
-        let specification = question.specification()?;
+        let (holding, specification) = question.checked()?;
         let investor = self.policies.one_period(&specification)?;
         let (advice, worst_case) = self.resolving.run(tenant, move || investor.advise(holding)).await??;
         let problem = &specification.problem;

@@ -1,20 +1,18 @@
-//! The books in figures, each with an interval where a resample of the months has a meaning.
+//! The books in figures, each with an interval where a resample of the periods has a meaning.
 
 use ballast::control::evaluation::account::{Account, Annual, keep, yearly_certainty_equivalent};
-use ballast::control::evaluation::rolling::{Decision, Period, WalkForward};
+use ballast::control::evaluation::rolling::{Decision, Period};
 use ballast::control::problem::actions::Band;
+use ballast::control::request::specification::UtilitySpecification;
 use ballast::numerics::block_bootstrap::circular_blocks;
 use ballast::numerics::streams::stream;
 use ballast::numerics::summary::quantile;
 use serde::Serialize;
 
-use super::MONTHS_PER_YEAR;
-
 /// Wealth at the start of the whole, and of every year whose utility is taken.
 pub const INITIAL_WEALTH: f64 = 100.0;
-/// Resamples, and their blocks: a year of months; three of the years whose utility is averaged.
+/// Resamples, and their blocks: a year of periods; three of the years whose utility is averaged.
 pub const RESAMPLES: usize = 2000;
-pub const MONTH_BLOCK: usize = 12;
 pub const YEAR_BLOCK: usize = 3;
 /// Probability that an interval is meant to hold.
 pub const CONFIDENCE: f64 = 0.9;
@@ -52,7 +50,7 @@ pub struct Figures {
     pub max_drawdown: f64,
     pub final_wealth: f64,
     pub mean_allocation: f64,
-    /// Share of the months with nothing in the risky asset.
+    /// Share of the periods with nothing in the risky asset.
     pub all_bank_share: f64,
 }
 
@@ -81,7 +79,14 @@ impl Line {
     }
 }
 
-/// What one resample of the months and years gives for one strategy.
+/// What figures of a year are made with.
+pub struct Scale {
+    pub periods_per_year: usize,
+    pub utility: UtilitySpecification,
+    pub seed: u64,
+}
+
+/// What one resample of the periods and years gives for one strategy.
 struct Measured {
     annual: Annual,
     turnover: f64,
@@ -96,16 +101,16 @@ struct Series<'a> {
 }
 
 impl Series<'_> {
-    fn measure(&self, bank: &[f64], months: &[usize], years: &[usize], walk: &WalkForward) -> Measured {
+    fn measure(&self, bank: &[f64], periods: &[usize], years: &[usize], scale: &Scale) -> Measured {
         let pick =
             |values: &[f64], indices: &[usize]| -> Vec<f64> { indices.iter().map(|&index| values[index]).collect() };
-        let per_year = MONTHS_PER_YEAR as f64;
-        let traded: f64 = months.iter().map(|&month| self.traded[month]).sum();
+        let per_year = scale.periods_per_year as f64;
+        let traded: f64 = periods.iter().map(|&period| self.traded[period]).sum();
         Measured {
-            annual: Annual::of(&pick(&self.returns, months), &pick(bank, months), per_year),
-            turnover: per_year * traded / months.len() as f64,
+            annual: Annual::of(&pick(&self.returns, periods), &pick(bank, periods), per_year),
+            turnover: per_year * traded / periods.len() as f64,
             certainty_equivalent: yearly_certainty_equivalent(
-                walk.utility(),
+                scale.utility,
                 &pick(&self.growth, years),
                 INITIAL_WEALTH,
             ),
@@ -114,29 +119,29 @@ impl Series<'_> {
 }
 
 impl Analysis {
-    /// Resamples months and years alike for all strategies, so that differences are of the same worlds.
+    /// Resamples periods and years alike for all strategies, so that differences are of the same worlds.
     /// Others are compared with line `main`.
-    pub fn of(lines: &[Line], main: usize, periods: &[Period], walk: &WalkForward) -> Self {
+    pub fn of(lines: &[Line], main: usize, periods: &[Period], scale: &Scale) -> Self {
         let bank: Vec<f64> = periods.iter().map(|period| period.bank_return).collect();
         let series: Vec<Series> = lines
             .iter()
             .map(|line| Series {
                 returns: line.account.returns(),
                 traded: &line.account.traded,
-                growth: line.account.yearly_growth(MONTHS_PER_YEAR),
+                growth: line.account.yearly_growth(scale.periods_per_year),
             })
             .collect();
-        let years = periods.len() / MONTHS_PER_YEAR;
-        let measure = |months: &[usize], years: &[usize]| -> Vec<Measured> {
-            series.iter().map(|series| series.measure(&bank, months, years, walk)).collect()
+        let years = periods.len() / scale.periods_per_year;
+        let measure = |periods: &[usize], years: &[usize]| -> Vec<Measured> {
+            series.iter().map(|series| series.measure(&bank, periods, years, scale)).collect()
         };
         let whole = measure(&(0..periods.len()).collect::<Vec<_>>(), &(0..years).collect::<Vec<_>>());
         let resampled: Vec<Vec<Measured>> = (0..RESAMPLES)
             .map(|draw| {
                 let blocks =
-                    |purpose, length, block| circular_blocks(length, block, &mut stream(walk.seed, purpose, 0, draw));
+                    |purpose, length, block| circular_blocks(length, block, &mut stream(scale.seed, purpose, 0, draw));
                 measure(
-                    &blocks("bootstrap months", periods.len(), MONTH_BLOCK),
+                    &blocks("bootstrap months", periods.len(), scale.periods_per_year),
                     &blocks("bootstrap years", years, YEAR_BLOCK),
                 )
             })

@@ -16,23 +16,25 @@ pub fn write(backtest: &Backtest, folder: &Path) -> Result<(), BacktestError> {
     file(folder, PAGE, &page::page(backtest).html()?)?;
     file(folder, "report.json", &(serde_json::to_string_pretty(&summary(backtest))? + "\n"))?;
     file(folder, "strategies.csv", &strategies(backtest))?;
-    file(folder, "months.csv", &months(backtest))
+    file(folder, "periods.csv", &periods(backtest))
 }
 
-/// Everything but the months; a run is told apart by its choices, not by when it was made.
+/// Everything but the periods; a run is told apart by its choices, not by when it was made.
 pub fn summary(backtest: &Backtest) -> Value {
-    let args = &backtest.args;
+    let (args, walk) = (&backtest.args, backtest.walk);
     json!({
-        "first_month": backtest.months.first().map(|month| &month.month),
-        "last_month": backtest.months.last().map(|month| &month.month),
+        "frequency": backtest.returns.frequency.adjective(),
+        "periods_per_year": backtest.returns.periods_per_year,
+        "first": backtest.rows().first().map(|row| &row.date),
+        "last": backtest.rows().last().map(|row| &row.date),
         "whole_years": backtest.analysis.years,
         "choices": {
-            "window": args.window, "alpha": args.alpha, "risk_aversion": args.risk_aversion, "cost_bp": args.cost_bp,
+            "window": walk.window, "every": walk.every, "horizon": walk.horizon, "alpha": args.alpha, "risk_aversion": args.risk_aversion, "cost_bp": args.cost_bp,
             "cost_blind": args.cost_blind, "count": args.count, "seed": args.seed,
         },
         "intervals": {
             "confidence": analysis::CONFIDENCE, "resamples": analysis::RESAMPLES,
-            "month_block": analysis::MONTH_BLOCK, "year_block": analysis::YEAR_BLOCK,
+            "period_block": backtest.returns.periods_per_year, "year_block": analysis::YEAR_BLOCK,
         },
         "strategies": backtest.analysis.figures,
         "sentences": verdict::sentences(backtest),
@@ -69,15 +71,15 @@ fn strategies(backtest: &Backtest) -> String {
     csv.into_text()
 }
 
-/// One line a month and strategy; wealth and drawdown at its end.
-pub fn months(backtest: &Backtest) -> String {
+/// One line a period and strategy; wealth and drawdown at its end.
+pub fn periods(backtest: &Backtest) -> String {
     let mut csv =
-        Csv::new(&["month", "strategy", "allocation", "low", "high", "radius", "traded", "wealth", "drawdown"]);
+        Csv::new(&["date", "strategy", "allocation", "low", "high", "radius", "traded", "wealth", "drawdown"]);
     for line in &backtest.lines {
         let drawdowns = line.account.drawdowns();
-        for (index, (month, decision)) in backtest.months.iter().zip(&line.decisions).enumerate() {
+        for (index, (row, decision)) in backtest.rows().iter().zip(&line.decisions).enumerate() {
             let fields: [&dyn Display; 9] = [
-                &month.month,
+                &row.date,
                 &line.name,
                 &line.account.allocations[index],
                 &decision.band.low,

@@ -2,11 +2,13 @@
 
 use ballast::report::{Axis, BarChart, Chart, Page, Table, interval, number};
 
-use super::analysis::{BootstrapEstimate, CONFIDENCE, Figures, Line, MONTH_BLOCK, RESAMPLES, YEAR_BLOCK};
-use super::{Backtest, verdict};
+use super::analysis::{BootstrapEstimate, CONFIDENCE, Figures, Line, RESAMPLES, YEAR_BLOCK};
+use super::{Backtest, Row, verdict};
 
 pub fn page(backtest: &Backtest) -> Page {
-    let (first, last) = (bound(backtest, 0), bound(backtest, backtest.months.len() - 1));
+    let date = |row: Option<&Row>| row.map_or(String::new(), |row| row.date.clone());
+    let (first, last) = (date(backtest.rows().first()), date(backtest.rows().last()));
+    let noun = noun(backtest);
     Page::new(&format!("Walk-forward, {first} to {last}"))
         .paragraph(method(backtest))
         .section("What it shows")
@@ -25,35 +27,50 @@ pub fn page(backtest: &Backtest) -> Page {
         .figure(drawdowns(backtest), "How far wealth is below its highest so far.")
         .table(performance_table(backtest))
         .section("What was held")
-        .figure(allocations(backtest), "Share of wealth in the risky asset at the start of each month.")
-        .figure(radii(backtest), "Radius of the Wasserstein ball that month; static ones keep theirs for a year.")
+        .figure(allocations(backtest), &format!("Share of wealth in the risky asset at the start of each {noun}."))
+        .figure(
+            radii(backtest),
+            &format!("Radius of the Wasserstein ball that {noun}; static ones keep theirs until the next training."),
+        )
         .section("How it was done")
         .points(notes(backtest))
 }
 
-fn bound(backtest: &Backtest, index: usize) -> &str {
-    backtest.months.get(index).map_or("", |month| &month.month)
+fn noun(backtest: &Backtest) -> &'static str {
+    backtest.returns.frequency.noun()
+}
+
+/// So many periods, in words.
+fn periods(backtest: &Backtest, count: usize) -> String {
+    format!("{count} {}{}", noun(backtest), if count == 1 { "" } else { "s" })
 }
 
 fn method(backtest: &Backtest) -> String {
-    let args = &backtest.args;
+    let (walk, noun) = (backtest.walk, noun(backtest));
     format!(
-        "Every {} months a policy is trained on the {} months before and lived by for the year: each month it is asked, \
-         held to, and told the return. Nothing later than a month is used for its allocation. Relative risk aversion {}.",
-        backtest.walk.year, args.window, args.risk_aversion
+        "{} Every {} a policy is trained on the {} before, for a horizon of {}, and lived by until the next: each {noun} it \
+         is asked, held to, and told the return. Nothing later than a {noun} is used for its allocation. Relative risk \
+         aversion {}.",
+        backtest.returns.sentence().replace('\n', " "),
+        periods(backtest, walk.every),
+        periods(backtest, walk.window),
+        periods(backtest, walk.horizon),
+        walk.risk_aversion
     )
 }
 
 fn notes(backtest: &Backtest) -> Vec<String> {
-    let args = &backtest.args;
+    let (args, noun) = (&backtest.args, noun(backtest));
+    let block = periods(backtest, backtest.returns.periods_per_year);
     vec![
         format!("Design points a step {}, seed {}, bridge radius; took {:.0} s.", args.count, args.seed, backtest.seconds),
-        "A policy takes the bank to go on paying what it paid in the last month before the year; accounts are credited \
-         with what it really paid."
-            .into(),
+        format!(
+            "A policy takes the bank to go on paying what it paid in the last {noun} before its training; accounts are \
+             credited with what it really paid."
+        ),
         format!(
             "Intervals are the middle {:.0} % of {RESAMPLES} circular block-bootstrap resamples, alike for all strategies: \
-             blocks of {MONTH_BLOCK} months, and of {YEAR_BLOCK} years for certainty equivalents. They take the past as one \
+             blocks of {block}, and of {YEAR_BLOCK} years for certainty equivalents. They take the past as one \
              draw of a stationary world, so they are too narrow for what was never seen.",
             100.0 * CONFIDENCE
         ),
@@ -66,13 +83,9 @@ fn notes(backtest: &Backtest) -> Vec<String> {
     ]
 }
 
-/// Months as years and their parts.
+/// Dates as years and their parts.
 fn years(backtest: &Backtest) -> Vec<f64> {
-    let year = |month: &str| {
-        let (year, month) = month.split_once('-')?;
-        Some(year.parse::<f64>().ok()? + (month.parse::<f64>().ok()? - 1.0) / 12.0)
-    };
-    backtest.months.iter().map(|month| year(&month.month).unwrap_or(0.0)).collect()
+    backtest.rows().iter().map(|row| row.time).collect()
 }
 
 fn time() -> Axis {
@@ -87,7 +100,8 @@ fn followed(backtest: &Backtest) -> impl Iterator<Item = &Line> {
 fn wealth(backtest: &Backtest) -> Chart {
     let years = years(backtest);
     let start = years.first().map_or(0.0, |first| *first);
-    let times: Vec<f64> = [start].into_iter().chain(years.iter().map(|year| year + 1.0 / 12.0)).collect();
+    let period = 1.0 / backtest.returns.periods_per_year as f64;
+    let times: Vec<f64> = [start].into_iter().chain(years.iter().map(|year| year + period)).collect();
     let chart = Chart::new("Wealth", time(), Axis::new("wealth, logarithmic").log());
     // The cost-blind strategy lies too close beside the one it is compared with, and a chart holds eight lines.
     let blind = backtest.args.blind_line();
@@ -119,7 +133,7 @@ fn allocations(backtest: &Backtest) -> Chart {
 
 fn radii(backtest: &Backtest) -> Chart {
     let years = years(backtest);
-    let chart = Chart::new("Radius", time(), Axis::new("log-return a month, %").from_zero());
+    let chart = Chart::new("Radius", time(), Axis::new(&format!("log-return a {}, %", noun(backtest))).from_zero());
     trained(backtest).filter(|line| line.decisions.iter().any(|decision| decision.radius > 0.0)).fold(
         chart,
         |chart, line| {
@@ -146,7 +160,13 @@ fn utility_table(backtest: &Backtest) -> Table {
     let main = &backtest.lines[backtest.args.main_line()].name;
     let table = Table::new(
         "Certainty equivalents of a year from 100",
-        &["strategy", "certainty equivalent", &format!("{main} less this"), "mean allocation, %", "all-bank months, %"],
+        &[
+            "strategy",
+            "certainty equivalent",
+            &format!("{main} less this"),
+            "mean allocation, %",
+            &format!("all-bank {}s, %", noun(backtest)),
+        ],
     );
     backtest.analysis.figures.iter().fold(table, |table, figures| {
         table.row([

@@ -93,9 +93,10 @@ fn holding(backtest: &Backtest, main: usize) -> String {
         format!("on average {:.1} % in the risky asset", 100.0 * figures.mean_allocation)
     };
     format!(
-        "It held nothing but the bank in {:.0} % of {} months; {held}.",
+        "It held nothing but the bank in {:.0} % of {} {}s; {held}.",
         100.0 * figures.all_bank_share,
-        backtest.months.len()
+        backtest.rows().len(),
+        backtest.returns.frequency.noun()
     )
 }
 
@@ -115,8 +116,9 @@ fn guard(backtest: &Backtest, main: usize) -> String {
     let decisions = &backtest.lines[main].decisions;
     let resolved = decisions.iter().filter(|one| one.source == Some(AdviceSource::ResolvedOutsideDesign)).count();
     format!(
-        "In {:.0} % of the months the state lay outside the design and the robust step was solved anew.",
-        100.0 * resolved as f64 / decisions.len() as f64
+        "In {:.0} % of the {}s the state lay outside the design and the robust step was solved anew.",
+        100.0 * resolved as f64 / decisions.len() as f64,
+        backtest.returns.frequency.noun()
     )
 }
 

@@ -1,7 +1,7 @@
 //! The investor of the story: what he wants, and what was known before a month.
 
 use super::DemoError;
-use crate::command::monthly_returns::MonthlyReturns;
+use crate::command::returns::Returns;
 
 /// Months of history: twenty years.
 pub const HISTORY: usize = 240;
@@ -19,7 +19,7 @@ pub struct Past {
 }
 
 impl Past {
-    pub fn before(market: &MonthlyReturns, month: &str) -> Result<Self, DemoError> {
+    pub fn before(market: &Returns, month: &str) -> Result<Self, DemoError> {
         let months = market.before(month, HISTORY)?;
         Ok(Past {
             month: month.into(),
@@ -41,7 +41,7 @@ mod tests {
 
     #[test]
     fn january_2008_pays_beyond_the_bank_more_than_the_radius_and_1987_less() {
-        let market = MonthlyReturns::bundled().unwrap();
+        let market = Returns::bundled().unwrap();
         assert!(Past::before(&market, "2008-01").unwrap().edge() > 0.0049);
         assert!(Past::before(&market, "1987-01").unwrap().edge() < 0.0056);
     }

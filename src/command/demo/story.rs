@@ -4,7 +4,7 @@ use super::DemoError;
 use super::calls::{Advice, Move, advice, observe, open_session, train};
 use super::past::{ALPHA, HISTORY, INITIAL_WEALTH, Past, RISK_AVERSION};
 use crate::command::api_client::ApiClient;
-use crate::command::monthly_returns::{Month, MonthlyReturns};
+use crate::command::returns::{Returns, Row};
 
 const YEAR: &str = "2008";
 const FIRST_MONTH: &str = "2008-01";
@@ -17,7 +17,7 @@ const MOVES_TOLD: usize = 3;
 
 /// Trains, tells why, and lives through the year.
 pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
-    let market = MonthlyReturns::bundled()?;
+    let market = Returns::bundled()?;
     let past = Past::before(&market, FIRST_MONTH)?;
     println!(
         "\nTraining on the US stock market of the {HISTORY} months before {FIRST_MONTH} for the {HORIZON} months after:"
@@ -73,7 +73,7 @@ fn reason(edge: f64, radius: f64) -> &'static str {
 }
 
 /// The same rule, one month ahead, in several Januaries. Cheap: each is a single robust solve.
-async fn compare_januaries(api: &ApiClient, market: &MonthlyReturns, count: usize) -> Result<(), DemoError> {
+async fn compare_januaries(api: &ApiClient, market: &Returns, count: usize) -> Result<(), DemoError> {
     println!("\nThe same rule, looking one month ahead, in four Januaries:");
     println!("{:<8} {:>8} {:>11}  stocks beyond the bank", "month", "radius", "allocation");
     for month in JANUARIES {
@@ -88,12 +88,7 @@ async fn compare_januaries(api: &ApiClient, market: &MonthlyReturns, count: usiz
 }
 
 /// One line a month; the advice of the last month, explained.
-async fn live_through(
-    api: &ApiClient,
-    session: &str,
-    past: &Past,
-    year: &[Month],
-) -> Result<Option<Advice>, DemoError> {
+async fn live_through(api: &ApiClient, session: &str, past: &Past, year: &[Row]) -> Result<Option<Advice>, DemoError> {
     println!("\nThe year {YEAR}, month by month (the bank pays {:.2} % throughout):", 100.0 * past.rate);
     println!(
         "{:<8} {:>8} {:>11} {:>10} {:>9} {:>9} {:>10}",
@@ -107,7 +102,7 @@ async fn live_through(
         all_stock *= 1.0 + month.risky_return;
         println!(
             "{:<8} {:>8.4} {:>11.3} {:>8.2} % {wealth:>9.2} {all_bank:>9.2} {all_stock:>10.2}",
-            month.month,
+            month.date,
             told.radius,
             told.allocation,
             100.0 * month.risky_return

@@ -1,7 +1,7 @@
-//! Walk-forward: every year a policy is trained on the window of returns before it, and lived by through the year.
+//! Walk-forward: every so many periods a policy is trained on the window of returns before, and lived by until the next one.
 //!
 //! Decisions and accounts are apart: under power and log utility no band depends on wealth, and hardly on what is held, so the
-//! years can be decided side by side, and what wealth became is counted afterwards ([`crate::control::evaluation::account`]).
+//! stretches between trainings can be decided side by side, and what wealth became is counted afterwards ([`crate::control::evaluation::account`]).
 
 use crate::control::error::TrainError;
 use crate::control::policy::advice::{Advice, AdviceSource};
@@ -63,13 +63,15 @@ pub struct Decision {
     pub source: Option<AdviceSource>,
 }
 
-/// The choices that all years share.
+/// The choices that all trainings share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WalkForward {
-    /// Periods of history before each year.
+    /// Periods of history that each policy is trained on.
     pub window: usize,
-    /// Periods a policy is lived by: its horizon.
-    pub year: usize,
+    /// Periods that a policy is lived by, until the next is trained: at most the horizon.
+    pub every: usize,
+    /// Periods that a policy looks ahead.
+    pub horizon: usize,
     /// Relative risk aversion: log utility at 1, power utility above.
     pub risk_aversion: f64,
     /// That policies reckon with, of what is traded.
@@ -93,26 +95,23 @@ impl Strategy {
 }
 
 impl WalkForward {
-    /// Log utility at risk aversion 1, power utility above.
+    /// Of terminal wealth, and of a year's in the figures.
     pub fn utility(&self) -> UtilitySpecification {
-        match self.risk_aversion {
-            1.0 => UtilitySpecification::Log {},
-            risk_aversion => UtilitySpecification::Power { risk_aversion },
-        }
+        UtilitySpecification::relative(self.risk_aversion)
     }
 
-    /// Trainings that [`Self::decide`] takes: one a strategy that needs it and a year.
+    /// Trainings that [`Self::decide`] takes: one a strategy that needs it and a stretch.
     pub fn trainings(&self, strategies: &[Strategy], periods: &[Period]) -> usize {
-        let years = periods.len().saturating_sub(self.window).div_ceil(self.year);
-        years * strategies.iter().filter(|strategy| strategy.framework().is_some()).count()
+        let stretches = periods.len().saturating_sub(self.window).div_ceil(self.every);
+        stretches * strategies.iter().filter(|strategy| strategy.framework().is_some()).count()
     }
 
-    /// The training request of one year from the periods before it. The bank is taken to go on paying what it paid last.
+    /// The training request of one stretch from the periods before it. The bank is taken to go on paying what it paid last.
     pub fn specification(&self, framework: Framework, alpha: f64, past: &[Period]) -> Specification {
         Specification {
             problem: ProblemSpecification {
                 framework,
-                horizon: self.year,
+                horizon: self.horizon,
                 trading_cost: self.trading_cost,
                 utility: self.utility(),
                 radius: Some(RadiusRule::bridge(alpha)),
@@ -128,7 +127,7 @@ impl WalkForward {
     }
 
     /// What each strategy holds through every period after the first window, on the current pool of threads.
-    /// The last year may be cut short. `trained` hears of every training done, in no order.
+    /// The last stretch may be cut short. `trained` hears of every training done, in no order.
     ///
     /// # Errors
     /// Returns or choices that break a rule of the specification; a training that fails; the stop signal.
@@ -139,42 +138,42 @@ impl WalkForward {
         watch: &Watch,
         trained: &(dyn Fn() + Sync),
     ) -> Result<Vec<Vec<Decision>>, TrainError> {
-        let starts = (self.window..periods.len()).step_by(self.year);
-        // Years outermost, so that years done stay done together.
+        let starts = (self.window..periods.len()).step_by(self.every);
+        // Stretches outermost, so that those done stay done together.
         let jobs: Vec<(usize, Strategy)> =
             starts.flat_map(|start| strategies.iter().map(move |&strategy| (start, strategy))).collect();
         let found = pool::map(jobs, |(start, strategy)| {
-            let decided = self.decide_year(strategy, periods, start, watch);
+            let decided = self.decide_stretch(strategy, periods, start, watch);
             if strategy.framework().is_some() {
                 trained();
             }
             decided
         });
         let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); strategies.len()];
-        for (job, year) in found.into_iter().enumerate() {
-            decisions[job % strategies.len()].extend(year?);
+        for (job, stretch) in found.into_iter().enumerate() {
+            decisions[job % strategies.len()].extend(stretch?);
         }
         Ok(decisions)
     }
 
-    fn decide_year(
+    fn decide_stretch(
         &self,
         strategy: Strategy,
         periods: &[Period],
         start: usize,
         watch: &Watch,
     ) -> Result<Vec<Decision>, TrainError> {
-        let year = &periods[start..periods.len().min(start + self.year)];
+        let stretch = &periods[start..periods.len().min(start + self.every)];
         let Some((framework, alpha)) = strategy.framework() else {
             let Strategy::Mix { share } = strategy else { return Ok(Vec::new()) };
-            return Ok(vec![Decision { band: Band::of(&[share]), radius: 0.0, source: None }; year.len()]);
+            return Ok(vec![Decision { band: Band::of(&[share]), radius: 0.0, source: None }; stretch.len()]);
         };
         let mut specification = self.specification(framework, alpha, &periods[start - self.window..start]);
         if matches!(strategy, Strategy::CostBlind { .. }) {
             specification.problem.trading_cost = 0.0;
         }
         let advisor = Advisor::new(Training::new(&specification)?.run(watch)?);
-        let returns: Vec<f64> = year.iter().map(|period| period.log_return).collect();
+        let returns: Vec<f64> = stretch.iter().map(|period| period.log_return).collect();
         let decided = |Advice { band, radius, source, .. }| Decision { band, radius, source: Some(source) };
         Ok(advisor.walk(advisor.initial_state(None, None)?, &returns).map(decided).collect())
     }

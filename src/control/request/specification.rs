@@ -105,6 +105,16 @@ pub enum UtilitySpecification {
     Log {},
 }
 
+impl UtilitySpecification {
+    /// Of constant relative risk aversion: log utility at 1, power utility above.
+    pub fn relative(risk_aversion: f64) -> Self {
+        match risk_aversion {
+            1.0 => UtilitySpecification::Log {},
+            risk_aversion => UtilitySpecification::Power { risk_aversion },
+        }
+    }
+}
+
 impl Default for UtilitySpecification {
     fn default() -> Self {
         UtilitySpecification::Power { risk_aversion: 3.0 }

@@ -1,0 +1,85 @@
+//! `ballast advise`: what to hold through the coming period, from a file of returns or prices. No server runs; the answer is
+//! that of `POST /advise`.
+
+use std::error::Error;
+
+use ballast::control::error::FieldError;
+use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification, default_seed};
+use ballast::service::advise::Advise;
+use clap::Args;
+
+use super::returns::{Returns, ReturnsFile};
+
+mod words;
+
+#[derive(Debug, Clone, Args)]
+pub struct AdviseArgs {
+    #[command(flatten)]
+    returns: ReturnsFile,
+    /// Use the last so many returns; all of them unless given
+    #[arg(long)]
+    window: Option<usize>,
+    /// Relative risk aversion: 1 is log utility, more is more careful
+    #[arg(long, default_value_t = 3.0)]
+    risk_aversion: f64,
+    /// Wealth now, in any currency
+    #[arg(long, default_value_t = 100.0)]
+    wealth: f64,
+    /// Share of wealth in the risky asset now
+    #[arg(long, default_value_t = 0.0)]
+    holding: f64,
+    /// Lost of what is bought or sold, as a fraction: 0.001 is 0.1 %
+    #[arg(long, default_value_t = 0.0)]
+    trading_cost: f64,
+    /// Print what POST /advise answers, and what was read on the standard error
+    #[arg(long)]
+    json: bool,
+}
+
+/// The option that says what a field of the question is.
+const OPTIONS: [(&str, &str); 3] =
+    [("problem.trading_cost", "--trading-cost"), ("wealth", "--wealth"), ("holding", "--holding")];
+
+pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
+    if !(1.0..=100.0).contains(&arguments.risk_aversion) {
+        return Err(FieldError::new("--risk-aversion", arguments.risk_aversion, "must lie in [1, 100]").into());
+    }
+    let mut returns = arguments.returns.read()?;
+    if let Some(window) = arguments.window {
+        returns = returns.last(window)?;
+    }
+    let count = returns.rows().len();
+    let advised = arguments.question(&returns).answer().map_err(|error| by_option(error, count))?;
+    if arguments.json {
+        eprintln!("{}", returns.sentence());
+        println!("{}", serde_json::to_string_pretty(&advised)?);
+    } else {
+        println!("{}\n\n{}", returns.sentence(), words::told(&advised, arguments.wealth, returns.frequency));
+    }
+    Ok(())
+}
+
+impl AdviseArgs {
+    fn question(&self, returns: &Returns) -> Advise {
+        let history = returns.rows().iter().map(|row| row.period().log_return).collect();
+        let problem = ProblemSpecification {
+            horizon: 1,
+            trading_cost: self.trading_cost,
+            utility: UtilitySpecification::relative(self.risk_aversion),
+            ..ProblemSpecification::of(history, returns.rate())
+        };
+        Advise { problem, wealth: Some(self.wealth), holding: Some(self.holding), seed: default_seed() }
+    }
+}
+
+/// The same error of a question about `count` returns, under the name by which the user knows the field.
+fn by_option(error: FieldError, count: usize) -> FieldError {
+    if error.field == "problem.radius.paths" {
+        let rule = "must be fewer: the radius is not simulated for so many";
+        return FieldError::new("--window", format!("{count} returns"), rule);
+    }
+    match OPTIONS.iter().find(|(field, _)| *field == error.field) {
+        Some((_, option)) => FieldError { field: (*option).into(), ..error },
+        None => error,
+    }
+}

@@ -1,0 +1,137 @@
+//! What a period is: told by how far apart the dates of a file are.
+
+use std::ops::RangeInclusive;
+
+use jiff::civil::{Date, Weekday};
+
+use super::cell::Cell;
+use super::error::ReturnsError;
+
+/// Days that an exchange may rest: weekends, and holidays as long as the golden weeks of Asia or March 1933.
+const LONGEST_REST: i32 = 12;
+/// Days from a week's date to the next one's, where a holiday moves either.
+const WEEK: RangeInclusive<i32> = 4..=10;
+
+/// Days from a month's date to the next one's, where both move to days on which exchanges are open; less is no month.
+const SHORTEST_MONTH: i32 = 20;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Frequency {
+    Daily,
+    Weekly,
+    Monthly,
+    Quarterly,
+    Yearly,
+}
+
+use Frequency::{Daily, Monthly, Quarterly, Weekly, Yearly};
+
+/// Days between dates by which most rows tell each.
+const DISTANCES: [(Frequency, RangeInclusive<i32>); 5] =
+    [(Daily, 1..=4), (Weekly, 5..=9), (Monthly, 26..=33), (Quarterly, 85..=97), (Yearly, 350..=380)];
+
+impl Frequency {
+    /// The one that the median distance of two or more dates tells; the cells are where they were read.
+    ///
+    /// # Errors
+    /// A date that is not later than the one before, or is not the next one at that frequency.
+    pub fn of(dates: &[Date], cells: &[Cell]) -> Result<Self, ReturnsError> {
+        let days = |pair: &[Date]| pair[0].until(pair[1]).map_or(0, |span| span.get_days());
+        let gaps: Vec<i32> = dates.windows(2).map(days).collect();
+        let refused = |index: usize, rule: String| Err(cells[index + 1].refused(rule));
+        if let Some(index) = gaps.iter().position(|gap| *gap <= 0) {
+            let rule = "the row before: rows go from the oldest to the newest, one a date";
+            return refused(index, format!("must be later than {}, {rule}", cells[index].text));
+        }
+        let mut sorted = gaps.clone();
+        sorted.sort_unstable();
+        let by = |gap: i32| DISTANCES.iter().find(|(_, days)| days.contains(&gap)).map(|(frequency, _)| *frequency);
+        let Some(frequency) = sorted.get(gaps.len().saturating_sub(1) / 2).and_then(|median| by(*median)) else {
+            let index = gaps.iter().position(|gap| by(*gap).is_none()).unwrap_or_default();
+            let rule = "where rows must be daily, weekly, monthly, quarterly or yearly";
+            let (gap, before) = (gaps[index], cells[index].text);
+            return refused(index, format!("is {gap} days after {before}, the row before, {rule}"));
+        };
+        match dates.windows(2).position(|pair| !frequency.follows(pair[0], pair[1])) {
+            None => Ok(frequency),
+            Some(index) => {
+                let (noun, adjective) = (frequency.noun(), frequency.adjective());
+                let rest = if frequency == Daily { ", but for weekends and holidays" } else { "" };
+                let (gap, before) = (gaps[index], cells[index].text);
+                let days = if gap == 1 { "day" } else { "days" };
+                refused(
+                    index,
+                    format!(
+                        "must be the {noun} after {before}{rest}: it is {gap} {days} later, and the rows are {adjective}"
+                    ),
+                )
+            }
+        }
+    }
+
+    /// Whether no period lies between.
+    fn follows(self, before: Date, date: Date) -> bool {
+        let days = before.until(date).map_or(0, |span| span.get_days());
+        let months = |date: Date| 12 * i32::from(date.year()) + i32::from(date.month());
+        let apart = months(date) - months(before);
+        match self {
+            Daily => days <= LONGEST_REST,
+            Weekly => WEEK.contains(&days),
+            Monthly => apart == 1 && days >= SHORTEST_MONTH,
+            Quarterly => apart == 3 && days >= 3 * SHORTEST_MONTH,
+            Yearly => apart == 12 && days >= 12 * SHORTEST_MONTH,
+        }
+    }
+
+    pub fn noun(self) -> &'static str {
+        match self {
+            Daily => "day",
+            Weekly => "week",
+            Monthly => "month",
+            Quarterly => "quarter",
+            Yearly => "year",
+        }
+    }
+
+    pub fn adjective(self) -> &'static str {
+        match self {
+            Daily => "daily",
+            Weekly => "weekly",
+            Monthly => "monthly",
+            Quarterly => "quarterly",
+            Yearly => "yearly",
+        }
+    }
+
+    /// Of days: those on which exchanges are open, or all where both days of the weekend are among the dates.
+    pub fn periods_per_year(self, dates: &[Date]) -> usize {
+        let has = |day: Weekday| dates.iter().any(|date| date.weekday() == day);
+        match self {
+            Daily if has(Weekday::Saturday) && has(Weekday::Sunday) => 365,
+            Daily => 252,
+            Weekly => 52,
+            Monthly => 12,
+            Quarterly => 4,
+            Yearly => 1,
+        }
+    }
+
+    /// A date, as fine as the periods are.
+    pub fn shown(self, date: Date) -> String {
+        let format = match self {
+            Daily | Weekly => "%Y-%m-%d",
+            Monthly | Quarterly => "%Y-%m",
+            Yearly => "%Y",
+        };
+        date.strftime(format).to_string()
+    }
+
+    /// The same in years; of months and longer the day does not count.
+    pub fn time(self, date: Date) -> f64 {
+        let year = f64::from(date.year());
+        match self {
+            Daily | Weekly => year + f64::from(date.day_of_year() - 1) / f64::from(date.days_in_year()),
+            Monthly | Quarterly | Yearly => year + f64::from(date.month() - 1) / 12.0,
+        }
+    }
+}
