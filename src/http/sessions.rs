@@ -18,10 +18,11 @@ use super::problem::Problem;
 use super::wire;
 use crate::control::policy::advisor::AdviceMode;
 use crate::service::Service;
+use crate::service::action::Question;
 use crate::service::allowance::Class;
 use crate::service::metrics::{ACTION_SECONDS, OBSERVE_SECONDS};
 use crate::service::observation::{Observe, Observed};
-use crate::service::sessions::{Question, Start};
+use crate::service::sessions::Start;
 use crate::service::what_if::Explain;
 
 /// Open a session.
@@ -146,6 +147,8 @@ pub struct Ask {
     session: String,
     mode: Option<Mode>,
     explain: Option<Explain>,
+    #[serde(default)]
+    sensitivity: bool,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
@@ -160,6 +163,7 @@ impl access::Question for Ask {
     fn class(&self) -> Class {
         match (self.mode, self.explain) {
             (Some(Mode::Resolve), _) | (_, Some(Explain::WorstCase)) => Class::Heavy,
+            (Some(Mode::Surrogate) | None, None) if self.sensitivity => Class::Heavy,
             (Some(Mode::Surrogate) | None, None) => Class::Live,
         }
     }
@@ -169,21 +173,25 @@ impl access::Question for Ask {
 #[utoipa::path(get, path = "/action", tag = "sessions",
     params(("session" = String, Query, description = "The session."),
            ("mode" = inline(Option<Mode>), Query, description = "`surrogate` (default) or `resolve`."),
-           ("explain" = inline(Option<Explain>), Query, description = "`worst_case`: re-solve, and show the worst-case law.")),
+           ("explain" = inline(Option<Explain>), Query, description = "`worst_case`: re-solve, and show the worst-case law."),
+           ("sensitivity" = Option<bool>, Query, description = "`true`: say how near the advice is to changing.")),
     responses(
         (status = 200, description = "The allocation.", body = wire::Action),
         (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json"),
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "The session has reached its horizon.", body = Problem, content_type = "application/problem+json")))]
+        (status = 409, description = "The session has reached its horizon.", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "The sensitivity of this session is not told.", body = Problem, content_type = "application/problem+json")))]
 pub async fn action(
     State(service): State<Arc<Service>>,
     Asked(caller, ask): Asked<Ask>,
 ) -> Result<Json<wire::Action>, Problem> {
-    let (question, label) = match (ask.explain, ask.mode) {
-        (Some(Explain::WorstCase), _) => (Question::Explain, "explain"),
-        (None, Some(Mode::Resolve)) => (Question::Advise(AdviceMode::Resolve), "resolve"),
-        (None, _) => (Question::Advise(AdviceMode::Surrogate), "surrogate"),
+    let (mode, label) = match (ask.explain, ask.mode) {
+        (Some(Explain::WorstCase), _) => (AdviceMode::Resolve, "explain"),
+        (None, Some(Mode::Resolve)) => (AdviceMode::Resolve, "resolve"),
+        (None, _) => (AdviceMode::Surrogate, "surrogate"),
     };
+    let label = if ask.sensitivity { "sensitivity" } else { label };
+    let question = Question { mode, explain: ask.explain.is_some(), sensitivity: ask.sensitivity };
     let started = Instant::now();
     let action = service.sessions.action(&caller.tenant, &ask.session, question, &caller.turn).await?;
     metrics::histogram!(ACTION_SECONDS, "mode" => label).record(started.elapsed().as_secs_f64());

@@ -7,6 +7,8 @@ use super::error::ServiceError;
 use super::sessions::Sessions;
 use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
+use crate::control::policy::caution::Caution;
+use crate::control::policy::sensitivity::{Sensitivity, cautions};
 use crate::control::policy::worst_case::WorstCase;
 use crate::control::request::rules;
 use crate::control::request::specification::{ProblemSpecification, Specification, default_seed};
@@ -25,6 +27,9 @@ pub struct Advise {
     /// Of the simulated bridges.
     #[serde(default = "default_seed")]
     pub seed: u64,
+    /// Whether to say how near the advice is to changing.
+    #[serde(default)]
+    pub sensitivity: bool,
 }
 
 /// The advice, and the law that is worst for it.
@@ -33,6 +38,11 @@ pub struct Advised {
     #[serde(flatten)]
     pub advice: Advice,
     pub worst_case: WorstCase,
+    /// What to know before the advice is followed.
+    pub caution: Vec<Caution>,
+    /// How near it is to changing, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensitivity: Option<Sensitivity>,
 }
 
 impl Advise {
@@ -52,13 +62,21 @@ impl Advise {
 
 impl Sessions {
     /// # Errors
-    /// A field breaks a rule; the radius asks for more memory than can be kept; no turn to solve.
+    /// A field breaks a rule; the radius asks for more memory than can be kept, or the sensitivity for too much time; no turn
+    /// to solve.
     pub async fn advise(&self, tenant: &Tenant, question: Advise) -> Result<Advised, ServiceError> {
-        let holding = question.holding.unwrap_or(0.0);
+        let (holding, asks_sensitivity) = (question.holding.unwrap_or(0.0), question.sensitivity);
         rules::share("holding", holding)?;
         let specification = question.specification()?;
         let investor = self.policies.one_period(&specification)?;
-        let (advice, worst_case) = self.resolving.run(tenant, move || investor.advise(holding)).await??;
-        Ok(Advised { advice, worst_case })
+        if asks_sensitivity {
+            investor.check_sensitivity()?;
+        }
+        let advising = self.resolving.run(tenant, move || -> Result<Advised, FieldError> {
+            let (advice, worst_case) = investor.advise(holding)?;
+            let sensitivity = asks_sensitivity.then(|| investor.sensitivity(holding, &advice)).transpose()?;
+            Ok(Advised { caution: cautions(&advice, sensitivity.as_ref()), advice, worst_case, sensitivity })
+        });
+        Ok(advising.await??)
     }
 }

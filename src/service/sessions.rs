@@ -28,31 +28,14 @@ use super::policies::Policies;
 use super::slots::{Generation, Held, Slots, Source};
 use super::spans;
 use crate::control::error::FieldError;
-use crate::control::policy::advice::Advice;
-use crate::control::policy::advisor::{AdviceMode, Advisor};
+use crate::control::policy::advisor::Advisor;
 use crate::control::policy::content_hash;
-use crate::control::policy::worst_case::WorstCase;
 use crate::store::{
     Append, CreateSession, ObservationRow, RequestKey, SessionFacts, SessionRow, SessionSummary, Store, Tenant,
 };
 
 /// Whose session it is, and its name.
 type Name = (Tenant, String);
-
-/// What [`Sessions::action`] found.
-pub struct Action {
-    pub period: usize,
-    pub advice: Advice,
-    pub worst_case: Option<WorstCase>,
-}
-
-/// How an action is asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Question {
-    Advise(AdviceMode),
-    /// Re-solve, and show the worst-case law.
-    Explain,
-}
 
 /// What a session starts from; history and wealth default to the policy's, and it holds nothing unless it says so.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -249,58 +232,22 @@ impl Sessions {
         }
     }
 
-    /// The robust allocation for the coming period.
-    ///
-    /// # Errors
-    /// There is no such session, it has reached its horizon, or it must be solved and too much is under way.
-    pub async fn action(
-        &self,
-        tenant: &Tenant,
-        session: &str,
-        question: Question,
-        turn: &HeavyTurn,
-    ) -> Result<Action, ServiceError> {
-        let mut held = self.hold(tenant, session).await;
-        let live = held.current(&Rows { sessions: self, tenant, session }).await?;
-        if live.observed() >= live.row.horizon {
-            return Err(ServiceError::Completed { session: session.to_owned(), horizon: live.row.horizon });
-        }
-        let period = live.observed() + 1;
-        let surrogate = question == Question::Advise(AdviceMode::Surrogate);
-        if let Some(advice) = live.advice.clone().filter(|_| surrogate) {
-            return Ok(Action { period, advice, worst_case: None });
-        }
-        let means = self.means(tenant, live, turn).await?;
-        if surrogate {
-            let advice = live.surrogate_advice(&means).await?.clone();
-            return Ok(Action { period, advice, worst_case: None });
-        }
-        let advisor = means.advisor;
-        let (state, step) = (live.state.clone(), live.observed());
-        drop(held);
-        turn.begin()?;
-        let solving = self.resolving.run(tenant, move || match question {
-            Question::Explain => {
-                let (advice, worst_case) = advisor.explain(step, &state);
-                (advice, Some(worst_case))
-            }
-            Question::Advise(mode) => (advisor.advise(step, &state, mode), None),
-        });
-        let (advice, worst_case) = solving.await?;
-        Ok(Action { period, advice, worst_case })
-    }
-
     /// The policy of a session, made ready.
     pub(super) async fn advisor(&self, tenant: &Tenant, live: &Live) -> Result<Arc<Advisor>, ServiceError> {
         self.policies.advisor(tenant, &live.row.policy).await
     }
 
-    async fn means<'a>(&'a self, tenant: &Tenant, live: &Live, turn: &'a HeavyTurn) -> Result<Means<'a>, ServiceError> {
+    pub(super) async fn means<'a>(
+        &'a self,
+        tenant: &Tenant,
+        live: &Live,
+        turn: &'a HeavyTurn,
+    ) -> Result<Means<'a>, ServiceError> {
         let advisor = self.advisor(tenant, live).await?;
         Ok(Means { advisor, advising: &self.advising, resolving: &self.resolving, turn })
     }
 
-    async fn hold(&self, tenant: &Tenant, session: &str) -> Held<Name, Live> {
+    pub(super) async fn hold(&self, tenant: &Tenant, session: &str) -> Held<Name, Live> {
         self.slots.hold((tenant.clone(), session.to_owned())).await
     }
 
@@ -311,10 +258,10 @@ impl Sessions {
 }
 
 /// The rows of a tenant's session.
-struct Rows<'a> {
-    sessions: &'a Sessions,
-    tenant: &'a Tenant,
-    session: &'a str,
+pub(super) struct Rows<'a> {
+    pub sessions: &'a Sessions,
+    pub tenant: &'a Tenant,
+    pub session: &'a str,
 }
 
 impl Source<Live> for Rows<'_> {
