@@ -64,6 +64,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "return_kind.js": SCRIPT,
         "returns_field.js": SCRIPT,
         "returns_reader.js": SCRIPT,
+        "sensitivity.js": SCRIPT,
         "session.js": SCRIPT,
         "session_opening.js": SCRIPT,
         "sessions.js": SCRIPT,

@@ -147,8 +147,15 @@ pub struct Ask {
     session: String,
     mode: Option<Mode>,
     explain: Option<Explain>,
-    #[serde(default)]
-    sensitivity: bool,
+    sensitivity: Option<Flag>,
+}
+
+/// A parameter is text, and so is what it says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Flag {
+    True,
+    False,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
@@ -163,7 +170,7 @@ impl access::Question for Ask {
     fn class(&self) -> Class {
         match (self.mode, self.explain) {
             (Some(Mode::Resolve), _) | (_, Some(Explain::WorstCase)) => Class::Heavy,
-            (Some(Mode::Surrogate) | None, None) if self.sensitivity => Class::Heavy,
+            (Some(Mode::Surrogate) | None, None) if self.sensitivity == Some(Flag::True) => Class::Heavy,
             (Some(Mode::Surrogate) | None, None) => Class::Live,
         }
     }
@@ -190,8 +197,9 @@ pub async fn action(
         (None, Some(Mode::Resolve)) => (AdviceMode::Resolve, "resolve"),
         (None, _) => (AdviceMode::Surrogate, "surrogate"),
     };
-    let label = if ask.sensitivity { "sensitivity" } else { label };
-    let question = Question { mode, explain: ask.explain.is_some(), sensitivity: ask.sensitivity };
+    let sensitivity = ask.sensitivity == Some(Flag::True);
+    let label = if sensitivity { "sensitivity" } else { label };
+    let question = Question { mode, explain: ask.explain.is_some(), sensitivity };
     let started = Instant::now();
     let action = service.sessions.action(&caller.tenant, &ask.session, question, &caller.turn).await?;
     metrics::histogram!(ACTION_SECONDS, "mode" => label).record(started.elapsed().as_secs_f64());

@@ -38,6 +38,10 @@ class AuditPage(TypedDict):
     """Give it as `after` for the next page; null on the last."""
 
 
+CautionCode: TypeAlias = Literal["short_record", "one_return"]
+"""The reasons."""
+
+
 Contributions: TypeAlias = float | list[float]
 """C, money added at the end of each period."""
 
@@ -165,6 +169,19 @@ JobKind: TypeAlias = Literal["train", "evaluate"]
 JobState: TypeAlias = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 
 
+class LeftOut(TypedDict):
+    """The advice without one return."""
+
+    index: int
+    """Of the return in the record, from 0; the first of equal ones."""
+    log_return: float
+    """The return."""
+    simple_return: float
+    """The same as `price / previous price - 1`."""
+    allocation: float
+    """The share of wealth that would be advised."""
+
+
 class MixtureComponent(TypedDict):
     """One normal law of a mixture, of log-returns per step."""
 
@@ -174,6 +191,19 @@ class MixtureComponent(TypedDict):
     """In log-return."""
     variance: float
     """In squared log-return."""
+
+
+class NextAdvice(TypedDict):
+    """The advice after one more return."""
+
+    quantile: float
+    """Share of the record below it; interpolated between its returns (Hyndman and Fan, type 7)."""
+    log_return: float
+    """The return supposed."""
+    simple_return: float
+    """The same as `price / previous price - 1`."""
+    allocation: float
+    """The share of wealth that would be advised."""
 
 
 class Observation(TypedDict):
@@ -251,6 +281,26 @@ class PolicyPage(TypedDict):
     policies: list[PolicyEntry]
     next: NotRequired[int | None]
     """Give it as `after` for the next page; null on the last."""
+
+
+class Premium(TypedDict):
+    """What the record pays beyond the bank, and what it would have to."""
+
+    present: float
+    """Mean log-return of the record less `ln(1 + rate_per_step)`, per period."""
+    needed: NotRequired[float | None]
+    """
+    The same of the record with every return shifted by the amount at which the advice leaves the bank, to 1e-6: above
+    `present` where all is in the bank now, else below it. Null where no shift within the distance between the lowest and the
+    highest return, that leaves all of them in `support`, parts the two. In one period without trading cost the shift is
+    `ln(1 + rate_per_step)` less the log of the least mean of e^Z in the ball. Checked by: tests/sensitivity.rs against that.
+    """
+    periods_more: NotRequired[int | None]
+    """
+    More returns, of the law of those seen, after which the advice leaves the bank: the least number m at which the step with
+    the radius times sqrt(n / (n + m)) advises anything. 0 where it has left already; null where it does not within 10000
+    periods, or the radius rule is `fixed`.
+    """
 
 
 class Problem(TypedDict):
@@ -344,6 +394,15 @@ class RadiusSpread(TypedDict):
     """Nine tenths of the paths have less."""
     first_path: float
     """On the first path."""
+
+
+class Return(TypedDict):
+    """A return in both units."""
+
+    log_return: float
+    """`ln(price / previous price)`."""
+    simple_return: float
+    """`price / previous price - 1`."""
 
 
 class SamplingLaw1(TypedDict):
@@ -514,6 +573,15 @@ class WealthReport(TypedDict):
     """Over paths."""
 
 
+class WithoutOne(TypedDict):
+    """The range of the advice over the records that lack one return."""
+
+    lowest: LeftOut
+    """The lowest advice, and the return whose absence gives it."""
+    highest: LeftOut
+    """The highest advice, and the return whose absence gives it."""
+
+
 class WorstLawSummary(TypedDict):
     """The worst-case law in figures, of log-returns."""
 
@@ -575,6 +643,15 @@ class Advice(TypedDict):
     """How it was found."""
 
 
+class Caution(TypedDict):
+    """A reason to be careful with an advice."""
+
+    code: CautionCode
+    """For programs."""
+    sentence: str
+    """For people."""
+
+
 class CoverageAtSize(TypedDict):
     """How often the ball held the true law at one sample size."""
 
@@ -616,6 +693,27 @@ class JobProgress(TypedDict):
     """Design points solved, or paths simulated, in this step."""
     points_total: NotRequired[int | None]
     seconds_left: NotRequired[float | None]
+
+
+class NextReturn(TypedDict):
+    """
+    What one more return would change.
+
+    Returns are tried from the lowest of the record less half the distance between its extremes to the highest and half of it
+    more, within `support` where there is one: at 49 of them, evenly, and between neighbours of which one is advised an end of
+    the action interval and the other is not, by halving, to 1e-6. The advice need not rise with the return, for one far out
+    widens the radius whichever side it lies on: of several crossings the one nearest to the median is told, and a pair of them
+    between two neighbours is missed. Checked by: tests/sensitivity.rs on a finer grid.
+    """
+
+    range: list[float]
+    """The lowest and the highest log-return tried."""
+    to_bank: NotRequired[Return | None]
+    to_highest: NotRequired[Return | None]
+    low: NextAdvice
+    """After a return at the 5 % quantile of the record."""
+    high: NextAdvice
+    """After a return at the 95 % quantile of the record."""
 
 
 class Observed(Uncertainty):
@@ -678,6 +776,16 @@ class ProblemSpecification(TypedDict):
     law: NotRequired[SamplingLaw | None]
     history: list[HistoryItem]
     """The log-returns observed before the start, at least two of them distinct."""
+
+
+class Sensitivity(TypedDict):
+    """How near an advice is to changing."""
+
+    without_one: NotRequired[WithoutOne | None]
+    next_return: NextReturn
+    """With one more return."""
+    premium: Premium
+    """With another mean, and with more returns like those seen."""
 
 
 class Session(TypedDict):
@@ -805,6 +913,9 @@ class Action(Advice):
     session: str
     period: int
     worst_case: NotRequired[WorstCase | None]
+    caution: list[Caution]
+    """What to know before the advice is followed."""
+    sensitivity: NotRequired[Sensitivity | None]
 
 
 class Advise(TypedDict):
@@ -818,12 +929,17 @@ class Advise(TypedDict):
     """Share of wealth in the risky asset now, before trading. Default: 0."""
     seed: NotRequired[int]
     """Of the simulated bridges."""
+    sensitivity: NotRequired[bool]
+    """Whether to say how near the advice is to changing."""
 
 
 class Advised(Advice):
     """The advice, and the law that is worst for it."""
 
     worst_case: WorstCase
+    caution: list[Caution]
+    """What to know before the advice is followed."""
+    sensitivity: NotRequired[Sensitivity | None]
 
 
 class Coverage(TypedDict):

@@ -85,7 +85,7 @@ impl Asked<'_> {
         let sorted = EmpiricalDistribution::new(self.record);
         let quantile = |share| interpolated_quantile(sorted.atoms(), share);
         let part = (range[1] - range[0]) / PARTS as f64;
-        let grid: Vec<f64> = (0..=PARTS).map(|index| range[0] + part * index as f64).collect();
+        let grid: Vec<f64> = (0..=PARTS).map(|index| (range[0] + part * index as f64).min(range[1])).collect();
         let tried = grid.iter().copied().chain(QUANTILES.map(quantile)).collect();
         let told = pool::map(tried, |log_return| self.after(log_return));
         let crossing = |is_above: &(dyn Fn(f64) -> bool + Sync)| {
