@@ -313,15 +313,15 @@ async fn a_short_record_is_said_to_be_short_and_a_steady_one_is_not_said_to_hang
 #[tokio::test(flavor = "multi_thread")]
 async fn what_would_take_seconds_or_say_nothing_is_refused_by_name() {
     let mut app = App::start().await;
-    let long: Vec<f64> = (0..521).map(|index| 0.001 * f64::from(index % 50)).collect();
+    let long: Vec<f64> = (0..361).map(|index| 0.001 * f64::from(index % 50)).collect();
     let bridge = |paths: usize| json!({ "rule": "bridge", "alpha": 0.1, "paths": paths, "scale": 1.0 });
     let normal =
         json!({ "kind": "gaussian_mixture", "components": [{ "weight": 1.0, "mean": 0.0, "variance": 0.01 }] });
     for (problem, rule) in [
-        (json!({ "history": long }), "above 520 returns: here they are 521"),
+        (json!({ "history": long }), "above 360 returns: here they are 361"),
         (
-            json!({ "history": &long[..100], "radius": bridge(41_601) }),
-            "above 4160000 returns times problem.radius.paths",
+            json!({ "history": &long[..100], "radius": bridge(28_801) }),
+            "above 2880000 returns times problem.radius.paths",
         ),
         (json!({ "history": HISTORY, "framework": "known_law", "law": normal }), "under the framework known_law"),
     ] {

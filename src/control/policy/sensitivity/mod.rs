@@ -19,12 +19,12 @@ use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::ProblemSpecification;
 use crate::numerics::empirical::EmpiricalDistribution;
 
-/// Longest record whose sensitivity is told: ten years of weeks.
-pub const LONGEST_RECORD: usize = 520;
+/// Longest record whose sensitivity is told: thirty years of months. It takes two cores half a second.
+pub const LONGEST_RECORD: usize = 360;
 /// Largest product of the numbers of returns and of simulated bridges: four times that of the longest record at the default.
-pub const MOST_BRIDGED: usize = 4_160_000;
-/// Largest product of the numbers of returns and of design points: that of the longest record at the default.
-pub const MOST_DESIGNED: usize = 520_000;
+pub const MOST_BRIDGED: usize = 2_880_000;
+/// Largest product of the numbers of returns and of design points: that of 250 returns at the default.
+pub const MOST_DESIGNED: usize = 250_000;
 
 /// How near an advice is to changing.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
