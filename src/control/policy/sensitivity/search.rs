@@ -1,15 +1,24 @@
 //! The advice of other records, and where between them it changes.
 
 use super::{LeftOut, NextAdvice, NextReturn, Premium, Return, Sensitivity, WithoutOne};
+use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
+use crate::control::policy::advisor::{AdviceMode, Advisor};
 use crate::control::policy::caution::Caution;
 use crate::control::pool;
+use crate::control::problem::state::State;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules;
 use crate::control::request::specification::{Interval, ProblemSpecification};
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::summary::interpolated_quantile;
 
+/// Longest record whose sensitivity is told: thirty years of months.
+pub const LONGEST_RECORD: usize = 360;
+/// Largest product of the numbers of returns and of simulated bridges: four times that of the longest record at the default.
+pub const MOST_BRIDGED: usize = 2_880_000;
+/// Largest product of the numbers of returns and of design points: that of 250 returns at the default.
+pub const MOST_DESIGNED: usize = 250_000;
 /// Quantiles of the record at which a next return is tried.
 const QUANTILES: [f64; 2] = [0.05, 0.95];
 /// How far a next return may lie beyond the extremes of the record, as a share of the distance between them.
@@ -26,22 +35,104 @@ const FAR: f64 = 0.5;
 const MOST_PERIODS: usize = 10_000;
 
 /// An advice, and the ways to ask for what stands beside it.
-pub(super) struct Asked<'a> {
+struct Asked<'a> {
     /// In the order in which the returns came.
-    pub record: &'a [f64],
-    pub advice: &'a Advice,
-    pub problem: &'a ProblemSpecification,
+    record: &'a [f64],
+    advice: &'a Advice,
+    problem: &'a ProblemSpecification,
     /// The highest allocation that may be advised.
-    pub highest: f64,
+    highest: f64,
     /// The allocation were the record another.
-    pub of: &'a (dyn Fn(&[f64]) -> f64 + Sync),
+    of: &'a (dyn Fn(&[f64]) -> f64 + Sync),
     /// The allocation were the radius another.
-    pub within: &'a (dyn Fn(f64) -> f64 + Sync),
+    within: &'a (dyn Fn(f64) -> f64 + Sync),
+}
+
+impl Advisor {
+    /// The sensitivity of `advice`, which was found by `mode` for the period after `step` observed periods in `state`, whose law
+    /// is that of `record`. Cost: as many pieces of advice as the record has distinct returns, and some 130 more, on the rayon
+    /// pool this is called from.
+    pub fn sensitivity(
+        &self,
+        step: usize,
+        state: &State,
+        record: &[f64],
+        (advice, mode): (&Advice, AdviceMode),
+    ) -> Sensitivity {
+        let of = |record: &[f64]| {
+            let state = State { law: EmpiricalDistribution::new(record), ..*state };
+            self.advise(step, &state, mode).allocation
+        };
+        self.sensitivity_by(step, state, record, advice, &of)
+    }
+
+    /// The same where `of` says what is advised were the record another.
+    pub(in crate::control::policy) fn sensitivity_by(
+        &self,
+        step: usize,
+        state: &State,
+        record: &[f64],
+        advice: &Advice,
+        of: &(dyn Fn(&[f64]) -> f64 + Sync),
+    ) -> Sensitivity {
+        let within = |radius: f64| self.explain_within(step, state, radius).0.allocation;
+        let problem = &self.specification().problem;
+        let highest = self.highest_action(step, state);
+        Asked { record, advice, problem, highest, of, within: &within }.sensitivity()
+    }
+
+    /// Checks that the sensitivity of advice from `returns` returns can be told at a bounded cost.
+    ///
+    /// # Errors
+    /// Under the name `sensitivity`: the framework does not learn from returns; too many of them, of simulated bridges, or of
+    /// design points.
+    pub fn check_sensitivity(&self, returns: usize) -> Result<(), FieldError> {
+        let problem = &self.specification().problem;
+        check_learning(problem, problem.framework.learns())?;
+        let design = if problem.horizon == 1 { 0 } else { self.specification().design.count.unwrap_or_default() };
+        check_cost(problem, returns, design)
+    }
+}
+
+/// Checks that some return changes the advice.
+pub(in crate::control::policy) fn check_learning(
+    problem: &ProblemSpecification,
+    learns: bool,
+) -> Result<(), FieldError> {
+    if learns {
+        return Ok(());
+    }
+    let rule =
+        format!("must be left out: under the framework {} no return changes the advice", problem.framework.name());
+    Err(FieldError::new("sensitivity", true, rule))
+}
+
+/// Checks what the sensitivity of a record of `returns` returns costs, where the step after is known by `design` points.
+pub(in crate::control::policy) fn check_cost(
+    problem: &ProblemSpecification,
+    returns: usize,
+    design: usize,
+) -> Result<(), FieldError> {
+    let paths = match problem.radius_rule() {
+        RadiusRule::Bridge { paths, .. } => paths,
+        _ => 0,
+    };
+    let of_returns = |count: usize| returns.saturating_mul(count);
+    for (found, most, what) in [
+        (returns, LONGEST_RECORD, "returns"),
+        (of_returns(paths), MOST_BRIDGED, "returns times problem.radius.paths"),
+        (of_returns(design), MOST_DESIGNED, "returns times design.count"),
+    ] {
+        if found > most {
+            let rule = format!("must be left out above {most} {what}: here they are {found}");
+            return Err(FieldError::new("sensitivity", true, rule));
+        }
+    }
+    Ok(())
 }
 
 impl Asked<'_> {
-    /// See [`Sensitivity`].
-    pub fn sensitivity(&self) -> Sensitivity {
+    fn sensitivity(&self) -> Sensitivity {
         let without_one = self.without_one();
         let next_return = self.next_return();
         let (needed, periods_more) = rayon::join(|| self.needed(), || self.periods_more());
