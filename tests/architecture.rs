@@ -21,6 +21,8 @@ const BEHIND_THE_FACE: [&str; 3] = ["bellman", "surrogate", "uncertainty"];
 const DOCUMENTS: [&str; 12] = [
     "control/evaluation/report.rs",
     "control/policy/advice.rs",
+    "control/policy/caution.rs",
+    "control/policy/sensitivity/mod.rs",
     "control/policy/worst_case.rs",
     "control/progress.rs",
     "control/request/annualised.rs",

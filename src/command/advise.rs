@@ -31,14 +31,22 @@ pub struct AdviseArgs {
     /// Lost of what is bought or sold, as a fraction: 0.001 is 0.1 %
     #[arg(long, default_value_t = 0.0)]
     trading_cost: f64,
+    /// Say as well how near the advice is to changing
+    #[arg(long)]
+    sensitivity: bool,
     /// Print what POST /advise answers, and what was read on the standard error
     #[arg(long)]
     json: bool,
 }
 
 /// The option that says what a field of the question is.
-const OPTIONS: [(&str, &str); 3] =
-    [("problem.trading_cost", "--trading-cost"), ("wealth", "--wealth"), ("holding", "--holding")];
+const OPTIONS: [(&str, &str); 5] = [
+    ("problem.trading_cost", "--trading-cost"),
+    ("problem.periods_per_year", "--periods-per-year"),
+    ("wealth", "--wealth"),
+    ("holding", "--holding"),
+    ("sensitivity", "--sensitivity"),
+];
 
 pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
     if !(1.0..=100.0).contains(&arguments.risk_aversion) {
@@ -64,11 +72,12 @@ impl AdviseArgs {
         let history = returns.rows().iter().map(|row| row.period().log_return).collect();
         let problem = ProblemSpecification {
             horizon: 1,
+            periods_per_year: Some(returns.periods_per_year as f64),
             trading_cost: self.trading_cost,
             utility: UtilitySpecification::relative(self.risk_aversion),
             ..ProblemSpecification::of(history, returns.rate())
         };
-        Advise { problem, wealth: Some(self.wealth), holding: Some(self.holding), seed: default_seed() }
+        Advise { problem, wealth: Some(self.wealth), holding: Some(self.holding), seed: default_seed(), sensitivity: self.sensitivity }
     }
 }
 

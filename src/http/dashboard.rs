@@ -66,6 +66,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "report_fields.js": SCRIPT,
         "returns_field.js": SCRIPT,
         "returns_reader.js": SCRIPT,
+        "sensitivity.js": SCRIPT,
         "session.js": SCRIPT,
         "session_opening.js": SCRIPT,
         "sessions.js": SCRIPT,

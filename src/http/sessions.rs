@@ -18,12 +18,13 @@ use super::problem::Problem;
 use super::wire;
 use crate::control::policy::advisor::AdviceMode;
 use crate::service::Service;
+use crate::service::action::Question;
 use crate::service::allowance::Class;
 use crate::service::history::History;
 use crate::service::metrics::{ACTION_SECONDS, OBSERVE_SECONDS};
 use crate::service::periods::{Corrected, Observed};
 use crate::service::report::{Correct, Observe};
-use crate::service::sessions::{Question, Start};
+use crate::service::sessions::Start;
 use crate::service::what_if::Explain;
 
 /// Open a session.
@@ -165,6 +166,15 @@ pub struct Ask {
     session: String,
     mode: Option<Mode>,
     explain: Option<Explain>,
+    sensitivity: Option<Flag>,
+}
+
+/// A parameter is text, and so is what it says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Flag {
+    True,
+    False,
 }
 
 #[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
@@ -179,6 +189,7 @@ impl access::Question for Ask {
     fn class(&self) -> Class {
         match (self.mode, self.explain) {
             (Some(Mode::Resolve), _) | (_, Some(Explain::WorstCase)) => Class::Heavy,
+            (Some(Mode::Surrogate) | None, None) if self.sensitivity == Some(Flag::True) => Class::Heavy,
             (Some(Mode::Surrogate) | None, None) => Class::Live,
         }
     }
@@ -188,21 +199,26 @@ impl access::Question for Ask {
 #[utoipa::path(get, path = "/action", tag = "sessions",
     params(("session" = String, Query, description = "The session."),
            ("mode" = inline(Option<Mode>), Query, description = "`surrogate` (default) or `resolve`."),
-           ("explain" = inline(Option<Explain>), Query, description = "`worst_case`: re-solve, and show the worst-case law.")),
+           ("explain" = inline(Option<Explain>), Query, description = "`worst_case`: re-solve, and show the worst-case law."),
+           ("sensitivity" = Option<bool>, Query, description = "`true`: say how near the advice is to changing.")),
     responses(
         (status = 200, description = "The allocation.", body = wire::Action),
         (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json"),
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "The session has reached its horizon.", body = Problem, content_type = "application/problem+json")))]
+        (status = 409, description = "The session has reached its horizon.", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "The sensitivity of this session is not told.", body = Problem, content_type = "application/problem+json")))]
 pub async fn action(
     State(service): State<Arc<Service>>,
     Asked(caller, ask): Asked<Ask>,
 ) -> Result<Json<wire::Action>, Problem> {
-    let (question, label) = match (ask.explain, ask.mode) {
-        (Some(Explain::WorstCase), _) => (Question::Explain, "explain"),
-        (None, Some(Mode::Resolve)) => (Question::Advise(AdviceMode::Resolve), "resolve"),
-        (None, _) => (Question::Advise(AdviceMode::Surrogate), "surrogate"),
+    let (mode, label) = match (ask.explain, ask.mode) {
+        (Some(Explain::WorstCase), _) => (AdviceMode::Resolve, "explain"),
+        (None, Some(Mode::Resolve)) => (AdviceMode::Resolve, "resolve"),
+        (None, _) => (AdviceMode::Surrogate, "surrogate"),
     };
+    let sensitivity = ask.sensitivity == Some(Flag::True);
+    let label = if sensitivity { "sensitivity" } else { label };
+    let question = Question { mode, explain: ask.explain.is_some(), sensitivity };
     let started = Instant::now();
     let action = service.sessions.action(&caller.tenant, &ask.session, question, &caller.turn).await?;
     metrics::histogram!(ACTION_SECONDS, "mode" => label).record(started.elapsed().as_secs_f64());

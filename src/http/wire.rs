@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::policy::advice::Advice;
+use crate::control::policy::caution::Caution;
+use crate::control::policy::sensitivity::{Sensitivity, cautions};
 use crate::control::policy::worst_case::WorstCase;
 use crate::control::progress::Phase;
 use crate::control::request::annualised::Annualised;
@@ -12,9 +14,9 @@ use crate::control::request::framework::Framework;
 use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
 use crate::control::solved_step::StepDiagnostics;
+use crate::service::action::Action as ServiceAction;
 use crate::service::jobs::{Accepted, Job as ServiceJob};
 use crate::service::live::Live;
-use crate::service::sessions::Action as ServiceAction;
 use crate::store::{JobKind, JobState, PolicySummary, SessionSummary};
 
 /// A job.
@@ -256,10 +258,17 @@ pub struct Action {
     /// The law that is worst for this allocation, where it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_case: Option<WorstCase>,
+    /// What to know before the advice is followed.
+    pub caution: Vec<Caution>,
+    /// How near it is to changing, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensitivity: Option<Sensitivity>,
 }
 
 impl Action {
     pub fn new(session: String, action: ServiceAction) -> Self {
-        Action { session, period: action.period, advice: action.advice, worst_case: action.worst_case }
+        let ServiceAction { period, advice, worst_case, sensitivity } = action;
+        let caution = cautions(&advice, sensitivity.as_ref());
+        Action { session, period, advice, worst_case, caution, sensitivity }
     }
 }

@@ -8,7 +8,9 @@ use super::sessions::Sessions;
 use crate::control::error::FieldError;
 use crate::control::kept::Kept;
 use crate::control::policy::advice::Advice;
+use crate::control::policy::caution::Caution;
 use crate::control::policy::one_period::OnePeriod;
+use crate::control::policy::sensitivity::{Sensitivity, cautions};
 use crate::control::policy::worst_case::WorstCase;
 use crate::control::request::annualised::Annualised;
 use crate::control::request::rules;
@@ -29,6 +31,9 @@ pub struct Advise {
     /// Of the simulated bridges.
     #[serde(default = "default_seed")]
     pub seed: u64,
+    /// Whether to say how near the advice is to changing.
+    #[serde(default)]
+    pub sensitivity: bool,
 }
 
 /// The advice, and the law that is worst for it.
@@ -37,11 +42,24 @@ pub struct Advised {
     #[serde(flatten)]
     pub advice: Advice,
     pub worst_case: WorstCase,
+    /// What to know before the advice is followed.
+    pub caution: Vec<Caution>,
+    /// How near it is to changing, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensitivity: Option<Sensitivity>,
     /// Where `problem.periods_per_year` is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub annualised: Option<Annualised>,
     /// What in the question may be a mistake.
     pub warnings: Vec<Warning>,
+}
+
+/// A question that keeps the rules.
+struct Checked {
+    /// The training request of which it asks the one step.
+    specification: Specification,
+    holding: f64,
+    asks_sensitivity: bool,
 }
 
 impl Advise {
@@ -51,20 +69,13 @@ impl Advise {
     /// # Errors
     /// A field breaks a rule.
     pub fn answer(self) -> Result<Advised, FieldError> {
-        let (holding, specification) = self.checked()?;
-        let (advice, worst_case) = OnePeriod::new(&specification, Kept::default()).advise(holding)?;
-        Ok(Advised { advice, worst_case })
+        let checked = self.checked()?;
+        checked.answered(&OnePeriod::new(&checked.specification, Kept::default()))
     }
 
-    /// The holding, and the training request of one step.
-    fn checked(self) -> Result<(f64, Specification), FieldError> {
+    fn checked(mut self) -> Result<Checked, FieldError> {
         let holding = self.holding.unwrap_or(0.0);
         rules::share("holding", holding)?;
-        Ok((holding, self.specification()?))
-    }
-
-    /// The training request of which it asks the one step.
-    fn specification(mut self) -> Result<Specification, FieldError> {
         if self.problem.horizon != 1 {
             let rule = "must be 1 or left out: one period is advised; train a policy for more";
             return Err(FieldError::new("problem.horizon", self.problem.horizon, rule));
@@ -73,18 +84,31 @@ impl Advise {
             rules::wealth("wealth", wealth)?;
             self.problem.initial_wealth = wealth;
         }
-        Specification::of(self.problem, self.seed).completed()
+        let specification = Specification::of(self.problem, self.seed).completed()?;
+        Ok(Checked { specification, holding, asks_sensitivity: self.sensitivity })
+    }
+}
+
+impl Checked {
+    fn answered(&self, investor: &OnePeriod) -> Result<Advised, FieldError> {
+        let (advice, worst_case) = investor.advise(self.holding)?;
+        let sensitivity = self.asks_sensitivity.then(|| investor.sensitivity(self.holding, &advice)).transpose()?;
+        let (caution, problem) = (cautions(&advice, sensitivity.as_ref()), &self.specification.problem);
+        let (annualised, warnings) = (problem.annualised(), problem.warnings());
+        Ok(Advised { advice, worst_case, caution, sensitivity, annualised, warnings })
     }
 }
 
 impl Sessions {
     /// # Errors
-    /// A field breaks a rule; the radius asks for more memory than can be kept; no turn to solve.
+    /// A field breaks a rule; the radius asks for more memory than can be kept, or the sensitivity for too much time; no turn
+    /// to solve.
     pub async fn advise(&self, tenant: &Tenant, question: Advise) -> Result<Advised, ServiceError> {
-        let (holding, specification) = question.checked()?;
-        let investor = self.policies.one_period(&specification)?;
-        let (advice, worst_case) = self.resolving.run(tenant, move || investor.advise(holding)).await??;
-        let problem = &specification.problem;
-        Ok(Advised { advice, worst_case, annualised: problem.annualised(), warnings: problem.warnings() })
+        let checked = question.checked()?;
+        let investor = self.policies.one_period(&checked.specification)?;
+        if checked.asks_sensitivity {
+            investor.check_sensitivity()?;
+        }
+        Ok(self.resolving.run(tenant, move || checked.answered(&investor)).await??)
     }
 }

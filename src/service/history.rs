@@ -108,7 +108,7 @@ impl Sessions {
 fn told_now(periods: &Periods, advisor: &Advisor, start: State) -> Result<Vec<Option<Now>>, ServiceError> {
     let first = periods.all.iter().position(|period| period.is_corrected).unwrap_or(periods.all.len());
     let mut told = Vec::with_capacity(periods.all.len());
-    let passed = periods.pass(advisor, start, |period, before, passed| {
+    periods.replay(advisor, start, |period, before, passed| {
         let Passed { log_return, executed_allocation, standing } = passed;
         told.push((period > first).then(|| Now {
             reported: periods.all.get(period - 1).filter(|period| period.is_corrected).map(|period| period.report),
@@ -119,7 +119,6 @@ fn told_now(periods: &Periods, advisor: &Advisor, start: State) -> Result<Vec<Op
             holding: standing.state.holding,
             radius: advisor.radius(&standing.state),
         }));
-    });
-    passed.map_err(|(period, error)| ServiceError::internal(format!("period {period}: {error}")))?;
+    })?;
     Ok(told)
 }

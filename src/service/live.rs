@@ -47,8 +47,7 @@ impl Live {
     pub(super) fn replayed(facts: SessionFacts, advisor: &Advisor) -> Result<Live, ServiceError> {
         let SessionFacts { row, entries, seen } = facts;
         let periods = Periods::of(&entries)?;
-        let passed = periods.pass(advisor, started(&row, advisor)?, |_, _, _| ());
-        let standing = passed.map_err(|(period, error)| ServiceError::internal(format!("period {period}: {error}")))?;
+        let standing = periods.replay(advisor, started(&row, advisor)?, |_, _, _| ())?;
         Ok(Live {
             row: Arc::new(row),
             standing,

@@ -3,6 +3,7 @@
 //! [`Service`] is what a transport needs: the store, the jobs and their trainer, the policies made ready to answer,
 //! and the live sessions. Everything acknowledged is in the store first; memory only saves recomputing.
 
+pub mod action;
 pub mod advise;
 pub mod allowance;
 pub mod audit;

@@ -252,6 +252,20 @@ impl Periods {
         }
         Ok(standing)
     }
+
+    /// As [`Self::pass`], of what was recorded: every report kept the rules when it was.
+    ///
+    /// # Errors
+    /// One does not keep them any more.
+    pub(super) fn replay(
+        &self,
+        advisor: &Advisor,
+        start: State,
+        tell: impl FnMut(usize, &Standing, &Passed),
+    ) -> Result<Standing, ServiceError> {
+        let passed = self.pass(advisor, start, tell);
+        passed.map_err(|(period, error)| ServiceError::internal(format!("period {period}: {error}")))
+    }
 }
 
 /// What an entry holds.

@@ -27,29 +27,12 @@ use super::periods::Standing;
 use super::policies::Policies;
 use super::slots::{Generation, Held, Slots, Source};
 use super::spans;
-use crate::control::policy::advice::Advice;
-use crate::control::policy::advisor::{AdviceMode, Advisor};
+use crate::control::policy::advisor::Advisor;
 use crate::control::policy::content_hash;
-use crate::control::policy::worst_case::WorstCase;
 use crate::store::{CreateSession, RequestKey, SessionFacts, SessionRow, SessionSummary, Store, Tenant};
 
 /// Whose session it is, and its name.
 pub(super) type Name = (Tenant, String);
-
-/// What [`Sessions::action`] found.
-pub struct Action {
-    pub period: usize,
-    pub advice: Advice,
-    pub worst_case: Option<WorstCase>,
-}
-
-/// How an action is asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Question {
-    Advise(AdviceMode),
-    /// Re-solve, and show the worst-case law.
-    Explain,
-}
 
 /// What a session starts from; history and wealth default to the policy's, and it holds nothing unless it says so.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -179,43 +162,6 @@ impl Sessions {
         if deleted { Ok(()) } else { Err(ServiceError::unknown("session", session)) }
     }
 
-    /// The robust allocation for the coming period.
-    ///
-    /// # Errors
-    /// There is no such session, it has reached its horizon, or it must be solved and too much is under way.
-    pub async fn action(
-        &self,
-        tenant: &Tenant,
-        session: &str,
-        question: Question,
-        turn: &HeavyTurn,
-    ) -> Result<Action, ServiceError> {
-        let mut held = self.hold(tenant, session).await;
-        let live = held.current(&self.rows(tenant, session)).await?;
-        live.goes_on()?;
-        let period = live.observed + 1;
-        let surrogate = question == Question::Advise(AdviceMode::Surrogate);
-        if let Some(advice) = live.advice.clone().filter(|_| surrogate) {
-            return Ok(Action { period, advice, worst_case: None });
-        }
-        let means = self.means(tenant, live, turn).await?;
-        if surrogate {
-            let advice = live.surrogate_advice(&means).await?.clone();
-            return Ok(Action { period, advice, worst_case: None });
-        }
-        let advisor = means.advisor;
-        let (state, step) = (live.standing.state.clone(), live.observed);
-        drop(held);
-        turn.begin()?;
-        let solving = self.resolving.run(tenant, move || match question {
-            Question::Explain => {
-                let (advice, worst_case) = advisor.explain(step, &state);
-                (advice, Some(worst_case))
-            }
-            Question::Advise(mode) => (advisor.advise(step, &state, mode), None),
-        });
-        let (advice, worst_case) = solving.await?;
-        Ok(Action { period, advice, worst_case })
     }
 
     /// The policy of a session, made ready.

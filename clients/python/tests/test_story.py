@@ -73,6 +73,17 @@ def test_what_may_be_a_mistake_is_said(ballast: Ballast) -> None:
     assert train(ballast).warnings == ballast.training(training.id).warnings == []
 
 
+def test_how_near_the_advice_is_to_changing(ballast: Ballast, session: Session) -> None:
+    advised = ballast.advise(RETURNS, kind="log", rate_per_step=0.002, sensitivity=True)
+    answers: list[wire.Advised | wire.Action] = [advised, session.action(sensitivity=True)]
+    for answer in answers:
+        without_one = answer["sensitivity"]["without_one"]  # type: ignore[index]
+        assert without_one["lowest"]["allocation"] <= without_one["highest"]["allocation"]  # type: ignore[index]
+        assert without_one["lowest"]["log_return"] in RETURNS  # type: ignore[index]
+        assert answer["caution"][0]["code"] == "short_record"
+    assert "sensitivity" not in session.action()
+
+
 def test_prices_and_what_was_really_done(session: Session) -> None:
     session.observe(price=103.0, previous_price=100.0, executed_allocation=0.5)
     assert session.wealth == pytest.approx(100.0 * (0.5 * 1.001 + 0.5 * 1.03), rel=1e-12)

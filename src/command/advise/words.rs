@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use ballast::control::policy::advice::{Advice, AdviceSource};
+use ballast::control::policy::sensitivity::{NextAdvice, Return, Sensitivity};
 use ballast::control::policy::worst_case::WorstCase;
 use ballast::service::advise::Advised;
 
@@ -23,7 +24,35 @@ pub fn told(advised: &Advised, wealth: f64, frequency: Frequency) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "  {name:<22}{figure:>14}  {meaning}");
     }
+    for sentence in near(advised) {
+        text += &format!("\n{sentence}");
+    }
     text.trim_end().to_owned()
+}
+
+/// How near the advice is to changing, where that was asked for, and what to be careful about.
+fn near(Advised { caution, sensitivity, warnings, .. }: &Advised) -> Vec<String> {
+    let mut told: Vec<String> = warnings.iter().map(|warning| warning.message.clone()).collect();
+    told.extend(caution.iter().map(|caution| caution.sentence.clone()));
+    let Some(Sensitivity { without_one, next_return, premium, .. }) = sensitivity else { return told };
+    if let Some(range) = without_one {
+        let [low, high] = [range.lowest, range.highest].map(|end| percent(end.allocation, 1));
+        told.push(format!("With any one return left out the advice would lie between {low} and {high}."));
+    }
+    let after = |next: NextAdvice| (percent(next.simple_return, 1), percent(next.allocation, 1));
+    let ((low, then_low), (high, then_high)) = (after(next_return.low), after(next_return.high));
+    told.push(format!("After a next return of {low} it would be {then_low}, after one of {high} {then_high}."));
+    let crossing = |to: Option<Return>, what: &str| {
+        to.map(|to| format!("A next return of {} would take it to {what}.", percent(to.simple_return, 1)))
+    };
+    told.extend(crossing(next_return.to_bank, "the bank"));
+    told.extend(crossing(next_return.to_highest, "the most that may be held"));
+    if let Some(needed) = premium.needed {
+        let present = percent(premium.present, 2);
+        let needed = percent(needed, 2);
+        told.push(format!("The record paid {present} a period beyond the bank; at {needed} the advice leaves the bank."));
+    }
+    told
 }
 
 fn hold(advice: &Advice, noun: &str) -> String {
@@ -46,7 +75,7 @@ fn trade(advice: &Advice, wealth: f64) -> String {
     format!("{verb} for {}: {held} is held now.", money(change * wealth))
 }
 
-fn why(Advised { advice, worst_case }: &Advised, noun: &str) -> String {
+fn why(Advised { advice, worst_case, .. }: &Advised, noun: &str) -> String {
     let among = format!("Against the worst law that the {} returns do not rule out", advice.sample_size);
     if advice.allocation <= 0.0 {
         return format!("{among}, nothing beats the bank.");
@@ -147,7 +176,7 @@ mod tests {
             trading_cost,
             ..ProblemSpecification::of(history.to_vec(), 0.001)
         };
-        Advise { problem, wealth: Some(2000.0), holding: Some(holding), seed: 1 }.answer().unwrap()
+        Advise { problem, wealth: Some(2000.0), holding: Some(holding), seed: 1, sensitivity: false }.answer().unwrap()
     }
 
     #[test]

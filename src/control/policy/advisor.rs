@@ -80,6 +80,11 @@ impl Advisor {
         advisor
     }
 
+    /// The highest allocation of the period after `step`.
+    pub(super) fn highest_action(&self, step: usize, state: &State) -> f64 {
+        self.problem.actions(step, state).highest
+    }
+
     /// Bytes it holds, without bridges and factors.
     pub fn bytes(&self) -> usize {
         prepared_bytes(&self.policy)

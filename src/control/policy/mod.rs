@@ -2,9 +2,11 @@
 
 pub mod advice;
 pub mod advisor;
+pub mod caution;
 mod document;
 pub mod one_period;
 pub mod prepared;
+pub mod sensitivity;
 pub mod walk;
 pub mod what_if;
 pub mod worst_case;

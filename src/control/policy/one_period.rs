@@ -2,26 +2,34 @@
 //! exactly and needs no surrogate.
 
 use super::advice::Advice;
-use super::advisor::Advisor;
+use super::advisor::{AdviceMode, Advisor};
 use super::document::Policy;
+use super::sensitivity::{Sensitivity, check_cost, check_learning};
 use super::worst_case::WorstCase;
 use crate::control::error::FieldError;
 use crate::control::kept::Kept;
-use crate::control::request::specification::Specification;
+use crate::control::problem::state::State;
+use crate::control::request::framework::Framework;
+use crate::control::request::specification::{ProblemSpecification, Specification};
 use crate::control::solved_step::StepSolution;
+use crate::numerics::empirical::EmpiricalDistribution;
 
 /// An investor whose horizon is the end of this period.
-pub struct OnePeriod(Advisor);
+pub struct OnePeriod {
+    advisor: Advisor,
+    kept: Kept,
+}
 
 impl OnePeriod {
     /// Of a completed specification of horizon 1, what can be made again in `kept`.
     pub fn new(specification: &Specification, kept: Kept) -> Self {
-        OnePeriod(Advisor::with(Policy::new(specification.clone(), vec![StepSolution::unsolved(0)]), kept))
+        let policy = Policy::new(specification.clone(), vec![StepSolution::unsolved(0)]);
+        OnePeriod { advisor: Advisor::with(policy, kept.clone()), kept }
     }
 
     /// Bytes of the bridges that its radius asks for.
     pub fn bridges(&self) -> usize {
-        self.0.heaviest_bridges(self.0.specification().problem.history.len())
+        self.advisor.heaviest_bridges(self.problem().history.len())
     }
 
     /// The advice for who holds the share `holding` of the initial wealth, and the worst law behind it.
@@ -30,8 +38,41 @@ impl OnePeriod {
     /// # Errors
     /// A holding that is no share, or one whose sale leaves less than is withdrawn.
     pub fn advise(&self, holding: f64) -> Result<(Advice, WorstCase), FieldError> {
-        let state = self.0.initial_state(None, None)?.with_holding(holding)?;
-        self.0.check_withdrawals(&state)?;
-        Ok(self.0.explain(0, &state))
+        let state = self.state(holding)?;
+        self.advisor.check_withdrawals(&state)?;
+        Ok(self.advisor.explain(0, &state))
+    }
+
+    /// The sensitivity of that advice, of which another record is another history. Cost: as [`Advisor::sensitivity`].
+    ///
+    /// # Errors
+    /// A holding that is no share.
+    pub fn sensitivity(&self, holding: f64, advice: &Advice) -> Result<Sensitivity, FieldError> {
+        let state = self.state(holding)?;
+        let of = |record: &[f64]| {
+            let problem = ProblemSpecification { history: record.to_vec(), ..self.problem().clone() };
+            let specification = Specification { problem, ..self.advisor.specification().clone() };
+            let law = EmpiricalDistribution::new(record);
+            let state = State { law, ..state };
+            OnePeriod::new(&specification, self.kept.clone()).advisor.advise(0, &state, AdviceMode::Resolve).allocation
+        };
+        Ok(self.advisor.sensitivity_by(0, &state, &self.problem().history, advice, &of))
+    }
+
+    /// Checks that [`Self::sensitivity`] can be told at a bounded cost.
+    ///
+    /// # Errors
+    /// As [`Advisor::check_sensitivity`]; of the frameworks `known_law` alone knows no returns.
+    pub fn check_sensitivity(&self) -> Result<(), FieldError> {
+        check_learning(self.problem(), self.problem().framework != Framework::KnownLaw)?;
+        check_cost(self.problem(), self.problem().history.len(), 0)
+    }
+
+    fn state(&self, holding: f64) -> Result<State, FieldError> {
+        self.advisor.initial_state(None, None)?.with_holding(holding)
+    }
+
+    fn problem(&self) -> &ProblemSpecification {
+        &self.advisor.specification().problem
     }
 }

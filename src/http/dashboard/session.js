@@ -20,6 +20,7 @@ import {
 } from "./format.js";
 import { lawChart } from "./law_chart.js";
 import { observeForm } from "./observe.js";
+import { sensitivity } from "./sensitivity.js";
 import { utility } from "./specification.js";
 import { conservatism } from "./what_if.js";
 
@@ -74,6 +75,7 @@ async function fill(holder, shown) {
   holder.replaceChildren(
     numbers,
     h("div", { class: "columns" }, h("div", {}, advice.element), sofar),
+    sensitivity(shown),
     worstCase(shown, advice, settled),
     shown.canAsk ? conservatism(shown, action) : "",
     observed(shown),

@@ -98,18 +98,20 @@ class Ballast:
         rate_per_step: float,
         wealth: float | None = None,
         holding: float | None = None,
+        sensitivity: bool | None = None,
         **problem: Any,
     ) -> wire.Advised:
         """What to hold through one period, given the returns seen so far. Nothing is trained or stored.
 
         ``returns``, ``kind`` and ``rate_per_step`` are as in ``train``, and so is every other field of the problem that
         is given by name, such as ``utility`` or ``trading_cost``. ``wealth`` and ``holding`` are what the investor has,
-        and what share of it is in the asset already.
+        and what share of it is in the asset already. ``sensitivity=True`` also says how near the advice is to changing.
         """
         question = {
             "problem": {"history": log_returns(returns, kind), "rate_per_step": rate_per_step, **_given(problem)},
             "wealth": wealth,
             "holding": holding,
+            "sensitivity": sensitivity,
         }
         return cast(wire.Advised, self._transport.json("POST", "/advise", body=_given(question)))
 

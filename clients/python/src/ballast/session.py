@@ -45,13 +45,15 @@ class Session:
         *,
         mode: Literal["surrogate", "resolve"] | None = None,
         explain: Literal["worst_case"] | None = None,
+        sensitivity: bool | None = None,
     ) -> wire.Action:
         """The robust allocation for the coming period.
 
         ``mode="resolve"`` solves the robust step anew at the exact state; ``explain="worst_case"`` does too, and shows
-        the law it is robust against. Raises :class:`SessionCompleted` after the horizon.
+        the law it is robust against. ``sensitivity=True`` says how near the allocation is to changing. Raises
+        :class:`SessionCompleted` after the horizon.
         """
-        params = {"session": self.id, "mode": mode, "explain": explain}
+        params = {"session": self.id, "mode": mode, "explain": explain, "sensitivity": "true" if sensitivity else None}
         return cast(wire.Action, self._transport.json("GET", "/action", params=params))
 
     def observe(self, *, period: int | None = None, confirm: bool = False, **report: Unpack[wire.Report]) -> Session:

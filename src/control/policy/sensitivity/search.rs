@@ -1,0 +1,283 @@
+//! The advice of other records, and where between them it changes.
+
+use super::{LeftOut, NextAdvice, NextReturn, Premium, Return, Sensitivity, WithoutOne};
+use crate::control::error::FieldError;
+use crate::control::policy::advice::Advice;
+use crate::control::policy::advisor::{AdviceMode, Advisor};
+use crate::control::policy::caution::Caution;
+use crate::control::pool;
+use crate::control::problem::state::State;
+use crate::control::request::radius_rule::RadiusRule;
+use crate::control::request::rules;
+use crate::control::request::specification::{Interval, ProblemSpecification};
+use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::summary::interpolated_quantile;
+
+/// Longest record whose sensitivity is told: thirty years of months.
+pub const LONGEST_RECORD: usize = 360;
+/// Largest product of the numbers of returns and of simulated bridges: four times that of the longest record at the default.
+pub const MOST_BRIDGED: usize = 2_880_000;
+/// Largest product of the numbers of returns and of design points: that of 250 returns at the default.
+pub const MOST_DESIGNED: usize = 250_000;
+/// Quantiles of the record at which a next return is tried.
+const QUANTILES: [f64; 2] = [0.05, 0.95];
+/// How far a next return may lie beyond the extremes of the record, as a share of the distance between them.
+const WIDENED: f64 = 0.5;
+/// Equal parts into which the next returns considered are cut.
+const PARTS: usize = 48;
+/// Returns and shifts are told to this, in log-return.
+const RESOLUTION: f64 = 1e-6;
+/// An allocation this near to an end of the action interval is at it: ten times what the search for the best leaves open.
+const AT_AN_END: f64 = 1e-6;
+/// An advice that moves by more than this share of the action interval is another one.
+const FAR: f64 = 0.5;
+/// More periods than this are never: eight centuries of months.
+const MOST_PERIODS: usize = 10_000;
+
+/// An advice, and the ways to ask for what stands beside it.
+struct Asked<'a> {
+    /// In the order in which the returns came.
+    record: &'a [f64],
+    advice: &'a Advice,
+    problem: &'a ProblemSpecification,
+    /// The highest allocation that may be advised.
+    highest: f64,
+    /// The allocation were the record another.
+    of: &'a (dyn Fn(&[f64]) -> f64 + Sync),
+    /// The allocation were the radius another.
+    within: &'a (dyn Fn(f64) -> f64 + Sync),
+}
+
+impl Advisor {
+    /// The sensitivity of `advice`, which was found by `mode` for the period after `step` observed periods in `state`, whose law
+    /// is that of `record`. Cost: as many pieces of advice as the record has distinct returns, and some 130 more, on the rayon
+    /// pool this is called from.
+    pub fn sensitivity(
+        &self,
+        step: usize,
+        state: &State,
+        record: &[f64],
+        (advice, mode): (&Advice, AdviceMode),
+    ) -> Sensitivity {
+        let of = |record: &[f64]| {
+            let state = State { law: EmpiricalDistribution::new(record), ..*state };
+            self.advise(step, &state, mode).allocation
+        };
+        self.sensitivity_by(step, state, record, advice, &of)
+    }
+
+    /// The same where `of` says what is advised were the record another.
+    pub(in crate::control::policy) fn sensitivity_by(
+        &self,
+        step: usize,
+        state: &State,
+        record: &[f64],
+        advice: &Advice,
+        of: &(dyn Fn(&[f64]) -> f64 + Sync),
+    ) -> Sensitivity {
+        let within = |radius: f64| self.explain_within(step, state, radius).0.allocation;
+        let problem = &self.specification().problem;
+        let highest = self.highest_action(step, state);
+        Asked { record, advice, problem, highest, of, within: &within }.sensitivity()
+    }
+
+    /// Checks that the sensitivity of advice from `returns` returns can be told at a bounded cost.
+    ///
+    /// # Errors
+    /// Under the name `sensitivity`: the framework does not learn from returns; too many of them, of simulated bridges, or of
+    /// design points.
+    pub fn check_sensitivity(&self, returns: usize) -> Result<(), FieldError> {
+        let problem = &self.specification().problem;
+        check_learning(problem, problem.framework.learns())?;
+        let design = if problem.horizon == 1 { 0 } else { self.specification().design.count.unwrap_or_default() };
+        check_cost(problem, returns, design)
+    }
+}
+
+/// Checks that some return changes the advice.
+pub(in crate::control::policy) fn check_learning(
+    problem: &ProblemSpecification,
+    learns: bool,
+) -> Result<(), FieldError> {
+    if learns {
+        return Ok(());
+    }
+    let rule =
+        format!("must be left out: under the framework {} no return changes the advice", problem.framework.name());
+    Err(FieldError::new("sensitivity", true, rule))
+}
+
+/// Checks what the sensitivity of a record of `returns` returns costs, where the step after is known by `design` points.
+pub(in crate::control::policy) fn check_cost(
+    problem: &ProblemSpecification,
+    returns: usize,
+    design: usize,
+) -> Result<(), FieldError> {
+    let paths = match problem.radius_rule() {
+        RadiusRule::Bridge { paths, .. } => paths,
+        _ => 0,
+    };
+    let of_returns = |count: usize| returns.saturating_mul(count);
+    for (found, most, what) in [
+        (returns, LONGEST_RECORD, "returns"),
+        (of_returns(paths), MOST_BRIDGED, "returns times problem.radius.paths"),
+        (of_returns(design), MOST_DESIGNED, "returns times design.count"),
+    ] {
+        if found > most {
+            let rule = format!("must be left out above {most} {what}: here they are {found}");
+            return Err(FieldError::new("sensitivity", true, rule));
+        }
+    }
+    Ok(())
+}
+
+impl Asked<'_> {
+    fn sensitivity(&self) -> Sensitivity {
+        let without_one = self.without_one();
+        let next_return = self.next_return();
+        let (needed, periods_more) = rayon::join(|| self.needed(), || self.periods_more());
+        let premium = Premium { present: self.present(), needed, periods_more };
+        let caution = without_one.and_then(|range| self.hangs_on_one(range));
+        Sensitivity { without_one, next_return, premium, caution }
+    }
+
+    /// Equal returns leave equal records: each is left out once.
+    fn without_one(&self) -> Option<WithoutOne> {
+        let mut order: Vec<usize> = (0..self.record.len()).collect();
+        order.sort_by(|&one, &other| self.record[one].total_cmp(&self.record[other]).then(one.cmp(&other)));
+        order.dedup_by(|later, first| self.record[*later] == self.record[*first]);
+        let found = pool::map(order, |index| {
+            let rest = [&self.record[..index], &self.record[index + 1..]].concat();
+            rules::history("history", &rest).ok()?;
+            let Return { log_return, simple_return } = Return::of(self.record[index]);
+            Some(LeftOut { index, log_return, simple_return, allocation: (self.of)(&rest) })
+        });
+        let by_allocation = |one: &&LeftOut, other: &&LeftOut| one.allocation.total_cmp(&other.allocation);
+        let left_out = || found.iter().flatten();
+        Some(WithoutOne { lowest: *left_out().min_by(by_allocation)?, highest: *left_out().max_by(by_allocation)? })
+    }
+
+    /// The end of the range that is further from the advice, where that is far, or one of the two is the bank alone.
+    fn hangs_on_one(&self, WithoutOne { lowest, highest }: WithoutOne) -> Option<Caution> {
+        let told = self.advice.allocation;
+        let change = |left_out: &LeftOut| (left_out.allocation - told).abs();
+        let is_another = |left_out: &LeftOut| {
+            is_invested(left_out.allocation) != is_invested(told) || change(left_out) > FAR * self.highest
+        };
+        let ends = [lowest, highest].into_iter().filter(is_another);
+        let worst = ends.max_by(|one, other| change(one).total_cmp(&change(other)))?;
+        Some(Caution::one_return(worst.simple_return, worst.allocation, told))
+    }
+
+    fn next_return(&self) -> NextReturn {
+        let ([lowest, highest], [low, high]) = (self.extremes(), self.bounds());
+        let widened = WIDENED * (highest - lowest);
+        let range = [(lowest - widened).max(low), (highest + widened).min(high)];
+        let sorted = EmpiricalDistribution::new(self.record);
+        let quantile = |share| interpolated_quantile(sorted.atoms(), share);
+        let part = (range[1] - range[0]) / PARTS as f64;
+        let grid: Vec<f64> = (0..=PARTS).map(|index| (range[0] + part * index as f64).min(range[1])).collect();
+        let tried = grid.iter().copied().chain(QUANTILES.map(quantile)).collect();
+        let told = pool::map(tried, |log_return| self.after(log_return));
+        let crossing = |is_above: &(dyn Fn(f64) -> bool + Sync)| {
+            let pairs = grid.windows(2).zip(told.windows(2));
+            let crossed = pairs.filter(|(_, told)| !is_above(told[0]) && is_above(told[1])).map(|(ends, _)| ends);
+            let median = quantile(0.5);
+            let away = |ends: &&[f64]| (ends[0] - median).max(median - ends[1]).max(0.0);
+            let nearest = crossed.min_by(|one, other| away(one).total_cmp(&away(other)))?;
+            Some(parted([nearest[0], nearest[1]], |log_return| is_above(self.after(log_return))))
+        };
+        let (bank, top) =
+            rayon::join(|| crossing(&is_invested), || crossing(&|allocation| allocation >= self.highest - AT_AN_END));
+        let next = |index: usize| {
+            let Return { log_return, simple_return } = Return::of(quantile(QUANTILES[index]));
+            let allocation = told[grid.len() + index];
+            NextAdvice { quantile: QUANTILES[index], log_return, simple_return, allocation }
+        };
+        NextReturn {
+            range,
+            to_bank: bank.map(|[below, _]| Return::of(below)),
+            to_highest: top.map(|[_, above]| Return::of(above)),
+            low: next(0),
+            high: next(1),
+        }
+    }
+
+    /// The allocation were `log_return` seen as well.
+    fn after(&self, log_return: f64) -> f64 {
+        (self.of)(&[self.record, &[log_return]].concat())
+    }
+
+    fn present(&self) -> f64 {
+        self.record.iter().sum::<f64>() / self.record.len() as f64 - self.problem.rate_per_step.ln_1p()
+    }
+
+    fn needed(&self) -> Option<f64> {
+        let ([lowest, highest], [low, high]) = (self.extremes(), self.bounds());
+        let width = highest - lowest;
+        let leaves = |shift: f64| {
+            let shifted: Vec<f64> = self.record.iter().map(|log_return| log_return + shift).collect();
+            is_invested((self.of)(&shifted))
+        };
+        let far =
+            if is_invested(self.advice.allocation) { (low - lowest).max(-width) } else { width.min(high - highest) };
+        if is_invested(self.advice.allocation) == leaves(far) {
+            return None;
+        }
+        let [_, shift] = parted([far.min(0.0), far.max(0.0)], leaves);
+        Some(self.present() + shift)
+    }
+
+    fn periods_more(&self) -> Option<usize> {
+        if is_invested(self.advice.allocation) {
+            return Some(0);
+        }
+        if let RadiusRule::Fixed { .. } = self.problem.radius_rule() {
+            return None;
+        }
+        let size = self.record.len() as f64;
+        let leaves =
+            |more: usize| is_invested((self.within)(self.advice.radius * (size / (size + more as f64)).sqrt()));
+        let (mut too_few, mut enough) = (0, MOST_PERIODS);
+        if !leaves(enough) {
+            return None;
+        }
+        while enough - too_few > 1 {
+            let between = usize::midpoint(too_few, enough);
+            if leaves(between) { enough = between } else { too_few = between }
+        }
+        Some(enough)
+    }
+
+    fn extremes(&self) -> [f64; 2] {
+        let of = |pick: fn(f64, f64) -> f64| self.record.iter().copied().reduce(pick).unwrap_or_default();
+        [of(f64::min), of(f64::max)]
+    }
+
+    /// Between which returns any may be supposed.
+    fn bounds(&self) -> [f64; 2] {
+        let Interval { min, max } =
+            self.problem.support.unwrap_or(Interval { min: f64::NEG_INFINITY, max: f64::INFINITY });
+        [min.max(-rules::LOG_RETURN), max.min(rules::LOG_RETURN)]
+    }
+}
+
+/// Whether an allocation is more than the bank alone.
+fn is_invested(allocation: f64) -> bool {
+    allocation > AT_AN_END
+}
+
+/// Halves an interval, of whose ends the upper one alone is above, down to one as narrow as can be told that is so too.
+fn parted([mut below, mut above]: [f64; 2], is_above: impl Fn(f64) -> bool) -> [f64; 2] {
+    while above - below > RESOLUTION {
+        let between = f64::midpoint(below, above);
+        if is_above(between) { above = between } else { below = between }
+    }
+    [below, above]
+}
+
+impl Return {
+    fn of(log_return: f64) -> Self {
+        Return { log_return, simple_return: log_return.exp_m1() }
+    }
+}

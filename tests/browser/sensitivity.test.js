@@ -1,0 +1,72 @@
+// What the session's page says of how near the advice is to changing: words from an answer, and on the page by a button.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { browser, call, service } from "./ballast.js";
+import { dashboardModule } from "./modules.js";
+
+const { sentences } = await dashboardModule("sensitivity.js");
+const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
+const said = (answer) => plain(sentences(answer).join(" "));
+
+const at = (simple_return, allocation) => ({ simple_return, allocation });
+const near = {
+  allocation: 0.43,
+  sensitivity: {
+    without_one: { lowest: at(0.03, 0.4304), highest: at(-0.086, 1) },
+    next_return: { to_bank: at(-0.062), to_highest: null, low: at(-0.07, 0), high: at(0.06, 0.612) },
+    premium: { present: 0.0051, needed: 0.0044, periods_more: 0 },
+  },
+};
+
+test("the sentences say what differs, in percent", () => {
+  assert.equal(
+    said(near),
+    "Without its return of -8.6 % the advice would be 100 %. " +
+      "After a return of -7.0 % the advice would be 0 %, after one of 6.0 % 61.2 %. " +
+      "A coming return of -6.2 % would take the advice to the bank, and a higher one would not. " +
+      "The record has paid 0.51 % a period beyond the bank; the advice leaves the bank at 0.44 %.",
+  );
+});
+
+test("who is in the bank is told what it would take, and what never would", () => {
+  const { next_return } = near.sensitivity;
+  const banked = (periods_more, needed = 0.0061) =>
+    said({
+      allocation: 0,
+      sensitivity: {
+        without_one: { lowest: at(0.03, 0), highest: at(0.03, 0) },
+        next_return: { ...next_return, to_bank: null },
+        premium: { present: 0.0051, needed, periods_more },
+      },
+    });
+  assert.match(banked(37), /leaves the bank at 0.61 %. About 37 more periods like those seen would do as well.$/);
+  assert.match(banked(1), /About 1 more period like/);
+  assert.match(banked(null), /No number of periods like those seen, up to 10,000, would do.$/);
+  assert.match(banked(null, null), /no other mean near it/);
+  assert.match(banked(37), /^No return of the record by itself makes a difference/);
+});
+
+test("the page asks when the button is pressed, and says it", async () => {
+  const [ballast, chromium] = await Promise.all([service(), browser()]);
+  try {
+    const page = await chromium.newPage();
+    page.setDefaultTimeout(20_000);
+    const history = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
+    const problem = { horizon: 2, history, radius: { rule: "bridge", alpha: 0.1, scale: 0.2 } };
+    const { job } = await call(ballast.url, "/train", { problem, design: { count: 50 } });
+    let now;
+    do now = await call(ballast.url, `/jobs/${job}`);
+    while (now.finished_ms === null);
+    const { session } = await call(ballast.url, "/sessions", { policy: now.policy });
+    await page.goto(`${ballast.url}/#/sessions/${session}`);
+    await page.getByRole("button", { name: "Ask how near" }).click();
+    await page.getByText(/The record has paid/).waitFor();
+    const told = sentences(await call(ballast.url, `/action?session=${session}&sensitivity=true`));
+    const shown = plain(await page.locator("main").innerText());
+    for (const words of told) assert.ok(shown.includes(plain(words)), words);
+  } finally {
+    await chromium.close();
+    await ballast.stop();
+  }
+});
