@@ -77,7 +77,13 @@ impl AdviseArgs {
             utility: UtilitySpecification::relative(self.risk_aversion),
             ..ProblemSpecification::of(history, returns.rate())
         };
-        Advise { problem, wealth: Some(self.wealth), holding: Some(self.holding), seed: default_seed(), sensitivity: self.sensitivity }
+        Advise {
+            problem,
+            wealth: Some(self.wealth),
+            holding: Some(self.holding),
+            seed: default_seed(),
+            sensitivity: self.sensitivity,
+        }
     }
 }
 

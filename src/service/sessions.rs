@@ -162,8 +162,6 @@ impl Sessions {
         if deleted { Ok(()) } else { Err(ServiceError::unknown("session", session)) }
     }
 
-    }
-
     /// The policy of a session, made ready.
     pub(super) async fn advisor(&self, tenant: &Tenant, live: &Live) -> Result<Arc<Advisor>, ServiceError> {
         self.policies.advisor(tenant, &live.row.policy).await

@@ -50,7 +50,9 @@ fn near(Advised { caution, sensitivity, warnings, .. }: &Advised) -> Vec<String>
     if let Some(needed) = premium.needed {
         let present = percent(premium.present, 2);
         let needed = percent(needed, 2);
-        told.push(format!("The record paid {present} a period beyond the bank; at {needed} the advice leaves the bank."));
+        told.push(format!(
+            "The record paid {present} a period beyond the bank; at {needed} the advice leaves the bank."
+        ));
     }
     told
 }
