@@ -15,6 +15,7 @@ use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
 use crate::control::solved_step::StepDiagnostics;
 use crate::service::action::Action as ServiceAction;
+use crate::service::drift::Drift;
 use crate::service::jobs::{Accepted, Job as ServiceJob};
 use crate::service::live::Live;
 use crate::store::{JobKind, JobState, PolicySummary, SessionSummary};
@@ -189,6 +190,8 @@ pub struct Session {
     pub sample_size: usize,
     /// Corrections of what periods reported; the next one is this and one more.
     pub corrections: usize,
+    /// Whether the returns still come as they came.
+    pub drift: Drift,
     pub created_ms: i64,
 }
 
@@ -206,6 +209,7 @@ impl From<Live> for Session {
             holding: live.standing.state.holding,
             sample_size: live.standing.state.law.sample_size(),
             corrections: live.corrections,
+            drift: live.standing.bet.told(),
             session: live.row.session.clone(),
             policy: live.row.policy.clone(),
             horizon: live.row.horizon,

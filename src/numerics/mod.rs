@@ -9,6 +9,7 @@ pub mod confidence_region;
 pub(crate) mod dispatch;
 pub mod elementary;
 pub mod empirical;
+pub mod exchangeability;
 pub mod exponential_mean;
 pub mod farthest;
 pub mod gp;

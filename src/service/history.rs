@@ -6,11 +6,10 @@ use utoipa::ToSchema;
 use super::allowance::HeavyTurn;
 use super::error::ServiceError;
 use super::live;
-use super::periods::{Observed, Passed, Periods, read};
+use super::periods::{Observed, Passed, Periods, Standing, read};
 use super::report::{Correct, Report};
 use super::sessions::Sessions;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
-use crate::control::problem::state::State;
 use crate::store::{EntryKind, SessionRow, Tenant};
 
 /// Where a session started, and everything recorded of it.
@@ -105,7 +104,7 @@ impl Sessions {
 }
 
 /// Of each period, from the first on that was put right.
-fn told_now(periods: &Periods, advisor: &Advisor, start: State) -> Result<Vec<Option<Now>>, ServiceError> {
+fn told_now(periods: &Periods, advisor: &Advisor, start: Standing) -> Result<Vec<Option<Now>>, ServiceError> {
     let first = periods.all.iter().position(|period| period.is_corrected).unwrap_or(periods.all.len());
     let mut told = Vec::with_capacity(periods.all.len());
     periods.replay(advisor, start, |period, before, passed| {

@@ -136,6 +136,7 @@ impl Live {
             wealth: standing.state.wealth,
             holding: standing.state.holding,
             completed: observe.period == self.row.horizon,
+            drift: standing.bet.told(),
             uncertainty,
         };
         Ok((standing, answer))
@@ -143,8 +144,9 @@ impl Live {
 }
 
 /// Where a session starts.
-pub(super) fn started(row: &SessionRow, advisor: &Advisor) -> Result<State, FieldError> {
-    advisor.initial_state(Some(&row.initial_history), Some(row.initial_wealth))?.with_holding(row.initial_holding)
+pub(super) fn started(row: &SessionRow, advisor: &Advisor) -> Result<Standing, FieldError> {
+    let state = advisor.initial_state(Some(&row.initial_history), Some(row.initial_wealth))?;
+    Ok(Standing::at(&row.session, state.with_holding(row.initial_holding)?))
 }
 
 impl Means<'_> {

@@ -30,6 +30,7 @@ pub const STORE_FAILURES: &str = "ballast_store_failures_total";
 pub const KEY_EXPIRES: &str = "ballast_key_expiry_timestamp_seconds";
 pub const KEY_USED: &str = "ballast_key_last_use_timestamp_seconds";
 pub const OLDEST_JOB_SECONDS: &str = "ballast_oldest_job_age_seconds";
+pub const DRIFT_ALARMS: &str = "ballast_drift_alarms_total";
 pub const JOBS_EXPIRED: &str = "ballast_jobs_expired_total";
 pub const STORE_BYTES: &str = "ballast_store_bytes";
 pub const STORE_FREE_BYTES: &str = "ballast_store_free_bytes";
@@ -109,6 +110,10 @@ pub fn describe() {
         Unit::Seconds,
         "Time since the oldest queued job was made, and since the oldest running one began, by state; 0 where there is none."
     );
+    describe_counter!(DRIFT_ALARMS, "Sessions whose returns no longer come as they came, by level.");
+    for level in ["warning", "alarm"] {
+        counter!(DRIFT_ALARMS, "level" => level).increment(0);
+    }
     describe_counter!(JOBS_EXPIRED, "Ended jobs deleted by age.");
     describe_gauge!(STORE_BYTES, Unit::Bytes, "Size of the database.");
     describe_gauge!(STORE_FREE_BYTES, Unit::Bytes, "Of the database, pages that hold nothing; over a folder.");

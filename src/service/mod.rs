@@ -10,6 +10,7 @@ pub mod audit;
 mod bounded;
 pub mod clock;
 pub mod config;
+pub mod drift;
 pub mod error;
 pub mod history;
 mod idempotency;

@@ -4,10 +4,13 @@
 //! corrected report in its place. What was advised for a period stays what it was, and with it what was held where nothing
 //! else was reported.
 
+use std::sync::Arc;
+
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::drift::{Bet, Drift};
 use super::error::ServiceError;
 use super::report::{Correct, Report};
 use crate::control::error::FieldError;
@@ -39,6 +42,8 @@ pub struct Observed {
     pub holding: f64,
     /// Whether the horizon is reached.
     pub completed: bool,
+    /// Whether the returns still come as they came.
+    pub drift: Drift,
     #[serde(flatten)]
     pub uncertainty: Uncertainty,
 }
@@ -70,6 +75,9 @@ pub struct Standing {
     pub price: Option<f64>,
     /// The last date reported.
     pub date: Option<Date>,
+    /// Against the returns' coming as they came.
+    pub bet: Bet,
+    session: Arc<str>,
 }
 
 /// What a report makes of a period.
@@ -81,8 +89,9 @@ pub struct Passed {
 }
 
 impl Standing {
-    pub(super) fn at(state: State) -> Self {
-        Standing { state, price: None, date: None }
+    /// At the start of `session`.
+    pub(super) fn at(session: &str, state: State) -> Self {
+        Standing { state, price: None, date: None, bet: Bet::default(), session: session.into() }
     }
 
     /// The log-return that `report` tells of the coming period, `None` where it is missing.
@@ -119,7 +128,9 @@ impl Standing {
             Some(reported) => reported,
             None => reached(state.wealth, report)?,
         };
-        let standing = Standing { state, price: report.price, date: report.date.or(self.date) };
+        let bet = self.bet.after(&state.law, log_return, &self.session, step + 1);
+        let (price, date, session) = (report.price, report.date.or(self.date), self.session.clone());
+        let standing = Standing { state, price, date, bet, session };
         Ok(Passed { log_return, executed_allocation, standing })
     }
 }
@@ -240,10 +251,10 @@ impl Periods {
     pub(super) fn pass(
         &self,
         advisor: &Advisor,
-        start: State,
+        start: Standing,
         mut tell: impl FnMut(usize, &Standing, &Passed),
     ) -> Result<Standing, (usize, FieldError)> {
-        let mut standing = Standing::at(start);
+        let mut standing = start;
         for (step, period) in self.all.iter().enumerate() {
             let passed = standing.after(advisor, step, &period.report, period.advised);
             let passed = passed.map_err(|error| (step + 1, error))?;
@@ -260,7 +271,7 @@ impl Periods {
     pub(super) fn replay(
         &self,
         advisor: &Advisor,
-        start: State,
+        start: Standing,
         tell: impl FnMut(usize, &Standing, &Passed),
     ) -> Result<Standing, ServiceError> {
         let passed = self.pass(advisor, start, tell);

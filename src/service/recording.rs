@@ -7,6 +7,7 @@ use serde::Serialize;
 use tracing::Instrument;
 
 use super::allowance::HeavyTurn;
+use super::drift;
 use super::error::ServiceError;
 use super::keys::Caller;
 use super::live::{self, Live, Means};
@@ -51,6 +52,7 @@ impl Sessions {
                 created_ms: self.clock.now_milliseconds(),
                 key: observe.reported_by.to_string(),
             };
+            let levels = (live.standing.bet.told().level, answer.drift.level);
             let next = Live {
                 row: live.row.clone(),
                 standing,
@@ -61,6 +63,7 @@ impl Sessions {
                 advice: None,
             };
             if let Some(answer_json) = record(&self.store, &mut held, new, next).await? {
+                drift::count(levels.0, levels.1);
                 return Ok(answer_json);
             }
         }

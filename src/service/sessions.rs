@@ -111,7 +111,7 @@ impl Sessions {
             CreateSession::Exists => return Err(ServiceError::internal("a session of this random name exists")),
         };
         let seen = row.as_opened();
-        let standing = Standing::at(state);
+        let standing = Standing::at(&row.session, state);
         Ok(Live { row: Arc::new(row), standing, observed: 0, corrections: 0, seen, radius: None, advice: None })
     }
 

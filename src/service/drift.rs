@@ -1,0 +1,101 @@
+//! Whether a session's returns still come as those did on which its advice rests.
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use utoipa::ToSchema;
+
+use super::metrics::DRIFT_ALARMS;
+use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::exchangeability::{Capital, p_value};
+
+/// Capitals from which on it warns, and alarms. Where nothing changes, the chance of ever being alarmed is at most 1 %.
+const WARNING: f64 = 20.0;
+const ALARM: f64 = 100.0;
+/// A larger capital is told as this.
+const LARGEST: f64 = 1e12;
+
+/// A bet that the order of the returns means something. It wins where new returns lie further from the median of all than those
+/// before them did: their volatility or their mean has changed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Drift {
+    /// Of the last return: how much of the record lies as far from its median. Null where none was observed.
+    pub p_value: Option<f64>,
+    /// What a capital of 1 has become, at most 1e12.
+    pub capital: f64,
+    /// The most that it ever was: of sessions where nothing changes, a share of at most 1 / c ever sees c.
+    pub highest: f64,
+    /// By the highest: `warning` from 20 on, `alarm` from 100 on.
+    pub level: DriftLevel,
+}
+
+/// What the highest capital says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DriftLevel {
+    /// Nothing unusual.
+    None,
+    /// The returns may have changed.
+    Warning,
+    /// The returns have changed, or one session in a hundred was unlucky.
+    Alarm,
+}
+
+/// The bet of a session, and its last p-value.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Bet {
+    capital: Capital,
+    p_value: Option<f64>,
+}
+
+impl Bet {
+    /// After `log_return`, the last that `record` learned, in `period` of `session`; of a missing one nothing is made.
+    #[must_use]
+    pub(super) fn after(self, record: &EmpiricalDistribution, log_return: Option<f64>, session: &str, period: usize) -> Bet {
+        let Some(log_return) = log_return else { return self };
+        let p_value = p_value(record, log_return, tie(session, period));
+        Bet { capital: self.capital.after(p_value), p_value: Some(p_value) }
+    }
+
+    /// As it is told.
+    pub fn told(self) -> Drift {
+        let [capital, highest] = [self.capital.log(), self.capital.log_highest()].map(|log| log.exp().min(LARGEST));
+        let level = match highest {
+            highest if highest >= ALARM => DriftLevel::Alarm,
+            highest if highest >= WARNING => DriftLevel::Warning,
+            _ => DriftLevel::None,
+        };
+        Drift { p_value: self.p_value, capital, highest, level }
+    }
+}
+
+/// A uniform number of (0, 1] that parts equal returns: the same whenever the period is passed through again, and nobody's to
+/// choose, since the name of a session is drawn at random.
+fn tie(session: &str, period: usize) -> f64 {
+    let digest = Sha256::new().chain_update(session).chain_update((period as u64).to_le_bytes()).finalize();
+    let bits = digest.iter().take(8).fold(0_u64, |bits, &byte| bits << 8 | u64::from(byte));
+    ((bits >> 11) + 1) as f64 / (1_u64 << 53) as f64
+}
+
+/// Counts a session whose level rose.
+pub(super) fn count(before: DriftLevel, after: DriftLevel) {
+    for (level, name) in [(DriftLevel::Warning, "warning"), (DriftLevel::Alarm, "alarm")] {
+        if before < level && level <= after {
+            metrics::counter!(DRIFT_ALARMS, "level" => name).increment(1);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 10,000 the largest gap of the empirical law from the uniform one is below 1.63 / sqrt(10,000) with 99 %.
+    #[test]
+    fn ties_are_parted_by_uniform_numbers() {
+        let mut ties: Vec<f64> = (0..100).flat_map(|name| (1..=100).map(move |period| tie(&format!("s{name}"), period))).collect();
+        ties.sort_by(f64::total_cmp);
+        assert!(ties[0] > 0.0 && ties[9999] <= 1.0);
+        let gap = ties.iter().enumerate().map(|(rank, tie)| (tie - (rank as f64 + 0.5) / 1e4).abs()).fold(0.0, f64::max);
+        assert!(gap < 0.0163, "{gap}");
+    }
+}
