@@ -70,7 +70,7 @@ async fn a_corrected_session_is_one_that_was_reported_right() {
     assert_eq!(status, 200, "{corrected}");
     assert_eq!(number(&corrected["log_return"]), (103.0_f64 / 102.0).ln());
     let put_right = standing(&app).await;
-    assert_ne!(put_right["action"]["allocation"], before["action"]["allocation"]);
+    assert_ne!(put_right["action"]["radius"], before["action"]["radius"]);
     assert_eq!(corrected["wealth"], put_right["session"]["wealth"]);
     assert_eq!(corrected["radius"], put_right["action"]["radius"]);
     app.restart().await;

@@ -42,7 +42,8 @@ async fn it_answers_what_the_service_answers_to_the_last_bit() {
         let output = ballast(&[&usual, &more[..], arguments].concat());
         assert!(output.status.success(), "{output:?}");
         let found: Value = serde_json::from_slice(&output.stdout).unwrap();
-        let problem = json!({ "history": history, "rate_per_step": rate, "trading_cost": 0.004,
+        let problem = json!({ "history": history, "rate_per_step": rate, "periods_per_year": 12,
+            "trading_cost": 0.004,
             "utility": { "kind": "power", "risk_aversion": 4.5 } });
         let question = json!({ "problem": problem, "wealth": 80.0, "holding": 0.25 });
         let (status, expected) = app.post("/advise", &question).await;

@@ -222,5 +222,5 @@ async fn an_observation_is_shown_with_the_key_that_reported_it() {
     app.enter(&key).await;
     assert_eq!(app.action().await.0, 500);
     let inspection = Inspection::of_folder(&folder).await.unwrap();
-    assert!(inspection.run(&mut |_| {}).await.unwrap_err().to_string().starts_with("period 1 of session"));
+    assert!(inspection.run(&mut |_| {}).await.unwrap_err().to_string().starts_with("entry 1 of session"));
 }

@@ -212,6 +212,16 @@ fn faulty_reports() -> Vec<(&'static str, u16, &'static str)> {
         (r#""period": 1, "log_return": 0.1, "executed_allocation": -0.01"#, 422, "executed_allocation"),
         (r#""period": 1, "log_return": 0.1, "wealth": -1.0"#, 422, "wealth"),
         (r#""period": 1, "log_return": 0.1, "wealth": 0"#, 422, "wealth"),
+        (r#""period": 1, "log_return": 0.1, "missing": true"#, 422, "missing"),
+        (r#""period": 1, "missing": "yes""#, 422, "missing"),
+        (r#""period": 1, "missing": false"#, 422, "log_return"),
+        (r#""period": 1, "log_return": 0.1, "date": "2008-02-30""#, 422, "date"),
+        (r#""period": 1, "log_return": 0.1, "date": 20080131"#, 422, "date"),
+        (r#""period": 1, "log_return": 0.1, "rate": 0.51"#, 422, "rate"),
+        (r#""period": 1, "log_return": 0.1, "rate": "3 %""#, 422, "rate"),
+        (r#""period": 1, "log_return": 0.1, "flow": 2e15"#, 422, "flow"),
+        (r#""period": 1, "log_return": 0.1, "flow": -1000"#, 422, "flow"),
+        (r#""period": 1, "log_return": 0.1, "confirm": 1"#, 422, "confirm"),
         (r#""period": 1, "log_return": 0.1, "colour": 1"#, 422, "colour"),
     ]
 }

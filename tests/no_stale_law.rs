@@ -156,8 +156,7 @@ fn routes(session: &str, policy: &str) -> Vec<(Method, String, Option<Value>)> {
     let mut routes = Vec::new();
     for (path, methods) in description["paths"].as_object().unwrap() {
         for (method, operation) in methods.as_object().unwrap() {
-            // Advice from a record names no session.
-            if operation["tags"] != json!(["sessions"]) || path == "/advise" {
+            if operation["tags"] != json!(["sessions"]) {
                 continue;
             }
             let body = match path.as_str() {

@@ -11,8 +11,7 @@ use crate::control::request::rules::{
     COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR, RADIUS_SCALE, RATE,
     RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST, WEALTH,
 };
-use crate::service::recording::MOST_CORRECTIONS;
-use crate::service::report::{LONGEST_REASON, PRICE};
+use crate::service::report::{LONGEST_REASON, MOST_CORRECTIONS, PRICE};
 use crate::service::what_if::POINTS;
 
 /// Adds to every schema what its fields may hold.
@@ -31,55 +30,40 @@ pub fn tell(description: &mut OpenApi) {
 
 /// Schema, or schema and variant; field; rule.
 fn rules() -> Vec<(&'static str, &'static str, Value)> {
-    let within = |low: f64, high: f64| json!({ "minimum": low, "maximum": high });
-    let between = |(low, high)| within(low, high);
     let whole = |range: &std::ops::RangeInclusive<usize>| json!({ "minimum": range.start(), "maximum": range.end() });
     let pair = json!({ "minItems": 2, "maxItems": 2, "items": { "minimum": 1e-12, "maximum": 1e12 } });
     let history = json!({ "minItems": HISTORY_LENGTH.start(), "maxItems": HISTORY_LENGTH.end(),
-        "items": within(-LOG_RETURN, LOG_RETURN) });
-    let wealth = within(WEALTH.0, WEALTH.1);
-    let probability = within(1e-3, 0.999);
-    let action = json!({ "minItems": 2, "maxItems": 2, "items": within(0.0, 1.0) });
-    let reported = ["Observe", "Correct", "Report"].into_iter().flat_map(|schema| {
-        let fields = [
-            ("log_return", within(-LOG_RETURN, LOG_RETURN)),
-            ("simple_return", within((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())),
-            ("price", between(PRICE)),
-            ("previous_price", between(PRICE)),
-            ("rate", between(RATE)),
-            ("flow", within(-WEALTH.1, WEALTH.1)),
-            ("executed_allocation", within(0.0, 1.0)),
-            ("wealth", between(WEALTH)),
-        ];
-        fields.map(|(field, rule)| (schema, field, rule))
-    });
+        "items": within((-LOG_RETURN, LOG_RETURN)) });
+    let wealth = within(WEALTH);
+    let probability = within((1e-3, 0.999));
+    let action = json!({ "minItems": 2, "maxItems": 2, "items": within((0.0, 1.0)) });
     let rules = [
         ("ProblemSpecification", "horizon", whole(&HORIZON)),
-        ("ProblemSpecification", "rate_per_step", between(RATE)),
-        ("ProblemSpecification", "periods_per_year", between(PERIODS_PER_YEAR)),
+        ("ProblemSpecification", "rate_per_step", within(RATE)),
+        ("ProblemSpecification", "periods_per_year", within(PERIODS_PER_YEAR)),
         ("ProblemSpecification", "initial_wealth", wealth.clone()),
         ("ProblemSpecification", "action_interval", action),
-        ("ProblemSpecification", "trading_cost", within(TRADING_COST.0, TRADING_COST.1)),
+        ("ProblemSpecification", "trading_cost", within(TRADING_COST)),
         ("ProblemSpecification", "history", history.clone()),
-        ("UtilitySpecification exponential", "risk_aversion", between(RISK_AVERSION)),
-        ("UtilitySpecification exponential", "risk_aversion_relative", between(RISK_AVERSION_RELATIVE)),
+        ("UtilitySpecification exponential", "risk_aversion", within(RISK_AVERSION)),
+        ("UtilitySpecification exponential", "risk_aversion_relative", within(RISK_AVERSION_RELATIVE)),
         ("UtilitySpecification power", "risk_aversion", json!({ "exclusiveMinimum": 1, "maximum": 100 })),
         ("RadiusRule bridge", "alpha", probability.clone()),
         ("RadiusRule concentration", "alpha", probability),
         ("RadiusRule concentration", "C", json!({ "exclusiveMinimum": 0, "maximum": 1e9 })),
-        ("RadiusRule chi_square", "alpha", within(1e-3, 1.0)),
+        ("RadiusRule chi_square", "alpha", within((1e-3, 1.0))),
         ("RadiusRule", "paths", whole(&PATHS)),
-        ("RadiusRule", "scale", within(RADIUS_SCALE.0, RADIUS_SCALE.1)),
-        ("RadiusRule", "kappa", within(0.0, 100.0)),
-        ("RadiusRule", "radius", within(FIXED_RADIUS.0, FIXED_RADIUS.1)),
-        ("RadiusRule", "c", within(1e-9, 1e12)),
+        ("RadiusRule", "scale", within(RADIUS_SCALE)),
+        ("RadiusRule", "kappa", within((0.0, 100.0))),
+        ("RadiusRule", "radius", within(FIXED_RADIUS)),
+        ("RadiusRule", "c", within((1e-9, 1e12))),
         ("SamplingLaw", "components", json!({ "minItems": 1, "maxItems": 32 })),
-        ("SamplingLaw", "location", within(-1.0, 1.0)),
-        ("SamplingLaw", "scale", within(1e-6, 1.0)),
-        ("SamplingLaw", "degrees_of_freedom", within(2.1, 1e6)),
+        ("SamplingLaw", "location", within((-1.0, 1.0))),
+        ("SamplingLaw", "scale", within((1e-6, 1.0))),
+        ("SamplingLaw", "degrees_of_freedom", within((2.1, 1e6))),
         ("MixtureComponent", "weight", json!({ "exclusiveMinimum": 0, "maximum": 1 })),
-        ("MixtureComponent", "mean", within(-1.0, 1.0)),
-        ("MixtureComponent", "variance", within(1e-12, 1.0)),
+        ("MixtureComponent", "mean", within((-1.0, 1.0))),
+        ("MixtureComponent", "variance", within((1e-12, 1.0))),
         ("DesignSpecification", "count", whole(&COUNT)),
         ("SurrogateSpecification", "moment_count", whole(&MOMENTS)),
         ("HyperparameterBounds", "lengthscale", pair.clone()),
@@ -88,28 +72,49 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("OpenSession", "policy", json!({ "minLength": 1 })),
         ("OpenSession", "history", history),
         ("OpenSession", "wealth", wealth.clone()),
-        ("OpenSession", "holding", within(0.0, 1.0)),
+        ("OpenSession", "holding", within((0.0, 1.0))),
         ("Observe", "session", json!({ "minLength": 1 })),
         ("Observe", "period", json!({ "minimum": 1 })),
         ("Correct", "correction", whole(&(1..=MOST_CORRECTIONS))),
         ("Correct", "period", json!({ "minimum": 1 })),
         ("Correct", "reason", json!({ "minLength": 1, "maxLength": LONGEST_REASON })),
         ("Advise", "wealth", wealth.clone()),
-        ("Advise", "holding", within(0.0, 1.0)),
+        ("Advise", "holding", within((0.0, 1.0))),
         ("WhatIf", "session", json!({ "minLength": 1 })),
         ("WhatIf", "wealth", wealth),
-        ("WhatIf", "holding", within(0.0, 1.0)),
-        ("WhatIf", "radius_scale", within(RADIUS_SCALE.0, RADIUS_SCALE.1)),
-        ("WhatIf", "radius", within(FIXED_RADIUS.0, FIXED_RADIUS.1)),
-        ("WhatIf", "log_return", within(-LOG_RETURN, LOG_RETURN)),
-        ("WhatIf", "simple_return", within((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())),
+        ("WhatIf", "holding", within((0.0, 1.0))),
+        ("WhatIf", "radius_scale", within(RADIUS_SCALE)),
+        ("WhatIf", "radius", within(FIXED_RADIUS)),
+        ("WhatIf", "log_return", within((-LOG_RETURN, LOG_RETURN))),
+        ("WhatIf", "simple_return", within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1()))),
         ("SweepRange", "points", whole(&POINTS)),
-        ("EvaluationRequest", "constant_mixes", json!({ "maxItems": MOST_MIXES, "items": within(0.0, 1.0) })),
+        ("EvaluationRequest", "constant_mixes", json!({ "maxItems": MOST_MIXES, "items": within((0.0, 1.0)) })),
         ("EvaluationRequest", "paths", whole(&evaluation::PATHS)),
-        ("EvaluationRequest", "level", within(LEVEL.0, LEVEL.1)),
+        ("EvaluationRequest", "level", within(LEVEL)),
         ("InitialHistories", "count", whole(&HISTORIES)),
     ];
-    rules.into_iter().chain(reported).collect()
+    rules.into_iter().chain(reported()).collect()
+}
+
+/// Of what a period reports, wherever it stands.
+fn reported() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
+    ["Observe", "Correct", "Report"].into_iter().flat_map(|schema| {
+        let fields = [
+            ("log_return", within((-LOG_RETURN, LOG_RETURN))),
+            ("simple_return", within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1()))),
+            ("price", within(PRICE)),
+            ("previous_price", within(PRICE)),
+            ("rate", within(RATE)),
+            ("flow", within((-WEALTH.1, WEALTH.1))),
+            ("executed_allocation", within((0.0, 1.0))),
+            ("wealth", within(WEALTH)),
+        ];
+        fields.map(|(field, rule)| (schema, field, rule))
+    })
+}
+
+fn within((low, high): (f64, f64)) -> Value {
+    json!({ "minimum": low, "maximum": high })
 }
 
 /// Changes the field, in `variant` or in every variant that has it.

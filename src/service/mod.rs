@@ -24,7 +24,7 @@ pub mod periods;
 pub mod policies;
 pub mod process;
 pub mod progress;
-pub mod recording;
+mod recording;
 pub mod report;
 mod secret;
 pub mod sessions;

@@ -19,9 +19,6 @@ use super::spans;
 use crate::control::error::FieldError;
 use crate::store::{Append, EntryKind, EntryRow, Store, Tenant};
 
-/// Corrections of a session: a replay passes through all of them.
-pub const MOST_CORRECTIONS: usize = 1_000;
-
 impl Sessions {
     /// Records the return of a period, durably before it is answered, exactly once, and answers with an
     /// [`Observed`](super::periods::Observed) in JSON as it was recorded. Where the caller goes away meanwhile
@@ -83,7 +80,7 @@ impl Sessions {
         turn: &HeavyTurn,
     ) -> Result<String, ServiceError> {
         let number = numbered("correction", correct.correction)?;
-        correct.check_reason()?;
+        correct.check()?;
         let (tenant, content) = (&caller.tenant, json(correct)?);
         let mut held = self.hold(tenant, session).await;
         loop {
@@ -95,10 +92,6 @@ impl Sessions {
             let expected = periods.corrections + 1;
             if number > expected {
                 return Err(ServiceError::Gap { what: "correction", given: number, expected });
-            }
-            if number > MOST_CORRECTIONS {
-                let rule = format!("must be at most {MOST_CORRECTIONS}: open a session on the record as it is now");
-                return Err(FieldError::new("correction", number, rule).into());
             }
             periods.correct(correct)?;
             let advisor = self.policies.advisor(tenant, &facts.row.policy).await?;

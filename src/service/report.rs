@@ -11,6 +11,8 @@ use crate::control::request::rules;
 
 /// Prices taken: any currency, any quantity.
 pub const PRICE: (f64, f64) = (1e-12, 1e15);
+/// Corrections of a session: a replay passes through all of them.
+pub const MOST_CORRECTIONS: usize = 1_000;
 /// Letters of a reason.
 pub const LONGEST_REASON: usize = 200;
 const ONE_RETURN: &str = "must be the only one of log_return, simple_return, price and missing";
@@ -199,8 +201,12 @@ impl Report {
 
 impl Correct {
     /// # Errors
-    /// A reason that is empty or long.
-    pub(super) fn check_reason(&self) -> Result<(), FieldError> {
+    /// A number past the most, a reason that is empty or long.
+    pub(super) fn check(&self) -> Result<(), FieldError> {
+        if self.correction > MOST_CORRECTIONS {
+            let rule = format!("must be at most {MOST_CORRECTIONS}: open a session on the record as it is now");
+            return Err(FieldError::new("correction", self.correction, rule));
+        }
         let letters = self.reason.chars().count();
         if self.reason.trim().is_empty() || letters > LONGEST_REASON {
             let rule = format!("must say in 1 to {LONGEST_REASON} letters why");

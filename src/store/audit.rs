@@ -22,7 +22,6 @@ use std::sync::Arc;
 use futures_util::FutureExt;
 
 use super::codec::{Seal, to_sql};
-use super::entries::EntryRow;
 use super::error::Failure;
 use super::query::{Connection, Row, query};
 use super::tenant::Tenant;
@@ -162,16 +161,6 @@ impl Store {
         Ok(page)
     }
 
-    /// The newest observations of a session, newest first, as entries; none where it is no session.
-    async fn observed(&self, session: &str, limit: usize) -> Result<Vec<AuditRow>, StoreError> {
-        let newest = query(
-            "SELECT entries.*, sessions.tenant FROM entries JOIN sessions ON sessions.session = entries.session
-             WHERE entries.session = $1 AND kind = 'observation' ORDER BY entry DESC LIMIT $2",
-        );
-        let decode = |rows: &[Row]| rows.iter().map(AuditRow::of_observation).collect();
-        self.list("reading the audit", newest.bind(session).bind(to_sql(limit)), decode).await
-    }
-
     /// Drops entries past their bounds, oldest first, a few thousand of each chain; their number. What was cut is itself an
     /// entry.
     pub async fn cut_audit(&self, bounds: AuditBounds, now_ms: i64) -> Result<u64, StoreError> {
@@ -282,21 +271,6 @@ impl AuditRow {
             .text(&self.object)
             .text(&self.outcome)
             .integer(self.at_ms)
-    }
-
-    /// An observation, its own seal verified.
-    fn of_observation(row: &Row) -> Result<Self, Failure> {
-        let observation = EntryRow::from_row(row)?;
-        Ok(AuditRow {
-            sequence: 0,
-            tenant: Tenant::stored(&row.get::<String>("tenant")?),
-            key: observation.key,
-            roles: String::new(),
-            deed: Deed::Observe.as_str().to_owned(),
-            object: observation.session,
-            outcome: format!("period {} recorded", observation.number),
-            at_ms: observation.created_ms,
-        })
     }
 
     pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {

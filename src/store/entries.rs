@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use futures_util::FutureExt;
 
-use super::audit::{self, Actor, Deed};
+use super::audit::{self, Actor, AuditRow, Deed};
 use super::codec::{Seal, from_sql, to_sql};
 use super::error::Failure;
 use super::head::Head;
@@ -113,6 +113,16 @@ impl Store {
     /// [`StoreError::Corrupt`] where a row is not what was written or one is missing.
     pub async fn entries(&self, session: &str) -> Result<Option<Vec<EntryRow>>, StoreError> {
         self.read("reading entries", all_of(session), |rows| numbered(session, rows)).await
+    }
+
+    /// The newest observations of a session, newest first, as the audit shows them; none where it is no session.
+    pub(super) async fn observed(&self, session: &str, limit: usize) -> Result<Vec<AuditRow>, StoreError> {
+        let newest = query(
+            "SELECT entries.*, sessions.tenant FROM entries JOIN sessions ON sessions.session = entries.session
+             WHERE entries.session = $1 AND kind = 'observation' ORDER BY entry DESC LIMIT $2",
+        );
+        let decode = |rows: &[Row]| rows.iter().map(EntryRow::told).collect();
+        self.list("reading the audit", newest.bind(session).bind(to_sql(limit)), decode).await
     }
 }
 
@@ -270,6 +280,21 @@ impl EntryRow {
             .text(&self.answer_json)
             .integer(self.created_ms)
             .text(&self.key)
+    }
+
+    /// An observation as the audit shows it, its own seal verified.
+    fn told(row: &Row) -> Result<AuditRow, Failure> {
+        let observation = EntryRow::from_row(row)?;
+        Ok(AuditRow {
+            sequence: 0,
+            tenant: Tenant::stored(&row.get::<String>("tenant")?),
+            key: observation.key,
+            roles: String::new(),
+            deed: Deed::Observe.as_str().to_owned(),
+            object: observation.session,
+            outcome: format!("period {} recorded", observation.number),
+            at_ms: observation.created_ms,
+        })
     }
 
     pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {

@@ -74,6 +74,7 @@ async function fill(holder, shown) {
   };
   holder.replaceChildren(
     numbers,
+    changed(shown),
     h("div", { class: "columns" }, h("div", {}, advice.element), sofar),
     sensitivity(shown),
     worstCase(shown, advice, settled),
@@ -98,6 +99,14 @@ function figures({ session, history, policy }, action) {
       `${counted(session.period - 1, "period")} observed of ${session.horizon}`,
     ],
   ]);
+}
+
+/** That the returns no longer come as they came, where they do not. */
+function changed({ session: { drift } }) {
+  if (drift.level === "none") return "";
+  const how = drift.level === "alarm" ? "no longer come as they came" : "may no longer come as they came";
+  const words = `The returns ${how}: a bet against it has made ${count(Math.floor(drift.highest))} out of 1, which it does for one session in ${count(Math.floor(drift.highest))} where nothing changes. The advice rests on all returns seen; a policy trained on newer ones may serve better.`;
+  return h("p", { class: "note wrong" }, words);
 }
 
 /** Wealth of selling everything at the start, and staying in the bank. */
