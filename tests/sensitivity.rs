@@ -19,13 +19,13 @@ fn problems() -> Vec<Value> {
     let power = |risk_aversion: f64| json!({ "kind": "power", "risk_aversion": risk_aversion });
     let bridge = |scale: f64| json!({ "rule": "bridge", "alpha": 0.5, "paths": 300, "scale": scale });
     vec![
-        json!({ "history": HISTORY, "utility": power(4.0), "radius": bridge(0.5) }),
+        json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": power(4.0), "radius": bridge(0.5) }),
         json!({ "history": HISTORY, "utility": power(4.0), "radius": bridge(0.8), "rate_per_step": 0.006 }),
-        json!({ "history": HISTORY, "utility": power(9.0), "radius": { "rule": "root_n", "kappa": 0.03 },
+        json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": power(9.0), "radius": { "rule": "root_n", "kappa": 0.03 },
             "framework": "static", "support": { "min": -0.11, "max": 0.1 }, "action_interval": [0.0, 0.6] }),
-        json!({ "history": HISTORY, "utility": { "kind": "exponential", "risk_aversion": 0.03 }, "contributions": -3.0,
+        json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": { "kind": "exponential", "risk_aversion": 0.03 }, "contributions": -3.0,
             "radius": { "rule": "concentration", "alpha": 0.3, "C": 1.0, "c": 900.0 }, "trading_cost": 0.004 }),
-        json!({ "history": HISTORY, "utility": power(5.0), "framework": "parametric_static",
+        json!({ "rate_per_step": 0.002, "history": HISTORY, "utility": power(5.0), "framework": "parametric_static",
             "radius": { "rule": "chi_square", "alpha": 0.8 } }),
         json!({ "history": HISTORY, "utility": power(6.0), "framework": "plug_in", "rate_per_step": 0.01 }),
     ]
@@ -245,7 +245,7 @@ async fn who_may_read_may_ask_how_near_it_is() {
     let mut app = App::start().await;
     app.train(&specification(2)).await;
     app.open().await;
-    let problem = json!({ "history": HISTORY });
+    let problem = json!({ "rate_per_step": 0.002, "history": HISTORY });
     let path = format!("/action?session={}&sensitivity=true", app.session);
     let (_, own) = app.get(&path).await;
     let [north, south] = [app.key("default", "read").await, app.key("south", "read").await];
@@ -268,7 +268,7 @@ fn codes(answer: &Value) -> Vec<&str> {
 async fn a_record_of_ten_years_may_hang_on_one_month() {
     let app = App::start().await;
     let record = months("1962-07", 120);
-    let problem = json!({ "history": record, "rate_per_step": 0.002 });
+    let problem = json!({ "history": record, "rate_per_step": 0.002, "utility": { "kind": "exponential", "risk_aversion": 0.01 } });
     let advised = asked(&app, &json!({ "problem": problem, "sensitivity": true })).await;
     let range = &advised["sensitivity"]["without_one"];
     let told = number(&advised["allocation"]);
@@ -292,7 +292,7 @@ async fn a_short_record_is_said_to_be_short_and_a_steady_one_is_not_said_to_hang
     // An advice of 0 that nothing near moves.
     for (count, expected) in [(23, vec!["short_record"]), (24, vec![])] {
         let record: Vec<f64> = (0..count).map(|index| if index % 2 == 0 { -0.02 } else { 0.01 }).collect();
-        let question = json!({ "problem": { "history": record, "radius": { "rule": "root_n", "kappa": 0.01 } }, "sensitivity": true });
+        let question = json!({ "problem": { "rate_per_step": 0.002, "history": record, "radius": { "rule": "root_n", "kappa": 0.01 } }, "sensitivity": true });
         let advised = asked(&app, &question).await;
         assert_eq!((codes(&advised), &advised["allocation"]), (expected, &json!(0.0)));
         let sensitivity = &advised["sensitivity"];
@@ -301,12 +301,12 @@ async fn a_short_record_is_said_to_be_short_and_a_steady_one_is_not_said_to_hang
         assert_eq!(sensitivity["next_return"]["to_bank"], Value::Null);
     }
     // Without the third nothing varies.
-    let three = json!({ "problem": { "history": [0.01, 0.01, 0.03] }, "sensitivity": true });
+    let three = json!({ "problem": { "rate_per_step": 0.002, "history": [0.01, 0.01, 0.03] }, "sensitivity": true });
     assert_ne!(asked(&app, &three).await["sensitivity"]["without_one"]["lowest"]["index"], 2);
-    let two = json!({ "problem": { "history": [0.01, 0.03] }, "sensitivity": true });
+    let two = json!({ "problem": { "rate_per_step": 0.002, "history": [0.01, 0.03] }, "sensitivity": true });
     assert_eq!(asked(&app, &two).await["sensitivity"]["without_one"], Value::Null);
     // A radius that no number of returns makes narrower.
-    let fixed = json!({ "problem": { "history": HISTORY, "radius": { "rule": "fixed", "radius": 0.05 } }, "sensitivity": true });
+    let fixed = json!({ "problem": { "rate_per_step": 0.002, "history": HISTORY, "radius": { "rule": "fixed", "radius": 0.05 } }, "sensitivity": true });
     assert_eq!(asked(&app, &fixed).await["sensitivity"]["premium"]["periods_more"], Value::Null);
 }
 
@@ -318,12 +318,15 @@ async fn what_would_take_seconds_or_say_nothing_is_refused_by_name() {
     let normal =
         json!({ "kind": "gaussian_mixture", "components": [{ "weight": 1.0, "mean": 0.0, "variance": 0.01 }] });
     for (problem, rule) in [
-        (json!({ "history": long }), "above 360 returns: here they are 361"),
+        (json!({ "rate_per_step": 0.002, "history": long }), "above 360 returns: here they are 361"),
         (
-            json!({ "history": &long[..100], "radius": bridge(28_801) }),
+            json!({ "rate_per_step": 0.002, "history": &long[..100], "radius": bridge(28_801) }),
             "above 2880000 returns times problem.radius.paths",
         ),
-        (json!({ "history": HISTORY, "framework": "known_law", "law": normal }), "under the framework known_law"),
+        (
+            json!({ "rate_per_step": 0.002, "history": HISTORY, "framework": "known_law", "law": normal }),
+            "under the framework known_law",
+        ),
     ] {
         let (status, refused) = app.post("/advise", &json!({ "problem": problem, "sensitivity": true })).await;
         assert_eq!((status.as_u16(), &refused["field"]), (422, &json!("sensitivity")), "{refused}");

@@ -667,7 +667,7 @@ async fn a_file_that_is_no_database_is_fatal() {
 
 #[tokio::test]
 async fn a_schema_that_is_not_text_is_refused() {
-    const COLUMN: &[u8] = b"wealth_after";
+    const COLUMN: &[u8] = b"answer_json";
     let folder = tempfile::tempdir().unwrap();
     Store::open(folder.path()).await.unwrap().close().await;
     let file = folder.path().join("ballast.sqlite");

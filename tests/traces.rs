@@ -92,7 +92,7 @@ async fn spans_name_routes_tenants_writes_and_solves_and_no_key() {
         "POST /observe",
         "/observe",
         "north",
-        "append an observation",
+        "append an entry",
         "open a session",
         "solve",
         "wait for a turn",

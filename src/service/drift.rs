@@ -50,7 +50,13 @@ pub struct Bet {
 impl Bet {
     /// After `log_return`, the last that `record` learned, in `period` of `session`; of a missing one nothing is made.
     #[must_use]
-    pub(super) fn after(self, record: &EmpiricalDistribution, log_return: Option<f64>, session: &str, period: usize) -> Bet {
+    pub(super) fn after(
+        self,
+        record: &EmpiricalDistribution,
+        log_return: Option<f64>,
+        session: &str,
+        period: usize,
+    ) -> Bet {
         let Some(log_return) = log_return else { return self };
         let p_value = p_value(record, log_return, tie(session, period));
         Bet { capital: self.capital.after(p_value), p_value: Some(p_value) }
@@ -92,10 +98,12 @@ mod tests {
     /// Of 10,000 the largest gap of the empirical law from the uniform one is below 1.63 / sqrt(10,000) with 99 %.
     #[test]
     fn ties_are_parted_by_uniform_numbers() {
-        let mut ties: Vec<f64> = (0..100).flat_map(|name| (1..=100).map(move |period| tie(&format!("s{name}"), period))).collect();
+        let mut ties: Vec<f64> =
+            (0..100).flat_map(|name| (1..=100).map(move |period| tie(&format!("s{name}"), period))).collect();
         ties.sort_by(f64::total_cmp);
         assert!(ties[0] > 0.0 && ties[9999] <= 1.0);
-        let gap = ties.iter().enumerate().map(|(rank, tie)| (tie - (rank as f64 + 0.5) / 1e4).abs()).fold(0.0, f64::max);
+        let gap =
+            ties.iter().enumerate().map(|(rank, tie)| (tie - (rank as f64 + 0.5) / 1e4).abs()).fold(0.0, f64::max);
         assert!(gap < 0.0163, "{gap}");
     }
 }

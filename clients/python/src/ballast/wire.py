@@ -49,6 +49,10 @@ class AuditPage(TypedDict):
     """Give it as `after` for the next page; null on the last."""
 
 
+CautionCode: TypeAlias = Literal["short_record", "one_return"]
+"""The reasons."""
+
+
 Contributions: TypeAlias = float | list[float]
 """C, money added at the end of each period."""
 
@@ -98,6 +102,10 @@ class Costs(TypedDict):
     """Seconds of the simulation."""
     resolve_seconds: NotRequired[float | None]
     """Mean of one re-solved step; null where there was none."""
+
+
+DriftLevel: TypeAlias = Literal["none", "warning", "alarm"]
+"""What the highest capital says."""
 
 
 class Estimate(TypedDict):
@@ -212,6 +220,19 @@ JobKind: TypeAlias = Literal["train", "evaluate"]
 JobState: TypeAlias = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 
 
+class LeftOut(TypedDict):
+    """The advice without one return."""
+
+    index: int
+    """Of the return in the record, from 0; the first of equal ones."""
+    log_return: float
+    """The return."""
+    simple_return: float
+    """The same as `price / previous price - 1`."""
+    allocation: float
+    """The share of wealth that would be advised."""
+
+
 class MixtureComponent(TypedDict):
     """One normal law of a mixture, of log-returns per step."""
 
@@ -221,6 +242,19 @@ class MixtureComponent(TypedDict):
     """In log-return."""
     variance: float
     """In squared log-return."""
+
+
+class NextAdvice(TypedDict):
+    """The advice after one more return."""
+
+    quantile: float
+    """Share of the record below it; interpolated between its returns (Hyndman and Fan, type 7)."""
+    log_return: float
+    """The return supposed."""
+    simple_return: float
+    """The same as `price / previous price - 1`."""
+    allocation: float
+    """The share of wealth that would be advised."""
 
 
 class Observe(TypedDict):
@@ -285,6 +319,26 @@ class PolicyPage(TypedDict):
     policies: list[PolicyEntry]
     next: NotRequired[int | None]
     """Give it as `after` for the next page; null on the last."""
+
+
+class Premium(TypedDict):
+    """What the record pays beyond the bank, and what it would have to."""
+
+    present: float
+    """Mean log-return of the record less `ln(1 + rate_per_step)`, per period."""
+    needed: NotRequired[float | None]
+    """
+    The same of the record with every return shifted by the amount at which the advice leaves the bank, to 1e-6: above
+    `present` where all is in the bank now, else below it. Null where no shift within the distance between the lowest and the
+    highest return, that leaves all of them in `support`, parts the two. In one period without trading cost the shift is
+    `ln(1 + rate_per_step)` less the log of the least mean of e^Z in the ball. Checked by: tests/sensitivity.rs against that.
+    """
+    periods_more: NotRequired[int | None]
+    """
+    More returns, of the law of those seen, after which the advice leaves the bank: the least number m at which the step with
+    the radius times sqrt(n / (n + m)) advises anything. 0 where it has left already; null where it does not within 10000
+    periods, or the radius rule is `fixed`.
+    """
 
 
 class Problem(TypedDict):
@@ -402,6 +456,15 @@ class Report(TypedDict):
     """Share of wealth held in the risky asset through the period. Default: the allocation advised for it."""
     wealth: NotRequired[float | None]
     """Wealth reached, with what was added, where it differs from what all of the above gives."""
+
+
+class Return(TypedDict):
+    """A return in both units."""
+
+    log_return: float
+    """`ln(price / previous price)`."""
+    simple_return: float
+    """`price / previous price - 1`."""
 
 
 class SamplingLaw1(TypedDict):
@@ -565,6 +628,15 @@ class WealthReport(TypedDict):
     """Over paths."""
 
 
+class WithoutOne(TypedDict):
+    """The range of the advice over the records that lack one return."""
+
+    lowest: LeftOut
+    """The lowest advice, and the return whose absence gives it."""
+    highest: LeftOut
+    """The highest advice, and the return whose absence gives it."""
+
+
 class WorstLawSummary(TypedDict):
     """The worst-case law in figures, of log-returns."""
 
@@ -626,6 +698,15 @@ class Advice(TypedDict):
     """How it was found."""
 
 
+class Caution(TypedDict):
+    """A reason to be careful with an advice."""
+
+    code: CautionCode
+    """For programs."""
+    sentence: str
+    """For people."""
+
+
 class Corrected(Uncertainty):
     """The session after a correction."""
 
@@ -672,6 +753,22 @@ class Difference(TypedDict):
     """Of the certainty equivalent, in terminal wealth."""
 
 
+class Drift(TypedDict):
+    """
+    A bet that the order of the returns means something. It wins where new returns lie further from the median of all than those
+    before them did: their volatility or their mean has changed.
+    """
+
+    p_value: NotRequired[float | None]
+    """Of the last return: how much of the record lies as far from its median. Null where none was observed."""
+    capital: float
+    """What a capital of 1 has become, at most 1e12."""
+    highest: float
+    """The most that it ever was: of sessions where nothing changes, a share of at most 1 / c ever sees c."""
+    level: DriftLevel
+    """By the highest: `warning` from 20 on, `alarm` from 100 on."""
+
+
 class JobProgress(TypedDict):
     """How far a job is."""
 
@@ -684,6 +781,27 @@ class JobProgress(TypedDict):
     """Design points solved, or paths simulated, in this step."""
     points_total: NotRequired[int | None]
     seconds_left: NotRequired[float | None]
+
+
+class NextReturn(TypedDict):
+    """
+    What one more return would change.
+
+    Returns are tried from the lowest of the record less half the distance between its extremes to the highest and half of it
+    more, within `support` where there is one: at 49 of them, evenly, and between neighbours of which one is advised an end of
+    the action interval and the other is not, by halving, to 1e-6. The advice need not rise with the return, for one far out
+    widens the radius whichever side it lies on: of several crossings the one nearest to the median is told, and a pair of them
+    between two neighbours is missed. Checked by: tests/sensitivity.rs on a finer grid.
+    """
+
+    range: list[float]
+    """The lowest and the highest log-return tried."""
+    to_bank: NotRequired[Return | None]
+    to_highest: NotRequired[Return | None]
+    low: NextAdvice
+    """After a return at the 5 % quantile of the record."""
+    high: NextAdvice
+    """After a return at the 95 % quantile of the record."""
 
 
 class Now(TypedDict):
@@ -723,6 +841,8 @@ class Observed(Uncertainty):
     """Share of it in the risky asset, as the return left it."""
     completed: bool
     """Whether the horizon is reached."""
+    drift: Drift
+    """Whether the returns still come as they came."""
 
 
 class PeriodReport(TypedDict):
@@ -767,6 +887,16 @@ class ProblemSpecification(TypedDict):
     """The log-returns observed before the start, at least two of them distinct."""
 
 
+class Sensitivity(TypedDict):
+    """How near an advice is to changing."""
+
+    without_one: NotRequired[WithoutOne | None]
+    next_return: NextReturn
+    """With one more return."""
+    premium: Premium
+    """With another mean, and with more returns like those seen."""
+
+
 class Session(TypedDict):
     """A live investor."""
 
@@ -784,6 +914,8 @@ class Session(TypedDict):
     sample_size: int
     corrections: int
     """Corrections of what periods reported; the next one is this and one more."""
+    drift: Drift
+    """Whether the returns still come as they came."""
     created_ms: int
 
 
@@ -907,6 +1039,9 @@ class Action(Advice):
     session: str
     period: int
     worst_case: NotRequired[WorstCase | None]
+    caution: list[Caution]
+    """What to know before the advice is followed."""
+    sensitivity: NotRequired[Sensitivity | None]
 
 
 class Advise(TypedDict):
@@ -920,12 +1055,17 @@ class Advise(TypedDict):
     """Share of wealth in the risky asset now, before trading. Default: 0."""
     seed: NotRequired[int]
     """Of the simulated bridges."""
+    sensitivity: NotRequired[bool]
+    """Whether to say how near the advice is to changing."""
 
 
 class Advised(Advice):
     """The advice, and the law that is worst for it."""
 
     worst_case: WorstCase
+    caution: list[Caution]
+    """What to know before the advice is followed."""
+    sensitivity: NotRequired[Sensitivity | None]
     annualised: NotRequired[Annualised | None]
     warnings: list[Warning]
     """What in the question may be a mistake."""
