@@ -100,9 +100,9 @@ async fn the_next_return_that_changes_the_advice_is_found_on_a_finer_grid_too() 
         let top = problem["action_interval"][1].as_f64().unwrap_or(1.0);
         let invested = |allocation: f64| allocation > AT_AN_END;
         let full = |allocation: f64| allocation >= top - AT_AN_END;
-        let ends: [(&str, &dyn Fn(f64) -> bool, f64); 2] =
-            [("to_bank", &invested, RESOLUTION), ("to_highest", &full, -RESOLUTION)];
-        for (name, is_above, across) in ends {
+        let is_above: [&dyn Fn(f64) -> bool; 2] = [&invested, &full];
+        let ends = [("to_bank", RESOLUTION), ("to_highest", -RESOLUTION)];
+        for ((name, across), is_above) in ends.into_iter().zip(is_above) {
             let crossed = grid.windows(2).filter(|pair| !is_above(pair[0].1) && is_above(pair[1].1));
             // The median lies between 0.013 and 0.029.
             let away = |pair: &&[(f64, f64)]| (pair[0].0 - 0.021).max(0.021 - pair[1].0);
