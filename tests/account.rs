@@ -198,7 +198,7 @@ async fn a_correction_is_made_once_and_in_its_turn() {
     // What was put right in a later period is said to be of that period.
     let (_, refused) = correct(&app, 3, json!({ "period": 1, "log_return": 0.02, "date": "2008-01-31" })).await;
     assert!(refused["rule"].as_str().unwrap().starts_with("in period 2, with period 1 put right"), "{refused}");
-    for reason in ["", "  ", &"x".repeat(201)] {
+    for reason in ["", "  ", "a\u{1}b", &"x".repeat(201)] {
         let body = json!({ "correction": 3, "period": 1, "log_return": 0.02, "reason": reason });
         let (status, refused) = app.post(&format!("/sessions/{}/corrections", app.session), &body).await;
         assert_eq!((status.as_u16(), &refused["field"]), (422, &json!("reason")));
@@ -259,6 +259,21 @@ async fn a_return_that_is_most_likely_a_slip_is_asked_about() {
     assert_eq!(correct(&app, 1, slip.clone()).await.1["type"], "/problems/unusual-return");
     let mut meant = slip;
     meant["confirm"] = json!(true);
+    assert_eq!(correct(&app, 1, meant).await.0, 200);
+}
+
+/// The return of a corrected price may be usual, and the one after it not.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_price_put_right_is_asked_about_where_the_next_return_becomes_unusual() {
+    let app = opened().await;
+    report_all(&app, &[json!({ "price": 102.0, "previous_price": 100.0 }), json!({ "price": 103.0 })]).await;
+    let before = standing(&app).await;
+    let slip = json!({ "period": 1, "price": 1.02, "previous_price": 1.0 });
+    let (status, refused) = correct(&app, 1, slip).await;
+    assert_eq!((status.as_u16(), &refused["type"]), (409, &json!("/problems/unusual-return")), "{refused}");
+    assert!(refused["rule"].as_str().unwrap().starts_with("in period 2, with period 1 put right"), "{refused}");
+    assert_eq!(standing(&app).await, before);
+    let meant = json!({ "period": 1, "price": 1.02, "previous_price": 1.0, "confirm": true });
     assert_eq!(correct(&app, 1, meant).await.0, 200);
 }
 

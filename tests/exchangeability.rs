@@ -87,7 +87,7 @@ fn where_nothing_changes_hardly_any_session_is_alarmed() {
 }
 
 /// Returns that are wider from the 25th on: how many of 400 sessions tell it within 240 periods, and after how many. Twice as
-/// wide ones are told by nearly all, in the median within three dozen.
+/// wide ones are told by nearly all, in the median within 40 periods.
 #[test]
 fn a_larger_volatility_is_told() {
     for known in [60, 120, 240] {
@@ -107,7 +107,7 @@ fn a_larger_volatility_is_told() {
     }
 }
 
-/// The US market: a session opened each January from 1946 on with the 240 months before as its record, and followed to the end
+/// The US market: a session opened each January from 1947 on with the 240 months before as its record, and followed to the end
 /// of 2018. Those alarmed are alarmed in the great falls after the war, and in no other year.
 #[test]
 fn the_alarms_of_the_us_market() {

@@ -22,7 +22,7 @@ const QUOTAS: Quotas = Quotas { queued_jobs: 2, sessions: 2, bytes: 0 };
 const TENANTS: u8 = 3;
 /// What a row takes beside what it holds, and what an entry of a session takes.
 const ROW: i64 = 1024;
-const ENTRY: i64 = 1024;
+const ENTRY: i64 = 1536;
 
 /// Names are drawn from so few that operations meet.
 #[derive(Debug, Clone)]

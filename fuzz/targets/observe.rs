@@ -7,11 +7,13 @@ use ballast::control::policy::Policy;
 use ballast::http::decode;
 use ballast::service::Service;
 use ballast::service::allowance::{Allowance, HeavyTurn, Limits};
+use ballast::service::answer::Observed;
 use ballast::service::clock::Clock;
 use ballast::service::config::Config;
-use ballast::service::observation::Observe;
+use ballast::service::keys::Caller;
+use ballast::service::report::Observe;
+use ballast::service::sessions::Start;
 use ballast::service::shutdown::Shutdown;
-use ballast::store::Tenant;
 use libfuzzer_sys::fuzz_target;
 use tokio::runtime::Runtime;
 
@@ -23,6 +25,7 @@ fn turn() -> Arc<HeavyTurn> {
 struct Live {
     runtime: Runtime,
     service: Arc<Service>,
+    caller: Arc<Caller>,
     policy: String,
     /// The session and its coming period.
     session: Mutex<(String, usize)>,
@@ -32,17 +35,19 @@ static LIVE: LazyLock<Live> = LazyLock::new(|| {
     let runtime = Runtime::new().expect("a runtime");
     let folder = tempfile::tempdir().expect("a folder").keep();
     let document = Policy::from_json(include_bytes!("../corpus/policy/two_steps.json")).expect("a policy");
-    let (service, policy) = runtime.block_on(async {
+    let (service, caller, policy) = runtime.block_on(async {
         let service = Service::start(&Config::new(folder), Clock::system(), Shutdown::new()).await.expect("a service");
-        let policy = service.policies.import(&Tenant::default(), document).await.expect("imported");
-        (service, policy)
+        let Ok(caller) = service.keys.admit(None) else { panic!("a service without keys asks for one") };
+        let policy = service.policies.import(&caller, document).await.expect("imported");
+        (service, caller, policy)
     });
-    let session = Mutex::new((open(&runtime, &service, &policy), 1));
-    Live { runtime, service, policy, session }
+    let session = Mutex::new((open(&runtime, &service, &caller, &policy), 1));
+    Live { runtime, service, caller, policy, session }
 });
 
-fn open(runtime: &Runtime, service: &Service, policy: &str) -> String {
-    let opened = runtime.block_on(service.sessions.open(&Tenant::default(), policy, None, None));
+fn open(runtime: &Runtime, service: &Service, caller: &Caller, policy: &str) -> String {
+    let start = Start { policy: policy.to_owned(), history: None, wealth: None, holding: None };
+    let opened = runtime.block_on(service.sessions.open(caller, start, None));
     opened.expect("a session").row.session.clone()
 }
 
@@ -52,15 +57,17 @@ fuzz_target!(|body: &[u8]| {
     let mut session = live.session.lock().expect("nothing panicked");
     // Otherwise nearly every report would be of another session.
     (report.session, report.period) = session.clone();
-    let observed = live.runtime.block_on(live.service.sessions.observe(&Tenant::default(), report.clone(), &turn()));
-    let Ok(observed) = observed else { return };
+    let observe = |report: &Observe| {
+        live.runtime.block_on(live.service.sessions.observe(&live.caller.tenant, report, &turn()))
+    };
+    let Ok(answer) = observe(&report) else { return };
+    let observed: Observed = serde_json::from_str(&answer).expect("an answer as it is stored");
     assert!(observed.wealth.is_finite() && observed.wealth > 0.0, "{observed:?}");
     assert!((0.0..=1.0).contains(&observed.executed_allocation), "{observed:?}");
     assert!(observed.uncertainty.radius.is_finite() && observed.uncertainty.radius >= 0.0, "{observed:?}");
-    let again = live.runtime.block_on(live.service.sessions.observe(&Tenant::default(), report, &turn()));
-    assert_eq!(again.expect("told again"), observed);
+    assert_eq!(observe(&report).expect("told again"), answer);
     *session = match observed.completed {
-        true => (open(&live.runtime, &live.service, &live.policy), 1),
+        true => (open(&live.runtime, &live.service, &live.caller, &live.policy), 1),
         false => (observed.session, observed.period + 1),
     };
 });

@@ -61,8 +61,12 @@ impl Capital {
     ///
     ///   M = integral over e of e^n exp((1 - e) L) = sum over k >= 0 of L^k / ((n+1) (n+2) ... (n+1+k)),
     ///
-    /// the series of the lower incomplete gamma function; all its terms are positive. Cost O(L + sqrt n).
+    /// the series of the lower incomplete gamma function; all its terms are positive. Cost O(L + sqrt n). Infinite after a p-value of 0, which no atom
+    /// of its law has.
     pub fn log(self) -> f64 {
+        if self.surprise.is_infinite() {
+            return f64::INFINITY;
+        }
         let mut divisor = self.bets as f64 + 1.0;
         let (mut term, mut sum, mut scale) = (1.0 / divisor, 1.0 / divisor, 0.0);
         while term > f64::EPSILON * sum || divisor < self.surprise {

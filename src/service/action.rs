@@ -2,13 +2,14 @@
 
 use super::allowance::HeavyTurn;
 use super::error::ServiceError;
-use super::live;
+use super::live::{self, Live};
 use super::periods::Periods;
 use super::sessions::Sessions;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
 use crate::control::policy::sensitivity::Sensitivity;
 use crate::control::policy::worst_case::WorstCase;
+use crate::control::problem::state::State;
 use crate::store::Tenant;
 
 /// What [`Sessions::action`] found.
@@ -56,9 +57,13 @@ impl Sessions {
             return Ok(Action { period, advice, worst_case: None, sensitivity: None });
         }
         let advisor = means.advisor;
-        let (state, step) = (live.standing.state.clone(), live.observed);
+        let (mut state, step) = (live.standing.state.clone(), live.observed);
+        let mut record = None;
+        if sensitivity {
+            let (same, seen) = self.record(tenant, live, &advisor).await?;
+            (state, record) = (same, Some(seen));
+        }
         drop(held);
-        let record = if sensitivity { Some(self.record(tenant, session, step, &advisor).await?) } else { None };
         turn.begin()?;
         let solving = self.resolving.run(tenant, move || {
             let (advice, worst_case) = match explain {
@@ -75,24 +80,20 @@ impl Sessions {
         solving.await
     }
 
-    /// The returns that a session has seen by the period after `step`, in their order.
+    /// The state of a session and the returns that it has seen, in their order, both as of the entries that `live` knows.
     ///
     /// # Errors
     /// There is no such session; its sensitivity would take too long.
-    async fn record(
-        &self,
-        tenant: &Tenant,
-        session: &str,
-        step: usize,
-        advisor: &Advisor,
-    ) -> Result<Vec<f64>, ServiceError> {
-        let facts = self.facts(tenant, session).await?;
-        advisor.check_sensitivity(facts.row.initial_history.len() + step)?;
+    async fn record(&self, tenant: &Tenant, live: &Live, advisor: &Advisor) -> Result<(State, Vec<f64>), ServiceError> {
+        let mut facts = self.facts(tenant, &live.row.session).await?;
+        // What another process recorded since then is of the next question.
+        facts.entries.truncate(live.seen.entries());
+        advisor.check_sensitivity(facts.row.initial_history.len() + live.observed)?;
         let start = live::started(&facts.row, advisor)?;
         let mut record = facts.row.initial_history;
-        Periods::of(&facts.entries)?.replay(advisor, start, |period, _, passed| {
-            record.extend(passed.log_return.filter(|_| period <= step));
+        let replayed = Periods::of(&facts.entries)?.replay(advisor, start, |_, _, passed| {
+            record.extend(passed.log_return);
         })?;
-        Ok(record)
+        Ok((replayed.state, record))
     }
 }

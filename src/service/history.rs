@@ -1,12 +1,15 @@
 //! What a session was told, and what it would be told now.
 
+use std::sync::Arc;
+
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::allowance::HeavyTurn;
+use super::answer::{Corrected, Observed};
 use super::error::ServiceError;
 use super::live;
-use super::periods::{Observed, Passed, Periods, Standing, read};
+use super::periods::{Passed, Periods, Standing, read};
 use super::report::{Correct, Report};
 use super::sessions::Sessions;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
@@ -64,12 +67,14 @@ pub struct Now {
 pub struct Correction {
     #[serde(flatten)]
     pub correction: Correct,
+    /// What was answered to it.
+    pub told: Corrected,
     pub corrected_ms: i64,
 }
 
 impl Sessions {
     /// The session's start and every entry. Where a period was put right, those from it on are passed through and advised
-    /// again, which takes a turn of those that solve.
+    /// again, each in a turn of those that solve.
     ///
     /// # Errors
     /// There is no such session; too much is solved already.
@@ -84,8 +89,11 @@ impl Sessions {
                     observed_ms: entry.created_ms,
                     now: None,
                 }),
-                EntryKind::Correction => corrections
-                    .push(Correction { correction: read(&entry.content_json)?, corrected_ms: entry.created_ms }),
+                EntryKind::Correction => corrections.push(Correction {
+                    correction: read(&entry.content_json)?,
+                    told: read(&entry.answer_json)?,
+                    corrected_ms: entry.created_ms,
+                }),
             }
         }
         if !corrections.is_empty() {
@@ -93,31 +101,50 @@ impl Sessions {
             let periods = Periods::of(&facts.entries)?;
             let advisor = self.policies.advisor(tenant, &facts.row.policy).await?;
             let start = live::started(&facts.row, &advisor)?;
-            let now = self.resolving.run(tenant, move || told_now(&periods, &advisor, start)).await??;
-            for (observation, now) in observations.iter_mut().zip(now) {
-                observation.now = now;
+            let first = periods.first_corrected();
+            let now = self.told_now(tenant, &periods, &advisor, start).await?;
+            for (observation, now) in observations.iter_mut().skip(first).zip(now) {
+                observation.now = Some(now);
             }
         }
         let SessionRow { session, policy, initial_wealth, initial_holding, initial_history: history, .. } = facts.row;
         Ok(History { session, policy, initial_wealth, initial_holding, history, observations, corrections })
     }
-}
 
-/// Of each period, from the first on that was put right.
-fn told_now(periods: &Periods, advisor: &Advisor, start: Standing) -> Result<Vec<Option<Now>>, ServiceError> {
-    let first = periods.all.iter().position(|period| period.is_corrected).unwrap_or(periods.all.len());
-    let mut told = Vec::with_capacity(periods.all.len());
-    periods.replay(advisor, start, |period, before, passed| {
-        let Passed { log_return, executed_allocation, standing } = passed;
-        told.push((period > first).then(|| Now {
-            reported: periods.all.get(period - 1).filter(|period| period.is_corrected).map(|period| period.report),
-            log_return: *log_return,
-            advised_allocation: advisor.advise(period - 1, &before.state, AdviceMode::Surrogate).allocation,
-            executed_allocation: *executed_allocation,
-            wealth: standing.state.wealth,
-            holding: standing.state.holding,
-            radius: advisor.radius(&standing.state),
-        }));
-    })?;
-    Ok(told)
+    /// Of each period from the first on that was put right. Each waits its turn to be advised by itself, so that a long session
+    /// starves nobody, and a caller who goes away stops it.
+    async fn told_now(
+        &self,
+        tenant: &Tenant,
+        periods: &Periods,
+        advisor: &Arc<Advisor>,
+        start: Standing,
+    ) -> Result<Vec<Now>, ServiceError> {
+        let (mut standing, mut told): (Standing, Vec<Now>) = (start, Vec::new());
+        for (step, period) in periods.all.iter().enumerate() {
+            let passed = periods.passed(advisor, step, &standing).map_err(ServiceError::internal)?;
+            let Passed { log_return, executed_allocation, standing: then } = passed;
+            if step >= periods.first_corrected() {
+                let (advising, state) = (advisor.clone(), standing.state);
+                let advise = move || advising.advise(step, &state, AdviceMode::Surrogate);
+                let advice = self.resolving.run(tenant, advise).await?;
+                // The radius after a period is the one that the next advice is within.
+                told.last_mut().into_iter().for_each(|before| before.radius = advice.radius);
+                told.push(Now {
+                    reported: period.is_corrected.then_some(period.report),
+                    log_return,
+                    advised_allocation: advice.allocation,
+                    executed_allocation,
+                    wealth: then.state.wealth,
+                    holding: then.state.holding,
+                    radius: f64::NAN,
+                });
+            }
+            standing = then;
+        }
+        let measuring = advisor.clone();
+        let radius = self.resolving.run(tenant, move || measuring.radius(&standing.state)).await?;
+        told.last_mut().into_iter().for_each(|last| last.radius = radius);
+        Ok(told)
+    }
 }

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use super::allowance::HeavyTurn;
+use super::answer::Observed;
 use super::bounded::Bounded;
 use super::error::ServiceError;
-use super::periods::{self, Observed, Passed, Periods, Standing};
+use super::periods::{self, Passed, Periods, Standing};
 use super::report::{Observe, Report};
 use crate::control::error::FieldError;
 use crate::control::policy::advice::{Advice, Uncertainty};

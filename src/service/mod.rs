@@ -6,6 +6,7 @@
 pub mod action;
 pub mod advise;
 pub mod allowance;
+pub mod answer;
 pub mod audit;
 mod bounded;
 pub mod clock;

@@ -7,65 +7,18 @@
 use std::sync::Arc;
 
 use jiff::civil::Date;
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use serde::Deserialize;
 
-use super::drift::{Bet, Drift};
+use super::drift::Bet;
 use super::error::ServiceError;
 use super::report::{Correct, Report};
 use crate::control::error::FieldError;
-use crate::control::policy::advice::Uncertainty;
 use crate::control::policy::advisor::Advisor;
-use crate::control::problem::actions::Band;
 use crate::control::problem::state::{Realised, State};
 use crate::control::request::rules;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::moments::CentralMoments;
 use crate::store::{EntryKind, EntryRow};
-
-/// The session after an observation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct Observed {
-    pub session: String,
-    pub period: usize,
-    /// Null where it is missing.
-    pub log_return: Option<f64>,
-    /// The holdings that were best kept at the start of the period; where trading costs nothing both ends are the advised
-    /// allocation.
-    #[schema(value_type = [f64; 2])]
-    pub band: Band,
-    pub advised_allocation: f64,
-    pub executed_allocation: f64,
-    /// Wealth at the end of the period, with what was added to it.
-    pub wealth: f64,
-    /// Share of it in the risky asset, as the return left it.
-    pub holding: f64,
-    /// Whether the horizon is reached.
-    pub completed: bool,
-    /// Whether the returns still come as they came.
-    pub drift: Drift,
-    #[serde(flatten)]
-    pub uncertainty: Uncertainty,
-}
-
-/// The session after a correction.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct Corrected {
-    pub session: String,
-    pub correction: usize,
-    /// The period put right.
-    pub period: usize,
-    /// What it is now; null where it is missing.
-    pub log_return: Option<f64>,
-    /// Periods observed, which is as before.
-    pub observed: usize,
-    /// Wealth now.
-    pub wealth: f64,
-    /// Share of it in the risky asset.
-    pub holding: f64,
-    #[serde(flatten)]
-    pub uncertainty: Uncertainty,
-}
 
 /// Where a session stands between two periods.
 #[derive(Debug, Clone, PartialEq)]
@@ -185,8 +138,8 @@ fn reached(wealth: f64, report: &Report) -> Result<f64, FieldError> {
 pub struct Period {
     /// As reported last.
     pub report: Report,
-    /// As advised when it came.
-    pub advised: f64,
+    /// As understood when it came; what was advised stays so whatever is put right.
+    told: Told,
     /// Whether that is not what was reported first.
     pub is_corrected: bool,
 }
@@ -200,9 +153,28 @@ pub struct Periods {
 }
 
 /// What is read of the answer to an observation.
-#[derive(Deserialize)]
+#[derive(Debug, Clone, Copy, Deserialize)]
 struct Told {
+    log_return: Option<f64>,
     advised_allocation: f64,
+    executed_allocation: f64,
+    wealth: f64,
+}
+
+impl Told {
+    /// The report in the numbers that were acknowledged, which no other processor or library computes otherwise.
+    fn report(self, reported: &Report) -> Report {
+        Report {
+            log_return: self.log_return,
+            missing: self.log_return.is_none(),
+            executed_allocation: Some(self.executed_allocation),
+            wealth: Some(self.wealth),
+            date: reported.date,
+            rate: reported.rate,
+            flow: reported.flow,
+            ..Report::default()
+        }
+    }
 }
 
 impl Periods {
@@ -214,8 +186,7 @@ impl Periods {
             match entry.kind {
                 EntryKind::Observation => {
                     let report = read(&entry.content_json)?;
-                    let Told { advised_allocation: advised } = read(&entry.answer_json)?;
-                    periods.all.push(Period { report, advised, is_corrected: false });
+                    periods.all.push(Period { report, told: read(&entry.answer_json)?, is_corrected: false });
                 }
                 EntryKind::Correction => periods.correct(&read(&entry.content_json)?)?,
             }
@@ -243,11 +214,31 @@ impl Periods {
         Ok(())
     }
 
+    /// The first period that was put right, from 0; the number of periods where none was.
+    pub(super) fn first_corrected(&self) -> usize {
+        self.all.iter().position(|period| period.is_corrected).unwrap_or(self.all.len())
+    }
+
+    /// What the period after `step` makes of where the session stood before it: before the first that was put right what was
+    /// acknowledged, from there on what follows.
+    ///
+    /// # Errors
+    /// A report that breaks a rule where it now stands.
+    pub(super) fn passed(&self, advisor: &Advisor, step: usize, before: &Standing) -> Result<Passed, FieldError> {
+        let Period { report, told, .. } = &self.all[step];
+        if step >= self.first_corrected() {
+            return before.after(advisor, step, report, told.advised_allocation);
+        }
+        let mut passed = before.after(advisor, step, &told.report(report), told.advised_allocation)?;
+        passed.standing.price = report.price;
+        Ok(passed)
+    }
+
     /// Passes through all of them, and tells `tell` of each: its number, where the session stood before, and what it made
     /// of it. Cost: a copy of the law for each.
     ///
     /// # Errors
-    /// A report that breaks a rule where it now stands, and the number of its period.
+    /// As [`Self::passed`], with the number of the period.
     pub(super) fn pass(
         &self,
         advisor: &Advisor,
@@ -255,13 +246,48 @@ impl Periods {
         mut tell: impl FnMut(usize, &Standing, &Passed),
     ) -> Result<Standing, (usize, FieldError)> {
         let mut standing = start;
-        for (step, period) in self.all.iter().enumerate() {
-            let passed = standing.after(advisor, step, &period.report, period.advised);
-            let passed = passed.map_err(|error| (step + 1, error))?;
+        for step in 0..self.all.len() {
+            let passed = self.passed(advisor, step, &standing).map_err(|error| (step + 1, error))?;
             tell(step + 1, &standing, &passed);
             standing = passed.standing;
         }
         Ok(standing)
+    }
+
+    /// Puts the correction in its place, and passes through all: where the session stands then, and the return of the period
+    /// put right.
+    ///
+    /// # Errors
+    /// It is of no period that was observed, makes a period break a rule, or gives one an unusual return that nobody confirms.
+    pub(super) fn put_right(
+        &mut self,
+        advisor: &Advisor,
+        start: &Standing,
+        correction: &Correct,
+    ) -> Result<(Standing, Option<f64>), ServiceError> {
+        let mut stood = Vec::with_capacity(self.all.len());
+        self.replay(advisor, start.clone(), |_, _, passed| stood.push(passed.log_return))?;
+        self.correct(correction)?;
+        let mut found = (None, Ok(()));
+        let passed = self.pass(advisor, start.clone(), |period, before, passed| {
+            let log_return = passed.log_return;
+            if period == correction.period {
+                found.0 = log_return;
+            }
+            // Of a price that is put right, the return after it is another too.
+            if found.1.is_ok() && stood[period - 1] != log_return {
+                let report = &self.all[period - 1].report;
+                found.1 =
+                    usual(report, &before.state.law, log_return, correction.confirm).map_err(|error| (period, error));
+            }
+        });
+        let standing = passed.map_err(|(period, error)| in_period(period, correction, error))?;
+        let (log_return, is_usual) = found;
+        is_usual.map_err(|(period, error)| match error {
+            ServiceError::UnusualReturn(field) => ServiceError::UnusualReturn(in_period(period, correction, field)),
+            other => other,
+        })?;
+        Ok((standing, log_return))
     }
 
     /// As [`Self::pass`], of what was recorded: every report kept the rules when it was.
@@ -277,6 +303,15 @@ impl Periods {
         let passed = self.pass(advisor, start, tell);
         passed.map_err(|(period, error)| ServiceError::internal(format!("period {period}: {error}")))
     }
+}
+
+/// A field that breaks a rule in some period once another is put right.
+fn in_period(period: usize, correction: &Correct, error: FieldError) -> FieldError {
+    if period == correction.period {
+        return error;
+    }
+    let rule = format!("in period {period}, with period {} put right: {}", correction.period, error.rule);
+    FieldError { rule, ..error }
 }
 
 /// What an entry holds.

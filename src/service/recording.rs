@@ -7,11 +7,12 @@ use serde::Serialize;
 use tracing::Instrument;
 
 use super::allowance::HeavyTurn;
+use super::answer::Corrected;
 use super::drift;
 use super::error::ServiceError;
 use super::keys::Caller;
 use super::live::{self, Live, Means};
-use super::periods::{self, Corrected, Periods};
+use super::periods::Periods;
 use super::report::{Correct, Observe};
 use super::sessions::{Name, Sessions};
 use super::slots::Held;
@@ -21,7 +22,7 @@ use crate::store::{Append, EntryKind, EntryRow, Store, Tenant};
 
 impl Sessions {
     /// Records the return of a period, durably before it is answered, exactly once, and answers with an
-    /// [`Observed`](super::periods::Observed) in JSON as it was recorded. Where the caller goes away meanwhile
+    /// [`Observed`](super::answer::Observed) in JSON as it was recorded. Where the caller goes away meanwhile
     /// the store may or may not record it, and nothing of it stays in memory.
     ///
     /// # Errors
@@ -59,7 +60,7 @@ impl Sessions {
                 radius: Some(answer.uncertainty.radius),
                 advice: None,
             };
-            if let Some(answer_json) = record(&self.store, &mut held, new, next).await? {
+            if let Some(answer_json) = self.append(&self.store, &mut held, new, next).await? {
                 drift::count(levels.0, levels.1);
                 return Ok(answer_json);
             }
@@ -93,20 +94,14 @@ impl Sessions {
             if number > expected {
                 return Err(ServiceError::Gap { what: "correction", given: number, expected });
             }
-            periods.correct(correct)?;
             let advisor = self.policies.advisor(tenant, &facts.row.policy).await?;
-            let start = live::started(&facts.row, &advisor)?;
-            let mut put_right = (None, Ok(()));
-            let passed = periods.pass(&advisor, start, |period, before, passed| {
-                if period == correct.period {
-                    let (law, log_return) = (&before.state.law, passed.log_return);
-                    put_right = (log_return, periods::usual(&correct.report(), law, log_return, correct.confirm));
-                }
-            });
-            let standing = passed.map_err(|(period, error)| in_period(period, correct, error))?;
-            let (log_return, is_usual) = put_right;
-            is_usual?;
-            let observed = periods.all.len();
+            let (start, observed) = (live::started(&facts.row, &advisor)?, periods.all.len());
+            let (passing, putting) = (advisor.clone(), correct.clone());
+            let put_right = move || {
+                let before = periods.replay(&passing, start.clone(), |_, _, _| ())?.bet.told().level;
+                periods.put_right(&passing, &start, &putting).map(|found| (before, found))
+            };
+            let (level, (standing, log_return)) = self.advising.run(tenant, put_right).await??;
             let (advising, resolving) = (&self.advising, &self.resolving);
             let means = Means { advisor, advising, resolving, turn };
             let (standing, uncertainty) = means.measured(tenant, observed, standing).await?;
@@ -119,8 +114,10 @@ impl Sessions {
                 observed,
                 wealth: standing.state.wealth,
                 holding: standing.state.holding,
+                drift: standing.bet.told(),
                 uncertainty,
             };
+            let levels = (level, answer.drift.level);
             let new = EntryRow {
                 session: session.to_owned(),
                 entry: facts.seen.entries() + 1,
@@ -135,7 +132,8 @@ impl Sessions {
             let next =
                 Live { row: facts.row.into(), standing, observed, corrections: number, seen, radius, advice: None };
             let store = self.store.by(caller.actor());
-            if let Some(answer_json) = record(&store, &mut held, new, next).await? {
+            if let Some(answer_json) = self.append(&store, &mut held, new, next).await? {
+                drift::count(levels.0, levels.1);
                 return Ok(answer_json);
             }
         }
@@ -154,25 +152,27 @@ impl Sessions {
             _ => Err(ServiceError::Conflict { what: kind.counted(), number }),
         }
     }
-}
 
-/// Appends the entry that leads to `next`, and gives its answer; `None` where another process wrote meanwhile. Memory is empty
-/// while it is under way, so that it never runs ahead of the disk.
-async fn record(
-    store: &Store,
-    held: &mut Held<Name, Live>,
-    new: EntryRow,
-    next: Live,
-) -> Result<Option<String>, ServiceError> {
-    held.clear();
-    let (session, answer_json) = (new.session.clone(), new.answer_json.clone());
-    match store.append(new).instrument(spans::of_write("append an entry")).await? {
-        Append::Appended => {
-            held.put(next);
-            Ok(Some(answer_json))
+    /// Appends the entry that leads to `next`, and gives its answer; `None` where another process wrote meanwhile. Memory is
+    /// empty while it is under way, so that it never runs ahead of the disk.
+    async fn append(
+        &self,
+        store: &Store,
+        held: &mut Held<Name, Live>,
+        new: EntryRow,
+        next: Live,
+    ) -> Result<Option<String>, ServiceError> {
+        held.clear();
+        let (session, answer_json) = (new.session.clone(), new.answer_json.clone());
+        match store.append(new).instrument(spans::of_write("append an entry")).await? {
+            Append::Appended => {
+                self.weigh(&next);
+                held.put(next);
+                Ok(Some(answer_json))
+            }
+            Append::NotNext => Ok(None),
+            Append::NoSession => Err(ServiceError::unknown("session", &session)),
         }
-        Append::NotNext => Ok(None),
-        Append::NoSession => Err(ServiceError::unknown("session", &session)),
     }
 }
 
@@ -182,13 +182,4 @@ fn numbered(field: &str, number: usize) -> Result<usize, FieldError> {
 
 fn json(of: &impl Serialize) -> Result<String, ServiceError> {
     serde_json::to_string(of).map_err(ServiceError::internal)
-}
-
-/// A field that breaks a rule in some period once another is put right.
-fn in_period(period: usize, correct: &Correct, error: FieldError) -> FieldError {
-    if period == correct.period {
-        return error;
-    }
-    let rule = format!("in period {period}, with period {} put right: {}", correct.period, error.rule);
-    FieldError { rule, ..error }
 }

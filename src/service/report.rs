@@ -208,8 +208,8 @@ impl Correct {
             return Err(FieldError::new("correction", self.correction, rule));
         }
         let letters = self.reason.chars().count();
-        if self.reason.trim().is_empty() || letters > LONGEST_REASON {
-            let rule = format!("must say in 1 to {LONGEST_REASON} letters why");
+        if self.reason.trim().is_empty() || letters > LONGEST_REASON || self.reason.contains(char::is_control) {
+            let rule = format!("must say in 1 to {LONGEST_REASON} letters why, without control characters");
             return Err(FieldError::new("reason", format!("{letters} letters"), rule));
         }
         Ok(())

@@ -177,6 +177,11 @@ impl Sessions {
         Ok(Means { advisor, advising: &self.advising, resolving: &self.resolving, turn })
     }
 
+    /// Counts a session in memory by what it takes now.
+    pub(super) fn weigh(&self, live: &Live) {
+        self.slots.weigh(&(live.row.tenant.clone(), live.row.session.clone()), live.bytes());
+    }
+
     pub(super) fn rows<'a>(&'a self, tenant: &'a Tenant, session: &'a str) -> Rows<'a> {
         Rows { sessions: self, tenant, session }
     }
@@ -209,7 +214,7 @@ impl Source<Live> for Rows<'_> {
         let facts = self.sessions.facts(self.tenant, self.session).await?;
         let advisor = self.sessions.policies.advisor(self.tenant, &facts.row.policy).await?;
         let live = Live::replayed(facts, &advisor)?;
-        self.sessions.slots.weigh(&(self.tenant.clone(), self.session.to_owned()), live.bytes());
+        self.sessions.weigh(&live);
         Ok(live)
     }
 }

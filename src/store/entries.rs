@@ -148,7 +148,7 @@ pub(super) fn numbered(session: &str, rows: &[Row]) -> Result<Option<Vec<EntryRo
 }
 
 /// Appends by one statement, which commits by itself: two that append the same entry, or one beside a deletion, meet at the
-/// table's keys. Why an entry is not appended is found out under the lock of its session.
+/// table's keys. Why an entry is not appended is found out after.
 async fn append_shared(database: &Database, new: EntryRow) -> Result<Append, StoreError> {
     match database.execute(APPENDING, bind_row(query(INSERT_ONE.as_str()), &new)).await {
         Ok(rows) if rows > 0 => Ok(Append::Appended),
@@ -168,10 +168,11 @@ pub(super) async fn append(mut connection: Connection<'_>, new: EntryRow) -> Res
     append_next(&mut connection, &new).await.map(|(append, _)| append)
 }
 
-/// As [`append`], and the tenant whose session it is.
+/// As [`append`], and the tenant whose session it is. Observations come without the lock: it must not keep them from referring
+/// to the session, or each would wait for the other.
 async fn append_next(connection: &mut Connection<'_>, new: &EntryRow) -> Result<(Append, Tenant), Failure> {
     let session = query("SELECT tenant FROM sessions WHERE session = $1").bind(new.session.as_str());
-    let Some(found) = connection.row(session.for_update()).await? else {
+    let Some(found) = connection.row(session.for_update_but_references()).await? else {
         return Ok((Append::NoSession, Tenant::default()));
     };
     let is_next = connection.execute(bind_row(query(INSERT_ONE.as_str()), new)).await? > 0;
@@ -203,13 +204,13 @@ const COLUMNS: usize = 9;
 /// The entry after the last that `new.session` has.
 const NEXT: &str = "(SELECT coalesce(max(entry), 0) + 1 FROM entries WHERE entries.session = new.session)";
 
-/// Inserts a row whose entry is the one after the last of a session that exists.
+/// Inserts a row whose entry is the one after the last of a session that exists, unless another is about to be that.
 static INSERT_ONE: LazyLock<String> = LazyLock::new(|| {
     let numbers: Vec<String> = (1..=COLUMNS).map(|column| format!("${column}")).collect();
     format!(
         "WITH new ({NAMES}) AS (VALUES ({}))
          INSERT INTO entries ({NAMES}) SELECT new.* FROM new CROSS JOIN sessions
-         WHERE sessions.session = new.session AND new.entry = {NEXT}",
+         WHERE sessions.session = new.session AND new.entry = {NEXT} ON CONFLICT (session, entry) DO NOTHING",
         numbers.join(", ")
     )
 });

@@ -52,6 +52,11 @@ impl Query {
         Query { lock: " FOR UPDATE", ..self }
     }
 
+    /// As [`Query::for_update`], but others may add rows that refer to those found.
+    pub(super) fn for_update_but_references(self) -> Self {
+        Query { lock: " FOR NO KEY UPDATE", ..self }
+    }
+
     /// As [`Query::for_update`], but passes over rows that another transaction holds.
     pub(super) fn for_update_of_free(self) -> Self {
         Query { lock: " FOR UPDATE SKIP LOCKED", ..self }

@@ -19,9 +19,9 @@ use super::{Store, StoreError};
 
 /// What a row of jobs, policies or sessions takes with its index entries, beside what is counted by its length.
 pub(super) const ROW_BYTES: i64 = 1024;
-/// What one entry of a session takes with its report, its answer, its seal and its index entry: less by a fifth and more
-/// (`docs/capacity.md`), so that there is room for a longer one.
-pub(super) const ENTRY_BYTES: i64 = 1024;
+/// What one entry of a session takes with its report, its answer, its seal and its index entry: some 900 bytes, up to 1,100
+/// where everything of a period is reported, and more where a correction has a long reason (`docs/capacity.md`).
+pub(super) const ENTRY_BYTES: i64 = 1536;
 
 /// What every tenant may keep; 0: any number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

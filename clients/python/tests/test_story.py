@@ -93,6 +93,27 @@ def test_prices_and_what_was_really_done(session: Session) -> None:
     assert session.wealth == 90.0
 
 
+def test_what_was_reported_is_put_right(session: Session) -> None:
+    session.observe(log_return=0.01, executed_allocation=0.5, date="2008-01-31", rate=0.002, flow=5.0)
+    session.observe(missing=True)
+    with pytest.raises(package.UnusualReturn):
+        session.correct(1, "typed twice", log_return=1.2)
+    corrected = session.correct(1, "the index was revised", log_return=0.02, executed_allocation=0.5)
+    assert (session.corrections, session.period) == (1, 3)
+    assert session.wealth == corrected["wealth"] == session.refresh().wealth
+    again = session.correct(1, "the index was revised", correction=1, log_return=0.02, executed_allocation=0.5)
+    assert again == corrected and session.corrections == 1
+    history = session.history()
+    first = history["observations"][0]
+    assert (first["log_return"], first["reported"].get("date")) == (0.01, "2008-01-31")
+    now = first.get("now")
+    assert now is not None and now["log_return"] == 0.02
+    assert history["corrections"][0]["told"] == corrected
+    # An answer from before the correction does not bring back what was wrong.
+    session.observe(missing=True, period=2)
+    assert session.wealth == corrected["wealth"]
+
+
 def test_a_session_is_found_again_where_it_was(ballast: Ballast, session: Session) -> None:
     session.observe(log_return=0.01)
     other = ballast.session(session.id)

@@ -5,8 +5,8 @@ import { problemWords } from "./problem_words.js";
 
 const identifier = (name) => `f-${name.replace(/[^a-z0-9]+/gi, "-")}`;
 
-function field(name, label, note, control) {
-  const id = identifier(name);
+function field(name, label, note, control, within = "") {
+  const id = identifier(within + name);
   const noteId = note ? `${id}-note` : null;
   control.id = id;
   control.name = name;
@@ -21,8 +21,8 @@ function field(name, label, note, control) {
   return { name, element, control };
 }
 
-/** A text field; `changed(text)` at every edit. `unit` is "percent" where it counts so and the request does not. */
-export function input({ name, label, note, changed, value = "", unit = null, ...attributes }) {
+/** A text field; `changed(text)` at every edit. `within` tells its id from that of the same field in another form. `unit` is "percent" where it counts so and the request does not. */
+export function input({ name, label, note, changed, within, value = "", unit = null, ...attributes }) {
   const control = h("input", {
     type: "text",
     inputmode: "decimal",
@@ -32,18 +32,18 @@ export function input({ name, label, note, changed, value = "", unit = null, ...
   });
   control.value = value;
   if (changed) control.addEventListener("input", () => changed(control.value));
-  return field(name, label, note, control);
+  return field(name, label, note, control, within);
 }
 
-/** A choice; `choices` maps values to words. */
-export function select({ name, label, note, choices, changed }) {
+/** A choice; `choices` maps values to words, or lists both where their order is not that of the values. */
+export function select({ name, label, note, choices, changed, within }) {
   const control = h(
     "select",
     {},
-    Object.entries(choices).map(([value, words]) => h("option", { value }, words)),
+    (Array.isArray(choices) ? choices : Object.entries(choices)).map(([value, words]) => h("option", { value }, words)),
   );
   if (changed) control.addEventListener("change", () => changed(control.value));
-  return field(name, label, note, control);
+  return field(name, label, note, control, within);
 }
 
 export function fieldset(legend, parts) {

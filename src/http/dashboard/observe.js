@@ -15,10 +15,12 @@ export function observeForm(action, { id, session, policy, refresh }) {
   const foretell = () => {
     const read = fields.read(advised);
     if (read === null) return (preview.textContent = "");
-    const { growth, executed, rate, added } = read;
+    const { growth, executed, rate, added, ended, missing } = read;
     const traded = 1 - trading_cost * Math.abs(executed - session.holding);
     const grown = session.wealth * traded * ((1 - executed) * (1 + rate) + executed * growth);
-    preview.textContent = `Log-return ${significant(Math.log(growth), 4)}; wealth ${wealth(session.wealth)} \u2192 ${wealth(grown + added)} at ${allocation(executed)} held. ${endWords(added)}`;
+    const seen = missing ? "No return" : `Log-return ${significant(Math.log(growth), 4)}`;
+    const reached = Number.isNaN(ended) ? grown + added : ended;
+    preview.textContent = `${seen}; wealth ${wealth(session.wealth)} \u2192 ${wealth(reached)} at ${allocation(executed)} held. ${endWords(added)}`;
   };
   const fields = reportFields({
     label: `Return in period ${action.period}, %`,

@@ -2,15 +2,16 @@
 
 import { h } from "./dom.js";
 import { input, select, showProblem } from "./form.js";
-import { allocation, percent } from "./format.js";
+import { allocation, percent, wealth } from "./format.js";
 import { fraction, typed } from "./number_text.js";
 
 const KINDS = { simple_return: "Simple return", log_return: "Log-return", missing: "None is known" };
 
 /** The fields for a period, with the policy's rate and contribution as what they are where nothing is said. */
-export function reportFields({ label, rate, contribution, changed }) {
+export function reportFields({ within, label, rate, contribution, changed }) {
   const edited = () => changed?.();
   const given = input({
+    within,
     name: "return",
     label,
     note: "Of the risky asset: \u22122.5 is a loss of 2.5 %",
@@ -18,6 +19,7 @@ export function reportFields({ label, rate, contribution, changed }) {
     changed: edited,
   });
   const kind = select({
+    within,
     name: "kind",
     label: "Given as",
     choices: KINDS,
@@ -26,17 +28,18 @@ export function reportFields({ label, rate, contribution, changed }) {
       edited();
     },
   });
-  const share = (name, label, note) => input({ name, label, note, unit: "percent", changed: edited });
+  const share = (name, label, note) => input({ within, name, label, note, unit: "percent", changed: edited });
   const held = share("executed_allocation", "Share held, %", " ");
   const paid = share("rate", "The bank paid, %", `Blank: ${percent(rate, 3)}, the policy\u2019s.`);
   const flow = input({
+    within,
     name: "flow",
     label: "Money added at the end",
-    note: `Blank: ${contribution}, the policy\u2019s. \u2212100 is 100 taken.`,
+    note: `Blank: ${contribution === null ? "what the policy says" : `${wealth(contribution)}, the policy\u2019s`}. \u2212100 is 100 taken.`,
     changed: edited,
   });
-  const reached = input({ name: "wealth", label: "Wealth reached", note: "Blank: what all the rest gives." });
-  const date = input({ name: "date", label: "Last day", note: "Such as 2008-09-30.", inputmode: "text" });
+  const reached = input({ within, name: "wealth", label: "Wealth reached", note: "Blank: what all the rest gives.", changed: edited });
+  const date = input({ within, name: "date", label: "Last day", note: "Such as 2008-09-30.", inputmode: "text" });
   const more = h(
     "details",
     {},
@@ -46,16 +49,17 @@ export function reportFields({ label, rate, contribution, changed }) {
   const isMissing = () => kind.control.value === "missing";
   return {
     element: h("div", {}, h("div", { class: "fields" }, given.element, kind.element), more),
-    edges: [kind.control],
-    /** The growth of the asset, what is held, what the bank pays and what is added; null where something cannot be read. */
+    /** The growth of the asset, what is held, what the bank pays, what is added and what is reached where it is said; null
+     * where something cannot be read. */
     read(advised) {
       const blank = (field, otherwise, read) => (field.control.value.trim() === "" ? otherwise : read(field.control.value));
       const value = isMissing() ? 0 : fraction(given.control.value);
       const executed = blank(held, advised, fraction);
       const [rateThen, added] = [blank(paid, rate, fraction), blank(flow, contribution, typed)];
-      if ([value, executed, rateThen, added].some((number) => typeof number !== "number")) return null;
+      const ended = blank(reached, Number.NaN, typed);
+      if ([value, executed, rateThen, added, ended].some((number) => typeof number !== "number")) return null;
       const growth = kind.control.value === "log_return" ? Math.exp(value) : 1 + value;
-      return { growth, executed, rate: rateThen, added };
+      return { growth, executed, rate: rateThen, added, ended, missing: isMissing() };
     },
     /** The report; fields that cannot be read go as they are typed, for the service to refuse by name. */
     report() {

@@ -33,13 +33,13 @@ export async function view(id, leaving) {
   ]);
   const holder = h("div", {});
   const shown = { id, policy, canAsk, leaving };
-  const refresh = async () => {
+  const refresh = async (news) => {
     const [now, past] = await Promise.all([get(`/sessions/${id}`, leaving), get(`/sessions/${id}/history`, leaving)]);
     await fill(holder, { ...shown, session: now, history: past, refresh });
     announce(
       now.state === "completed"
         ? `The session is completed with wealth ${wealth(now.wealth)}.`
-        : `Period ${now.period - 1} is recorded. Wealth ${wealth(now.wealth)}.`,
+        : `${news ?? `Period ${now.period - 1} is recorded.`} Wealth ${wealth(now.wealth)}.`,
     );
     holder.querySelector("#advice")?.focus();
   };
@@ -105,7 +105,7 @@ function figures({ session, history, policy }, action) {
 function changed({ session: { drift } }) {
   if (drift.level === "none") return "";
   const how = drift.level === "alarm" ? "no longer come as they came" : "may no longer come as they came";
-  const words = `The returns ${how}: a bet against it has made ${count(Math.floor(drift.highest))} out of 1, which it does for one session in ${count(Math.floor(drift.highest))} where nothing changes. The advice rests on all returns seen; a policy trained on newer ones may serve better.`;
+  const words = `The returns ${how}: a bet against it has made ${count(Math.floor(drift.highest))} out of 1, which it does for one session in ${count(Math.floor(drift.highest))} at most where nothing changes. The advice rests on all returns seen; a policy trained on newer ones may serve better.`;
   return h("p", { class: "note wrong" }, words);
 }
 

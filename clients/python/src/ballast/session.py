@@ -102,6 +102,7 @@ class Session:
         corrected: wire.Corrected = self._transport.json("POST", f"{self._path}/corrections", body=body)
         if number > self.corrections:
             self.corrections, self.wealth, self.holding = number, corrected["wealth"], corrected["holding"]
+            self.period = corrected["observed"] + 1
         return corrected
 
     def what_if(

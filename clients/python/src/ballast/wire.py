@@ -87,12 +87,6 @@ class Correct(TypedDict):
     """Wealth reached, with what was added, where it differs from what all of the above gives."""
 
 
-class Correction(Correct):
-    """One correction, as it was made."""
-
-    corrected_ms: int
-
-
 class Costs(TypedDict):
     """What the evaluation cost; the only part that differs between two runs."""
 
@@ -707,23 +701,6 @@ class Caution(TypedDict):
     """For people."""
 
 
-class Corrected(Uncertainty):
-    """The session after a correction."""
-
-    session: str
-    correction: int
-    period: int
-    """The period put right."""
-    log_return: NotRequired[float | None]
-    """What it is now; null where it is missing."""
-    observed: int
-    """Periods observed, which is as before."""
-    wealth: float
-    """Wealth now."""
-    holding: float
-    """Share of it in the risky asset."""
-
-
 class CoverageAtSize(TypedDict):
     """How often the ball held the true law at one sample size."""
 
@@ -1069,6 +1046,33 @@ class Advised(Advice):
     annualised: NotRequired[Annualised | None]
     warnings: list[Warning]
     """What in the question may be a mistake."""
+
+
+class Corrected(Uncertainty):
+    """The session after a correction."""
+
+    session: str
+    correction: int
+    period: int
+    """The period put right."""
+    log_return: NotRequired[float | None]
+    """What it is now; null where it is missing."""
+    observed: int
+    """Periods observed, which is as before."""
+    wealth: float
+    """Wealth now."""
+    holding: float
+    """Share of it in the risky asset."""
+    drift: Drift
+    """Whether the returns, as they stand, come as they came."""
+
+
+class Correction(Correct):
+    """One correction, as it was made."""
+
+    told: Corrected
+    """What was answered to it."""
+    corrected_ms: int
 
 
 class Coverage(TypedDict):

@@ -1,0 +1,54 @@
+//! What is answered to a report and to a correction; kept with them, to be given again.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::drift::Drift;
+use crate::control::policy::advice::Uncertainty;
+use crate::control::problem::actions::Band;
+
+/// The session after an observation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Observed {
+    pub session: String,
+    pub period: usize,
+    /// Null where it is missing.
+    pub log_return: Option<f64>,
+    /// The holdings that were best kept at the start of the period; where trading costs nothing both ends are the advised
+    /// allocation.
+    #[schema(value_type = [f64; 2])]
+    pub band: Band,
+    pub advised_allocation: f64,
+    pub executed_allocation: f64,
+    /// Wealth at the end of the period, with what was added to it.
+    pub wealth: f64,
+    /// Share of it in the risky asset, as the return left it.
+    pub holding: f64,
+    /// Whether the horizon is reached.
+    pub completed: bool,
+    /// Whether the returns still come as they came.
+    pub drift: Drift,
+    #[serde(flatten)]
+    pub uncertainty: Uncertainty,
+}
+
+/// The session after a correction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Corrected {
+    pub session: String,
+    pub correction: usize,
+    /// The period put right.
+    pub period: usize,
+    /// What it is now; null where it is missing.
+    pub log_return: Option<f64>,
+    /// Periods observed, which is as before.
+    pub observed: usize,
+    /// Wealth now.
+    pub wealth: f64,
+    /// Share of it in the risky asset.
+    pub holding: f64,
+    /// Whether the returns, as they stand, come as they came.
+    pub drift: Drift,
+    #[serde(flatten)]
+    pub uncertainty: Uncertainty,
+}
