@@ -77,7 +77,7 @@ reporting! {
         #[schema(example = 1)]
         period: usize,
         /// The return is meant, however unusual it is.
-        #[serde(default, skip_serializing)]
+        #[serde(default, skip_serializing_if = "never_recorded")]
         confirm: bool,
         /// The name of the key that reports it, which no body says; empty where none was asked for.
         #[serde(skip)]
@@ -98,9 +98,14 @@ reporting! {
         #[schema(example = "the index was revised", max_length = 200)]
         reason: String,
         /// The return is meant, however unusual it is.
-        #[serde(default, skip_serializing)]
+        #[serde(default, skip_serializing_if = "never_recorded")]
         confirm: bool,
     }
+}
+
+/// Of what is said beside a report: it is no part of the content.
+fn never_recorded(_: &bool) -> bool {
+    true
 }
 
 /// What both structs have in common, by itself.

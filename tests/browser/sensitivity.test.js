@@ -53,7 +53,7 @@ test("the page asks when the button is pressed, and says it", async () => {
     const page = await chromium.newPage();
     page.setDefaultTimeout(20_000);
     const history = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
-    const problem = { horizon: 2, history, radius: { rule: "bridge", alpha: 0.1, scale: 0.2 } };
+    const problem = { horizon: 2, rate_per_step: 0.002, history, radius: { rule: "bridge", alpha: 0.1, scale: 0.2 } };
     const { job } = await call(ballast.url, "/train", { problem, design: { count: 50 } });
     let now;
     do now = await call(ballast.url, `/jobs/${job}`);

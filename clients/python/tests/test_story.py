@@ -141,7 +141,7 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     own = policy.session(history=RETURNS[:5])
     own.action(mode="resolve")
     own.what_if(radius_scale=0.5)
-    own.observe(log_return=0.01)
+    own.observe(log_return=0.01).correct(1, "revised", log_return=0.02)
     own.refresh().history()
     assert own.id in [entry["session"] for entry in ballast.sessions()]
     own.delete()
@@ -204,8 +204,11 @@ def test_every_field_of_a_specification_is_an_argument() -> None:
 
 
 def test_every_field_of_a_report_is_an_argument() -> None:
-    arguments = set(inspect.signature(Session.observe).parameters) - {"self"}
-    assert arguments == set(wire.Observe.__annotations__) - {"session"}
+    report = set(wire.Report.__annotations__)
+    observe = set(inspect.signature(Session.observe).parameters) - {"self", "report"}
+    correct = set(inspect.signature(Session.correct).parameters) - {"self", "report"}
+    assert observe | report == set(wire.Observe.__annotations__) - {"session"}
+    assert correct | report == set(wire.Correct.__annotations__)
 
 
 def test_pages_are_joined(ballast: Ballast, session: Session, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,6 +66,8 @@ class Correct(TypedDict):
     """The period that is put right."""
     reason: str
     """Why, in at most 200 letters."""
+    confirm: NotRequired[bool]
+    """The return is meant, however unusual it is."""
     log_return: NotRequired[float | None]
     simple_return: NotRequired[float | None]
     """`price / previous price - 1`."""
@@ -257,6 +259,8 @@ class Observe(TypedDict):
     session: str
     period: int
     """Number of the period, from 1."""
+    confirm: NotRequired[bool]
+    """The return is meant, however unusual it is."""
     log_return: NotRequired[float | None]
     simple_return: NotRequired[float | None]
     """`price / previous price - 1`."""
