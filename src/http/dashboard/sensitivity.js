@@ -10,7 +10,7 @@ const LEARN = ["adaptive", "plug_in", "parametric_adaptive"];
 /** The button, and in its place what `/action` says. */
 export function sensitivity({ id, policy, leaving }) {
   if (!LEARN.includes(policy.specification.problem.framework)) return "";
-  const holder = h("div", { class: "later", "aria-live": "polite" });
+  const holder = h("div", { "aria-live": "polite" });
   const ask = async () => {
     holder.replaceChildren(h("p", { class: "note" }, "Asking for the advice of some hundred other records\u2026"));
     const action = await get(`/action?session=${id}&sensitivity=true`, leaving);
