@@ -5,7 +5,8 @@ use std::time::Instant;
 
 use axum::Json;
 use axum::extract::State;
-use serde_json::Value;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use super::access::{By, Heavy};
 use super::decode;
@@ -31,17 +32,28 @@ pub async fn advise(
     JsonBytes(bytes): JsonBytes,
 ) -> Result<Json<Advised>, Problem> {
     let started = Instant::now();
-    let question: Advise = decode::json(&for_one_period(&bytes)?)?;
-    let advised = service.sessions.advise(&caller.tenant, question).await?;
+    let advised = service.sessions.advise(&caller.tenant, question(&bytes)?).await?;
     metrics::histogram!(ACTION_SECONDS, "mode" => "advise").record(started.elapsed().as_secs_f64());
     Ok(Json(advised))
 }
 
-/// The same question with the horizon that is meant where none is given.
-fn for_one_period(bytes: &[u8]) -> Result<Vec<u8>, Problem> {
-    let mut body: Value = decode::json(bytes)?;
-    if let Some(problem) = body.get_mut("problem").and_then(Value::as_object_mut) {
-        problem.entry("horizon").or_insert(1.into());
+/// What tells whether a question says its horizon.
+#[derive(Deserialize)]
+struct Said {
+    problem: SaidOfProblem,
+}
+
+#[derive(Deserialize)]
+struct SaidOfProblem {
+    horizon: Option<IgnoredAny>,
+}
+
+/// The question, with the horizon that is meant where none is given.
+fn question(bytes: &[u8]) -> Result<Advise, Problem> {
+    let mut question: Advise = decode::json(bytes)?;
+    let Said { problem } = decode::json(bytes)?;
+    if problem.horizon.is_none() {
+        question.problem.horizon = 1;
     }
-    Ok(body.to_string().into_bytes())
+    Ok(question)
 }

@@ -65,12 +65,16 @@ impl Bet {
     /// As it is told.
     pub fn told(self) -> Drift {
         let [capital, highest] = [self.capital.log(), self.capital.log_highest()].map(|log| log.exp().min(LARGEST));
-        let level = match highest {
+        Drift { p_value: self.p_value, capital, highest, level: self.level() }
+    }
+
+    /// What the highest capital says.
+    pub fn level(self) -> DriftLevel {
+        match self.capital.log_highest().exp() {
             highest if highest >= ALARM => DriftLevel::Alarm,
             highest if highest >= WARNING => DriftLevel::Warning,
             _ => DriftLevel::None,
-        };
-        Drift { p_value: self.p_value, capital, highest, level }
+        }
     }
 }
 

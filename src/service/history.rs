@@ -102,7 +102,7 @@ impl Sessions {
             let advisor = self.policies.advisor(tenant, &facts.row.policy).await?;
             let start = live::started(&facts.row, &advisor)?;
             let first = periods.first_corrected();
-            let now = self.told_now(tenant, &periods, &advisor, start).await?;
+            let now = self.told_now(tenant, &periods, first, &advisor, start).await?;
             for (observation, now) in observations.iter_mut().skip(first).zip(now) {
                 observation.now = Some(now);
             }
@@ -111,12 +111,13 @@ impl Sessions {
         Ok(History { session, policy, initial_wealth, initial_holding, history, observations, corrections })
     }
 
-    /// Of each period from the first on that was put right. Each waits its turn to be advised by itself, so that a long session
+    /// Of each period from `first` on, the first that was put right. Each waits its turn to be advised by itself, so that a long session
     /// starves nobody, and a caller who goes away stops it.
     async fn told_now(
         &self,
         tenant: &Tenant,
         periods: &Periods,
+        first: usize,
         advisor: &Arc<Advisor>,
         start: Standing,
     ) -> Result<Vec<Now>, ServiceError> {
@@ -124,7 +125,7 @@ impl Sessions {
         for (step, period) in periods.all.iter().enumerate() {
             let passed = periods.passed(advisor, step, &standing).map_err(ServiceError::internal)?;
             let Passed { log_return, executed_allocation, standing: then } = passed;
-            if step >= periods.first_corrected() {
+            if step >= first {
                 let (advising, state) = (advisor.clone(), standing.state);
                 let advise = move || advising.advise(step, &state, AdviceMode::Surrogate);
                 let advice = self.resolving.run(tenant, advise).await?;

@@ -93,8 +93,11 @@ const UNUSUAL_DEVIATIONS: f64 = 8.0;
 /// Of a simple return, either way: what is smaller is never unusual.
 const UNUSUAL_RETURN: f64 = 0.2;
 
+/// Asks about a return z that lies far from a record of mean m and standard deviation s: `|z - m| > 8 s` and `|e^z - 1| > 0.2`.
+/// Checked by: `tests/account.rs::a_return_that_is_most_likely_a_slip_is_asked_about`.
+///
 /// # Errors
-/// The return is most likely a slip, and nobody confirms it.
+/// It is most likely a slip, and nobody confirms it.
 pub(super) fn usual(
     report: &Report,
     record: &EmpiricalDistribution,
@@ -140,6 +143,8 @@ pub struct Period {
     pub report: Report,
     /// As understood when it came; what was advised stays so whatever is put right.
     told: Told,
+    /// Whether what was told of it stands: no correction of it, or of a period before it, came after it.
+    stands: bool,
     /// Whether that is not what was reported first.
     pub is_corrected: bool,
 }
@@ -150,6 +155,16 @@ pub struct Periods {
     pub all: Vec<Period>,
     /// Number of corrections.
     pub corrections: usize,
+}
+
+/// What a correction makes of a session.
+pub struct PutRight {
+    /// Where it stood.
+    pub before: Standing,
+    /// Where it stands now.
+    pub standing: Standing,
+    /// Of the period put right; `None` where it is missing.
+    pub log_return: Option<f64>,
 }
 
 /// What is read of the answer to an observation.
@@ -186,7 +201,8 @@ impl Periods {
             match entry.kind {
                 EntryKind::Observation => {
                     let report = read(&entry.content_json)?;
-                    periods.all.push(Period { report, told: read(&entry.answer_json)?, is_corrected: false });
+                    let told = read(&entry.answer_json)?;
+                    periods.all.push(Period { report, told, stands: true, is_corrected: false });
                 }
                 EntryKind::Correction => periods.correct(&read(&entry.content_json)?)?,
             }
@@ -211,6 +227,7 @@ impl Periods {
         self.corrections += 1;
         period.report = correction.report();
         period.is_corrected = true;
+        self.all.iter_mut().skip(index).for_each(|period| period.stands = false);
         Ok(())
     }
 
@@ -219,14 +236,14 @@ impl Periods {
         self.all.iter().position(|period| period.is_corrected).unwrap_or(self.all.len())
     }
 
-    /// What the period after `step` makes of where the session stood before it: before the first that was put right what was
-    /// acknowledged, from there on what follows.
+    /// What the period after `step` makes of where the session stood before it: what was acknowledged, where that stands, else
+    /// what follows.
     ///
     /// # Errors
     /// A report that breaks a rule where it now stands.
     pub(super) fn passed(&self, advisor: &Advisor, step: usize, before: &Standing) -> Result<Passed, FieldError> {
-        let Period { report, told, .. } = &self.all[step];
-        if step >= self.first_corrected() {
+        let Period { report, told, stands, .. } = &self.all[step];
+        if !stands {
             return before.after(advisor, step, report, told.advised_allocation);
         }
         let mut passed = before.after(advisor, step, &told.report(report), told.advised_allocation)?;
@@ -254,8 +271,7 @@ impl Periods {
         Ok(standing)
     }
 
-    /// Puts the correction in its place, and passes through all: where the session stands then, and the return of the period
-    /// put right.
+    /// Puts the correction in its place, and passes through all.
     ///
     /// # Errors
     /// It is of no period that was observed, makes a period break a rule, or gives one an unusual return that nobody confirms.
@@ -264,9 +280,9 @@ impl Periods {
         advisor: &Advisor,
         start: &Standing,
         correction: &Correct,
-    ) -> Result<(Standing, Option<f64>), ServiceError> {
+    ) -> Result<PutRight, ServiceError> {
         let mut stood = Vec::with_capacity(self.all.len());
-        self.replay(advisor, start.clone(), |_, _, passed| stood.push(passed.log_return))?;
+        let before = self.replay(advisor, start.clone(), |_, _, passed| stood.push(passed.log_return))?;
         self.correct(correction)?;
         let mut found = (None, Ok(()));
         let passed = self.pass(advisor, start.clone(), |period, before, passed| {
@@ -287,7 +303,7 @@ impl Periods {
             ServiceError::UnusualReturn(field) => ServiceError::UnusualReturn(in_period(period, correction, field)),
             other => other,
         })?;
-        Ok((standing, log_return))
+        Ok(PutRight { before, standing, log_return })
     }
 
     /// As [`Self::pass`], of what was recorded: every report kept the rules when it was.

@@ -12,7 +12,7 @@ use super::drift;
 use super::error::ServiceError;
 use super::keys::Caller;
 use super::live::{self, Live, Means};
-use super::periods::Periods;
+use super::periods::{Periods, PutRight};
 use super::report::{Correct, Observe};
 use super::sessions::{Name, Sessions};
 use super::slots::Held;
@@ -50,7 +50,7 @@ impl Sessions {
                 created_ms: self.clock.now_milliseconds(),
                 key: observe.reported_by.to_string(),
             };
-            let levels = (live.standing.bet.told().level, answer.drift.level);
+            let levels = (live.standing.bet.level(), answer.drift.level);
             let next = Live {
                 row: live.row.clone(),
                 standing,
@@ -97,11 +97,8 @@ impl Sessions {
             let advisor = self.policies.advisor(tenant, &facts.row.policy).await?;
             let (start, observed) = (live::started(&facts.row, &advisor)?, periods.all.len());
             let (passing, putting) = (advisor.clone(), correct.clone());
-            let put_right = move || {
-                let before = periods.replay(&passing, start.clone(), |_, _, _| ())?.bet.told().level;
-                periods.put_right(&passing, &start, &putting).map(|found| (before, found))
-            };
-            let (level, (standing, log_return)) = self.advising.run(tenant, put_right).await??;
+            let put_right = move || periods.put_right(&passing, &start, &putting);
+            let PutRight { before, standing, log_return } = self.advising.run(tenant, put_right).await??;
             let (advising, resolving) = (&self.advising, &self.resolving);
             let means = Means { advisor, advising, resolving, turn };
             let (standing, uncertainty) = means.measured(tenant, observed, standing).await?;
@@ -117,7 +114,7 @@ impl Sessions {
                 drift: standing.bet.told(),
                 uncertainty,
             };
-            let levels = (level, answer.drift.level);
+            let levels = (before.bet.level(), answer.drift.level);
             let new = EntryRow {
                 session: session.to_owned(),
                 entry: facts.seen.entries() + 1,
