@@ -88,7 +88,8 @@ async fn what_cannot_be_advised_is_refused_by_field_and_nothing_is_stored() {
     let twice = r#"{"problem": {"history": [0.1, -0.1], "rate_per_step": 0.001, "rate_per_step": 0.002}}"#;
     let request = app.client.post(format!("{}/advise", app.url)).header("content-type", "application/json").body(twice);
     let (status, problem) = support::read(request.send().await.unwrap()).await;
-    assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("problem.rate_per_step")), "{problem}");
+    let refused = (status.as_u16(), &problem["field"], &problem["rule"]);
+    assert_eq!(refused, (422, &json!("problem"), &json!("duplicate field `rate_per_step`")));
     assert_eq!(app.post("/advise", &ask(json!({}), json!({}))).await.0, 200);
     let (_, jobs) = app.get("/jobs").await;
     let (_, policies) = app.get("/policies").await;

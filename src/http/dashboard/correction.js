@@ -1,10 +1,9 @@
 // A period that passed, put right: what was reported and told stays on record, and the advice rests on the new report.
 
-import { get, post } from "./api.js";
 import { h } from "./dom.js";
 import { standing } from "./flows.js";
-import { clear, input, select, showProblem } from "./form.js";
-import { refusedReport, reportFields } from "./report_fields.js";
+import { input, select } from "./form.js";
+import { reportFields, sendReports } from "./report_fields.js";
 
 /** The form for a session with observed periods. */
 export function correctionForm({ id, session, history, policy, refresh }) {
@@ -41,45 +40,13 @@ export function correctionForm({ id, session, history, policy, refresh }) {
     message,
     h("p", { class: "send" }, button),
   );
-  let request = null;
-  form.addEventListener("input", () => (request = null));
-  form.addEventListener("change", () => (request = null));
-  const send = async () => {
-    try {
-      await post(`/sessions/${id}/corrections`, request);
-    } catch (error) {
-      return refused(error);
-    }
-    await refresh("The period is put right.");
-  };
-  const refused = async (error) => {
-    if (error.passing) {
-      showProblem(form, message, { message: `${error.message} Sending it again is safe: a correction counts once.` });
-      return;
-    }
-    const refusal = request;
-    request = null;
-    if (error.field === "correction") {
-      const now = await get(`/sessions/${id}`).catch(() => null);
-      if (now && now.corrections !== session.corrections) return refresh("Another correction was made meanwhile.");
-    }
-    if (refusedReport(form, message, error)) {
-      request = { ...refusal, confirm: true };
-      await send();
-    }
-  };
-  form.addEventListener("submit", async (event) => {
-    event.preventDefault();
-    if (button.disabled) return;
-    clear(form);
-    message.hidden = true;
-    const trouble = fields.trouble();
-    if (trouble) return showProblem(form, message, trouble);
-    button.disabled = true;
+  const compose = () => {
     const about = { correction: session.corrections + 1, period: Number(period.control.value), reason: reason.control.value };
-    request ??= { ...about, ...fields.report() };
-    await send();
-    button.disabled = false;
-  });
+    return { ...about, ...fields.report() };
+  };
+  const once = "a correction counts once.";
+  const path = `/sessions/${id}/corrections`;
+  const done = "The period is put right.";
+  sendReports(form, { button, message, fields, path, compose, once, done, session, refresh });
   return form;
 }

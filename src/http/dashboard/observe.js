@@ -1,11 +1,9 @@
 // The return of the coming period, reported once: what is sent again after a failure is the very same request.
 
-import { get, post } from "./api.js";
 import { h } from "./dom.js";
 import { endWords } from "./flows.js";
-import { clear, showProblem } from "./form.js";
 import { allocation, significant, wealth } from "./format.js";
-import { refusedReport, reportFields } from "./report_fields.js";
+import { reportFields, sendReports } from "./report_fields.js";
 
 /** `{element, advise(allocation)}`: what is held where nothing else is said is the advice, or another that took its place. */
 export function observeForm(action, { id, session, policy, refresh }) {
@@ -39,55 +37,13 @@ export function observeForm(action, { id, session, policy, refresh }) {
     message,
     h("p", { class: "send" }, button),
   );
-  let request = null;
-  const freed = () => {
-    request = null;
-    button.textContent = `Report period ${action.period}`;
-  };
-  form.addEventListener("input", freed);
-  form.addEventListener("change", freed);
   const compose = () => {
     const report = { session: id, period: action.period, ...fields.report() };
     if (replaced) report.executed_allocation ??= advised;
     return report;
   };
-  const send = async () => {
-    try {
-      await post("/observe", request);
-      await refresh();
-    } catch (error) {
-      await refused(error);
-    }
-  };
-  form.addEventListener("submit", async (event) => {
-    event.preventDefault();
-    if (button.disabled) return;
-    clear(form);
-    message.hidden = true;
-    const trouble = fields.trouble();
-    if (trouble) return showProblem(form, message, trouble);
-    request ??= compose();
-    button.disabled = true;
-    await send();
-    button.disabled = false;
-  });
-  const refused = async (error) => {
-    if (error.passing) {
-      button.textContent = "Send again";
-      showProblem(form, message, { message: `${error.message} Sending it again is safe: a period counts once.` });
-      return;
-    }
-    const refusal = request;
-    request = null;
-    if (error.status === 409) {
-      const now = await get(`/sessions/${id}`).catch(() => null);
-      if (now && now.period !== action.period) await refresh();
-    }
-    if (refusedReport(form, message, error)) {
-      request = { ...refusal, confirm: true };
-      await send();
-    }
-  };
+  const once = "a period counts once.";
+  sendReports(form, { button, message, fields, path: "/observe", compose, once, session, refresh });
   const advise = (allocation) => {
     [advised, replaced] = [allocation, true];
     fields.advised(advised);

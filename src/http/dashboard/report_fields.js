@@ -1,7 +1,8 @@
 // What is said of a period, in its report and in a correction of it: the return, and on demand how else it went.
 
+import { get, post } from "./api.js";
 import { h } from "./dom.js";
-import { input, select, showProblem } from "./form.js";
+import { clear, input, select, showProblem } from "./form.js";
 import { allocation, percent, wealth } from "./format.js";
 import { fraction, typed } from "./number_text.js";
 
@@ -89,12 +90,58 @@ export function reportFields({ within, label, rate, contribution, changed }) {
 }
 
 /**
- * Shows why a report was refused. True where it is an unusual return and the user says that it is meant: it is to be sent
- * again with `confirm`.
+ * Sends what `compose` makes of the form to `path`, once at a time, and then has the session shown anew by `refresh`. What is
+ * sent again after a failure is the very same request; `once` says why that is safe. An unusual return is sent again with
+ * `confirm` where the user says that it is meant.
  */
-export function refusedReport(form, message, error) {
-  if (error.type === "/problems/unusual-return") return window.confirm(`${error.message}\n\nIs it meant?`);
-  const field = ["log_return", "simple_return"].includes(error.field) ? "return" : error.field;
-  showProblem(form, message, { ...error, message: error.message, field });
-  return false;
+export function sendReports(form, { button, message, fields, path, compose, once, done, session, refresh }) {
+  let request = null;
+  const label = button.textContent;
+  const freed = () => {
+    request = null;
+    button.textContent = label;
+  };
+  form.addEventListener("input", freed);
+  form.addEventListener("change", freed);
+  const send = async () => {
+    try {
+      await post(path, request);
+      await refresh(done);
+    } catch (error) {
+      await refused(error);
+    }
+  };
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    if (button.disabled) return;
+    clear(form);
+    message.hidden = true;
+    const trouble = fields.trouble();
+    if (trouble) return showProblem(form, message, trouble);
+    request ??= compose();
+    button.disabled = true;
+    await send();
+    button.disabled = false;
+  });
+  const refused = async (error) => {
+    if (error.passing) {
+      button.textContent = "Send again";
+      showProblem(form, message, { message: `${error.message} Sending it again is safe: ${once}` });
+      return;
+    }
+    const refusal = request;
+    request = null;
+    if (error.status === 409) {
+      const now = await get(`/sessions/${session.session}`).catch(() => null);
+      if (now && (now.period !== session.period || now.corrections !== session.corrections))
+        return refresh("Somebody else reported meanwhile.");
+    }
+    if (error.type === "/problems/unusual-return") {
+      if (!window.confirm(`${error.message}\n\nIs it meant?`)) return;
+      request = { ...refusal, confirm: true };
+      return send();
+    }
+    const field = ["log_return", "simple_return"].includes(error.field) ? "return" : error.field;
+    showProblem(form, message, { ...error, message: error.message, field });
+  };
 }
