@@ -241,6 +241,12 @@ fn faulty_sessions() -> Vec<(&'static str, &'static str)> {
         (r#""history": [0.1, 9.0]"#, "history[1]"),
         (r#""history": [0.1, null]"#, "history[1]"),
         (r#""history": 3"#, "history"),
+        (r#""renew": 12"#, "renew"),
+        (r#""renew": {"window": 12}"#, "renew.every"),
+        (r#""renew": {"every": 0}"#, "renew.every"),
+        (r#""renew": {"every": 1.5}"#, "renew.every"),
+        (r#""renew": {"every": 1, "window": 1}"#, "renew.window"),
+        (r#""renew": {"every": 1, "horizon": 2}"#, "renew.horizon"),
         (r#""colour": 1"#, "colour"),
     ]
 }
@@ -362,7 +368,7 @@ fn the_walks_cover_every_field() {
     walked.insert("session".into());
     assert!(properties("Observe").is_subset(&walked), "{walked:?}");
     let mut walked: BTreeSet<String> =
-        faulty_sessions().iter().map(|(_, field)| field.split('[').next().unwrap().to_owned()).collect();
+        faulty_sessions().iter().map(|(_, field)| field.split(['[', '.']).next().unwrap().to_owned()).collect();
     walked.insert("policy".into());
     let evaluated = faulty_evaluations();
     let evaluated: BTreeSet<String> =

@@ -11,6 +11,7 @@ use crate::control::request::rules::{
     COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR, RADIUS_SCALE, RATE,
     RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST, WEALTH,
 };
+use crate::service::plan::MOST_RENEWALS;
 use crate::service::report::{LONGEST_REASON, MOST_CORRECTIONS, PRICE};
 use crate::service::what_if::POINTS;
 
@@ -30,10 +31,7 @@ pub fn tell(description: &mut OpenApi) {
 
 /// Schema, or schema and variant; field; rule.
 fn rules() -> Vec<(&'static str, &'static str, Value)> {
-    let whole = |range: &std::ops::RangeInclusive<usize>| json!({ "minimum": range.start(), "maximum": range.end() });
     let pair = json!({ "minItems": 2, "maxItems": 2, "items": { "minimum": 1e-12, "maximum": 1e12 } });
-    let history = json!({ "minItems": HISTORY_LENGTH.start(), "maxItems": HISTORY_LENGTH.end(),
-        "items": within((-LOG_RETURN, LOG_RETURN)) });
     let wealth = within(WEALTH);
     let probability = within((1e-3, 0.999));
     let action = json!({ "minItems": 2, "maxItems": 2, "items": within((0.0, 1.0)) });
@@ -44,7 +42,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("ProblemSpecification", "initial_wealth", wealth.clone()),
         ("ProblemSpecification", "action_interval", action),
         ("ProblemSpecification", "trading_cost", within(TRADING_COST)),
-        ("ProblemSpecification", "history", history.clone()),
+        ("ProblemSpecification", "history", history()),
         ("UtilitySpecification exponential", "risk_aversion", within(RISK_AVERSION)),
         ("UtilitySpecification exponential", "risk_aversion_relative", within(RISK_AVERSION_RELATIVE)),
         ("UtilitySpecification power", "risk_aversion", json!({ "exclusiveMinimum": 1, "maximum": 100 })),
@@ -69,15 +67,6 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("HyperparameterBounds", "lengthscale", pair.clone()),
         ("HyperparameterBounds", "signal_variance", pair.clone()),
         ("HyperparameterBounds", "noise_variance", pair),
-        ("OpenSession", "policy", json!({ "minLength": 1 })),
-        ("OpenSession", "history", history),
-        ("OpenSession", "wealth", wealth.clone()),
-        ("OpenSession", "holding", within((0.0, 1.0))),
-        ("Observe", "session", json!({ "minLength": 1 })),
-        ("Observe", "period", json!({ "minimum": 1 })),
-        ("Correct", "correction", whole(&(1..=MOST_CORRECTIONS))),
-        ("Correct", "period", json!({ "minimum": 1 })),
-        ("Correct", "reason", json!({ "minLength": 1, "maxLength": LONGEST_REASON })),
         ("Advise", "wealth", wealth.clone()),
         ("Advise", "holding", within((0.0, 1.0))),
         ("WhatIf", "session", json!({ "minLength": 1 })),
@@ -93,7 +82,37 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("EvaluationRequest", "level", within(LEVEL)),
         ("InitialHistories", "count", whole(&HISTORIES)),
     ];
-    rules.into_iter().chain(reported()).collect()
+    rules.into_iter().chain(of_sessions()).chain(reported()).collect()
+}
+
+fn history() -> Value {
+    json!({ "minItems": HISTORY_LENGTH.start(), "maxItems": HISTORY_LENGTH.end(),
+        "items": within((-LOG_RETURN, LOG_RETURN)) })
+}
+
+fn whole(range: &std::ops::RangeInclusive<usize>) -> Value {
+    json!({ "minimum": range.start(), "maximum": range.end() })
+}
+
+/// Of sessions and what is recorded of them.
+fn of_sessions() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
+    let rules = [
+        ("OpenSession", "policy", json!({ "minLength": 1 })),
+        ("OpenSession", "history", history()),
+        ("OpenSession", "wealth", within(WEALTH)),
+        ("OpenSession", "holding", within((0.0, 1.0))),
+        ("Observe", "session", json!({ "minLength": 1 })),
+        ("Observe", "period", json!({ "minimum": 1 })),
+        ("Correct", "correction", whole(&(1..=MOST_CORRECTIONS))),
+        ("Correct", "period", json!({ "minimum": 1 })),
+        ("Correct", "reason", json!({ "minLength": 1, "maxLength": LONGEST_REASON })),
+        ("Renew", "renewal", whole(&(1..=MOST_RENEWALS))),
+        ("Renew", "policy", json!({ "minLength": 1 })),
+        ("Renew", "window", whole(&HISTORY_LENGTH)),
+        ("Renewing", "every", json!({ "minimum": 1 })),
+        ("Renewing", "window", whole(&HISTORY_LENGTH)),
+    ];
+    rules.into_iter()
 }
 
 /// Of what a period reports, wherever it stands.

@@ -64,6 +64,7 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(sessions::history))
         .routes(routes!(sessions::observe))
         .routes(routes!(sessions::correct))
+        .routes(routes!(sessions::renew))
         .routes(routes!(sessions::action))
         .routes(routes!(what_if::what_if))
         .routes(routes!(advise::advise))

@@ -8,5 +8,6 @@ pub mod framework;
 pub mod radius_rule;
 pub mod rules;
 pub mod specification;
+pub mod terms;
 pub mod warnings;
 pub mod withdrawals;

@@ -285,19 +285,6 @@ class Observe(TypedDict):
 HistoryItem: TypeAlias = float
 
 
-class OpenSession(TypedDict):
-    """A session to open."""
-
-    policy: str
-    """The policy to live by."""
-    history: NotRequired[list[HistoryItem] | None]
-    """Log-returns known at the start. Default: the policy's."""
-    wealth: NotRequired[float | None]
-    """Default: the policy's initial wealth."""
-    holding: NotRequired[float | None]
-    """Share of wealth in the risky asset at the start. Default: 0."""
-
-
 Phase: TypeAlias = Literal["solving", "fitting", "simulating"]
 """What a job is doing."""
 
@@ -432,6 +419,29 @@ class RadiusSpread(TypedDict):
     """On the first path."""
 
 
+class Renew(TypedDict):
+    """The policy that a session goes on by."""
+
+    renewal: int
+    """Number of the renewal, from 1."""
+    policy: str
+    """The next policy."""
+    window: NotRequired[int | None]
+    """Returns that the law is made of, the last ones. Default: all that were seen."""
+
+
+RenewalState: TypeAlias = Literal["due", "training", "failed", "trained"]
+
+
+class Renewing(TypedDict):
+    """How a session is renewed by itself."""
+
+    every: int
+    """Periods by one policy, until the next is trained; fewer than its horizon."""
+    window: NotRequired[int | None]
+    """Returns that the next policy is trained on, the last ones. Default: all that were seen."""
+
+
 class Report(TypedDict):
     """What is recorded of a period: its return, given in exactly one of three ways or as missing, and what was done in it."""
 
@@ -542,6 +552,19 @@ SweepRange = TypedDict(
         "points": int,
     },
 )
+
+
+class Terms(TypedDict):
+    """Rate, cost and flows of the periods that a policy is lived by."""
+
+    horizon: int
+    """T, periods."""
+    rate_per_step: float
+    """r, simple return of the bank per step."""
+    trading_cost: float
+    """c, of what is traded."""
+    contributions: Contributions
+    """C, money added at the end of each period."""
 
 
 class TransportedMass(TypedDict):
@@ -826,6 +849,20 @@ class Observed(Uncertainty):
     """Whether the returns still come as they came."""
 
 
+class OpenSession(TypedDict):
+    """A session to open."""
+
+    policy: str
+    """The policy to live by."""
+    history: NotRequired[list[HistoryItem] | None]
+    """Log-returns known at the start. Default: the policy's."""
+    wealth: NotRequired[float | None]
+    """Default: the policy's initial wealth."""
+    holding: NotRequired[float | None]
+    """Share of wealth in the risky asset at the start. Default: 0."""
+    renew: NotRequired[Renewing | None]
+
+
 class PeriodReport(TypedDict):
     """One period over all paths."""
 
@@ -868,6 +905,34 @@ class ProblemSpecification(TypedDict):
     """The log-returns observed before the start, at least two of them distinct."""
 
 
+class RenewalDue(TypedDict):
+    """Where a renewal is that is due."""
+
+    renewal: int
+    """Its number."""
+    state: RenewalState
+    job: NotRequired[str | None]
+    """The job that trains the policy, or last did; null before there is one."""
+    error: NotRequired[str | None]
+    """Why the last attempt failed."""
+    attempts: int
+    """Jobs so far."""
+
+
+class Renewed(Uncertainty):
+    """The session after a renewal."""
+
+    session: str
+    renewal: int
+    policy: str
+    period: int
+    """The coming period, the first that the policy advises."""
+    horizon: int
+    """The last period that it advises."""
+    terms: Terms
+    """Rate, cost and flows of its periods, where none other are reported."""
+
+
 class Sensitivity(TypedDict):
     """How near an advice is to changing."""
 
@@ -883,9 +948,11 @@ class Session(TypedDict):
 
     session: str
     policy: str
+    """The one that advises the coming period."""
     period: int
     """The coming period, from 1; `horizon + 1` once completed."""
     horizon: int
+    """The last period that the policy advises."""
     state: SessionState
     date: NotRequired[str | None]
     """The last day of the last period that was reported with one."""
@@ -895,6 +962,10 @@ class Session(TypedDict):
     sample_size: int
     corrections: int
     """Corrections of what periods reported; the next one is this and one more."""
+    renewals: int
+    """Policies that followed the first; the next renewal is this and one more."""
+    renew: NotRequired[Renewing | None]
+    renewal: NotRequired[RenewalDue | None]
     drift: Drift
     """Whether the returns still come as they came."""
     created_ms: int
@@ -905,8 +976,10 @@ class SessionEntry(TypedDict):
 
     session: str
     policy: str
+    """The one that advises the coming period."""
     period: int
     horizon: int
+    """The last period that the policy advises."""
     state: SessionState
     initial_wealth: float
     created_ms: int
@@ -1155,6 +1228,14 @@ class Observation(Observed):
     now: NotRequired[Now | None]
 
 
+class Renewal(Renewed):
+    """One renewal, as it was made."""
+
+    window: NotRequired[int | None]
+    """Returns that the law was made of, the last ones; null where those were all."""
+    renewed_ms: int
+
+
 class Specification(TypedDict):
     """A whole training job: the problem, the design that samples its states, the surrogates, one seed."""
 
@@ -1242,6 +1323,9 @@ class History(TypedDict):
 
     session: str
     policy: str
+    """The first policy."""
+    terms: Terms
+    """Rate, cost and flows of its periods, where none other are reported."""
     initial_wealth: float
     initial_holding: float
     """Share of it in the risky asset."""
@@ -1249,6 +1333,8 @@ class History(TypedDict):
     """Log-returns known at the start."""
     observations: list[Observation]
     corrections: list[Correction]
+    renewals: list[Renewal]
+    """The policies that followed the first."""
 
 
 class PolicyDetail(TypedDict):
