@@ -31,6 +31,7 @@ const DOCUMENTS: [&str; 14] = [
     "control/request/framework.rs",
     "control/request/radius_rule.rs",
     "control/request/specification.rs",
+    "control/request/terms.rs",
     "control/request/warnings.rs",
     "control/solved_step.rs",
 ];
