@@ -5,12 +5,14 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use ballast::control::estimate;
+use ballast::control::evaluation::backtest::Backtest;
+use ballast::control::evaluation::backtest_report::BacktestReport;
 use ballast::control::evaluation::paths::Evaluation;
 use ballast::control::evaluation::report::{Costs, EvaluationReport};
 use ballast::control::kept::Kept;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
-use ballast::control::pool::TrainingPool;
+use ballast::control::pool::{self, TrainingPool};
 use ballast::control::progress::Watch;
 use ballast::control::request::evaluation::EvaluationRequest;
 use ballast::control::request::specification::Specification;
@@ -123,6 +125,31 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
             })
         });
         holds(what, estimate::evaluation(&request, THREADS).bytes(), taken);
+    }
+    walk_forwards(&pool);
+}
+
+/// What walk-forwards take.
+fn walk_forwards(pool: &TrainingPool) {
+    for (what, count, length) in [("its design", 700, 30), ("its record", 10, 1500)] {
+        let request = json!({ "log_returns": history(length), "rate": 0.001, "periods_per_year": 4, "window": 24, "count": count,
+            "every": length.min(500) - 24, "horizon": length.min(500) - 24, "alpha": [0.5] });
+        let (taken, _) = most_bytes(|| {
+            let backtest = Backtest::new(serde_json::from_value(request.clone()).unwrap()).unwrap();
+            let kept = Kept::new(estimate::kept_by_backtest(&backtest, THREADS));
+            let watch = Watch::unwatched();
+            let mut decisions = vec![Vec::new(); backtest.strategies.len()];
+            for stretch in 0..backtest.walk.stretches(length) {
+                let decide = |strategy| {
+                    backtest.walk.decide_stretch(strategy, &backtest.periods, stretch, kept.clone(), &watch).unwrap()
+                };
+                let found = pool.install(|| pool::map(backtest.plain_strategies(), decide));
+                found.into_iter().zip(&mut decisions).for_each(|(found, all)| all.extend(found));
+            }
+            serde_json::to_string(&BacktestReport::new(&backtest.walked(decisions))).unwrap()
+        });
+        let backtest = Backtest::new(serde_json::from_value(request.clone()).unwrap()).unwrap();
+        holds(what, estimate::backtest(&backtest, THREADS).bytes(), taken);
     }
 }
 

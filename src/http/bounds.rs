@@ -6,6 +6,7 @@
 use serde_json::{Map, Value, json};
 use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
+use crate::control::request::backtest;
 use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
 use crate::control::request::rules::{
     COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR, RADIUS_SCALE, RATE,
@@ -32,8 +33,9 @@ pub fn tell(description: &mut OpenApi) {
 fn rules() -> Vec<(&'static str, &'static str, Value)> {
     let whole = |range: &std::ops::RangeInclusive<usize>| json!({ "minimum": range.start(), "maximum": range.end() });
     let pair = json!({ "minItems": 2, "maxItems": 2, "items": { "minimum": 1e-12, "maximum": 1e12 } });
-    let history = json!({ "minItems": HISTORY_LENGTH.start(), "maxItems": HISTORY_LENGTH.end(),
-        "items": within((-LOG_RETURN, LOG_RETURN)) });
+    let listed = |counts: &std::ops::RangeInclusive<usize>, items: Value| json!({ "minItems": counts.start(), "maxItems": counts.end(), "items": items });
+    let history = listed(&HISTORY_LENGTH, within((-LOG_RETURN, LOG_RETURN)));
+    let simple_return = ((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1());
     let wealth = within(WEALTH);
     let probability = within((1e-3, 0.999));
     let action = json!({ "minItems": 2, "maxItems": 2, "items": within((0.0, 1.0)) });
@@ -86,12 +88,27 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("WhatIf", "radius_scale", within(RADIUS_SCALE)),
         ("WhatIf", "radius", within(FIXED_RADIUS)),
         ("WhatIf", "log_return", within((-LOG_RETURN, LOG_RETURN))),
-        ("WhatIf", "simple_return", within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1()))),
+        ("WhatIf", "simple_return", within(simple_return)),
         ("SweepRange", "points", whole(&POINTS)),
         ("EvaluationRequest", "constant_mixes", json!({ "maxItems": MOST_MIXES, "items": within((0.0, 1.0)) })),
         ("EvaluationRequest", "paths", whole(&evaluation::PATHS)),
         ("EvaluationRequest", "level", within(LEVEL)),
         ("InitialHistories", "count", whole(&HISTORIES)),
+        ("BacktestRequest", "periods_per_year", whole(&backtest::YEAR)),
+        ("BacktestRequest", "window", whole(&HISTORY_LENGTH)),
+        ("BacktestRequest", "every", whole(&HORIZON)),
+        ("BacktestRequest", "horizon", whole(&HORIZON)),
+        ("BacktestRequest", "alpha", listed(&backtest::LEVELS, within(backtest::ALPHA))),
+        ("BacktestRequest", "risk_aversion", within(backtest::RELATIVE)),
+        ("BacktestRequest", "trading_cost", within(TRADING_COST)),
+        ("BacktestRequest", "count", whole(&COUNT)),
+        ("BacktestRequest", "log_returns", listed(&backtest::PERIODS, within((-LOG_RETURN, LOG_RETURN)))),
+        ("BacktestRequest", "simple_returns", listed(&backtest::PERIODS, within(simple_return))),
+        (
+            "BacktestRequest",
+            "dates",
+            json!({ "minItems": backtest::PERIODS.start(), "maxItems": backtest::PERIODS.end() }),
+        ),
     ];
     rules.into_iter().chain(reported()).collect()
 }

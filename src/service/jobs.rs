@@ -1,4 +1,4 @@
-//! Training jobs as their users see them: each tenant its own.
+//! Jobs as their users see them: each tenant its own.
 
 use std::sync::Arc;
 
@@ -12,7 +12,9 @@ use super::keys::Caller;
 use super::memory::Memory;
 use super::progress::{Progress, ProgressBoard};
 use crate::control::estimate;
+use crate::control::evaluation::backtest::Backtest;
 use crate::control::policy::content_hash;
+use crate::control::request::backtest::BacktestRequest;
 use crate::control::request::evaluation::EvaluationRequest;
 use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
@@ -88,6 +90,24 @@ impl Jobs {
         Ok(Accepted { job, warnings: completed.problem.warnings() })
     }
 
+    /// Queues a walk-forward. The same key and request again give the same job.
+    ///
+    /// # Errors
+    /// As [`Self::train`].
+    pub async fn backtest(
+        &self,
+        caller: &Caller,
+        request: BacktestRequest,
+        key: Option<String>,
+    ) -> Result<Accepted, ServiceError> {
+        let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
+        let backtest = Backtest::new(request)?;
+        self.memory.admits(&estimate::backtest(&backtest, self.threads))?;
+        let request_json = serde_json::to_string(&backtest.request).map_err(ServiceError::internal)?;
+        let job = self.queue(caller, JobKind::Backtest, &sent, request_json, backtest.trainings(), key).await?;
+        Ok(Accepted { job, warnings: backtest.warnings() })
+    }
+
     async fn queue(
         &self,
         caller: &Caller,
@@ -118,7 +138,7 @@ impl Jobs {
         }
     }
 
-    /// The report of a succeeded evaluation, as JSON.
+    /// The report of a succeeded evaluation or walk-forward, as JSON.
     ///
     /// # Errors
     /// There is no such job, or it has no report (yet).
