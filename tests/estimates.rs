@@ -9,6 +9,7 @@ use ballast::control::evaluation::backtest::Backtest;
 use ballast::control::evaluation::backtest_report::BacktestReport;
 use ballast::control::evaluation::paths::Evaluation;
 use ballast::control::evaluation::report::{Costs, EvaluationReport};
+use ballast::control::evaluation::rolling::Common;
 use ballast::control::kept::Kept;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
@@ -140,8 +141,9 @@ fn walk_forwards(pool: &TrainingPool) {
             let watch = Watch::unwatched();
             let mut decisions = vec![Vec::new(); backtest.strategies.len()];
             for stretch in 0..backtest.walk.stretches(length) {
+                let common = Common::of(&backtest.plain_strategies(), kept.clone());
                 let decide = |strategy| {
-                    backtest.walk.decide_stretch(strategy, &backtest.periods, stretch, kept.clone(), &watch).unwrap()
+                    backtest.walk.decide_stretch(strategy, &backtest.periods, stretch, &common, &watch).unwrap()
                 };
                 let found = pool.install(|| pool::map(backtest.plain_strategies(), decide));
                 found.into_iter().zip(&mut decisions).for_each(|(found, all)| all.extend(found));

@@ -31,11 +31,8 @@ pub fn tell(description: &mut OpenApi) {
 
 /// Schema, or schema and variant; field; rule.
 fn rules() -> Vec<(&'static str, &'static str, Value)> {
-    let whole = |range: &std::ops::RangeInclusive<usize>| json!({ "minimum": range.start(), "maximum": range.end() });
     let pair = json!({ "minItems": 2, "maxItems": 2, "items": { "minimum": 1e-12, "maximum": 1e12 } });
-    let listed = |counts: &std::ops::RangeInclusive<usize>, items: Value| json!({ "minItems": counts.start(), "maxItems": counts.end(), "items": items });
     let history = listed(&HISTORY_LENGTH, within((-LOG_RETURN, LOG_RETURN)));
-    let simple_return = ((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1());
     let wealth = within(WEALTH);
     let probability = within((1e-3, 0.999));
     let action = json!({ "minItems": 2, "maxItems": 2, "items": within((0.0, 1.0)) });
@@ -88,29 +85,32 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("WhatIf", "radius_scale", within(RADIUS_SCALE)),
         ("WhatIf", "radius", within(FIXED_RADIUS)),
         ("WhatIf", "log_return", within((-LOG_RETURN, LOG_RETURN))),
-        ("WhatIf", "simple_return", within(simple_return)),
+        ("WhatIf", "simple_return", within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1()))),
         ("SweepRange", "points", whole(&POINTS)),
         ("EvaluationRequest", "constant_mixes", json!({ "maxItems": MOST_MIXES, "items": within((0.0, 1.0)) })),
         ("EvaluationRequest", "paths", whole(&evaluation::PATHS)),
         ("EvaluationRequest", "level", within(LEVEL)),
         ("InitialHistories", "count", whole(&HISTORIES)),
-        ("BacktestRequest", "periods_per_year", whole(&backtest::YEAR)),
-        ("BacktestRequest", "window", whole(&HISTORY_LENGTH)),
-        ("BacktestRequest", "every", whole(&HORIZON)),
-        ("BacktestRequest", "horizon", whole(&HORIZON)),
-        ("BacktestRequest", "alpha", listed(&backtest::LEVELS, within(backtest::ALPHA))),
-        ("BacktestRequest", "risk_aversion", within(backtest::RELATIVE)),
-        ("BacktestRequest", "trading_cost", within(TRADING_COST)),
-        ("BacktestRequest", "count", whole(&COUNT)),
-        ("BacktestRequest", "log_returns", listed(&backtest::PERIODS, within((-LOG_RETURN, LOG_RETURN)))),
-        ("BacktestRequest", "simple_returns", listed(&backtest::PERIODS, within(simple_return))),
-        (
-            "BacktestRequest",
-            "dates",
-            json!({ "minItems": backtest::PERIODS.start(), "maxItems": backtest::PERIODS.end() }),
-        ),
     ];
-    rules.into_iter().chain(reported()).collect()
+    rules.into_iter().chain(walked()).chain(reported()).collect()
+}
+
+/// Of a walk-forward.
+fn walked() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
+    let fields = [
+        ("periods_per_year", whole(&backtest::YEAR)),
+        ("window", whole(&HISTORY_LENGTH)),
+        ("every", whole(&HORIZON)),
+        ("horizon", whole(&HORIZON)),
+        ("alpha", listed(&backtest::LEVELS, within(backtest::ALPHA))),
+        ("risk_aversion", within(backtest::RELATIVE)),
+        ("trading_cost", within(TRADING_COST)),
+        ("count", whole(&COUNT)),
+        ("log_returns", listed(&backtest::PERIODS, within((-LOG_RETURN, LOG_RETURN)))),
+        ("simple_returns", listed(&backtest::PERIODS, within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())))),
+        ("dates", json!({ "minItems": backtest::PERIODS.start(), "maxItems": backtest::PERIODS.end() })),
+    ];
+    fields.into_iter().map(|(field, rule)| ("BacktestRequest", field, rule))
 }
 
 /// Of what a period reports, wherever it stands.
@@ -128,6 +128,14 @@ fn reported() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
         ];
         fields.map(|(field, rule)| (schema, field, rule))
     })
+}
+
+fn whole(range: &std::ops::RangeInclusive<usize>) -> Value {
+    json!({ "minimum": range.start(), "maximum": range.end() })
+}
+
+fn listed(counts: &std::ops::RangeInclusive<usize>, items: Value) -> Value {
+    json!({ "minItems": counts.start(), "maxItems": counts.end(), "items": items })
 }
 
 fn within((low, high): (f64, f64)) -> Value {

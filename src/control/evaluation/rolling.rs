@@ -3,6 +3,8 @@
 //! Decisions and accounts are apart: under power and log utility no band depends on wealth, and hardly on what is held, so the
 //! stretches between trainings can be decided side by side, and what wealth became is counted afterwards ([`crate::control::evaluation::account`]).
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use crate::control::error::TrainError;
@@ -18,6 +20,7 @@ use crate::control::request::specification::{
     DesignSpecification, ProblemSpecification, Specification, SurrogateSpecification, UtilitySpecification,
 };
 use crate::control::training::Training;
+use crate::control::uncertainty::measured::Measured;
 
 /// One period of the real world.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,6 +105,27 @@ impl Strategy {
     }
 }
 
+/// What the trainings of one stretch have in common; no bit of what is decided depends on it.
+pub struct Common {
+    kept: Kept,
+    measured: Arc<Measured>,
+}
+
+impl Common {
+    /// With what can be made again in `kept`.
+    pub fn of(strategies: &[Strategy], kept: Kept) -> Self {
+        let mut alphas: Vec<f64> = Vec::new();
+        for strategy in strategies {
+            if let Some((Framework::Adaptive, alpha)) = strategy.framework()
+                && !alphas.contains(&alpha)
+            {
+                alphas.push(alpha);
+            }
+        }
+        Common { kept, measured: Arc::new(Measured::at(alphas)) }
+    }
+}
+
 impl WalkForward {
     /// Of terminal wealth, and of a year's in the figures.
     pub fn utility(&self) -> UtilitySpecification {
@@ -150,25 +174,26 @@ impl WalkForward {
         watch: &Watch,
         trained: &(dyn Fn() + Sync),
     ) -> Result<Vec<Vec<Decision>>, TrainError> {
-        // Stretches outermost, so that those done stay done together.
-        let jobs: Vec<(usize, Strategy)> = (0..self.stretches(periods.len()))
-            .flat_map(|stretch| strategies.iter().map(move |&strategy| (stretch, strategy)))
-            .collect();
-        let found = pool::map(jobs, |(stretch, strategy)| {
-            let decided = self.decide_stretch(strategy, periods, stretch, Kept::default(), watch);
-            if strategy.is_trained() {
-                trained();
-            }
-            decided
-        });
+        let decided = |stretch: usize| -> Result<Vec<Vec<Decision>>, TrainError> {
+            let common = Common::of(strategies, Kept::default());
+            let decided = |strategy: Strategy| {
+                let decided = self.decide_stretch(strategy, periods, stretch, &common, watch);
+                if strategy.is_trained() {
+                    trained();
+                }
+                decided
+            };
+            pool::map(strategies.to_vec(), decided).into_iter().collect()
+        };
+        let stretches = (0..self.stretches(periods.len())).collect();
         let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); strategies.len()];
-        for (job, stretch) in found.into_iter().enumerate() {
-            decisions[job % strategies.len()].extend(stretch?);
+        for found in pool::map(stretches, decided) {
+            decisions.iter_mut().zip(found?).for_each(|(all, stretch)| all.extend(stretch));
         }
         Ok(decisions)
     }
 
-    /// What one strategy holds from a training to the next, with what can be made again in `kept`.
+    /// What one strategy holds from a training to the next; `common` is of its stretch.
     ///
     /// # Errors
     /// As [`Self::decide`].
@@ -177,7 +202,7 @@ impl WalkForward {
         strategy: Strategy,
         periods: &[Period],
         stretch: usize,
-        kept: Kept,
+        common: &Common,
         watch: &Watch,
     ) -> Result<Vec<Decision>, TrainError> {
         let start = self.window + stretch * self.every;
@@ -190,8 +215,8 @@ impl WalkForward {
         if matches!(strategy, Strategy::CostBlind { .. }) {
             specification.problem.trading_cost = 0.0;
         }
-        let policy = Training::with(&specification, kept.clone())?.run(watch)?;
-        let advisor = Advisor::with(policy, kept);
+        let policy = Training::among(&specification, common.kept.clone(), common.measured.clone())?.run(watch)?;
+        let advisor = Advisor::with(policy, common.kept.clone());
         let returns: Vec<f64> = lived.iter().map(|period| period.log_return).collect();
         let decided = |Advice { band, radius, source, .. }| Decision { band, radius, source: Some(source) };
         Ok(advisor.walk(advisor.initial_state(None, None)?, &returns).map(decided).collect())

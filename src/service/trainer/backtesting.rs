@@ -7,7 +7,7 @@ use super::{Ended, Worker, failed};
 use crate::control::estimate;
 use crate::control::evaluation::backtest::Backtest;
 use crate::control::evaluation::backtest_report::BacktestReport;
-use crate::control::evaluation::rolling::Decision;
+use crate::control::evaluation::rolling::{Common, Decision};
 use crate::control::kept::Kept;
 use crate::control::pool;
 use crate::control::progress::Watch;
@@ -46,14 +46,14 @@ impl Worker {
         let policies = strategies.iter().filter(|strategy| strategy.is_trained()).count();
         let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); strategies.len()];
         for stretch in 0..backtest.walk.stretches(backtest.periods.len()) {
+            let common = Common::of(&strategies, kept.clone());
             let decide = |(index, strategy)| -> Result<Vec<Decision>, Ended> {
                 let step = (index < policies).then_some(stretch * policies + index);
                 let before = step.and_then(|step| checkpoints.get(&step));
                 if let Some(decided) = before.and_then(|bytes| serde_json::from_slice(bytes).ok()) {
                     return Ok(decided);
                 }
-                let decided =
-                    backtest.walk.decide_stretch(strategy, &backtest.periods, stretch, kept.clone(), &watch)?;
+                let decided = backtest.walk.decide_stretch(strategy, &backtest.periods, stretch, &common, &watch)?;
                 step.map_or(Ok(()), |step| self.keep(claimed, step, &decided))?;
                 Ok(decided)
             };
