@@ -8,16 +8,18 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use super::radius::{Radii, RadiusEstimator};
 use crate::control::problem::state::State;
 
-/// Radii at each level of a state, state by state.
-type AtLevels = Vec<Vec<Radii>>;
+/// A step and some states of it.
+pub type Part = (usize, Range<usize>);
+
+/// Radii at each level of a state, state by state, once they are found.
+type AtLevels = Arc<OnceLock<Vec<Vec<Radii>>>>;
 
 /// What trainings of one history, horizon, design and seed measure in common; the default is for a training by itself.
 #[derive(Default)]
 pub struct Measured {
     /// Their levels.
     alphas: Vec<f64>,
-    /// By the step and the states in it.
-    known: Mutex<HashMap<(usize, Range<usize>), Arc<OnceLock<AtLevels>>>>,
+    known: Mutex<HashMap<Part, AtLevels>>,
 }
 
 impl Measured {
@@ -28,13 +30,7 @@ impl Measured {
 
     /// Radii at level `alpha` of `states`, those of a step in a range of the design; the same to the last bit whoever else
     /// asks. Trainings at one of several levels find those of all.
-    pub fn radii(
-        &self,
-        alpha: f64,
-        part: (usize, Range<usize>),
-        sets: &RadiusEstimator,
-        states: &[State],
-    ) -> Vec<Radii> {
+    pub fn radii(&self, alpha: f64, part: Part, sets: &RadiusEstimator, states: &[State]) -> Vec<Radii> {
         let laws: Vec<_> = states.iter().map(|state| &state.law).collect();
         let level = self.alphas.iter().position(|other| *other == alpha).filter(|_| self.alphas.len() > 1);
         let Some(level) = level else { return sets.radii_of(&laws, &[alpha]).concat() };
