@@ -161,7 +161,14 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     ballast.training(training.id).delete()
     assert training.id not in [job["job"] for job in ballast.jobs()]
 
-    ids = {training.id: "{id}", evaluation.id: "{id}", walked.id: "{id}", policy.id: "{id}", own.id: "{id}", session.id: "{id}"}
+    ids = {
+        training.id: "{id}",
+        evaluation.id: "{id}",
+        walked.id: "{id}",
+        policy.id: "{id}",
+        own.id: "{id}",
+        session.id: "{id}",
+    }
     reached = {(method, "/".join(ids.get(part, part) for part in path.split("/"))) for method, path in network.sent}
     paths = json.loads((REPOSITORY / "api/openapi.json").read_text())["paths"]
     described = {(method.upper(), path) for path, item in paths.items() for method in item if for_clients(item)}

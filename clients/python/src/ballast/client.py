@@ -152,8 +152,8 @@ class Ballast:
     ) -> WalkForward:
         """Queues a walk-forward through a record of returns, as ``ballast backtest`` does, and does not wait for it.
 
-        ``returns`` and ``kind`` are as in ``train``; ``rate`` is what the bank paid, one fraction for all periods or one
-        for each. ``dates`` are texts or dates, one for each number, and tell how many periods make a year;
+        ``returns`` and ``kind`` are as in ``train``; ``rate`` is what the bank paid, one fraction for all periods or
+        one for each. ``dates`` are texts or dates, one for each number, and tell how many periods make a year;
         ``periods_per_year`` says so without them. What is left out the service chooses, and the report tells.
         """
         record = log_returns(returns, kind)
