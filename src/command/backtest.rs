@@ -259,7 +259,9 @@ mod tests {
         let long = BacktestArgs { window: Some(50), ..arguments(&[]) };
         let short = walk(&long, months(48)).err().unwrap().to_string();
         assert_eq!(short, "the file is 48 periods: must hold at least 62, the window and a year");
-        assert_eq!(message(&["--count", "3"]), "--count is 3: must lie in [10, 10000]");
+        let few = BacktestArgs { count: 3, ..arguments(&[]) };
+        let few = walk(&few, months(48)).err().unwrap().to_string();
+        assert_eq!(few, "--count is 3: must lie in [10, 10000]");
         assert_eq!(message(&["--alpha", "0.1,2"]), "--alpha[1] is 2: must be a number in [0.001, 0.999]");
     }
 }
