@@ -6,6 +6,7 @@
 use serde_json::{Map, Value, json};
 use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
+use crate::control::request::backtest;
 use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
 use crate::control::request::rules::{
     COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR, RADIUS_SCALE, RATE,
@@ -32,6 +33,7 @@ pub fn tell(description: &mut OpenApi) {
 /// Schema, or schema and variant; field; rule.
 fn rules() -> Vec<(&'static str, &'static str, Value)> {
     let pair = json!({ "minItems": 2, "maxItems": 2, "items": { "minimum": 1e-12, "maximum": 1e12 } });
+    let history = listed(&HISTORY_LENGTH, within((-LOG_RETURN, LOG_RETURN)));
     let wealth = within(WEALTH);
     let probability = within((1e-3, 0.999));
     let action = json!({ "minItems": 2, "maxItems": 2, "items": within((0.0, 1.0)) });
@@ -42,7 +44,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("ProblemSpecification", "initial_wealth", wealth.clone()),
         ("ProblemSpecification", "action_interval", action),
         ("ProblemSpecification", "trading_cost", within(TRADING_COST)),
-        ("ProblemSpecification", "history", history()),
+        ("ProblemSpecification", "history", history),
         ("UtilitySpecification exponential", "risk_aversion", within(RISK_AVERSION)),
         ("UtilitySpecification exponential", "risk_aversion_relative", within(RISK_AVERSION_RELATIVE)),
         ("UtilitySpecification power", "risk_aversion", json!({ "exclusiveMinimum": 1, "maximum": 100 })),
@@ -82,23 +84,14 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("EvaluationRequest", "level", within(LEVEL)),
         ("InitialHistories", "count", whole(&HISTORIES)),
     ];
-    rules.into_iter().chain(of_sessions()).chain(reported()).collect()
-}
-
-fn history() -> Value {
-    json!({ "minItems": HISTORY_LENGTH.start(), "maxItems": HISTORY_LENGTH.end(),
-        "items": within((-LOG_RETURN, LOG_RETURN)) })
-}
-
-fn whole(range: &std::ops::RangeInclusive<usize>) -> Value {
-    json!({ "minimum": range.start(), "maximum": range.end() })
+    rules.into_iter().chain(of_sessions()).chain(walked()).chain(reported()).collect()
 }
 
 /// Of sessions and what is recorded of them.
 fn of_sessions() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     let rules = [
         ("OpenSession", "policy", json!({ "minLength": 1 })),
-        ("OpenSession", "history", history()),
+        ("OpenSession", "history", listed(&HISTORY_LENGTH, within((-LOG_RETURN, LOG_RETURN)))),
         ("OpenSession", "wealth", within(WEALTH)),
         ("OpenSession", "holding", within((0.0, 1.0))),
         ("Observe", "session", json!({ "minLength": 1 })),
@@ -113,6 +106,24 @@ fn of_sessions() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
         ("Renewing", "window", whole(&HISTORY_LENGTH)),
     ];
     rules.into_iter()
+}
+
+/// Of a walk-forward.
+fn walked() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
+    let fields = [
+        ("periods_per_year", whole(&backtest::YEAR)),
+        ("window", whole(&HISTORY_LENGTH)),
+        ("every", whole(&HORIZON)),
+        ("horizon", whole(&HORIZON)),
+        ("alpha", listed(&backtest::LEVELS, within(backtest::ALPHA))),
+        ("risk_aversion", within(backtest::RELATIVE)),
+        ("trading_cost", within(TRADING_COST)),
+        ("count", whole(&COUNT)),
+        ("log_returns", listed(&backtest::PERIODS, within((-LOG_RETURN, LOG_RETURN)))),
+        ("simple_returns", listed(&backtest::PERIODS, within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())))),
+        ("dates", json!({ "minItems": backtest::PERIODS.start(), "maxItems": backtest::PERIODS.end() })),
+    ];
+    fields.into_iter().map(|(field, rule)| ("BacktestRequest", field, rule))
 }
 
 /// Of what a period reports, wherever it stands.
@@ -130,6 +141,14 @@ fn reported() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
         ];
         fields.map(|(field, rule)| (schema, field, rule))
     })
+}
+
+fn whole(range: &std::ops::RangeInclusive<usize>) -> Value {
+    json!({ "minimum": range.start(), "maximum": range.end() })
+}
+
+fn listed(counts: &std::ops::RangeInclusive<usize>, items: Value) -> Value {
+    json!({ "minItems": counts.start(), "maxItems": counts.end(), "items": items })
 }
 
 fn within((low, high): (f64, f64)) -> Value {

@@ -4,6 +4,8 @@ use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::evaluation::backtest_report::BacktestReport;
+use crate::control::evaluation::report::EvaluationReport;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::caution::Caution;
 use crate::control::policy::sensitivity::{Sensitivity, cautions};
@@ -33,7 +35,7 @@ pub struct Job {
     pub progress: JobProgress,
     /// The policy of a succeeded training.
     pub policy: Option<String>,
-    /// Where the report of a succeeded evaluation is.
+    /// Where the report of a succeeded evaluation or walk-forward is.
     pub report: Option<String>,
     /// Why it failed.
     pub error: Option<String>,
@@ -69,7 +71,7 @@ impl From<ServiceJob> for Job {
                 points_total: current.map(|current| current.total),
                 seconds_left: progress.and_then(|progress| progress.seconds_left),
             },
-            report: (row.kind == JobKind::Evaluate && row.state == JobState::Succeeded)
+            report: (row.kind != JobKind::Train && row.state == JobState::Succeeded)
                 .then(|| format!("/jobs/{}/report", row.job)),
             job: row.job,
             kind: row.kind,
@@ -97,6 +99,15 @@ impl From<Accepted> for AcceptedJob {
     fn from(Accepted { job, warnings }: Accepted) -> Self {
         AcceptedJob { job: job.into(), warnings }
     }
+}
+
+/// The report of a job: of an evaluation or of a walk-forward.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "reports travel as they are stored: this describes them")]
+pub enum JobReport {
+    Evaluation(Box<EvaluationReport>),
+    Backtest(Box<BacktestReport>),
 }
 
 /// A page of jobs, newest first.

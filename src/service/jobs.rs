@@ -1,4 +1,4 @@
-//! Training jobs as their users see them: each tenant its own.
+//! Jobs as their users see them: each tenant its own.
 
 use std::sync::Arc;
 
@@ -12,7 +12,9 @@ use super::keys::Caller;
 use super::memory::Memory;
 use super::progress::{Progress, ProgressBoard};
 use crate::control::estimate;
+use crate::control::evaluation::backtest::Backtest;
 use crate::control::policy::content_hash;
+use crate::control::request::backtest::BacktestRequest;
 use crate::control::request::evaluation::EvaluationRequest;
 use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
@@ -121,6 +123,27 @@ impl Jobs {
         Ok(Accepted { job, warnings: completed.problem.warnings() })
     }
 
+    /// Queues a walk-forward. The same key and request again give the same job.
+    ///
+    /// # Errors
+    /// As [`Self::train`].
+    pub async fn backtest(
+        &self,
+        caller: &Caller,
+        request: BacktestRequest,
+        key: Option<String>,
+    ) -> Result<Accepted, ServiceError> {
+        key.as_deref().map_or(Ok(()), idempotency::check)?;
+        let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
+        let backtest = Backtest::new(request)?;
+        self.memory.admits(&estimate::backtest(&backtest, self.threads))?;
+        let request_json = serde_json::to_string(&backtest.request).map_err(ServiceError::internal)?;
+        let steps = backtest.trainings();
+        let new = self.new_job(&caller.tenant, JobKind::Backtest, &sent, request_json, steps, key)?;
+        let job = self.queue(caller.actor(), new).await?;
+        Ok(Accepted { job, warnings: backtest.warnings() })
+    }
+
     fn new_job(
         &self,
         tenant: &Tenant,
@@ -154,7 +177,7 @@ impl Jobs {
         }
     }
 
-    /// The report of a succeeded evaluation, as JSON.
+    /// The report of a succeeded evaluation or walk-forward, as JSON.
     ///
     /// # Errors
     /// There is no such job, or it has no report (yet).

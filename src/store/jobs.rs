@@ -37,7 +37,7 @@ impl Store {
         self.list("reading a job", find, |rows| rows.first().map(JobRow::from_row).transpose()).await
     }
 
-    /// The report of a tenant's succeeded evaluation.
+    /// The report of a tenant's succeeded job.
     pub async fn report(&self, tenant: &Tenant, job: &str) -> Result<Option<String>, StoreError> {
         let find = query(
             "SELECT json FROM job_reports JOIN jobs ON jobs.job = job_reports.job

@@ -182,11 +182,16 @@ impl Problem {
 
     /// The same where the radius of the state is known already.
     pub fn features_within(&self, step: usize, state: &State, radius: f64) -> Features {
-        let (moments, total) = (CentralMoments::of(&state.law), self.dynamics(step).total(state.wealth, 0.0));
         if !self.selection.has_ball() {
-            return self.selection.of(total, &without_ball(moments));
+            let total = self.dynamics(step).total(state.wealth, 0.0);
+            return self.selection.of(total, &without_ball(CentralMoments::of(&state.law)));
         }
-        let radii = self.sets.radii(&state.law, radius);
+        self.features_knowing(step, state, self.sets.radii(&state.law, radius))
+    }
+
+    /// The same where both radii of the state are known already.
+    pub fn features_knowing(&self, step: usize, state: &State, radii: Radii) -> Features {
+        let (moments, total) = (CentralMoments::of(&state.law), self.dynamics(step).total(state.wealth, 0.0));
         let worst = ExponentialMean::of(&state.law, self.lowest_return()).worst(radii.radius);
         self.selection.of(total, &self.summary(moments, radii, worst))
     }

@@ -145,6 +145,36 @@ impl RadiusEstimator {
         Radii { radius: known, radius_ahead }
     }
 
+    /// The radii of laws of one size, each at every one of `alphas` in the place of the rule's own, as [`Self::radius`] and
+    /// [`Self::radii`] give them one by one, bit for bit.
+    ///
+    /// Checked by: `laws_measured_together_are_measured_as_one_by_one`.
+    pub fn radii_of(&self, laws: &[&EmpiricalDistribution], alphas: &[f64]) -> Vec<Vec<Radii>> {
+        let Some(size) = laws.first().map(|law| law.sample_size()) else { return Vec::new() };
+        let RadiusRule::Bridge { paths, scale, .. } = self.rule else {
+            let radius = self.radius_of_size(size);
+            return vec![vec![Radii { radius, radius_ahead: radius }; alphas.len()]; laws.len()];
+        };
+        let atoms: Vec<&[f64]> = laws.iter().map(|law| law.atoms()).collect();
+        let quantiles = |which, size| self.bridges(size, paths).bridge_quantiles(&atoms, which, alphas);
+        let now = quantiles(Statistic::Now, size);
+        let ahead = (size < self.last_size).then(|| quantiles(Statistic::OneLater, size + 1));
+        let of_law = |(index, now): (usize, Vec<f64>)| {
+            let of_level = |(level, now): (usize, f64)| {
+                let known = radius(scale, now, size);
+                let later = ahead.as_ref().map(|ahead| radius(scale, ahead[index][level], size + 1));
+                Radii { radius: known, radius_ahead: later.unwrap_or(known) }
+            };
+            now.into_iter().enumerate().map(of_level).collect()
+        };
+        now.into_iter().enumerate().map(of_law).collect()
+    }
+
+    /// The miscoverage of the rule, where laws of one size have different radii by it.
+    pub fn alpha(&self) -> Option<f64> {
+        self.rule.alpha().filter(|_| self.varies())
+    }
+
     /// The same for `law` with one more value, for every value in ascending `values`.
     pub fn radii_with(&self, law: &EmpiricalDistribution, values: &[f64]) -> Vec<Radii> {
         let size = law.sample_size() + 1;
@@ -212,6 +242,22 @@ mod tests {
         for (framework, rule, expected) in rules {
             let found = radius_of(framework, rule.clone());
             assert!((found - expected).abs() < 1e-7, "{framework} {rule}: {found}");
+        }
+    }
+
+    #[test]
+    fn laws_measured_together_are_measured_as_one_by_one() {
+        let laws =
+            [[0.02, -0.01, 0.04, 0.01], [0.03, -0.05, 0.0, 0.01]].map(|sample| EmpiricalDistribution::new(&sample));
+        let at = |alpha: f64| json!({ "rule": "bridge", "alpha": alpha, "paths": 300, "scale": 1.0 });
+        let alphas = [0.1, 0.5];
+        let together = estimator("adaptive", at(0.3)).radii_of(&laws.each_ref(), &alphas);
+        for (law, found) in laws.iter().zip(together) {
+            let one_by_one = alphas.map(|alpha| {
+                let sets = estimator("adaptive", at(alpha));
+                sets.radii(law, sets.radius(law))
+            });
+            assert_eq!(found, one_by_one);
         }
     }
 
