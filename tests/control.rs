@@ -10,6 +10,7 @@ use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::state::{Realised, State};
 use ballast::control::problem::utility::utility;
 use ballast::control::progress::Watch;
+use ballast::control::request::learning::Learning;
 use ballast::control::solved_step::StepSolution;
 use ballast::control::training::Training;
 use serde_json::{Value, json};
@@ -204,7 +205,7 @@ fn values_stay_above_the_floor_and_actions_in_the_interval_everywhere() {
             );
             for (wealth, shift) in [(100.0, 0.0), (3.0, 0.4), (2000.0, -0.4), (100.0, 2.0)] {
                 let history: Vec<f64> = twenty_returns().iter().map(|z| z * (1.0 + shift) + shift).collect();
-                let state = State::new(&history, wealth).unwrap();
+                let state = State::new(&history, wealth, Learning::default()).unwrap();
                 for step in 0..2 {
                     let advice = solved.advise(step, &state, AdviceMode::Surrogate);
                     assert!(advice.certainty_equivalent >= advice.floor, "{target} {features} {kind} {advice:?}");

@@ -92,9 +92,9 @@ impl Quadrature {
     }
 }
 
-/// `sqrt(kappa / n)` at miscoverage `alpha` in (0, 1] and sample size n.
-pub fn radius(alpha: f64, sample_size: usize) -> f64 {
-    (-2.0 * alpha.ln() / sample_size as f64).max(0.0).sqrt()
+/// `sqrt(kappa / n)` at miscoverage `alpha` in (0, 1] and sample size n, of a weighted sample its effective size.
+pub fn radius(alpha: f64, sample_size: f64) -> f64 {
+    (-2.0 * alpha.ln() / sample_size).max(0.0).sqrt()
 }
 
 impl ConfidenceRegion {

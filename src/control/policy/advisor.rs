@@ -18,7 +18,6 @@ use crate::control::problem::state::{Realised, State};
 use crate::control::request::specification::{Specification, UtilitySpecification};
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
 use crate::control::uncertainty::radius::Measure;
-use crate::numerics::empirical::EmpiricalDistribution;
 
 /// Numbers read in some hundreds of microseconds.
 const PROMPT_COST: usize = 1 << 20;
@@ -119,7 +118,7 @@ impl Advisor {
             let value = format!("{} values", history.len());
             return Err(FieldError::new("history", value, "must be the policy's own under a static framework"));
         }
-        State::new(history, wealth.unwrap_or(problem.initial_wealth))
+        State::new(history, wealth.unwrap_or(problem.initial_wealth), problem.learning)
     }
 
     /// Checks that a state at the start can pay for every withdrawal to come.
@@ -268,6 +267,7 @@ impl Advisor {
             floor,
             radius: asked.radius,
             sample_size: asked.state.law.sample_size(),
+            effective_size: asked.state.law.effective_size(),
             surrogate_sd: predicted.deviation,
             in_design: predicted.in_design,
             source: asked.source,
@@ -314,7 +314,7 @@ impl Advisor {
     /// Whether `state` is the one state that a single-state step was solved at.
     fn is_single_state(&self, step: usize, state: &State) -> bool {
         let problem = &self.specification().problem;
-        let start = EmpiricalDistribution::new(&problem.history);
+        let start = problem.learning.law(&problem.history);
         let same_law = !problem.framework.learns() || (step == 0 && state.law == start);
         let trained = self.specification().design.wealth.map_or(problem.initial_wealth, |wealth| wealth.min);
         let same_wealth = !problem.depends_on_wealth() || state.wealth == trained;
@@ -336,6 +336,7 @@ impl Advisor {
         let Measure { radius, quantile } = self.problem.measure(state);
         Uncertainty {
             sample_size: state.law.sample_size(),
+            effective_size: state.law.effective_size(),
             moments: state.law.raw_moments(self.specification().surrogate.moment_count),
             quantile: quantile.map(|found| found.value),
             quantile_standard_error: quantile.map(|found| found.standard_error),

@@ -5,6 +5,7 @@ pub mod completion;
 pub mod contributions;
 pub mod evaluation;
 pub mod framework;
+pub mod learning;
 pub mod radius_rule;
 pub mod rules;
 pub mod specification;

@@ -3,6 +3,7 @@
 use crate::control::error::FieldError;
 use crate::control::request::contributions::Contributions;
 use crate::control::request::framework::Framework;
+use crate::control::request::learning::Learning;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{
     InitialLaws, Interval, ProblemSpecification, SamplingLaw, Specification, SurrogateSpecification,
@@ -18,6 +19,9 @@ pub const COUNT: std::ops::RangeInclusive<usize> = 10..=LARGEST_COUNT;
 pub const HORIZON: std::ops::RangeInclusive<usize> = 1..=520;
 /// Log-returns of a history.
 pub const HISTORY_LENGTH: std::ops::RangeInclusive<usize> = 2..=20_000;
+/// Periods in which a return's weight halves. Below 1 the newest return would outweigh all others together, however many there are:
+/// at 1 the effective size is at most 3. Above the largest, weights are equal to rounding.
+pub const HALF_LIFE: (f64, f64) = (1.0, 1e15);
 /// Largest log-return in absolute value: a factor of 148 in one step.
 pub const LOG_RETURN: f64 = 5.0;
 /// Two observations closer than this are one value: the standard deviation must exceed it.
@@ -86,6 +90,9 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
     }
     contributions(problem)?;
     utility(problem)?;
+    if let Learning::Decay { half_life } = problem.learning {
+        within("problem.learning.half_life", half_life, HALF_LIFE.0, HALF_LIFE.1)?;
+    }
     radius(&problem.radius_rule(), problem)?;
     if let Some(support) = problem.support {
         if problem.framework.is_parametric() {
@@ -105,7 +112,7 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
         (Some(law), _) => sampling_law("problem.law", law)?,
         (None, _) => {}
     }
-    history("problem.history", &problem.history)?;
+    history("problem.history", &problem.history, problem.learning)?;
     if let (Some(support), Some((index, value))) = (problem.support, outside(&problem.history, problem.support)) {
         let rule = format!("must lie in problem.support, [{}, {}]", support.min, support.max);
         return Err(FieldError::new(format!("problem.history[{index}]"), value, rule));
@@ -213,8 +220,8 @@ fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), Field
     }
 }
 
-/// Checks a history of log-returns, named `field` in messages.
-pub fn history(field: &str, values: &[f64]) -> Result<(), FieldError> {
+/// Checks a history of log-returns, oldest first, of which the law is learned so; named `field` in messages.
+pub fn history(field: &str, values: &[f64], learning: Learning) -> Result<(), FieldError> {
     if !HISTORY_LENGTH.contains(&values.len()) {
         let rule = format!("must hold {} to {} log-returns", HISTORY_LENGTH.start(), HISTORY_LENGTH.end());
         return Err(FieldError::new(field, format!("{} values", values.len()), rule));
@@ -222,10 +229,11 @@ pub fn history(field: &str, values: &[f64]) -> Result<(), FieldError> {
     for (index, &value) in values.iter().enumerate() {
         log_return(&format!("{field}[{index}]"), value)?;
     }
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    let variance = values.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / values.len() as f64;
+    let mean = learning.mean(values, |z| z);
+    let variance = learning.mean(values, |z| (z - mean).powi(2));
     if variance.sqrt() < SMALLEST_DEVIATION {
-        let rule = format!("must vary: its standard deviation must be at least {SMALLEST_DEVIATION:e}");
+        let weighted = if learning.decays() { ", weighted by problem.learning," } else { "" };
+        let rule = format!("must vary: its standard deviation{weighted} must be at least {SMALLEST_DEVIATION:e}");
         return Err(FieldError::new(field, format!("{} values near {mean}", values.len()), rule));
     }
     Ok(())

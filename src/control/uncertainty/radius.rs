@@ -19,6 +19,8 @@ pub struct RadiusEstimator {
     seed: u64,
     /// Sample size at the last step.
     last_size: usize,
+    /// Whether newer returns weigh more.
+    decays: bool,
     /// Where the common random numbers are kept.
     kept: Kept,
 }
@@ -49,8 +51,8 @@ impl RadiusEstimator {
             _ => specification.problem.radius_rule(),
         };
         let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
-        let seed = specification.seed;
-        RadiusEstimator { rule, seed, last_size, kept }
+        let decays = specification.problem.learning.decays();
+        RadiusEstimator { rule, seed: specification.seed, last_size, decays, kept }
     }
 
     /// True where laws of one sample size have different radii.
@@ -84,9 +86,15 @@ impl RadiusEstimator {
         }
     }
 
-    /// What measuring laws of `sample_size` reads: its bridges, and those of the next where a step comes after.
+    /// Whether laws of this size are told what their radius tends to be one return later. Of laws that decay all are, since no size
+    /// is the last of a session that goes on by the first step.
+    fn looks_ahead(&self, sample_size: usize) -> bool {
+        self.decays || sample_size < self.last_size
+    }
+
+    /// What measuring laws of `sample_size` reads: its bridges, and those of the next where it looks ahead.
     fn sizes(&self, sample_size: usize) -> impl Iterator<Item = usize> {
-        [sample_size, sample_size + 1].into_iter().take(if sample_size < self.last_size { 2 } else { 1 })
+        [sample_size, sample_size + 1].into_iter().take(if self.looks_ahead(sample_size) { 2 } else { 1 })
     }
 
     /// Numbers read to measure a law of this size, or `None` where its bridges are yet to be simulated.
@@ -109,22 +117,21 @@ impl RadiusEstimator {
 
     /// Radius of the ball around `law`, in log-return; of the confidence region, in standard deviations of `law`.
     pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
-        let size = law.sample_size();
         match self.rule {
             RadiusRule::Bridge { alpha, paths, scale } => {
-                let bridges = self.bridges(size, paths);
-                radius(scale, bridges.bridge_quantile(law, Statistic::Now, alpha), size)
+                let bridges = self.bridges(law.sample_size(), paths);
+                radius(scale, bridges.bridge_quantile(law, Statistic::Now, alpha), law.effective_size())
             }
-            _ => self.radius_of_size(size),
+            _ => self.radius_of_size(law.effective_size()),
         }
     }
 
     /// The radius of `law` and what it is made of.
     pub fn measure(&self, law: &EmpiricalDistribution) -> Measure {
-        let size = law.sample_size();
+        let size = law.effective_size();
         match self.rule {
             RadiusRule::Bridge { alpha, paths, scale } => {
-                let quantile = self.bridges(size, paths).bridge_quantile_with_error(law, alpha);
+                let quantile = self.bridges(law.sample_size(), paths).bridge_quantile_with_error(law, alpha);
                 Measure { radius: radius(scale, quantile.value, size), quantile: Some(quantile) }
             }
             _ => Measure { radius: self.radius_of_size(size), quantile: None },
@@ -135,12 +142,12 @@ impl RadiusEstimator {
     pub fn radii(&self, law: &EmpiricalDistribution, known: f64) -> Radii {
         let size = law.sample_size();
         let radius_ahead = match self.rule {
-            RadiusRule::Bridge { .. } if size >= self.last_size => known,
+            RadiusRule::Bridge { .. } if !self.looks_ahead(size) => known,
             RadiusRule::Bridge { alpha, paths, scale } => {
                 let bridges = self.bridges(size + 1, paths);
-                radius(scale, bridges.bridge_quantile(law, Statistic::OneLater, alpha), size + 1)
+                radius(scale, bridges.bridge_quantile(law, Statistic::OneLater, alpha), law.effective_sizes_ahead()[0])
             }
-            _ => self.radius_of_size(size),
+            _ => self.radius_of_size(law.effective_size()),
         };
         Radii { radius: known, radius_ahead }
     }
@@ -148,38 +155,41 @@ impl RadiusEstimator {
     /// The same for `law` with one more value, for every value in ascending `values`.
     pub fn radii_with(&self, law: &EmpiricalDistribution, values: &[f64]) -> Vec<Radii> {
         let size = law.sample_size() + 1;
+        let [next_size, size_after] = law.effective_sizes_ahead();
         match self.rule {
             RadiusRule::Bridge { alpha, paths, scale } => {
-                let quantiles = |which, size| {
-                    let found = self.bridges(size, paths).bridge_quantiles_with(law.atoms(), values, which, alpha);
-                    found.into_iter().map(|quantile| radius(scale, quantile, size)).collect::<Vec<f64>>()
+                let quantiles = |which, size, effective_size| {
+                    let found = self.bridges(size, paths).bridge_quantiles_with(law, values, which, alpha);
+                    found.into_iter().map(|quantile| radius(scale, quantile, effective_size)).collect::<Vec<f64>>()
                 };
-                let now = quantiles(Statistic::Now, size);
-                let later = if size < self.last_size { quantiles(Statistic::OneLater, size + 1) } else { now.clone() };
+                let now = quantiles(Statistic::Now, size, next_size);
+                let later = match self.looks_ahead(size) {
+                    true => quantiles(Statistic::OneLater, size + 1, size_after),
+                    false => now.clone(),
+                };
                 now.into_iter().zip(later).map(|(radius, radius_ahead)| Radii { radius, radius_ahead }).collect()
             }
             _ => {
-                let radius = self.radius_of_size(size);
+                let radius = self.radius_of_size(next_size);
                 vec![Radii { radius, radius_ahead: radius }; values.len()]
             }
         }
     }
 
-    /// The radius under the rules that look at the sample size alone.
-    fn radius_of_size(&self, sample_size: usize) -> f64 {
-        let size = sample_size as f64;
+    /// The radius under the rules that look at the effective sample size alone.
+    fn radius_of_size(&self, size: f64) -> f64 {
         match self.rule {
             RadiusRule::Bridge { .. } => 0.0,
             RadiusRule::Concentration { alpha, numerator, rate } => ((numerator / alpha).ln() / (rate * size)).sqrt(),
             RadiusRule::RootN { kappa } => kappa / size.sqrt(),
             RadiusRule::Fixed { radius } => radius,
-            RadiusRule::ChiSquare { alpha } => confidence_region::radius(alpha, sample_size),
+            RadiusRule::ChiSquare { alpha } => confidence_region::radius(alpha, size),
         }
     }
 }
 
-fn radius(scale: f64, quantile: f64, sample_size: usize) -> f64 {
-    scale * quantile / (sample_size as f64).sqrt()
+fn radius(scale: f64, quantile: f64, effective_size: f64) -> f64 {
+    scale * quantile / effective_size.sqrt()
 }
 
 #[cfg(test)]
