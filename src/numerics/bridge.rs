@@ -239,19 +239,21 @@ mod tests {
         let small = [0.02, -0.05, 0.11, 0.04, 0.04];
         let large: Vec<f64> = (0..3000).map(|k| (f64::from(k) / 1500.0 - 1.0).powi(3)).collect();
         let values = [-2.0, -0.7, -0.05, 0.0, 0.001, 0.04, 0.4, 0.41, 3.0];
-        for (law, [now, later]) in [1.0, 0.6].into_iter().flat_map(|retention| {
-            let sample_size = [6, 7].map(|size| AbsoluteBridges::simulate(size, 300, 9));
-            let graded = [(); 2].map(|()| AbsoluteBridges::graded(50, 2));
-            let law = |sample| EmpiricalDistribution::decaying(sample, retention);
-            [(law(&small), sample_size), (law(&large), graded)]
-        }) {
-            for (which, bridges) in [(Statistic::Now, now), (Statistic::OneLater, later)] {
-                let carried = bridges.bridge_quantiles_with(&law, &values, which, 0.1);
-                for (value, quantile) in values.iter().zip(carried) {
-                    let mut larger = law.clone();
-                    larger.push(*value);
-                    // The tolerance of one of many quantiles.
-                    assert!((bridges.bridge_quantile(&larger, which, 0.1) - quantile).abs() < 1e-6);
+        for retention in [1.0, 0.6] {
+            for (sample, bridges) in [
+                (&small[..], [6, 7].map(|size| AbsoluteBridges::simulate(size, 300, 9))),
+                (&large, [2, 3].map(|seed| AbsoluteBridges::graded(50, seed))),
+            ] {
+                let law = EmpiricalDistribution::decaying(sample, retention);
+                for (which, bridges) in [Statistic::Now, Statistic::OneLater].into_iter().zip(bridges) {
+                    let carried = bridges.bridge_quantiles_with(&law, &values, which, 0.1);
+                    for (value, quantile) in values.iter().zip(carried) {
+                        let mut larger = law.clone();
+                        larger.push(*value);
+                        let expected = bridges.bridge_quantile(&larger, which, 0.1);
+                        // The tolerance of one of many quantiles, for values as far apart as these.
+                        assert!((quantile / expected - 1.0).abs() < 5e-6, "{retention} {value}: {quantile} {expected}");
+                    }
                 }
             }
         }
@@ -267,20 +269,6 @@ mod tests {
             let [one, other] = [&equal, &decaying].map(|law| bridges.bridge_quantile(law, which, 0.1));
             // Times move by some 1e-15, and between two nodes |B| grows by about its size: the tolerance of a quantile is 1e-9.
             assert!((one / other - 1.0).abs() < 1e-9, "{one} and {other}");
-        }
-    }
-
-    /// The times of one sample size serve weights that decay: the graded ones, which are finer there, say the same of them.
-    #[test]
-    fn interpolating_between_the_nodes_of_a_small_sample_is_close() {
-        let sample: Vec<f64> =
-            (0..60).map(|k| 0.05 * f64::from(k * 37 % 60 - 30) / (5.0 + f64::from(k * 17 % 31))).collect();
-        for (size, half_life, bias) in [(6, 2.0, 0.03), (12, 3.0, 0.01), (30, 10.0, 0.004), (60, 6.0, 0.002)] {
-            let law = EmpiricalDistribution::decaying(&sample[..size], 0.5_f64.powf(1.0 / half_life));
-            let expected = AbsoluteBridges::graded(20_000, 4).bridge_quantile_with_error(&law, 0.1);
-            let found = AbsoluteBridges::simulate(size, 20_000, 4).bridge_quantile_with_error(&law, 0.1);
-            let allowed = bias * expected.value + 4.0 * expected.standard_error.hypot(found.standard_error);
-            assert!((found.value - expected.value).abs() < allowed, "{size}: {found:?} against {expected:?}");
         }
     }
 

@@ -19,6 +19,8 @@ use crate::control::request::specification::{Specification, UtilitySpecification
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
 use crate::control::uncertainty::radius::Measure;
 
+/// Share of the largest effective size from which on a record counts as settled.
+const SETTLED: f64 = 0.99;
 /// Numbers read in some hundreds of microseconds.
 const PROMPT_COST: usize = 1 << 20;
 
@@ -127,6 +129,13 @@ impl Advisor {
     /// The bank alone runs dry, under the name `wealth`.
     pub fn check_withdrawals(&self, state: &State) -> Result<(), FieldError> {
         self.problem.check_withdrawals(state)
+    }
+
+    /// Whether a record of so many returns is as long as any to what is learned of it: its effective size is within a hundredth of
+    /// what that tends to. Then laws move on and their precision does not, and [`Self::advise`] at step 0 serves every period.
+    /// Checked by: `tests/learning.rs::the_first_step_serves_every_law_once_the_record_has_settled`.
+    pub fn is_settled(&self, returns: usize) -> bool {
+        self.specification().problem.learning.settled(returns) >= SETTLED
     }
 
     /// The advice for the period after `step` observed periods. `step` must be below the horizon.

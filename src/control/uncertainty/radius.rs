@@ -12,6 +12,10 @@ use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
 use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
 
+/// Where the oldest return of the last law weighs at least this share of the newest, times lie within 1/8000 of i/n, and |B| is read
+/// off the bridges of n.
+const ALL_BUT_EQUAL: f64 = 0.999;
+
 /// The radius rule of a specification, with its common random numbers.
 pub struct RadiusEstimator {
     /// That of the specification; a radius of 0 where the framework has no uncertainty (known law, plug-in).
@@ -21,6 +25,8 @@ pub struct RadiusEstimator {
     last_size: usize,
     /// Whether newer returns weigh more.
     decays: bool,
+    /// Whether their times lie anywhere, and not at those of the sample size or next to them.
+    graded: bool,
     /// Where the common random numbers are kept.
     kept: Kept,
 }
@@ -51,8 +57,9 @@ impl RadiusEstimator {
             _ => specification.problem.radius_rule(),
         };
         let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
-        let decays = specification.problem.learning.decays();
-        RadiusEstimator { rule, seed: specification.seed, last_size, decays, kept }
+        let learning = specification.problem.learning;
+        let graded = learning.retention().powf(last_size as f64) < ALL_BUT_EQUAL;
+        RadiusEstimator { rule, seed: specification.seed, last_size, decays: learning.decays(), graded, kept }
     }
 
     /// True where laws of one sample size have different radii.
@@ -60,18 +67,24 @@ impl RadiusEstimator {
         matches!(self.rule, RadiusRule::Bridge { scale, .. } if scale > 0.0)
     }
 
-    /// The name of the bridges of sample size n; all large ones share those of [`GRADED_FROM`].
-    fn key(&self, sample_size: usize, paths: usize) -> Key {
-        Key::Bridges { sample_size: sample_size.min(GRADED_FROM), paths, seed: self.seed }
+    /// The sample size whose bridges serve laws of n returns: all large ones share those of [`GRADED_FROM`], and so do all whose
+    /// weights decay.
+    fn bridged(&self, sample_size: usize) -> usize {
+        if self.graded { GRADED_FROM } else { sample_size.min(GRADED_FROM) }
     }
 
-    /// The bridges of sample size n.
+    /// The name of those bridges.
+    fn key(&self, sample_size: usize, paths: usize) -> Key {
+        Key::Bridges { sample_size: self.bridged(sample_size), paths, seed: self.seed }
+    }
+
+    /// Those bridges.
     fn bridges(&self, sample_size: usize, paths: usize) -> Arc<AbsoluteBridges> {
-        let simulate = || match sample_size {
-            ..GRADED_FROM => AbsoluteBridges::simulate(sample_size, paths, self.seed),
+        let simulate = || match self.bridged(sample_size) {
+            size @ ..GRADED_FROM => AbsoluteBridges::simulate(size, paths, self.seed),
             _ => AbsoluteBridges::graded(paths, self.seed),
         };
-        let bytes = AbsoluteBridges::bytes_of(sample_size, paths);
+        let bytes = AbsoluteBridges::bytes_of(self.bridged(sample_size), paths);
         self.kept.get_or_make(&self.key(sample_size, paths), bytes, simulate)
     }
 
@@ -80,7 +93,7 @@ impl RadiusEstimator {
         match self.rule {
             RadiusRule::Bridge { paths, .. } => {
                 let largest_of_its_own = sample_size.max(GRADED_FROM - 1);
-                AbsoluteBridges::bytes_of((sample_size + steps).min(largest_of_its_own), paths)
+                AbsoluteBridges::bytes_of(self.bridged((sample_size + steps).min(largest_of_its_own)), paths)
             }
             _ => 0,
         }
@@ -102,7 +115,7 @@ impl RadiusEstimator {
         match self.rule {
             RadiusRule::Bridge { paths, .. } => {
                 let ready = |size: usize| self.kept.has(&self.key(size, paths));
-                self.sizes(sample_size).all(ready).then_some(2 * sample_size.min(GRADED_FROM) * paths)
+                self.sizes(sample_size).all(ready).then_some(2 * self.bridged(sample_size) * paths)
             }
             _ => Some(sample_size),
         }

@@ -216,6 +216,24 @@ JobKind: TypeAlias = Literal["train", "evaluate"]
 JobState: TypeAlias = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 
 
+class Learning1(TypedDict):
+    """As much as any other."""
+
+    kind: Literal["equal"]
+
+
+class Learning2(TypedDict):
+    """Half as much as one that is `half_life` periods newer: the law forgets what is long past."""
+
+    half_life: float
+    """In periods."""
+    kind: Literal["decay"]
+
+
+Learning: TypeAlias = Learning1 | Learning2
+"""What a return weighs in the law that is learned: of the history and of what is seen after it alike."""
+
+
 class LeftOut(TypedDict):
     """The advice without one return."""
 
@@ -474,7 +492,7 @@ class SamplingLaw1(TypedDict):
 
 
 class SamplingLaw2(TypedDict):
-    """Smoothed bootstrap of the history, with the history's own mean and variance."""
+    """Smoothed bootstrap of the history, each return with its weight, with the mean and variance that gives."""
 
     kind: Literal["bootstrap"]
 
@@ -560,8 +578,10 @@ class Uncertainty(TypedDict):
 
     sample_size: int
     """Returns seen, those of the history among them."""
+    effective_size: float
+    """How many returns of equal weight tell as much: as many as were seen where `learning` is `equal`."""
     moments: list[float]
-    """Raw moments of the empirical law, first to the specification's count."""
+    """Raw moments of the law learned, first to the specification's count."""
     quantile: NotRequired[float | None]
     """(1 - alpha)-quantile of the bridge statistic; absent under other radius rules."""
     quantile_standard_error: NotRequired[float | None]
@@ -688,6 +708,8 @@ class Advice(TypedDict):
     """
     sample_size: int
     """Returns seen, those of the history among them."""
+    effective_size: float
+    """How many returns of equal weight tell as much: as many as were seen where `learning` is `equal`."""
     surrogate_sd: float
     """Predicted standard deviation of the log certainty equivalent."""
     in_design: bool
@@ -861,6 +883,8 @@ class ProblemSpecification(TypedDict):
     """Money added at the end of each period, withdrawn where it is negative: one number for all, or `horizon` numbers."""
     utility: NotRequired[UtilitySpecification]
     """Of terminal wealth."""
+    learning: NotRequired[Learning]
+    """What older returns weigh in the law that is learned."""
     radius: NotRequired[RadiusRule | None]
     support: NotRequired[Interval | None]
     law: NotRequired[SamplingLaw | None]
