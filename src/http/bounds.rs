@@ -7,9 +7,10 @@ use serde_json::{Map, Value, json};
 use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
 use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
+use crate::control::request::learning::HALF_LIFE;
 use crate::control::request::rules::{
-    COUNT, FIXED_RADIUS, HALF_LIFE, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR,
-    RADIUS_SCALE, RATE, RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST, WEALTH,
+    COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR, RADIUS_SCALE, RATE,
+    RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST, WEALTH,
 };
 use crate::service::report::{LONGEST_REASON, MOST_CORRECTIONS, PRICE};
 use crate::service::what_if::POINTS;

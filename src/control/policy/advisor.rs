@@ -19,8 +19,6 @@ use crate::control::request::specification::{Specification, UtilitySpecification
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
 use crate::control::uncertainty::radius::Measure;
 
-/// Share of the largest effective size from which on a record counts as settled.
-const SETTLED: f64 = 0.99;
 /// Numbers read in some hundreds of microseconds.
 const PROMPT_COST: usize = 1 << 20;
 
@@ -114,9 +112,8 @@ impl Advisor {
     /// uncertainty set is frozen at it.
     pub fn initial_state(&self, history: Option<&[f64]>, wealth: Option<f64>) -> Result<State, FieldError> {
         let problem = &self.specification().problem;
-        let own = &problem.history;
-        let history = history.unwrap_or(own);
-        if problem.framework.is_frozen() && history != own {
+        let history = history.unwrap_or(&problem.history);
+        if problem.framework.is_frozen() && history != problem.history {
             let value = format!("{} values", history.len());
             return Err(FieldError::new("history", value, "must be the policy's own under a static framework"));
         }
@@ -129,13 +126,6 @@ impl Advisor {
     /// The bank alone runs dry, under the name `wealth`.
     pub fn check_withdrawals(&self, state: &State) -> Result<(), FieldError> {
         self.problem.check_withdrawals(state)
-    }
-
-    /// Whether a record of so many returns is as long as any to what is learned of it: its effective size is within a hundredth of
-    /// what that tends to. Then laws move on and their precision does not, and [`Self::advise`] at step 0 serves every period.
-    /// Checked by: `tests/learning.rs::the_first_step_serves_every_law_once_the_record_has_settled`.
-    pub fn is_settled(&self, returns: usize) -> bool {
-        self.specification().problem.learning.settled(returns) >= SETTLED
     }
 
     /// The advice for the period after `step` observed periods. `step` must be below the horizon.
@@ -323,8 +313,8 @@ impl Advisor {
     /// Whether `state` is the one state that a single-state step was solved at.
     fn is_single_state(&self, step: usize, state: &State) -> bool {
         let problem = &self.specification().problem;
-        let start = problem.learning.law(&problem.history);
-        let same_law = !problem.framework.learns() || (step == 0 && state.law == start);
+        let same_law =
+            !problem.framework.learns() || (step == 0 && state.law == problem.learning.law(&problem.history));
         let trained = self.specification().design.wealth.map_or(problem.initial_wealth, |wealth| wealth.min);
         let same_wealth = !problem.depends_on_wealth() || state.wealth == trained;
         same_law && same_wealth

@@ -3,7 +3,12 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::error::FieldError;
 use crate::numerics::empirical::{EmpiricalDistribution, weights};
+
+/// Periods in which a return's weight halves. Below 1 the newest return would outweigh all others together, however many there are:
+/// at 1 the effective size is at most 3. Above the largest, weights are equal to rounding.
+pub const HALF_LIFE: (f64, f64) = (1.0, 1e15);
 
 /// What a return weighs in the law that is learned: of the history and of what is seen after it alike.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -25,6 +30,21 @@ impl Default for Learning {
 }
 
 impl Learning {
+    /// Checks the half-life.
+    ///
+    /// # Errors
+    /// It is out of [`HALF_LIFE`].
+    pub fn check(self) -> Result<(), FieldError> {
+        let (least, most) = HALF_LIFE;
+        match self {
+            Learning::Decay { half_life } if !(least..=most).contains(&half_life) => {
+                let rule = format!("must be a number in [{least}, {most}]");
+                Err(FieldError::new("problem.learning.half_life", half_life, rule))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Whether older returns weigh less.
     pub fn decays(self) -> bool {
         self != Learning::Equal {}
@@ -53,6 +73,12 @@ impl Learning {
         let weights = self.weights(record.len());
         let sum = record.iter().zip(&weights).map(|(&log_return, weight)| weight * value(log_return)).sum::<f64>();
         sum / weights.iter().sum::<f64>()
+    }
+
+    /// Standard deviation of a record, oldest first.
+    pub fn deviation(self, record: &[f64]) -> f64 {
+        let mean = self.mean(record, |log_return| log_return);
+        self.mean(record, |log_return| (log_return - mean).powi(2)).sqrt()
     }
 
     /// [`EmpiricalDistribution::effective_size`] of the law of `count` returns:

@@ -19,9 +19,6 @@ pub const COUNT: std::ops::RangeInclusive<usize> = 10..=LARGEST_COUNT;
 pub const HORIZON: std::ops::RangeInclusive<usize> = 1..=520;
 /// Log-returns of a history.
 pub const HISTORY_LENGTH: std::ops::RangeInclusive<usize> = 2..=20_000;
-/// Periods in which a return's weight halves. Below 1 the newest return would outweigh all others together, however many there are:
-/// at 1 the effective size is at most 3. Above the largest, weights are equal to rounding.
-pub const HALF_LIFE: (f64, f64) = (1.0, 1e15);
 /// Largest log-return in absolute value: a factor of 148 in one step.
 pub const LOG_RETURN: f64 = 5.0;
 /// Two observations closer than this are one value: the standard deviation must exceed it.
@@ -71,8 +68,8 @@ pub fn check(specification: &Specification) -> Result<(), FieldError> {
 fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
     whole("problem.horizon", problem.horizon, &HORIZON)?;
     within("problem.rate_per_step", problem.rate_per_step, RATE.0, RATE.1)?;
-    let (fewest, most) = PERIODS_PER_YEAR;
-    problem.periods_per_year.map_or(Ok(()), |count| within("problem.periods_per_year", count, fewest, most))?;
+    let (least, most) = PERIODS_PER_YEAR;
+    problem.periods_per_year.map_or(Ok(()), |count| within("problem.periods_per_year", count, least, most))?;
     wealth("problem.initial_wealth", problem.initial_wealth)?;
     let [lowest, highest] = problem.action_interval;
     if lowest != 0.0 {
@@ -90,9 +87,7 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
     }
     contributions(problem)?;
     utility(problem)?;
-    if let Learning::Decay { half_life } = problem.learning {
-        within("problem.learning.half_life", half_life, HALF_LIFE.0, HALF_LIFE.1)?;
-    }
+    problem.learning.check()?;
     radius(&problem.radius_rule(), problem)?;
     if let Some(support) = problem.support {
         if problem.framework.is_parametric() {
@@ -229,12 +224,9 @@ pub fn history(field: &str, values: &[f64], learning: Learning) -> Result<(), Fi
     for (index, &value) in values.iter().enumerate() {
         log_return(&format!("{field}[{index}]"), value)?;
     }
-    let mean = learning.mean(values, |z| z);
-    let variance = learning.mean(values, |z| (z - mean).powi(2));
-    if variance.sqrt() < SMALLEST_DEVIATION {
-        let weighted = if learning.decays() { ", weighted by problem.learning," } else { "" };
-        let rule = format!("must vary: its standard deviation{weighted} must be at least {SMALLEST_DEVIATION:e}");
-        return Err(FieldError::new(field, format!("{} values near {mean}", values.len()), rule));
+    if learning.deviation(values) < SMALLEST_DEVIATION {
+        let rule = format!("must vary: as learned, its standard deviation must be at least {SMALLEST_DEVIATION:e}");
+        return Err(FieldError::new(field, format!("{} values near {}", values.len(), values[0]), rule));
     }
     Ok(())
 }
