@@ -205,7 +205,7 @@ async fn an_evaluation_measures_coverage_by_weight() {
     asked["problem"]["law"] = law;
     asked["problem"]["history"] = json!((0..40).map(|k| 0.008 + 0.001 * f64::from(k)).collect::<Vec<f64>>());
     asked["design"] = json!({ "count": 12 });
-    (asked["frameworks"], asked["paths"]) = (json!(["adaptive", "static", "known_law"]), json!(20));
+    (asked["frameworks"], asked["paths"]) = (json!(["adaptive", "static", "known_law"]), json!(100));
     asked["histories"] = json!({ "kind": "drawn", "count": 60 });
     let (status, job) = app.post("/evaluate", &asked).await;
     assert_eq!(status, StatusCode::ACCEPTED, "{job}");

@@ -204,8 +204,8 @@ fn another_program_finds_the_bridge_radius_with_random_numbers_of_its_own() {
             // Either simulation has its error, and four of both together pass one seed in 16,000.
             let allowed = 4.0 * own_error.hypot(number("standard_error"));
             assert!((quantile - number("value")).abs() < allowed, "{learning} {which}: {quantile} and {found}");
-            // An error of three in a hundred would show.
-            assert!(allowed < 0.03 * quantile, "{learning} {which}: {allowed} of {quantile}");
+            // An error of four in a hundred would show.
+            assert!(allowed < 0.04 * quantile, "{learning} {which}: {allowed} of {quantile}");
         }
         let trend = radii.radius_ahead / radii.radius;
         assert!(trend < 0.97, "{trend}");

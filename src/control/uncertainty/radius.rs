@@ -12,8 +12,8 @@ use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
 use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
 
-/// Where the oldest return of the last law weighs at least this share of the newest, times lie within 1/8000 of i/n, and |B| is read
-/// off the bridges of n.
+/// Where the oldest return of the last law weighs at least this share of the newest, weights are taken to decay no more than
+/// rounding does: times lie within 1/8000 of i/n, and |B| is read off the bridges of n.
 const ALL_BUT_EQUAL: f64 = 0.999;
 
 /// The radius rule of a specification, with its common random numbers.
@@ -23,10 +23,8 @@ pub struct RadiusEstimator {
     seed: u64,
     /// Sample size at the last step.
     last_size: usize,
-    /// Whether newer returns weigh more.
+    /// Whether weights decay, more than a little.
     decays: bool,
-    /// Whether their times lie anywhere, and not at those of the sample size or next to them.
-    graded: bool,
     /// Where the common random numbers are kept.
     kept: Kept,
 }
@@ -58,8 +56,8 @@ impl RadiusEstimator {
         };
         let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
         let learning = specification.problem.learning;
-        let graded = learning.retention().powf(last_size as f64) < ALL_BUT_EQUAL;
-        RadiusEstimator { rule, seed: specification.seed, last_size, decays: learning.decays(), graded, kept }
+        let decays = learning.retention().powf(last_size as f64) < ALL_BUT_EQUAL;
+        RadiusEstimator { rule, seed: specification.seed, last_size, decays, kept }
     }
 
     /// True where laws of one sample size have different radii.
@@ -70,7 +68,7 @@ impl RadiusEstimator {
     /// The sample size whose bridges serve laws of n returns: all large ones share those of [`GRADED_FROM`], and so do all whose
     /// weights decay.
     fn bridged(&self, sample_size: usize) -> usize {
-        if self.graded { GRADED_FROM } else { sample_size.min(GRADED_FROM) }
+        if self.decays { GRADED_FROM } else { sample_size.min(GRADED_FROM) }
     }
 
     /// The name of those bridges.
