@@ -102,8 +102,8 @@ fn the_bridge_quantile_of_decaying_weights_agrees_with_a_million_paths() {
         let found = measure.quantile.unwrap();
         let allowed = 4.0 * found.standard_error.hypot(number("standard_error"));
         assert!((found.value - number("quantile")).abs() < allowed, "{found:?} against {}", number("quantile"));
-        // An error of one in a hundred would show.
-        assert!(allowed < 0.01 * found.value, "{allowed}");
+        // An error of two in a hundred would show.
+        assert!(allowed < 0.02 * found.value, "{allowed}");
         assert!((measure.radius / (found.value / number("effective_size").sqrt()) - 1.0).abs() < 1e-13);
     }
 }
