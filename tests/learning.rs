@@ -213,10 +213,10 @@ async fn an_evaluation_measures_coverage_by_weight() {
     assert_eq!(done["state"], "succeeded", "{done}");
     let report = app.get(done["report"].as_str().unwrap()).await.1;
     let covered = &report["strategies"][0]["coverage"]["by_sample_size"][0]["covered"];
-    // The ball of 40 returns that weigh like 17 is to hold the law in nine cases of ten: less than 0.75 or all would show that the
-    // distance, or the size, is not that of the weights (50 histories: one standard error is 0.04).
+    // The ball of 40 returns that weigh like 17 holds the law in 87 % of cases (an independent simulation of 250; the bridge is a limit),
+    // four standard errors of 50 are 19 %. By equal weights the distance would be so small that every ball held it.
     let share = covered["value"].as_f64().unwrap();
-    assert!(share > 0.75 && share <= 1.0, "{covered}");
+    assert!(share > 0.68 && share < 1.0, "{covered}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
