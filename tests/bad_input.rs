@@ -49,6 +49,8 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
             "problem.utility.risk_aversion_relative",
         ),
         ("/problem/utility", json!({"kind": "power", "risk_aversion": 1.0}), "problem.utility.risk_aversion"),
+        ("/problem/learning", json!({"kind": "decay", "half_life": 0.5}), "problem.learning.half_life"),
+        ("/problem/learning", json!({"kind": "decay", "half_life": -12.0}), "problem.learning.half_life"),
         ("/problem/radius", json!({"rule": "bridge", "alpha": 0.0}), "problem.radius.alpha"),
         ("/problem/radius", json!({"rule": "bridge", "paths": 1}), "problem.radius.paths"),
         ("/problem/radius", json!({"rule": "bridge", "scale": -1.0}), "problem.radius.scale"),

@@ -12,6 +12,7 @@ use ballast::control::pool::TrainingPool;
 use ballast::control::problem::state::State;
 use ballast::control::progress::Watch;
 use ballast::control::request::framework::Framework;
+use ballast::control::request::learning::Learning;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 use support::{App, specification};
@@ -57,7 +58,7 @@ fn advised(request: &Value, history: &[f64], lived: &[f64], wealth: f64) -> f64 
     let mut request = request.clone();
     request["problem"]["history"] = json!(history);
     let advisor = Advisor::new(support::policies::train(request));
-    let mut state = State::new(history, wealth).unwrap();
+    let mut state = State::new(history, wealth, Learning::default()).unwrap();
     lived.iter().for_each(|&seen| state.law.push(seen));
     advisor.advise(lived.len(), &state, AdviceMode::Surrogate).allocation
 }
@@ -77,7 +78,8 @@ async fn until_renewed(app: &App, renewals: usize) -> Value {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_session_goes_on_by_another_policy_as_one_that_is_opened_there_does() {
     let mut app = App::start().await;
-    let (short, long) = (request(2), request(4));
+    let (short, mut long) = (request(2), request(4));
+    long["problem"]["learning"] = json!({ "kind": "decay", "half_life": 6.0 });
     app.train(&long).await;
     let next = app.policy.clone();
     app.train(&short).await;
@@ -92,7 +94,7 @@ async fn a_session_goes_on_by_another_policy_as_one_that_is_opened_there_does() 
     assert_eq!(renewed["horizon"], 6);
     assert_eq!(
         renewed["terms"],
-        json!({ "horizon": 4, "rate_per_step": 0.002, "trading_cost": 0.0, "contributions": 0.0 })
+        json!({ "horizon": 4, "rate_per_step": 0.002, "trading_cost": 0.0, "contributions": 0.0, "learning": { "kind": "decay", "half_life": 6.0 } })
     );
     assert_eq!(renewed["sample_size"], 8);
     let now = session(&app).await;
@@ -104,7 +106,7 @@ async fn a_session_goes_on_by_another_policy_as_one_that_is_opened_there_does() 
     // The next policy at the law of the window, by the library.
     let wealth = number(&now["wealth"]);
     let advisor = Advisor::new(support::policies::train(long));
-    let mut state = State::new(&record(2, 8), wealth).unwrap();
+    let mut state = State::new(&record(2, 8), wealth, Learning::Decay { half_life: 6.0 }).unwrap();
     for period in 3..=6 {
         let expected = advisor.advise(period - 3, &state, AdviceMode::Surrogate);
         let (status, action) = app.action().await;

@@ -61,8 +61,8 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         }
         let laws = Problem::new(&specification);
         let sampling_law = specification.design.sampling_law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
-        let law = continuous_law(sampling_law, &specification.problem.history);
-        let history = EmpiricalDistribution::new(&specification.problem.history);
+        let law = continuous_law(sampling_law, &specification.problem);
+        let history = specification.problem.learning.law(&specification.problem.history);
         let described = problem.describe(0, start).len();
         let mut names: Vec<String> = (0..described).map(|index| format!("state_{index}")).collect();
         names.extend(laws.selection.names());

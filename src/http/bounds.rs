@@ -8,6 +8,7 @@ use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
 use crate::control::request::backtest;
 use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
+use crate::control::request::learning::HALF_LIFE;
 use crate::control::request::rules::{
     COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR, RADIUS_SCALE, RATE,
     RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST, WEALTH,
@@ -45,6 +46,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("ProblemSpecification", "action_interval", action),
         ("ProblemSpecification", "trading_cost", within(TRADING_COST)),
         ("ProblemSpecification", "history", history),
+        ("Learning", "half_life", within(HALF_LIFE)),
         ("UtilitySpecification exponential", "risk_aversion", within(RISK_AVERSION)),
         ("UtilitySpecification exponential", "risk_aversion_relative", within(RISK_AVERSION_RELATIVE)),
         ("UtilitySpecification power", "risk_aversion", json!({ "exclusiveMinimum": 1, "maximum": 100 })),
@@ -215,7 +217,8 @@ mod tests {
         let mut given = json!({
             "problem": { "history": [0.1, -0.1, 0.05], "horizon": 3, "rate_per_step": 0.0, "periods_per_year": 12.0,
                 "initial_wealth": 100.0, "trading_cost": 0.0, "utility": { "kind": "exponential", "risk_aversion": 0.01 },
-                "radius": { "rule": "bridge", "alpha": 0.1, "paths": 200, "scale": 1.0 } },
+                "radius": { "rule": "bridge", "alpha": 0.1, "paths": 200, "scale": 1.0 },
+                "learning": { "kind": "decay", "half_life": 2.0 } },
             "design": { "count": 20, "sampling_law": { "kind": "student_t", "location": 0.0, "scale": 0.1,
                 "degrees_of_freedom": 5.0 } },
             "surrogate": { "moment_count": 4 }
@@ -240,6 +243,7 @@ mod tests {
             ("/problem/initial_wealth", of("ProblemSpecification", None, "initial_wealth"), 1e-7),
             ("/problem/trading_cost", of("ProblemSpecification", None, "trading_cost"), 1e-3),
             ("/problem/history/0", of("ProblemSpecification", None, "history")["items"].clone(), 1e-3),
+            ("/problem/learning/half_life", of("Learning", Some(1), "half_life"), 1e-3),
             ("/problem/radius/paths", of("RadiusRule", Some(0), "paths"), 1.0),
             ("/problem/radius/scale", of("RadiusRule", Some(0), "scale"), 1e-3),
             ("/problem/radius/alpha", of("RadiusRule", Some(0), "alpha"), 1e-4),

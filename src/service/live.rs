@@ -46,9 +46,9 @@ pub struct Live {
     pub(super) advice: Option<Advice>,
 }
 
-/// Bytes of a session in memory, and of each of its returns, in the law and in the history.
+/// Bytes of a session in memory, and of each of its returns: in the law with its weight, and in the history.
 pub(super) const SESSION_BYTES: usize = 3000;
-const RETURN_BYTES: usize = 16;
+const RETURN_BYTES: usize = 24;
 
 impl Live {
     /// The session that its entries tell of.

@@ -102,8 +102,10 @@ impl Periods {
     /// The entries are not those of the session.
     pub(super) fn of(facts: &SessionFacts) -> Result<Self, ServiceError> {
         let SessionFacts { row, entries, .. } = facts;
-        let state = State::new(&row.initial_history, row.initial_wealth)?.with_holding(row.initial_holding)?;
-        let first = Stretch { policy: row.policy.clone(), after: 0, terms: Plan::of(row)?.terms, window: None };
+        let terms = Plan::of(row)?.terms;
+        let state = State::new(&row.initial_history, row.initial_wealth, terms.learning)?;
+        let state = state.with_holding(row.initial_holding)?;
+        let first = Stretch { policy: row.policy.clone(), after: 0, terms, window: None };
         let mut periods = Periods {
             all: Vec::new(),
             corrections: 0,
@@ -246,7 +248,7 @@ impl<'a> Passage<'a> {
     /// Goes on under the policies that begin here.
     fn renew(&mut self) -> Result<(), FieldError> {
         while let Some(next) = self.periods.stretches.get(self.stretch + 1).filter(|next| next.after == self.step) {
-            self.standing = self.standing.renewed(&self.record, next.window)?;
+            self.standing = self.standing.renewed(&self.record, next.window, next.terms.learning)?;
             self.stretch += 1;
         }
         Ok(())

@@ -75,17 +75,17 @@ impl Sessions {
     ) -> Result<Decided, ServiceError> {
         let advisor = self.policies.advisor(tenant, &renew.policy).await?;
         let (observed, corrections, before) = (periods.all.len(), periods.corrections, periods.current().horizon());
-        let (onto, window) = (advisor.clone(), renew.window);
+        let terms = Terms::of(&advisor.specification().problem);
+        let (onto, window, learning) = (advisor.clone(), renew.window, terms.learning);
         let go_on = move || {
             let passage = periods.replay()?;
-            let standing = passage.standing.renewed(&passage.record, window)?;
+            let standing = passage.standing.renewed(&passage.record, window, learning)?;
             accepts(&onto, last_of(&passage.record, window), standing.state.wealth)?;
             Ok::<_, ServiceError>(standing)
         };
         let standing = self.advising.run(tenant, go_on).await??;
         self.policies.starts_from(&advisor, standing.state.law.sample_size())?;
         let (standing, uncertainty) = measured(&self.advising, &advisor, tenant, 0, standing).await?;
-        let terms = Terms::of(&advisor.specification().problem);
         let current = Stretch { policy: renew.policy.clone(), after: observed, terms, window };
         let (horizon, radius) = (current.horizon(), Some(uncertainty.radius));
         let answer = Renewed {

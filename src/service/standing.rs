@@ -10,6 +10,7 @@ use super::report::Report;
 use crate::control::error::FieldError;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::state::{Realised, State};
+use crate::control::request::learning::Learning;
 use crate::control::request::rules;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::moments::CentralMoments;
@@ -43,13 +44,18 @@ impl Standing {
         Standing { state, price: None, date: None, bet: Bet::default(), seen: None, session: session.into() }
     }
 
-    /// The same with the law of the last `window` returns of `record`, which holds all that were seen.
+    /// The same with the law that the last `window` returns of `record` teach, which holds all that were seen.
     ///
     /// # Errors
     /// They are no history.
-    pub(super) fn renewed(&self, record: &[f64], window: Option<usize>) -> Result<Self, FieldError> {
+    pub(super) fn renewed(
+        &self,
+        record: &[f64],
+        window: Option<usize>,
+        learning: Learning,
+    ) -> Result<Self, FieldError> {
         let last = last_of(record, window);
-        let state = State::new(last, self.state.wealth)?.with_holding(self.state.holding)?;
+        let state = State::new(last, self.state.wealth, learning)?.with_holding(self.state.holding)?;
         let seen = (last.len() < record.len()).then(|| EmpiricalDistribution::new(record));
         let Standing { price, date, bet, .. } = *self;
         Ok(Standing { state, price, date, bet, seen, session: self.session.clone() })

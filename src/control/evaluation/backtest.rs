@@ -9,6 +9,7 @@ use crate::control::progress::Watch;
 use crate::control::request::backtest::BacktestRequest;
 use crate::control::request::framework::Framework;
 use crate::control::request::frequency::Frequency;
+use crate::control::request::learning::Learning;
 use crate::control::request::rules;
 use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::warnings::Warning;
@@ -67,7 +68,7 @@ impl Backtest {
         for stretch in 0..walk.stretches(periods.len()) {
             let start = stretch * walk.every;
             let past: Vec<f64> = periods[start..start + walk.window].iter().map(|period| period.log_return).collect();
-            rules::history(field, &past).map_err(|error| {
+            rules::history(field, &past, Learning::default()).map_err(|error| {
                 let rule = format!("{}, in the window from period {} on", error.rule, start + 1);
                 FieldError::new(error.field, error.value, rule)
             })?;

@@ -8,6 +8,7 @@ pub mod dates;
 pub mod evaluation;
 pub mod framework;
 pub mod frequency;
+pub mod learning;
 pub mod radius_rule;
 pub mod rules;
 pub mod specification;

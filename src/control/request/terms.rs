@@ -4,10 +4,11 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::contributions::Contributions;
+use super::learning::Learning;
 use super::specification::ProblemSpecification;
 use crate::control::problem::dynamics::Dynamics;
 
-/// Rate, cost and flows of the periods that a policy is lived by.
+/// Rate, cost and flows of the periods that a policy is lived by, and how its law is learned.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Terms {
     /// T, periods.
@@ -18,6 +19,8 @@ pub struct Terms {
     pub trading_cost: f64,
     /// C, money added at the end of each period.
     pub contributions: Contributions,
+    /// What older returns weigh.
+    pub learning: Learning,
 }
 
 impl Terms {
@@ -28,6 +31,7 @@ impl Terms {
             rate_per_step: problem.rate_per_step,
             trading_cost: problem.trading_cost,
             contributions: problem.contributions.clone(),
+            learning: problem.learning,
         }
     }
 

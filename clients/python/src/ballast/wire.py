@@ -289,6 +289,24 @@ JobKind: TypeAlias = Literal["train", "evaluate", "backtest"]
 JobState: TypeAlias = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 
 
+class Learning1(TypedDict):
+    """As much as any other."""
+
+    kind: Literal["equal"]
+
+
+class Learning2(TypedDict):
+    """Half as much as one that is `half_life` periods newer: the law forgets what is long past."""
+
+    half_life: float
+    """In periods."""
+    kind: Literal["decay"]
+
+
+Learning: TypeAlias = Learning1 | Learning2
+"""What a return weighs in the law that is learned: of the history and of what is seen after it alike."""
+
+
 class LeftOut(TypedDict):
     """The advice without one return."""
 
@@ -356,19 +374,6 @@ class Observe(TypedDict):
 
 
 HistoryItem: TypeAlias = float
-
-
-class OpenSession(TypedDict):
-    """A session to open."""
-
-    policy: str
-    """The policy to live by."""
-    history: NotRequired[list[HistoryItem] | None]
-    """Log-returns known at the start. Default: the policy's."""
-    wealth: NotRequired[float | None]
-    """Default: the policy's initial wealth."""
-    holding: NotRequired[float | None]
-    """Share of wealth in the risky asset at the start. Default: 0."""
 
 
 Phase: TypeAlias = Literal["solving", "fitting", "simulating"]
@@ -509,6 +514,29 @@ Rates: TypeAlias = float | list[float]
 """What the bank pays in each period."""
 
 
+class Renew(TypedDict):
+    """The policy that a session goes on by."""
+
+    renewal: int
+    """Number of the renewal, from 1."""
+    policy: str
+    """The next policy."""
+    window: NotRequired[int | None]
+    """Returns that the law is made of, the last ones. Default: all that were seen."""
+
+
+RenewalState: TypeAlias = Literal["due", "training", "failed", "trained"]
+
+
+class Renewing(TypedDict):
+    """How a session is renewed by itself."""
+
+    every: int
+    """Periods by one policy, until the next is trained; fewer than its horizon."""
+    window: NotRequired[int | None]
+    """Returns that the next policy is trained on, the last ones. Default: all that were seen."""
+
+
 class Report(TypedDict):
     """What is recorded of a period: its return, given in exactly one of three ways or as missing, and what was done in it."""
 
@@ -551,7 +579,7 @@ class SamplingLaw1(TypedDict):
 
 
 class SamplingLaw2(TypedDict):
-    """Smoothed bootstrap of the history, with the history's own mean and variance."""
+    """Smoothed bootstrap of the history, each return with its weight, with the mean and variance that gives."""
 
     kind: Literal["bootstrap"]
 
@@ -621,6 +649,21 @@ SweepRange = TypedDict(
 )
 
 
+class Terms(TypedDict):
+    """Rate, cost and flows of the periods that a policy is lived by, and how its law is learned."""
+
+    horizon: int
+    """T, periods."""
+    rate_per_step: float
+    """r, simple return of the bank per step."""
+    trading_cost: float
+    """c, of what is traded."""
+    contributions: Contributions
+    """C, money added at the end of each period."""
+    learning: Learning
+    """What older returns weigh."""
+
+
 class TransportedMass(TypedDict):
     """Mass of one atom and where the adversary puts it."""
 
@@ -637,8 +680,10 @@ class Uncertainty(TypedDict):
 
     sample_size: int
     """Returns seen, those of the history among them."""
+    effective_size: float
+    """How many returns of equal weight tell as much: as many as were seen where `learning` is `equal`."""
     moments: list[float]
-    """Raw moments of the empirical law, first to the specification's count."""
+    """Raw moments of the law learned, first to the specification's count."""
     quantile: NotRequired[float | None]
     """(1 - alpha)-quantile of the bridge statistic; absent under other radius rules."""
     quantile_standard_error: NotRequired[float | None]
@@ -765,6 +810,8 @@ class Advice(TypedDict):
     """
     sample_size: int
     """Returns seen, those of the history among them."""
+    effective_size: float
+    """How many returns of equal weight tell as much: as many as were seen where `learning` is `equal`."""
     surrogate_sd: float
     """Predicted standard deviation of the log certainty equivalent."""
     in_design: bool
@@ -993,6 +1040,20 @@ class Observed(Uncertainty):
     """Whether the returns still come as they came."""
 
 
+class OpenSession(TypedDict):
+    """A session to open."""
+
+    policy: str
+    """The policy to live by."""
+    history: NotRequired[list[HistoryItem] | None]
+    """Log-returns known at the start. Default: the policy's."""
+    wealth: NotRequired[float | None]
+    """Default: the policy's initial wealth."""
+    holding: NotRequired[float | None]
+    """Share of wealth in the risky asset at the start. Default: 0."""
+    renew: NotRequired[Renewing | None]
+
+
 class PeriodReport(TypedDict):
     """One period over all paths."""
 
@@ -1028,11 +1089,41 @@ class ProblemSpecification(TypedDict):
     """Money added at the end of each period, withdrawn where it is negative: one number for all, or `horizon` numbers."""
     utility: NotRequired[UtilitySpecification]
     """Of terminal wealth."""
+    learning: NotRequired[Learning]
+    """What older returns weigh in the law that is learned."""
     radius: NotRequired[RadiusRule | None]
     support: NotRequired[Interval | None]
     law: NotRequired[SamplingLaw | None]
     history: list[HistoryItem]
     """The log-returns observed before the start, at least two of them distinct."""
+
+
+class RenewalDue(TypedDict):
+    """Where a renewal is that is due."""
+
+    renewal: int
+    """Its number."""
+    state: RenewalState
+    job: NotRequired[str | None]
+    """The job that trains the policy, or last did; null before there is one."""
+    error: NotRequired[str | None]
+    """Why the last attempt failed."""
+    attempts: int
+    """Jobs so far."""
+
+
+class Renewed(Uncertainty):
+    """The session after a renewal."""
+
+    session: str
+    renewal: int
+    policy: str
+    period: int
+    """The coming period, the first that the policy advises."""
+    horizon: int
+    """The last period that it advises."""
+    terms: Terms
+    """Rate, cost and flows of its periods, where none other are reported."""
 
 
 class Sensitivity(TypedDict):
@@ -1050,9 +1141,11 @@ class Session(TypedDict):
 
     session: str
     policy: str
+    """The one that advises the coming period."""
     period: int
     """The coming period, from 1; `horizon + 1` once completed."""
     horizon: int
+    """The last period that the policy advises."""
     state: SessionState
     date: NotRequired[str | None]
     """The last day of the last period that was reported with one."""
@@ -1062,6 +1155,10 @@ class Session(TypedDict):
     sample_size: int
     corrections: int
     """Corrections of what periods reported; the next one is this and one more."""
+    renewals: int
+    """Policies that followed the first; the next renewal is this and one more."""
+    renew: NotRequired[Renewing | None]
+    renewal: NotRequired[RenewalDue | None]
     drift: Drift
     """Whether the returns still come as they came."""
     created_ms: int
@@ -1072,8 +1169,10 @@ class SessionEntry(TypedDict):
 
     session: str
     policy: str
+    """The one that advises the coming period."""
     period: int
     horizon: int
+    """The last period that the policy advises."""
     state: SessionState
     initial_wealth: float
     created_ms: int
@@ -1322,6 +1421,14 @@ class Observation(Observed):
     now: NotRequired[Now | None]
 
 
+class Renewal(Renewed):
+    """One renewal, as it was made."""
+
+    window: NotRequired[int | None]
+    """Returns that the law was made of, the last ones; null where those were all."""
+    renewed_ms: int
+
+
 class Specification(TypedDict):
     """A whole training job: the problem, the design that samples its states, the surrogates, one seed."""
 
@@ -1409,6 +1516,9 @@ class History(TypedDict):
 
     session: str
     policy: str
+    """The first policy."""
+    terms: Terms
+    """Rate, cost and flows of its periods, where none other are reported."""
     initial_wealth: float
     initial_holding: float
     """Share of it in the risky asset."""
@@ -1416,6 +1526,8 @@ class History(TypedDict):
     """Log-returns known at the start."""
     observations: list[Observation]
     corrections: list[Correction]
+    renewals: list[Renewal]
+    """The policies that followed the first."""
 
 
 JobReport: TypeAlias = EvaluationReport | BacktestReport
