@@ -71,7 +71,7 @@ fn what_is_wrong_is_said_by_line_or_option() {
         (&["advise", MARKET, "--risk-aversion", "0.5"], "--risk-aversion is 0.5: must lie in [1, 100]"),
         (
             &["backtest", MARKET, "--out", file, "--window", "1100"],
-            "the file holds 1109 months: must hold at least 1112",
+            "the file is 1109 periods: must hold at least 1112",
         ),
     ] {
         let output = ballast(arguments);

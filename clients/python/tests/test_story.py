@@ -135,6 +135,18 @@ def test_a_policy_travels_and_its_specification_trains_it_again(ballast: Ballast
     assert ballast.submit(detail["specification"]).policy().id == policy.id
 
 
+def test_a_session_goes_on_by_another_policy(ballast: Ballast, session: Session) -> None:
+    session.observe(log_return=0.01)
+    horizon = session.horizon
+    renewed = session.renew(session.policy, window=5)
+    assert (session.renewals, session.period, session.horizon) == (1, 2, horizon + 1)
+    assert (renewed["sample_size"], renewed["terms"]["horizon"]) == (5, horizon)
+    assert session.renew(session.policy, window=5, renewal=1) == renewed
+    assert session.refresh().renewals == 1
+    kept = ballast.policy(session.policy).session(renew={"every": 1})
+    assert kept.observe(log_return=0.02).period == 2
+
+
 def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, session: Session) -> None:
     """Compares what goes over the network with api/openapi.json: an operation the service gains is missed here."""
     ballast.advise(RETURNS, kind="log", rate_per_step=0.001)
@@ -144,6 +156,7 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     own.action(mode="resolve")
     own.what_if(radius_scale=0.5)
     own.observe(log_return=0.01).correct(1, "revised", log_return=0.02)
+    own.renew(policy.id)
     own.refresh().history()
     assert own.id in [entry["session"] for entry in ballast.sessions()]
     own.delete()
