@@ -49,6 +49,7 @@
 //! Not the paper's: the floor gain that stands for V (`problem::utility`), radius rules other than (2.5) and (2.7), and the
 //! parametric frameworks (`bellman::normal`).
 
+pub mod assets;
 pub mod bellman;
 pub mod controlled_training;
 pub mod error;

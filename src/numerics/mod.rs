@@ -17,6 +17,7 @@ pub mod gp_fit;
 pub mod gp_likelihood;
 pub mod law;
 pub mod law_distance;
+pub mod levelling;
 pub mod matern;
 pub mod minimise;
 pub mod moments;

@@ -75,6 +75,48 @@ impl RelativeUtility {
         relative
     }
 
+    /// The utility and its derivative at relative wealth W = e^w, above 0: U(W) = u(ln W) and U'(W).
+    pub fn at(self, wealth: f64) -> (f64, f64) {
+        match self {
+            RelativeUtility::Exponential { k } => {
+                let exponent = (-k * (wealth - 1.0)).min(LARGEST_EXPONENT);
+                (-exponent.exp_m1() / k, exponent.exp())
+            }
+            RelativeUtility::Power { eta } => {
+                let power = ((1.0 - eta) * wealth.ln()).min(LARGEST_EXPONENT).exp_m1();
+                (power / (1.0 - eta), (power + 1.0) / wealth)
+            }
+            RelativeUtility::Log => (wealth.ln(), 1.0 / wealth),
+        }
+    }
+
+    /// `-W U''(W) / U'(W)`.
+    pub fn relative_aversion(self, wealth: f64) -> f64 {
+        match self {
+            RelativeUtility::Exponential { k } => k * wealth,
+            RelativeUtility::Power { eta } => eta,
+            RelativeUtility::Log => 1.0,
+        }
+    }
+
+    /// The y at which `U'(b + y) y` is largest, b `fixed`; it rises up to there and falls from there on.
+    pub fn steepest(self, fixed: f64) -> f64 {
+        match self {
+            RelativeUtility::Exponential { k } => 1.0 / k,
+            RelativeUtility::Power { eta } => fixed / (eta - 1.0),
+            RelativeUtility::Log => f64::INFINITY,
+        }
+    }
+
+    /// What `U'(b + y) y` tends to as y falls to 0, b `fixed`: 0 wherever something is left.
+    pub fn steepness_of_ruin(self, fixed: f64) -> f64 {
+        match self {
+            RelativeUtility::Log if fixed <= 0.0 => 1.0,
+            RelativeUtility::Power { .. } if fixed <= 0.0 => f64::INFINITY,
+            _ => 0.0,
+        }
+    }
+
     /// The log gain whose utility is `value`: the log certainty equivalent over the floor.
     pub fn inverse(self, value: f64) -> f64 {
         match self {
