@@ -12,6 +12,7 @@ pub mod empirical;
 pub mod exchangeability;
 pub mod exponential_mean;
 pub mod farthest;
+pub mod fund_bridges;
 pub mod gp;
 pub mod gp_fit;
 pub mod gp_likelihood;

@@ -43,6 +43,8 @@ pub(super) struct Branches {
     /// The derivative of what does not move by the allocation and by gamma.
     still: Vec<f64>,
     levelling: Levelling,
+    /// The last local minimum inside a phase: most atoms share their last phase.
+    last: Inside,
     /// False where some atom pays the less the further it is moved, without an end.
     pub bounded: bool,
 }
@@ -110,7 +112,7 @@ impl Branches {
             return Some(of.start);
         }
         let level = self.all[branch].level;
-        let apart = |other: &usize| (before.all[*other].level / level).ln().abs();
+        let apart = |other: &usize| (before.all[*other].level / level).max(level / before.all[*other].level);
         let close = (of.start + 1..of.end).filter(|&other| near(before.all[other].level, level));
         close.min_by(|left, right| apart(left).total_cmp(&apart(right)))
     }
@@ -123,6 +125,7 @@ impl Branches {
         self.excesses.clear();
         self.still.clear();
         self.bounded = true;
+        self.last = Inside::default();
     }
 
     /// Adds a move that stays as it is.
@@ -152,6 +155,7 @@ impl Branches {
         if step.radius <= 0.0 {
             return;
         }
+        let slope = self.all[self.first[atom]].slope;
         let mut levelling = std::mem::take(&mut self.levelling);
         let rest = (1.0 - allocation.iter().sum::<f64>()).max(0.0);
         let (mut positions, mut floors) = ([0.0; super::MOST_ASSETS], [0.0; super::MOST_ASSETS]);
@@ -160,7 +164,8 @@ impl Branches {
         }
         let count = allocation.len();
         let phases = levelling.phases(rest, &positions[..count], &floors[..count], &step.ground);
-        let bounded = local_minima(phases, step.utility, price, |level, follows| {
+        let mut last = self.last;
+        let bounded = local_minima(phases, step.utility, price, slope, &mut last, |level, follows| {
             let start = self.still.len();
             let (mut wealth, mut moving) = (rest, 0.0);
             for (index, &share) in allocation.iter().enumerate() {
@@ -193,9 +198,20 @@ impl Branches {
             let bend = aversion / (1.0 - aversion * moving);
             self.all.push(Branch { cost, payoff: value + price * cost, slope, bend, level, follows });
         });
-        self.levelling = levelling;
+        (self.levelling, self.last) = (levelling, last);
         self.bounded &= bounded;
     }
+}
+
+/// A local minimum inside a phase, of a price: it depends on what stays and on the rate alone.
+#[derive(Debug, Clone, Copy, Default)]
+struct Inside {
+    fixed: f64,
+    rate: f64,
+    /// What a unit of distance takes where it takes most.
+    at_peak: f64,
+    /// What moves; NaN before it is asked for.
+    moving: f64,
 }
 
 /// Levels as near as those of one branch before and after a step.
@@ -204,25 +220,42 @@ fn near(left: f64, right: f64) -> bool {
 }
 
 /// Tells the level of every local minimum of u(w) + price D along the phases, but for D = 0, and whether it lies inside a phase.
-/// False where there is no least value: it falls for ever.
-fn local_minima(phases: &[Phase], utility: RelativeUtility, price: f64, mut found: impl FnMut(f64, bool)) -> bool {
+/// `slope` is U' where nothing is moved. False where there is no least value: it falls for ever.
+fn local_minima(
+    phases: &[Phase],
+    utility: RelativeUtility,
+    price: f64,
+    mut slope: f64,
+    last: &mut Inside,
+    mut found: impl FnMut(f64, bool),
+) -> bool {
     // What a unit of distance takes just before a phase starts; the first one starts at the atom itself.
     let mut before = None;
     for phase in phases.iter().rev() {
         let &Phase { fixed, speed, rate, high, low } = phase;
-        let taken = |moving: f64| utility.at(fixed + moving).1 * moving / rate;
-        let start = taken(speed * high);
+        let start = slope * speed * high / rate;
         if before.is_some_and(|before| before > price && start <= price) {
             found(high, false);
         }
-        let end = match low > 0.0 {
-            true => taken(speed * low),
-            false => utility.steepness_of_ruin(fixed) / rate,
+        let end = if low > 0.0 {
+            slope = utility.at(fixed + speed * low).1;
+            slope * speed * low / rate
+        } else {
+            utility.steepness_of_ruin(fixed) / rate
         };
         before = Some(end);
-        let peak = utility.steepest(fixed).min(speed * high);
-        if end < price && (start > price || (peak < speed * high && taken(peak) > price)) {
-            found(inside(phase, utility, price, peak) / speed, true);
+        if end < price {
+            let peak = utility.steepest(fixed);
+            if last.fixed != fixed || last.rate != rate {
+                let at_peak = if peak < f64::INFINITY { utility.at(fixed + peak).1 * peak / rate } else { 0.0 };
+                *last = Inside { fixed, rate, at_peak, moving: f64::NAN };
+            }
+            if start > price || (peak < speed * high && last.at_peak > price) {
+                if last.moving.is_nan() {
+                    last.moving = inside(phase, utility, price, peak.min(speed * high));
+                }
+                found(last.moving / speed, true);
+            }
         }
     }
     match (before, phases.first()) {

@@ -18,7 +18,7 @@ use super::{AssetsSolution, AssetsStep};
 
 /// The first barrier, in relative utility, and that near a similar step.
 const BARRIER: f64 = 1e-3;
-const BARRIER_NEAR: f64 = 1e-5;
+const BARRIER_NEAR: f64 = 1e-4;
 /// What a barrier is brought to, of what is reached: after a step of this length, or more; shorter ones do with less.
 const REDUCTIONS: [(f64, f64); 3] = [(0.9, 0.1), (0.5, 0.4), (0.0, 0.9)];
 /// Points at most.
@@ -30,12 +30,17 @@ const GIVING_WAY: f64 = 10.0;
 /// Of its slack before a branch keeps at least this, and one that is new this of the barrier.
 const KEPT_SLACK: f64 = 0.1;
 const NEW_SLACK: f64 = 0.3;
+/// A branch that has all of its atom has the barrier for its slack; none has less than this of it.
+const LEAST_SLACK: f64 = 0.01;
 /// Slack times multiplier beyond this of the barrier tells that a multiplier is that of another branch.
 const OFF_CENTRE: f64 = 100.0;
 /// Branches of less of their atom's mass are let go with their place.
 const LEAST_MASS: f64 = 1e-6;
 /// Shares of the start by which one near a similar step is drawn inside.
 const DRAWN_INSIDE: f64 = 0.02;
+/// Prices tried for the start at most, and how far its law may be, over the radius or under it.
+const PRICES: usize = 8;
+const SPREAD: f64 = 3.0;
 /// Room that the sum of the shares has at least.
 const LEAST_ROOM: f64 = 1e-6;
 
@@ -81,8 +86,6 @@ pub(super) struct Interior<'a> {
     /// What the best is worth at least, and every allocation at most, in relative utility.
     pub lower: f64,
     pub upper: f64,
-    /// Of the law behind the upper bound.
-    pub mean_moves: Vec<f64>,
     pub evaluations: usize,
 }
 
@@ -148,21 +151,18 @@ impl<'a> Interior<'a> {
             pairs_before: Vec::new(),
             lower: f64::NEG_INFINITY,
             upper: f64::INFINITY,
-            mean_moves: vec![0.0; assets],
             evaluations: 0,
         };
-        if near.is_none() {
-            interior.price_the_start();
-        }
+        interior.price_the_start();
         interior.open();
         interior
     }
 
-    /// Finds a price at which the centred laws at the start are about as far away as the radius: twelve bisections at most.
+    /// Finds a price at which the centred laws at the start are about as far away as the radius: by bisection.
     fn price_the_start(&mut self) {
         let assets = self.step.assets();
         let (mut low, mut high) = (0.0, f64::INFINITY);
-        for _ in 0..12 {
+        for _ in 0..PRICES {
             let price = self.point[assets];
             self.find();
             let mut distance = 0.0;
@@ -172,9 +172,9 @@ impl<'a> Interior<'a> {
                     distance += self.step.masses[atom] * self.barrier / (branch.payoff - top) * branch.cost;
                 }
             }
-            if distance > 1.5 * self.step.radius {
+            if distance > SPREAD * self.step.radius {
                 low = price;
-            } else if distance < 0.67 * self.step.radius {
+            } else if distance < self.step.radius / SPREAD {
                 high = price;
             } else {
                 break;
@@ -217,7 +217,7 @@ impl<'a> Interior<'a> {
     pub fn run(&mut self, tolerance: f64) {
         let mut length = 1.0;
         for _ in 0..STEP_LIMIT {
-            self.bound();
+            self.tell_bounds();
             if self.upper - self.lower < tolerance {
                 return;
             }
@@ -241,60 +241,6 @@ impl<'a> Interior<'a> {
         }
         let reduction = REDUCTIONS.iter().find(|(least, _)| length > *least).map_or(1.0, |(_, reduction)| *reduction);
         self.barrier = reduction * products / weight;
-    }
-
-    /// Both bounds of the step, at this point and from the multipliers' law.
-    fn bound(&mut self) {
-        let assets = self.step.assets();
-        let (shares, price) = (&self.point[..assets], self.point[assets]);
-        let (lower, _) = self.step.dual(&self.branches, price);
-        if lower > self.lower {
-            (self.lower, self.best, self.best_price) = (lower, shares.to_vec(), price);
-        }
-        let mut masses = vec![0.0; self.pairs.len()];
-        let mut distance = 0.0;
-        for (atom, mass) in self.step.masses.iter().enumerate() {
-            let of = self.branches.of(atom);
-            let whole: f64 = self.pairs[of.clone()].iter().map(|pair| pair.multiplier).sum();
-            for branch in of {
-                masses[branch] = mass * self.pairs[branch].multiplier / whole;
-                distance += masses[branch] * self.branches.all[branch].cost;
-            }
-        }
-        // A law that is too far is mixed with the centre.
-        let kept = if distance > self.step.radius { self.step.radius / distance } else { 1.0 };
-        let (mut mean, mut gradient) = (0.0, vec![0.0; assets]);
-        for (atom, mass) in self.step.masses.iter().enumerate() {
-            for branch in self.branches.of(atom) {
-                let left = if branch == self.branches.first[atom] { (1.0 - kept) * mass } else { 0.0 };
-                masses[branch] = kept * masses[branch] + left;
-                let found = &self.branches.all[branch];
-                mean += masses[branch] * (found.payoff - price * found.cost);
-                let weight = masses[branch] * found.slope;
-                let excess = self.branches.excess(branch);
-                gradient.iter_mut().zip(excess).for_each(|(sum, excess)| *sum += weight * excess);
-            }
-        }
-        let steepest = gradient.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let total = self.step.total;
-        let upper = mean + (total.highest * steepest).max(total.lowest * steepest) - dot(&gradient, shares);
-        if upper < self.upper {
-            self.upper = upper;
-            self.mean_moves = self.mean_moves_under(&masses);
-        }
-    }
-
-    fn mean_moves_under(&self, masses: &[f64]) -> Vec<f64> {
-        let mut moves = vec![0.0; self.step.assets()];
-        for atom in 0..self.step.atoms() {
-            for branch in self.branches.of(atom).skip(1) {
-                let grown = self.branches.excess(branch).iter().zip(self.step.growth(atom));
-                for (sum, (excess, growth)) in moves.iter_mut().zip(grown) {
-                    *sum += masses[branch] * ((excess + 1.0) / growth).ln();
-                }
-            }
-        }
-        moves
     }
 
     /// Takes the step, or as many halves of it as keep the atoms from giving way by far more than the barrier. Answers the share
@@ -336,7 +282,7 @@ impl<'a> Interior<'a> {
         let mut way: f64 = 0.0;
         for branch in self.branches.of(atom) {
             let least = match self.branches.continued(atom, branch, &self.before) {
-                Some(before) => KEPT_SLACK * self.pairs_before[before].slack,
+                Some(before) => (KEPT_SLACK * self.pairs_before[before].slack).max(LEAST_SLACK * self.barrier),
                 None => NEW_SLACK * self.barrier,
             };
             way = way.max(least - (self.branches.all[branch].payoff - self.tops[atom]));

@@ -18,6 +18,8 @@
 //! `ln(sum theta_i e^(z_i))`, theta = a / sum a. Source of the ball: paper (2.5); of the reduction, the levelling.
 
 mod branches;
+mod certificate;
+pub mod composition;
 mod interior;
 mod newton;
 pub mod worst;
@@ -53,7 +55,7 @@ pub struct AssetsStep {
 /// The law of the coming returns and the set around it.
 #[derive(Debug, Clone, Copy)]
 pub struct AssetsLaw<'a> {
-    /// Log-returns of all assets, date by date.
+    /// Log-returns of all assets, at most thirty, date by date; at least one date.
     pub returns: &'a [Vec<f64>],
     /// In log-return, at least 0.
     pub radius: f64,
@@ -72,7 +74,7 @@ pub struct AssetsSolution {
     pub bound: f64,
     /// Lost relative utility per unit of radius.
     pub multiplier: f64,
-    /// By how much the worst law moves each log-return, on average over the law; negative.
+    /// By how much the law behind the bound moves each log-return, on average; at most 0.
     pub mean_moves: Vec<f64>,
     /// Points at which the adversary's answer was found.
     pub evaluations: usize,
@@ -108,6 +110,9 @@ impl AssetsStep {
     pub fn solve(&self, near: Option<&AssetsSolution>) -> AssetsSolution {
         let mut interior = Interior::start(self, near);
         interior.run(TOLERANCE);
+        if near.is_some() && interior.upper - interior.lower > 10.0 * TOLERANCE {
+            return self.solve(None);
+        }
         let (mut allocation, price) = (interior.best.clone(), interior.best_price);
         for share in allocation.iter_mut().filter(|share| **share < LEAST_SHARE) {
             *share = 0.0;
@@ -121,7 +126,7 @@ impl AssetsStep {
             value: self.utility.inverse(value),
             bound: self.utility.inverse(interior.upper.max(value)),
             multiplier: price,
-            mean_moves: interior.mean_moves,
+            mean_moves: interior.mean_moves(),
             evaluations: interior.evaluations,
         }
     }

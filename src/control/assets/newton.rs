@@ -10,6 +10,8 @@ use crate::numerics::dispatch::dispatched;
 const TO_BOUND: f64 = 0.95;
 /// A branch of less of its atom's mass weighs nothing in the step of the others.
 const NO_MASS: f64 = 1e-13;
+/// What rounding may take of a pivot, as a share of the diagonal.
+const ROUNDING: f64 = 1e-11;
 
 /// A step of everything, and how much of it keeps slacks and multipliers positive.
 pub(super) struct Direction {
@@ -75,6 +77,9 @@ impl Interior<'_> {
             let target = self.barrier * self.bound_weight / slack;
             system.right.iter_mut().zip(&bound.direction).for_each(|(sum, part)| *sum += target * part);
             system.add(bound.multiplier / slack, &bound.direction);
+        }
+        for diagonal in system.matrix.iter_mut().step_by(size + 1) {
+            *diagonal *= 1.0 + ROUNDING;
         }
         let point = Cholesky::factor(DMatrix::from_vec(size, size, system.matrix))?.solve(&system.right);
         let top =

@@ -4,8 +4,8 @@
 //! price at which they take too much and one at which they take too little, the next is where the two tangents meet, kept off the
 //! ends; the two laws, mixed so that the radius is just spent, are the worst law, and their value the primal.
 
+use super::AssetsStep;
 use super::branches::Branches;
-use super::{AssetsSolution, AssetsStep};
 
 /// Prices tried at most.
 const PRICES: usize = 200;
@@ -80,10 +80,5 @@ impl AssetsStep {
         }
         let best = if low.dual > high.dual { low } else { high };
         told(best.dual, f64::NEG_INFINITY, best.price)
-    }
-
-    /// Checks
-    pub fn worth_of(&self, solution: &AssetsSolution) -> AssetsWorth {
-        self.worth(&solution.allocation)
     }
 }
