@@ -13,6 +13,8 @@ use crate::numerics::levelling::{Levelling, Phase};
 /// Newton steps for a local minimum, which it is approached from one side by; they double the digits from the third or so on.
 const NEWTON_STEPS: usize = 40;
 const NEWTON_TOLERANCE: f64 = 1e-13;
+/// At 1 a local minimum and a maximum meet.
+const MOST_FOLLOWED: f64 = 1.0 - 1e-4;
 
 /// One way of the adversary with an atom.
 #[derive(Debug, Clone, Copy)]
@@ -187,15 +189,18 @@ impl Branches {
             let cost = step.ground.cost(count, level, |index| {
                 positions[index] / step.ground.lowered(index, positions[index], floors[index], level)
             });
-            if moving > 0.0 {
-                self.still.push(moving / price);
-            } else {
-                self.still.push(0.0);
-            }
-            debug_assert_eq!(self.still.len() - start, count + 1);
             let (value, slope) = step.utility.at(wealth);
             let aversion = step.utility.relative_aversion(wealth) / wealth;
-            let bend = aversion / (1.0 - aversion * moving);
+            // Where the level follows only just, it would follow without bounds: such a move counts as one that stays.
+            let (room, follows) = (1.0 - aversion * moving, follows && aversion * moving < MOST_FOLLOWED);
+            if follows {
+                self.still.push(moving / price);
+            } else {
+                self.still.truncate(start);
+                self.still.extend_from_slice(&self.excesses[self.excesses.len() - count..]);
+                self.still.push(0.0);
+            }
+            let bend = if follows { aversion / room } else { aversion };
             self.all.push(Branch { cost, payoff: value + price * cost, slope, bend, level, follows });
         });
         (self.levelling, self.last) = (levelling, last);

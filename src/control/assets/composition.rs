@@ -73,7 +73,7 @@ mod tests {
         let inverse = CompositionRule::InverseVolatility.composition(&rows, never);
         assert!((inverse[0] - 2.0 / 3.0).abs() < 1e-12 && (inverse[1] - 1.0 / 3.0).abs() < 1e-12, "{inverse:?}");
         assert_eq!(CompositionRule::Given(vec![0.9, 0.1]).composition(&rows, never), [0.9, 0.1]);
-        assert_eq!(CompositionRule::OneStep.composition(&rows, || solution(&[0.1, 0.3])), [0.25, 0.75]);
+        assert_eq!(CompositionRule::OneStep.composition(&rows, || solution(&[0.125, 0.375])), [0.25, 0.75]);
         assert_eq!(CompositionRule::OneStep.composition(&rows, || solution(&[0.0, 0.0])), inverse);
     }
 

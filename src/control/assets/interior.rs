@@ -16,11 +16,8 @@ use super::branches::Branches;
 use super::newton::Direction;
 use super::{AssetsSolution, AssetsStep};
 
-/// The first barrier, in relative utility, and that near a similar step.
-const BARRIER: f64 = 1e-3;
-const BARRIER_NEAR: f64 = 1e-4;
 /// What a barrier is brought to, of what is reached: after a step of this length, or more; shorter ones do with less.
-const REDUCTIONS: [(f64, f64); 3] = [(0.9, 0.1), (0.5, 0.4), (0.0, 0.9)];
+const REDUCTIONS: [(f64, f64); 3] = [(0.9, 0.2), (0.5, 0.4), (0.0, 0.9)];
 /// Points at most.
 const STEP_LIMIT: usize = 100;
 /// Halvings of a step that falls far below what it foresaw, at most.
@@ -114,7 +111,7 @@ fn top(branches: &Branches, atom: usize, barrier: f64) -> f64 {
 }
 
 impl<'a> Interior<'a> {
-    pub fn start(step: &'a AssetsStep, near: Option<&AssetsSolution>) -> Self {
+    pub fn start(step: &'a AssetsStep, near: Option<&AssetsSolution>, barrier: f64) -> Self {
         let assets = step.assets();
         let highest = step.total.highest;
         let lowest = step.total.lowest.min(highest - LEAST_ROOM);
@@ -144,7 +141,7 @@ impl<'a> Interior<'a> {
             tops: vec![0.0; step.atoms()],
             bounds,
             bound_weight: 1.0 / assets as f64,
-            barrier: if near.is_some() { BARRIER_NEAR } else { BARRIER },
+            barrier,
             branches: Branches::default(),
             pairs: Vec::new(),
             before: Branches::default(),
@@ -243,8 +240,8 @@ impl<'a> Interior<'a> {
         self.barrier = reduction * products / weight;
     }
 
-    /// Takes the step, or as many halves of it as keep the atoms from giving way by far more than the barrier. Answers the share
-    /// of the whole step.
+    /// Takes the step, or as many halves of it as keep the atoms from giving way by far more than the barrier. Answers the shorter
+    /// length of the point's and the multipliers'.
     fn go(&mut self, direction: &Direction) -> f64 {
         std::mem::swap(&mut self.branches, &mut self.before);
         std::mem::swap(&mut self.pairs, &mut self.pairs_before);
@@ -269,12 +266,12 @@ impl<'a> Interior<'a> {
         }
         self.pairs.clear();
         for atom in 0..self.tops.len() {
-            self.pair_up(atom, direction, length);
+            self.pair_up(atom, direction);
         }
         for (bound, step) in self.bounds.iter_mut().zip(&direction.bounds) {
-            bound.multiplier += length * step;
+            bound.multiplier += direction.dual_length * step;
         }
-        length
+        length.min(direction.dual_length)
     }
 
     /// Lowers t_j until every branch has a share of the slack it had, and answers by how much.
@@ -292,7 +289,7 @@ impl<'a> Interior<'a> {
     }
 
     /// The pairs of an atom after a step: multipliers go on with their branches, new ones start on the central path.
-    fn pair_up(&mut self, atom: usize, direction: &Direction, length: f64) {
+    fn pair_up(&mut self, atom: usize, direction: &Direction) {
         let (from, central) = (self.pairs.len(), self.barrier * self.step.masses[atom]);
         let mut off_centre = false;
         for branch in self.branches.of(atom) {
@@ -300,7 +297,7 @@ impl<'a> Interior<'a> {
             let multiplier = match self.branches.continued(atom, branch, &self.before) {
                 Some(before) => {
                     off_centre |= self.pairs_before[before].multiplier * slack > OFF_CENTRE * central;
-                    self.pairs_before[before].multiplier + length * direction.multipliers[before]
+                    self.pairs_before[before].multiplier + direction.dual_length * direction.multipliers[before]
                 }
                 None => central / slack,
             };

@@ -32,8 +32,13 @@ use crate::numerics::levelling::Ground;
 
 /// Assets at most.
 pub const MOST_ASSETS: usize = 30;
-/// Where a search for the best allocation starts to be content: relative utility, 0.001 of a hundredth of a percent.
+/// Relative utility between the bounds at which a search ends.
 const TOLERANCE: f64 = 1e-8;
+/// Log certainty equivalent between the bounds that asks for no other search: a thousandth of a hundredth of a percent.
+const CONTENT: f64 = 1e-7;
+/// First barriers of searches, in relative utility, and that of one near a similar step.
+const BARRIERS: [f64; 3] = [1e-3, 1e-2, 1e-1];
+const BARRIER_NEAR: f64 = 1e-4;
 /// Shares below this are rounding of a search that stays inside its bounds.
 const LEAST_SHARE: f64 = 1e-6;
 
@@ -106,16 +111,34 @@ impl AssetsStep {
 
     /// The best allocation. `near` is where the search starts: the solution of a similar step.
     ///
-    /// Cost: some 30 to 60 evaluations, each O(n d ln d) with O(n d^2) of algebra.
+    /// A search that does not bring its bounds together is followed by others, which start further inside; bounds of all of them
+    /// hold. Cost: some 20 to 60 evaluations, each O(n d ln d) with O(n d^2) of algebra; of 4 searches at most.
     pub fn solve(&self, near: Option<&AssetsSolution>) -> AssetsSolution {
-        let mut interior = Interior::start(self, near);
-        interior.run(TOLERANCE);
-        if near.is_some() && interior.upper - interior.lower > 10.0 * TOLERANCE {
-            return self.solve(None);
+        let mut best = match near {
+            Some(near) => self.search(Some(near), BARRIER_NEAR),
+            None => self.search(None, BARRIERS[0]),
+        };
+        for barrier in BARRIERS.into_iter().skip(usize::from(near.is_none())) {
+            if best.bound - best.value < CONTENT {
+                break;
+            }
+            let next = self.search(None, barrier);
+            let (bound, evaluations) = (best.bound.min(next.bound), best.evaluations + next.evaluations);
+            let better = if next.value > best.value { next } else { best };
+            best = AssetsSolution { bound, evaluations, ..better };
         }
+        best
+    }
+
+    fn search(&self, near: Option<&AssetsSolution>, barrier: f64) -> AssetsSolution {
+        let mut interior = Interior::start(self, near, barrier);
+        interior.run(TOLERANCE);
         let (mut allocation, price) = (interior.best.clone(), interior.best_price);
-        for share in allocation.iter_mut().filter(|share| **share < LEAST_SHARE) {
-            *share = 0.0;
+        let total: f64 = allocation.iter().sum();
+        allocation.iter_mut().filter(|share| **share < LEAST_SHARE).for_each(|share| *share = 0.0);
+        let left: f64 = allocation.iter().sum();
+        if left > 0.0 {
+            allocation.iter_mut().for_each(|share| *share *= total / left);
         }
         let mut value = self.value_at(&allocation, price);
         if value < interior.lower - TOLERANCE {

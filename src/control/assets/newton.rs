@@ -19,7 +19,9 @@ pub(super) struct Direction {
     pub tops: Vec<f64>,
     pub multipliers: Vec<f64>,
     pub bounds: Vec<f64>,
+    /// For the point and the slacks, and for the multipliers.
     pub length: f64,
+    pub dual_length: f64,
 }
 
 /// A symmetric matrix of a sum of squares, and a right-hand side.
@@ -150,17 +152,17 @@ impl Interior<'_> {
         }
     }
 
-    /// The steps of the multipliers, and the length that keeps everything positive.
+    /// The steps of the multipliers, and the lengths that keep everything positive.
     fn with_multipliers(&self, point: Vec<f64>, tops: Vec<f64>) -> Direction {
         let last = point.len() - 1;
-        let mut length: f64 = 1.0;
+        let (mut length, mut dual_length): (f64, f64) = (1.0, 1.0);
         let mut pair = |slack: f64, step: f64, multiplier: f64, target: f64| {
             let change = target / slack - multiplier - multiplier / slack * step;
             if step < 0.0 {
                 length = length.min(-TO_BOUND * slack / step);
             }
             if change < 0.0 {
-                length = length.min(-TO_BOUND * multiplier / change);
+                dual_length = dual_length.min(-TO_BOUND * multiplier / change);
             }
             change
         };
@@ -178,6 +180,6 @@ impl Interior<'_> {
             pair(bound.slack(&self.point), dot(&bound.direction, &point), bound.multiplier, target)
         };
         let bounds = self.bounds.iter().map(bound).collect();
-        Direction { point, tops, multipliers, bounds, length }
+        Direction { point, tops, multipliers, bounds, length, dual_length }
     }
 }

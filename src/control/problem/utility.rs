@@ -80,14 +80,14 @@ impl RelativeUtility {
         match self {
             RelativeUtility::Exponential { k } => {
                 let exponent = (-k * (wealth - 1.0)).min(LARGEST_EXPONENT);
-                let power = exp_m1(exponent);
+                let power = exponent.exp_m1();
                 (-power / k, power + 1.0)
             }
             RelativeUtility::Power { eta } => {
-                let power = exp_m1(((1.0 - eta) * ln(wealth)).min(LARGEST_EXPONENT));
+                let power = ((1.0 - eta) * wealth.ln()).min(LARGEST_EXPONENT).exp_m1();
                 (power / (1.0 - eta), (power + 1.0) / wealth)
             }
-            RelativeUtility::Log => (ln(wealth), 1.0 / wealth),
+            RelativeUtility::Log => (wealth.ln(), 1.0 / wealth),
         }
     }
 
