@@ -12,8 +12,10 @@
 //! Multipliers and slacks follow Newton steps on `slack x multiplier = barrier x p_j`; where a branch has come or gone, or lies
 //! lower than the step foresaw, t_j gives way. Source: Boyd and Vandenberghe (2004), Convex Optimization, section 11.7.
 
+mod newton;
+
+use self::newton::Direction;
 use super::branches::Branches;
-use super::newton::Direction;
 use super::{AssetsSolution, AssetsStep};
 
 /// What a barrier is brought to, of what is reached: after a step of this length, or more; shorter ones do with less.

@@ -21,7 +21,6 @@ mod branches;
 mod certificate;
 pub mod composition;
 mod interior;
-mod newton;
 pub mod worst;
 
 use self::branches::Branches;

@@ -2,7 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::interior::{Interior, dot};
+use super::{Bound, Interior, dot};
+use crate::control::assets::MOST_ASSETS;
 use crate::numerics::cholesky::Cholesky;
 use crate::numerics::dispatch::dispatched;
 
@@ -64,7 +65,7 @@ impl Interior<'_> {
     ///     = sum_j [ sum q g + (p_j - sum q) (sum theta g) / sum theta ] - radius e_gamma + bounds,   q = barrier p_j / slack.
     ///
     /// `None` where the matrix is not positive definite to working precision. Cost O(branches d^2).
-    pub fn direction(&self) -> Option<Direction> {
+    pub(super) fn direction(&self) -> Option<Direction> {
         let size = self.point.len();
         let mut system = System { size, matrix: vec![0.0; size * size], right: vec![0.0; size] };
         let mut eliminated = vec![Eliminated::default(); self.tops.len()];
@@ -93,7 +94,7 @@ impl Interior<'_> {
     #[inline(always)]
     fn add_atom(&self, atom: usize, left: &mut Eliminated, system: &mut System) {
         let (size, mass, price) = (system.size, self.step.masses[atom], self.point[system.size - 1]);
-        let mut gradient = [0.0; super::MOST_ASSETS + 1];
+        let mut gradient = [0.0; MOST_ASSETS + 1];
         left.gradient = vec![0.0; size];
         for branch in self.branches.of(atom) {
             let (found, pair) = (&self.branches.all[branch], self.pairs[branch]);
@@ -135,7 +136,7 @@ impl Interior<'_> {
         let moving = |index: &usize| still[*index] == -1.0;
         if self.step.ground.is_sup() {
             let whole = still[last] * price;
-            let mut direction = [0.0; super::MOST_ASSETS + 1];
+            let mut direction = [0.0; MOST_ASSETS + 1];
             for index in (0..last).filter(moving) {
                 direction[index] = (excess[index] + 1.0) / whole;
             }
@@ -176,9 +177,8 @@ impl Interior<'_> {
             }
         }
         let target = self.barrier * self.bound_weight;
-        let bound = |bound: &super::interior::Bound| {
-            pair(bound.slack(&self.point), dot(&bound.direction, &point), bound.multiplier, target)
-        };
+        let bound =
+            |bound: &Bound| pair(bound.slack(&self.point), dot(&bound.direction, &point), bound.multiplier, target);
         let bounds = self.bounds.iter().map(bound).collect();
         Direction { point, tops, multipliers, bounds, length, dual_length }
     }
