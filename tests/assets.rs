@@ -247,6 +247,17 @@ fn what_an_allocation_is_worth_agrees_with_the_transport_programme() {
 }
 
 #[test]
+fn all_in_is_worth_nothing_to_power_utility_and_the_radius_less_to_log_utility() {
+    let returns = sample(2, 20, 6);
+    let worth = |utility| without_floor(&returns, &Ground::Sup, utility, 0.02).worth(&[0.4, 0.6]).value;
+    assert_eq!(worth(POWER), f64::NEG_INFINITY);
+    let fund = |row: &Vec<f64>| (0.4 * row[0].exp() + 0.6 * row[1].exp()).ln();
+    let mean = returns.iter().map(fund).sum::<f64>() / returns.len() as f64;
+    // Log utility is a straight line in the fund's log-return: every law that spends the radius is as bad.
+    assert!((worth(RelativeUtility::Log) - (mean - 1.002_f64.ln() - 0.02)).abs() < 1e-9);
+}
+
+#[test]
 fn the_bounds_hold_between_the_bounds_of_the_total_and_with_a_floor() {
     let returns = sample(3, 50, 4);
     let ground = Ground::Weighted(inverse_volatility(&returns));

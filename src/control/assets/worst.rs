@@ -14,6 +14,8 @@ const TOLERANCE: f64 = 1e-11;
 const WIDTH: f64 = 1e-14;
 /// A price that no atom moves at is sought by this factor.
 const GROWTH: f64 = 4.0;
+/// Beyond it an allocation is worth nothing: some atom is worth the less the further it is moved, at any price.
+const HIGHEST_PRICE: f64 = 1e15;
 
 /// What an allocation is worth against the worst law for it.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,6 +54,9 @@ impl AssetsStep {
         let mut low = Priced { price: 0.0, dual: f64::NEG_INFINITY, distance: f64::INFINITY };
         let mut high = at(1.0);
         while high.distance > self.radius {
+            if high.price > HIGHEST_PRICE {
+                return told(f64::NEG_INFINITY, f64::NEG_INFINITY, high.price);
+            }
             low = high;
             high = at(GROWTH * high.price);
         }
