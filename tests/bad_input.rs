@@ -49,6 +49,8 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
             "problem.utility.risk_aversion_relative",
         ),
         ("/problem/utility", json!({"kind": "power", "risk_aversion": 1.0}), "problem.utility.risk_aversion"),
+        ("/problem/learning", json!({"kind": "decay", "half_life": 0.5}), "problem.learning.half_life"),
+        ("/problem/learning", json!({"kind": "decay", "half_life": -12.0}), "problem.learning.half_life"),
         ("/problem/radius", json!({"rule": "bridge", "alpha": 0.0}), "problem.radius.alpha"),
         ("/problem/radius", json!({"rule": "bridge", "paths": 1}), "problem.radius.paths"),
         ("/problem/radius", json!({"rule": "bridge", "scale": -1.0}), "problem.radius.scale"),
@@ -241,6 +243,12 @@ fn faulty_sessions() -> Vec<(&'static str, &'static str)> {
         (r#""history": [0.1, 9.0]"#, "history[1]"),
         (r#""history": [0.1, null]"#, "history[1]"),
         (r#""history": 3"#, "history"),
+        (r#""renew": 12"#, "renew"),
+        (r#""renew": {"window": 12}"#, "renew.every"),
+        (r#""renew": {"every": 0}"#, "renew.every"),
+        (r#""renew": {"every": 1.5}"#, "renew.every"),
+        (r#""renew": {"every": 1, "window": 1}"#, "renew.window"),
+        (r#""renew": {"every": 1, "horizon": 2}"#, "renew.horizon"),
         (r#""colour": 1"#, "colour"),
     ]
 }
@@ -349,6 +357,78 @@ async fn every_field_of_an_evaluation_is_named() {
     assert_named(&app.post("/evaluate", &frozen).await.1, "policies.static");
 }
 
+/// Twelve quarters, of which the last four are lived through.
+fn walk_forward() -> Value {
+    let simple: Vec<f64> = (0..12).map(|quarter| 0.02 + 0.03 * (1.7 * f64::from(quarter)).sin()).collect();
+    json!({ "simple_returns": simple, "rate": 0.002, "periods_per_year": 4, "window": 8, "count": 10, "alpha": [0.5] })
+}
+
+/// Changes to a walk-forward, and the field each must be answered with.
+fn faulty_walk_forwards() -> Vec<(&'static str, Value, &'static str)> {
+    let months =
+        |count: usize| -> Vec<String> { (0..count).map(|k| format!("20{:02}-{:02}", k / 12, k % 12 + 1)).collect() };
+    let gap: Vec<String> = months(13).into_iter().filter(|month| month != "2000-05").collect();
+    vec![
+        ("log_returns", json!([0.1, 0.2, 0.3]), "log_returns"),
+        ("simple_returns", json!([0.1, 0.2]), "simple_returns"),
+        ("simple_returns", json!([0.1, 0.2, -1.0]), "simple_returns[2]"),
+        ("simple_returns", json!(vec![0.1; 12]), "simple_returns"),
+        ("simple_returns", json!([0.1, 0.2, 0.3, 0.2]), "simple_returns"),
+        ("simple_returns", Value::Null, "log_returns"),
+        ("rate", json!(0.6), "rate"),
+        ("rate", json!([0.1, 0.2]), "rate"),
+        ("rate", json!([0, 0, 0, 0, 0, 0, 0, -0.6, 0, 0, 0, 0]), "rate[7]"),
+        ("rate", json!("much"), "rate"),
+        ("dates", json!(["2008"]), "dates"),
+        ("dates", json!(vec!["31.1.2008"; 12]), "dates[0]"),
+        ("dates", json!(gap), "dates[4]"),
+        ("periods_per_year", json!(0), "periods_per_year"),
+        ("periods_per_year", json!(367), "periods_per_year"),
+        ("periods_per_year", Value::Null, "periods_per_year"),
+        ("window", json!(9), "simple_returns"),
+        ("window", json!(1), "window"),
+        ("window", json!(usize::MAX), "window"),
+        ("every", json!(0), "every"),
+        ("every", json!(usize::MAX), "horizon"),
+        ("horizon", json!(521), "horizon"),
+        ("horizon", json!(0), "every"),
+        ("alpha", json!([]), "alpha"),
+        ("alpha", json!([0.1, 0.2, 0.3, 0.4]), "alpha"),
+        ("alpha", json!([0.1, 0.1]), "alpha[1]"),
+        ("alpha", json!([0.1, 1.0]), "alpha[1]"),
+        ("risk_aversion", json!(0.9), "risk_aversion"),
+        ("trading_cost", json!(0.2), "trading_cost"),
+        ("trading_cost", json!(1e-12), "trading_cost"),
+        ("cost_blind", json!(1), "cost_blind"),
+        ("count", json!(9), "count"),
+        ("seed", json!(0.5), "seed"),
+        ("colour", json!(1), "colour"),
+    ]
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_field_of_a_walk_forward_is_named() {
+    let app = App::start().await;
+    for (name, value, field) in faulty_walk_forwards() {
+        let mut request = walk_forward();
+        request[name] = value;
+        let (status, problem) = app.post("/backtest", &request).await;
+        assert_eq!(status, 422, "{name} {problem}");
+        assert_named(&problem, field);
+    }
+    // A training every period of a long record, and long horizons of many trainings.
+    let long: Vec<f64> = (0..5000).map(|day| 0.01 * (1.7 * f64::from(day)).sin()).collect();
+    for (every, horizon, field) in [(1, 1, "every"), (5, 400, "horizon")] {
+        let mut request = walk_forward();
+        (request["simple_returns"], request["every"], request["horizon"]) = (json!(long), json!(every), json!(horizon));
+        let (status, problem) = app.post("/backtest", &request).await;
+        assert_eq!(status, 422, "{problem}");
+        assert_named(&problem, field);
+    }
+    let (status, job) = app.post("/backtest", &walk_forward()).await;
+    assert_eq!((status, &job["progress"]["steps_total"]), (reqwest::StatusCode::ACCEPTED, &json!(3)), "{job}");
+}
+
 /// Names of the properties of a schema of the description.
 fn properties(schema: &str) -> BTreeSet<String> {
     let description: Value = serde_json::from_str(include_str!("../api/openapi.json")).unwrap();
@@ -362,13 +442,15 @@ fn the_walks_cover_every_field() {
     walked.insert("session".into());
     assert!(properties("Observe").is_subset(&walked), "{walked:?}");
     let mut walked: BTreeSet<String> =
-        faulty_sessions().iter().map(|(_, field)| field.split('[').next().unwrap().to_owned()).collect();
+        faulty_sessions().iter().map(|(_, field)| field.split(['[', '.']).next().unwrap().to_owned()).collect();
     walked.insert("policy".into());
     let evaluated = faulty_evaluations();
     let evaluated: BTreeSet<String> =
         evaluated.iter().map(|(_, _, field)| field.split(['.', '[']).next().unwrap().to_owned()).collect();
     assert!(properties("EvaluationRequest").is_subset(&evaluated), "{evaluated:?}");
     assert!(properties("OpenSession").is_subset(&walked), "{walked:?}");
+    let lived: BTreeSet<String> = faulty_walk_forwards().iter().map(|(name, _, _)| (*name).to_owned()).collect();
+    assert!(properties("BacktestRequest").is_subset(&lived), "{lived:?}");
     let mut walked: BTreeSet<String> =
         faulty_hypotheses().iter().flat_map(|(_, field)| field.split('.').map(str::to_owned)).collect();
     walked.insert("session".into());

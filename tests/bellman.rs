@@ -11,6 +11,7 @@ use ballast::control::bellman::solution::{Adversary, RobustSolution};
 use ballast::control::policy::advisor::Advisor;
 use ballast::control::problem::state::{Realised, State};
 use ballast::control::problem::utility::{RelativeUtility, utility};
+use ballast::control::request::learning::Learning;
 use ballast::control::request::specification::{Specification, UtilitySpecification};
 use serde_json::{Value, json};
 
@@ -29,7 +30,7 @@ fn problem(radius: f64, utility: &Value, support: Option<[f64; 2]>) -> Problem {
 
 /// The last step at the history, by the actions `solve` asks for.
 fn last_step(problem: &Problem, solve: impl Fn(BellmanStep, &State) -> RobustSolution) -> RobustSolution {
-    let state = State::new(&HISTORY, 100.0).unwrap();
+    let state = State::new(&HISTORY, 100.0, Learning::default()).unwrap();
     solve(BellmanStep { problem, step: 0, next: &NextValue::Terminal }, &state)
 }
 
@@ -58,7 +59,7 @@ fn a_certified_value_is_that_over_all_returns() {
 fn wealth_whose_utility_no_longer_grows_has_a_finite_value_and_gap() {
     let problem = problem(0.01, &json!({ "kind": "exponential", "risk_aversion": 1.0 }), None);
     for wealth in [1e3, 1e6, 1e15] {
-        let state = State::new(&HISTORY, wealth).unwrap();
+        let state = State::new(&HISTORY, wealth, Learning::default()).unwrap();
         let found = BellmanStep { problem: &problem, step: 0, next: &NextValue::Terminal }.solve(&state);
         assert!(found.floor_gain >= 0.0 && found.floor_gain.is_finite(), "{wealth}: {found:?}");
         assert!(found.duality_gap.is_finite(), "{wealth}: {found:?}");
@@ -99,7 +100,7 @@ fn first_step(problem: &Problem) -> RobustSolution {
         let atoms = state.law.atoms();
         vec![0.05 * (10.0 * atoms.iter().sum::<f64>() / atoms.len() as f64).tanh().max(0.0)]
     };
-    let state = State::new(&HISTORY, 100.0).unwrap();
+    let state = State::new(&HISTORY, 100.0, Learning::default()).unwrap();
     BellmanStep { problem, step: 0, next: &NextValue::Exact(problem.holdings(1), Box::new(gain)) }.solve(&state)
 }
 
@@ -222,7 +223,7 @@ fn the_tabulated_field_is_the_value_of_the_next_state() {
         let solved = support::policies::advisor(request);
         let (problem, after) = (solved.policy().problem(Default::default()), &solved.policy().steps()[1].solution);
         let next = NextValue::new(solved.specification(), 1, Some(after));
-        let state = State::new(&HISTORY, 100.0).unwrap().with_holding(0.4).unwrap();
+        let state = State::new(&HISTORY, 100.0, Learning::default()).unwrap().with_holding(0.4).unwrap();
         let (dynamics, floor) = (problem.dynamics(0), problem.floor(0, &state));
         let relative = RelativeUtility::new(solved.specification().problem.utility, floor);
         let exact_at: Vec<f64> = (0..=40).map(|k| -0.06 + 0.0035 * f64::from(k)).collect();
@@ -249,7 +250,7 @@ fn last_step_of_at_most_a_third(kind: &Value, radius: f64) -> (Advisor, State, U
         "action_interval": [0.0, 0.3], "radius": { "rule": "fixed", "radius": radius } } });
     let solved = support::policies::advisor(request);
     let utility_of = solved.specification().problem.utility;
-    (solved, State::new(&HISTORY, 100.0).unwrap(), utility_of)
+    (solved, State::new(&HISTORY, 100.0, Learning::default()).unwrap(), utility_of)
 }
 
 #[test]
@@ -325,7 +326,7 @@ fn what_is_frozen_is_the_set_of_the_history_at_every_state() {
     let mut learning = request;
     learning["problem"]["framework"] = json!("adaptive");
     let learning = Problem::new(&serde_json::from_value::<Specification>(learning).unwrap().completed().unwrap());
-    let start = State::new(&HISTORY, 100.0).unwrap();
+    let start = State::new(&HISTORY, 100.0, Learning::default()).unwrap();
     let mut later = start.clone();
     later.law.push(0.2);
     assert_eq!(frozen.uncertainty_set(&later), frozen.uncertainty_set(&start));

@@ -5,6 +5,7 @@ mod support;
 use ballast::control::policy::advice::Advice;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::state::{Realised, State};
+use ballast::control::request::learning::Learning;
 use ballast::control::request::specification::Specification;
 use serde_json::{Value, json};
 
@@ -13,7 +14,10 @@ const HISTORY: [f64; 8] = [0.061, -0.034, 0.052, 0.013, -0.041, 0.083, -0.022, 0
 const RATE: f64 = 0.002;
 
 fn start(solved: &Advisor, wealth: f64, holding: f64) -> State {
-    State::new(&solved.specification().problem.history, wealth).unwrap().with_holding(holding).unwrap()
+    State::new(&solved.specification().problem.history, wealth, Learning::default())
+        .unwrap()
+        .with_holding(holding)
+        .unwrap()
 }
 
 fn advice(solved: &Advisor, wealth: f64, holding: f64) -> Advice {

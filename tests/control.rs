@@ -4,12 +4,14 @@ mod support;
 
 use std::sync::atomic::AtomicBool;
 
+use ballast::control::bellman::problem::Problem;
 use ballast::control::error::TrainError;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::state::{Realised, State};
 use ballast::control::problem::utility::utility;
 use ballast::control::progress::Watch;
+use ballast::control::request::learning::Learning;
 use ballast::control::solved_step::StepSolution;
 use ballast::control::training::Training;
 use serde_json::{Value, json};
@@ -78,6 +80,31 @@ fn the_bridge_quantile_agrees_with_a_million_paths() {
             let allowed = 4.0 * (found.standard_error + row["standard_error"].as_f64().unwrap());
             assert!((found.value - row["quantile"].as_f64().unwrap()).abs() < allowed, "{row} {found:?}");
         }
+    }
+}
+
+/// `weighted_bridge.json`: returns whose weights halve every `half_life` of them, through the radius that a policy is given.
+#[test]
+fn the_bridge_quantile_of_decaying_weights_agrees_with_a_million_paths() {
+    let oracle: Value = serde_json::from_str(include_str!("data/weighted_bridge.json")).unwrap();
+    let cases = oracle["cases"].as_array().unwrap();
+    assert_eq!(cases.len(), 3);
+    for case in cases {
+        let number = |field: &str| case[field].as_f64().unwrap();
+        let request = json!({ "problem": { "horizon": 1, "rate_per_step": 0.0, "history": case["returns"],
+            "learning": { "kind": "decay", "half_life": case["half_life"] },
+            "radius": { "rule": "bridge", "alpha": case["alpha"], "paths": 50_000 } }, "seed": 11 });
+        let problem = Problem::new(&specification(request));
+        let history = &problem.specification.problem.history;
+        let law = problem.specification.problem.learning.law(history);
+        assert!((law.effective_size() / number("effective_size") - 1.0).abs() < 1e-13);
+        let measure = problem.sets.measure(&law);
+        let found = measure.quantile.unwrap();
+        let allowed = 4.0 * found.standard_error.hypot(number("standard_error"));
+        assert!((found.value - number("quantile")).abs() < allowed, "{found:?} against {}", number("quantile"));
+        // An error of two in a hundred would show.
+        assert!(allowed < 0.02 * found.value, "{allowed}");
+        assert!((measure.radius / (found.value / number("effective_size").sqrt()) - 1.0).abs() < 1e-13);
     }
 }
 
@@ -204,7 +231,7 @@ fn values_stay_above_the_floor_and_actions_in_the_interval_everywhere() {
             );
             for (wealth, shift) in [(100.0, 0.0), (3.0, 0.4), (2000.0, -0.4), (100.0, 2.0)] {
                 let history: Vec<f64> = twenty_returns().iter().map(|z| z * (1.0 + shift) + shift).collect();
-                let state = State::new(&history, wealth).unwrap();
+                let state = State::new(&history, wealth, Learning::default()).unwrap();
                 for step in 0..2 {
                     let advice = solved.advise(step, &state, AdviceMode::Surrogate);
                     assert!(advice.certainty_equivalent >= advice.floor, "{target} {features} {kind} {advice:?}");

@@ -7,6 +7,7 @@ use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::investor::{Investor, Position};
 use ballast::control::problem::state::State;
 use ballast::control::progress::Watch;
+use ballast::control::request::learning::Learning;
 use ballast::control::request::specification::Specification;
 use ballast::control::training::Training;
 use ballast::numerics::empirical::EmpiricalDistribution;
@@ -21,7 +22,7 @@ fn compared(problem: Value, count: usize, holding: f64) -> (f64, f64) {
     let specification: Specification = serde_json::from_value(request).unwrap();
     let specification = specification.completed().unwrap();
     let solved = Advisor::new(Training::new(&specification).unwrap().run(&Watch::unwatched()).unwrap());
-    let state = State::new(&HISTORY, 100.0).unwrap().with_holding(holding).unwrap();
+    let state = State::new(&HISTORY, 100.0, Learning::default()).unwrap().with_holding(holding).unwrap();
     let own = solved.advise(0, &state, AdviceMode::Resolve);
     let investor = Investor::new(&specification.problem);
     let start = Position { wealth: 100.0, holding };

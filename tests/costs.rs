@@ -5,13 +5,17 @@ mod support;
 use ballast::control::policy::advice::Advice;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::state::State;
+use ballast::control::request::learning::Learning;
 use serde_json::{Value, json};
 
 const BASIS_POINTS: f64 = 1e4;
 const HISTORY: [f64; 8] = [0.061, -0.034, 0.052, 0.013, -0.041, 0.083, -0.022, 0.037];
 
 fn state(solved: &Advisor, wealth: f64, holding: f64) -> State {
-    State::new(&solved.specification().problem.history, wealth).unwrap().with_holding(holding).unwrap()
+    State::new(&solved.specification().problem.history, wealth, Learning::default())
+        .unwrap()
+        .with_holding(holding)
+        .unwrap()
 }
 
 fn advice(solved: &Advisor, step: usize, holding: f64) -> Advice {

@@ -244,7 +244,7 @@ fn every_field_of_every_request_has_its_row_and_its_bounds() {
 #[test]
 fn every_answer_is_described_where_it_is_given() {
     let (description, page) = (description(), read("docs/requests.md"));
-    let report = spans(&read("docs/evaluation.md"));
+    let report = [spans(&read("docs/evaluation.md")), spans(&read("docs/backtest.md"))].concat();
     let mut said: Vec<(String, Vec<String>, BTreeSet<String>)> = Vec::new();
     for (path, operations) in description["paths"].as_object().unwrap() {
         for (method, operation) in operations.as_object().unwrap() {
@@ -325,7 +325,7 @@ fn every_example_fits_its_request() {
         assert_eq!(operations["post"]["requestBody"]["content"]["application/json"]["example"], example, "{path}");
         examples += 1;
     }
-    assert_eq!(examples, 7);
+    assert_eq!(examples, 8);
 }
 
 #[test]

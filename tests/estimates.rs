@@ -5,12 +5,16 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use ballast::control::estimate;
+use ballast::control::evaluation::backtest::Backtest;
+use ballast::control::evaluation::backtest_report::BacktestReport;
 use ballast::control::evaluation::paths::Evaluation;
 use ballast::control::evaluation::report::{Costs, EvaluationReport};
+use ballast::control::evaluation::rolling::{Common, Decision, Period};
 use ballast::control::kept::Kept;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
-use ballast::control::pool::TrainingPool;
+use ballast::control::pool::{self, TrainingPool};
+use ballast::control::problem::actions::Band;
 use ballast::control::progress::Watch;
 use ballast::control::request::evaluation::EvaluationRequest;
 use ballast::control::request::specification::Specification;
@@ -124,6 +128,37 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
         });
         holds(what, estimate::evaluation(&request, THREADS).bytes(), taken);
     }
+    walk_forwards(&pool);
+}
+
+/// What walk-forwards take: the trainings of a stretch side by side, and the books of a long record.
+fn walk_forwards(pool: &TrainingPool) {
+    let request = |length: usize, count: usize, every: usize| {
+        let request = json!({ "log_returns": history(length), "rate": 0.001, "periods_per_year": 4, "window": 24,
+            "count": count, "every": every, "alpha": [0.5] });
+        Backtest::new(serde_json::from_value(request).unwrap()).unwrap()
+    };
+    let backtest = request(30, 700, 6);
+    let (taken, _) = most_bytes(|| {
+        let strategies = backtest.plain_strategies();
+        let common = Common::of(&strategies, Kept::new(estimate::kept_by_backtest(&backtest, THREADS)));
+        let watch = Watch::unwatched();
+        let decide = |strategy| backtest.walk.decide_stretch(strategy, &backtest.periods, 0, &common, &watch).unwrap();
+        pool.install(|| pool::map(strategies, decide))
+    });
+    holds("a stretch", estimate::backtest(&backtest, THREADS).bytes(), taken);
+    let backtest = request(4000, 10, 60);
+    let estimated = estimate::backtest(&backtest, THREADS).bytes();
+    let (taken, _) = most_bytes(|| {
+        let held = |period: &Period| {
+            let share = (40.0 * period.log_return).abs().min(1.0);
+            Decision { band: Band::of(&[share]), radius: 0.1 * share, source: None }
+        };
+        let held: Vec<Decision> = backtest.lived().iter().map(held).collect();
+        let decisions = vec![held; backtest.strategies.len()];
+        serde_json::to_string(&BacktestReport::new(&backtest.walked(decisions))).unwrap()
+    });
+    holds("a record", estimated, taken);
 }
 
 fn evaluation(mut request: Value) -> EvaluationRequest {

@@ -2,7 +2,8 @@
 
 Reads {"policy": .., "questions": [{"step", "wealth", "holding", "returns"}, ..]} from standard input, where a question may give the
 "radius" and the "radius_ahead" of a bridge rule, whose random numbers nobody else has. Answers one object a question.
-With the argument "bridge" it reads {"returns", "alpha", "paths"} and answers the quantiles Q and Q' of its own bridges.
+Returns are in the order in which they came. With the argument "bridge" it reads {"learning", "returns", "alpha", "paths"} and answers
+the quantiles Q and Q' of its own bridges.
 """
 
 import json
@@ -11,16 +12,27 @@ import random
 import sys
 
 
-def mean(values):
-    return sum(values) / len(values)
+def retention(learning):
+    """d, what of a return's weight is left one return later."""
+    return 1.0 if learning["kind"] == "equal" else 0.5 ** (1 / learning["half_life"])
 
 
-def cap(returns, radius, lowest):
-    """c from (1/n) sum max(z_j - c, 0) = radius, by bisection, and at least the lowest return of the support."""
+def masses(learning, count):
+    """Of so many returns, the oldest first."""
+    weights = [retention(learning) ** age for age in reversed(range(count))]
+    return [weight / sum(weights) for weight in weights]
+
+
+def mean(values, w):
+    return sum(value * mass for value, mass in zip(values, w))
+
+
+def cap(returns, w, radius, lowest):
+    """c from sum w_j max(z_j - c, 0) = radius, by bisection, and at least the lowest return of the support."""
     low, high = min(returns) - radius - 1.0, max(returns)
     for _ in range(200):
         middle = (low + high) / 2
-        if mean([max(z - middle, 0.0) for z in returns]) > radius:
+        if mean([max(z - middle, 0.0) for z in returns], w) > radius:
             low = middle
         else:
             high = middle
@@ -28,7 +40,7 @@ def cap(returns, radius, lowest):
 
 
 def radius_of(problem, size):
-    """The rules of docs/requests.md that look at the number of returns alone."""
+    """The rules of docs/requests.md that look at the effective number of returns alone."""
     rule = problem["radius"]
     if problem["framework"] == "plug_in":
         return 0.0
@@ -41,10 +53,10 @@ def radius_of(problem, size):
     raise ValueError(f"{rule['rule']} must be asked for with its radius")
 
 
-def moment_features(returns, count):
-    m = mean(returns)
-    s = math.sqrt(mean([(z - m) ** 2 for z in returns]))
-    shape = lambda order: mean([(z - m) ** order for z in returns]) / s**order
+def moment_features(returns, w, count):
+    m = mean(returns, w)
+    s = math.sqrt(mean([(z - m) ** 2 for z in returns], w))
+    shape = lambda order: mean([(z - m) ** order for z in returns], w) / s**order
     features = {
         "mean": m,
         "log_standard_deviation": math.log(s),
@@ -56,7 +68,7 @@ def moment_features(returns, count):
     return list(features.values())[:count]
 
 
-def merton_features(problem, returns, radius):
+def merton_features(problem, returns, w, radius):
     utility, bank = problem["utility"], 1 + problem["rate_per_step"]
     rho = {
         "exponential": lambda: utility["risk_aversion"] * (problem["initial_wealth"] + to_come(problem, 0)[0]),
@@ -64,11 +76,11 @@ def merton_features(problem, returns, radius):
         "log": lambda: 1.0,
     }[utility["kind"]]()
     lowest = (problem.get("support") or {"min": -math.inf})["min"]
-    c = cap(returns, radius, lowest)
+    c = cap(returns, w, radius, lowest)
     capped = [math.exp(min(z, c)) / bank for z in returns]
-    e = mean(capped) - 1
-    v = mean([(x - mean(capped)) ** 2 for x in capped])
-    s2 = mean([(z - mean(returns)) ** 2 for z in returns])
+    e = mean(capped, w) - 1
+    v = mean([(x - mean(capped, w)) ** 2 for x in capped], w)
+    s2 = mean([(z - mean(returns, w)) ** 2 for z in returns], w)
     return [math.asinh(e / (rho * s2)), math.asinh(e / (rho * max(v, s2 / 100)))]
 
 
@@ -93,24 +105,25 @@ def sees_wealth(problem):
 def features(specification, question):
     problem, surrogate = specification["problem"], specification["surrogate"]
     framework, returns = problem["framework"], question["returns"]
+    w = masses(problem["learning"], len(returns))
     wealth = question["wealth"] + to_come(problem, question["step"])[0]
     learns = framework in ("adaptive", "plug_in", "parametric_adaptive")
     count = surrogate["moment_count"] if learns else 0
     if framework == "parametric_adaptive":
         count = min(count, 2)
     if surrogate["features"] == "raw_moments":
-        raw = [mean([z**order for z in returns]) for order in range(1, count + 1)]
+        raw = [mean([z**order for z in returns], w) for order in range(1, count + 1)]
         return ([wealth] if sees_wealth(problem) else []) + raw
     found = [math.log(wealth)] if sees_wealth(problem) else []
     if not learns:
         return found
-    found += moment_features(returns, count)
+    found += moment_features(returns, w, count)
     if framework == "parametric_adaptive":
         return found
-    radius = question["radius"] if "radius" in question else radius_of(problem, len(returns))
+    radius = question["radius"] if "radius" in question else radius_of(problem, 1 / sum(mass * mass for mass in w))
     if problem["radius"]["rule"] == "bridge" and framework == "adaptive":
         found += [math.log(radius), math.log(question["radius_ahead"] / radius)]
-    return found + merton_features(problem, returns, radius)
+    return found + merton_features(problem, returns, w, radius)
 
 
 def kernel(hyper, left, right):
@@ -205,32 +218,38 @@ def evaluate(policy, question):
     }
 
 
-def bridge(size):
-    """|B(i/n)|, i = 1 to n - 1: a random walk of n steps, tied down at its end."""
-    walk, paths = 0.0, []
-    for _ in range(size):
-        walk += random.gauss(0.0, 1.0) / math.sqrt(size)
-        paths.append(walk)
-    return [abs(b - walk * (i + 1) / size) for i, b in enumerate(paths[:-1])]
+def bridge(times):
+    """|B| at ascending times: a random walk, tied down at 1."""
+    walk, before, path = 0.0, 0.0, []
+    for time in [*times, 1.0]:
+        walk += random.gauss(0.0, math.sqrt(max(time - before, 0.0)))
+        before = time
+        path.append(walk)
+    return [abs(b - walk * time) for b, time in zip(path, times)]
 
 
-def gaps(returns):
-    ordered = sorted(returns)
-    return [high - low for low, high in zip(ordered, ordered[1:])]
+def gaps(returns, w):
+    """The time and the length of each gap: the mass of the returns below it, and its width."""
+    ordered, below, found = sorted(zip(returns, w)), 0.0, []
+    for (low, mass), (high, _) in zip(ordered, ordered[1:]):
+        below += mass
+        found.append((below, high - low))
+    return found
 
 
 def quantile(gaps, alpha, paths):
-    """The (1 - alpha)-quantile of sum |B(i/n)| (z_(i+1) - z_(i)), and half the width that 1 standard error of its rank has."""
-    values = sorted(sum(b * gap for b, gap in zip(bridge(len(gaps) + 1), gaps)) for _ in range(paths))
+    """The (1 - alpha)-quantile of sum |B(time)| length, and half the width that 1 standard error of its rank has."""
+    times, lengths = zip(*sorted(gaps))
+    values = sorted(sum(b * length for b, length in zip(bridge(times), lengths)) for _ in range(paths))
     rank, error = (1 - alpha) * paths, math.sqrt(alpha * (1 - alpha) * paths)
     return {"value": values[round(rank)], "standard_error": (values[round(rank + error)] - values[round(rank - error)]) / 2}
 
 
-def quantiles(returns, alpha, paths):
+def quantiles(learning, returns, alpha, paths):
     random.seed(20260101)
-    doubled = [gaps(returns + [again]) for again in returns]
-    ahead = [mean(column) for column in zip(*doubled)]
-    return {"now": quantile(gaps(returns), alpha, paths), "ahead": quantile(ahead, alpha, paths)}
+    now, later = (masses(learning, len(returns) + more) for more in (0, 1))
+    ahead = [(time, mass * length) for again, mass in zip(returns, now) for time, length in gaps(returns + [again], later)]
+    return {"now": quantile(gaps(returns, now), alpha, paths), "ahead": quantile(ahead, alpha, paths)}
 
 
 if __name__ == "__main__":

@@ -57,6 +57,10 @@ async fn a_job_larger_than_memory_is_refused_and_the_service_lives() {
     evaluation["frameworks"] = json!(["adaptive"]);
     let (status, refused) = app.post("/evaluate", &evaluation).await;
     assert_eq!((status, &refused["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!("design.count")), "{refused}");
+    let returns: Vec<f64> = (0..40).map(|k| 0.02 + 0.03 * (1.7 * f64::from(k)).sin()).collect();
+    let walk = json!({ "log_returns": returns, "rate": 0.002, "periods_per_year": 4, "window": 20, "count": 6000 });
+    let (status, refused) = app.post("/backtest", &walk).await;
+    assert_eq!((status, &refused["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!("count")), "{refused}");
     app.train(&support::specification(2)).await;
     app.open().await;
     assert_eq!(app.action().await.0, StatusCode::OK);

@@ -165,6 +165,7 @@ fn routes(session: &str, policy: &str) -> Vec<(Method, String, Option<Value>)> {
                 "/sessions/{id}/corrections" => {
                     json!({ "correction": 1, "period": 1, "log_return": 0.5, "reason": "not theirs" })
                 }
+                "/sessions/{id}/renewals" => json!({ "renewal": 1, "policy": policy }),
                 _ => json!({ "session": session, "wealth": 1.0 }),
             };
             let query = if path == "/action" { format!("?session={session}") } else { String::new() };
@@ -173,7 +174,7 @@ fn routes(session: &str, policy: &str) -> Vec<(Method, String, Option<Value>)> {
             routes.push((method.clone(), path, (method == Method::POST).then_some(body)));
         }
     }
-    assert!(routes.len() >= 8, "{routes:?}");
+    assert!(routes.len() >= 9, "{routes:?}");
     routes
 }
 

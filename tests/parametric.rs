@@ -9,6 +9,7 @@ use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::policy::what_if::{Hypothesis, HypotheticalRadius};
 use ballast::control::problem::state::{Realised, State};
+use ballast::control::request::learning::Learning;
 use serde_json::{Value, json};
 use support::App;
 use support::policies::{advisor, specification, train};
@@ -101,7 +102,8 @@ fn exact_first_of_two(request: Value) -> (f64, f64) {
     let gain = move |state: &State| {
         vec![BellmanStep { problem: &last, step: 1, next: &NextValue::Terminal }.solve(state).floor_gain]
     };
-    let state = State::new(&specification.problem.history, specification.problem.initial_wealth).unwrap();
+    let state =
+        State::new(&specification.problem.history, specification.problem.initial_wealth, Learning::default()).unwrap();
     let next = NextValue::Exact(problem.holdings(1), Box::new(gain));
     let found = BellmanStep { problem: &problem, step: 0, next: &next }.solve(&state);
     (found.floor_gain, found.action)

@@ -9,7 +9,6 @@ use std::process::{Command, Stdio};
 use ballast::control::policy::advice::AdviceSource;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::problem::state::{Realised, State};
-use ballast::numerics::empirical::EmpiricalDistribution;
 use serde_json::{Value, json};
 use support::policies::advisor;
 
@@ -62,7 +61,15 @@ fn policies() -> Vec<Value> {
         of["problem"]["contributions"] = contributions;
         of
     };
+    let decaying = |mut of: Value| {
+        of["problem"]["learning"] = json!({ "kind": "decay", "half_life": 3.5 });
+        of
+    };
     vec![
+        decaying(policy("adaptive", power(), bridge(), six())),
+        decaying(policy("adaptive", exponential(), json!({ "rule": "root_n", "kappa": 0.02 }), raw_value.clone())),
+        decaying(policy("plug_in", power(), bridge(), json!({}))),
+        decaying(policy("parametric_adaptive", exponential(), chi_square(), json!({}))),
         flowing(policy("adaptive", power(), bridge(), json!({})), json!(12.0)),
         flowing(policy("adaptive", exponential(), bridge(), value.clone()), json!([30.0, -60.0, 10.0])),
         flowing(
@@ -90,18 +97,21 @@ fn policies() -> Vec<Value> {
     ]
 }
 
+/// Seen in the two periods after the history.
+const SEEN: [f64; 2] = [0.03, -0.02];
+
 /// States of every step: along a path, and one of another wealth.
 fn states(solved: &Advisor) -> Vec<(usize, State)> {
     let start = solved.initial_state(None, None).unwrap();
-    let first = solved.advance(0, &start, &Realised::of(0.6, 0.03));
+    let first = solved.advance(0, &start, &Realised::of(0.6, SEEN[0]));
     let other = State { wealth: 91.0, holding: 0.83, ..first.clone() };
-    let second = solved.advance(1, &first, &Realised::of(0.3, -0.02));
+    let second = solved.advance(1, &first, &Realised::of(0.3, SEEN[1]));
     vec![(0, start), (1, first), (1, other), (2, second)]
 }
 
 fn question(solved: &Advisor, step: usize, state: &State) -> Value {
-    let mut question =
-        json!({ "step": step, "wealth": state.wealth, "holding": state.holding, "returns": state.law.atoms() });
+    let returns = [&HISTORY, &SEEN[..step]].concat();
+    let mut question = json!({ "step": step, "wealth": state.wealth, "holding": state.holding, "returns": returns });
     let problem = solved.policy().problem(Default::default());
     if problem.specification.problem.radius.as_ref().is_some_and(|rule| json!(rule)["rule"] == "bridge") {
         let radii = problem.sets.radii(&state.law, solved.radius(state));
@@ -176,23 +186,28 @@ fn another_program_that_follows_the_page_answers_what_the_service_answers() {
 fn another_program_finds_the_bridge_radius_with_random_numbers_of_its_own() {
     let (alpha, paths) = (0.1, 20_000);
     let bridge = json!({ "rule": "bridge", "alpha": alpha, "paths": paths, "scale": 0.7 });
-    let mut request = policy("adaptive", json!({ "kind": "log" }), bridge, json!({}));
-    request["problem"]["horizon"] = json!(2);
-    let problem = ballast::control::bellman::problem::Problem::new(&support::policies::specification(request));
-    let law = EmpiricalDistribution::new(&HISTORY);
-    let measure = problem.sets.measure(&law);
-    let radii = problem.sets.radii(&law, measure.radius);
-    let found = python(&["bridge"], &json!({ "returns": HISTORY, "alpha": alpha, "paths": paths }));
-    let own_error = measure.quantile.unwrap().standard_error;
-    for (which, radius, size) in [("now", radii.radius, 8.0), ("ahead", radii.radius_ahead, 9.0_f64)] {
-        let number = |field: &str| found[which][field].as_f64().unwrap();
-        let quantile = radius * size.sqrt() / 0.7;
-        // Either simulation has its error, and four of both together pass one seed in 16,000.
-        let allowed = 4.0 * own_error.hypot(number("standard_error"));
-        assert!((quantile - number("value")).abs() < allowed, "{which}: {quantile} and {found}");
-        // An error of three in a hundred would show.
-        assert!(allowed < 0.03 * quantile, "{which}: {allowed} of {quantile}");
+    for learning in [json!({ "kind": "equal" }), json!({ "kind": "decay", "half_life": 20.0 })] {
+        let mut request = policy("adaptive", json!({ "kind": "log" }), bridge.clone(), json!({}));
+        request["problem"]["horizon"] = json!(2);
+        request["problem"]["learning"] = learning.clone();
+        let problem = ballast::control::bellman::problem::Problem::new(&support::policies::specification(request));
+        let law = problem.specification.problem.learning.law(&HISTORY);
+        let measure = problem.sets.measure(&law);
+        let radii = problem.sets.radii(&law, measure.radius);
+        let asked = json!({ "learning": learning, "returns": HISTORY, "alpha": alpha, "paths": paths });
+        let found = python(&["bridge"], &asked);
+        let own_error = measure.quantile.unwrap().standard_error;
+        let sizes = [law.effective_size(), law.effective_sizes_ahead()[0]];
+        for (which, radius, size) in [("now", radii.radius, sizes[0]), ("ahead", radii.radius_ahead, sizes[1])] {
+            let number = |field: &str| found[which][field].as_f64().unwrap();
+            let quantile = radius * size.sqrt() / 0.7;
+            // Either simulation has its error, and four of both together pass one seed in 16,000.
+            let allowed = 4.0 * own_error.hypot(number("standard_error"));
+            assert!((quantile - number("value")).abs() < allowed, "{learning} {which}: {quantile} and {found}");
+            // An error of four in a hundred would show.
+            assert!(allowed < 0.04 * quantile, "{learning} {which}: {allowed} of {quantile}");
+        }
+        let trend = radii.radius_ahead / radii.radius;
+        assert!(trend < 0.97, "{trend}");
     }
-    let trend = radii.radius_ahead / radii.radius;
-    assert!(trend < 0.97, "{trend}");
 }

@@ -84,6 +84,8 @@ async fn with_session(store: &Store, session: &str, history: &[f64]) {
         initial_holding: 0.0,
         initial_history: history.into(),
         horizon: 3,
+        plan_json: "{}".into(),
+        due: None,
         created_ms: 5,
     };
     assert_eq!(store.create_session(new, None).await.unwrap(), CreateSession::Created);
@@ -367,6 +369,8 @@ async fn a_session_needs_its_policy_and_a_free_name(place: &Place) {
         initial_holding: 0.0,
         initial_history: vec![],
         horizon: 1,
+        plan_json: "{}".into(),
+        due: None,
         created_ms: 1,
     };
     assert_eq!(store.create_session(new.clone(), None).await.unwrap(), CreateSession::NoPolicy);
@@ -602,6 +606,8 @@ async fn two_replicas_meet(place: &Place) {
             initial_holding: 0.0,
             initial_history: vec![0.1],
             horizon: 1,
+            plan_json: "{}".into(),
+            due: None,
             created_ms: 1,
         };
         let tenant = Tenant::default();
@@ -730,6 +736,8 @@ fn session_of(owner: &str, session: &str) -> SessionRow {
         initial_holding: 0.0,
         initial_history: vec![0.01, -0.02],
         horizon: 3,
+        plan_json: "{}".into(),
+        due: None,
         created_ms: 5,
     }
 }

@@ -423,6 +423,8 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
                 initial_holding: 0.0,
                 initial_history: vec![0.1, -0.0],
                 horizon: 3,
+                plan_json: "{}".into(),
+                due: None,
                 created_ms: model.now,
             };
             let taken = model.sessions.iter().any(|row| row.0 == session);
@@ -518,7 +520,7 @@ async fn replay(place: &Place, operations: &[Operation]) -> Result<(), TestCaseE
 }
 
 const TABLES: &str = "jobs, job_requests, job_reports, idempotency_keys, checkpoints, turns, usage, policies, \
-                      policy_owners, sessions, entries";
+                      policy_owners, sessions, entries, renewals";
 
 #[test]
 fn sqlite_does_what_the_model_does() {

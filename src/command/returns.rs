@@ -1,13 +1,15 @@
 //! Returns of a risky asset and of the bank: those bundled, of the US stock market and Treasury bills, or a file's.
 //!
 //! A file has one period a row, oldest first, and columns that are found by their names ([`columns`]). How far apart its
-//! dates are says what a period is ([`frequency`]). What breaks a rule is refused with its line, column and value: a file
+//! dates are says what a period is ([`Frequency`]). What breaks a rule is refused with its line, column and value: a file
 //! that is misread would give advice all the same.
 
 use std::path::PathBuf;
 
 use ballast::control::evaluation::account::Annual;
 use ballast::control::evaluation::rolling::Period;
+use ballast::control::request::dates;
+pub use ballast::control::request::frequency::Frequency;
 use clap::Args;
 use csv::StringRecord;
 use jiff::civil::Date;
@@ -15,13 +17,10 @@ use jiff::civil::Date;
 use cell::Cell;
 use columns::{Columns, Kind, Line};
 pub use error::ReturnsError;
-pub use frequency::Frequency;
 
 mod cell;
 mod columns;
-mod dates;
 mod error;
-mod frequency;
 #[cfg(test)]
 mod tests;
 
@@ -106,13 +105,14 @@ impl Returns {
         };
         let records: Vec<StringRecord> = reader.records().collect::<Result<_, _>>()?;
         let lines: Vec<Line> = records.iter().map(|record| columns.line(record)).collect::<Result<_, _>>()?;
-        let dates: Vec<Date> = lines.iter().map(|line| dates::date(line.date)).collect::<Result<_, _>>()?;
+        let date = |line: &Line| dates::date(line.date.text).ok_or_else(|| line.date.refused(dates::FORM));
+        let dates: Vec<Date> = lines.iter().map(date).collect::<Result<_, _>>()?;
         let risky_returns = columns.kind.returns(&lines)?;
         if risky_returns.len() < 2 {
             return Err(ReturnsError::Few { found: risky_returns.len() });
         }
-        let cells: Vec<Cell> = lines.iter().map(|line| line.date).collect();
-        let frequency = Frequency::of(&dates, &cells)?;
+        let written: Vec<&str> = lines.iter().map(|line| line.date.text).collect();
+        let frequency = Frequency::of(&dates, &written).map_err(|found| lines[found.index].date.refused(found.rule))?;
         // The first price has no return.
         let first = lines.len() - risky_returns.len();
         let rows = dates[first..].iter().zip(&lines[first..]).zip(risky_returns);

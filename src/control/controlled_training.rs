@@ -1,5 +1,7 @@
 //! Backward induction for any controlled problem: the method of `training`, without what only the investor's problem allows.
 
+use std::ops::Range;
+
 use rand::RngExt;
 
 use crate::control::bellman::controlled::{ControlledSolution, ControlledStep, ControlledValue};
@@ -59,8 +61,8 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         }
         let laws = Problem::new(&specification);
         let sampling_law = specification.design.sampling_law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
-        let law = continuous_law(sampling_law, &specification.problem.history);
-        let history = EmpiricalDistribution::new(&specification.problem.history);
+        let law = continuous_law(sampling_law, &specification.problem);
+        let history = specification.problem.learning.law(&specification.problem.history);
         let described = problem.describe(0, start).len();
         let mut names: Vec<String> = (0..described).map(|index| format!("state_{index}")).collect();
         names.extend(laws.selection.names());
@@ -73,7 +75,7 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
             let bellman = ControlledStep { problem, laws: &laws, step, next: values.last() };
             let states = Simulated { bellman, start, history: &history, law: &law };
             if names.is_empty() {
-                values.push(ControlledValue::Constant(states.solve(0, states.features(0))?.floor_gain));
+                values.push(ControlledValue::Constant(states.solve(0, states.features_at(0))?.floor_gain));
                 continue;
             }
             let (specification, names, counts) = (&specification, &names, counts.clone());
@@ -123,10 +125,16 @@ impl<P: Controlled> Simulated<'_, P> {
     }
 }
 
-impl<P: Controlled> Candidates for Simulated<'_, P> {
-    fn features(&self, index: usize) -> Features {
+impl<P: Controlled> Simulated<'_, P> {
+    fn features_at(&self, index: usize) -> Features {
         let (state, law) = self.state(index);
         self.bellman.features(&state, &law)
+    }
+}
+
+impl<P: Controlled> Candidates for Simulated<'_, P> {
+    fn features(&self, some: Range<usize>) -> Vec<Features> {
+        some.map(|index| self.features_at(index)).collect()
     }
 
     fn solve(&self, index: usize, features: Features) -> Result<DesignPoint, TrainError> {

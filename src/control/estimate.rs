@@ -5,6 +5,7 @@
 //! (`tests/estimates.rs` holds the estimates to it).
 
 use super::bellman::problem::Problem;
+use super::evaluation::backtest::Backtest;
 use super::policy::Policy;
 use super::policy::prepared::{bytes_ready, factor_bytes, prepared_bytes};
 use super::problem::holdings::{HOLDINGS, HOLDINGS_OF_ONE_LAW};
@@ -37,6 +38,9 @@ const FUNCTIONS_WITHOUT_COST: usize = 2;
 const WEALTH_BYTES: usize = 48;
 const LIVED_BYTES: usize = 48;
 const PATH_BYTES: usize = 256;
+/// A period of a strategy's walk-forward: its decision and account, the series that are resampled, and the report with its
+/// digits and the copies that the store is given.
+const DECIDED_BYTES: usize = 1024;
 /// What any job takes.
 const LEAST: usize = 8 << 20;
 
@@ -227,6 +231,42 @@ pub fn kept_by_evaluation(request: &EvaluationRequest) -> usize {
         .fold((0usize, 0usize), |(factors, bridges), (more, own)| (factors.saturating_add(more), bridges.max(own)));
     // Room for any of them to be half of all.
     factors.saturating_add(bridges).saturating_mul(2)
+}
+
+/// What a walk-forward takes on so many threads.
+pub fn backtest(backtest: &Backtest, threads: usize) -> Footprint {
+    let (field, returns) = backtest.request.returns();
+    // Beside the strategies stands a constant mix.
+    let decided = product(&[returns.len(), backtest.strategies.len() + 1, DECIDED_BYTES]);
+    let record = Footprint::of(field, returns.len(), decided.saturating_add(LEAST));
+    let Some(sizes) = heaviest(backtest) else { return record };
+    let at_once = at_once(backtest, threads);
+    let policies = product(&[at_once, sizes.policy().saturating_add(sizes.prepared())]);
+    let bridges = training_keeps(&sizes).saturating_mul(at_once).saturating_add(sizes.statistics(threads));
+    record.and("count", sizes.count, product(&[at_once, sizes.fit()])).and("horizon", sizes.horizon, policies).and(
+        "window",
+        sizes.history,
+        bridges.saturating_add(sizes.solving(threads)),
+    )
+}
+
+/// Bytes of the cache that such a walk-forward should have.
+pub fn kept_by_backtest(backtest: &Backtest, threads: usize) -> usize {
+    let bridges = heaviest(backtest).map_or(0, |sizes| training_keeps(&sizes));
+    bridges.saturating_mul(at_once(backtest, threads))
+}
+
+/// The sizes of the training that takes most, which learns and knows the cost.
+fn heaviest(backtest: &Backtest) -> Option<Sizes> {
+    let past = backtest.periods.get(..backtest.walk.window)?;
+    let specification = backtest.walk.specification(Framework::Adaptive, *backtest.request.alpha.first()?, past);
+    Some(Sizes::of(&specification.completed().ok()?))
+}
+
+/// Trainings of a stretch that run side by side.
+fn at_once(backtest: &Backtest, threads: usize) -> usize {
+    let trained = backtest.strategies.iter().filter(|(_, strategy)| strategy.is_trained()).count();
+    threads.min(trained).max(1)
 }
 
 fn product(factors: &[usize]) -> usize {

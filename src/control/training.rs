@@ -3,6 +3,9 @@
 //! optimise (the robust step at every design point), train (both surrogates), go one step back. A step depends on
 //! the specification and the step after it alone, so a checkpoint per step resumes to the same bits.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use crate::control::bellman::next_value::NextValue;
 use crate::control::bellman::problem::Problem;
 use crate::control::bellman::solution::RobustSolution;
@@ -20,11 +23,13 @@ use crate::control::surrogate::features::Features;
 use crate::control::surrogate::fitting::DesignPoint;
 use crate::control::surrogate::learning::{Candidates, Counts, Learning, diagnostics};
 use crate::control::surrogate::stored::{SingleSolution, Solution};
+use crate::control::uncertainty::measured::Measured;
 
 /// A prepared training job: the completed specification and its simulated design.
 pub struct Training {
     problem: Problem,
     design: Design,
+    measured: Arc<Measured>,
 }
 
 impl Training {
@@ -41,8 +46,17 @@ impl Training {
     /// # Errors
     /// As [`Self::new`].
     pub fn with(specification: &Specification, kept: Kept) -> Result<Self, TrainError> {
+        Training::among(specification, kept, Arc::default())
+    }
+
+    /// The same, measuring in common with other trainings; `measured` changes no bit.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn among(specification: &Specification, kept: Kept, measured: Arc<Measured>) -> Result<Self, TrainError> {
         let specification = specification.clone().completed()?;
-        Ok(Training { design: Design::new(&specification), problem: Problem::with(&specification, kept) })
+        let design = Design::new(&specification);
+        Ok(Training { design, problem: Problem::with(&specification, kept), measured })
     }
 
     /// Number of steps to solve: steps `horizon - 1` down to 0.
@@ -64,7 +78,7 @@ impl Training {
     ) -> Result<StepSolution, TrainError> {
         let next = NextValue::new(&self.problem.specification, step + 1, after.map(|after| &after.solution));
         let bellman = BellmanStep { problem: &self.problem, step, next: &next };
-        let solver = DesignSolver { bellman, design: &self.design };
+        let solver = DesignSolver { bellman, design: &self.design, measured: &self.measured };
         let count = self.design.count(step);
         if count == 1 {
             watch.go_on()?;
@@ -106,11 +120,20 @@ impl Training {
 struct DesignSolver<'a> {
     bellman: BellmanStep<'a>,
     design: &'a Design,
+    measured: &'a Measured,
 }
 
 impl Candidates for DesignSolver<'_> {
-    fn features(&self, index: usize) -> Features {
-        self.bellman.problem.features(self.bellman.step, &self.state(index))
+    fn features(&self, some: Range<usize>) -> Vec<Features> {
+        let (problem, step) = (self.bellman.problem, self.bellman.step);
+        let states: Vec<State> = some.clone().map(|index| self.state(index)).collect();
+        match problem.sets.alpha().filter(|_| problem.selection.has_ball()) {
+            None => states.iter().map(|state| problem.features(step, state)).collect(),
+            Some(alpha) => {
+                let radii = self.measured.radii(alpha, (step, some), &problem.sets, &states);
+                states.iter().zip(radii).map(|(state, radii)| problem.features_knowing(step, state, radii)).collect()
+            }
+        }
     }
 
     fn solve(&self, index: usize, features: Features) -> Result<DesignPoint, TrainError> {

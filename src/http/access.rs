@@ -48,10 +48,9 @@ pub fn access(method: &str, route: Option<&str>) -> Access {
         (_, "/livez" | "/readyz" | "/" | "/dashboard/{file}" | "/openapi.json" | "/docs" | "/docs/{file}") => {
             Access::Open
         }
-        ("POST", "/sessions" | "/observe" | "/sessions/{id}/corrections") | ("DELETE", "/sessions/{id}") => {
-            Access::Role(KeyRole::Operate)
-        }
-        ("POST", "/train" | "/evaluate" | "/jobs/{id}/cancel" | "/policies/import")
+        ("POST", "/sessions" | "/observe" | "/sessions/{id}/corrections" | "/sessions/{id}/renewals")
+        | ("DELETE", "/sessions/{id}") => Access::Role(KeyRole::Operate),
+        ("POST", "/train" | "/evaluate" | "/backtest" | "/jobs/{id}/cancel" | "/policies/import")
         | ("DELETE", "/jobs/{id}" | "/policies/{id}") => Access::Role(KeyRole::Train),
         (_, "/health" | "/metrics" | "/audit") => Access::Role(KeyRole::Admin),
         ("GET" | "HEAD", _) | ("POST", "/what-if" | "/advise") => Access::Role(KeyRole::Read),

@@ -6,11 +6,14 @@
 use serde_json::{Map, Value, json};
 use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
+use crate::control::request::backtest;
 use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
+use crate::control::request::learning::HALF_LIFE;
 use crate::control::request::rules::{
     COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR, RADIUS_SCALE, RATE,
     RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST, WEALTH,
 };
+use crate::service::plan::MOST_RENEWALS;
 use crate::service::report::{LONGEST_REASON, MOST_CORRECTIONS, PRICE};
 use crate::service::what_if::POINTS;
 
@@ -30,10 +33,8 @@ pub fn tell(description: &mut OpenApi) {
 
 /// Schema, or schema and variant; field; rule.
 fn rules() -> Vec<(&'static str, &'static str, Value)> {
-    let whole = |range: &std::ops::RangeInclusive<usize>| json!({ "minimum": range.start(), "maximum": range.end() });
     let pair = json!({ "minItems": 2, "maxItems": 2, "items": { "minimum": 1e-12, "maximum": 1e12 } });
-    let history = json!({ "minItems": HISTORY_LENGTH.start(), "maxItems": HISTORY_LENGTH.end(),
-        "items": within((-LOG_RETURN, LOG_RETURN)) });
+    let history = listed(&HISTORY_LENGTH, within((-LOG_RETURN, LOG_RETURN)));
     let wealth = within(WEALTH);
     let probability = within((1e-3, 0.999));
     let action = json!({ "minItems": 2, "maxItems": 2, "items": within((0.0, 1.0)) });
@@ -44,7 +45,8 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("ProblemSpecification", "initial_wealth", wealth.clone()),
         ("ProblemSpecification", "action_interval", action),
         ("ProblemSpecification", "trading_cost", within(TRADING_COST)),
-        ("ProblemSpecification", "history", history.clone()),
+        ("ProblemSpecification", "history", history),
+        ("Learning", "half_life", within(HALF_LIFE)),
         ("UtilitySpecification exponential", "risk_aversion", within(RISK_AVERSION)),
         ("UtilitySpecification exponential", "risk_aversion_relative", within(RISK_AVERSION_RELATIVE)),
         ("UtilitySpecification power", "risk_aversion", json!({ "exclusiveMinimum": 1, "maximum": 100 })),
@@ -69,15 +71,6 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("HyperparameterBounds", "lengthscale", pair.clone()),
         ("HyperparameterBounds", "signal_variance", pair.clone()),
         ("HyperparameterBounds", "noise_variance", pair),
-        ("OpenSession", "policy", json!({ "minLength": 1 })),
-        ("OpenSession", "history", history),
-        ("OpenSession", "wealth", wealth.clone()),
-        ("OpenSession", "holding", within((0.0, 1.0))),
-        ("Observe", "session", json!({ "minLength": 1 })),
-        ("Observe", "period", json!({ "minimum": 1 })),
-        ("Correct", "correction", whole(&(1..=MOST_CORRECTIONS))),
-        ("Correct", "period", json!({ "minimum": 1 })),
-        ("Correct", "reason", json!({ "minLength": 1, "maxLength": LONGEST_REASON })),
         ("Advise", "wealth", wealth.clone()),
         ("Advise", "holding", within((0.0, 1.0))),
         ("WhatIf", "session", json!({ "minLength": 1 })),
@@ -93,7 +86,46 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("EvaluationRequest", "level", within(LEVEL)),
         ("InitialHistories", "count", whole(&HISTORIES)),
     ];
-    rules.into_iter().chain(reported()).collect()
+    rules.into_iter().chain(of_sessions()).chain(walked()).chain(reported()).collect()
+}
+
+/// Of sessions and what is recorded of them.
+fn of_sessions() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
+    let rules = [
+        ("OpenSession", "policy", json!({ "minLength": 1 })),
+        ("OpenSession", "history", listed(&HISTORY_LENGTH, within((-LOG_RETURN, LOG_RETURN)))),
+        ("OpenSession", "wealth", within(WEALTH)),
+        ("OpenSession", "holding", within((0.0, 1.0))),
+        ("Observe", "session", json!({ "minLength": 1 })),
+        ("Observe", "period", json!({ "minimum": 1 })),
+        ("Correct", "correction", whole(&(1..=MOST_CORRECTIONS))),
+        ("Correct", "period", json!({ "minimum": 1 })),
+        ("Correct", "reason", json!({ "minLength": 1, "maxLength": LONGEST_REASON })),
+        ("Renew", "renewal", whole(&(1..=MOST_RENEWALS))),
+        ("Renew", "policy", json!({ "minLength": 1 })),
+        ("Renew", "window", whole(&HISTORY_LENGTH)),
+        ("Renewing", "every", json!({ "minimum": 1 })),
+        ("Renewing", "window", whole(&HISTORY_LENGTH)),
+    ];
+    rules.into_iter()
+}
+
+/// Of a walk-forward.
+fn walked() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
+    let fields = [
+        ("periods_per_year", whole(&backtest::YEAR)),
+        ("window", whole(&HISTORY_LENGTH)),
+        ("every", whole(&HORIZON)),
+        ("horizon", whole(&HORIZON)),
+        ("alpha", listed(&backtest::LEVELS, within(backtest::ALPHA))),
+        ("risk_aversion", within(backtest::RELATIVE)),
+        ("trading_cost", within(TRADING_COST)),
+        ("count", whole(&COUNT)),
+        ("log_returns", listed(&backtest::PERIODS, within((-LOG_RETURN, LOG_RETURN)))),
+        ("simple_returns", listed(&backtest::PERIODS, within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())))),
+        ("dates", json!({ "minItems": backtest::PERIODS.start(), "maxItems": backtest::PERIODS.end() })),
+    ];
+    fields.into_iter().map(|(field, rule)| ("BacktestRequest", field, rule))
 }
 
 /// Of what a period reports, wherever it stands.
@@ -111,6 +143,14 @@ fn reported() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
         ];
         fields.map(|(field, rule)| (schema, field, rule))
     })
+}
+
+fn whole(range: &std::ops::RangeInclusive<usize>) -> Value {
+    json!({ "minimum": range.start(), "maximum": range.end() })
+}
+
+fn listed(counts: &std::ops::RangeInclusive<usize>, items: Value) -> Value {
+    json!({ "minItems": counts.start(), "maxItems": counts.end(), "items": items })
 }
 
 fn within((low, high): (f64, f64)) -> Value {
@@ -177,7 +217,8 @@ mod tests {
         let mut given = json!({
             "problem": { "history": [0.1, -0.1, 0.05], "horizon": 3, "rate_per_step": 0.0, "periods_per_year": 12.0,
                 "initial_wealth": 100.0, "trading_cost": 0.0, "utility": { "kind": "exponential", "risk_aversion": 0.01 },
-                "radius": { "rule": "bridge", "alpha": 0.1, "paths": 200, "scale": 1.0 } },
+                "radius": { "rule": "bridge", "alpha": 0.1, "paths": 200, "scale": 1.0 },
+                "learning": { "kind": "decay", "half_life": 2.0 } },
             "design": { "count": 20, "sampling_law": { "kind": "student_t", "location": 0.0, "scale": 0.1,
                 "degrees_of_freedom": 5.0 } },
             "surrogate": { "moment_count": 4 }
@@ -202,6 +243,7 @@ mod tests {
             ("/problem/initial_wealth", of("ProblemSpecification", None, "initial_wealth"), 1e-7),
             ("/problem/trading_cost", of("ProblemSpecification", None, "trading_cost"), 1e-3),
             ("/problem/history/0", of("ProblemSpecification", None, "history")["items"].clone(), 1e-3),
+            ("/problem/learning/half_life", of("Learning", Some(1), "half_life"), 1e-3),
             ("/problem/radius/paths", of("RadiusRule", Some(0), "paths"), 1.0),
             ("/problem/radius/scale", of("RadiusRule", Some(0), "scale"), 1e-3),
             ("/problem/radius/alpha", of("RadiusRule", Some(0), "alpha"), 1e-4),

@@ -9,6 +9,7 @@ use serde_json::{Map, Value, json};
 use utoipa::openapi::OpenApi;
 
 use super::bounds::{merged, with_field};
+use crate::control::request::backtest::BacktestRequest;
 use crate::control::request::evaluation::EvaluationRequest;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{
@@ -26,7 +27,7 @@ pub fn tell(description: &mut OpenApi) {
     }
 }
 
-fn told() -> [(&'static str, Map<String, Value>); 7] {
+fn told() -> [(&'static str, Map<String, Value>); 8] {
     let least = json!({ "history": [], "rate_per_step": 0.0 });
     [
         ("Specification", of::<Specification>(json!({ "problem": least }))),
@@ -36,6 +37,7 @@ fn told() -> [(&'static str, Map<String, Value>); 7] {
         ("HyperparameterBounds", of::<HyperparameterBounds>(json!({}))),
         ("RadiusRule", of::<RadiusRule>(json!({ "rule": "bridge" }))),
         ("EvaluationRequest", of::<EvaluationRequest>(json!({ "problem": least }))),
+        ("BacktestRequest", of::<BacktestRequest>(json!({ "rate": 0.0 }))),
     ]
 }
 
@@ -63,6 +65,7 @@ mod tests {
             ("HyperparameterBounds", "noise_variance", json!([1e-10, 1.0])),
             ("EvaluationRequest", "level", json!(0.95)),
             ("Specification", "seed", json!(1)),
+            ("BacktestRequest", "alpha", json!([0.05, 0.1, 0.5])),
         ] {
             assert_eq!(schemas[name]["properties"][field]["default"], default, "{name}.{field}");
         }

@@ -11,7 +11,6 @@ use super::extract::{Id, JsonBody};
 use super::jobs::{accepted, idempotency_key};
 use super::problem::Problem;
 use super::wire;
-use crate::control::evaluation::report::EvaluationReport;
 use crate::control::request::evaluation::EvaluationRequest;
 use crate::service::Service;
 
@@ -47,10 +46,10 @@ pub async fn evaluate(
     Ok(accepted(service.evaluate(&caller, request, idempotency_key(&headers)?).await?))
 }
 
-/// The report of a succeeded evaluation.
+/// The report of a succeeded evaluation or walk-forward.
 #[utoipa::path(get, path = "/jobs/{id}/report", tag = "jobs", params(("id" = String, Path, description = "The job.")),
     responses(
-        (status = 200, description = "The report.", body = EvaluationReport),
+        (status = 200, description = "The report.", body = wire::JobReport),
         (status = 404, description = "There is no such job, or it has no report.", body = Problem, content_type = "application/problem+json")))]
 pub async fn report(
     State(service): State<Arc<Service>>,

@@ -4,6 +4,7 @@ mod access;
 mod advise;
 mod asset;
 mod audit;
+mod backtests;
 mod bodies;
 mod bounds;
 mod connections;

@@ -21,7 +21,7 @@ use super::documentation::Published;
 use super::hosts::Hosts;
 use super::problem::{Problem, ProblemKind};
 use super::{
-    access, advise, audit, bounds, dashboard, defaults, described, documentation, evaluations, events, jobs,
+    access, advise, audit, backtests, bounds, dashboard, defaults, described, documentation, evaluations, events, jobs,
     operations, policies, sessions, telemetry, what_if,
 };
 use crate::service::Service;
@@ -55,6 +55,7 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(events::follow))
         .routes(routes!(evaluations::evaluate))
         .routes(routes!(evaluations::report))
+        .routes(routes!(backtests::backtest))
         .routes(routes!(policies::list))
         .routes(routes!(policies::get, policies::delete))
         .routes(routes!(policies::export))
@@ -64,6 +65,7 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(sessions::history))
         .routes(routes!(sessions::observe))
         .routes(routes!(sessions::correct))
+        .routes(routes!(sessions::renew))
         .routes(routes!(sessions::action))
         .routes(routes!(what_if::what_if))
         .routes(routes!(advise::advise))

@@ -23,6 +23,7 @@ use crate::service::allowance::Class;
 use crate::service::answer::{Corrected, Observed};
 use crate::service::history::History;
 use crate::service::metrics::{ACTION_SECONDS, OBSERVE_SECONDS};
+use crate::service::plan::{Renew, Renewed};
 use crate::service::report::{Correct, Observe};
 use crate::service::sessions::Start;
 use crate::service::what_if::Explain;
@@ -45,8 +46,8 @@ pub async fn open(
     headers: HeaderMap,
     JsonBody(request): JsonBody<wire::OpenSession>,
 ) -> Result<Response, Problem> {
-    let wire::OpenSession { policy, history, wealth, holding } = request;
-    let start = Start { policy, history, wealth, holding };
+    let wire::OpenSession { policy, history, wealth, holding, renew } = request;
+    let start = Start { policy, history, wealth, holding, renew };
     let live = service.sessions.open(&caller, start, idempotency_key(&headers)?).await?;
     let session = wire::Session::from(live);
     let location = [(header::LOCATION, format!("/sessions/{}", session.session))];
@@ -81,7 +82,9 @@ pub async fn get(
     By(caller, _): By<Read>,
     Id(id): Id,
 ) -> Result<Json<wire::Session>, Problem> {
-    Ok(Json(service.sessions.get(&caller.tenant, &id).await?.into()))
+    let live = service.sessions.get(&caller.tenant, &id).await?;
+    let renewal = service.sessions.renewal(&live).await?;
+    Ok(Json(wire::Session { renewal, ..live.into() }))
 }
 
 /// Where a session started and everything recorded of it: what was reported, what was told then, what would be told now.
@@ -114,8 +117,28 @@ pub async fn correct(
     Id(id): Id,
     JsonBody(correction): JsonBody<Correct>,
 ) -> Result<Response, Problem> {
-    let corrected = service.sessions.correct(&caller, &id, &correction, &caller.turn).await?;
+    let corrected = service.sessions.correct(&caller, &id, &correction).await?;
     Ok(as_recorded(corrected))
+}
+
+/// Go on by another policy from the coming period: exactly once, durable before it is answered.
+#[utoipa::path(post, path = "/sessions/{id}/renewals", tag = "sessions",
+    params(("id" = String, Path, description = "The session.")),
+    request_body(content = Renew, example = json!({
+        "renewal": 1, "policy": "2c882522ef92e64d9ad1cb0dd2b4ff4e7c3b0c1e8f5d2a6b9c0d1e2f3a4b5c6d", "window": 240
+    })),
+    responses(
+        (status = 200, description = "Recorded; the same renewal and content again give the same answer.", body = Renewed),
+        (status = 404, description = "There is no such session or policy.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "Other content, or not the next renewal.", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn renew(
+    State(service): State<Arc<Service>>,
+    By(caller, _): By<Live>,
+    Id(id): Id,
+    JsonBody(renewal): JsonBody<Renew>,
+) -> Result<Response, Problem> {
+    Ok(as_recorded(service.sessions.renew(&caller.tenant, caller.actor(), &id, &renewal).await?))
 }
 
 /// An answer as it is stored.

@@ -4,6 +4,8 @@ use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::evaluation::backtest_report::BacktestReport;
+use crate::control::evaluation::report::EvaluationReport;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::caution::Caution;
 use crate::control::policy::sensitivity::{Sensitivity, cautions};
@@ -18,6 +20,8 @@ use crate::service::action::Action as ServiceAction;
 use crate::service::drift::Drift;
 use crate::service::jobs::{Accepted, Job as ServiceJob};
 use crate::service::live::Live;
+use crate::service::plan::Renewing;
+use crate::service::renewer::RenewalDue;
 use crate::store::{JobKind, JobState, PolicySummary, SessionSummary};
 
 /// A job.
@@ -31,7 +35,7 @@ pub struct Job {
     pub progress: JobProgress,
     /// The policy of a succeeded training.
     pub policy: Option<String>,
-    /// Where the report of a succeeded evaluation is.
+    /// Where the report of a succeeded evaluation or walk-forward is.
     pub report: Option<String>,
     /// Why it failed.
     pub error: Option<String>,
@@ -67,7 +71,7 @@ impl From<ServiceJob> for Job {
                 points_total: current.map(|current| current.total),
                 seconds_left: progress.and_then(|progress| progress.seconds_left),
             },
-            report: (row.kind == JobKind::Evaluate && row.state == JobState::Succeeded)
+            report: (row.kind != JobKind::Train && row.state == JobState::Succeeded)
                 .then(|| format!("/jobs/{}/report", row.job)),
             job: row.job,
             kind: row.kind,
@@ -95,6 +99,15 @@ impl From<Accepted> for AcceptedJob {
     fn from(Accepted { job, warnings }: Accepted) -> Self {
         AcceptedJob { job: job.into(), warnings }
     }
+}
+
+/// The report of a job: of an evaluation or of a walk-forward.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "reports travel as they are stored: this describes them")]
+pub enum JobReport {
+    Evaluation(Box<EvaluationReport>),
+    Backtest(Box<BacktestReport>),
 }
 
 /// A page of jobs, newest first.
@@ -162,6 +175,8 @@ pub struct OpenSession {
     pub wealth: Option<f64>,
     /// Share of wealth in the risky asset at the start. Default: 0.
     pub holding: Option<f64>,
+    /// Train the next policy by itself, on the returns seen, and go on by it. Default: never.
+    pub renew: Option<Renewing>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
@@ -176,9 +191,11 @@ pub enum SessionState {
 #[derive(Debug, Serialize, ToSchema)]
 pub struct Session {
     pub session: String,
+    /// The one that advises the coming period.
     pub policy: String,
     /// The coming period, from 1; `horizon + 1` once completed.
     pub period: usize,
+    /// The last period that the policy advises.
     pub horizon: usize,
     pub state: SessionState,
     /// The last day of the last period that was reported with one.
@@ -190,6 +207,12 @@ pub struct Session {
     pub sample_size: usize,
     /// Corrections of what periods reported; the next one is this and one more.
     pub corrections: usize,
+    /// Policies that followed the first; the next renewal is this and one more.
+    pub renewals: usize,
+    /// How it is renewed by itself; null where it is not.
+    pub renew: Option<Renewing>,
+    /// Where the next renewal is; null where it is not due.
+    pub renewal: Option<RenewalDue>,
     /// Whether the returns still come as they came.
     pub drift: Drift,
     pub created_ms: i64,
@@ -203,7 +226,7 @@ impl From<Live> for Session {
     fn from(live: Live) -> Self {
         Session {
             period: live.observed + 1,
-            state: session_state(live.observed, live.row.horizon),
+            state: session_state(live.observed, live.horizon()),
             date: live.standing.date,
             wealth: live.standing.state.wealth,
             holding: live.standing.state.holding,
@@ -211,8 +234,11 @@ impl From<Live> for Session {
             corrections: live.corrections,
             drift: live.standing.bet.told(),
             session: live.row.session.clone(),
-            policy: live.row.policy.clone(),
-            horizon: live.row.horizon,
+            policy: live.current.policy.clone(),
+            horizon: live.horizon(),
+            renewals: live.renewals,
+            renew: live.renew,
+            renewal: None,
             created_ms: live.row.created_ms,
         }
     }
@@ -222,8 +248,10 @@ impl From<Live> for Session {
 #[derive(Debug, Serialize, ToSchema)]
 pub struct SessionEntry {
     pub session: String,
+    /// The one that advises the coming period.
     pub policy: String,
     pub period: usize,
+    /// The last period that the policy advises.
     pub horizon: usize,
     pub state: SessionState,
     pub initial_wealth: f64,

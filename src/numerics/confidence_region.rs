@@ -92,9 +92,9 @@ impl Quadrature {
     }
 }
 
-/// `sqrt(kappa / n)` at miscoverage `alpha` in (0, 1] and sample size n.
-pub fn radius(alpha: f64, sample_size: usize) -> f64 {
-    (-2.0 * alpha.ln() / sample_size as f64).max(0.0).sqrt()
+/// `sqrt(kappa / n)` at miscoverage `alpha` in (0, 1] and sample size n, of a weighted sample its effective size.
+pub fn radius(alpha: f64, sample_size: f64) -> f64 {
+    (-2.0 * alpha.ln() / sample_size).max(0.0).sqrt()
 }
 
 impl ConfidenceRegion {
@@ -188,7 +188,7 @@ mod tests {
         (|z| (9.0 * z).cos(), |mu, s2| (-40.5 * s2).exp() * (9.0 * mu).cos()),
     ];
 
-    fn region(size: usize) -> ConfidenceRegion {
+    fn region(size: f64) -> ConfidenceRegion {
         ConfidenceRegion { estimate: NormalLaw { mean: 0.03, variance: 0.01 }, radius: radius(0.1, size) }
     }
 
@@ -201,7 +201,7 @@ mod tests {
     fn the_worst_of_the_boundary_is_the_worst_of_the_whole_region() {
         // From 9 returns down the ellipse passes zero variance.
         for size in [3, 8, 10, 20, 500] {
-            let region = region(size);
+            let region = region(f64::from(size));
             for (payoff, exact) in PAYOFFS {
                 let tried: Vec<f64> = region.angles().map(|angle| expectation(payoff, region.at(angle))).collect();
                 let worst = region.worst(&tried, |law| expectation(payoff, law));
@@ -223,8 +223,8 @@ mod tests {
     #[test]
     fn the_level_is_that_of_chi_square_with_two_degrees_of_freedom() {
         // P(chi-square(2) > 4.605170) = 0.1.
-        assert!((radius(0.1, 20).powi(2) * 20.0 - 4.605_170_185_988_09).abs() < 1e-12);
-        assert_eq!(radius(1.0, 20), 0.0);
-        assert_eq!(region(20).at(0.0), NormalLaw { mean: 0.03 + radius(0.1, 20) * 0.1, variance: 0.01 });
+        assert!((radius(0.1, 20.0).powi(2) * 20.0 - 4.605_170_185_988_09).abs() < 1e-12);
+        assert_eq!(radius(1.0, 20.0), 0.0);
+        assert_eq!(region(20.0).at(0.0), NormalLaw { mean: 0.03 + radius(0.1, 20.0) * 0.1, variance: 0.01 });
     }
 }

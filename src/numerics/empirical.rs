@@ -1,29 +1,51 @@
 //! Empirical distributions and their moments.
 
-use serde::{Deserialize, Serialize};
-
-/// The law that puts mass 1/n on each of n observed values.
+/// The law of n observed values, of which the one seen k values ago weighs `d^k`, d the *retention* in (0, 1]: mass
 ///
-/// Values are kept in ascending order, and every statistic is computed from that order, so the order of
-/// arrival cannot be felt, and pushing values one by one equals starting from the whole sample, bit for bit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
+///   w_k = d^k / (1 + d + ... + d^(n-1)).
+///
+/// At d = 1 every value has mass 1/n. One more value z makes it `(1 - w) F + w delta_z` with `w = 1 / (1 + d + ... + d^n)`,
+/// which tends to 1/(n + 1) as d tends to 1, and to 1 - d as n grows.
+///
+/// Values are kept in ascending order, and every statistic is computed from that order. Pushing values one by one equals
+/// starting from the whole sample, bit for bit; at d = 1 the order of arrival cannot be felt.
+/// Checked by: `weights_are_the_powers_of_the_retention`.
+#[derive(Debug, Clone, PartialEq)]
 pub struct EmpiricalDistribution {
     sorted: Vec<f64>,
+    /// `d^k` of each value, in the order of the values.
+    weights: Vec<f64>,
+    retention: f64,
+    /// Sums of the weights and of their squares, in the order of arrival.
+    total: f64,
+    squares: f64,
 }
 
 impl EmpiricalDistribution {
-    /// The law of `sample`, which must be finite. Cost O(n ln n).
+    /// The law of `sample`, which must be finite, with equal weights. Cost O(n ln n).
     pub fn new(sample: &[f64]) -> Self {
-        let mut sorted = sample.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        EmpiricalDistribution { sorted }
+        EmpiricalDistribution::decaying(sample, 1.0)
     }
 
-    /// Adds one observation: `(n F + delta_z) / (n + 1)`. Cost O(n).
+    /// The law of `sample`, finite and oldest first, at a retention in (0, 1]. Cost O(n ln n).
+    pub fn decaying(sample: &[f64], retention: f64) -> Self {
+        let (mut total, mut squares) = (0.0, 0.0);
+        let mut weighted: Vec<(f64, f64)> = sample.iter().copied().zip(weights(sample.len(), retention)).collect();
+        weighted.sort_by(|left, right| left.0.total_cmp(&right.0));
+        for _ in sample {
+            (total, squares) = one_more(total, squares, retention);
+        }
+        let (sorted, weights) = weighted.into_iter().unzip();
+        EmpiricalDistribution { sorted, weights, retention, total, squares }
+    }
+
+    /// Learns one observation. Cost O(n).
     pub fn push(&mut self, value: f64) {
         let position = self.sorted.partition_point(|&atom| atom.total_cmp(&value).is_le());
+        self.weights.iter_mut().for_each(|weight| *weight *= self.retention);
         self.sorted.insert(position, value);
+        self.weights.insert(position, 1.0);
+        (self.total, self.squares) = one_more(self.total, self.squares, self.retention);
     }
 
     /// The atoms in ascending order, repeated where observed repeatedly.
@@ -31,21 +53,108 @@ impl EmpiricalDistribution {
         &self.sorted
     }
 
+    /// Those of the atoms, in their order; the newest value weighs 1.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
+    /// The sum of the weights: n where they are equal.
+    pub fn total_weight(&self) -> f64 {
+        self.total
+    }
+
+    /// d, what of a value's weight is left once another was learned.
+    pub fn retention(&self) -> f64 {
+        self.retention
+    }
+
     /// Number of observations, n.
     pub fn sample_size(&self) -> usize {
         self.sorted.len()
     }
 
-    /// Raw moments `m_k = (1/n) sum_j z_j^k` for k = 1 to `count`. Cost O(n count).
+    /// How many equally weighted values tell as much of a mean: `1 / sum of the squared masses`, which is n at d = 1, and
+    ///
+    ///   (1 + d) (1 - d^n) / ((1 - d) (1 + d^n))
+    ///
+    /// below. Checked by: `src/control/request/learning.rs::the_effective_size_has_its_closed_form`.
+    pub fn effective_size(&self) -> f64 {
+        self.total * self.total / self.squares
+    }
+
+    /// The same after one more observation, and after two.
+    pub fn effective_sizes_ahead(&self) -> [f64; 2] {
+        let mut sums = (self.total, self.squares);
+        [(); 2].map(|()| {
+            sums = one_more(sums.0, sums.1, self.retention);
+            sums.0 * sums.0 / sums.1
+        })
+    }
+
+    /// Raw moments `m_k = sum_j w_j z_j^k`, w the masses, for k = 1 to `count`. Cost O(n count).
     pub fn raw_moments(&self, count: usize) -> Vec<f64> {
         let mut sums = vec![0.0; count];
-        for &atom in &self.sorted {
+        for (&atom, &weight) in self.sorted.iter().zip(&self.weights) {
             let mut power = 1.0;
             for sum in &mut sums {
                 power *= atom;
-                *sum += power;
+                *sum += weight * power;
             }
         }
-        sums.iter().map(|sum| sum / self.sorted.len() as f64).collect()
+        sums.iter().map(|sum| sum / self.total).collect()
+    }
+}
+
+/// `d^k` of `count` values, oldest first: the newest weighs 1.
+pub fn weights(count: usize, retention: f64) -> Vec<f64> {
+    let mut weights = vec![1.0; count];
+    for age in 1..count {
+        weights[count - 1 - age] = weights[count - age] * retention;
+    }
+    weights
+}
+
+/// The sums of the weights and of their squares after one more value.
+fn one_more(total: f64, squares: f64, retention: f64) -> (f64, f64) {
+    (total * retention + 1.0, squares * (retention * retention) + 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SAMPLE: [f64; 6] = [0.03, -0.11, 0.07, 0.02, -0.11, 0.16];
+
+    #[test]
+    fn weights_are_the_powers_of_the_retention() {
+        for retention in [1.0, 0.9, 0.5] {
+            let law = EmpiricalDistribution::decaying(&SAMPLE, retention);
+            let mut pushed = EmpiricalDistribution::decaying(&SAMPLE[..2], retention);
+            for (age, &value) in SAMPLE.iter().enumerate().skip(2) {
+                // F' = (1 - w) F + w delta_z, w = 1 / (1 + d + ... + d^n): of the mean, which is linear in the law.
+                let before = pushed.raw_moments(1)[0];
+                let newest = 1.0 / (0..=age).map(|power| retention.powi(power as i32)).sum::<f64>();
+                pushed.push(value);
+                let after = (1.0 - newest) * before + newest * value;
+                // A dozen roundings of numbers below 1.
+                assert!((pushed.raw_moments(1)[0] - after).abs() < 1e-15);
+            }
+            assert_eq!(pushed, law, "one by one and the whole sample are one law");
+            // By hand: the values in ascending order were seen 4, 1, 2, 5, 3 and 0 values ago.
+            let ages = [4, 1, 2, 5, 3, 0].map(|age| retention.powi(age));
+            for (found, expected) in law.weights().iter().zip(ages) {
+                assert!((found - expected).abs() < 1e-15, "{found} against {expected}");
+            }
+            let masses = ages.map(|weight| weight / ages.iter().sum::<f64>());
+            let effective = 1.0 / masses.iter().map(|mass| mass * mass).sum::<f64>();
+            assert!((law.effective_size() / effective - 1.0).abs() < 1e-14);
+            let mut larger = law.clone();
+            let ahead = [0.4, 0.1].map(|value| {
+                larger.push(value);
+                larger.effective_size()
+            });
+            assert_eq!(law.effective_sizes_ahead(), ahead);
+        }
+        assert_eq!(EmpiricalDistribution::new(&SAMPLE).effective_size(), 6.0);
     }
 }

@@ -30,16 +30,18 @@ const COARSE_STEP: f64 = 0.5;
 const MANY_COMPONENTS: usize = 16;
 
 impl ContinuousLaw {
-    /// Smoothed bootstrap of a sample: a normal of Silverman's bandwidth around each value, shrunk towards the mean
-    /// so that the mean and variance are the sample's own. Source: Silverman (1986), section 6.4.1.
-    pub fn smoothed_bootstrap(sample: &[f64]) -> Self {
-        let size = sample.len() as f64;
-        let mean = sample.iter().sum::<f64>() / size;
-        let variance = sample.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / size;
+    /// Smoothed bootstrap of a weighted sample: a normal of Silverman's bandwidth at the effective size around each value,
+    /// shrunk towards the mean so that the mean and variance are the sample's own. Source: Silverman (1986), section 6.4.1.
+    pub fn smoothed_bootstrap(sample: &[f64], weights: &[f64]) -> Self {
+        let total: f64 = weights.iter().sum();
+        let weighted = || sample.iter().zip(weights);
+        let mean = weighted().map(|(z, weight)| weight * z).sum::<f64>() / total;
+        let variance = weighted().map(|(z, weight)| weight * (z - mean).powi(2)).sum::<f64>() / total;
+        let size = total * total / weights.iter().map(|weight| weight * weight).sum::<f64>();
         let bandwidth = 1.06 * variance.sqrt() * size.powf(-0.2);
         let shrink = (1.0 + bandwidth * bandwidth / variance).sqrt().recip();
-        let component = |z: &f64| (1.0 / size, mean + shrink * (z - mean), shrink * bandwidth);
-        ContinuousLaw::GaussianMixture(sample.iter().map(component).collect())
+        let component = |(z, weight): (&f64, &f64)| (weight / total, mean + shrink * (z - mean), shrink * bandwidth);
+        ContinuousLaw::GaussianMixture(weighted().map(component).collect())
     }
 
     /// One draw.
@@ -169,13 +171,19 @@ mod tests {
 
     #[test]
     fn the_smoothed_bootstrap_keeps_mean_and_variance() {
-        let law = ContinuousLaw::smoothed_bootstrap(&[0.02, -0.05, 0.11, 0.04, 0.07]);
-        let mut generator = stream(3, "test", 0, 0);
-        let draws: Vec<f64> = (0..200_000).map(|_| law.draw(&mut generator)).collect();
-        let mean = draws.iter().sum::<f64>() / draws.len() as f64;
-        let variance = draws.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / draws.len() as f64;
-        // Standard deviation 0.053; four standard errors of 200,000 draws are 0.00048 for the mean.
-        assert!((mean - 0.038).abs() < 5e-4, "{mean}");
-        assert!((variance / 0.002_856 - 1.0).abs() < 0.02, "{variance}");
+        // By hand; of the second: mean (0.04 + 2 x 0.01) / 3, and its variance 0.0002.
+        for (sample, weights, expected_mean, expected_variance) in [
+            (&[0.02, -0.05, 0.11, 0.04, 0.07][..], &[1.0; 5][..], 0.038, 0.002_856),
+            (&[0.04, 0.01], &[0.5, 1.0], 0.02, 0.0002),
+        ] {
+            let law = ContinuousLaw::smoothed_bootstrap(sample, weights);
+            let mut generator = stream(3, "test", 0, 0);
+            let draws: Vec<f64> = (0..200_000).map(|_| law.draw(&mut generator)).collect();
+            let mean = draws.iter().sum::<f64>() / draws.len() as f64;
+            let variance = draws.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / draws.len() as f64;
+            // Standard deviation 0.053 at most; four standard errors of 200,000 draws are 0.00048 for the mean.
+            assert!((mean - expected_mean).abs() < 5e-4, "{mean}");
+            assert!((variance / expected_variance - 1.0).abs() < 0.02, "{variance}");
+        }
     }
 }

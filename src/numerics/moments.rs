@@ -5,10 +5,13 @@ use super::empirical::EmpiricalDistribution;
 /// Highest moment order supported.
 pub const ORDERS: usize = 6;
 
-/// Mean and central power sums `M_p = sum_j (z_j - mean)^p`, p = 2 to 6, of n values.
+/// Mean and central power sums `M_p = sum_j w_j (z_j - mean)^p`, p = 2 to 6, of values of weights w, which sum to n: the number
+/// of values where every weight is 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CentralMoments {
     size: f64,
+    /// What of every weight is left once one more value is learned.
+    retention: f64,
     mean: f64,
     /// `sums[p]` is M_p; entries 0 and 1 are n and 0.
     sums: [f64; ORDERS + 1],
@@ -17,42 +20,46 @@ pub struct CentralMoments {
 impl CentralMoments {
     /// Two passes over the sample. Cost O(n).
     pub fn of(law: &EmpiricalDistribution) -> Self {
-        let size = law.sample_size() as f64;
-        let mean = law.atoms().iter().sum::<f64>() / size;
+        let (size, retention) = (law.total_weight(), law.retention());
+        let weighted = || law.atoms().iter().zip(law.weights());
+        let mean = weighted().map(|(atom, weight)| weight * atom).sum::<f64>() / size;
         let mut sums = [0.0; ORDERS + 1];
-        for atom in law.atoms() {
-            let mut power = 1.0;
+        for (atom, weight) in weighted() {
+            let mut power = *weight;
             for sum in &mut sums {
                 *sum += power;
                 power *= atom - mean;
             }
         }
         sums[1] = 0.0;
-        CentralMoments { size, mean, sums }
+        CentralMoments { size, retention, mean, sums }
     }
 
-    /// The moments after one more value z. With d = z - mean, n' = n + 1 and e = d / n':
+    /// The moments after one more value z of weight 1, n and every M_p first multiplied by the retention. With d = z - mean,
+    /// n' = n + 1 and e = d / n':
     ///
     ///   M_p' = M_p + sum_{k=1}^{p-2} C(p,k) M_{p-k} (-e)^k + (n e)^p (1 - (-1/n)^(p-1))
     ///
     /// Cost O(1). Source: Pebay (2008), Sandia report SAND2008-6212, eq. 3.1 with a second set of one value.
     pub fn with(&self, value: f64) -> Self {
-        let size = self.size + 1.0;
+        let kept = self.size * self.retention;
+        let size = kept + 1.0;
         let shift = (value - self.mean) / size;
-        let mut sums = self.sums;
+        let before = self.sums.map(|sum| sum * self.retention);
+        let mut sums = before;
         sums[0] = size;
         for (order, sum) in sums.iter_mut().enumerate().skip(2) {
-            let mut total = self.sums[order];
+            let mut total = before[order];
             let (mut binomial, mut power) = (1.0, 1.0);
             for k in 1..=order.saturating_sub(2) {
                 binomial *= (order - k + 1) as f64 / k as f64;
                 power *= -shift;
-                total += binomial * self.sums[order - k] * power;
+                total += binomial * before[order - k] * power;
             }
-            let sign = (-1.0 / self.size).powi(order as i32 - 1);
-            *sum = total + (self.size * shift).powi(order as i32) * (1.0 - sign);
+            let sign = (-1.0 / kept).powi(order as i32 - 1);
+            *sum = total + (kept * shift).powi(order as i32) * (1.0 - sign);
         }
-        CentralMoments { size, mean: self.mean + shift, sums }
+        CentralMoments { size, mean: self.mean + shift, sums, ..*self }
     }
 
     /// m, in the unit of the values.
@@ -101,10 +108,9 @@ mod tests {
     #[test]
     fn one_more_value_equals_the_whole_sample() {
         let sample = [0.03, -0.11, 0.07, 0.02, -0.045, 0.16];
-        let mut law = EmpiricalDistribution::new(&sample);
-        let before = CentralMoments::of(&law);
-        for value in [0.4, -0.9, 0.02] {
-            let updated = before.with(value);
+        for (retention, value) in [1.0, 0.8].into_iter().flat_map(|d| [0.4, -0.9, 0.02].map(|value| (d, value))) {
+            let law = EmpiricalDistribution::decaying(&sample, retention);
+            let updated = CentralMoments::of(&law).with(value);
             let mut larger = law.clone();
             larger.push(value);
             let whole = CentralMoments::of(&larger);
@@ -116,7 +122,5 @@ mod tests {
             }
             assert!((updated.raw(1) - raw[0]).abs() < 1e-15);
         }
-        law.push(0.1);
-        assert_eq!(law.sample_size(), sample.len() + 1);
     }
 }

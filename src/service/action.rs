@@ -2,8 +2,8 @@
 
 use super::allowance::HeavyTurn;
 use super::error::ServiceError;
-use super::live::{self, Live};
-use super::periods::Periods;
+use super::live::Live;
+use super::periods::{Passage, Periods};
 use super::sessions::Sessions;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
@@ -57,7 +57,7 @@ impl Sessions {
             return Ok(Action { period, advice, worst_case: None, sensitivity: None });
         }
         let advisor = means.advisor;
-        let (mut state, step) = (live.standing.state.clone(), live.observed);
+        let (mut state, step) = (live.standing.state.clone(), live.step());
         let mut record = None;
         if sensitivity {
             let (same, seen) = self.record(tenant, live, &advisor).await?;
@@ -88,12 +88,11 @@ impl Sessions {
         let mut facts = self.facts(tenant, &live.row.session).await?;
         // What another process recorded since then is of the next question.
         facts.entries.truncate(live.seen.entries());
-        advisor.check_sensitivity(facts.row.initial_history.len() + live.observed)?;
-        let start = live::started(&facts.row, advisor)?;
-        let mut record = facts.row.initial_history;
-        let replayed = Periods::of(&facts.entries)?.replay(advisor, start, |_, _, passed| {
-            record.extend(passed.log_return);
-        })?;
-        Ok((replayed.state, record))
+        advisor.check_sensitivity(live.standing.state.law.sample_size())?;
+        let periods = Periods::of(&facts)?;
+        let Passage { standing, record, .. } = periods.replay()?;
+        // The law is of the last of them.
+        let older = record.len() - standing.state.law.sample_size();
+        Ok((standing.state, record[older..].to_vec()))
     }
 }

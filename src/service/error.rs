@@ -51,6 +51,11 @@ impl ServiceError {
         ServiceError::Unknown { what, id: id.to_owned() }
     }
 
+    /// A period that was recorded and keeps a rule no more.
+    pub(super) fn of_recorded((period, error): (usize, FieldError)) -> Self {
+        ServiceError::Internal(format!("period {period}: {error}"))
+    }
+
     pub fn internal(error: impl std::fmt::Display) -> Self {
         ServiceError::Internal(error.to_string())
     }

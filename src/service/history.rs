@@ -1,25 +1,28 @@
 //! What a session was told, and what it would be told now.
 
-use std::sync::Arc;
-
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::allowance::HeavyTurn;
 use super::answer::{Corrected, Observed};
+use super::content::read;
 use super::error::ServiceError;
-use super::live;
-use super::periods::{Passed, Periods, Standing, read};
+use super::periods::{Passage, Periods, Step};
+use super::plan::{Plan, Renew, Renewed, Stretch};
 use super::report::{Correct, Report};
 use super::sessions::Sessions;
-use crate::control::policy::advisor::{AdviceMode, Advisor};
+use crate::control::policy::advisor::AdviceMode;
+use crate::control::request::terms::Terms;
 use crate::store::{EntryKind, SessionRow, Tenant};
 
 /// Where a session started, and everything recorded of it.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct History {
     pub session: String,
+    /// The first policy.
     pub policy: String,
+    /// Rate, cost and flows of its periods, where none other are reported.
+    pub terms: Terms,
     pub initial_wealth: f64,
     /// Share of it in the risky asset.
     pub initial_holding: f64,
@@ -27,6 +30,8 @@ pub struct History {
     pub history: Vec<f64>,
     pub observations: Vec<Observation>,
     pub corrections: Vec<Correction>,
+    /// The policies that followed the first.
+    pub renewals: Vec<Renewal>,
 }
 
 /// One observed period.
@@ -72,6 +77,17 @@ pub struct Correction {
     pub corrected_ms: i64,
 }
 
+/// One renewal, as it was made.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct Renewal {
+    /// What was answered to it.
+    #[serde(flatten)]
+    pub told: Renewed,
+    /// Returns that the law was made of, the last ones; null where those were all.
+    pub window: Option<usize>,
+    pub renewed_ms: i64,
+}
+
 impl Sessions {
     /// The session's start and every entry. Where a period was put right, those from it on are passed through and advised
     /// again, each in a turn of those that solve.
@@ -80,7 +96,7 @@ impl Sessions {
     /// There is no such session; too much is solved already.
     pub async fn history(&self, tenant: &Tenant, session: &str, turn: &HeavyTurn) -> Result<History, ServiceError> {
         let facts = self.facts(tenant, session).await?;
-        let (mut observations, mut corrections) = (Vec::new(), Vec::new());
+        let (mut observations, mut corrections, mut renewals) = (Vec::new(), Vec::new(), Vec::new());
         for entry in &facts.entries {
             match entry.kind {
                 EntryKind::Observation => observations.push(Observation {
@@ -94,57 +110,66 @@ impl Sessions {
                     told: read(&entry.answer_json)?,
                     corrected_ms: entry.created_ms,
                 }),
+                EntryKind::Renewal => renewals.push(Renewal {
+                    told: read(&entry.answer_json)?,
+                    window: read::<Renew>(&entry.content_json)?.window,
+                    renewed_ms: entry.created_ms,
+                }),
             }
         }
         if !corrections.is_empty() {
             turn.begin()?;
-            let periods = Periods::of(&facts.entries)?;
-            let advisor = self.policies.advisor(tenant, &facts.row.policy).await?;
-            let start = live::started(&facts.row, &advisor)?;
+            let periods = Periods::of(&facts)?;
             let first = periods.first_corrected();
-            let now = self.told_now(tenant, &periods, first, &advisor, start).await?;
+            let now = self.told_now(tenant, &periods, first).await?;
             for (observation, now) in observations.iter_mut().skip(first).zip(now) {
                 observation.now = Some(now);
             }
         }
+        let terms = Plan::of(&facts.row)?.terms;
         let SessionRow { session, policy, initial_wealth, initial_holding, initial_history: history, .. } = facts.row;
-        Ok(History { session, policy, initial_wealth, initial_holding, history, observations, corrections })
+        Ok(History {
+            session,
+            policy,
+            terms,
+            initial_wealth,
+            initial_holding,
+            history,
+            observations,
+            corrections,
+            renewals,
+        })
     }
 
     /// Of each period from `first` on, the first that was put right. Each waits its turn to be advised by itself, so that a long session
     /// starves nobody, and a caller who goes away stops it.
-    async fn told_now(
-        &self,
-        tenant: &Tenant,
-        periods: &Periods,
-        first: usize,
-        advisor: &Arc<Advisor>,
-        start: Standing,
-    ) -> Result<Vec<Now>, ServiceError> {
-        let (mut standing, mut told): (Standing, Vec<Now>) = (start, Vec::new());
+    async fn told_now(&self, tenant: &Tenant, periods: &Periods, first: usize) -> Result<Vec<Now>, ServiceError> {
+        let (mut passage, mut told): (Passage<'_>, Vec<Now>) = (periods.passage()?, Vec::new());
         for (step, period) in periods.all.iter().enumerate() {
-            let passed = periods.passed(advisor, step, &standing).map_err(ServiceError::internal)?;
-            let Passed { log_return, executed_allocation, standing: then } = passed;
+            let Stretch { policy, after, .. } = passage.stretch();
+            let passed = passage.next().map_err(ServiceError::of_recorded)?;
+            let Some(Step { before, log_return, executed_allocation }) = passed else { break };
             if step >= first {
-                let (advising, state) = (advisor.clone(), standing.state);
-                let advise = move || advising.advise(step, &state, AdviceMode::Surrogate);
+                let (advising, local) = (self.policies.advisor(tenant, policy).await?, step - after);
+                let advise = move || advising.advise(local, &before.state, AdviceMode::Surrogate);
                 let advice = self.resolving.run(tenant, advise).await?;
                 // The radius after a period is the one that the next advice is within.
                 told.last_mut().into_iter().for_each(|before| before.radius = advice.radius);
+                let then = &passage.standing.state;
                 told.push(Now {
                     reported: period.is_corrected.then_some(period.report),
                     log_return,
                     advised_allocation: advice.allocation,
                     executed_allocation,
-                    wealth: then.state.wealth,
-                    holding: then.state.holding,
+                    wealth: then.wealth,
+                    holding: then.holding,
                     radius: f64::NAN,
                 });
             }
-            standing = then;
         }
-        let measuring = advisor.clone();
-        let radius = self.resolving.run(tenant, move || measuring.radius(&standing.state)).await?;
+        let (measuring, policy) = (passage.standing.state, &periods.current().policy);
+        let advisor = self.policies.advisor(tenant, policy).await?;
+        let radius = self.resolving.run(tenant, move || advisor.radius(&measuring)).await?;
         told.last_mut().into_iter().for_each(|last| last.radius = radius);
         Ok(told)
     }

@@ -1,4 +1,4 @@
-//! Training jobs as their users see them: each tenant its own.
+//! Jobs as their users see them: each tenant its own.
 
 use std::sync::Arc;
 
@@ -12,11 +12,13 @@ use super::keys::Caller;
 use super::memory::Memory;
 use super::progress::{Progress, ProgressBoard};
 use crate::control::estimate;
+use crate::control::evaluation::backtest::Backtest;
 use crate::control::policy::content_hash;
+use crate::control::request::backtest::BacktestRequest;
 use crate::control::request::evaluation::EvaluationRequest;
 use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
-use crate::store::{CreateJob, DeleteJob, JobKind, JobRow, NewJob, Store, Tenant};
+use crate::store::{Actor, CreateJob, DeleteJob, JobKind, JobRow, NewJob, Store, Tenant};
 
 /// A job as stored, and how far it is where it runs in this process.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +35,7 @@ pub struct Accepted {
 }
 
 /// The jobs of the store.
+#[derive(Clone)]
 pub struct Jobs {
     store: Store,
     clock: Clock,
@@ -61,13 +64,42 @@ impl Jobs {
         specification: Specification,
         key: Option<String>,
     ) -> Result<Accepted, ServiceError> {
+        key.as_deref().map_or(Ok(()), idempotency::check)?;
         let sent = serde_json::to_vec(&specification).map_err(ServiceError::internal)?;
+        let (tenant, by) = (&caller.tenant, caller.actor());
+        let (job, completed) = self.queue_training(tenant, by, specification, &sent, key).await?;
+        Ok(Accepted { job, warnings: completed.problem.warnings() })
+    }
+
+    /// Queues a training of the service's own. The same key again gives the same job, whatever it is to train.
+    ///
+    /// # Errors
+    /// As [`Self::train`].
+    pub(super) async fn train_by_key(
+        &self,
+        tenant: &Tenant,
+        by: Actor,
+        specification: Specification,
+        key: String,
+    ) -> Result<Job, ServiceError> {
+        let sent = key.clone();
+        Ok(self.queue_training(tenant, by, specification, sent.as_bytes(), Some(key)).await?.0)
+    }
+
+    async fn queue_training(
+        &self,
+        tenant: &Tenant,
+        by: Actor,
+        specification: Specification,
+        sent: &[u8],
+        key: Option<String>,
+    ) -> Result<(Job, Specification), ServiceError> {
         let completed = specification.completed()?;
         self.memory.admits(&estimate::training(&completed, self.threads))?;
         self.memory.keeps(&estimate::advising(&completed))?;
         let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
-        let job = self.queue(caller, JobKind::Train, &sent, request_json, completed.problem.horizon, key).await?;
-        Ok(Accepted { job, warnings: completed.problem.warnings() })
+        let new = self.new_job(tenant, JobKind::Train, sent, request_json, completed.problem.horizon, key)?;
+        Ok((self.queue(by, new).await?, completed))
     }
 
     /// Queues an evaluation, whose policies the caller has looked at. The same key and request again give the same job.
@@ -80,35 +112,62 @@ impl Jobs {
         request: EvaluationRequest,
         key: Option<String>,
     ) -> Result<Accepted, ServiceError> {
+        key.as_deref().map_or(Ok(()), idempotency::check)?;
         let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
         let completed = request.completed()?;
         self.memory.admits(&estimate::evaluation(&completed, self.threads))?;
         let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
-        let job = self.queue(caller, JobKind::Evaluate, &sent, request_json, completed.step_count(), key).await?;
+        let steps = completed.step_count();
+        let new = self.new_job(&caller.tenant, JobKind::Evaluate, &sent, request_json, steps, key)?;
+        let job = self.queue(caller.actor(), new).await?;
         Ok(Accepted { job, warnings: completed.problem.warnings() })
     }
 
-    async fn queue(
+    /// Queues a walk-forward. The same key and request again give the same job.
+    ///
+    /// # Errors
+    /// As [`Self::train`].
+    pub async fn backtest(
         &self,
         caller: &Caller,
+        request: BacktestRequest,
+        key: Option<String>,
+    ) -> Result<Accepted, ServiceError> {
+        key.as_deref().map_or(Ok(()), idempotency::check)?;
+        let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
+        let backtest = Backtest::new(request)?;
+        self.memory.admits(&estimate::backtest(&backtest, self.threads))?;
+        let request_json = serde_json::to_string(&backtest.request).map_err(ServiceError::internal)?;
+        let steps = backtest.trainings();
+        let new = self.new_job(&caller.tenant, JobKind::Backtest, &sent, request_json, steps, key)?;
+        let job = self.queue(caller.actor(), new).await?;
+        Ok(Accepted { job, warnings: backtest.warnings() })
+    }
+
+    fn new_job(
+        &self,
+        tenant: &Tenant,
         kind: JobKind,
         sent: &[u8],
         request_json: String,
         steps_total: usize,
         key: Option<String>,
-    ) -> Result<Job, ServiceError> {
-        key.as_deref().map_or(Ok(()), idempotency::check)?;
-        let new = NewJob {
+    ) -> Result<NewJob, ServiceError> {
+        Ok(NewJob {
             job: identity::new_id("job")?,
-            tenant: caller.tenant.clone(),
+            tenant: tenant.clone(),
             kind,
             request_json,
             request_hash: content_hash(sent),
-            idempotency_key: key.clone(),
+            idempotency_key: key,
             steps_total,
             created_ms: self.clock.now_milliseconds(),
-        };
-        match self.store.by(caller.actor()).create_job(new).await? {
+        })
+    }
+
+    async fn queue(&self, by: Actor, new: NewJob) -> Result<Job, ServiceError> {
+        let key = new.idempotency_key.clone();
+        match self.store.by(by).create_job(new).await? {
             CreateJob::Created(row) => {
                 self.board.ring();
                 Ok(self.with_progress(row))
@@ -118,7 +177,7 @@ impl Jobs {
         }
     }
 
-    /// The report of a succeeded evaluation, as JSON.
+    /// The report of a succeeded evaluation or walk-forward, as JSON.
     ///
     /// # Errors
     /// There is no such job, or it has no report (yet).

@@ -6,9 +6,10 @@ use super::allowance::HeavyTurn;
 use super::answer::Observed;
 use super::bounded::Bounded;
 use super::error::ServiceError;
-use super::periods::{self, Passed, Periods, Standing};
+use super::periods::Periods;
+use super::plan::{Plan, Renewing, Stretch};
 use super::report::{Observe, Report};
-use crate::control::error::FieldError;
+use super::standing::{self, Passed, Standing};
 use crate::control::policy::advice::{Advice, Uncertainty};
 use crate::control::policy::advisor::{Advisor, OutsideDesign};
 use crate::control::problem::state::State;
@@ -31,6 +32,12 @@ pub struct Live {
     pub observed: usize,
     /// Corrections of them.
     pub corrections: usize,
+    /// Policies that followed the first.
+    pub renewals: usize,
+    /// The one that advises the coming period.
+    pub current: Arc<Stretch>,
+    /// How it is renewed by itself.
+    pub renew: Option<Renewing>,
     /// The rows it was replayed from.
     pub(super) seen: Seen,
     /// Radius of the state, once computed.
@@ -39,21 +46,24 @@ pub struct Live {
     pub(super) advice: Option<Advice>,
 }
 
-/// Bytes of a session in memory, and of each of its returns, in the law and in the history.
+/// Bytes of a session in memory, and of each of its returns: in the law with its weight, and in the history.
 pub(super) const SESSION_BYTES: usize = 3000;
-const RETURN_BYTES: usize = 16;
+const RETURN_BYTES: usize = 24;
 
 impl Live {
     /// The session that its entries tell of.
-    pub(super) fn replayed(facts: SessionFacts, advisor: &Advisor) -> Result<Live, ServiceError> {
-        let SessionFacts { row, entries, seen } = facts;
-        let periods = Periods::of(&entries)?;
-        let standing = periods.replay(advisor, started(&row, advisor)?, |_, _, _| ())?;
+    pub(super) fn replayed(facts: SessionFacts) -> Result<Live, ServiceError> {
+        let periods = Periods::of(&facts)?;
+        let standing = periods.replay()?.standing;
+        let SessionFacts { row, seen, .. } = facts;
         Ok(Live {
+            renew: Plan::of(&row)?.renew,
             row: Arc::new(row),
             standing,
             observed: periods.all.len(),
             corrections: periods.corrections,
+            renewals: periods.renewals(),
+            current: Arc::new(periods.current().clone()),
             seen,
             radius: None,
             advice: None,
@@ -61,22 +71,38 @@ impl Live {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        SESSION_BYTES + RETURN_BYTES * self.standing.state.law.sample_size()
+        SESSION_BYTES + RETURN_BYTES * self.standing.returns()
     }
 
     /// # Errors
     /// Every period of the horizon is observed.
     pub(super) fn goes_on(&self) -> Result<(), ServiceError> {
-        let SessionRow { session, horizon, .. } = &*self.row;
-        if self.observed < *horizon {
+        let horizon = self.horizon();
+        if self.observed < horizon {
             return Ok(());
         }
-        Err(ServiceError::Completed { session: session.clone(), horizon: *horizon })
+        Err(ServiceError::Completed { session: self.row.session.clone(), horizon })
+    }
+
+    /// The last period that its policy advises.
+    pub fn horizon(&self) -> usize {
+        self.current.horizon()
+    }
+
+    /// Whether the next policy is to be trained.
+    pub fn is_due(&self) -> bool {
+        self.renew.is_some_and(|renew| self.step() >= renew.every)
+    }
+
+    /// Periods observed by its policy.
+    pub(super) fn step(&self) -> usize {
+        self.observed - self.current.after
     }
 
     pub(super) fn expects(&self, period: usize) -> Result<(), ServiceError> {
-        if self.observed >= self.row.horizon {
-            return Err(ServiceError::PastHorizon { given: period, horizon: self.row.horizon });
+        let horizon = self.horizon();
+        if self.observed >= horizon {
+            return Err(ServiceError::PastHorizon { given: period, horizon });
         }
         let expected = self.observed + 1;
         if period == expected { Ok(()) } else { Err(ServiceError::Gap { what: "period", given: period, expected }) }
@@ -85,7 +111,7 @@ impl Live {
     /// The surrogate's advice for the coming period, computed once: here where that takes less than a thread would, else
     /// on a thread that may block. A state outside the design is solved, which is heavy from there on.
     pub(super) async fn surrogate_advice(&mut self, means: &Means<'_>) -> Result<&Advice, ServiceError> {
-        let step = self.observed;
+        let step = self.step();
         let advice = match self.advice.take() {
             Some(advice) => advice,
             None => match self.predicted(step, means).await? {
@@ -122,11 +148,13 @@ impl Live {
         means: &Means<'_>,
     ) -> Result<(Standing, Observed), ServiceError> {
         let log_return = self.standing.log_return(report)?;
-        periods::usual(report, &self.standing.state.law, log_return, observe.confirm)?;
+        standing::usual(report, &self.standing.state.law, log_return, observe.confirm)?;
         let Advice { allocation, band, .. } = *self.surrogate_advice(means).await?;
-        let passed = self.standing.after(&means.advisor, self.observed, report, allocation)?;
+        let dynamics = self.current.dynamics(self.observed);
+        let passed = self.standing.after(dynamics, observe.period, report, allocation)?;
         let Passed { log_return, executed_allocation, standing } = passed;
-        let (standing, uncertainty) = means.measured(&self.row.tenant, self.observed + 1, standing).await?;
+        let (standing, uncertainty) =
+            measured(means.advising, &means.advisor, &self.row.tenant, self.step() + 1, standing).await?;
         let answer = Observed {
             session: observe.session.clone(),
             period: observe.period,
@@ -136,7 +164,7 @@ impl Live {
             executed_allocation,
             wealth: standing.state.wealth,
             holding: standing.state.holding,
-            completed: observe.period == self.row.horizon,
+            completed: observe.period == self.horizon(),
             drift: standing.bet.told(),
             uncertainty,
         };
@@ -144,30 +172,23 @@ impl Live {
     }
 }
 
-/// Where a session starts.
-pub(super) fn started(row: &SessionRow, advisor: &Advisor) -> Result<Standing, FieldError> {
-    let state = advisor.initial_state(Some(&row.initial_history), Some(row.initial_wealth))?;
-    Ok(Standing::at(&row.session, state.with_holding(row.initial_holding)?))
-}
-
-impl Means<'_> {
-    /// The uncertainty set after `step` periods.
-    pub(super) async fn measured(
-        &self,
-        tenant: &Tenant,
-        step: usize,
-        standing: Standing,
-    ) -> Result<(Standing, Uncertainty), ServiceError> {
-        if self.advisor.is_prompt(step, &standing.state) {
-            let uncertainty = self.advisor.uncertainty(&standing.state);
-            return Ok((standing, uncertainty));
-        }
-        let measuring = self.advisor.clone();
-        let measure = move || (measuring.uncertainty(&standing.state), standing);
-        let (uncertainty, standing) = self.advising.run(tenant, measure).await?;
-        // The first session to get this far: the next advice finds its common random numbers simulated.
-        let (advisor, reached) = (self.advisor.clone(), standing.state.clone());
-        tokio::task::spawn_blocking(move || advisor.prepare(step, &reached));
-        Ok((standing, uncertainty))
+/// The uncertainty set after `step` periods by the policy.
+pub(super) async fn measured(
+    advising: &Bounded,
+    advisor: &Arc<Advisor>,
+    tenant: &Tenant,
+    step: usize,
+    standing: Standing,
+) -> Result<(Standing, Uncertainty), ServiceError> {
+    if advisor.is_prompt(step, &standing.state) {
+        let uncertainty = advisor.uncertainty(&standing.state);
+        return Ok((standing, uncertainty));
     }
+    let measuring = advisor.clone();
+    let measure = move || (measuring.uncertainty(&standing.state), standing);
+    let (uncertainty, standing) = advising.run(tenant, measure).await?;
+    // The first session to get this far: the next advice finds its common random numbers simulated.
+    let (advisor, reached) = (advisor.clone(), standing.state.clone());
+    tokio::task::spawn_blocking(move || advisor.prepare(step, &reached));
+    Ok((standing, uncertainty))
 }

@@ -31,6 +31,7 @@ pub const KEY_EXPIRES: &str = "ballast_key_expiry_timestamp_seconds";
 pub const KEY_USED: &str = "ballast_key_last_use_timestamp_seconds";
 pub const OLDEST_JOB_SECONDS: &str = "ballast_oldest_job_age_seconds";
 pub const DRIFT_ALARMS: &str = "ballast_drift_alarms_total";
+pub const RENEWALS: &str = "ballast_renewals_total";
 pub const JOBS_EXPIRED: &str = "ballast_jobs_expired_total";
 pub const STORE_BYTES: &str = "ballast_store_bytes";
 pub const STORE_FREE_BYTES: &str = "ballast_store_free_bytes";
@@ -113,6 +114,10 @@ pub fn describe() {
     describe_counter!(DRIFT_ALARMS, "Sessions whose returns no longer come as they came, by level.");
     for level in ["warning", "alarm"] {
         counter!(DRIFT_ALARMS, "level" => level).increment(0);
+    }
+    describe_counter!(RENEWALS, "Renewals of sessions that renew themselves, by outcome.");
+    for outcome in ["renewed", "failed"] {
+        counter!(RENEWALS, "outcome" => outcome).increment(0);
     }
     describe_counter!(JOBS_EXPIRED, "Ended jobs deleted by age.");
     describe_gauge!(STORE_BYTES, Unit::Bytes, "Size of the database.");

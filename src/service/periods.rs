@@ -2,139 +2,18 @@
 //!
 //! The state is a function of the entries alone. A correction is one of them: the periods are passed through again with the
 //! corrected report in its place. What was advised for a period stays what it was, and with it what was held where nothing
-//! else was reported.
+//! else was reported. A renewal is another: from its place on the terms and the law are those of the next policy.
 
-use std::sync::Arc;
-
-use jiff::civil::Date;
 use serde::Deserialize;
 
-use super::drift::Bet;
+use super::content::read;
 use super::error::ServiceError;
+use super::plan::{Plan, Renew, Stretch};
 use super::report::{Correct, Report};
+use super::standing::{Passed, Standing, usual};
 use crate::control::error::FieldError;
-use crate::control::policy::advisor::Advisor;
-use crate::control::problem::state::{Realised, State};
-use crate::control::request::rules;
-use crate::numerics::empirical::EmpiricalDistribution;
-use crate::numerics::moments::CentralMoments;
-use crate::store::{EntryKind, EntryRow};
-
-/// Where a session stands between two periods.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Standing {
-    pub state: State,
-    /// The price reported for the last period, if one was.
-    pub price: Option<f64>,
-    /// The last date reported.
-    pub date: Option<Date>,
-    /// Against the returns' coming as they came.
-    pub bet: Bet,
-    session: Arc<str>,
-}
-
-/// What a report makes of a period.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Passed {
-    pub log_return: Option<f64>,
-    pub executed_allocation: f64,
-    pub standing: Standing,
-}
-
-impl Standing {
-    /// At the start of `session`.
-    pub(super) fn at(session: &str, state: State) -> Self {
-        Standing { state, price: None, date: None, bet: Bet::default(), session: session.into() }
-    }
-
-    /// The log-return that `report` tells of the coming period, `None` where it is missing.
-    ///
-    /// # Errors
-    /// A field breaks a rule; the date is none after the last.
-    pub(super) fn log_return(&self, report: &Report) -> Result<Option<f64>, FieldError> {
-        report.check()?;
-        if let (Some(date), Some(last)) = (report.date, self.date)
-            && date <= last
-        {
-            return Err(FieldError::new("date", date, format!("must be later than {last}, that of a period before")));
-        }
-        report.log_return(self.price)
-    }
-
-    /// After the period that follows `step` periods: `report` tells of it, `advised` was advised for it.
-    ///
-    /// # Errors
-    /// As [`Standing::log_return`]; wealth leaves the range that is taken.
-    pub(super) fn after(
-        &self,
-        advisor: &Advisor,
-        step: usize,
-        report: &Report,
-        advised: f64,
-    ) -> Result<Passed, FieldError> {
-        let log_return = self.log_return(report)?;
-        let executed_allocation = report.executed_allocation.unwrap_or(advised);
-        let Report { rate, flow, .. } = *report;
-        let realised = Realised { action: executed_allocation, log_return, rate, flow };
-        let mut state = advisor.advance(step, &self.state, &realised);
-        state.wealth = match report.wealth {
-            Some(reported) => reported,
-            None => reached(state.wealth, report)?,
-        };
-        let bet = self.bet.after(&state.law, log_return, &self.session, step + 1);
-        let (price, date, session) = (report.price, report.date.or(self.date), self.session.clone());
-        let standing = Standing { state, price, date, bet, session };
-        Ok(Passed { log_return, executed_allocation, standing })
-    }
-}
-
-/// Returns further from the record than so many of its standard deviations are unusual, where they are also large.
-const UNUSUAL_DEVIATIONS: f64 = 8.0;
-/// Of a simple return, either way: what is smaller is never unusual.
-const UNUSUAL_RETURN: f64 = 0.2;
-
-/// Asks about a return z that lies far from a record of mean m and standard deviation s: `|z - m| > 8 s` and `|e^z - 1| > 0.2`.
-/// Checked by: `tests/account.rs::a_return_that_is_most_likely_a_slip_is_asked_about`.
-///
-/// # Errors
-/// It is most likely a slip, and nobody confirms it.
-pub(super) fn usual(
-    report: &Report,
-    record: &EmpiricalDistribution,
-    log_return: Option<f64>,
-    is_confirmed: bool,
-) -> Result<(), ServiceError> {
-    let unless_confirmed = log_return.filter(|_| !is_confirmed).map(|log_return| (log_return, log_return.exp_m1()));
-    let Some((log_return, simple_return)) = unless_confirmed.filter(|(_, simple)| simple.abs() > UNUSUAL_RETURN) else {
-        return Ok(());
-    };
-    let moments = CentralMoments::of(record);
-    let deviations = (log_return - moments.mean()).abs() / moments.variance().sqrt();
-    if deviations <= UNUSUAL_DEVIATIONS {
-        return Ok(());
-    }
-    let percent = 100.0 * simple_return;
-    let rule = format!(
-        "must come with \"confirm\": true where it is meant: a return of {percent:.1} % lies {deviations:.1} standard deviations from the record"
-    );
-    let (field, value) = report.given();
-    Err(ServiceError::UnusualReturn(FieldError::new(field, value, rule)))
-}
-
-/// Wealth as return, allocation and flow give it.
-fn reached(wealth: f64, report: &Report) -> Result<f64, FieldError> {
-    let (low, high) = rules::WEALTH;
-    if (low..=high).contains(&wealth) {
-        return Ok(wealth);
-    }
-    let leaves = format!(
-        "what the return, the allocation and what is added give is {wealth}, and a wealth lies in [{low}, {high}]"
-    );
-    Err(match report.flow {
-        Some(flow) => FieldError::new("flow", flow, format!("must leave a wealth that is taken: {leaves}")),
-        None => FieldError::new("wealth", "null", format!("must be reported: {leaves}")),
-    })
-}
+use crate::control::problem::state::State;
+use crate::store::{EntryKind, SessionFacts};
 
 /// A period as its entries tell of it.
 #[derive(Debug, Clone)]
@@ -149,12 +28,38 @@ pub struct Period {
     pub is_corrected: bool,
 }
 
-/// All periods of a session.
-#[derive(Debug, Clone, Default)]
+/// All periods of a session, and the policies that it lives them by.
+#[derive(Debug, Clone)]
 pub struct Periods {
     pub all: Vec<Period>,
     /// Number of corrections.
     pub corrections: usize,
+    /// The first policy, and those that followed it.
+    pub stretches: Vec<Stretch>,
+    start: Standing,
+    history: Vec<f64>,
+}
+
+/// What the session starts from, up to some period.
+pub struct Passage<'a> {
+    periods: &'a Periods,
+    /// Where it stands, under the policy that comes next.
+    pub standing: Standing,
+    /// All returns seen, in their order.
+    pub record: Vec<f64>,
+    /// Periods passed.
+    step: usize,
+    /// Of the policy that comes next.
+    stretch: usize,
+}
+
+/// A period that was passed.
+pub struct Step {
+    /// Where the session stood.
+    pub before: Standing,
+    /// `None` where it is missing.
+    pub log_return: Option<f64>,
+    pub executed_allocation: f64,
 }
 
 /// What a correction makes of a session.
@@ -194,9 +99,20 @@ impl Told {
 
 impl Periods {
     /// # Errors
-    /// The entries are not those of a session.
-    pub(super) fn of(entries: &[EntryRow]) -> Result<Self, ServiceError> {
-        let mut periods = Periods::default();
+    /// The entries are not those of the session.
+    pub(super) fn of(facts: &SessionFacts) -> Result<Self, ServiceError> {
+        let SessionFacts { row, entries, .. } = facts;
+        let terms = Plan::of(row)?.terms;
+        let state = State::new(&row.initial_history, row.initial_wealth, terms.learning)?;
+        let state = state.with_holding(row.initial_holding)?;
+        let first = Stretch { policy: row.policy.clone(), after: 0, terms, window: None };
+        let mut periods = Periods {
+            all: Vec::new(),
+            corrections: 0,
+            stretches: vec![first],
+            start: Standing::at(&row.session, state),
+            history: row.initial_history.clone(),
+        };
         for entry in entries {
             match entry.kind {
                 EntryKind::Observation => {
@@ -205,9 +121,24 @@ impl Periods {
                     periods.all.push(Period { report, told, stands: true, is_corrected: false });
                 }
                 EntryKind::Correction => periods.correct(&read(&entry.content_json)?)?,
+                EntryKind::Renewal => {
+                    let renew: Renew = read(&entry.content_json)?;
+                    periods.stretches.push(Stretch::after(periods.all.len(), renew, read(&entry.answer_json)?));
+                }
             }
         }
         Ok(periods)
+    }
+
+    /// The policy that advises the coming period.
+    pub(super) fn current(&self) -> &Stretch {
+        // The first is there from the start.
+        &self.stretches[self.stretches.len() - 1]
+    }
+
+    /// Policies that followed the first.
+    pub(super) fn renewals(&self) -> usize {
+        self.stretches.len() - 1
     }
 
     /// Puts the correction in the place of what was reported.
@@ -236,88 +167,91 @@ impl Periods {
         self.all.iter().position(|period| period.is_corrected).unwrap_or(self.all.len())
     }
 
-    /// What the period after `step` makes of where the session stood before it: what was acknowledged, where that stands, else
-    /// what follows.
+    /// From the start, to be passed through period by period. Cost of each: a copy of the law.
     ///
     /// # Errors
-    /// A report that breaks a rule where it now stands.
-    pub(super) fn passed(&self, advisor: &Advisor, step: usize, before: &Standing) -> Result<Passed, FieldError> {
-        let Period { report, told, stands, .. } = &self.all[step];
-        if !stands {
-            return before.after(advisor, step, report, told.advised_allocation);
-        }
-        let mut passed = before.after(advisor, step, &told.report(report), told.advised_allocation)?;
-        passed.standing.price = report.price;
-        Ok(passed)
-    }
-
-    /// Passes through all of them, and tells `tell` of each: its number, where the session stood before, and what it made
-    /// of it. Cost: a copy of the law for each.
-    ///
-    /// # Errors
-    /// As [`Self::passed`], with the number of the period.
-    pub(super) fn pass(
-        &self,
-        advisor: &Advisor,
-        start: Standing,
-        mut tell: impl FnMut(usize, &Standing, &Passed),
-    ) -> Result<Standing, (usize, FieldError)> {
-        let mut standing = start;
-        for step in 0..self.all.len() {
-            let passed = self.passed(advisor, step, &standing).map_err(|error| (step + 1, error))?;
-            tell(step + 1, &standing, &passed);
-            standing = passed.standing;
-        }
-        Ok(standing)
+    /// The first policy was renewed before the first period, by returns that are no history.
+    pub(super) fn passage(&self) -> Result<Passage<'_>, FieldError> {
+        let (standing, record) = (self.start.clone(), self.history.clone());
+        let mut passage = Passage { periods: self, standing, record, step: 0, stretch: 0 };
+        passage.renew()?;
+        Ok(passage)
     }
 
     /// Puts the correction in its place, and passes through all.
     ///
     /// # Errors
     /// It is of no period that was observed, makes a period break a rule, or gives one an unusual return that nobody confirms.
-    pub(super) fn put_right(
-        &mut self,
-        advisor: &Advisor,
-        start: &Standing,
-        correction: &Correct,
-    ) -> Result<PutRight, ServiceError> {
-        let mut stood = Vec::with_capacity(self.all.len());
-        let before = self.replay(advisor, start.clone(), |_, _, passed| stood.push(passed.log_return))?;
+    pub(super) fn put_right(&mut self, correction: &Correct) -> Result<PutRight, ServiceError> {
+        let (mut stood, mut passage) = (Vec::with_capacity(self.all.len()), self.passage()?);
+        while let Some(step) = passage.next().map_err(ServiceError::of_recorded)? {
+            stood.push(step.log_return);
+        }
+        let before = passage.standing;
         self.correct(correction)?;
-        let mut found = (None, Ok(()));
-        let passed = self.pass(advisor, start.clone(), |period, before, passed| {
-            let log_return = passed.log_return;
+        let (mut corrected, mut passage) = (None, self.passage()?);
+        for (period, stood) in (1..).zip(stood) {
+            let passed = passage.next().map_err(|(period, error)| in_period(period, correction, error))?;
+            let Some(Step { before, log_return, .. }) = passed else { break };
             if period == correction.period {
-                found.0 = log_return;
+                corrected = log_return;
             }
             // Of a price that is put right, the return after it is another too.
-            if found.1.is_ok() && stood[period - 1] != log_return {
+            if stood != log_return {
                 let report = &self.all[period - 1].report;
-                found.1 =
-                    usual(report, &before.state.law, log_return, correction.confirm).map_err(|error| (period, error));
+                usual(report, &before.state.law, log_return, correction.confirm).map_err(|error| match error {
+                    ServiceError::UnusualReturn(field) => {
+                        ServiceError::UnusualReturn(in_period(period, correction, field))
+                    }
+                    other => other,
+                })?;
             }
-        });
-        let standing = passed.map_err(|(period, error)| in_period(period, correction, error))?;
-        let (log_return, is_usual) = found;
-        is_usual.map_err(|(period, error)| match error {
-            ServiceError::UnusualReturn(field) => ServiceError::UnusualReturn(in_period(period, correction, field)),
-            other => other,
-        })?;
-        Ok(PutRight { before, standing, log_return })
+        }
+        Ok(PutRight { before, standing: passage.standing, log_return: corrected })
     }
 
-    /// As [`Self::pass`], of what was recorded: every report kept the rules when it was.
+    /// Where the session stands after all of them.
     ///
     /// # Errors
-    /// One does not keep them any more.
-    pub(super) fn replay(
-        &self,
-        advisor: &Advisor,
-        start: Standing,
-        tell: impl FnMut(usize, &Standing, &Passed),
-    ) -> Result<Standing, ServiceError> {
-        let passed = self.pass(advisor, start, tell);
-        passed.map_err(|(period, error)| ServiceError::internal(format!("period {period}: {error}")))
+    /// A report that was recorded does not keep the rules any more.
+    pub(super) fn replay(&self) -> Result<Passage<'_>, ServiceError> {
+        let mut passage = self.passage()?;
+        while passage.next().map_err(ServiceError::of_recorded)?.is_some() {}
+        Ok(passage)
+    }
+}
+
+impl<'a> Passage<'a> {
+    /// Passes the next period: what was acknowledged of it, where that stands, else what follows. `None` after the last.
+    ///
+    /// # Errors
+    /// A report that breaks a rule where it now stands, with the number of its period.
+    pub(super) fn next(&mut self) -> Result<Option<Step>, (usize, FieldError)> {
+        let Some(Period { report, told, stands, .. }) = self.periods.all.get(self.step) else { return Ok(None) };
+        let (dynamics, period) = (self.stretch().dynamics(self.step), self.step + 1);
+        let report_told = if *stands { told.report(report) } else { *report };
+        let passed = self.standing.after(dynamics, period, &report_told, told.advised_allocation);
+        let Passed { log_return, executed_allocation, mut standing } = passed.map_err(|error| (period, error))?;
+        standing.price = report.price;
+        let before = std::mem::replace(&mut self.standing, standing);
+        self.record.extend(log_return);
+        self.step = period;
+        self.renew().map_err(|error| (period, error))?;
+        Ok(Some(Step { before, log_return, executed_allocation }))
+    }
+
+    /// The policy that advises the period after those passed.
+    pub(super) fn stretch(&self) -> &'a Stretch {
+        &self.periods.stretches[self.stretch]
+    }
+
+    /// Goes on under the policies that begin here.
+    fn renew(&mut self) -> Result<(), FieldError> {
+        while let Some(next) = self.periods.stretches.get(self.stretch + 1).filter(|next| next.after == self.step) {
+            self.standing = self.standing.renewed(&self.record, next.window, next.terms.learning)?;
+            self.stretch += 1;
+        }
+        Ok(())
     }
 }
 
@@ -328,9 +262,4 @@ fn in_period(period: usize, correction: &Correct, error: FieldError) -> FieldErr
     }
     let rule = format!("in period {period}, with period {} put right: {}", correction.period, error.rule);
     FieldError { rule, ..error }
-}
-
-/// What an entry holds.
-pub(super) fn read<'a, T: Deserialize<'a>>(json: &'a str) -> Result<T, ServiceError> {
-    serde_json::from_str(json).map_err(ServiceError::internal)
 }

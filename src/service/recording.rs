@@ -3,16 +3,17 @@
 //! An entry is decided on all entries before it, and appended as the one after them. Where another process wrote meanwhile it
 //! is not, and is decided anew on what is there now: observations and corrections of all processes have one order.
 
-use serde::Serialize;
 use tracing::Instrument;
 
 use super::allowance::HeavyTurn;
 use super::answer::Corrected;
+use super::content::json;
 use super::drift;
 use super::error::ServiceError;
 use super::keys::Caller;
-use super::live::{self, Live, Means};
+use super::live::{Live, measured};
 use super::periods::{Periods, PutRight};
+use super::plan::Plan;
 use super::report::{Correct, Observe};
 use super::sessions::{Name, Sessions};
 use super::slots::Held;
@@ -56,12 +57,20 @@ impl Sessions {
                 standing,
                 observed: period,
                 corrections: live.corrections,
+                renewals: live.renewals,
+                current: live.current.clone(),
+                renew: live.renew,
                 seen: live.seen.followed_by(&new),
                 radius: Some(answer.uncertainty.radius),
                 advice: None,
             };
+            let is_due = next.is_due();
             if let Some(answer_json) = self.append(&self.store, &mut held, new, next).await? {
                 drift::count(levels.0, levels.1);
+                if is_due {
+                    // Where too many are told of already, a round finds it.
+                    let _ = self.due.try_send((tenant.clone(), session.clone()));
+                }
                 return Ok(answer_json);
             }
         }
@@ -73,20 +82,14 @@ impl Sessions {
     /// # Errors
     /// A field breaks a rule, or makes a later period break one; the correction was made with other content, or is not the
     /// next.
-    pub async fn correct(
-        &self,
-        caller: &Caller,
-        session: &str,
-        correct: &Correct,
-        turn: &HeavyTurn,
-    ) -> Result<String, ServiceError> {
+    pub async fn correct(&self, caller: &Caller, session: &str, correct: &Correct) -> Result<String, ServiceError> {
         let number = numbered("correction", correct.correction)?;
         correct.check()?;
         let (tenant, content) = (&caller.tenant, json(correct)?);
         let mut held = self.hold(tenant, session).await;
         loop {
             let facts = self.facts(tenant, session).await?;
-            let mut periods = Periods::of(&facts.entries)?;
+            let mut periods = Periods::of(&facts)?;
             if number <= periods.corrections {
                 return self.repeat(session, EntryKind::Correction, number, &content).await;
             }
@@ -94,14 +97,13 @@ impl Sessions {
             if number > expected {
                 return Err(ServiceError::Gap { what: "correction", given: number, expected });
             }
-            let advisor = self.policies.advisor(tenant, &facts.row.policy).await?;
-            let (start, observed) = (live::started(&facts.row, &advisor)?, periods.all.len());
-            let (passing, putting) = (advisor.clone(), correct.clone());
-            let put_right = move || periods.put_right(&passing, &start, &putting);
+            let (observed, renewals, current) = (periods.all.len(), periods.renewals(), periods.current().clone());
+            let advisor = self.policies.advisor(tenant, &current.policy).await?;
+            let putting = correct.clone();
+            let put_right = move || periods.put_right(&putting);
             let PutRight { before, standing, log_return } = self.advising.run(tenant, put_right).await??;
-            let (advising, resolving) = (&self.advising, &self.resolving);
-            let means = Means { advisor, advising, resolving, turn };
-            let (standing, uncertainty) = means.measured(tenant, observed, standing).await?;
+            let step = observed - current.after;
+            let (standing, uncertainty) = measured(&self.advising, &advisor, tenant, step, standing).await?;
             let radius = Some(uncertainty.radius);
             let answer = Corrected {
                 session: session.to_owned(),
@@ -126,8 +128,18 @@ impl Sessions {
                 key: caller.key().to_string(),
             };
             let seen = facts.seen.followed_by(&new);
-            let next =
-                Live { row: facts.row.into(), standing, observed, corrections: number, seen, radius, advice: None };
+            let next = Live {
+                renew: Plan::of(&facts.row)?.renew,
+                row: facts.row.into(),
+                standing,
+                observed,
+                corrections: number,
+                renewals,
+                current: current.into(),
+                seen,
+                radius,
+                advice: None,
+            };
             let store = self.store.by(caller.actor());
             if let Some(answer_json) = self.append(&store, &mut held, new, next).await? {
                 drift::count(levels.0, levels.1);
@@ -137,7 +149,7 @@ impl Sessions {
     }
 
     /// The first answer to what was recorded already.
-    async fn repeat(
+    pub(super) async fn repeat(
         &self,
         session: &str,
         kind: EntryKind,
@@ -160,23 +172,32 @@ impl Sessions {
         next: Live,
     ) -> Result<Option<String>, ServiceError> {
         held.clear();
-        let (session, answer_json) = (new.session.clone(), new.answer_json.clone());
-        match store.append(new).instrument(spans::of_write("append an entry")).await? {
+        let answer_json = new.answer_json.clone();
+        let appended = store.append(new).instrument(spans::of_write("append an entry")).await?;
+        self.settled(held, appended, answer_json, next)
+    }
+
+    /// As [`Self::append`], of an entry that the store has decided on.
+    pub(super) fn settled(
+        &self,
+        held: &mut Held<Name, Live>,
+        appended: Append,
+        answer_json: String,
+        next: Live,
+    ) -> Result<Option<String>, ServiceError> {
+        match appended {
             Append::Appended => {
                 self.weigh(&next);
                 held.put(next);
                 Ok(Some(answer_json))
             }
             Append::NotNext => Ok(None),
-            Append::NoSession => Err(ServiceError::unknown("session", &session)),
+            Append::NoSession => Err(ServiceError::unknown("session", &next.row.session)),
+            Append::NoPolicy => Err(ServiceError::unknown("policy", &next.current.policy)),
         }
     }
 }
 
-fn numbered(field: &str, number: usize) -> Result<usize, FieldError> {
+pub(super) fn numbered(field: &str, number: usize) -> Result<usize, FieldError> {
     if number == 0 { Err(FieldError::new(field, 0, "must be at least 1")) } else { Ok(number) }
-}
-
-fn json(of: &impl Serialize) -> Result<String, ServiceError> {
-    serde_json::to_string(of).map_err(ServiceError::internal)
 }

@@ -11,6 +11,7 @@
 use std::sync::Arc;
 
 use serde::Serialize;
+use tokio::sync::mpsc::Sender;
 use tracing::Instrument;
 
 use super::allowance::HeavyTurn;
@@ -23,10 +24,11 @@ use super::identity;
 use super::keys::Caller;
 use super::live::{Live, Means, SESSION_BYTES};
 use super::memory::Memory;
-use super::periods::Standing;
+use super::plan::{Plan, Renewing, Stretch};
 use super::policies::Policies;
 use super::slots::{Generation, Held, Slots, Source};
 use super::spans;
+use super::standing::Standing;
 use crate::control::policy::advisor::Advisor;
 use crate::control::policy::content_hash;
 use crate::store::{CreateSession, RequestKey, SessionFacts, SessionRow, SessionSummary, Store, Tenant};
@@ -41,6 +43,7 @@ pub struct Start {
     pub history: Option<Vec<f64>>,
     pub wealth: Option<f64>,
     pub holding: Option<f64>,
+    pub renew: Option<Renewing>,
 }
 
 impl Start {
@@ -59,19 +62,28 @@ pub struct Sessions {
     pub(super) clock: Clock,
     pub(super) policies: Arc<Policies>,
     slots: Arc<Slots<Name, Live>>,
+    /// Told of sessions that became due to be renewed.
+    pub(super) due: Sender<Name>,
     pub(super) advising: Bounded,
     pub(super) resolving: Bounded,
 }
 
 impl Sessions {
-    pub(super) fn new(config: &Config, store: Store, clock: Clock, policies: Arc<Policies>, memory: &Memory) -> Self {
+    pub(super) fn new(
+        config: &Config,
+        store: Store,
+        clock: Clock,
+        policies: Arc<Policies>,
+        memory: &Memory,
+        due: Sender<Name>,
+    ) -> Self {
         let size = |common| Size { common, guests: config.guest_limit };
         let advising = Bounded::new("advise", size(config.advice_limit), config.turn_wait);
         let resolving = Bounded::new("solve", size(config.resolve_limit), config.turn_wait);
         // Two generations are kept.
         let weight = memory.for_sessions() / 2;
         let slots = Arc::new(Slots::new(Generation { slots: weight / SESSION_BYTES, weight }));
-        Sessions { store, clock, policies, slots, advising, resolving }
+        Sessions { store, clock, policies, slots, due, advising, resolving }
     }
 
     /// Opens a session. The same key and start again give the same session as it was opened.
@@ -81,13 +93,15 @@ impl Sessions {
     pub async fn open(&self, caller: &Caller, start: Start, key: Option<String>) -> Result<Live, ServiceError> {
         let tenant = &caller.tenant;
         let key = key.map(|key| start.under(key)).transpose()?;
-        let Start { policy, history, wealth, holding } = start;
+        let Start { policy, history, wealth, holding, renew } = start;
         let advisor = self.policies.advisor(tenant, &policy).await?;
         let state = advisor.initial_state(history.as_deref(), wealth)?.with_holding(holding.unwrap_or(0.0))?;
         // The policy's own wealth pays, whatever is held.
         advisor.check_withdrawals(&state)?;
         self.policies.starts_from(&advisor, state.law.sample_size())?;
         let problem = &advisor.specification().problem;
+        renew.map_or(Ok(()), |renew| renew.check(problem))?;
+        let plan = Plan::new(problem, renew);
         let row = SessionRow {
             session: identity::new_id("session")?,
             tenant: tenant.clone(),
@@ -96,6 +110,8 @@ impl Sessions {
             initial_holding: state.holding,
             initial_history: history.unwrap_or_else(|| problem.history.clone()),
             horizon: problem.horizon,
+            plan_json: plan.json()?,
+            due: renew.map(|renew| renew.every),
             created_ms: self.clock.now_milliseconds(),
         };
         let opening = self.store.by(caller.actor());
@@ -112,7 +128,19 @@ impl Sessions {
         };
         let seen = row.as_opened();
         let standing = Standing::at(&row.session, state);
-        Ok(Live { row: Arc::new(row), standing, observed: 0, corrections: 0, seen, radius: None, advice: None })
+        let current = Stretch { policy: row.policy.clone(), after: 0, terms: plan.terms, window: None };
+        Ok(Live {
+            row: Arc::new(row),
+            standing,
+            observed: 0,
+            corrections: 0,
+            renewals: 0,
+            current: Arc::new(current),
+            renew,
+            seen,
+            radius: None,
+            advice: None,
+        })
     }
 
     /// Bytes of the sessions in memory.
@@ -164,7 +192,7 @@ impl Sessions {
 
     /// The policy of a session, made ready.
     pub(super) async fn advisor(&self, tenant: &Tenant, live: &Live) -> Result<Arc<Advisor>, ServiceError> {
-        self.policies.advisor(tenant, &live.row.policy).await
+        self.policies.advisor(tenant, &live.current.policy).await
     }
 
     pub(super) async fn means<'a>(
@@ -212,8 +240,7 @@ impl Source<Live> for Rows<'_> {
 
     async fn read(&self) -> Result<Live, ServiceError> {
         let facts = self.sessions.facts(self.tenant, self.session).await?;
-        let advisor = self.sessions.policies.advisor(self.tenant, &facts.row.policy).await?;
-        let live = Live::replayed(facts, &advisor)?;
+        let live = Live::replayed(facts)?;
         self.sessions.weigh(&live);
         Ok(live)
     }

@@ -26,6 +26,7 @@ use crate::control::estimate::Footprint;
 use crate::control::pool::TrainingPool;
 use crate::store::{ClaimedJob, JobKind, JobOutcome, Store, StoreError};
 
+mod backtesting;
 mod evaluating;
 mod training;
 
@@ -175,6 +176,7 @@ impl Worker {
         let solved = match claimed.row.kind {
             JobKind::Train => self.train(claimed, stop),
             JobKind::Evaluate => self.evaluate(claimed, stop),
+            JobKind::Backtest => self.backtest(claimed, stop),
         };
         solved.map_or_else(|ended| ended, Ended::Finished)
     }

@@ -211,14 +211,12 @@ impl Sessions {
         let mode = if solves { AdviceMode::Resolve } else { AdviceMode::Surrogate };
         let mut points = Vec::with_capacity(hypotheses.len());
         for hypothesis in hypotheses {
-            let (advisor, state, step) = (advisor.clone(), live.standing.state.clone(), live.observed);
+            let (advisor, state, step) = (advisor.clone(), live.standing.state.clone(), live.step());
             let turns = if solves || hypothesis.radius.is_some() { &self.resolving } else { &self.advising };
             let supposed = turns.run(tenant, move || advisor.suppose(step, &state, &hypothesis, mode)).await?;
-            points.push(WhatIfPoint::new(
-                &hypothesis,
-                supposed.map_err(|error| request.renamed(error))?,
-                request.explain,
-            ));
+            let mut supposed = supposed.map_err(|error| request.renamed(error))?;
+            supposed.step += live.current.after;
+            points.push(WhatIfPoint::new(&hypothesis, supposed, request.explain));
         }
         let session = request.session;
         match (request.sweep, points.pop()) {

@@ -24,6 +24,8 @@ pub enum EntryKind {
     Observation,
     /// Another report of a period that passed before.
     Correction,
+    /// The policy that the session goes on by.
+    Renewal,
 }
 
 /// One entry; as read, verified against its seal.
@@ -49,6 +51,8 @@ pub enum Append {
     /// Its number is not the one after the last entry's: somebody else wrote meanwhile.
     NotNext,
     NoSession,
+    /// Its tenant has no such policy.
+    NoPolicy,
 }
 
 impl EntryKind {
@@ -56,6 +60,7 @@ impl EntryKind {
         match self {
             EntryKind::Observation => "observation",
             EntryKind::Correction => "correction",
+            EntryKind::Renewal => "renewal",
         }
     }
 
@@ -64,11 +69,12 @@ impl EntryKind {
         match self {
             EntryKind::Observation => "period",
             EntryKind::Correction => "correction",
+            EntryKind::Renewal => "renewal",
         }
     }
 
     fn stored(text: &str) -> Result<Self, Failure> {
-        let all = [EntryKind::Observation, EntryKind::Correction];
+        let all = [EntryKind::Observation, EntryKind::Correction, EntryKind::Renewal];
         let found = all.into_iter().find(|kind| kind.as_str() == text);
         found.ok_or_else(|| Failure::Corrupt(format!("an entry of the kind {text}")))
     }
@@ -76,7 +82,7 @@ impl EntryKind {
 
 impl Store {
     /// Appends the entry after the last, or says why not; decided and written in one transaction. An observation has its
-    /// room since the session was opened; every other entry takes its own, and is told of in the audit.
+    /// room since the session was opened or renewed; every other entry takes its own, and is told of in the audit.
     ///
     /// # Errors
     /// [`StoreError::OverQuota`] where there is no room for what is no observation.
@@ -85,7 +91,7 @@ impl Store {
             let (quotas, actor, session) = (self.quotas, self.actor.clone(), new.session.clone());
             return self
                 .write_to(&session, APPENDING, move |connection| {
-                    append_with_room(connection, new, quotas, actor).boxed()
+                    append_with_room(connection, new, (quotas, actor)).boxed()
                 })
                 .await;
         }
@@ -170,7 +176,7 @@ pub(super) async fn append(mut connection: Connection<'_>, new: EntryRow) -> Res
 
 /// As [`append`], and the tenant whose session it is. Observations come without the lock: it must not keep them from referring
 /// to the session, or each would wait for the other.
-async fn append_next(connection: &mut Connection<'_>, new: &EntryRow) -> Result<(Append, Tenant), Failure> {
+pub(super) async fn append_next(connection: &mut Connection<'_>, new: &EntryRow) -> Result<(Append, Tenant), Failure> {
     let session = query("SELECT tenant FROM sessions WHERE session = $1").bind(new.session.as_str());
     let Some(found) = connection.row(session.for_update_but_references()).await? else {
         return Ok((Append::NoSession, Tenant::default()));
@@ -184,19 +190,30 @@ async fn append_next(connection: &mut Connection<'_>, new: &EntryRow) -> Result<
 async fn append_with_room(
     mut connection: Connection<'_>,
     new: EntryRow,
-    quotas: Quotas,
-    actor: Actor,
+    by: (Quotas, Actor),
 ) -> Result<Append, Failure> {
     let connection = &mut connection;
     let (append, tenant) = append_next(connection, &new).await?;
     if append == Append::Appended {
-        let widen = query("UPDATE sessions SET room = room + 1 WHERE session = $1");
-        connection.execute(widen.bind(new.session.as_str())).await?;
-        quotas::take(connection, &tenant, Usage::of_bytes(ENTRY_BYTES), quotas).await?;
         let outcome = format!("{} {} recorded", new.kind.counted(), new.number);
-        audit::record(connection, &actor, &tenant, Deed::Correct, &new.session, &outcome).await?;
+        take_room(connection, &tenant, &new.session, 1, by, (Deed::Correct, &outcome)).await?;
     }
     Ok(append)
+}
+
+/// Room for so many entries more, and what it was taken for.
+pub(super) async fn take_room(
+    connection: &mut Connection<'_>,
+    tenant: &Tenant,
+    session: &str,
+    room: i64,
+    (quotas, actor): (Quotas, Actor),
+    (deed, outcome): (Deed, &str),
+) -> Result<(), Failure> {
+    let widen = query("UPDATE sessions SET room = room + $1 WHERE session = $2");
+    connection.execute(widen.bind(room).bind(session)).await?;
+    quotas::take(connection, tenant, Usage::of_bytes(room.saturating_mul(ENTRY_BYTES)), quotas).await?;
+    audit::record(connection, &actor, tenant, deed, session, outcome).await
 }
 
 const NAMES: &str = "session, entry, kind, number, content_json, answer_json, created_ms, access_key, seal";

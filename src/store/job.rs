@@ -15,6 +15,7 @@ use super::tenant::Tenant;
 pub enum JobKind {
     Train,
     Evaluate,
+    Backtest,
 }
 
 impl JobKind {
@@ -23,11 +24,12 @@ impl JobKind {
         match self {
             JobKind::Train => "train",
             JobKind::Evaluate => "evaluate",
+            JobKind::Backtest => "backtest",
         }
     }
 
     pub(super) fn parse(name: &str) -> Option<JobKind> {
-        [JobKind::Train, JobKind::Evaluate].into_iter().find(|kind| kind.as_str() == name)
+        [JobKind::Train, JobKind::Evaluate, JobKind::Backtest].into_iter().find(|kind| kind.as_str() == name)
     }
 }
 

@@ -27,7 +27,17 @@ impl Store {
         self.list("reading a job", find, |rows| rows.first().map(JobRow::from_row).transpose()).await
     }
 
-    /// The report of a tenant's succeeded evaluation.
+    /// The job that a tenant's idempotency key made.
+    pub async fn job_by_key(&self, tenant: &Tenant, key: &str) -> Result<Option<JobRow>, StoreError> {
+        let find = query(
+            "SELECT jobs.* FROM idempotency_keys JOIN jobs ON jobs.job = idempotency_keys.job
+             WHERE idempotency_keys.tenant = $1 AND idempotency_key = $2",
+        );
+        let find = find.bind(tenant.as_str()).bind(key);
+        self.list("reading a job", find, |rows| rows.first().map(JobRow::from_row).transpose()).await
+    }
+
+    /// The report of a tenant's succeeded job.
     pub async fn report(&self, tenant: &Tenant, job: &str) -> Result<Option<String>, StoreError> {
         let find = query(
             "SELECT json FROM job_reports JOIN jobs ON jobs.job = job_reports.job

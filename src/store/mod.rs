@@ -41,7 +41,9 @@ mod policies;
 mod postgres;
 mod query;
 mod quotas;
+mod renewals;
 mod retention;
+mod seen;
 mod sessions;
 mod sqlite;
 mod tenant;
@@ -68,8 +70,10 @@ pub use keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, Successor};
 pub use policies::{DeletePolicy, PolicyRow, PolicySummary};
 pub use postgres::{PostgresUrl, UrlError};
 pub use quotas::{Quotas, Usage};
+pub use renewals::Onto;
 pub use retention::{DeleteJob, Room};
-pub use sessions::{CreateSession, Seen, SessionFacts, SessionRow, SessionSummary};
+pub use seen::Seen;
+pub use sessions::{CreateSession, SessionFacts, SessionRow, SessionSummary};
 pub use tenant::Tenant;
 
 /// The durable facts of one folder or one database. Clones share the connections.

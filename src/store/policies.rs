@@ -149,6 +149,12 @@ pub(super) async fn insert(
     Ok(is_new)
 }
 
+/// Keeps a policy from being deleted until this transaction ends; whether it is there.
+pub(super) async fn lock(connection: &mut Connection<'_>, id: &str) -> Result<bool, Failure> {
+    let policy = query("SELECT sequence FROM policies WHERE policy = $1").bind(id);
+    Ok(connection.row(policy.for_share()).await?.is_some())
+}
+
 pub(super) async fn is_owned(connection: &mut Connection<'_>, tenant: &Tenant, id: &str) -> Result<bool, Failure> {
     let owner = query("SELECT sequence FROM policy_owners WHERE policy = $1 AND tenant = $2");
     Ok(connection.row(owner.bind(id).bind(tenant.as_str())).await?.is_some())
@@ -169,7 +175,11 @@ async fn delete(
     if !is_owned(connection, &tenant, &id).await? {
         return Ok(DeletePolicy::Absent);
     }
-    let count = query("SELECT count(*) AS sessions FROM sessions WHERE policy = $1 AND tenant = $2");
+    let count = query(
+        "SELECT count(*) AS sessions FROM sessions
+         WHERE tenant = $2 AND session IN (SELECT session FROM sessions WHERE policy = $1
+                                           UNION SELECT session FROM renewals WHERE policy = $1)",
+    );
     let count = count.bind(id.as_str()).bind(tenant.as_str());
     let sessions: i64 = connection.row(count).await?.map_or(Ok(0), |row| row.get("sessions"))?;
     if sessions > 0 {

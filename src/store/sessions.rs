@@ -10,8 +10,9 @@ use super::head::Head;
 use super::idempotency::{self, RequestKey, Used};
 use super::query::{Connection, Row, query};
 use super::quotas::{self, Quotas, Usage};
+use super::seen::Seen;
 use super::tenant::Tenant;
-use super::{Engine, Store, StoreError, policies};
+use super::{Store, StoreError, policies};
 
 /// What became of a session to open.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,7 +39,12 @@ pub struct SessionRow {
     pub initial_holding: f64,
     /// The log-returns known at the start.
     pub initial_history: Vec<f64>,
+    /// Periods by its first policy.
     pub horizon: usize,
+    /// What else was fixed when it was opened.
+    pub plan_json: String,
+    /// Periods after which it is due to be renewed by itself. It finds sessions, and no seal covers it.
+    pub due: Option<usize>,
     pub created_ms: i64,
 }
 
@@ -51,35 +57,16 @@ pub struct SessionFacts {
     pub seen: Seen,
 }
 
-/// What tells later whether a session is still what was read of it.
-#[derive(Debug, Clone)]
-pub struct Seen {
-    head: Head,
-    /// Of a folder: the number of the session's changes that all are in `head`.
-    change: Option<u64>,
-}
-
-impl Seen {
-    /// Number of entries.
-    pub fn entries(&self) -> usize {
-        self.head.entries
-    }
-
-    /// The session as the caller knows it once `appended` is answered with [`Append::Appended`](super::Append).
-    pub fn followed_by(&self, appended: &EntryRow) -> Seen {
-        // Whoever else wrote meanwhile raised the number too, so that it is not this one.
-        Seen { head: appended.head(), change: self.change.map(|change| change + 1) }
-    }
-}
-
 /// A session without its history.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionSummary {
     /// Order of creation; the cursor of [`Store::sessions`].
     pub sequence: i64,
     pub session: String,
+    /// The one that advises the coming period.
     pub policy: String,
     pub initial_wealth: f64,
+    /// The last period that the policy advises.
     pub horizon: usize,
     pub created_ms: i64,
     /// Number of periods observed.
@@ -119,44 +106,6 @@ impl Store {
         Ok(Some(SessionFacts { row, entries, seen: Seen { head, change } }))
     }
 
-    /// Whether a session is still as it was `seen`: known without a read where a folder's session was not written to.
-    pub async fn is_as_seen(&self, session: &str, seen: &mut Seen) -> Result<bool, StoreError> {
-        let change = self.change(session);
-        if change.is_some() && change == seen.change {
-            return Ok(true);
-        }
-        let is_as_seen = self.head(session).await?.as_ref() == Some(&seen.head);
-        if is_as_seen {
-            seen.change = change;
-        }
-        Ok(is_as_seen)
-    }
-
-    /// A number that is another after every write to `session`, where this process makes all of them.
-    fn change(&self, session: &str) -> Option<u64> {
-        match &self.engine {
-            Engine::Sqlite(folder) => Some(folder.change(session)),
-            Engine::Postgres(_) => None,
-        }
-    }
-
-    /// The head of a session: where it is the one of what was read, that is still the session.
-    pub async fn head(&self, session: &str) -> Result<Option<Head>, StoreError> {
-        let last = query(
-            "SELECT sessions.seal AS start_seal, entries.entry, entries.seal
-             FROM sessions LEFT JOIN entries ON entries.session = sessions.session
-             WHERE sessions.session = $1 ORDER BY entries.entry DESC LIMIT 1",
-        );
-        self.read("reading the head of a session", last.bind(session), |rows| {
-            let Some(row) = rows.first() else { return Ok(None) };
-            Ok(Some(match row.get::<Option<i64>>("entry")? {
-                Some(entry) => Head { entries: from_sql(entry)?, seal: row.get("seal")? },
-                None => Head { entries: 0, seal: row.get("start_seal")? },
-            }))
-        })
-        .await
-    }
-
     /// At most `limit` sessions of a tenant, newest first; `after` is the `sequence` of the last row of the page before.
     pub async fn sessions(
         &self,
@@ -165,7 +114,11 @@ impl Store {
         after: Option<i64>,
     ) -> Result<Vec<SessionSummary>, StoreError> {
         let page = query(
-            "SELECT sequence, session, policy, initial_wealth, horizon, created_ms,
+            "SELECT sequence, session, initial_wealth, created_ms,
+                    coalesce((SELECT policy FROM renewals WHERE renewals.session = sessions.session
+                              ORDER BY number DESC LIMIT 1), policy) AS policy,
+                    coalesce((SELECT horizon FROM renewals WHERE renewals.session = sessions.session
+                              ORDER BY number DESC LIMIT 1), horizon) AS horizon,
                     coalesce((SELECT number FROM entries WHERE entries.session = sessions.session AND kind = 'observation'
                               ORDER BY entry DESC LIMIT 1), 0) AS observations
              FROM sessions WHERE tenant = $1 AND sequence < $2 ORDER BY sequence DESC LIMIT $3",
@@ -240,16 +193,15 @@ async fn repeated(
 
 /// The policy stays locked until the session is there: it cannot be deleted in between.
 async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<CreateSession, Failure> {
-    let policy = query("SELECT sequence FROM policies WHERE policy = $1").bind(row.policy.as_str());
-    if connection.row(policy.for_share()).await?.is_none()
+    if !policies::lock(connection, &row.policy).await?
         || !policies::is_owned(connection, &row.tenant, &row.policy).await?
     {
         return Ok(CreateSession::NoPolicy);
     }
     let insert = query(
         "INSERT INTO sessions (session, policy, initial_wealth, initial_holding, initial_history, horizon, room, created_ms,
-                               seal, tenant)
-         VALUES ($1, $2, $3, $4, $5, $6, $6, $7, $8, $9) ON CONFLICT (session) DO NOTHING",
+                               seal, tenant, plan_json, due)
+         VALUES ($1, $2, $3, $4, $5, $6, $6, $7, $8, $9, $10, $11) ON CONFLICT (session) DO NOTHING",
     );
     let insert = insert
         .bind(row.session.as_str())
@@ -260,7 +212,9 @@ async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<Cre
         .bind(to_sql(row.horizon))
         .bind(row.created_ms)
         .bind(row.seal().finish())
-        .bind(row.tenant.as_str());
+        .bind(row.tenant.as_str())
+        .bind(row.plan_json.as_str())
+        .bind(row.due.map(to_sql));
     let inserted = connection.execute(insert).await?;
     Ok(if inserted > 0 { CreateSession::Created } else { CreateSession::Exists })
 }
@@ -308,6 +262,7 @@ impl SessionRow {
             .real(self.initial_holding)
             .bytes(&encode_reals(&self.initial_history))
             .integer(to_sql(self.horizon))
+            .text(&self.plan_json)
             .integer(self.created_ms)
     }
 
@@ -322,6 +277,8 @@ impl SessionRow {
             initial_holding: row.get("initial_holding")?,
             initial_history: history.ok_or_else(|| Failure::Corrupt(what()))?,
             horizon: from_sql(row.get("horizon")?)?,
+            plan_json: row.get("plan_json")?,
+            due: row.get::<Option<i64>>("due")?.map(from_sql).transpose()?,
             created_ms: row.get("created_ms")?,
             session: session.clone(),
         };

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::control::error::FieldError;
 
 /// The name of a tenant. The default one owns what is made where nobody is asked for a key.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Tenant(Arc<str>);
 
 const DEFAULT: &str = "default";

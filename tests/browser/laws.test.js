@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { dashboardModule } from "./modules.js";
 
-const { Shape } = await dashboardModule("laws.js");
+const { Shape, effectiveSize } = await dashboardModule("laws.js");
 const { feature } = await dashboardModule("surface.js");
 
 const RATE = 0.002;
@@ -45,6 +45,29 @@ test("a law of a shape has the moments of its atoms", () => {
       assert.ok(Math.abs(worst.variance - central(growths, 2)) <= 1e-14, `worst variance at ${radius}`);
     }
   }
+});
+
+test("a return of twice the weight is two returns", () => {
+  // At a retention of 1/2 the weights are 1, 2 and 4 quarters.
+  const [weighted, repeated] = [new Shape([0.03, -0.02, 0.01], 0.5).law(), new Shape([0.03, -0.02, -0.02, 0.01, 0.01, 0.01, 0.01]).law()];
+  const near = (found, expected) => assert.ok(Math.abs(found - expected) <= 1e-14, `${found} is not ${expected}`);
+  near(weighted.mean, repeated.mean);
+  near(weighted.deviation, repeated.deviation);
+  near(weighted.standardised(3), repeated.standardised(3));
+  for (const radius of [0, 0.001, 0.02, 0.5]) {
+    near(weighted.worst(radius, RATE).mean, repeated.worst(radius, RATE).mean);
+    near(weighted.worst(radius, RATE).variance, repeated.worst(radius, RATE).variance);
+  }
+});
+
+test("the effective size is one over the sum of the squared masses", () => {
+  for (const [half_life, count] of [[1, 4], [24, 240]]) {
+    const weights = Array.from({ length: count }, (_, age) => 0.5 ** (age / half_life));
+    const expected = weights.reduce((sum, weight) => sum + weight) ** 2 / weights.reduce((sum, weight) => sum + weight ** 2, 0);
+    const found = effectiveSize({ kind: "decay", half_life }, count);
+    assert.ok(Math.abs(found / expected - 1) < 1e-12, `${found} is not ${expected}`);
+  }
+  assert.equal(effectiveSize({ kind: "equal" }, 17), 17);
 });
 
 test("features of a state are those of its law", () => {

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import datetime
 import inspect
 import json
 import math
+from typing import Any
 
 import pytest
 from conftest import REPOSITORY, RETURNS, Network, train
 
 import ballast as package
-from ballast import Ballast, Evaluation, Session, wire
+from ballast import Ballast, Evaluation, Session, WalkForward, wire
 
 
 def test_an_investor_lives_to_the_horizon(session: Session) -> None:
@@ -154,10 +156,19 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     assert ballast.health()["status"] == "ok"
     evaluation = compare(ballast)
     assert ballast.evaluation(evaluation.id).report()["reference"] == "all_bank"
+    walked = walk(ballast)
+    assert ballast.walk_forward(walked.id).report()["choices"]["window"] == 8
     ballast.training(training.id).delete()
     assert training.id not in [job["job"] for job in ballast.jobs()]
 
-    ids = {training.id: "{id}", evaluation.id: "{id}", policy.id: "{id}", own.id: "{id}", session.id: "{id}"}
+    ids = {
+        training.id: "{id}",
+        evaluation.id: "{id}",
+        walked.id: "{id}",
+        policy.id: "{id}",
+        own.id: "{id}",
+        session.id: "{id}",
+    }
     reached = {(method, "/".join(ids.get(part, part) for part in path.split("/"))) for method, path in network.sent}
     paths = json.loads((REPOSITORY / "api/openapi.json").read_text())["paths"]
     described = {(method.upper(), path) for path, item in paths.items() for method in item if for_clients(item)}
@@ -186,6 +197,32 @@ def test_an_evaluation_ends_in_a_report(ballast: Ballast) -> None:
     # Every path of the bank ends alike, up to rounding.
     assert bank["utility"]["variance"]["value"] == pytest.approx(0.0, abs=1e-20)
     assert half["utility"]["mean"]["low"] <= half["utility"]["mean"]["value"] <= half["utility"]["mean"]["high"]
+
+
+def walk(ballast: Ballast, **more: Any) -> WalkForward:
+    """Three years of quarters, the last of them lived through."""
+    dates = [datetime.date(2020 + quarter // 4, 3 * (quarter % 4) + 1, 1) for quarter in range(12)]
+    simple = [0.02 + 0.03 * math.sin(1.7 * quarter) for quarter in range(12)]
+    return ballast.backtest(simple, kind="simple", rate=0.002, dates=dates, window=8, count=10, **more)
+
+
+def test_a_walk_forward_ends_in_a_report(ballast: Ballast) -> None:
+    report = walk(ballast, alpha=[0.5]).report()
+    assert (report["frequency"], report["dates"]) == ("quarterly", ["2022-01", "2022-04", "2022-07", "2022-10"])
+    stock = next(line for line in report["periods"] if line["strategy"] == "all-stock")
+    wealth = 100.0
+    for quarter, found in zip(range(8, 12), stock["wealth"], strict=True):
+        wealth *= 1.02 + 0.03 * math.sin(1.7 * quarter)
+        assert found == pytest.approx(wealth, rel=1e-12)
+    assert report["sentences"][0].startswith("adaptive, alpha 0.5: ")
+
+
+def test_every_field_of_a_walk_forward_is_an_argument() -> None:
+    arguments = set(inspect.signature(Ballast.backtest).parameters)
+    assert arguments - {"self", "returns", "kind", "idempotency_key"} == set(wire.BacktestRequest.__annotations__) - {
+        "log_returns",
+        "simple_returns",
+    }
 
 
 def test_every_hypothesis_is_an_argument() -> None:

@@ -4,46 +4,23 @@ use std::fmt::Display;
 use std::path::Path;
 
 use ballast::report::Csv;
-use serde_json::{Value, json};
 
-use super::{Backtest, BacktestError, analysis, file, page, verdict};
+use super::{BacktestError, Shown, file, page};
 
 pub const PAGE: &str = "report.html";
 
-pub fn write(backtest: &Backtest, folder: &Path) -> Result<(), BacktestError> {
+pub fn write(shown: &Shown, folder: &Path) -> Result<(), BacktestError> {
     let made = std::fs::create_dir_all(folder);
     made.map_err(|source| BacktestError::Write { path: folder.into(), source })?;
-    file(folder, PAGE, &page::page(backtest).html()?)?;
-    file(folder, "report.json", &(serde_json::to_string_pretty(&summary(backtest))? + "\n"))?;
-    file(folder, "strategies.csv", &strategies(backtest))?;
-    file(folder, "periods.csv", &periods(backtest))
+    file(folder, PAGE, &page::page(shown).html()?)?;
+    file(folder, "report.json", &(serde_json::to_string_pretty(&shown.report)? + "\n"))?;
+    file(folder, "strategies.csv", &strategies(shown))?;
+    file(folder, "periods.csv", &periods(shown))
 }
 
-/// Everything but the periods; a run is told apart by its choices, not by when it was made.
-pub fn summary(backtest: &Backtest) -> Value {
-    let (args, walk) = (&backtest.args, backtest.walk);
-    json!({
-        "frequency": backtest.returns.frequency.adjective(),
-        "periods_per_year": backtest.returns.periods_per_year,
-        "first": backtest.rows().first().map(|row| &row.date),
-        "last": backtest.rows().last().map(|row| &row.date),
-        "whole_years": backtest.analysis.years,
-        "choices": {
-            "window": walk.window, "every": walk.every, "horizon": walk.horizon, "alpha": args.alpha, "risk_aversion": args.risk_aversion, "cost_bp": args.cost_bp,
-            "cost_blind": args.cost_blind, "count": args.count, "seed": args.seed,
-        },
-        "intervals": {
-            "confidence": analysis::CONFIDENCE, "resamples": analysis::RESAMPLES,
-            "period_block": backtest.returns.periods_per_year, "year_block": analysis::YEAR_BLOCK,
-        },
-        "strategies": backtest.analysis.figures,
-        "sentences": verdict::sentences(backtest),
-    })
-}
-
-fn strategies(backtest: &Backtest) -> String {
+fn strategies(shown: &Shown) -> String {
     let mut csv = Csv::new(&["strategy", "figure", "value", "low", "high"]);
-    for figures in &backtest.analysis.figures {
+    for figures in &shown.report.strategies {
         let estimates = [
             ("yearly_certainty_equivalent", figures.yearly_certainty_equivalent),
             ("adaptive_ahead", figures.adaptive_ahead),
@@ -72,12 +49,12 @@ fn strategies(backtest: &Backtest) -> String {
 }
 
 /// One line a period and strategy; wealth and drawdown at its end.
-pub fn periods(backtest: &Backtest) -> String {
+pub fn periods(shown: &Shown) -> String {
     let mut csv =
         Csv::new(&["date", "strategy", "allocation", "low", "high", "radius", "traded", "wealth", "drawdown"]);
-    for line in &backtest.lines {
+    for line in &shown.walked.lines {
         let drawdowns = line.account.drawdowns();
-        for (index, (row, decision)) in backtest.rows().iter().zip(&line.decisions).enumerate() {
+        for (index, (row, decision)) in shown.rows().iter().zip(&line.decisions).enumerate() {
             let fields: [&dyn Display; 9] = [
                 &row.date,
                 &line.name,

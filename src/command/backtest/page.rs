@@ -1,69 +1,75 @@
 //! The report as a page.
 
+use ballast::control::evaluation::analysis::{CONFIDENCE, Line, RESAMPLES, YEAR_BLOCK};
+use ballast::control::evaluation::backtest_report::{BacktestFigures, BootstrapEstimate};
 use ballast::report::{Axis, BarChart, Chart, Page, Table, interval, number};
 
-use super::analysis::{BootstrapEstimate, CONFIDENCE, Figures, Line, RESAMPLES, YEAR_BLOCK};
-use super::{Backtest, Row, verdict};
+use super::{Row, Shown};
 
-pub fn page(backtest: &Backtest) -> Page {
+pub fn page(shown: &Shown) -> Page {
     let date = |row: Option<&Row>| row.map_or(String::new(), |row| row.date.clone());
-    let (first, last) = (date(backtest.rows().first()), date(backtest.rows().last()));
-    let noun = noun(backtest);
+    let (first, last) = (date(shown.rows().first()), date(shown.rows().last()));
+    let noun = noun(shown);
     Page::new(&format!("Walk-forward, {first} to {last}"))
-        .paragraph(method(backtest))
+        .paragraph(method(shown))
         .section("What it shows")
-        .points(verdict::sentences(backtest))
-        .table(utility_table(backtest))
+        .points(shown.report.sentences.clone())
+        .table(utility_table(shown))
         .figure(
-            certainty_equivalents(backtest),
+            certainty_equivalents(shown),
             &format!(
                 "Mean utility over {} years, each from 100, as wealth for certain, with {:.0} % intervals.",
-                backtest.analysis.years,
+                shown.report.whole_years,
                 100.0 * CONFIDENCE
             ),
         )
         .section("Wealth")
-        .figure(wealth(backtest), "Equal ratios take equal room. The start is 100, all in the bank.")
-        .figure(drawdowns(backtest), "How far wealth is below its highest so far.")
-        .table(performance_table(backtest))
+        .figure(wealth(shown), "Equal ratios take equal room. The start is 100, all in the bank.")
+        .figure(drawdowns(shown), "How far wealth is below its highest so far.")
+        .table(performance_table(shown))
         .section("What was held")
-        .figure(allocations(backtest), &format!("Share of wealth in the risky asset at the start of each {noun}."))
+        .figure(allocations(shown), &format!("Share of wealth in the risky asset at the start of each {noun}."))
         .figure(
-            radii(backtest),
+            radii(shown),
             &format!("Radius of the Wasserstein ball that {noun}; static ones keep theirs until the next training."),
         )
         .section("How it was done")
-        .points(notes(backtest))
+        .points(notes(shown))
 }
 
-fn noun(backtest: &Backtest) -> &'static str {
-    backtest.returns.frequency.noun()
+/// Of the line most is said about.
+fn main_name(shown: &Shown) -> &str {
+    &shown.walked.lines[shown.walked.backtest.main_line()].name
+}
+
+fn noun(shown: &Shown) -> &'static str {
+    shown.returns.frequency.noun()
 }
 
 /// So many periods, in words.
-fn periods(backtest: &Backtest, count: usize) -> String {
-    format!("{count} {}{}", noun(backtest), if count == 1 { "" } else { "s" })
+fn periods(shown: &Shown, count: usize) -> String {
+    format!("{count} {}{}", noun(shown), if count == 1 { "" } else { "s" })
 }
 
-fn method(backtest: &Backtest) -> String {
-    let (walk, noun) = (backtest.walk, noun(backtest));
+fn method(shown: &Shown) -> String {
+    let (walk, noun) = (shown.walked.backtest.walk, noun(shown));
     format!(
         "{} Every {} a policy is trained on the {} before, for a horizon of {}, and lived by until the next: each {noun} it \
          is asked, held to, and told the return. Nothing later than a {noun} is used for its allocation. Relative risk \
          aversion {}.",
-        backtest.returns.sentence().replace('\n', " "),
-        periods(backtest, walk.every),
-        periods(backtest, walk.window),
-        periods(backtest, walk.horizon),
+        shown.returns.sentence().replace('\n', " "),
+        periods(shown, walk.every),
+        periods(shown, walk.window),
+        periods(shown, walk.horizon),
         walk.risk_aversion
     )
 }
 
-fn notes(backtest: &Backtest) -> Vec<String> {
-    let (args, noun) = (&backtest.args, noun(backtest));
-    let block = periods(backtest, backtest.returns.periods_per_year);
+fn notes(shown: &Shown) -> Vec<String> {
+    let (choices, noun) = (&shown.report.choices, noun(shown));
+    let block = periods(shown, shown.returns.periods_per_year);
     vec![
-        format!("Design points a step {}, seed {}, bridge radius; took {:.0} s.", args.count, args.seed, backtest.seconds),
+        format!("Design points a step {}, seed {}, bridge radius; took {:.0} s.", choices.count, choices.seed, shown.seconds),
         format!(
             "A policy takes the bank to go on paying what it paid in the last {noun} before its training; accounts are \
              credited with what it really paid."
@@ -84,8 +90,8 @@ fn notes(backtest: &Backtest) -> Vec<String> {
 }
 
 /// Dates as years and their parts.
-fn years(backtest: &Backtest) -> Vec<f64> {
-    backtest.rows().iter().map(|row| row.time).collect()
+fn years(shown: &Shown) -> Vec<f64> {
+    shown.rows().iter().map(|row| row.time).collect()
 }
 
 fn time() -> Axis {
@@ -93,48 +99,51 @@ fn time() -> Axis {
 }
 
 /// Strategies that could have been followed.
-fn followed(backtest: &Backtest) -> impl Iterator<Item = &Line> {
-    backtest.lines.iter().filter(|line| !line.hindsight)
+fn followed(shown: &Shown) -> impl Iterator<Item = &Line> {
+    shown.walked.lines.iter().filter(|line| !line.hindsight)
 }
 
-fn wealth(backtest: &Backtest) -> Chart {
-    let years = years(backtest);
+fn wealth(shown: &Shown) -> Chart {
+    let years = years(shown);
     let start = years.first().map_or(0.0, |first| *first);
-    let period = 1.0 / backtest.returns.periods_per_year as f64;
+    let period = 1.0 / shown.returns.periods_per_year as f64;
     let times: Vec<f64> = [start].into_iter().chain(years.iter().map(|year| year + period)).collect();
     let chart = Chart::new("Wealth", time(), Axis::new("wealth, logarithmic").log());
     // The cost-blind strategy lies too close beside the one it is compared with, and a chart holds eight lines.
-    let blind = backtest.args.blind_line();
-    followed(backtest).filter(|line| line.name != blind).fold(chart, |chart, line| {
+    let blind = shown.walked.backtest.blind_line();
+    followed(shown).filter(|line| line.name != blind).fold(chart, |chart, line| {
         chart.line(&line.name, times.iter().copied().zip(line.account.wealth.iter().copied()))
     })
 }
 
 /// The adaptive strategy most is said about and two everybody knows: more cover each other.
-fn drawdowns(backtest: &Backtest) -> Chart {
-    let years = years(backtest);
+fn drawdowns(shown: &Shown) -> Chart {
+    let years = years(shown);
     let chart = Chart::new("Drawdown", time(), Axis::new("below the highest wealth so far, %").from_zero());
-    let main = &backtest.lines[backtest.args.main_line()].name;
-    let shown = ["all-stock", "60/40", main.as_str()];
-    shown.iter().filter_map(|name| backtest.lines.iter().find(|line| line.name == *name)).fold(chart, |chart, line| {
-        let falls = line.account.drawdowns().into_iter().skip(1).map(|fall| -100.0 * fall);
-        chart.line(&line.name, years.iter().copied().zip(falls))
-    })
+    let main = main_name(shown);
+    let names = ["all-stock", "60/40", main];
+    names.iter().filter_map(|name| shown.walked.lines.iter().find(|line| line.name == *name)).fold(
+        chart,
+        |chart, line| {
+            let falls = line.account.drawdowns().into_iter().skip(1).map(|fall| -100.0 * fall);
+            chart.line(&line.name, years.iter().copied().zip(falls))
+        },
+    )
 }
 
-fn allocations(backtest: &Backtest) -> Chart {
-    let years = years(backtest);
+fn allocations(shown: &Shown) -> Chart {
+    let years = years(shown);
     let chart = Chart::new("Allocation", time(), Axis::new("share of wealth, %").from_zero());
-    trained(backtest).fold(chart, |chart, line| {
+    trained(shown).fold(chart, |chart, line| {
         let shares = line.account.allocations.iter().map(|allocation| 100.0 * allocation);
         chart.line(&line.name, years.iter().copied().zip(shares))
     })
 }
 
-fn radii(backtest: &Backtest) -> Chart {
-    let years = years(backtest);
-    let chart = Chart::new("Radius", time(), Axis::new(&format!("log-return a {}, %", noun(backtest))).from_zero());
-    trained(backtest).filter(|line| line.decisions.iter().any(|decision| decision.radius > 0.0)).fold(
+fn radii(shown: &Shown) -> Chart {
+    let years = years(shown);
+    let chart = Chart::new("Radius", time(), Axis::new(&format!("log-return a {}, %", noun(shown))).from_zero());
+    trained(shown).filter(|line| line.decisions.iter().any(|decision| decision.radius > 0.0)).fold(
         chart,
         |chart, line| {
             let radii = line.decisions.iter().map(|decision| 100.0 * decision.radius);
@@ -143,21 +152,21 @@ fn radii(backtest: &Backtest) -> Chart {
     )
 }
 
-fn trained(backtest: &Backtest) -> impl Iterator<Item = &Line> {
-    followed(backtest).filter(|line| line.decisions.iter().any(|decision| decision.source.is_some()))
+fn trained(shown: &Shown) -> impl Iterator<Item = &Line> {
+    followed(shown).filter(|line| line.decisions.iter().any(|decision| decision.source.is_some()))
 }
 
-fn certainty_equivalents(backtest: &Backtest) -> BarChart {
+fn certainty_equivalents(shown: &Shown) -> BarChart {
     // From 100 on, what a year adds: bars from zero would all look alike.
     let chart = BarChart::new("What a year from 100 counts as, beyond 100", Axis::new("certainty equivalent less 100"));
-    backtest.analysis.figures.iter().fold(chart, |chart, figures| {
+    shown.report.strategies.iter().fold(chart, |chart, figures| {
         let BootstrapEstimate { value, interval: [low, high] } = figures.yearly_certainty_equivalent;
         chart.bar(&figures.strategy, value - 100.0, Some([low - 100.0, high - 100.0]))
     })
 }
 
-fn utility_table(backtest: &Backtest) -> Table {
-    let main = &backtest.lines[backtest.args.main_line()].name;
+fn utility_table(shown: &Shown) -> Table {
+    let main = main_name(shown);
     let table = Table::new(
         "Certainty equivalents of a year from 100",
         &[
@@ -165,10 +174,10 @@ fn utility_table(backtest: &Backtest) -> Table {
             "certainty equivalent",
             &format!("{main} less this"),
             "mean allocation, %",
-            &format!("all-bank {}s, %", noun(backtest)),
+            &format!("all-bank {}s, %", noun(shown)),
         ],
     );
-    backtest.analysis.figures.iter().fold(table, |table, figures| {
+    shown.report.strategies.iter().fold(table, |table, figures| {
         table.row([
             figures.strategy.as_str().into(),
             estimate(figures.yearly_certainty_equivalent, 1.0, 2),
@@ -179,12 +188,12 @@ fn utility_table(backtest: &Backtest) -> Table {
     })
 }
 
-fn performance_table(backtest: &Backtest) -> Table {
+fn performance_table(shown: &Shown) -> Table {
     let table = Table::new(
         "Performance, a year",
         &["strategy", "mean, %", "volatility, %", "Sharpe ratio", "turnover, %", "max drawdown, %", "final wealth"],
     );
-    backtest.analysis.figures.iter().fold(table, |table, figures: &Figures| {
+    shown.report.strategies.iter().fold(table, |table, figures: &BacktestFigures| {
         table.row([
             figures.strategy.as_str().into(),
             estimate(figures.annual_mean, 100.0, 2),

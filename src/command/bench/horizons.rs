@@ -107,7 +107,7 @@ fn trained(specification: &Specification) -> Result<Start, TrainError> {
 /// The first of two steps by brute force.
 fn nested(specification: &Specification) -> Result<Start, TrainError> {
     let problem = &specification.problem;
-    let state = State::new(&problem.history, problem.initial_wealth)?;
+    let state = State::new(&problem.history, problem.initial_wealth, problem.learning)?;
     let next = exact_last_value(specification);
     let solution = BellmanStep { problem: &Problem::new(specification), step: 0, next: &next }.solve(&state);
     Ok(Start { gain: solution.floor_gain, allocation: solution.action })

@@ -19,7 +19,7 @@ pub fn mixture() -> SamplingLaw {
 
 /// `count` log-returns drawn from the mixture.
 pub fn history(count: usize, seed: u64) -> Vec<f64> {
-    let law: ContinuousLaw = continuous_law(&mixture(), &[]);
+    let law: ContinuousLaw = continuous_law(&mixture(), &ProblemSpecification::of(Vec::new(), 0.0));
     let mut generator = stream(seed, "bench-history", 0, 0);
     (0..count).map(|_| law.draw(&mut generator)).collect()
 }

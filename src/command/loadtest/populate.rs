@@ -8,6 +8,8 @@ use ballast::control::pool::TrainingPool;
 use ballast::control::progress::Watch;
 use ballast::control::request::specification::{InitialLaws, Specification};
 use ballast::control::training::Training;
+use ballast::service::error::ServiceError;
+use ballast::service::plan::Plan;
 use ballast::store::{CreateSession, SessionRow, Store, Tenant};
 use futures_util::{StreamExt, stream};
 use serde_json::Value;
@@ -78,20 +80,24 @@ impl World {
         };
         let creating = stream::iter(0..count).map(|index| {
             let (store, new) = (store.clone(), self.session(index));
-            async move { store.create_session(new.clone(), None).await.map(|outcome| (outcome, new.session)) }
+            async move {
+                let new = new?;
+                let outcome = store.create_session(new.clone(), None).await?;
+                Ok::<_, Box<dyn Error>>((outcome, new.session))
+            }
         });
         let created: Vec<_> = creating.buffered(IN_FLIGHT).collect().await;
         store.close().await;
-        let session = |created| match created? {
+        let session = |created: Result<_, Box<dyn Error>>| match created? {
             (CreateSession::Created, session) => Ok(session),
             (refused, session) => Err(format!("the store answered {refused:?} to {session}").into()),
         };
         created.into_iter().map(session).collect()
     }
 
-    fn session(&self, index: u32) -> SessionRow {
+    fn session(&self, index: u32) -> Result<SessionRow, ServiceError> {
         let problem = &self.specification.problem;
-        SessionRow {
+        Ok(SessionRow {
             tenant: Tenant::default(),
             // As spread as the service's own, which are random.
             session: format!("session_{}", &content_hash(&index.to_le_bytes())[..32]),
@@ -100,8 +106,10 @@ impl World {
             initial_holding: 0.0,
             initial_history: problem.history.clone(),
             horizon: self.horizon,
+            plan_json: Plan::new(problem, None).json()?,
+            due: None,
             created_ms: 0,
-        }
+        })
     }
 }
 

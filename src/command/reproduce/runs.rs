@@ -93,7 +93,7 @@ pub fn section(plan: &Plan, workshop: &Workshop) -> Result<Section, Box<dyn Erro
 fn seek(plan: &Plan, evaluation: &Evaluation) -> (Quantiles, [Vec<Vec<f64>>; 2]) {
     let request = &evaluation.request;
     let sets = Problem::new(&request.specification(Framework::Adaptive, None)).sets;
-    let law = continuous_law(&paper::mixture(), &[]);
+    let law = continuous_law(&paper::mixture(), &request.problem);
     let draw = |index: usize| {
         let mut generator = stream(request.seed, "reproduce-seek", index, 0);
         let history: Vec<f64> = (0..SAMPLE_SIZE).map(|_| law.draw(&mut generator)).collect();

@@ -21,6 +21,8 @@ use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::exponential_mean::{ExponentialMean, WorstExponential};
 use crate::numerics::moments::CentralMoments;
 
+/// Of an estimated law. What decays may leave no other; a history that is accepted varies more, however long it is lived after.
+const SMALLEST_VARIANCE: f64 = 1e-18;
 /// Where the features do not depend on the ball.
 const NO_BALL: Radii = Radii { radius: 0.0, radius_ahead: 0.0 };
 
@@ -154,7 +156,7 @@ impl Problem {
     fn frozen(&self) -> &Frozen {
         self.frozen.get_or_init(|| {
             let problem = &self.specification.problem;
-            let history = EmpiricalDistribution::new(&problem.history);
+            let history = problem.learning.law(&problem.history);
             let measure = self.sets.measure(&history);
             let set = match problem.framework.is_parametric() {
                 true => self.learned_set(&history, measure.radius),
@@ -171,7 +173,7 @@ impl Problem {
             return UncertaintySet::around(Centre::empirical(law), radius, problem.support);
         }
         let moments = CentralMoments::of(law);
-        let estimate = NormalLaw { mean: moments.mean(), variance: moments.variance() };
+        let estimate = NormalLaw { mean: moments.mean(), variance: moments.variance().max(SMALLEST_VARIANCE) };
         UncertaintySet::Region(ConfidenceRegion { estimate, radius })
     }
 
@@ -182,11 +184,16 @@ impl Problem {
 
     /// The same where the radius of the state is known already.
     pub fn features_within(&self, step: usize, state: &State, radius: f64) -> Features {
-        let (moments, total) = (CentralMoments::of(&state.law), self.dynamics(step).total(state.wealth, 0.0));
         if !self.selection.has_ball() {
-            return self.selection.of(total, &without_ball(moments));
+            let total = self.dynamics(step).total(state.wealth, 0.0);
+            return self.selection.of(total, &without_ball(CentralMoments::of(&state.law)));
         }
-        let radii = self.sets.radii(&state.law, radius);
+        self.features_knowing(step, state, self.sets.radii(&state.law, radius))
+    }
+
+    /// The same where both radii of the state are known already.
+    pub fn features_knowing(&self, step: usize, state: &State, radii: Radii) -> Features {
+        let (moments, total) = (CentralMoments::of(&state.law), self.dynamics(step).total(state.wealth, 0.0));
         let worst = ExponentialMean::of(&state.law, self.lowest_return()).worst(radii.radius);
         self.selection.of(total, &self.summary(moments, radii, worst))
     }

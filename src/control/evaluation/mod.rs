@@ -1,7 +1,11 @@
 //! Strategies compared on simulated paths and on real returns (paper, section 3.2).
 
 pub mod account;
+pub mod analysis;
+pub mod backtest;
+pub mod backtest_report;
 pub mod paths;
 pub mod report;
 pub mod rolling;
 pub mod statistics;
+pub mod verdict;

@@ -21,7 +21,7 @@ use crate::control::request::rules;
 use crate::control::request::specification::{SamplingLaw, Specification};
 use crate::control::training::Training;
 use crate::numerics::law::ContinuousLaw;
-use crate::numerics::law_distance::{LawDistance, Placed, insert};
+use crate::numerics::law_distance::{LawDistance, Placed};
 use crate::numerics::streams::stream;
 
 /// Progress is reported about this often.
@@ -117,7 +117,7 @@ impl Evaluation {
         request.histories = InitialHistories::Drawn { count: histories.len() };
         let request = request.completed()?;
         for (index, history) in histories.iter().enumerate() {
-            rules::history(&format!("histories[{index}]"), history)?;
+            rules::history(&format!("histories[{index}]"), history, request.problem.learning)?;
             if history.len() != request.problem.history.len() {
                 let value = format!("{} values", history.len());
                 return Err(FieldError::new(
@@ -165,8 +165,10 @@ impl Evaluation {
         watch: &Watch,
         clock: &(dyn Fn() -> f64 + Sync),
     ) -> Result<Outcomes, TrainError> {
-        let first = self.request.problem.history.len();
-        let distances = LawDistance::new(self.law.clone(), first..first + self.request.problem.horizon);
+        let problem = &self.request.problem;
+        let first = problem.history.len();
+        let sizes = first..first + problem.horizon;
+        let distances = LawDistance::new(self.law.clone(), problem.learning.retention(), sizes);
         let (periods, done) = (Dynamics::of(&self.request.problem), AtomicUsize::new(0));
         let simulator = Simulator { evaluation: self, followers, watch, clock, periods, distances, done };
         let found: Result<Vec<_>, TrainError> =
@@ -185,7 +187,7 @@ impl Evaluation {
 
 fn true_law(request: &EvaluationRequest) -> ContinuousLaw {
     let law = request.problem.law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
-    continuous_law(law, &request.problem.history)
+    continuous_law(law, &request.problem)
 }
 
 /// The history `index` of those drawn from the true law of a completed request.
@@ -219,7 +221,7 @@ impl Simulator<'_> {
             .filter_map(|(follower, own)| follower.advisor.as_ref().or(own.as_ref()))
             .collect();
         let mut sample = Vec::with_capacity(history.len() + self.evaluation.request.problem.horizon);
-        history.iter().for_each(|&value| insert(&mut sample, self.distances.place(value)));
+        history.iter().for_each(|&value| self.distances.learn(&mut sample, self.distances.place(value)));
         let paths = 0..self.evaluation.request.paths;
         let outcomes: Result<Paths, TrainError> =
             paths.into_par_iter().map(|path| self.path(index, path, &advisors, &sample)).collect();
@@ -277,7 +279,7 @@ impl Simulator<'_> {
         let mut sample = sample.to_vec();
         let before = |&log_return: &f64| {
             let distance = self.distances.distance(&sample);
-            insert(&mut sample, self.distances.place(log_return));
+            self.distances.learn(&mut sample, self.distances.place(log_return));
             distance
         };
         returns.iter().map(before).collect()

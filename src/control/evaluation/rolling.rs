@@ -3,7 +3,12 @@
 //! Decisions and accounts are apart: under power and log utility no band depends on wealth, and hardly on what is held, so the
 //! stretches between trainings can be decided side by side, and what wealth became is counted afterwards ([`crate::control::evaluation::account`]).
 
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
 use crate::control::error::TrainError;
+use crate::control::kept::Kept;
 use crate::control::policy::advice::{Advice, AdviceSource};
 use crate::control::policy::advisor::Advisor;
 use crate::control::pool;
@@ -15,6 +20,7 @@ use crate::control::request::specification::{
     DesignSpecification, ProblemSpecification, Specification, SurrogateSpecification, UtilitySpecification,
 };
 use crate::control::training::Training;
+use crate::control::uncertainty::measured::Measured;
 
 /// One period of the real world.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,7 +59,7 @@ pub enum Strategy {
 }
 
 /// What was decided for one period, and why.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Decision {
     /// The holdings that are kept as they are.
     pub band: Band,
@@ -83,6 +89,11 @@ pub struct WalkForward {
 }
 
 impl Strategy {
+    /// Whether it follows a policy.
+    pub fn is_trained(self) -> bool {
+        self.framework().is_some()
+    }
+
     fn framework(self) -> Option<(Framework, f64)> {
         match self {
             Strategy::Adaptive { alpha } | Strategy::CostBlind { alpha } => Some((Framework::Adaptive, alpha)),
@@ -94,16 +105,41 @@ impl Strategy {
     }
 }
 
+/// What the trainings of one stretch have in common; no bit of what is decided depends on it.
+pub struct Common {
+    kept: Kept,
+    measured: Arc<Measured>,
+}
+
+impl Common {
+    /// With what can be made again in `kept`.
+    pub fn of(strategies: &[Strategy], kept: Kept) -> Self {
+        let mut alphas: Vec<f64> = Vec::new();
+        for strategy in strategies {
+            if let Some((Framework::Adaptive, alpha)) = strategy.framework()
+                && !alphas.contains(&alpha)
+            {
+                alphas.push(alpha);
+            }
+        }
+        Common { kept, measured: Arc::new(Measured::at(alphas)) }
+    }
+}
+
 impl WalkForward {
     /// Of terminal wealth, and of a year's in the figures.
     pub fn utility(&self) -> UtilitySpecification {
         UtilitySpecification::relative(self.risk_aversion)
     }
 
+    /// From one training to the next, how often; the last may be cut short.
+    pub fn stretches(&self, periods: usize) -> usize {
+        periods.saturating_sub(self.window).div_ceil(self.every)
+    }
+
     /// Trainings that [`Self::decide`] takes: one a strategy that needs it and a stretch.
     pub fn trainings(&self, strategies: &[Strategy], periods: &[Period]) -> usize {
-        let stretches = periods.len().saturating_sub(self.window).div_ceil(self.every);
-        stretches * strategies.iter().filter(|strategy| strategy.framework().is_some()).count()
+        self.stretches(periods.len()) * strategies.iter().filter(|strategy| strategy.is_trained()).count()
     }
 
     /// The training request of one stretch from the periods before it. The bank is taken to go on paying what it paid last.
@@ -138,42 +174,50 @@ impl WalkForward {
         watch: &Watch,
         trained: &(dyn Fn() + Sync),
     ) -> Result<Vec<Vec<Decision>>, TrainError> {
-        let starts = (self.window..periods.len()).step_by(self.every);
-        // Stretches outermost, so that those done stay done together.
-        let jobs: Vec<(usize, Strategy)> =
-            starts.flat_map(|start| strategies.iter().map(move |&strategy| (start, strategy))).collect();
-        let found = pool::map(jobs, |(start, strategy)| {
-            let decided = self.decide_stretch(strategy, periods, start, watch);
-            if strategy.framework().is_some() {
-                trained();
-            }
-            decided
-        });
+        let decided = |stretch: usize| -> Result<Vec<Vec<Decision>>, TrainError> {
+            let common = Common::of(strategies, Kept::default());
+            let decided = |strategy: Strategy| {
+                let decided = self.decide_stretch(strategy, periods, stretch, &common, watch);
+                if strategy.is_trained() {
+                    trained();
+                }
+                decided
+            };
+            pool::map(strategies.to_vec(), decided).into_iter().collect()
+        };
+        let stretches = (0..self.stretches(periods.len())).collect();
         let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); strategies.len()];
-        for (job, stretch) in found.into_iter().enumerate() {
-            decisions[job % strategies.len()].extend(stretch?);
+        for found in pool::map(stretches, decided) {
+            decisions.iter_mut().zip(found?).for_each(|(all, stretch)| all.extend(stretch));
         }
         Ok(decisions)
     }
 
-    fn decide_stretch(
+    /// What one strategy holds from a training to the next; `common` is of its stretch.
+    ///
+    /// # Errors
+    /// As [`Self::decide`].
+    pub fn decide_stretch(
         &self,
         strategy: Strategy,
         periods: &[Period],
-        start: usize,
+        stretch: usize,
+        common: &Common,
         watch: &Watch,
     ) -> Result<Vec<Decision>, TrainError> {
-        let stretch = &periods[start..periods.len().min(start + self.every)];
+        let start = self.window + stretch * self.every;
+        let lived = &periods[start..periods.len().min(start + self.every)];
         let Some((framework, alpha)) = strategy.framework() else {
             let Strategy::Mix { share } = strategy else { return Ok(Vec::new()) };
-            return Ok(vec![Decision { band: Band::of(&[share]), radius: 0.0, source: None }; stretch.len()]);
+            return Ok(vec![Decision { band: Band::of(&[share]), radius: 0.0, source: None }; lived.len()]);
         };
         let mut specification = self.specification(framework, alpha, &periods[start - self.window..start]);
         if matches!(strategy, Strategy::CostBlind { .. }) {
             specification.problem.trading_cost = 0.0;
         }
-        let advisor = Advisor::new(Training::new(&specification)?.run(watch)?);
-        let returns: Vec<f64> = stretch.iter().map(|period| period.log_return).collect();
+        let policy = Training::among(&specification, common.kept.clone(), common.measured.clone())?.run(watch)?;
+        let advisor = Advisor::with(policy, common.kept.clone());
+        let returns: Vec<f64> = lived.iter().map(|period| period.log_return).collect();
         let decided = |Advice { band, radius, source, .. }| Decision { band, radius, source: Some(source) };
         Ok(advisor.walk(advisor.initial_state(None, None)?, &returns).map(decided).collect())
     }

@@ -46,6 +46,8 @@ pub struct Advice {
     pub radius: f64,
     /// Returns seen, those of the history among them.
     pub sample_size: usize,
+    /// How many returns of equal weight tell as much: as many as were seen where `learning` is `equal`.
+    pub effective_size: f64,
     /// Predicted standard deviation of the log certainty equivalent.
     pub surrogate_sd: f64,
     /// Whether the state lies where the surrogates were trained.
@@ -59,7 +61,9 @@ pub struct Advice {
 pub struct Uncertainty {
     /// Returns seen, those of the history among them.
     pub sample_size: usize,
-    /// Raw moments of the empirical law, first to the specification's count.
+    /// How many returns of equal weight tell as much: as many as were seen where `learning` is `equal`.
+    pub effective_size: f64,
+    /// Raw moments of the law learned, first to the specification's count.
     pub moments: Vec<f64>,
     /// (1 - alpha)-quantile of the bridge statistic; absent under other radius rules.
     pub quantile: Option<f64>,

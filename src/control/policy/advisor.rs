@@ -18,7 +18,6 @@ use crate::control::problem::state::{Realised, State};
 use crate::control::request::specification::{Specification, UtilitySpecification};
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
 use crate::control::uncertainty::radius::Measure;
-use crate::numerics::empirical::EmpiricalDistribution;
 
 /// Numbers read in some hundreds of microseconds.
 const PROMPT_COST: usize = 1 << 20;
@@ -113,13 +112,12 @@ impl Advisor {
     /// uncertainty set is frozen at it.
     pub fn initial_state(&self, history: Option<&[f64]>, wealth: Option<f64>) -> Result<State, FieldError> {
         let problem = &self.specification().problem;
-        let own = &problem.history;
-        let history = history.unwrap_or(own);
-        if problem.framework.is_frozen() && history != own {
+        let history = history.unwrap_or(&problem.history);
+        if problem.framework.is_frozen() && history != problem.history {
             let value = format!("{} values", history.len());
             return Err(FieldError::new("history", value, "must be the policy's own under a static framework"));
         }
-        State::new(history, wealth.unwrap_or(problem.initial_wealth))
+        State::new(history, wealth.unwrap_or(problem.initial_wealth), problem.learning)
     }
 
     /// Checks that a state at the start can pay for every withdrawal to come.
@@ -268,6 +266,7 @@ impl Advisor {
             floor,
             radius: asked.radius,
             sample_size: asked.state.law.sample_size(),
+            effective_size: asked.state.law.effective_size(),
             surrogate_sd: predicted.deviation,
             in_design: predicted.in_design,
             source: asked.source,
@@ -314,8 +313,8 @@ impl Advisor {
     /// Whether `state` is the one state that a single-state step was solved at.
     fn is_single_state(&self, step: usize, state: &State) -> bool {
         let problem = &self.specification().problem;
-        let start = EmpiricalDistribution::new(&problem.history);
-        let same_law = !problem.framework.learns() || (step == 0 && state.law == start);
+        let same_law =
+            !problem.framework.learns() || (step == 0 && state.law == problem.learning.law(&problem.history));
         let trained = self.specification().design.wealth.map_or(problem.initial_wealth, |wealth| wealth.min);
         let same_wealth = !problem.depends_on_wealth() || state.wealth == trained;
         same_law && same_wealth
@@ -336,6 +335,7 @@ impl Advisor {
         let Measure { radius, quantile } = self.problem.measure(state);
         Uncertainty {
             sample_size: state.law.sample_size(),
+            effective_size: state.law.effective_size(),
             moments: state.law.raw_moments(self.specification().surrogate.moment_count),
             quantile: quantile.map(|found| found.value),
             quantile_standard_error: quantile.map(|found| found.standard_error),

@@ -3,7 +3,9 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// A record with fewer returns is short: two years of months.
+use super::advice::Advice;
+
+/// A record with fewer returns, by its effective size, is short: two years of months.
 const SHORT_RECORD: usize = 24;
 
 /// A reason to be careful with an advice.
@@ -19,7 +21,7 @@ pub struct Caution {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CautionCode {
-    /// The record has fewer than 24 returns.
+    /// The record has fewer than 24 returns, by its effective size.
     ShortRecord,
     /// Without one of its returns the advice would move by more than half of the action interval, or between the bank alone and
     /// holding something. Told where the sensitivity is asked for.
@@ -27,13 +29,18 @@ pub enum CautionCode {
 }
 
 impl Caution {
-    /// Of a record of so many returns, where those are few.
-    pub(super) fn short_record(returns: usize) -> Option<Self> {
-        if returns >= SHORT_RECORD {
+    /// Of an advice that rests on few returns, or on few by their weight.
+    pub(super) fn short_record(advice: &Advice) -> Option<Self> {
+        let Advice { sample_size, effective_size, .. } = *advice;
+        if effective_size >= SHORT_RECORD as f64 {
             return None;
         }
+        let worth = match effective_size < sample_size as f64 {
+            true => format!(", which weigh like {effective_size:.1} equal ones"),
+            false => String::new(),
+        };
         let sentence = format!(
-            "The advice rests on {returns} returns: with fewer than {SHORT_RECORD}, each of them weighs much, and most of what the asset can do is yet unseen."
+            "The advice rests on {sample_size} returns{worth}: with fewer than {SHORT_RECORD}, each of them weighs much, and most of what the asset can do is yet unseen."
         );
         Some(Caution { code: CautionCode::ShortRecord, sentence })
     }

@@ -12,7 +12,6 @@ use crate::control::problem::state::State;
 use crate::control::request::framework::Framework;
 use crate::control::request::specification::{ProblemSpecification, Specification};
 use crate::control::solved_step::StepSolution;
-use crate::numerics::empirical::EmpiricalDistribution;
 
 /// An investor whose horizon is the end of this period.
 pub struct OnePeriod {
@@ -52,7 +51,7 @@ impl OnePeriod {
         let of = |record: &[f64]| {
             let problem = ProblemSpecification { history: record.to_vec(), ..self.problem().clone() };
             let specification = Specification { problem, ..self.advisor.specification().clone() };
-            let law = EmpiricalDistribution::new(record);
+            let law = self.problem().learning.law(record);
             let state = State { law, ..state };
             OnePeriod::new(&specification, self.kept.clone()).advisor.advise(0, &state, AdviceMode::Resolve).allocation
         };

@@ -4,10 +4,11 @@ use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::specification::{Interval, MixtureComponent, ProblemSpecification, SamplingLaw};
 use crate::numerics::law::ContinuousLaw;
 
-/// The law behind a specification's name for it.
-pub fn continuous_law(law: &SamplingLaw, history: &[f64]) -> ContinuousLaw {
+/// The law behind a problem's name for it.
+pub fn continuous_law(law: &SamplingLaw, problem: &ProblemSpecification) -> ContinuousLaw {
+    let ProblemSpecification { history, learning, .. } = problem;
     match law {
-        SamplingLaw::Bootstrap {} => ContinuousLaw::smoothed_bootstrap(history),
+        SamplingLaw::Bootstrap {} => ContinuousLaw::smoothed_bootstrap(history, &learning.weights(history.len())),
         SamplingLaw::StudentT { location, scale, degrees_of_freedom } => {
             let (location, scale, degrees_of_freedom) = (*location, *scale, *degrees_of_freedom);
             ContinuousLaw::StudentT { location, scale, degrees_of_freedom }

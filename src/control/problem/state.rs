@@ -2,6 +2,7 @@
 
 use crate::control::error::FieldError;
 use crate::control::problem::dynamics::Dynamics;
+use crate::control::request::learning::Learning;
 use crate::control::request::rules;
 use crate::numerics::empirical::EmpiricalDistribution;
 
@@ -37,14 +38,14 @@ pub struct State {
 }
 
 impl State {
-    /// The state of an investor with `wealth`, all of it in the bank, who has seen `history`.
+    /// The state of an investor with `wealth`, all of it in the bank, who has seen `history`, oldest first, and learns so.
     ///
     /// # Errors
     /// A history or a wealth that breaks its rule, under the names `history` and `wealth`.
-    pub fn new(history: &[f64], wealth: f64) -> Result<Self, FieldError> {
-        rules::history("history", history)?;
+    pub fn new(history: &[f64], wealth: f64, learning: Learning) -> Result<Self, FieldError> {
+        rules::history("history", history, learning)?;
         rules::wealth("wealth", wealth)?;
-        Ok(State { wealth, holding: 0.0, law: EmpiricalDistribution::new(history) })
+        Ok(State { wealth, holding: 0.0, law: learning.law(history) })
     }
 
     /// The same with the share `holding` of wealth in the risky asset.

@@ -1,12 +1,17 @@
 //! What may be asked: the requests, their defaults, and every rule they must keep. No mathematics.
 
 pub mod annualised;
+pub mod backtest;
 pub mod completion;
 pub mod contributions;
+pub mod dates;
 pub mod evaluation;
 pub mod framework;
+pub mod frequency;
+pub mod learning;
 pub mod radius_rule;
 pub mod rules;
 pub mod specification;
+pub mod terms;
 pub mod warnings;
 pub mod withdrawals;

@@ -3,6 +3,7 @@
 use crate::control::error::FieldError;
 use crate::control::request::contributions::Contributions;
 use crate::control::request::framework::Framework;
+use crate::control::request::learning::Learning;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{
     InitialLaws, Interval, ProblemSpecification, SamplingLaw, Specification, SurrogateSpecification,
@@ -67,8 +68,8 @@ pub fn check(specification: &Specification) -> Result<(), FieldError> {
 fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
     whole("problem.horizon", problem.horizon, &HORIZON)?;
     within("problem.rate_per_step", problem.rate_per_step, RATE.0, RATE.1)?;
-    let (fewest, most) = PERIODS_PER_YEAR;
-    problem.periods_per_year.map_or(Ok(()), |count| within("problem.periods_per_year", count, fewest, most))?;
+    let (least, most) = PERIODS_PER_YEAR;
+    problem.periods_per_year.map_or(Ok(()), |count| within("problem.periods_per_year", count, least, most))?;
     wealth("problem.initial_wealth", problem.initial_wealth)?;
     let [lowest, highest] = problem.action_interval;
     if lowest != 0.0 {
@@ -86,6 +87,7 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
     }
     contributions(problem)?;
     utility(problem)?;
+    problem.learning.check()?;
     radius(&problem.radius_rule(), problem)?;
     if let Some(support) = problem.support {
         if problem.framework.is_parametric() {
@@ -105,7 +107,7 @@ fn problem(problem: &ProblemSpecification) -> Result<(), FieldError> {
         (Some(law), _) => sampling_law("problem.law", law)?,
         (None, _) => {}
     }
-    history("problem.history", &problem.history)?;
+    history("problem.history", &problem.history, problem.learning)?;
     if let (Some(support), Some((index, value))) = (problem.support, outside(&problem.history, problem.support)) {
         let rule = format!("must lie in problem.support, [{}, {}]", support.min, support.max);
         return Err(FieldError::new(format!("problem.history[{index}]"), value, rule));
@@ -213,8 +215,8 @@ fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), Field
     }
 }
 
-/// Checks a history of log-returns, named `field` in messages.
-pub fn history(field: &str, values: &[f64]) -> Result<(), FieldError> {
+/// Checks a history of log-returns, oldest first, of which the law is learned so; named `field` in messages.
+pub fn history(field: &str, values: &[f64], learning: Learning) -> Result<(), FieldError> {
     if !HISTORY_LENGTH.contains(&values.len()) {
         let rule = format!("must hold {} to {} log-returns", HISTORY_LENGTH.start(), HISTORY_LENGTH.end());
         return Err(FieldError::new(field, format!("{} values", values.len()), rule));
@@ -222,11 +224,9 @@ pub fn history(field: &str, values: &[f64]) -> Result<(), FieldError> {
     for (index, &value) in values.iter().enumerate() {
         log_return(&format!("{field}[{index}]"), value)?;
     }
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    let variance = values.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / values.len() as f64;
-    if variance.sqrt() < SMALLEST_DEVIATION {
-        let rule = format!("must vary: its standard deviation must be at least {SMALLEST_DEVIATION:e}");
-        return Err(FieldError::new(field, format!("{} values near {mean}", values.len()), rule));
+    if learning.deviation(values) < SMALLEST_DEVIATION {
+        let rule = format!("must vary: as learned, its standard deviation must be at least {SMALLEST_DEVIATION:e}");
+        return Err(FieldError::new(field, format!("{} values near {}", values.len(), values[0]), rule));
     }
     Ok(())
 }

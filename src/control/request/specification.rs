@@ -8,6 +8,7 @@ use utoipa::ToSchema;
 
 use crate::control::request::contributions::Contributions;
 use crate::control::request::framework::Framework;
+use crate::control::request::learning::Learning;
 use crate::control::request::radius_rule::RadiusRule;
 
 /// A whole training job: the problem, the design that samples its states, the surrogates, one seed.
@@ -69,6 +70,9 @@ pub struct ProblemSpecification {
     /// Of terminal wealth.
     #[serde(default)]
     pub utility: UtilitySpecification,
+    /// What older returns weigh in the law that is learned.
+    #[serde(default)]
+    pub learning: Learning,
     /// Default: `bridge`; `chi_square` in the parametric frameworks, which take no other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radius: Option<RadiusRule>,
@@ -154,6 +158,7 @@ impl ProblemSpecification {
             trading_cost: 0.0,
             contributions: Contributions::default(),
             utility: UtilitySpecification::default(),
+            learning: Learning::default(),
             radius: None,
             support: None,
             law: None,
@@ -191,7 +196,7 @@ pub enum SamplingLaw {
         /// At least one; their weights sum to 1.
         components: Vec<MixtureComponent>,
     },
-    /// Smoothed bootstrap of the history, with the history's own mean and variance.
+    /// Smoothed bootstrap of the history, each return with its weight, with the mean and variance that gives.
     Bootstrap {},
     /// A Student t law, moved and stretched.
     StudentT {

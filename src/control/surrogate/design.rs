@@ -58,7 +58,7 @@ impl Design {
         let resampled = learns && design.initial_laws == InitialLaws::Resampled;
         let wealth_matters = problem.depends_on_wealth();
         Design {
-            law: continuous_law(design.sampling_law.as_ref().unwrap_or(&bootstrap), &problem.history),
+            law: continuous_law(design.sampling_law.as_ref().unwrap_or(&bootstrap), problem),
             seed: specification.seed,
             count,
             start,
@@ -99,7 +99,7 @@ impl Design {
     pub fn state(&self, step: usize, index: usize) -> State {
         let problem = &self.problem;
         if let Some(wealths) = self.ladder.get(index) {
-            return self.holding_half(wealths[step], EmpiricalDistribution::new(&problem.history));
+            return self.holding_half(wealths[step], problem.learning.law(&problem.history));
         }
         let mut generator = stream(self.seed, "initial", 0, index);
         let mut wealth = self.start.min * (self.start.max / self.start.min).powf(generator.random::<f64>());
@@ -115,7 +115,7 @@ impl Design {
             (wealth, holding) = dynamics.next(wealth, holding, action, log_return);
             sample.push(log_return);
         }
-        self.holding_half(wealth.max(self.periods[step].least_wealth()), EmpiricalDistribution::new(&sample))
+        self.holding_half(wealth.max(self.periods[step].least_wealth()), problem.learning.law(&sample))
     }
 
     /// The band and the value are found for every holding from any one, best from one in the middle.
@@ -131,7 +131,7 @@ fn wealth_ladders(problem: &ProblemSpecification, start: Interval, count: usize)
     let centre = Centre::frozen(problem);
     let (mean, mut variance) = (centre.mean(), centre.variance());
     if let RadiusRule::ChiSquare { alpha } = problem.radius_rule() {
-        let radius = confidence_region::radius(alpha, problem.history.len());
+        let radius = confidence_region::radius(alpha, problem.learning.effective_size(problem.history.len()));
         variance = ConfidenceRegion { estimate: NormalLaw { mean, variance }, radius }.largest_variance();
     }
     let periods = Dynamics::of(problem);

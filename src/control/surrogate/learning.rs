@@ -16,13 +16,16 @@ use crate::control::request::specification::Specification;
 use crate::control::solved_step::{StepDiagnostics, StepSolution};
 use crate::numerics::farthest::farthest_points;
 
+/// States whose features are found together: what they have in common is read from memory once, and their sums stay in the
+/// first-level cache.
+pub const FEATURES_AT_A_TIME: usize = 16;
 /// Progress is reported about this often a step.
 const REPORTS_PER_STEP: usize = 100;
 
 /// States of a step that surrogates may learn from, by number.
 pub trait Candidates: Sync {
-    /// What the surrogates see of a state, unscaled.
-    fn features(&self, index: usize) -> Features;
+    /// What the surrogates see of some states, unscaled.
+    fn features(&self, some: Range<usize>) -> Vec<Features>;
 
     /// The robust step there.
     ///
@@ -89,8 +92,13 @@ impl Learning<'_> {
     }
 
     fn features(&self, states: &impl Candidates, some: Range<usize>) -> Result<Vec<Features>, TrainError> {
-        let features = |index| self.watch.go_on().map(|()| states.features(index));
-        some.into_par_iter().map(features).collect()
+        let parts: Vec<usize> = some.clone().step_by(FEATURES_AT_A_TIME).collect();
+        let features = |start: usize| {
+            self.watch.go_on()?;
+            Ok(states.features(start..some.end.min(start + FEATURES_AT_A_TIME)))
+        };
+        let found: Result<Vec<Vec<Features>>, TrainError> = parts.into_par_iter().map(features).collect();
+        Ok(found?.concat())
     }
 
     /// Solves the robust step at the states named, after those solved before. `features` are those of all candidates.

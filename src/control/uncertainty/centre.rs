@@ -5,6 +5,9 @@ use crate::control::request::framework::Framework;
 use crate::control::request::specification::{ProblemSpecification, SamplingLaw};
 use crate::numerics::empirical::EmpiricalDistribution;
 
+/// Less than this of a law is lost in rounding; what decayed to it is left out.
+const NO_MASS: f64 = 1e-18;
+
 /// A discrete law of log-returns: ascending distinct atoms, and their masses, which sum to 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Centre {
@@ -15,10 +18,11 @@ pub struct Centre {
 }
 
 impl Centre {
-    /// The empirical law, each distinct value with its share of the sample.
+    /// The empirical law, each distinct value with its mass.
     pub fn empirical(law: &EmpiricalDistribution) -> Self {
-        let mass = 1.0 / law.sample_size() as f64;
-        Centre::gathered(law.atoms().iter().map(|&atom| (atom, mass)))
+        let weighted = law.atoms().iter().zip(law.weights());
+        let masses = weighted.map(|(&atom, weight)| (atom, weight / law.total_weight()));
+        Centre::gathered(masses.filter(|(_, mass)| *mass > NO_MASS))
     }
 
     /// Where nothing is learned: the known law by its quadrature, or the empirical law of the history. What of a known law
@@ -27,10 +31,10 @@ impl Centre {
     pub fn frozen(problem: &ProblemSpecification) -> Self {
         if problem.framework == Framework::KnownLaw {
             let law = problem.law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
-            let (atoms, masses) = continuous_law(law, &problem.history).quadrature();
+            let (atoms, masses) = continuous_law(law, problem).quadrature();
             return Centre::gathered(atoms.into_iter().map(|atom| admissible(atom, problem)).zip(masses));
         }
-        Centre::empirical(&EmpiricalDistribution::new(&problem.history))
+        Centre::empirical(&problem.learning.law(&problem.history))
     }
 
     /// The masses of equal neighbours added up.

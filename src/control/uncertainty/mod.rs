@@ -5,6 +5,7 @@
 //! or, where returns are taken as normal, the joint confidence region of mean and variance.
 
 pub mod centre;
+pub mod measured;
 pub mod radius;
 
 use self::centre::Centre;

@@ -12,6 +12,10 @@ use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
 use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
 
+/// Where the oldest return of the last law weighs at least this share of the newest, weights are taken to decay no more than
+/// rounding does: times lie within 1/8000 of i/n, and |B| is read off the bridges of n.
+const ALL_BUT_EQUAL: f64 = 0.999;
+
 /// The radius rule of a specification, with its common random numbers.
 pub struct RadiusEstimator {
     /// That of the specification; a radius of 0 where the framework has no uncertainty (known law, plug-in).
@@ -19,6 +23,8 @@ pub struct RadiusEstimator {
     seed: u64,
     /// Sample size at the last step.
     last_size: usize,
+    /// Whether weights decay, more than a little.
+    decays: bool,
     /// Where the common random numbers are kept.
     kept: Kept,
 }
@@ -49,8 +55,9 @@ impl RadiusEstimator {
             _ => specification.problem.radius_rule(),
         };
         let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
-        let seed = specification.seed;
-        RadiusEstimator { rule, seed, last_size, kept }
+        let learning = specification.problem.learning;
+        let decays = learning.retention().powf(last_size as f64) < ALL_BUT_EQUAL;
+        RadiusEstimator { rule, seed: specification.seed, last_size, decays, kept }
     }
 
     /// True where laws of one sample size have different radii.
@@ -58,18 +65,24 @@ impl RadiusEstimator {
         matches!(self.rule, RadiusRule::Bridge { scale, .. } if scale > 0.0)
     }
 
-    /// The name of the bridges of sample size n; all large ones share those of [`GRADED_FROM`].
-    fn key(&self, sample_size: usize, paths: usize) -> Key {
-        Key::Bridges { sample_size: sample_size.min(GRADED_FROM), paths, seed: self.seed }
+    /// The sample size whose bridges serve laws of n returns: all large ones share those of [`GRADED_FROM`], and so do all whose
+    /// weights decay.
+    fn bridged(&self, sample_size: usize) -> usize {
+        if self.decays { GRADED_FROM } else { sample_size.min(GRADED_FROM) }
     }
 
-    /// The bridges of sample size n.
+    /// The name of those bridges.
+    fn key(&self, sample_size: usize, paths: usize) -> Key {
+        Key::Bridges { sample_size: self.bridged(sample_size), paths, seed: self.seed }
+    }
+
+    /// Those bridges.
     fn bridges(&self, sample_size: usize, paths: usize) -> Arc<AbsoluteBridges> {
-        let simulate = || match sample_size {
-            ..GRADED_FROM => AbsoluteBridges::simulate(sample_size, paths, self.seed),
+        let simulate = || match self.bridged(sample_size) {
+            size @ ..GRADED_FROM => AbsoluteBridges::simulate(size, paths, self.seed),
             _ => AbsoluteBridges::graded(paths, self.seed),
         };
-        let bytes = AbsoluteBridges::bytes_of(sample_size, paths);
+        let bytes = AbsoluteBridges::bytes_of(self.bridged(sample_size), paths);
         self.kept.get_or_make(&self.key(sample_size, paths), bytes, simulate)
     }
 
@@ -78,15 +91,21 @@ impl RadiusEstimator {
         match self.rule {
             RadiusRule::Bridge { paths, .. } => {
                 let largest_of_its_own = sample_size.max(GRADED_FROM - 1);
-                AbsoluteBridges::bytes_of((sample_size + steps).min(largest_of_its_own), paths)
+                AbsoluteBridges::bytes_of(self.bridged((sample_size + steps).min(largest_of_its_own)), paths)
             }
             _ => 0,
         }
     }
 
-    /// What measuring laws of `sample_size` reads: its bridges, and those of the next where a step comes after.
+    /// Whether laws of this size are told what their radius tends to be one return later. Of laws that decay all are, since no size
+    /// is the last of a session that goes on by the first step.
+    fn looks_ahead(&self, sample_size: usize) -> bool {
+        self.decays || sample_size < self.last_size
+    }
+
+    /// What measuring laws of `sample_size` reads: its bridges, and those of the next where it looks ahead.
     fn sizes(&self, sample_size: usize) -> impl Iterator<Item = usize> {
-        [sample_size, sample_size + 1].into_iter().take(if sample_size < self.last_size { 2 } else { 1 })
+        [sample_size, sample_size + 1].into_iter().take(if self.looks_ahead(sample_size) { 2 } else { 1 })
     }
 
     /// Numbers read to measure a law of this size, or `None` where its bridges are yet to be simulated.
@@ -94,7 +113,7 @@ impl RadiusEstimator {
         match self.rule {
             RadiusRule::Bridge { paths, .. } => {
                 let ready = |size: usize| self.kept.has(&self.key(size, paths));
-                self.sizes(sample_size).all(ready).then_some(2 * sample_size.min(GRADED_FROM) * paths)
+                self.sizes(sample_size).all(ready).then_some(2 * self.bridged(sample_size) * paths)
             }
             _ => Some(sample_size),
         }
@@ -109,22 +128,21 @@ impl RadiusEstimator {
 
     /// Radius of the ball around `law`, in log-return; of the confidence region, in standard deviations of `law`.
     pub fn radius(&self, law: &EmpiricalDistribution) -> f64 {
-        let size = law.sample_size();
         match self.rule {
             RadiusRule::Bridge { alpha, paths, scale } => {
-                let bridges = self.bridges(size, paths);
-                radius(scale, bridges.bridge_quantile(law, Statistic::Now, alpha), size)
+                let bridges = self.bridges(law.sample_size(), paths);
+                radius(scale, bridges.bridge_quantile(law, Statistic::Now, alpha), law.effective_size())
             }
-            _ => self.radius_of_size(size),
+            _ => self.radius_of_size(law.effective_size()),
         }
     }
 
     /// The radius of `law` and what it is made of.
     pub fn measure(&self, law: &EmpiricalDistribution) -> Measure {
-        let size = law.sample_size();
+        let size = law.effective_size();
         match self.rule {
             RadiusRule::Bridge { alpha, paths, scale } => {
-                let quantile = self.bridges(size, paths).bridge_quantile_with_error(law, alpha);
+                let quantile = self.bridges(law.sample_size(), paths).bridge_quantile_with_error(law, alpha);
                 Measure { radius: radius(scale, quantile.value, size), quantile: Some(quantile) }
             }
             _ => Measure { radius: self.radius_of_size(size), quantile: None },
@@ -135,51 +153,85 @@ impl RadiusEstimator {
     pub fn radii(&self, law: &EmpiricalDistribution, known: f64) -> Radii {
         let size = law.sample_size();
         let radius_ahead = match self.rule {
-            RadiusRule::Bridge { .. } if size >= self.last_size => known,
+            RadiusRule::Bridge { .. } if !self.looks_ahead(size) => known,
             RadiusRule::Bridge { alpha, paths, scale } => {
                 let bridges = self.bridges(size + 1, paths);
-                radius(scale, bridges.bridge_quantile(law, Statistic::OneLater, alpha), size + 1)
+                radius(scale, bridges.bridge_quantile(law, Statistic::OneLater, alpha), law.effective_sizes_ahead()[0])
             }
-            _ => self.radius_of_size(size),
+            _ => self.radius_of_size(law.effective_size()),
         };
         Radii { radius: known, radius_ahead }
+    }
+
+    /// The radii of laws of one size, each at every one of `alphas` in the place of the rule's own, as [`Self::radius`] and
+    /// [`Self::radii`] give them one by one, bit for bit.
+    ///
+    /// Checked by: `laws_measured_together_are_measured_as_one_by_one`.
+    pub fn radii_of(&self, laws: &[&EmpiricalDistribution], alphas: &[f64]) -> Vec<Vec<Radii>> {
+        let Some(first) = laws.first() else { return Vec::new() };
+        let (size, effective_size) = (first.sample_size(), first.effective_size());
+        let RadiusRule::Bridge { paths, scale, .. } = self.rule else {
+            let radius = self.radius_of_size(effective_size);
+            return vec![vec![Radii { radius, radius_ahead: radius }; alphas.len()]; laws.len()];
+        };
+        let quantiles = |which, size| self.bridges(size, paths).bridge_quantiles(laws, which, alphas);
+        let now = quantiles(Statistic::Now, size);
+        let ahead = self.looks_ahead(size).then(|| quantiles(Statistic::OneLater, size + 1));
+        let effective_size_ahead = first.effective_sizes_ahead()[0];
+        let of_law = |(index, now): (usize, Vec<f64>)| {
+            let of_level = |(level, now): (usize, f64)| {
+                let known = radius(scale, now, effective_size);
+                let later = ahead.as_ref().map(|ahead| radius(scale, ahead[index][level], effective_size_ahead));
+                Radii { radius: known, radius_ahead: later.unwrap_or(known) }
+            };
+            now.into_iter().enumerate().map(of_level).collect()
+        };
+        now.into_iter().enumerate().map(of_law).collect()
+    }
+
+    /// The miscoverage of the rule, where laws of one size have different radii by it.
+    pub fn alpha(&self) -> Option<f64> {
+        self.rule.alpha().filter(|_| self.varies())
     }
 
     /// The same for `law` with one more value, for every value in ascending `values`.
     pub fn radii_with(&self, law: &EmpiricalDistribution, values: &[f64]) -> Vec<Radii> {
         let size = law.sample_size() + 1;
+        let [next_size, size_after] = law.effective_sizes_ahead();
         match self.rule {
             RadiusRule::Bridge { alpha, paths, scale } => {
-                let quantiles = |which, size| {
-                    let found = self.bridges(size, paths).bridge_quantiles_with(law.atoms(), values, which, alpha);
-                    found.into_iter().map(|quantile| radius(scale, quantile, size)).collect::<Vec<f64>>()
+                let quantiles = |which, size, effective_size| {
+                    let found = self.bridges(size, paths).bridge_quantiles_with(law, values, which, alpha);
+                    found.into_iter().map(|quantile| radius(scale, quantile, effective_size)).collect::<Vec<f64>>()
                 };
-                let now = quantiles(Statistic::Now, size);
-                let later = if size < self.last_size { quantiles(Statistic::OneLater, size + 1) } else { now.clone() };
+                let now = quantiles(Statistic::Now, size, next_size);
+                let later = match self.looks_ahead(size) {
+                    true => quantiles(Statistic::OneLater, size + 1, size_after),
+                    false => now.clone(),
+                };
                 now.into_iter().zip(later).map(|(radius, radius_ahead)| Radii { radius, radius_ahead }).collect()
             }
             _ => {
-                let radius = self.radius_of_size(size);
+                let radius = self.radius_of_size(next_size);
                 vec![Radii { radius, radius_ahead: radius }; values.len()]
             }
         }
     }
 
-    /// The radius under the rules that look at the sample size alone.
-    fn radius_of_size(&self, sample_size: usize) -> f64 {
-        let size = sample_size as f64;
+    /// The radius under the rules that look at the effective sample size alone.
+    fn radius_of_size(&self, size: f64) -> f64 {
         match self.rule {
             RadiusRule::Bridge { .. } => 0.0,
             RadiusRule::Concentration { alpha, numerator, rate } => ((numerator / alpha).ln() / (rate * size)).sqrt(),
             RadiusRule::RootN { kappa } => kappa / size.sqrt(),
             RadiusRule::Fixed { radius } => radius,
-            RadiusRule::ChiSquare { alpha } => confidence_region::radius(alpha, sample_size),
+            RadiusRule::ChiSquare { alpha } => confidence_region::radius(alpha, size),
         }
     }
 }
 
-fn radius(scale: f64, quantile: f64, sample_size: usize) -> f64 {
-    scale * quantile / (sample_size as f64).sqrt()
+fn radius(scale: f64, quantile: f64, effective_size: f64) -> f64 {
+    scale * quantile / effective_size.sqrt()
 }
 
 #[cfg(test)]
@@ -212,6 +264,22 @@ mod tests {
         for (framework, rule, expected) in rules {
             let found = radius_of(framework, rule.clone());
             assert!((found - expected).abs() < 1e-7, "{framework} {rule}: {found}");
+        }
+    }
+
+    #[test]
+    fn laws_measured_together_are_measured_as_one_by_one() {
+        let laws =
+            [[0.02, -0.01, 0.04, 0.01], [0.03, -0.05, 0.0, 0.01]].map(|sample| EmpiricalDistribution::new(&sample));
+        let at = |alpha: f64| json!({ "rule": "bridge", "alpha": alpha, "paths": 300, "scale": 1.0 });
+        let alphas = [0.1, 0.5];
+        let together = estimator("adaptive", at(0.3)).radii_of(&laws.each_ref(), &alphas);
+        for (law, found) in laws.iter().zip(together) {
+            let one_by_one = alphas.map(|alpha| {
+                let sets = estimator("adaptive", at(alpha));
+                sets.radii(law, sets.radius(law))
+            });
+            assert_eq!(found, one_by_one);
         }
     }
 

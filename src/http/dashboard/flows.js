@@ -6,6 +6,10 @@ import { wealth } from "./format.js";
 const added = ({ contributions }, period) =>
   Array.isArray(contributions) ? contributions[period - 1] : contributions;
 
+/** The terms of a period of a session, and the first period by them. */
+const termsOf = ({ terms, renewals }, period) =>
+  renewals.findLast((renewal) => renewal.period <= period) ?? { terms, period: 1 };
+
 /** True where nothing is ever added or withdrawn. */
 const none = ({ contributions }) => [contributions].flat().every((amount) => amount === 0);
 
@@ -13,14 +17,18 @@ const none = ({ contributions }) => [contributions].flat().every((amount) => amo
 export const standing = (observation) => observation?.now?.reported ?? observation?.reported ?? {};
 
 /** What was added at the end of a period as it is reported, and what would be of one that is not. */
-const addedIn = (problem, observations, period) => standing(observations[period - 1]).flow ?? added(problem, period);
+function addedIn(history, period) {
+  const { terms, period: first } = termsOf(history, period);
+  return standing(history.observations[period - 1]).flow ?? added(terms, period - first + 1);
+}
 
-/** Wealth in the bank alone, at the start and after each period; of those observed as they were reported. */
-export function banked(problem, start, observations) {
-  const held = [start];
-  for (let period = 1; period <= problem.horizon; period++) {
-    const rate = standing(observations[period - 1]).rate ?? problem.rate_per_step;
-    held.push(held[period - 1] * (1 + rate) + addedIn(problem, observations, period));
+/** Wealth of selling everything at the start and staying in the bank, after each period up to `horizon`; of those observed as
+ * they were reported. */
+export function banked(history, horizon) {
+  const held = [history.initial_wealth * (1 - history.terms.trading_cost * history.initial_holding)];
+  for (let period = 1; period <= horizon; period++) {
+    const rate = standing(history.observations[period - 1]).rate ?? termsOf(history, period).terms.rate_per_step;
+    held.push(held[period - 1] * (1 + rate) + addedIn(history, period));
   }
   return held;
 }
@@ -55,5 +63,5 @@ export function inWords(problem) {
 }
 
 /** What was added and withdrawn in the periods observed, in all. */
-export const netAdded = (problem, observations) =>
-  observations.reduce((net, _, index) => net + addedIn(problem, observations, index + 1), 0);
+export const netAdded = (history) =>
+  history.observations.reduce((net, _, index) => net + addedIn(history, index + 1), 0);

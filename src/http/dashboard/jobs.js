@@ -1,6 +1,6 @@
 // Jobs: what is being computed, how far it is, and how to stop it.
 
-import { follow, get, isOver, post, Problem } from "./api.js";
+import { download, follow, get, isOver, post, Problem } from "./api.js";
 import { announce, h } from "./dom.js";
 import { count, duration, moment, short } from "./format.js";
 import { foot, Pages } from "./pages.js";
@@ -10,7 +10,7 @@ const FOLLOWED = 2;
 /** Jobs that are not followed are asked for this often, in milliseconds. */
 const POLL = 1000;
 
-const WORDS = { train: "Training", evaluate: "Evaluation", walk_forward: "Walk-forward" };
+const WORDS = { train: "Training", evaluate: "Evaluation", backtest: "Walk-forward" };
 const named = (kind) => WORDS[kind] ?? kind.replace(/_/g, " ");
 
 export async function view(_, leaving) {
@@ -121,12 +121,13 @@ function summary({ state, progress, error, kind }) {
     return kind === "train"
       ? `${progress.steps_total} steps solved, last to first.`
       : `${progress.steps_total} steps done.`;
+  const left = progress.seconds_left === null ? "" : `, ${duration(progress.seconds_left)} left`;
+  if (kind === "backtest") return `Trains policies and lives by them${left}`;
   const at =
     progress.step === null || progress.phase === null ? "Starting" : `Step ${progress.step}, ${progress.phase}`;
   const points = progress.points_total
     ? `: ${count(progress.points_done)} of ${count(progress.points_total)} points`
     : "";
-  const left = progress.seconds_left === null ? "" : `, ${duration(progress.seconds_left)} left`;
   return `${at}${points}${left}`;
 }
 
@@ -156,6 +157,10 @@ function times({ created_ms, started_ms, finished_ms }) {
 function links(card) {
   const { job } = card;
   if (job.policy) return h("a", { class: "button quiet", href: `#/policies/${job.policy}` }, "See the policy");
+  if (job.state === "succeeded" && job.kind === "backtest") {
+    const name = `walk-forward-${short(job.job)}.json`;
+    return h("a", { class: "button quiet", href: job.report, download: name, onclick: download }, "Export the report");
+  }
   if (job.state === "succeeded")
     return h("a", { class: "button quiet", href: `#/evaluations/${job.job}` }, "See the report");
   if (isOver(job)) return null;

@@ -1,25 +1,41 @@
-// Laws of one shape: a sample of returns moved to any mean and stretched to any standard deviation.
+// Laws of one shape: a weighted sample of returns moved to any mean and stretched to any standard deviation.
 //
 // A shape moved and stretched keeps the order of its atoms and its standardised moments, so both are found once, however
 // many laws are drawn from it; what is left for a law is a search and, for a new standard deviation, one pass.
 
-/** Atoms of mean 0 and variance 1, largest first, with what all laws of this shape have in common. */
+/** What of a return's weight is left one return later. */
+export const retention = (learning) => (learning.kind === "decay" ? 0.5 ** (1 / learning.half_life) : 1);
+
+/** How many returns of equal weight tell as much as so many. */
+export function effectiveSize(learning, count) {
+  if (learning.kind !== "decay") return count;
+  const half = Math.LN2 / (2 * learning.half_life);
+  return Math.tanh(count * half) / Math.tanh(half);
+}
+
+/** Atoms of mean 0 and variance 1, largest first, with what all laws of this shape have in common. Of returns, the oldest first. */
 export class Shape {
-  constructor(atoms) {
-    const n = atoms.length;
-    this.mean = atoms.reduce((sum, atom) => sum + atom, 0) / n;
-    this.deviation = Math.sqrt(atoms.reduce((sum, atom) => sum + (atom - this.mean) ** 2, 0) / n);
-    this.atoms = Float64Array.from(atoms, (atom) => (atom - this.mean) / (this.deviation || 1))
-      .sort()
-      .reverse();
-    this.sums = cumulated(this.atoms);
+  constructor(returns, kept = 1) {
+    const weighted = returns.map((atom, index) => ({ atom, weight: kept ** (returns.length - 1 - index) }));
+    const total = weighted.reduce((sum, { weight }) => sum + weight, 0);
+    const average = (of) => weighted.reduce((sum, { atom, weight }) => sum + weight * of(atom), 0) / total;
+    this.mean = average((atom) => atom);
+    this.deviation = Math.sqrt(average((atom) => (atom - this.mean) ** 2));
+    weighted.sort((left, right) => right.atom - left.atom);
+    this.atoms = Float64Array.from(weighted, ({ atom }) => (atom - this.mean) / (this.deviation || 1));
+    this.masses = Float64Array.from(weighted, ({ weight }) => weight / total);
+    this.above = cumulated(this.masses);
+    this.sums = cumulated(this.atoms, this.masses);
     this.known = new Map();
   }
 
   /** The mean of the powers of the standardised atoms. */
   moment(order) {
     if (!this.known.has(order)) {
-      this.known.set(order, this.atoms.reduce((sum, atom) => sum + atom ** order, 0) / this.atoms.length);
+      this.known.set(
+        order,
+        this.atoms.reduce((sum, atom, index) => sum + this.masses[index] * atom ** order, 0),
+      );
     }
     return this.known.get(order);
   }
@@ -36,14 +52,18 @@ class Stretched {
   constructor(shape, deviation) {
     this.deviation = deviation;
     const growths = shape.atoms.map((atom) => Math.exp(deviation * atom)).reverse();
-    this.sums = cumulated(growths);
-    this.squares = cumulated(growths.map((growth) => growth * growth));
+    const masses = shape.masses.toReversed();
+    this.sums = cumulated(growths, masses);
+    this.squares = cumulated(
+      growths.map((growth) => growth * growth),
+      masses,
+    );
   }
 }
 
-function cumulated(values) {
+function cumulated(values, masses) {
   const sums = new Float64Array(values.length + 1);
-  for (let k = 0; k < values.length; k++) sums[k + 1] = sums[k] + values[k];
+  for (let k = 0; k < values.length; k++) sums[k + 1] = sums[k] + values[k] * (masses?.[k] ?? 1);
   return sums;
 }
 
@@ -74,21 +94,22 @@ class Law {
   worst(radius, rate) {
     const n = this.shape.atoms.length;
     const used = this.moved(radius);
-    const cut = this.mean + (this.deviation * this.shape.sums[used] - n * radius) / used;
+    const mass = this.shape.above[used];
+    const cut = this.mean + (this.deviation * this.shape.sums[used] - radius) / mass;
     const [growth, moved] = [Math.exp(this.mean) / (1 + rate), Math.exp(cut) / (1 + rate)];
-    const mean = (growth * this.stretched.sums[n - used] + used * moved) / n;
-    const square = (growth * growth * this.stretched.squares[n - used] + used * moved * moved) / n;
+    const mean = growth * this.stretched.sums[n - used] + mass * moved;
+    const square = growth * growth * this.stretched.squares[n - used] + mass * moved * moved;
     return { mean, variance: Math.max(0, square - mean * mean) };
   }
 
   /** How many of the largest atoms the cut takes: the fewest whose average, lowered by the radius, is not below the next. */
   moved(radius) {
-    const { atoms, sums } = this.shape;
+    const { atoms, above, sums } = this.shape;
     const n = atoms.length;
     let [low, high] = [1, n];
     while (low < high) {
       const used = (low + high) >> 1;
-      const enough = this.deviation * sums[used] - n * radius >= used * this.deviation * atoms[used];
+      const enough = this.deviation * sums[used] - radius >= above[used] * this.deviation * atoms[used];
       if (enough) high = used;
       else low = used + 1;
     }

@@ -75,6 +75,7 @@ async function fill(holder, shown) {
   holder.replaceChildren(
     numbers,
     changed(shown),
+    due(shown),
     h("div", { class: "columns" }, h("div", {}, advice.element), sofar),
     sensitivity(shown),
     worstCase(shown, advice, settled),
@@ -83,8 +84,8 @@ async function fill(holder, shown) {
   );
 }
 
-function figures({ session, history, policy }, action) {
-  const put = netAdded(policy.specification.problem, history.observations);
+function figures({ session, history }, action) {
+  const put = netAdded(history);
   const change = (session.wealth - put) / history.initial_wealth - 1;
   const apart = put === 0 ? "" : `, ${put > 0 ? "beside" : "after"} ${wealth(Math.abs(put))} ${put > 0 ? "added" : "withdrawn"}`;
   return facts([
@@ -109,12 +110,8 @@ function changed({ session: { drift } }) {
   return h("p", { class: "note wrong" }, words);
 }
 
-/** Wealth of selling everything at the start, and staying in the bank. */
-const allBank = ({ initial_wealth, initial_holding, observations }, { specification: { problem } }) =>
-  banked(problem, initial_wealth * (1 - problem.trading_cost * initial_holding), observations);
-
-function completed({ session, history, policy }) {
-  const bank = allBank(history, policy).at(-1);
+function completed({ session, history }) {
+  const bank = banked(history, session.horizon).at(-1);
   return section(
     "Completed",
     h(
@@ -127,6 +124,19 @@ function completed({ session, history, policy }) {
   );
 }
 
+/** That the next policy is to come, and what keeps it. */
+function due({ session: { renewal } }) {
+  if (!renewal) return "";
+  const job = renewal.job ? h("a", { href: `#/jobs/${renewal.job}` }, "its training") : "its training";
+  const states = {
+    due: ["The next policy is about to be trained: ", job, "."],
+    training: ["The next policy is being trained: ", job, ". Until then this one goes on."],
+    trained: ["The next policy is trained, and about to be gone on by: ", job, "."],
+    failed: ["The next policy is not there: ", job, ` failed${renewal.error ? ` (${renewal.error})` : ""}. It is tried again by itself; until then this one goes on.`],
+  };
+  return h("p", { class: renewal.state === "failed" ? "note wrong" : "note" }, ...states[renewal.state]);
+}
+
 /** Wealth, allocation and radius through time. */
 function course({ session, history, policy }, action) {
   const { trading_cost } = policy.specification.problem;
@@ -137,7 +147,7 @@ function course({ session, history, policy }, action) {
   const stands = (period, name) => after(period, (row) => (row.now ?? row)[name]);
   const x = { values: periods, domain: [0, horizon], label: "After period", format: String, whole: true };
   const lived = periods.map((k) => (k === 0 ? initial_wealth : stands(k, "wealth")));
-  const bank = allBank(history, policy);
+  const bank = banked(history, horizon);
   const held = periods.map((k) => stands(k, "executed_allocation"));
   const told = (now, then) =>
     periods.map((k) => (action && k === action.period ? now(action) : after(k, then)));
@@ -254,6 +264,7 @@ function observed(shown) {
       rows,
     ),
     corrections(history),
+    renewals(history),
     disclosure("Put a period right", () => correctionForm(shown)),
   );
 }
@@ -263,6 +274,17 @@ function corrections({ corrections }) {
   if (corrections.length === 0) return "";
   const words = ({ period, reason, corrected_ms }) => `Period ${period} was put right on ${moment(corrected_ms)}: ${reason}`;
   return h("ul", { class: "corrections" }, [...corrections].reverse().map((made) => h("li", {}, words(made))));
+}
+
+/** The policies that followed the first, newest first. */
+function renewals({ renewals }) {
+  if (renewals.length === 0) return "";
+  const words = ({ period, policy, renewed_ms }) => [
+    `From period ${period} on by `,
+    h("a", { href: `#/policies/${policy}` }, `policy ${short(policy)}`),
+    `, since ${moment(renewed_ms)}`,
+  ];
+  return h("ul", { class: "renewals" }, [...renewals].reverse().map((made) => h("li", {}, ...words(made))));
 }
 
 function deletion(id) {

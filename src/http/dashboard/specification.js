@@ -83,9 +83,12 @@ export function inWords({ problem, design, surrogate, seed }, annualised) {
   const { mean, deviation } = moments(problem.history);
   const limit = problem.action_interval[1];
   const ball = hasBall(problem) ? ` The radius of the ball is ${radiusRule(problem.radius)}.` : "";
+  const { learning } = problem;
+  const forgets =
+    learning.kind === "decay" ? ` Returns weigh less the older they are: half after ${significant(learning.half_life)} of the periods.` : "";
   const laws = design.initial_laws === "resampled" ? "starting from resampled histories" : "starting from this history";
   return [
-    `${MEANINGS[problem.framework]}${ball}`,
+    `${MEANINGS[problem.framework]}${ball}${forgets}`,
     `${counted(problem.horizon, "decision")} with ${utility(problem.utility)}; the bank pays ${percent(problem.rate_per_step, 2)} a period${annualised ? ` (${percent(annualised.rate, 2)} a year)` : ""}, and up to ${percent(limit, 0)} of wealth may be at risk. It starts with ${wealth(problem.initial_wealth)}. ${trading(problem)} ${flows.inWords(problem)}`.trim(),
     `The history holds ${counted(problem.history.length, "log-return")}: mean ${percent(mean, 2)}, standard deviation ${percent(deviation, 2)} a period.${annualised ? ` By the year the asset returned ${percent(annualised.mean_return)} on average, with a standard deviation of ${percent(annualised.deviation)}.` : ""}`,
     `Each step was solved at ${counted(design.count, "state")} simulated under ${law(design.sampling_law)}, ${laws}; surrogates of the ${surrogate.target === "value" ? "value" : "gain over the floor"} on ${surrogate.features === "raw_moments" ? "raw" : "standardised"} features. Seed ${count(seed)}.`,

@@ -5,6 +5,7 @@
 // history's shape does not settle (skewness, kurtosis, the level of the rest) stays at the centre of the step's design.
 
 import { flowsAfter } from "./flows.js";
+import { effectiveSize } from "./laws.js";
 
 /** One named feature of a state `{wealth, law, radius, rate, riskAversion}`: total wealth, and the last relative. */
 export function feature(name, { wealth, law, radius, rate, riskAversion }) {
@@ -123,9 +124,9 @@ function centres(level, problem, step, own) {
   };
 }
 
-/** Radius where it follows from the sample size alone. */
-function ruledRadius({ framework, radius, history }, step) {
-  const n = history.length + step;
+/** Radius where it follows from the effective sample size alone. */
+function ruledRadius({ framework, learning, radius, history }, step) {
+  const n = effectiveSize(learning, history.length + step);
   if (framework === "plug_in" || framework === "known_law") return 0;
   switch (radius.rule) {
     case "fixed":

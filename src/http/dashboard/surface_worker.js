@@ -3,7 +3,7 @@
 // First message: `{address, headers}`, answered by `{ready}`. Each one after it is a wish for a picture, answered by
 // `{picture}`. A failure of either is `{failed}`, in words.
 
-import { Shape } from "./laws.js";
+import { Shape, retention } from "./laws.js";
 import { picture } from "./surface_picture.js";
 
 let policy;
@@ -17,7 +17,8 @@ async function load({ address, headers }) {
     throw new Error(problem.detail ?? `The service answered ${response.status}.`);
   }
   policy = await response.json();
-  shape = new Shape(policy.specification.problem.history);
+  const { history, learning } = policy.specification.problem;
+  shape = new Shape(history, retention(learning));
   return { ready: true };
 }
 

@@ -107,11 +107,15 @@ impl Database {
     {
         self.bounded(&self.work, doing, |connection| {
             async move {
-                // Rolls back where it is dropped before its commit.
                 let mut transaction = connection.begin().await.map_err(Failure::postgres)?;
-                let answer = work(Connection::Postgres(&mut transaction)).await?;
-                transaction.commit().await.map_err(Failure::postgres)?;
-                Ok(answer)
+                let answer = work(Connection::Postgres(&mut transaction)).await;
+                // Were it only dropped, what failed would keep its locks for a while after it is answered.
+                match answer {
+                    Ok(_) => transaction.commit().await,
+                    Err(_) => transaction.rollback().await,
+                }
+                .map_err(Failure::postgres)?;
+                answer
             }
             .boxed()
         })

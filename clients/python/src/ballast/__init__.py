@@ -44,7 +44,7 @@ from .errors import (
 )
 from .policy import Policy
 from .session import Session
-from .training import Evaluation, ProgressPrinter, Training
+from .training import Evaluation, ProgressPrinter, Training, WalkForward
 
 __all__ = [
     "Ballast",
@@ -79,5 +79,6 @@ __all__ = [
     "Unauthenticated",
     "Unreachable",
     "UnusualReturn",
+    "WalkForward",
     "wire",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import Any, cast
 from urllib.parse import quote
@@ -14,7 +14,7 @@ from . import wire
 from .policy import Policy
 from .returns import Kind, Returns, log_returns
 from .session import Session
-from .training import Evaluation, Training
+from .training import Evaluation, Training, WalkForward
 from .transport import Transport, idempotent
 
 
@@ -57,6 +57,7 @@ class Ballast:
         trading_cost: float | None = None,
         contributions: float | Sequence[float] | None = None,
         utility: wire.UtilitySpecification | None = None,
+        learning: wire.Learning | None = None,
         radius: wire.RadiusRule | None = None,
         support: wire.Interval | None = None,
         law: wire.SamplingLaw | None = None,
@@ -83,6 +84,7 @@ class Ballast:
             "trading_cost": trading_cost,
             "contributions": _amounts(contributions),
             "utility": utility,
+            "learning": learning,
             "radius": radius,
             "support": support,
             "law": law,
@@ -130,6 +132,57 @@ class Ballast:
     def evaluation(self, job: str) -> Evaluation:
         """An evaluation that was queued before."""
         return Evaluation(self._transport, self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
+
+    def backtest(
+        self,
+        returns: Returns,
+        *,
+        kind: Kind,
+        rate: float | Sequence[float],
+        dates: Iterable[object] | None = None,
+        periods_per_year: int | None = None,
+        window: int | None = None,
+        every: int | None = None,
+        horizon: int | None = None,
+        alpha: Sequence[float] | None = None,
+        risk_aversion: float | None = None,
+        trading_cost: float | None = None,
+        cost_blind: bool | None = None,
+        count: int | None = None,
+        seed: int | None = None,
+        idempotency_key: str | None = None,
+    ) -> WalkForward:
+        """Queues a walk-forward through a record of returns, as ``ballast backtest`` does, and does not wait for it.
+
+        ``returns`` and ``kind`` are as in ``train``; ``rate`` is what the bank paid, one fraction for all periods or
+        one for each. ``dates`` are texts or dates, one for each number, and tell how many periods make a year;
+        ``periods_per_year`` says so without them. What is left out the service chooses, and the report tells.
+        """
+        record = log_returns(returns, kind)
+        days = None if dates is None else [str(date)[:10] for date in dates]
+        rates = rate if isinstance(rate, (int, float)) else [float(paid) for paid in rate]
+        # The first price has no return.
+        first = 1 if kind == "price" else 0
+        request = {
+            "log_returns": record,
+            "rate": rates[first:] if first and isinstance(rates, list) else rates,
+            "dates": days if days is None else days[first:],
+            "periods_per_year": periods_per_year,
+            "window": window,
+            "every": every,
+            "horizon": horizon,
+            "alpha": None if alpha is None else list(alpha),
+            "risk_aversion": risk_aversion,
+            "trading_cost": trading_cost,
+            "cost_blind": cost_blind,
+            "count": count,
+            "seed": seed,
+        }
+        return WalkForward(self._transport, self._queued("/backtest", _given(request), idempotency_key))
+
+    def walk_forward(self, job: str) -> WalkForward:
+        """A walk-forward that was queued before."""
+        return WalkForward(self._transport, self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
 
     def policy(self, policy: str) -> Policy:
         """A policy by its name. Asks nothing of the service yet."""

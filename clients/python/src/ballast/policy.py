@@ -40,6 +40,7 @@ class Policy:
         kind: Kind = "log",
         wealth: float | None = None,
         holding: float | None = None,
+        renew: wire.Renewing | None = None,
         idempotency_key: str | None = None,
     ) -> Session:
         """Opens a session of an investor.
@@ -49,7 +50,7 @@ class Policy:
         same ``idempotency_key`` and arguments again, even from another process, give the same session, at its first
         period; ``Session.refresh`` tells how far it is.
         """
-        request: wire.OpenSession = {"policy": self.id, "wealth": wealth, "holding": holding}
+        request: wire.OpenSession = {"policy": self.id, "wealth": wealth, "holding": holding, "renew": renew}
         if history is not None:
             request["history"] = log_returns(history, kind)
         headers = idempotent(idempotency_key)

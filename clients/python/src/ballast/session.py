@@ -31,6 +31,8 @@ class Session:
         self.wealth = session["wealth"]
         #: Share of it in the risky asset, before trading.
         self.holding = session["holding"]
+        #: Policies that followed the first.
+        self.renewals = session["renewals"]
         #: Corrections made of what periods reported.
         self.corrections = session["corrections"]
         #: The answer to the last ``observe``: wealth, sample size, moments, quantile, radius.
@@ -105,6 +107,19 @@ class Session:
             self.period = corrected["observed"] + 1
         return corrected
 
+    def renew(self, policy: str, *, window: int | None = None, renewal: int | None = None) -> wire.Renewed:
+        """Goes on by another policy from the coming period, with the law of the last ``window`` returns seen, or of all.
+
+        Exactly once as :meth:`observe` is: ``renewal`` is the number after the last one made unless given.
+        """
+        number = self.renewals + 1 if renewal is None else renewal
+        body: wire.Renew = {"renewal": number, "policy": policy, "window": window}
+        renewed: wire.Renewed = self._transport.json("POST", f"{self._path}/renewals", body=body)
+        if number > self.renewals:
+            self.renewals, self.policy, self.horizon = number, renewed["policy"], renewed["horizon"]
+            self.period = renewed["period"]
+        return renewed
+
     def what_if(
         self,
         *,
@@ -139,8 +154,9 @@ class Session:
         return cast(wire.History, self._transport.json("GET", f"{self._path}/history"))
 
     def refresh(self) -> Session:
-        """Reads the period, the wealth, the holding and the number of corrections from the service."""
+        """Reads from the service where the session stands, and by which policy it lives."""
         session: wire.Session = self._transport.json("GET", self._path)
+        self.renewals, self.policy, self.horizon = session["renewals"], session["policy"], session["horizon"]
         self.corrections = session["corrections"]
         self.period, self.wealth, self.holding = session["period"], session["wealth"], session["holding"]
         return self

@@ -1,4 +1,4 @@
-"""Jobs: a training ends in a policy, an evaluation in a report."""
+"""Jobs: a training ends in a policy, an evaluation or a walk-forward in a report."""
 
 from __future__ import annotations
 
@@ -91,6 +91,12 @@ class Job:
             raise JobEnded(self.job)
         return self.job
 
+    def _report(self, watch: Watch | None) -> object:
+        path = self._watched(watch).get("report")
+        if path is None:
+            raise JobEnded(self.job)
+        return self._transport.json("GET", path)
+
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.id} {self.job['state']}>"
 
@@ -133,10 +139,18 @@ class Evaluation(Job):
 
         Raises :class:`JobEnded` where the job fails or is cancelled.
         """
-        path = self._watched(watch).get("report")
-        if path is None:
-            raise JobEnded(self.job)
-        return cast(wire.EvaluationReport, self._transport.json("GET", path))
+        return cast(wire.EvaluationReport, self._report(watch))
+
+
+class WalkForward(Job):
+    """A job that ends in a report; ``Ballast.walk_forward(id)`` finds it again."""
+
+    def report(self, watch: Watch | None = None) -> wire.BacktestReport:
+        """Waits for the end of the walk-forward, showing each change to ``watch``.
+
+        Raises :class:`JobEnded` where the job fails or is cancelled.
+        """
+        return cast(wire.BacktestReport, self._report(watch))
 
 
 class ProgressPrinter:

@@ -49,6 +49,79 @@ class AuditPage(TypedDict):
     """Give it as `after` for the next page; null on the last."""
 
 
+class BacktestChoices(TypedDict):
+    """The choices of a walk-forward."""
+
+    window: int
+    """Periods of history that each policy was trained on."""
+    every: int
+    """Periods from one training to the next."""
+    horizon: int
+    """Periods that a policy looked ahead."""
+    alpha: list[float]
+    """Levels of the adaptive strategies."""
+    risk_aversion: float
+    """Relative."""
+    trading_cost: float
+    """Lost of what is traded, as a share of it."""
+    cost_blind: bool
+    """Whether every policy was trained as if trading were free."""
+    count: int
+    """Design points per step."""
+    seed: int
+    """Of every training, and of the resamples."""
+
+
+class BacktestIntervals(TypedDict):
+    """How the intervals were made: circular blocks of what was lived, the same for all strategies."""
+
+    confidence: float
+    """Probability that an interval is meant to hold."""
+    resamples: int
+    """How many."""
+    period_block: int
+    """Periods of a block."""
+    year_block: int
+    """Years of a block, where whole years are resampled."""
+
+
+class BacktestPeriods(TypedDict):
+    """What one strategy did, a number a period."""
+
+    strategy: str
+    """Its name."""
+    allocation: list[float]
+    """Share of wealth held through the period."""
+    low: list[float]
+    """Lower end of the holdings that were kept as they were."""
+    high: list[float]
+    """Upper end of them."""
+    radius: list[float]
+    """Of the ball, in log-return; 0 where there was none."""
+    traded: list[float]
+    """Share of wealth that changed between bank and asset at the start."""
+    wealth: list[float]
+    """At the end, from 100."""
+
+
+LogReturn: TypeAlias = float
+
+
+SimpleReturn: TypeAlias = float
+
+
+AlphaItem: TypeAlias = float
+
+
+class BootstrapEstimate(TypedDict):
+    """A figure with its interval."""
+
+    value: float
+    """Of what was lived."""
+    interval: list[float]
+    """Its ends."""
+
+
 CautionCode: TypeAlias = Literal["short_record", "one_return"]
 """The reasons."""
 
@@ -209,11 +282,29 @@ class Interval(TypedDict):
     """The upper end."""
 
 
-JobKind: TypeAlias = Literal["train", "evaluate"]
+JobKind: TypeAlias = Literal["train", "evaluate", "backtest"]
 """What a job computes."""
 
 
 JobState: TypeAlias = Literal["queued", "running", "succeeded", "failed", "cancelled"]
+
+
+class Learning1(TypedDict):
+    """As much as any other."""
+
+    kind: Literal["equal"]
+
+
+class Learning2(TypedDict):
+    """Half as much as one that is `half_life` periods newer: the law forgets what is long past."""
+
+    half_life: float
+    """In periods."""
+    kind: Literal["decay"]
+
+
+Learning: TypeAlias = Learning1 | Learning2
+"""What a return weighs in the law that is learned: of the history and of what is seen after it alike."""
 
 
 class LeftOut(TypedDict):
@@ -283,19 +374,6 @@ class Observe(TypedDict):
 
 
 HistoryItem: TypeAlias = float
-
-
-class OpenSession(TypedDict):
-    """A session to open."""
-
-    policy: str
-    """The policy to live by."""
-    history: NotRequired[list[HistoryItem] | None]
-    """Log-returns known at the start. Default: the policy's."""
-    wealth: NotRequired[float | None]
-    """Default: the policy's initial wealth."""
-    holding: NotRequired[float | None]
-    """Share of wealth in the risky asset at the start. Default: 0."""
 
 
 Phase: TypeAlias = Literal["solving", "fitting", "simulating"]
@@ -432,6 +510,33 @@ class RadiusSpread(TypedDict):
     """On the first path."""
 
 
+Rates: TypeAlias = float | list[float]
+"""What the bank pays in each period."""
+
+
+class Renew(TypedDict):
+    """The policy that a session goes on by."""
+
+    renewal: int
+    """Number of the renewal, from 1."""
+    policy: str
+    """The next policy."""
+    window: NotRequired[int | None]
+    """Returns that the law is made of, the last ones. Default: all that were seen."""
+
+
+RenewalState: TypeAlias = Literal["due", "training", "failed", "trained"]
+
+
+class Renewing(TypedDict):
+    """How a session is renewed by itself."""
+
+    every: int
+    """Periods by one policy, until the next is trained; fewer than its horizon."""
+    window: NotRequired[int | None]
+    """Returns that the next policy is trained on, the last ones. Default: all that were seen."""
+
+
 class Report(TypedDict):
     """What is recorded of a period: its return, given in exactly one of three ways or as missing, and what was done in it."""
 
@@ -474,7 +579,7 @@ class SamplingLaw1(TypedDict):
 
 
 class SamplingLaw2(TypedDict):
-    """Smoothed bootstrap of the history, with the history's own mean and variance."""
+    """Smoothed bootstrap of the history, each return with its weight, with the mean and variance that gives."""
 
     kind: Literal["bootstrap"]
 
@@ -544,6 +649,21 @@ SweepRange = TypedDict(
 )
 
 
+class Terms(TypedDict):
+    """Rate, cost and flows of the periods that a policy is lived by, and how its law is learned."""
+
+    horizon: int
+    """T, periods."""
+    rate_per_step: float
+    """r, simple return of the bank per step."""
+    trading_cost: float
+    """c, of what is traded."""
+    contributions: Contributions
+    """C, money added at the end of each period."""
+    learning: Learning
+    """What older returns weigh."""
+
+
 class TransportedMass(TypedDict):
     """Mass of one atom and where the adversary puts it."""
 
@@ -560,8 +680,10 @@ class Uncertainty(TypedDict):
 
     sample_size: int
     """Returns seen, those of the history among them."""
+    effective_size: float
+    """How many returns of equal weight tell as much: as many as were seen where `learning` is `equal`."""
     moments: list[float]
-    """Raw moments of the empirical law, first to the specification's count."""
+    """Raw moments of the law learned, first to the specification's count."""
     quantile: NotRequired[float | None]
     """(1 - alpha)-quantile of the bridge statistic; absent under other radius rules."""
     quantile_standard_error: NotRequired[float | None]
@@ -688,12 +810,104 @@ class Advice(TypedDict):
     """
     sample_size: int
     """Returns seen, those of the history among them."""
+    effective_size: float
+    """How many returns of equal weight tell as much: as many as were seen where `learning` is `equal`."""
     surrogate_sd: float
     """Predicted standard deviation of the log certainty equivalent."""
     in_design: bool
     """Whether the state lies where the surrogates were trained."""
     source: AdviceSource
     """How it was found."""
+
+
+class BacktestFigures(TypedDict):
+    """One strategy in figures; returns as fractions."""
+
+    strategy: str
+    """Its name."""
+    hindsight: bool
+    """Whether it was chosen with what only the end could tell."""
+    yearly_certainty_equivalent: BootstrapEstimate
+    """Of mean utility over the whole years, each from wealth 100."""
+    adaptive_ahead: BootstrapEstimate
+    """That of the main adaptive strategy less this one."""
+    annual_mean: BootstrapEstimate
+    """Of simple returns."""
+    annual_volatility: BootstrapEstimate
+    """Standard deviation of simple returns."""
+    sharpe_ratio: BootstrapEstimate
+    """Mean excess over the bank by its deviation."""
+    annual_turnover: BootstrapEstimate
+    """Share of wealth that changes between bank and asset in a year."""
+    max_drawdown: float
+    """Largest fall below the highest wealth so far, as a share of it."""
+    final_wealth: float
+    """From 100."""
+    mean_allocation: float
+    """Share of wealth in the risky asset."""
+    all_bank_share: float
+    """Share of the periods with nothing in the risky asset."""
+
+
+class BacktestReport(TypedDict):
+    """Strategies that lived through a record of returns. The same request gives the same report, bit for bit."""
+
+    format: str
+    """`ballast-backtest-1`."""
+    frequency: NotRequired[str | None]
+    """`daily`, `weekly`, `monthly`, `quarterly` or `yearly`; null where the periods have no dates."""
+    periods_per_year: int
+    """Periods in a year."""
+    dates: NotRequired[list[str] | None]
+    """Of the periods decided about, those after the first window; null where the periods have none."""
+    whole_years: int
+    """Whole years decided about, whose utility is taken."""
+    choices: BacktestChoices
+    """As completed."""
+    intervals: BacktestIntervals
+    """How the intervals were made."""
+    strategies: list[BacktestFigures]
+    """One strategy in figures each."""
+    periods: list[BacktestPeriods]
+    """What each strategy did, in their order."""
+    sentences: list[str]
+    """What the figures say, the most important first."""
+
+
+class BacktestRequest(TypedDict):
+    """
+    A walk-forward through a record of returns: every so many periods policies are trained on the window before, and lived by
+    until the next.
+    """
+
+    log_returns: NotRequired[list[LogReturn] | None]
+    """Of the risky asset, oldest first, none left out. Exactly one of this and `simple_returns` is given."""
+    simple_returns: NotRequired[list[SimpleReturn] | None]
+    """`price / previous price - 1`, likewise."""
+    rate: Rates
+    """What the bank pays a period, as a fraction: one number for all, or one for each."""
+    dates: NotRequired[list[str] | None]
+    """One for each period, evenly apart: `2008-01-31`, `2008-01` or `2008`. They tell the periods of a year."""
+    periods_per_year: NotRequired[int | None]
+    """Default: what `dates` tell; required without them."""
+    window: NotRequired[int | None]
+    """Periods of history that each policy is trained on. Default: 20 years of them."""
+    every: NotRequired[int | None]
+    """Periods from one training to the next. Default: a year of them, at most `horizon`."""
+    horizon: NotRequired[int | None]
+    """Periods that a policy looks ahead. Default: `every`."""
+    alpha: NotRequired[list[AlphaItem]]
+    """Levels of the adaptive strategies; the static one takes the second, or the only one."""
+    risk_aversion: NotRequired[float]
+    """Relative: 1 is log utility."""
+    trading_cost: NotRequired[float]
+    """Lost of what is traded, as a share of it; policies are trained with it."""
+    cost_blind: NotRequired[bool]
+    """Train every policy as if trading were free."""
+    count: NotRequired[int]
+    """Design points per step."""
+    seed: NotRequired[int]
+    """The same request and seed give the same report, bit for bit."""
 
 
 class Caution(TypedDict):
@@ -826,6 +1040,20 @@ class Observed(Uncertainty):
     """Whether the returns still come as they came."""
 
 
+class OpenSession(TypedDict):
+    """A session to open."""
+
+    policy: str
+    """The policy to live by."""
+    history: NotRequired[list[HistoryItem] | None]
+    """Log-returns known at the start. Default: the policy's."""
+    wealth: NotRequired[float | None]
+    """Default: the policy's initial wealth."""
+    holding: NotRequired[float | None]
+    """Share of wealth in the risky asset at the start. Default: 0."""
+    renew: NotRequired[Renewing | None]
+
+
 class PeriodReport(TypedDict):
     """One period over all paths."""
 
@@ -861,11 +1089,41 @@ class ProblemSpecification(TypedDict):
     """Money added at the end of each period, withdrawn where it is negative: one number for all, or `horizon` numbers."""
     utility: NotRequired[UtilitySpecification]
     """Of terminal wealth."""
+    learning: NotRequired[Learning]
+    """What older returns weigh in the law that is learned."""
     radius: NotRequired[RadiusRule | None]
     support: NotRequired[Interval | None]
     law: NotRequired[SamplingLaw | None]
     history: list[HistoryItem]
     """The log-returns observed before the start, at least two of them distinct."""
+
+
+class RenewalDue(TypedDict):
+    """Where a renewal is that is due."""
+
+    renewal: int
+    """Its number."""
+    state: RenewalState
+    job: NotRequired[str | None]
+    """The job that trains the policy, or last did; null before there is one."""
+    error: NotRequired[str | None]
+    """Why the last attempt failed."""
+    attempts: int
+    """Jobs so far."""
+
+
+class Renewed(Uncertainty):
+    """The session after a renewal."""
+
+    session: str
+    renewal: int
+    policy: str
+    period: int
+    """The coming period, the first that the policy advises."""
+    horizon: int
+    """The last period that it advises."""
+    terms: Terms
+    """Rate, cost and flows of its periods, where none other are reported."""
 
 
 class Sensitivity(TypedDict):
@@ -883,9 +1141,11 @@ class Session(TypedDict):
 
     session: str
     policy: str
+    """The one that advises the coming period."""
     period: int
     """The coming period, from 1; `horizon + 1` once completed."""
     horizon: int
+    """The last period that the policy advises."""
     state: SessionState
     date: NotRequired[str | None]
     """The last day of the last period that was reported with one."""
@@ -895,6 +1155,10 @@ class Session(TypedDict):
     sample_size: int
     corrections: int
     """Corrections of what periods reported; the next one is this and one more."""
+    renewals: int
+    """Policies that followed the first; the next renewal is this and one more."""
+    renew: NotRequired[Renewing | None]
+    renewal: NotRequired[RenewalDue | None]
     drift: Drift
     """Whether the returns still come as they came."""
     created_ms: int
@@ -905,8 +1169,10 @@ class SessionEntry(TypedDict):
 
     session: str
     policy: str
+    """The one that advises the coming period."""
     period: int
     horizon: int
+    """The last period that the policy advises."""
     state: SessionState
     initial_wealth: float
     created_ms: int
@@ -1130,7 +1396,7 @@ class Job(TypedDict):
     policy: NotRequired[str | None]
     """The policy of a succeeded training."""
     report: NotRequired[str | None]
-    """Where the report of a succeeded evaluation is."""
+    """Where the report of a succeeded evaluation or walk-forward is."""
     error: NotRequired[str | None]
     """Why it failed."""
     created_ms: int
@@ -1153,6 +1419,14 @@ class Observation(Observed):
     """What was reported first."""
     observed_ms: int
     now: NotRequired[Now | None]
+
+
+class Renewal(Renewed):
+    """One renewal, as it was made."""
+
+    window: NotRequired[int | None]
+    """Returns that the law was made of, the last ones; null where those were all."""
+    renewed_ms: int
 
 
 class Specification(TypedDict):
@@ -1242,6 +1516,9 @@ class History(TypedDict):
 
     session: str
     policy: str
+    """The first policy."""
+    terms: Terms
+    """Rate, cost and flows of its periods, where none other are reported."""
     initial_wealth: float
     initial_holding: float
     """Share of it in the risky asset."""
@@ -1249,6 +1526,12 @@ class History(TypedDict):
     """Log-returns known at the start."""
     observations: list[Observation]
     corrections: list[Correction]
+    renewals: list[Renewal]
+    """The policies that followed the first."""
+
+
+JobReport: TypeAlias = EvaluationReport | BacktestReport
+"""The report of a job: of an evaluation or of a walk-forward."""
 
 
 class PolicyDetail(TypedDict):

@@ -60,7 +60,7 @@ impl Advisor {
         (advice, mode): (&Advice, AdviceMode),
     ) -> Sensitivity {
         let of = |record: &[f64]| {
-            let state = State { law: EmpiricalDistribution::new(record), ..*state };
+            let state = State { law: self.specification().problem.learning.law(record), ..*state };
             self.advise(step, &state, mode).allocation
         };
         self.sensitivity_by(step, state, record, advice, &of)
@@ -141,14 +141,16 @@ impl Asked<'_> {
         Sensitivity { without_one, next_return, premium, caution }
     }
 
-    /// Equal returns leave equal records: each is left out once.
+    /// Where all weigh the same, equal returns leave equal records: each is left out once.
     fn without_one(&self) -> Option<WithoutOne> {
         let mut order: Vec<usize> = (0..self.record.len()).collect();
         order.sort_by(|&one, &other| self.record[one].total_cmp(&self.record[other]).then(one.cmp(&other)));
-        order.dedup_by(|later, first| self.record[*later] == self.record[*first]);
+        let alike =
+            |one: usize, other: usize| !self.problem.learning.decays() && self.record[one] == self.record[other];
+        order.dedup_by(|later, first| alike(*later, *first));
         let found = pool::map(order, |index| {
             let rest = [&self.record[..index], &self.record[index + 1..]].concat();
-            rules::history("history", &rest).ok()?;
+            rules::history("history", &rest, self.problem.learning).ok()?;
             let Return { log_return, simple_return } = Return::of(self.record[index]);
             Some(LeftOut { index, log_return, simple_return, allocation: (self.of)(&rest) })
         });
@@ -209,7 +211,7 @@ impl Asked<'_> {
     }
 
     fn present(&self) -> f64 {
-        self.record.iter().sum::<f64>() / self.record.len() as f64 - self.problem.rate_per_step.ln_1p()
+        self.problem.learning.mean(self.record, |log_return| log_return) - self.problem.rate_per_step.ln_1p()
     }
 
     fn needed(&self) -> Option<f64> {
@@ -235,9 +237,8 @@ impl Asked<'_> {
         if let RadiusRule::Fixed { .. } = self.problem.radius_rule() {
             return None;
         }
-        let size = self.record.len() as f64;
-        let leaves =
-            |more: usize| is_invested((self.within)(self.advice.radius * (size / (size + more as f64)).sqrt()));
+        let size = |more: usize| self.problem.learning.effective_size(self.record.len() + more);
+        let leaves = |more: usize| is_invested((self.within)(self.advice.radius * (size(0) / size(more)).sqrt()));
         let (mut too_few, mut enough) = (0, MOST_PERIODS);
         if !leaves(enough) {
             return None;

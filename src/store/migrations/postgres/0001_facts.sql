@@ -90,6 +90,10 @@ CREATE TABLE sessions (
     -- Doubles, little-endian, eight bytes each.
     initial_history BYTEA NOT NULL,
     horizon         BIGINT NOT NULL,
+    -- What else was fixed when it was opened.
+    plan_json       TEXT NOT NULL,
+    -- Periods after which it is to be renewed by itself. It finds sessions, so no seal covers it.
+    due             BIGINT,
     -- Entries that its tenant's total counts it with; it grows, so no seal covers it.
     room            BIGINT NOT NULL,
     created_ms      BIGINT NOT NULL,
@@ -98,6 +102,7 @@ CREATE TABLE sessions (
 
 CREATE INDEX sessions_by_policy ON sessions (policy);
 CREATE INDEX sessions_by_tenant ON sessions (tenant, sequence);
+CREATE INDEX sessions_to_renew ON sessions (sequence) WHERE due IS NOT NULL;
 
 -- A key lives as long as what it made.
 CREATE TABLE idempotency_keys (
@@ -117,7 +122,7 @@ CREATE INDEX idempotency_keys_by_session ON idempotency_keys (session);
 CREATE TABLE entries (
     session      TEXT NOT NULL REFERENCES sessions (session) ON DELETE CASCADE,
     entry        BIGINT NOT NULL,
-    kind         TEXT NOT NULL CHECK (kind IN ('observation', 'correction')),
+    kind         TEXT NOT NULL CHECK (kind IN ('observation', 'correction', 'renewal')),
     -- From 1 among those of its kind: the period, or which correction it is.
     number       BIGINT NOT NULL,
     content_json TEXT NOT NULL,
@@ -128,6 +133,19 @@ CREATE TABLE entries (
     seal         BYTEA NOT NULL,
     PRIMARY KEY (session, entry)
 );
+
+-- The policies that sessions went on by, as their entries tell; they find sessions and keep policies.
+CREATE TABLE renewals (
+    session TEXT NOT NULL REFERENCES sessions (session) ON DELETE CASCADE,
+    -- From 1 among those of its session.
+    number  BIGINT NOT NULL,
+    policy  TEXT NOT NULL REFERENCES policies (policy) ON DELETE RESTRICT,
+    -- The last period that the policy advises.
+    horizon BIGINT NOT NULL,
+    PRIMARY KEY (session, number)
+);
+
+CREATE INDEX renewals_by_policy ON renewals (policy);
 
 -- Of a key the SHA-256 alone is kept. A revoked one stays: a store that ever had a key never again answers without one.
 CREATE TABLE access_keys (

@@ -1,11 +1,8 @@
-//! What a period is: told by how far apart the dates of a file are.
+//! What a period is: told by how far apart dates are.
 
 use std::ops::RangeInclusive;
 
 use jiff::civil::{Date, Weekday};
-
-use super::cell::Cell;
-use super::error::ReturnsError;
 
 /// Days that an exchange may rest: weekends, and holidays as long as the golden weeks of Asia or March 1933.
 const LONGEST_REST: i32 = 12;
@@ -15,13 +12,28 @@ const WEEK: RangeInclusive<i32> = 4..=10;
 /// Days from a month's date to the next one's, where both move to days on which exchanges are open; less is no month.
 const SHORTEST_MONTH: i32 = 20;
 
+/// How often there is a period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Frequency {
+    /// Days on which an exchange is open, or all days.
     Daily,
+    /// Weeks.
     Weekly,
+    /// Months.
     Monthly,
+    /// Quarters of a year.
     Quarterly,
+    /// Years.
     Yearly,
+}
+
+/// A date that does not follow the one before: its index, and the rule that it breaks.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Misplaced {
+    /// From 0.
+    pub index: usize,
+    /// As a sentence without its subject.
+    pub rule: String,
 }
 
 use Frequency::{Daily, Monthly, Quarterly, Weekly, Yearly};
@@ -31,17 +43,17 @@ const DISTANCES: [(Frequency, RangeInclusive<i32>); 5] =
     [(Daily, 1..=4), (Weekly, 5..=9), (Monthly, 26..=33), (Quarterly, 85..=97), (Yearly, 350..=380)];
 
 impl Frequency {
-    /// The one that the median distance of two or more dates tells; the cells are where they were read.
+    /// The one that the median distance of two or more dates tells; `written` is how each of them was given.
     ///
     /// # Errors
     /// A date that is not later than the one before, or is not the next one at that frequency.
-    pub fn of(dates: &[Date], cells: &[Cell]) -> Result<Self, ReturnsError> {
+    pub fn of(dates: &[Date], written: &[&str]) -> Result<Self, Misplaced> {
         let days = |pair: &[Date]| pair[0].until(pair[1]).map_or(0, |span| span.get_days());
         let gaps: Vec<i32> = dates.windows(2).map(days).collect();
-        let refused = |index: usize, rule: String| Err(cells[index + 1].refused(rule));
+        let refused = |index: usize, rule: String| Err(Misplaced { index: index + 1, rule });
         if let Some(index) = gaps.iter().position(|gap| *gap <= 0) {
             let rule = "the row before: rows go from the oldest to the newest, one a date";
-            return refused(index, format!("must be later than {}, {rule}", cells[index].text));
+            return refused(index, format!("must be later than {}, {rule}", written[index]));
         }
         let mut sorted = gaps.clone();
         sorted.sort_unstable();
@@ -49,7 +61,7 @@ impl Frequency {
         let Some(frequency) = sorted.get(gaps.len().saturating_sub(1) / 2).and_then(|median| by(*median)) else {
             let index = gaps.iter().position(|gap| by(*gap).is_none()).unwrap_or_default();
             let rule = "where rows must be daily, weekly, monthly, quarterly or yearly";
-            let (gap, before) = (gaps[index], cells[index].text);
+            let (gap, before) = (gaps[index], written[index]);
             return refused(index, format!("is {gap} days after {before}, the row before, {rule}"));
         };
         match dates.windows(2).position(|pair| !frequency.follows(pair[0], pair[1])) {
@@ -57,7 +69,7 @@ impl Frequency {
             Some(index) => {
                 let (noun, adjective) = (frequency.noun(), frequency.adjective());
                 let rest = if frequency == Daily { ", but for weekends and holidays" } else { "" };
-                let (gap, before) = (gaps[index], cells[index].text);
+                let (gap, before) = (gaps[index], written[index]);
                 let days = if gap == 1 { "day" } else { "days" };
                 refused(
                     index,
@@ -83,6 +95,7 @@ impl Frequency {
         }
     }
 
+    /// One of its periods, in a word.
     pub fn noun(self) -> &'static str {
         match self {
             Daily => "day",
@@ -93,6 +106,7 @@ impl Frequency {
         }
     }
 
+    /// What its returns are called.
     pub fn adjective(self) -> &'static str {
         match self {
             Daily => "daily",
@@ -103,7 +117,7 @@ impl Frequency {
         }
     }
 
-    /// Of days: those on which exchanges are open, or all where both days of the weekend are among the dates.
+    /// Periods in a year. Of days: those on which exchanges are open, or all where both days of the weekend are among the dates.
     pub fn periods_per_year(self, dates: &[Date]) -> usize {
         let has = |day: Weekday| dates.iter().any(|date| date.weekday() == day);
         match self {

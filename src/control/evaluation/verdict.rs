@@ -1,20 +1,24 @@
-//! What the figures say, flattering or not: every sentence follows from them by a rule that is blind to the strategy.
+//! What the figures say, flattering or not: every sentence follows from them by a rule that is blind to the strategy. And the
+//! report of both.
 
-use ballast::control::policy::advice::AdviceSource;
-
-use super::Backtest;
-use super::analysis::{BootstrapEstimate, Figures};
+use crate::control::evaluation::analysis::{CONFIDENCE, Line, RESAMPLES, YEAR_BLOCK};
+use crate::control::evaluation::backtest::{Backtest, Walked};
+use crate::control::evaluation::backtest_report::{
+    BacktestChoices, BacktestFigures, BacktestIntervals, BacktestPeriods, BacktestReport, BootstrapEstimate, FORMAT,
+};
+use crate::control::evaluation::rolling::Decision;
+use crate::control::policy::advice::AdviceSource;
 
 /// Below it a resample of years says nothing about the next one.
 const FEWEST_YEARS: usize = 10;
 
 /// One statement each, the most important first.
-pub fn sentences(backtest: &Backtest) -> Vec<String> {
-    let figures = &backtest.analysis.figures;
-    let main = backtest.args.main_line();
+pub fn sentences(walked: &Walked) -> Vec<String> {
+    let Walked { backtest, lines, analysis } = walked;
+    let (figures, main) = (&analysis.figures, backtest.main_line());
     let mut sentences = vec![ranking(figures, main)];
     let others = figures.iter().enumerate().filter(|(index, _)| *index != main).map(|(_, other)| other);
-    let years = backtest.analysis.years;
+    let years = analysis.years;
     if years < FEWEST_YEARS {
         sentences.push(format!(
             "The whole years are {years}, fewer than {FEWEST_YEARS}: they do not tell the strategies apart, and the intervals mean nothing."
@@ -23,16 +27,16 @@ pub fn sentences(backtest: &Backtest) -> Vec<String> {
         sentences.push(against(others));
         sentences.extend(timing(figures, main));
     }
-    sentences.push(holding(backtest, main));
+    sentences.push(holding(&figures[main], backtest));
     sentences.extend(drawdown(figures, main));
-    sentences.push(guard(backtest, main));
+    sentences.push(guard(&lines[main], backtest.noun()));
     sentences.push(cost(backtest));
     sentences
 }
 
-fn ranking(figures: &[Figures], main: usize) -> String {
-    let value = |figures: &Figures| figures.yearly_certainty_equivalent.value;
-    let real: Vec<&Figures> = figures.iter().filter(|figures| !figures.hindsight).collect();
+fn ranking(figures: &[BacktestFigures], main: usize) -> String {
+    let value = |figures: &BacktestFigures| figures.yearly_certainty_equivalent.value;
+    let real: Vec<&BacktestFigures> = figures.iter().filter(|figures| !figures.hindsight).collect();
     let ahead = real.iter().filter(|other| value(other) > value(&figures[main])).count();
     let best = real.iter().max_by(|a, b| value(a).total_cmp(&value(b)));
     let best = best.map_or(String::new(), |best| format!(" The first is {} with {:.2}.", best.strategy, value(best)));
@@ -46,7 +50,7 @@ fn ranking(figures: &[Figures], main: usize) -> String {
 }
 
 /// Which strategies are behind, ahead, or not to be told apart.
-fn against<'a>(others: impl Iterator<Item = &'a Figures>) -> String {
+fn against<'a>(others: impl Iterator<Item = &'a BacktestFigures>) -> String {
     let mut groups: [Vec<&str>; 3] = Default::default();
     for other in others {
         let BootstrapEstimate { interval: [low, high], .. } = other.adaptive_ahead;
@@ -69,7 +73,7 @@ fn against<'a>(others: impl Iterator<Item = &'a Figures>) -> String {
 }
 
 /// Whether moving in and out did anything that its average would not have done.
-fn timing(figures: &[Figures], main: usize) -> Option<String> {
+fn timing(figures: &[BacktestFigures], main: usize) -> Option<String> {
     let constant = figures.iter().find(|figures| figures.hindsight)?;
     let BootstrapEstimate { value, interval: [low, high] } = constant.adaptive_ahead;
     let verdict = match () {
@@ -85,8 +89,7 @@ fn timing(figures: &[Figures], main: usize) -> Option<String> {
     ))
 }
 
-fn holding(backtest: &Backtest, main: usize) -> String {
-    let figures = &backtest.analysis.figures[main];
+fn holding(figures: &BacktestFigures, backtest: &Backtest) -> String {
     let held = if figures.mean_allocation <= 0.0 {
         "it never held stocks, so its returns are the bank's".into()
     } else {
@@ -95,12 +98,12 @@ fn holding(backtest: &Backtest, main: usize) -> String {
     format!(
         "It held nothing but the bank in {:.0} % of {} {}s; {held}.",
         100.0 * figures.all_bank_share,
-        backtest.rows().len(),
-        backtest.returns.frequency.noun()
+        backtest.lived().len(),
+        backtest.noun()
     )
 }
 
-fn drawdown(figures: &[Figures], main: usize) -> Option<String> {
+fn drawdown(figures: &[BacktestFigures], main: usize) -> Option<String> {
     let stock = figures.iter().find(|figures| figures.strategy == "all-stock")?;
     Some(format!(
         "Its largest fall from a peak was {:.1} %, where all-stock fell {:.1} %; 100 became {:.0}, with all-stock {:.0}.",
@@ -112,19 +115,20 @@ fn drawdown(figures: &[Figures], main: usize) -> Option<String> {
 }
 
 /// How often the surrogate could not be trusted and the step was solved.
-fn guard(backtest: &Backtest, main: usize) -> String {
-    let decisions = &backtest.lines[main].decisions;
+fn guard(line: &Line, noun: &str) -> String {
+    let decisions = &line.decisions;
     let resolved = decisions.iter().filter(|one| one.source == Some(AdviceSource::ResolvedOutsideDesign)).count();
     format!(
-        "In {:.0} % of the {}s the state lay outside the design and the robust step was solved anew.",
-        100.0 * resolved as f64 / decisions.len() as f64,
-        backtest.returns.frequency.noun()
+        "In {:.0} % of the {noun}s the state lay outside the design and the robust step was solved anew.",
+        100.0 * resolved as f64 / decisions.len() as f64
     )
 }
 
 fn cost(backtest: &Backtest) -> String {
-    let (basis_points, blind) = (backtest.args.cost_bp, backtest.args.cost_blind);
-    if basis_points > 0.0 {
+    let (cost, blind) = (backtest.request.trading_cost, backtest.request.cost_blind);
+    if cost > 0.0 {
+        // To a millionth, below which digits are those of binary fractions.
+        let basis_points = (1e10 * cost).round() / 1e6;
         let known =
             if blind { "no policy knows of it" } else { "policies are trained with it, but for the cost-blind one" };
         format!("Trading costs {basis_points} bp of what is traded in every account; {known}.")
@@ -133,14 +137,64 @@ fn cost(backtest: &Backtest) -> String {
     }
 }
 
+impl BacktestReport {
+    /// Of all that was lived.
+    pub fn new(walked: &Walked) -> Self {
+        let Walked { backtest, lines, analysis } = walked;
+        let (request, walk) = (&backtest.request, backtest.walk);
+        BacktestReport {
+            format: FORMAT.to_owned(),
+            frequency: backtest.frequency.map(|frequency| frequency.adjective().to_owned()),
+            periods_per_year: backtest.periods_per_year,
+            dates: backtest.dates(),
+            whole_years: analysis.years,
+            choices: BacktestChoices {
+                window: walk.window,
+                every: walk.every,
+                horizon: walk.horizon,
+                alpha: request.alpha.clone(),
+                risk_aversion: request.risk_aversion,
+                trading_cost: request.trading_cost,
+                cost_blind: request.cost_blind,
+                count: request.count,
+                seed: request.seed,
+            },
+            intervals: BacktestIntervals {
+                confidence: CONFIDENCE,
+                resamples: RESAMPLES,
+                period_block: backtest.periods_per_year,
+                year_block: YEAR_BLOCK,
+            },
+            strategies: analysis.figures.clone(),
+            periods: lines.iter().map(BacktestPeriods::new).collect(),
+            sentences: sentences(walked),
+        }
+    }
+}
+
+impl BacktestPeriods {
+    fn new(line: &Line) -> Self {
+        let decided = |of: fn(&Decision) -> f64| line.decisions.iter().map(of).collect();
+        BacktestPeriods {
+            strategy: line.name.clone(),
+            allocation: line.account.allocations.clone(),
+            low: decided(|decision| decision.band.low),
+            high: decided(|decision| decision.band.high),
+            radius: decided(|decision| decision.radius),
+            traded: line.account.traded.clone(),
+            wealth: line.account.wealth[1..].to_vec(),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn figures(strategy: &str, value: f64, ahead: [f64; 2], hindsight: bool) -> Figures {
+    fn figures(strategy: &str, value: f64, ahead: [f64; 2], hindsight: bool) -> BacktestFigures {
         let at = |value: f64, interval| BootstrapEstimate { value, interval };
         let none = at(0.0, [0.0; 2]);
-        Figures {
+        BacktestFigures {
             strategy: strategy.into(),
             hindsight,
             yearly_certainty_equivalent: at(value, [value - 1.0, value + 1.0]),

@@ -1,66 +1,45 @@
 //! The books in figures, each with an interval where a resample of the periods has a meaning.
 
-use ballast::control::evaluation::account::{Account, Annual, keep, yearly_certainty_equivalent};
-use ballast::control::evaluation::rolling::{Decision, Period};
-use ballast::control::problem::actions::Band;
-use ballast::control::request::specification::UtilitySpecification;
-use ballast::numerics::block_bootstrap::circular_blocks;
-use ballast::numerics::streams::stream;
-use ballast::numerics::summary::quantile;
-use serde::Serialize;
+use crate::control::evaluation::account::{Account, Annual, keep, yearly_certainty_equivalent};
+use crate::control::evaluation::backtest_report::{BacktestFigures, BootstrapEstimate};
+use crate::control::evaluation::rolling::{Decision, Period};
+use crate::control::problem::actions::Band;
+use crate::control::request::specification::UtilitySpecification;
+use crate::numerics::block_bootstrap::circular_blocks;
+use crate::numerics::streams::stream;
+use crate::numerics::summary::quantile;
 
 /// Wealth at the start of the whole, and of every year whose utility is taken.
 pub const INITIAL_WEALTH: f64 = 100.0;
-/// Resamples, and their blocks: a year of periods; three of the years whose utility is averaged.
+/// Resamples; a block of periods is a year of them.
 pub const RESAMPLES: usize = 2000;
+/// Years of a block, where years are resampled.
 pub const YEAR_BLOCK: usize = 3;
 /// Probability that an interval is meant to hold.
 pub const CONFIDENCE: f64 = 0.9;
 
 /// One strategy: what it held, and what became of it.
 pub struct Line {
+    /// Its name.
     pub name: String,
+    /// One a period.
     pub decisions: Vec<Decision>,
+    /// Its books.
     pub account: Account,
     /// Chosen with what only the end could tell.
     pub hindsight: bool,
 }
 
-/// A figure with its interval.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct BootstrapEstimate {
-    pub value: f64,
-    pub interval: [f64; 2],
-}
-
-/// One strategy in figures; returns as fractions.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Figures {
-    pub strategy: String,
-    pub hindsight: bool,
-    /// Of mean utility over the whole years, each from wealth 100.
-    pub yearly_certainty_equivalent: BootstrapEstimate,
-    /// That of the main adaptive strategy less this one.
-    pub adaptive_ahead: BootstrapEstimate,
-    pub annual_mean: BootstrapEstimate,
-    pub annual_volatility: BootstrapEstimate,
-    pub sharpe_ratio: BootstrapEstimate,
-    /// Share of wealth that changes between bank and asset in a year.
-    pub annual_turnover: BootstrapEstimate,
-    pub max_drawdown: f64,
-    pub final_wealth: f64,
-    pub mean_allocation: f64,
-    /// Share of the periods with nothing in the risky asset.
-    pub all_bank_share: f64,
-}
-
+/// All strategies in figures.
 pub struct Analysis {
-    pub figures: Vec<Figures>,
+    /// In the order of the strategies.
+    pub figures: Vec<BacktestFigures>,
     /// Whole years, whose utility is taken.
     pub years: usize,
 }
 
 impl Line {
+    /// The books of what was decided; `cost` is charged on what is traded.
     pub fn new(name: String, decisions: Vec<Decision>, periods: &[Period], cost: f64) -> Self {
         let account = keep(decisions.iter().map(|decision| decision.band), periods, cost, INITIAL_WEALTH);
         Line { name, decisions, account, hindsight: false }
@@ -81,8 +60,11 @@ impl Line {
 
 /// What figures of a year are made with.
 pub struct Scale {
+    /// Periods in a year.
     pub periods_per_year: usize,
+    /// Of a year's wealth.
     pub utility: UtilitySpecification,
+    /// Of the resamples.
     pub seed: u64,
 }
 
@@ -156,7 +138,7 @@ impl Analysis {
                 }
             };
             let zero = line.account.allocations.iter().filter(|allocation| **allocation <= 0.0).count();
-            Figures {
+            BacktestFigures {
                 strategy: line.name.clone(),
                 hindsight: line.hindsight,
                 yearly_certainty_equivalent: estimate(&|all| all[index].certainty_equivalent),

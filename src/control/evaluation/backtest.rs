@@ -1,0 +1,203 @@
+//! A walk-forward whole: the request made into strategies and periods, and the books made of what they decided.
+
+use jiff::civil::Date;
+
+use crate::control::error::{FieldError, TrainError};
+use crate::control::evaluation::analysis::{Analysis, Line, Scale};
+use crate::control::evaluation::rolling::{Decision, Period, Strategy, WalkForward};
+use crate::control::progress::Watch;
+use crate::control::request::backtest::BacktestRequest;
+use crate::control::request::framework::Framework;
+use crate::control::request::frequency::Frequency;
+use crate::control::request::learning::Learning;
+use crate::control::request::rules;
+use crate::control::request::specification::ProblemSpecification;
+use crate::control::request::warnings::Warning;
+
+/// A prepared walk-forward.
+#[derive(Debug, Clone)]
+pub struct Backtest {
+    /// As completed.
+    pub request: BacktestRequest,
+    /// How policies are trained.
+    pub walk: WalkForward,
+    /// Of the dates; none without them.
+    pub frequency: Option<Frequency>,
+    /// Periods in a year.
+    pub periods_per_year: usize,
+    /// The whole record.
+    pub periods: Vec<Period>,
+    /// Names and what they stand for: the adaptive ones first, in the order of their levels.
+    pub strategies: Vec<(String, Strategy)>,
+    days: Vec<Date>,
+}
+
+/// What was decided, and what became of it.
+pub struct Walked {
+    /// What was asked for.
+    pub backtest: Backtest,
+    /// Strategies in their order, and what the timing of the main one is measured against.
+    pub lines: Vec<Line>,
+    /// In figures.
+    pub analysis: Analysis,
+}
+
+impl Backtest {
+    /// Completes and checks the request, the training of every window among it.
+    ///
+    /// # Errors
+    /// A field that breaks its rule.
+    pub fn new(request: BacktestRequest) -> Result<Self, FieldError> {
+        let request = request.completed()?;
+        let given = |field: Option<usize>| field.unwrap_or_default();
+        let walk = WalkForward {
+            window: given(request.window),
+            every: given(request.every),
+            horizon: given(request.horizon),
+            risk_aversion: request.risk_aversion,
+            trading_cost: if request.cost_blind { 0.0 } else { request.trading_cost },
+            count: request.count,
+            seed: request.seed,
+        };
+        let (field, returns) = request.returns();
+        let period = |(index, &value): (usize, &f64)| Period {
+            log_return: request.log_return(value),
+            bank_return: request.rate.at(index),
+        };
+        let periods: Vec<Period> = returns.iter().enumerate().map(period).collect();
+        for stretch in 0..walk.stretches(periods.len()) {
+            let start = stretch * walk.every;
+            let past: Vec<f64> = periods[start..start + walk.window].iter().map(|period| period.log_return).collect();
+            rules::history(field, &past, Learning::default()).map_err(|error| {
+                let rule = format!("{}, in the window from period {} on", error.rule, start + 1);
+                FieldError::new(error.field, error.value, rule)
+            })?;
+        }
+        walk.specification(Framework::Adaptive, request.alpha[0], &periods[..walk.window])
+            .completed()
+            .map_err(|error| renamed(error, field))?;
+        Ok(Backtest {
+            frequency: request.frequency()?,
+            periods_per_year: given(request.periods_per_year),
+            days: request.days(),
+            strategies: strategies(&request),
+            request,
+            walk,
+            periods,
+        })
+    }
+
+    /// The periods decided about, after the first window.
+    pub fn lived(&self) -> &[Period] {
+        &self.periods[self.walk.window..]
+    }
+
+    /// Their dates, as fine as the frequency.
+    pub fn dates(&self) -> Option<Vec<String>> {
+        let frequency = self.frequency?;
+        Some(self.days.iter().skip(self.walk.window).map(|date| frequency.shown(*date)).collect())
+    }
+
+    /// A period, in a word.
+    pub fn noun(&self) -> &'static str {
+        self.frequency.map_or("period", Frequency::noun)
+    }
+
+    /// The line most is said about: the second adaptive strategy, or the only one.
+    pub fn main_line(&self) -> usize {
+        main_level(&self.request)
+    }
+
+    /// The name of the same, trained as if trading were free.
+    pub fn blind_line(&self) -> String {
+        blind_line(&self.request)
+    }
+
+    /// What the strategies are, without their names.
+    pub fn plain_strategies(&self) -> Vec<Strategy> {
+        self.strategies.iter().map(|(_, strategy)| *strategy).collect()
+    }
+
+    /// Policies to train.
+    pub fn trainings(&self) -> usize {
+        self.walk.trainings(&self.plain_strategies(), &self.periods)
+    }
+
+    /// What may be a mistake, by the last window; fields as they are named here.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let (returns, _) = self.request.returns();
+        let names =
+            [("problem.rate_per_step", "rate"), ("problem.trading_cost", "trading_cost"), ("problem.history", returns)];
+        let last = &self.periods[self.periods.len() - self.walk.window..];
+        let problem = ProblemSpecification {
+            periods_per_year: Some(self.periods_per_year as f64),
+            trading_cost: self.request.trading_cost,
+            ..self.walk.specification(Framework::Adaptive, self.request.alpha[0], last).problem
+        };
+        let renamed = |warning: Warning| Warning {
+            field: names.iter().find(|(from, _)| *from == warning.field).map_or(warning.field, |(_, to)| to),
+            message: names.iter().fold(warning.message, |message, (from, to)| message.replace(from, to)),
+            code: warning.code,
+        };
+        problem.warnings().into_iter().map(renamed).collect()
+    }
+
+    /// Decides every period on the current pool and keeps the books; `trained` hears of every training done.
+    ///
+    /// # Errors
+    /// As [`WalkForward::decide`].
+    pub fn run(self, watch: &Watch, trained: &(dyn Fn() + Sync)) -> Result<Walked, TrainError> {
+        let decisions = self.walk.decide(&self.plain_strategies(), &self.periods, watch, trained)?;
+        Ok(self.walked(decisions))
+    }
+
+    /// The books of what each strategy decided in every period, in figures.
+    pub fn walked(self, decisions: Vec<Vec<Decision>>) -> Walked {
+        let (cost, main, lived) = (self.request.trading_cost, self.main_line(), self.lived());
+        let names = self.strategies.iter().map(|(name, _)| name.clone());
+        let mut lines: Vec<Line> =
+            names.zip(decisions).map(|(name, decisions)| Line::new(name, decisions, lived, cost)).collect();
+        lines.push(lines[main].hindsight(lived, cost));
+        let (periods_per_year, seed) = (self.periods_per_year, self.walk.seed);
+        let scale = Scale { periods_per_year, utility: self.walk.utility(), seed };
+        let analysis = Analysis::of(&lines, main, lived, &scale);
+        Walked { backtest: self, lines, analysis }
+    }
+}
+
+fn main_level(request: &BacktestRequest) -> usize {
+    usize::from(request.alpha.len() > 1)
+}
+
+fn blind_line(request: &BacktestRequest) -> String {
+    format!("cost-blind, alpha {}", request.alpha[main_level(request)])
+}
+
+fn strategies(request: &BacktestRequest) -> Vec<(String, Strategy)> {
+    let adaptive =
+        request.alpha.iter().map(|&alpha| (format!("adaptive, alpha {alpha}"), Strategy::Adaptive { alpha }));
+    let alpha = request.alpha[main_level(request)];
+    let knows_cost = request.trading_cost > 0.0 && !request.cost_blind;
+    let blind = knows_cost.then(|| (blind_line(request), Strategy::CostBlind { alpha }));
+    adaptive
+        .chain(blind)
+        .chain([
+            (format!("static, alpha {alpha}"), Strategy::Static { alpha }),
+            ("plug-in".into(), Strategy::PlugIn),
+            ("60/40".into(), Strategy::Mix { share: 0.6 }),
+            ("all-stock".into(), Strategy::Mix { share: 1.0 }),
+            ("all-bank".into(), Strategy::Mix { share: 0.0 }),
+        ])
+        .collect()
+}
+
+/// A rule that the specification of a training breaks, under the name that its field has here.
+fn renamed(error: FieldError, returns: &str) -> FieldError {
+    let field = match error.field.as_str() {
+        "problem.history" => returns.to_owned(),
+        // Of the bridges of a window.
+        "problem.radius.paths" => "window".to_owned(),
+        other => other.rsplit('.').next().unwrap_or(other).to_owned(),
+    };
+    FieldError { field, ..error }
+}

@@ -1,0 +1,126 @@
+//! The report of a walk-forward, as it travels; `docs/backtest.md` says what its figures are.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Name and version of the report's form.
+pub const FORMAT: &str = "ballast-backtest-1";
+
+/// Strategies that lived through a record of returns. The same request gives the same report, bit for bit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct BacktestReport {
+    /// `ballast-backtest-1`.
+    pub format: String,
+    /// `daily`, `weekly`, `monthly`, `quarterly` or `yearly`; null where the periods have no dates.
+    pub frequency: Option<String>,
+    /// Periods in a year.
+    pub periods_per_year: usize,
+    /// Of the periods decided about, those after the first window; null where the periods have none.
+    pub dates: Option<Vec<String>>,
+    /// Whole years decided about, whose utility is taken.
+    pub whole_years: usize,
+    /// As completed.
+    pub choices: BacktestChoices,
+    /// How the intervals were made.
+    pub intervals: BacktestIntervals,
+    /// One strategy in figures each.
+    pub strategies: Vec<BacktestFigures>,
+    /// What each strategy did, in their order.
+    pub periods: Vec<BacktestPeriods>,
+    /// What the figures say, the most important first.
+    pub sentences: Vec<String>,
+}
+
+/// The choices of a walk-forward.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct BacktestChoices {
+    /// Periods of history that each policy was trained on.
+    pub window: usize,
+    /// Periods from one training to the next.
+    pub every: usize,
+    /// Periods that a policy looked ahead.
+    pub horizon: usize,
+    /// Levels of the adaptive strategies.
+    pub alpha: Vec<f64>,
+    /// Relative.
+    pub risk_aversion: f64,
+    /// Lost of what is traded, as a share of it.
+    pub trading_cost: f64,
+    /// Whether every policy was trained as if trading were free.
+    pub cost_blind: bool,
+    /// Design points per step.
+    pub count: usize,
+    /// Of every training, and of the resamples.
+    pub seed: u64,
+}
+
+/// How the intervals were made: circular blocks of what was lived, the same for all strategies.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct BacktestIntervals {
+    /// Probability that an interval is meant to hold.
+    pub confidence: f64,
+    /// How many.
+    pub resamples: usize,
+    /// Periods of a block.
+    pub period_block: usize,
+    /// Years of a block, where whole years are resampled.
+    pub year_block: usize,
+}
+
+/// A figure with its interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct BootstrapEstimate {
+    /// Of what was lived.
+    pub value: f64,
+    /// Its ends.
+    #[schema(value_type = [f64; 2])]
+    pub interval: [f64; 2],
+}
+
+/// One strategy in figures; returns as fractions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct BacktestFigures {
+    /// Its name.
+    pub strategy: String,
+    /// Whether it was chosen with what only the end could tell.
+    pub hindsight: bool,
+    /// Of mean utility over the whole years, each from wealth 100.
+    pub yearly_certainty_equivalent: BootstrapEstimate,
+    /// That of the main adaptive strategy less this one.
+    pub adaptive_ahead: BootstrapEstimate,
+    /// Of simple returns.
+    pub annual_mean: BootstrapEstimate,
+    /// Standard deviation of simple returns.
+    pub annual_volatility: BootstrapEstimate,
+    /// Mean excess over the bank by its deviation.
+    pub sharpe_ratio: BootstrapEstimate,
+    /// Share of wealth that changes between bank and asset in a year.
+    pub annual_turnover: BootstrapEstimate,
+    /// Largest fall below the highest wealth so far, as a share of it.
+    pub max_drawdown: f64,
+    /// From 100.
+    pub final_wealth: f64,
+    /// Share of wealth in the risky asset.
+    pub mean_allocation: f64,
+    /// Share of the periods with nothing in the risky asset.
+    pub all_bank_share: f64,
+}
+
+/// What one strategy did, a number a period.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct BacktestPeriods {
+    /// Its name.
+    pub strategy: String,
+    /// Share of wealth held through the period.
+    pub allocation: Vec<f64>,
+    /// Lower end of the holdings that were kept as they were.
+    pub low: Vec<f64>,
+    /// Upper end of them.
+    pub high: Vec<f64>,
+    /// Of the ball, in log-return; 0 where there was none.
+    pub radius: Vec<f64>,
+    /// Share of wealth that changed between bank and asset at the start.
+    pub traded: Vec<f64>,
+    /// At the end, from 100.
+    pub wealth: Vec<f64>,
+}

@@ -1,0 +1,140 @@
+//! How much older returns weigh in what is learned.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::control::error::FieldError;
+use crate::numerics::empirical::{EmpiricalDistribution, weights};
+
+/// Periods in which a return's weight halves. Below 1 the newest return would outweigh all others together, however many there are:
+/// at 1 the effective size is at most 3. Above the largest, weights are equal to rounding.
+pub const HALF_LIFE: (f64, f64) = (1.0, 1e15);
+
+/// What a return weighs in the law that is learned: of the history and of what is seen after it alike.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Learning {
+    /// As much as any other.
+    Equal {},
+    /// Half as much as one that is `half_life` periods newer: the law forgets what is long past.
+    Decay {
+        /// In periods.
+        half_life: f64,
+    },
+}
+
+impl Default for Learning {
+    fn default() -> Self {
+        Learning::Equal {}
+    }
+}
+
+impl Learning {
+    /// Checks the half-life.
+    ///
+    /// # Errors
+    /// It is out of [`HALF_LIFE`].
+    pub fn check(self) -> Result<(), FieldError> {
+        let (least, most) = HALF_LIFE;
+        match self {
+            Learning::Decay { half_life } if !(least..=most).contains(&half_life) => {
+                let rule = format!("must be a number in [{least}, {most}]");
+                Err(FieldError::new("problem.learning.half_life", half_life, rule))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether older returns weigh less.
+    pub fn decays(self) -> bool {
+        self != Learning::Equal {}
+    }
+
+    /// d, what of a return's weight is left one return later: `2^(-1 / half_life)`.
+    pub fn retention(self) -> f64 {
+        match self {
+            Learning::Equal {} => 1.0,
+            Learning::Decay { half_life } => 0.5_f64.powf(half_life.recip()),
+        }
+    }
+
+    /// The law that `record`, oldest first, teaches.
+    pub fn law(self, record: &[f64]) -> EmpiricalDistribution {
+        EmpiricalDistribution::decaying(record, self.retention())
+    }
+
+    /// What the values of a record of `count` weigh, oldest first; the newest weighs 1.
+    pub fn weights(self, count: usize) -> Vec<f64> {
+        weights(count, self.retention())
+    }
+
+    /// The mean over a record, oldest first, of `value`.
+    pub fn mean(self, record: &[f64], value: impl Fn(f64) -> f64) -> f64 {
+        let weights = self.weights(record.len());
+        let sum = record.iter().zip(&weights).map(|(&log_return, weight)| weight * value(log_return)).sum::<f64>();
+        sum / weights.iter().sum::<f64>()
+    }
+
+    /// Standard deviation of a record, oldest first.
+    pub fn deviation(self, record: &[f64]) -> f64 {
+        let mean = self.mean(record, |log_return| log_return);
+        self.mean(record, |log_return| (log_return - mean).powi(2)).sqrt()
+    }
+
+    /// [`EmpiricalDistribution::effective_size`] of the law of `count` returns:
+    ///
+    ///   tanh(n b / 2) / tanh(b / 2),   b = ln(2) / half_life.
+    pub fn effective_size(self, count: usize) -> f64 {
+        self.largest_effective_size().map_or(count as f64, |largest| largest * self.settled(count))
+    }
+
+    /// What the effective size tends to as returns accumulate, `1 / tanh(b / 2) = (1 + d) / (1 - d)`; none where it grows for ever.
+    pub fn largest_effective_size(self) -> Option<f64> {
+        match self {
+            Learning::Equal {} => None,
+            Learning::Decay { half_life } => Some((0.5 * std::f64::consts::LN_2 / half_life).tanh().recip()),
+        }
+    }
+
+    /// The effective size of `count` returns over what it tends to: `tanh(n b / 2)`; 0 where it grows for ever.
+    pub fn settled(self, count: usize) -> f64 {
+        match self {
+            Learning::Equal {} => 0.0,
+            Learning::Decay { half_life } => (0.5 * std::f64::consts::LN_2 / half_life * count as f64).tanh(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_effective_size_has_its_closed_form() {
+        for half_life in [1.0, 3.0, 24.0, 500.0, 1e9] {
+            let learning = Learning::Decay { half_life };
+            for count in [2, 30, 240] {
+                let record: Vec<f64> = (0..count).map(|k| f64::from(k * 7 % 11)).collect();
+                let (found, expected) = (learning.law(&record).effective_size(), learning.effective_size(record.len()));
+                // Two sums of as many terms, each rounded.
+                assert!((found / expected - 1.0).abs() < 1e-13, "{half_life} {count}: {found} against {expected}");
+            }
+            let d = learning.retention();
+            let largest = learning.largest_effective_size().unwrap();
+            // 1 - d loses as many digits as the half-life has.
+            assert!(((1.0 + d) / (1.0 - d) / largest - 1.0).abs() < 1e-15 * half_life.max(10.0));
+        }
+        assert_eq!(Learning::Equal {}.effective_size(17), 17.0);
+    }
+
+    #[test]
+    fn a_return_weighs_half_of_one_that_is_a_half_life_newer() {
+        let weights = Learning::Decay { half_life: 4.0 }.weights(9);
+        // Eight roundings.
+        assert!((weights[0] - 0.25).abs() < 1e-15 && (weights[4] - 0.5).abs() < 1e-15 && weights[8] == 1.0);
+        // By hand: (1/4 x 1 + 1/2 x 2 + 1 x 4) / (7/4).
+        let mean = Learning::Decay { half_life: 1.0 }.mean(&[1.0, 2.0, 4.0], |value| value);
+        assert!((mean - 3.0).abs() < 1e-15, "{mean}");
+        assert_eq!(Learning::Equal {}.mean(&[1.0, 2.0, 6.0], |value| value), 3.0);
+    }
+}

@@ -1,0 +1,41 @@
+//! Walk-forwards through records of returns.
+
+use std::sync::Arc;
+
+use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::response::Response;
+
+use super::access::{By, Heavy};
+use super::extract::JsonBody;
+use super::jobs::{accepted, idempotency_key};
+use super::problem::Problem;
+use super::wire;
+use crate::control::request::backtest::BacktestRequest;
+use crate::service::Service;
+
+/// Queue a walk-forward through a record of returns.
+#[utoipa::path(post, path = "/backtest", tag = "jobs",
+    request_body(content = BacktestRequest, example = json!({
+        "simple_returns": [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.017, -0.009, 0.024, 0.011, -0.03, 0.019],
+        "dates": ["2020-03", "2020-06", "2020-09", "2020-12", "2021-03", "2021-06", "2021-09", "2021-12", "2022-03", "2022-06",
+            "2022-09", "2022-12"],
+        "rate": 0.0027, "window": 8, "every": 4, "horizon": 4, "alpha": [0.1, 0.5], "risk_aversion": 3.0,
+        "trading_cost": 0.001, "cost_blind": false, "count": 100, "seed": 1
+    })),
+    params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
+    responses(
+        (status = 202, description = "Queued; poll the Location or follow its events.", body = wire::AcceptedJob, headers(
+            ("Location" = String, description = "The job."),
+            ("Retry-After" = u32, description = "Seconds to wait before asking for the job."))),
+        (status = 400, description = "The body is not JSON.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "The key was used with another body.", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn backtest(
+    State(service): State<Arc<Service>>,
+    By(caller, _): By<Heavy>,
+    headers: HeaderMap,
+    JsonBody(request): JsonBody<BacktestRequest>,
+) -> Result<Response, Problem> {
+    Ok(accepted(service.jobs.backtest(&caller, request, idempotency_key(&headers)?).await?))
+}

@@ -1,0 +1,140 @@
+//! The policies that a session lives by, one after the other.
+//!
+//! A renewal is an entry of its session: it names the next policy, which advises from the coming period on, and tells the terms
+//! by which that period and those after it are counted, so that a replay needs no policy that advises no more. The law is made
+//! anew of the returns seen, as they stand: of all of them, or of a window of the last.
+
+use std::sync::Arc;
+
+use tracing::Instrument;
+
+use super::content::json;
+use super::error::ServiceError;
+use super::live::{Live, measured};
+use super::periods::Periods;
+use super::plan::{MOST_RENEWALS, Plan, Renew, Renewed, Stretch, check_window};
+use super::recording::numbered;
+use super::sessions::Sessions;
+use super::spans;
+use super::standing::last_of;
+use crate::control::error::FieldError;
+use crate::control::policy::advisor::Advisor;
+use crate::control::request::terms::Terms;
+use crate::store::{Actor, EntryKind, EntryRow, Onto, SessionFacts, Tenant};
+
+impl Sessions {
+    /// Goes on by another policy from the coming period, durably before it is answered, exactly once, and answers with a
+    /// [`Renewed`] in JSON.
+    ///
+    /// # Errors
+    /// A field breaks a rule, there is no such session or policy; the renewal was made with other content, or is not the next.
+    pub async fn renew(
+        &self,
+        tenant: &Tenant,
+        by: Actor,
+        session: &str,
+        renew: &Renew,
+    ) -> Result<String, ServiceError> {
+        let number = numbered("renewal", renew.renewal)?;
+        check_window("window", renew.window)?;
+        let content = json(renew)?;
+        let mut held = self.hold(tenant, session).await;
+        loop {
+            let facts = self.facts(tenant, session).await?;
+            let periods = Periods::of(&facts)?;
+            if number <= periods.renewals() {
+                return self.repeat(session, EntryKind::Renewal, number, &content).await;
+            }
+            let expected = periods.renewals() + 1;
+            if number > expected {
+                return Err(ServiceError::Gap { what: "renewal", given: number, expected });
+            }
+            if number > MOST_RENEWALS {
+                let rule = format!("must be at most {MOST_RENEWALS}: open a session on the record as it is now");
+                return Err(FieldError::new("renewal", number, rule).into());
+            }
+            let decided = self.decided(tenant, &by, facts, periods, renew).await?;
+            let Decided { new, onto, next } = decided;
+            let (store, answer_json) = (self.store.by(by.clone()), new.answer_json.clone());
+            held.clear();
+            let appended = store.renew(new, onto).instrument(spans::of_write("append an entry")).await?;
+            if let Some(answer_json) = self.settled(&mut held, appended, answer_json, next)? {
+                return Ok(answer_json);
+            }
+        }
+    }
+
+    /// The next renewal of a session, as it stands by `facts`.
+    async fn decided(
+        &self,
+        tenant: &Tenant,
+        by: &Actor,
+        facts: SessionFacts,
+        periods: Periods,
+        renew: &Renew,
+    ) -> Result<Decided, ServiceError> {
+        let advisor = self.policies.advisor(tenant, &renew.policy).await?;
+        let (observed, corrections, before) = (periods.all.len(), periods.corrections, periods.current().horizon());
+        let terms = Terms::of(&advisor.specification().problem);
+        let (onto, window, learning) = (advisor.clone(), renew.window, terms.learning);
+        let go_on = move || {
+            let passage = periods.replay()?;
+            let standing = passage.standing.renewed(&passage.record, window, learning)?;
+            accepts(&onto, last_of(&passage.record, window), standing.state.wealth)?;
+            Ok::<_, ServiceError>(standing)
+        };
+        let standing = self.advising.run(tenant, go_on).await??;
+        self.policies.starts_from(&advisor, standing.state.law.sample_size())?;
+        let (standing, uncertainty) = measured(&self.advising, &advisor, tenant, 0, standing).await?;
+        let current = Stretch { policy: renew.policy.clone(), after: observed, terms, window };
+        let (horizon, radius) = (current.horizon(), Some(uncertainty.radius));
+        let answer = Renewed {
+            session: facts.row.session.clone(),
+            renewal: renew.renewal,
+            policy: renew.policy.clone(),
+            period: observed + 1,
+            horizon,
+            terms: current.terms.clone(),
+            uncertainty,
+        };
+        let new = EntryRow {
+            session: facts.row.session.clone(),
+            entry: facts.seen.entries() + 1,
+            kind: EntryKind::Renewal,
+            number: renew.renewal,
+            content_json: json(renew)?,
+            answer_json: json(&answer)?,
+            created_ms: self.clock.now_milliseconds(),
+            key: by.key.to_string(),
+        };
+        let renew_next = Plan::of(&facts.row)?.renew;
+        let due = renew_next.map(|renew| observed + renew.every);
+        let onto = Onto { policy: renew.policy.clone(), horizon, periods: horizon.saturating_sub(before), due };
+        let next = Live {
+            seen: facts.seen.followed_by(&new),
+            row: facts.row.into(),
+            standing,
+            observed,
+            corrections,
+            renewals: renew.renewal,
+            current: Arc::new(current),
+            renew: renew_next,
+            radius,
+            advice: None,
+        };
+        Ok(Decided { new, onto, next })
+    }
+}
+
+/// A renewal to append, and where it leads.
+struct Decided {
+    new: EntryRow,
+    onto: Onto,
+    next: Live,
+}
+
+/// Whether a session that has seen `record` and has `wealth` can live by the policy.
+fn accepts(advisor: &Advisor, record: &[f64], wealth: f64) -> Result<(), FieldError> {
+    let state = advisor.initial_state(Some(record), Some(wealth))?;
+    advisor.check_withdrawals(&state)
+}

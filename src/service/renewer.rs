@@ -1,0 +1,309 @@
+//! Sessions that are renewed by themselves: the next policy is trained on the returns seen, and the session goes on by it.
+//!
+//! What is to be done is found in the store each time anew, so that it goes on after a kill between any two steps, and on
+//! every replica alike. A session is due by its entries; the job that trains its next policy is found by its idempotency key,
+//! which no caller can send and which says of which session and renewal it is, and the how-manieth attempt; and the renewal
+//! has a number. Whoever does a step that another did already finds that it was done.
+//!
+//! An attempt that fails leaves the session as it is, and is followed by the next after a while that doubles each time.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use serde::Serialize;
+use tokio::sync::mpsc::Receiver;
+use tokio::time::MissedTickBehavior;
+use utoipa::ToSchema;
+
+use super::clock::Clock;
+use super::error::ServiceError;
+use super::jobs::Jobs;
+use super::live::Live;
+use super::metrics::RENEWALS;
+use super::periods::Periods;
+use super::plan::{Renew, Renewing};
+use super::sessions::{Name, Sessions};
+use super::shutdown::Shutdown;
+use super::standing::last_of;
+use crate::control::request::specification::{Interval, Specification};
+use crate::store::{Actor, JobRow, JobState, Store};
+
+/// Between two looks at jobs that train next policies.
+const PAUSE: Duration = Duration::from_millis(500);
+/// Between two looks for sessions that are due and that nobody told of: after a kill, or a failure.
+const ROUND: Duration = Duration::from_secs(60);
+/// Before the second attempt; doubled before each one after it, up to the longest.
+const FIRST_DELAY: Duration = Duration::from_secs(60);
+const LONGEST_DELAY: Duration = Duration::from_hours(24);
+/// Sessions read in one step of a round.
+const PAGE: usize = 256;
+/// Renewals of one tenant under way at a time in this process.
+const OF_ONE: usize = 256;
+/// Sessions told of that are not looked at yet; of more a round finds out.
+pub(super) const TOLD: usize = 1024;
+
+/// Where a renewal is that is due.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct RenewalDue {
+    /// Its number.
+    pub renewal: usize,
+    pub state: RenewalState,
+    /// The job that trains the policy, or last did; null before there is one.
+    pub job: Option<String>,
+    /// Why the last attempt failed.
+    pub error: Option<String>,
+    /// Jobs so far.
+    pub attempts: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RenewalState {
+    /// Its policy is about to be trained.
+    Due,
+    /// Its policy is trained.
+    Training,
+    /// The last attempt failed; the next one comes by itself. Until then the session goes on by its policy.
+    Failed,
+    /// Its policy is there, and about to be gone on by.
+    Trained,
+}
+
+/// The jobs that train the next policy of a session that is due.
+struct Attempts {
+    number: usize,
+    count: usize,
+    last: Option<JobRow>,
+}
+
+impl Attempts {
+    async fn of(store: &Store, live: &Live) -> Result<Self, ServiceError> {
+        let (number, mut last, mut count) = (live.renewals + 1, None, 0);
+        while let Some(job) = store.job_by_key(&live.row.tenant, &key(&live.row.session, number, count)).await? {
+            (last, count) = (Some(job), count + 1);
+        }
+        Ok(Attempts { number, count, last })
+    }
+
+    fn told(self) -> RenewalDue {
+        let state = match self.last.as_ref().map(|job| job.state) {
+            None => RenewalState::Due,
+            Some(JobState::Queued | JobState::Running) => RenewalState::Training,
+            Some(JobState::Failed | JobState::Cancelled) => RenewalState::Failed,
+            Some(JobState::Succeeded) => RenewalState::Trained,
+        };
+        let (job, error) = self.last.map_or((None, None), |row| (Some(row.job), row.error));
+        RenewalDue { renewal: self.number, state, job, error, attempts: self.count }
+    }
+}
+
+/// No header has a line break, so it is nobody's own.
+fn key(session: &str, renewal: usize, attempt: usize) -> String {
+    format!("renewal\n{session}\n{renewal}\n{attempt}")
+}
+
+impl Sessions {
+    /// Where the next renewal of a session is; `None` where it is not due.
+    ///
+    /// # Errors
+    /// The store does not answer.
+    pub async fn renewal(&self, live: &Live) -> Result<Option<RenewalDue>, ServiceError> {
+        if !live.is_due() {
+            return Ok(None);
+        }
+        Ok(Some(Attempts::of(&self.store, live).await?.told()))
+    }
+}
+
+/// The sessions whose next policies are trained, and the jobs that train them.
+type UnderWay = BTreeMap<Name, String>;
+
+/// What is left to do for a session.
+enum Left {
+    Nothing,
+    /// Once the job has ended.
+    Job(String),
+}
+
+pub(super) struct Renewer {
+    pub store: Store,
+    pub clock: Clock,
+    pub sessions: Sessions,
+    pub jobs: Jobs,
+}
+
+impl Renewer {
+    /// Renews sessions until the shutdown begins.
+    pub(super) async fn run(self, mut told: Receiver<Name>, shutdown: Shutdown) {
+        let mut under_way = UnderWay::new();
+        let (mut round, mut look) = (tokio::time::interval(ROUND), tokio::time::interval(PAUSE));
+        look.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        loop {
+            tokio::select! {
+                () = shutdown.begun() => return,
+                Some(name) = told.recv() => self.begin(name, &mut under_way).await,
+                _ = look.tick(), if !under_way.is_empty() => self.follow(&mut under_way).await,
+                _ = round.tick() => self.find(&mut under_way).await,
+            }
+        }
+    }
+
+    /// Begins with all sessions that are due.
+    async fn find(&self, under_way: &mut UnderWay) {
+        let mut after = 0;
+        loop {
+            let page = match self.store.due_sessions(PAGE, after).await {
+                Ok(page) => page,
+                Err(error) => {
+                    tracing::warn!(error = &error as &dyn std::error::Error, "sessions that are due were not found");
+                    return;
+                }
+            };
+            let Some((last, ..)) = page.last() else { return };
+            after = *last;
+            for (_, tenant, session) in page {
+                self.begin((tenant, session), under_way).await;
+            }
+        }
+    }
+
+    /// Begins with a session, unless as many of its tenant are under way as may be.
+    async fn begin(&self, name: Name, under_way: &mut UnderWay) {
+        let from = (name.0.clone(), String::new());
+        let of_one = under_way.range(from..).take_while(|((tenant, _), _)| *tenant == name.0).take(OF_ONE).count();
+        if of_one < OF_ONE && !under_way.contains_key(&name) {
+            self.go_on(name, under_way).await;
+        }
+    }
+
+    /// Looks at the jobs under way.
+    async fn follow(&self, under_way: &mut UnderWay) {
+        let names: Vec<Name> = under_way.keys().cloned().collect();
+        for name in names {
+            let Some(job) = under_way.remove(&name) else { continue };
+            match self.store.job(&job).await {
+                Ok(Some(row)) if row.state == JobState::Failed || row.state == JobState::Cancelled => {
+                    metrics::counter!(RENEWALS, "outcome" => "failed").increment(1);
+                    tracing::warn!(session = name.1, job, error = row.error, "a renewal failed");
+                }
+                _ => self.go_on(name, under_way).await,
+            }
+        }
+    }
+
+    /// Does the next step for a session; a step that fails is done again in a later round.
+    async fn go_on(&self, name: Name, under_way: &mut UnderWay) {
+        match self.step(&name).await {
+            Ok(Left::Nothing) => {}
+            Ok(Left::Job(job)) => drop(under_way.insert(name, job)),
+            Err(error) => {
+                metrics::counter!(RENEWALS, "outcome" => "failed").increment(1);
+                tracing::warn!(session = name.1, error = &error as &dyn std::error::Error, "a session was not renewed");
+            }
+        }
+    }
+
+    async fn step(&self, (tenant, session): &Name) -> Result<Left, ServiceError> {
+        let live = match self.sessions.get(tenant, session).await {
+            Ok(live) => live,
+            Err(ServiceError::Unknown { .. }) => return Ok(Left::Nothing),
+            Err(error) => return Err(error),
+        };
+        let Some(renew) = live.renew.filter(|_| live.is_due()) else { return Ok(Left::Nothing) };
+        let attempts = Attempts::of(&self.store, &live).await?;
+        let Some(last) = &attempts.last else { return self.train(&live, renew, &attempts).await };
+        match (last.state, &last.policy) {
+            (JobState::Queued | JobState::Running, _) => return Ok(Left::Job(last.job.clone())),
+            (JobState::Succeeded, Some(policy)) => {
+                match self.onto(&live, policy, renew, attempts.number).await {
+                    Ok(()) => return Ok(Left::Nothing),
+                    // The policy was deleted, or does not fit where the session stands by now.
+                    Err(ServiceError::Unknown { what: "policy", .. } | ServiceError::Field(_)) => {}
+                    Err(error) => return Err(error),
+                }
+            }
+            _ => {}
+        }
+        let ended_ms = last.finished_ms.unwrap_or_default();
+        if self.clock.now_milliseconds() >= ended_ms.saturating_add(delay_ms(attempts.count)) {
+            return self.train(&live, renew, &attempts).await;
+        }
+        Ok(Left::Nothing)
+    }
+
+    /// Goes on by the policy that was trained.
+    async fn onto(&self, live: &Live, policy: &str, renew: Renewing, number: usize) -> Result<(), ServiceError> {
+        let (tenant, session) = (&live.row.tenant, &live.row.session);
+        let renewal = Renew { renewal: number, policy: policy.to_owned(), window: renew.window };
+        let by = Actor::service(self.clock.now_milliseconds());
+        match self.sessions.renew(tenant, by, session, &renewal).await {
+            Ok(_) => {
+                metrics::counter!(RENEWALS, "outcome" => "renewed").increment(1);
+                tracing::info!(session, policy, renewal = number, "session renewed");
+                Ok(())
+            }
+            // Somebody else renewed it meanwhile, or deleted it.
+            Err(ServiceError::Conflict { .. } | ServiceError::Gap { .. }) => Ok(()),
+            Err(ServiceError::Unknown { what: "session", .. }) => Ok(()),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Queues the next attempt.
+    async fn train(&self, live: &Live, renew: Renewing, attempts: &Attempts) -> Result<Left, ServiceError> {
+        let (tenant, session) = (&live.row.tenant, &live.row.session);
+        let advisor = self.sessions.advisor(tenant, live).await?;
+        let facts = self.sessions.facts(tenant, session).await?;
+        let wealth = live.standing.state.wealth;
+        let specify = move || {
+            let periods = Periods::of(&facts)?;
+            let record = periods.replay()?.record;
+            let rate = periods.all.iter().rev().find_map(|period| period.report.rate);
+            Ok::<_, ServiceError>(next(advisor.specification(), last_of(&record, renew.window), rate, wealth))
+        };
+        let specification = self.sessions.advising.run(tenant, specify).await??;
+        let (by, key) = (Actor::service(self.clock.now_milliseconds()), key(session, attempts.number, attempts.count));
+        let job = self.jobs.train_by_key(tenant, by, specification, key).await?;
+        tracing::info!(
+            session,
+            job = job.row.job,
+            renewal = attempts.number,
+            "the next policy of a session is trained"
+        );
+        Ok(Left::Job(job.row.job))
+    }
+}
+
+/// What the next policy is trained for: the same, from the returns seen and the rate observed last. Where wealth matters, the
+/// one reached takes the place of the one at first, and design points move with it.
+fn next(specification: &Specification, history: &[f64], rate: Option<f64>, wealth: f64) -> Specification {
+    let mut next = specification.clone();
+    let problem = &mut next.problem;
+    problem.history = history.to_vec();
+    problem.rate_per_step = rate.unwrap_or(problem.rate_per_step);
+    if problem.depends_on_wealth() {
+        let factor = wealth / problem.initial_wealth;
+        problem.initial_wealth = wealth;
+        let moved = |Interval { min, max }| Interval { min: min * factor, max: max * factor };
+        next.design.wealth = next.design.wealth.map(moved);
+    }
+    next
+}
+
+/// Before the attempt after `count` of them.
+fn delay_ms(count: usize) -> i64 {
+    let doublings = u32::try_from(count.saturating_sub(1)).unwrap_or(u32::MAX).min(20);
+    let delay = FIRST_DELAY.saturating_mul(1 << doublings).min(LONGEST_DELAY);
+    i64::try_from(delay.as_millis()).unwrap_or(i64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn attempts_follow_each_other_ever_more_slowly_up_to_a_day() {
+        let minutes: Vec<i64> = [1, 2, 3, 11, 12, 1_000].into_iter().map(|count| delay_ms(count) / 60_000).collect();
+        assert_eq!(minutes, [1, 2, 4, 1_024, 1_440, 1_440]);
+    }
+}
