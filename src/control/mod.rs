@@ -6,7 +6,8 @@
 //!   V_t(x, F^) = max_a  min_{F in C_t(F^)}  E_F[ V_(t+1)( S(x, a, Z), R(F^, Z) ) ],   V_T the utility of wealth.
 //!
 //! Folders from the lowest to the highest: `request` (what may be asked), `problem` (state, dynamics, utility),
-//! `uncertainty` (the set C), `surrogate` (what regresses V and the action), `bellman` (one step), `training` (all of them),
+//! `uncertainty` (the set C), `assets` (one step with several assets), `surrogate` (what regresses V and the action), `bellman`
+//! (one step), `training` (all of them),
 //! `policy` (the document and how it answers), `evaluation` (strategies compared).
 //!
 //! | paper | name | printed as | file | checked by |
@@ -49,6 +50,7 @@
 //! Not the paper's: the floor gain that stands for V (`problem::utility`), radius rules other than (2.5) and (2.7), and the
 //! parametric frameworks (`bellman::normal`).
 
+pub mod assets;
 pub mod bellman;
 pub mod controlled_training;
 pub mod error;

@@ -75,6 +75,49 @@ impl RelativeUtility {
         relative
     }
 
+    /// The utility and its derivative at relative wealth W = e^w, above 0: U(W) = u(ln W) and U'(W).
+    pub fn at(self, wealth: f64) -> (f64, f64) {
+        match self {
+            RelativeUtility::Exponential { k } => {
+                let exponent = (-k * (wealth - 1.0)).min(LARGEST_EXPONENT);
+                let power = exponent.exp_m1();
+                (-power / k, power + 1.0)
+            }
+            RelativeUtility::Power { eta } => {
+                let power = ((1.0 - eta) * wealth.ln()).min(LARGEST_EXPONENT).exp_m1();
+                (power / (1.0 - eta), (power + 1.0) / wealth)
+            }
+            RelativeUtility::Log => (wealth.ln(), 1.0 / wealth),
+        }
+    }
+
+    /// `-W U''(W) / U'(W)`.
+    pub fn relative_aversion(self, wealth: f64) -> f64 {
+        match self {
+            RelativeUtility::Exponential { k } => k * wealth,
+            RelativeUtility::Power { eta } => eta,
+            RelativeUtility::Log => 1.0,
+        }
+    }
+
+    /// The y at which `U'(b + y) y` is largest, b `fixed`; it rises up to there and falls from there on.
+    pub fn steepest(self, fixed: f64) -> f64 {
+        match self {
+            RelativeUtility::Exponential { k } => 1.0 / k,
+            RelativeUtility::Power { eta } => fixed / (eta - 1.0),
+            RelativeUtility::Log => f64::INFINITY,
+        }
+    }
+
+    /// What `U'(b + y) y` tends to as y falls to 0, b `fixed`: 0 wherever something is left.
+    pub fn steepness_of_ruin(self, fixed: f64) -> f64 {
+        match self {
+            RelativeUtility::Log if fixed <= 0.0 => 1.0,
+            RelativeUtility::Power { .. } if fixed <= 0.0 => f64::INFINITY,
+            _ => 0.0,
+        }
+    }
+
     /// The log gain whose utility is `value`: the log certainty equivalent over the floor.
     pub fn inverse(self, value: f64) -> f64 {
         match self {
@@ -145,6 +188,29 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn by_wealth_it_is_the_utility_of_its_logarithm_and_steepest_where_it_says() {
+        for utility in
+            [RelativeUtility::Exponential { k: 1.2 }, RelativeUtility::Power { eta: 3.0 }, RelativeUtility::Log]
+        {
+            for wealth in [0.2, 0.9, 1.0, 1.7_f64] {
+                let (value, slope) = utility.at(wealth);
+                assert!((value - utility.value(wealth.ln())).abs() < 1e-14 * (1.0 + value.abs()));
+                // Central differences: their error is 1e-8 of the third derivative, below 2000 here.
+                let difference = |step: f64| (utility.at(wealth + step).0 - utility.at(wealth - step).0) / (2.0 * step);
+                assert!((difference(1e-4) - slope).abs() < 1e-4 * slope, "{utility:?} {wealth}");
+                let falls = (utility.at(wealth + 1e-4).1 - utility.at(wealth - 1e-4).1) / -2e-4;
+                assert!((wealth * falls / slope / utility.relative_aversion(wealth) - 1.0).abs() < 1e-4);
+            }
+            let taken = |moving: f64| utility.at(0.4 + moving).1 * moving;
+            let peak = utility.steepest(0.4).min(1e6);
+            assert!(taken(peak) >= taken(0.9 * peak) && taken(peak) >= taken(1.1 * peak) || peak == 1e6, "{utility:?}");
+            assert!((taken(1e-9) - utility.steepness_of_ruin(0.4)).abs() < 1e-7);
+        }
+        assert_eq!(RelativeUtility::Log.steepness_of_ruin(0.0), 1.0);
+        assert_eq!(RelativeUtility::Power { eta: 3.0 }.steepness_of_ruin(0.0), f64::INFINITY);
     }
 
     #[test]

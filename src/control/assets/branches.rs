@@ -1,0 +1,295 @@
+//! What the adversary can do to each atom at one allocation and one price of distance: to leave it, or to move it to where
+//! moving further does not pay any more.
+//!
+//! An atom that is moved along its levelling for the cost D pays `f(D) = u(w(D)) + gamma D`. Along a phase, in which y falls and
+//! b stays, `w = b + y` and f falls by `U'(w) y / rate - gamma` per unit of D. In ln y that slope rises to one peak and falls, so
+//! f has at most one local minimum inside a phase, on the side of small y, where U' y still grows. Where a position reaches its
+//! floor f may have a local minimum at the end of a phase. With the atom left where it is these are all that a worst law needs.
+
+use super::AssetsStep;
+use crate::control::problem::utility::RelativeUtility;
+use crate::numerics::levelling::{Levelling, Phase};
+
+/// Newton steps for a local minimum, which it is approached from one side by; they double the digits from the third or so on.
+const NEWTON_STEPS: usize = 40;
+const NEWTON_TOLERANCE: f64 = 1e-13;
+/// At 1 a local minimum and a maximum meet.
+const MOST_FOLLOWED: f64 = 1.0 - 1e-4;
+
+/// One way of the adversary with an atom.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Branch {
+    /// Distance that it moves the atom by.
+    pub cost: f64,
+    /// `u(w) + gamma D`.
+    pub payoff: f64,
+    /// `U'(w)`, by relative wealth.
+    pub slope: f64,
+    /// The curvature of the payoff against what does not move, over the slope.
+    pub bend: f64,
+    /// The level to which positions are lowered; infinite where the atom is left.
+    pub level: f64,
+    /// True where the level follows allocation and price: at a local minimum inside a phase.
+    pub follows: bool,
+}
+
+/// All branches of all atoms; those of an atom lie together, the first leaves it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Branches {
+    assets: usize,
+    /// Where those of an atom start, and the end.
+    pub first: Vec<usize>,
+    pub all: Vec<Branch>,
+    /// Growth over the bank, less 1, asset by asset of each branch.
+    excesses: Vec<f64>,
+    /// The derivative of what does not move by the allocation and by gamma.
+    still: Vec<f64>,
+    levelling: Levelling,
+    /// The last local minimum inside a phase: most atoms share their last phase.
+    last: Inside,
+    /// False where some atom pays the less the further it is moved, without an end.
+    pub bounded: bool,
+}
+
+impl Branches {
+    pub fn excess(&self, branch: usize) -> &[f64] {
+        &self.excesses[branch * self.assets..][..self.assets]
+    }
+
+    pub fn still(&self, branch: usize) -> &[f64] {
+        &self.still[branch * (self.assets + 1)..][..self.assets + 1]
+    }
+
+    /// Branches of an atom.
+    pub fn of(&self, atom: usize) -> std::ops::Range<usize> {
+        self.first[atom]..self.first[atom + 1]
+    }
+
+    /// The branch of an atom that pays least.
+    pub fn worst(&self, atom: usize) -> usize {
+        self.of(atom)
+            .min_by(|&left, &right| self.all[left].payoff.total_cmp(&self.all[right].payoff))
+            .unwrap_or_default()
+    }
+
+    /// Finds the branches at a point. Cost O(n d ln d).
+    pub fn find(&mut self, step: &AssetsStep, allocation: &[f64], price: f64) {
+        self.start(step);
+        for atom in 0..step.atoms() {
+            self.find_of(step, atom, allocation, price);
+            self.first.push(self.all.len());
+        }
+    }
+
+    /// Finds the branches at a point, and keeps beside them, as moves that stay, those of `before` that have gone and that
+    /// `counts` still: what is gone may come back, far below.
+    pub fn find_after(
+        &mut self,
+        step: &AssetsStep,
+        allocation: &[f64],
+        price: f64,
+        before: &Branches,
+        counts: impl Fn(usize, usize) -> bool,
+    ) {
+        self.start(step);
+        for atom in 0..step.atoms() {
+            let from = self.all.len();
+            self.find_of(step, atom, allocation, price);
+            let found = from + 1..self.all.len();
+            for gone in before.of(atom).skip(1) {
+                let level = before.all[gone].level;
+                if counts(atom, gone) && !found.clone().any(|branch| near(self.all[branch].level, level)) {
+                    let (cost, row) = (before.all[gone].cost, before.excess(gone));
+                    self.push(step.utility, price, allocation, row.iter().copied(), cost, level);
+                }
+            }
+            self.first.push(self.all.len());
+        }
+    }
+
+    /// The branch of an atom `before` that this one of now continues.
+    pub fn continued(&self, atom: usize, branch: usize, before: &Branches) -> Option<usize> {
+        let of = before.of(atom);
+        if branch == self.first[atom] {
+            return Some(of.start);
+        }
+        let level = self.all[branch].level;
+        let apart = |other: &usize| (before.all[*other].level / level).max(level / before.all[*other].level);
+        let close = (of.start + 1..of.end).filter(|&other| near(before.all[other].level, level));
+        close.min_by(|left, right| apart(left).total_cmp(&apart(right)))
+    }
+
+    fn start(&mut self, step: &AssetsStep) {
+        self.assets = step.assets();
+        self.first.clear();
+        self.first.push(0);
+        self.all.clear();
+        self.excesses.clear();
+        self.still.clear();
+        self.bounded = true;
+        self.last = Inside::default();
+    }
+
+    /// Adds a move that stays as it is.
+    fn push(
+        &mut self,
+        utility: RelativeUtility,
+        price: f64,
+        allocation: &[f64],
+        excess: impl Iterator<Item = f64>,
+        cost: f64,
+        level: f64,
+    ) {
+        let start = self.excesses.len();
+        self.excesses.extend(excess);
+        let row = &self.excesses[start..];
+        let wealth = 1.0 + row.iter().zip(allocation).map(|(excess, share)| excess * share).sum::<f64>();
+        self.still.extend(row);
+        self.still.push(0.0);
+        let (value, slope) = utility.at(wealth);
+        let bend = utility.relative_aversion(wealth) / wealth;
+        self.all.push(Branch { cost, payoff: value + price * cost, slope, bend, level, follows: false });
+    }
+
+    fn find_of(&mut self, step: &AssetsStep, atom: usize, allocation: &[f64], price: f64) {
+        let growths = step.growth(atom);
+        self.push(step.utility, price, allocation, growths.iter().map(|growth| growth - 1.0), 0.0, f64::INFINITY);
+        if step.radius <= 0.0 {
+            return;
+        }
+        let slope = self.all[self.first[atom]].slope;
+        let mut levelling = std::mem::take(&mut self.levelling);
+        let rest = (1.0 - allocation.iter().sum::<f64>()).max(0.0);
+        let (mut positions, mut floors) = ([0.0; super::MOST_ASSETS], [0.0; super::MOST_ASSETS]);
+        for (index, (&share, &growth)) in allocation.iter().zip(growths).enumerate() {
+            (positions[index], floors[index]) = (share * growth, share * step.least_growth.min(growth));
+        }
+        let count = allocation.len();
+        let phases = levelling.phases(rest, &positions[..count], &floors[..count], &step.ground);
+        let mut last = self.last;
+        let bounded = local_minima(phases, step.utility, price, slope, &mut last, |level, follows| {
+            let start = self.still.len();
+            let (mut wealth, mut moving) = (rest, 0.0);
+            for (index, &share) in allocation.iter().enumerate() {
+                let position = step.ground.lowered(index, positions[index], floors[index], level);
+                wealth += position;
+                // What is not held moves for nothing where all move together, and does not move where each is paid for.
+                let growth = match share > 0.0 {
+                    true => position / share,
+                    false if step.ground.is_sup() => {
+                        (growths[index] * level).max(step.least_growth).min(growths[index])
+                    }
+                    false => growths[index],
+                };
+                let moves = follows && position < positions[index] && position > floors[index];
+                moving += if moves { position } else { 0.0 };
+                self.excesses.push(growth - 1.0);
+                self.still.push(if moves { -1.0 } else { growth - 1.0 });
+            }
+            let cost = step.ground.cost(count, level, |index| {
+                positions[index] / step.ground.lowered(index, positions[index], floors[index], level)
+            });
+            let (value, slope) = step.utility.at(wealth);
+            let aversion = step.utility.relative_aversion(wealth) / wealth;
+            // Where the level follows only just, it would follow without bounds: such a move counts as one that stays.
+            let (room, follows) = (1.0 - aversion * moving, follows && aversion * moving < MOST_FOLLOWED);
+            if follows {
+                self.still.push(moving / price);
+            } else {
+                self.still.truncate(start);
+                self.still.extend_from_slice(&self.excesses[self.excesses.len() - count..]);
+                self.still.push(0.0);
+            }
+            let bend = if follows { aversion / room } else { aversion };
+            self.all.push(Branch { cost, payoff: value + price * cost, slope, bend, level, follows });
+        });
+        (self.levelling, self.last) = (levelling, last);
+        self.bounded &= bounded;
+    }
+}
+
+/// A local minimum inside a phase, of a price: it depends on what stays and on the rate alone.
+#[derive(Debug, Clone, Copy, Default)]
+struct Inside {
+    fixed: f64,
+    rate: f64,
+    /// What a unit of distance takes where it takes most.
+    at_peak: f64,
+    /// What moves; NaN before it is asked for.
+    moving: f64,
+}
+
+/// Levels as near as those of one branch before and after a step.
+fn near(left: f64, right: f64) -> bool {
+    (1.0 / 3.0..3.0).contains(&(left / right))
+}
+
+/// Tells the level of every local minimum of u(w) + price D along the phases, but for D = 0, and whether it lies inside a phase.
+/// `slope` is U' where nothing is moved. False where there is no least value: it falls for ever.
+fn local_minima(
+    phases: &[Phase],
+    utility: RelativeUtility,
+    price: f64,
+    mut slope: f64,
+    last: &mut Inside,
+    mut found: impl FnMut(f64, bool),
+) -> bool {
+    // What a unit of distance takes just before a phase starts; the first one starts at the atom itself.
+    let mut before = None;
+    for phase in phases.iter().rev() {
+        let &Phase { fixed, speed, rate, high, low } = phase;
+        let start = slope * speed * high / rate;
+        if before.is_some_and(|before| before > price && start <= price) {
+            found(high, false);
+        }
+        let end = if low > 0.0 {
+            slope = utility.at(fixed + speed * low).1;
+            slope * speed * low / rate
+        } else {
+            utility.steepness_of_ruin(fixed) / rate
+        };
+        before = Some(end);
+        if end < price {
+            let peak = utility.steepest(fixed);
+            if last.fixed != fixed || last.rate != rate {
+                let at_peak = if peak < f64::INFINITY { utility.at(fixed + peak).1 * peak / rate } else { 0.0 };
+                *last = Inside { fixed, rate, at_peak, moving: f64::NAN };
+            }
+            if start > price || (peak < speed * high && last.at_peak > price) {
+                if last.moving.is_nan() {
+                    last.moving = inside(phase, utility, price, peak.min(speed * high));
+                }
+                found(last.moving / speed, true);
+            }
+        }
+    }
+    match (before, phases.first()) {
+        (Some(before), Some(last)) if before > price && last.low > 0.0 => found(last.low, false),
+        (Some(before), Some(_)) => return before <= price,
+        _ => {}
+    }
+    true
+}
+
+/// The y below `peak` at which `U'(b + y) y / rate` is the price: by Newton's method in ln y on the logarithms, whose difference
+/// is concave there, from the left.
+fn inside(phase: &Phase, utility: RelativeUtility, price: f64, peak: f64) -> f64 {
+    let &Phase { fixed, speed, rate, low, .. } = phase;
+    let target = price * rate;
+    let mut moving = if matches!(utility, RelativeUtility::Log) {
+        // y / (b + y) = target.
+        return (target * fixed / (1.0 - target)).min(peak);
+    } else {
+        (speed * low).max(target / utility.at(fixed).1).min(peak)
+    };
+    for _ in 0..NEWTON_STEPS {
+        let wealth = fixed + moving;
+        let short = (target / (utility.at(wealth).1 * moving)).ln();
+        let step = short / (1.0 - utility.relative_aversion(wealth) * moving / wealth);
+        moving = (moving * step.exp()).min(peak);
+        if step.abs() < NEWTON_TOLERANCE {
+            break;
+        }
+    }
+    moving
+}

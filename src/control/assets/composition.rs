@@ -1,0 +1,87 @@
+//! The composition of a fund: what share of it each asset has, whatever the share of wealth in the fund.
+
+use super::AssetsSolution;
+use crate::numerics::levelling::inverse_volatility;
+
+/// A total below this says nothing about its parts.
+const LEAST_TOTAL: f64 = 1e-4;
+
+/// How the composition of the fund is chosen.
+#[derive(Debug, Clone, PartialEq)]
+pub enum CompositionRule {
+    /// That of the allocation that solves the one-step problem; inverse volatilities where it holds nothing.
+    OneStep,
+    /// Equal shares.
+    Equal,
+    /// Shares in inverse proportion to the deviations of the returns.
+    InverseVolatility,
+    /// These shares, which sum to 1.
+    Given(Vec<f64>),
+}
+
+impl CompositionRule {
+    /// The composition after the log-returns `rows`, date by date; `one_step` solves the one-step problem, where it is asked.
+    pub fn composition(&self, rows: &[Vec<f64>], one_step: impl FnOnce() -> AssetsSolution) -> Vec<f64> {
+        match self {
+            CompositionRule::OneStep => of(&one_step().allocation).unwrap_or_else(|| inverse_volatility(rows)),
+            CompositionRule::Equal => {
+                let assets = rows.first().map_or(0, Vec::len);
+                vec![1.0 / assets as f64; assets]
+            }
+            CompositionRule::InverseVolatility => inverse_volatility(rows),
+            CompositionRule::Given(shares) => shares.clone(),
+        }
+    }
+}
+
+/// The composition of an allocation; `None` where it holds next to nothing.
+pub fn of(allocation: &[f64]) -> Option<Vec<f64>> {
+    let total: f64 = allocation.iter().sum();
+    (total >= LEAST_TOTAL).then(|| allocation.iter().map(|share| share / total).collect())
+}
+
+/// The guard of the promise: a new composition takes the place of the one held only where the policy values the law of its fund
+/// at least as much. `value` is the policy's value at the law of a fund's returns, given the fund.
+///
+/// Then what the policy promises at the fund held stays true whatever proposes the new one: by induction over the steps the
+/// payoff depends on the returns through the fund held alone, and what follows is worth at least what keeping it would be.
+pub fn guarded(held: Vec<f64>, proposed: Vec<f64>, value: impl Fn(&[f64]) -> f64) -> Vec<f64> {
+    if value(&proposed) >= value(&held) { proposed } else { held }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn solution(allocation: &[f64]) -> AssetsSolution {
+        AssetsSolution {
+            allocation: allocation.to_vec(),
+            value: 0.0,
+            bound: 0.0,
+            multiplier: 0.0,
+            mean_moves: vec![0.0; allocation.len()],
+            evaluations: 0,
+        }
+    }
+
+    #[test]
+    fn every_rule_gives_shares_that_sum_to_1() {
+        // Deviations 0.02 and 0.04.
+        let rows = vec![vec![0.03, -0.03], vec![-0.01, 0.05]];
+        let never = || unreachable!("no other rule solves the one-step problem");
+        assert_eq!(CompositionRule::Equal.composition(&rows, never), [0.5, 0.5]);
+        let inverse = CompositionRule::InverseVolatility.composition(&rows, never);
+        assert!((inverse[0] - 2.0 / 3.0).abs() < 1e-12 && (inverse[1] - 1.0 / 3.0).abs() < 1e-12, "{inverse:?}");
+        assert_eq!(CompositionRule::Given(vec![0.9, 0.1]).composition(&rows, never), [0.9, 0.1]);
+        assert_eq!(CompositionRule::OneStep.composition(&rows, || solution(&[0.125, 0.375])), [0.25, 0.75]);
+        assert_eq!(CompositionRule::OneStep.composition(&rows, || solution(&[0.0, 0.0])), inverse);
+    }
+
+    #[test]
+    fn a_composition_that_the_policy_values_less_is_not_taken() {
+        let value = |fund: &[f64]| fund[0];
+        assert_eq!(guarded(vec![0.5, 0.5], vec![0.4, 0.6], value), [0.5, 0.5]);
+        assert_eq!(guarded(vec![0.5, 0.5], vec![0.6, 0.4], value), [0.6, 0.4]);
+        assert_eq!(guarded(vec![0.5, 0.5], vec![0.5, 0.5], value), [0.5, 0.5]);
+    }
+}

@@ -1,0 +1,191 @@
+//! How far a sum of positions can be lowered by moving their logarithms, at a cost.
+//!
+//! Positions h_i > 0 fall to h_i e^(-delta_i), none below its floor. The cost of a move is the largest delta_i, or the sum of
+//! k_i delta_i. The least sum at every cost is reached along one path:
+//!
+//!   max_i delta_i    all positions fall by the same share, each until it is at its floor;
+//!   sum k_i delta_i  the positions of largest h_i / k_i fall first, to one level of it: h_i -> min(h_i, k_i level).
+//!
+//! (The sum is convex in the moves: dear ones bring equal gains, h_i e^(-delta_i) = k_i level.) Both are the same path of a
+//! level that falls: a position of speed s_i is held between its floor and where it was, `clamp(s_i level)`, with s_i = k_i, or
+//! s_i = h_i and a level that starts at 1. Between two levels at which a position starts or ends to move, the moving ones are
+//! one number y that falls, and y to y' costs `rate ln(y / y')`.
+
+/// What moving logarithms of positions costs.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ground {
+    /// The largest move.
+    Sup,
+    /// The sum of the moves, each times its weight; positive weights.
+    Weighted(Vec<f64>),
+}
+
+impl Ground {
+    /// True where the largest move is all that costs.
+    pub fn is_sup(&self) -> bool {
+        matches!(self, Ground::Sup)
+    }
+
+    /// How fast a position moves per unit of level.
+    fn speed(&self, index: usize, position: f64) -> f64 {
+        match self {
+            Ground::Sup => position,
+            Ground::Weighted(weights) => weights[index],
+        }
+    }
+
+    /// Where a position is once the level is reached.
+    pub fn lowered(&self, index: usize, position: f64, floor: f64, level: f64) -> f64 {
+        (self.speed(index, position) * level).max(floor).min(position)
+    }
+
+    /// The cost of positions as they are once the level is reached: `ratio(i)` is the position over what it is then.
+    pub fn cost(&self, count: usize, level: f64, ratio: impl Fn(usize) -> f64) -> f64 {
+        match self {
+            Ground::Sup => -level.min(1.0).ln(),
+            Ground::Weighted(weights) => {
+                let moved = (0..count).map(|index| (weights[index], ratio(index))).filter(|(_, ratio)| *ratio > 1.0);
+                moved.map(|(weight, ratio)| weight * ratio.ln()).sum()
+            }
+        }
+    }
+}
+
+/// A stretch of the path along which the same positions move: the sum is `fixed + speed * level`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Phase {
+    /// The sum of what does not move, with what is no position at all.
+    pub fixed: f64,
+    /// What moves, per unit of level.
+    pub speed: f64,
+    /// What moves falls from y to y' at the cost of this times ln(y / y').
+    pub rate: f64,
+    /// The level at which the phase starts.
+    pub high: f64,
+    /// The lower level at which it ends, 0 for a phase without an end.
+    pub low: f64,
+}
+
+/// The path of one set of positions, and the memory for the next.
+#[derive(Debug, Clone, Default)]
+pub struct Levelling {
+    /// Levels at which a position ends (true) or starts (false) to move, ascending.
+    turns: Vec<(f64, bool, usize)>,
+    /// From the lowest level up.
+    phases: Vec<Phase>,
+}
+
+impl Levelling {
+    /// The phases of the path from the lowest level up. `rest` is what the sum holds beside the positions; a position at or
+    /// below its floor, or of 0, does not move. Cost O(d ln d) for d positions.
+    ///
+    /// Sums run from the lowest level up, so that the small ones, of which a logarithm is taken, are not rounded by large ones.
+    pub fn phases(&mut self, rest: f64, positions: &[f64], floors: &[f64], ground: &Ground) -> &[Phase] {
+        self.turns.clear();
+        self.phases.clear();
+        let (mut fixed, mut speed, mut rate, mut moving, mut low) = (rest, 0.0, 0.0, 0_usize, 0.0);
+        for (index, (&position, &floor)) in positions.iter().zip(floors).enumerate() {
+            if position <= floor || position <= 0.0 {
+                fixed += position;
+                continue;
+            }
+            fixed += floor;
+            let own = ground.speed(index, position);
+            self.turns.extend([(floor / own, true, index), (position / own, false, index)]);
+        }
+        self.turns.sort_unstable_by(|left, right| left.0.total_cmp(&right.0));
+        for &(level, ends, index) in &self.turns {
+            if level > low && moving > 0 {
+                let rate = if ground.is_sup() { 1.0 } else { rate };
+                self.phases.push(Phase { fixed, speed, rate, high: level, low });
+            }
+            low = level;
+            let own = ground.speed(index, positions[index]);
+            let weight = if let Ground::Weighted(weights) = ground { weights[index] } else { 0.0 };
+            if ends {
+                (fixed, speed, rate, moving) = (fixed - floors[index], speed + own, rate + weight, moving + 1);
+            } else {
+                (fixed, speed, rate, moving) = (fixed + positions[index], speed - own, rate - weight, moving - 1);
+            }
+        }
+        &self.phases
+    }
+}
+
+/// `(1 / sigma_i) / sum_l (1 / sigma_l)` of a sample, row by row: moving every coordinate by s costs s. Deviations are the
+/// sample's own; one without any counts as the smallest of the others, and without others all count alike.
+pub fn inverse_volatility(rows: &[Vec<f64>]) -> Vec<f64> {
+    let (count, width) = (rows.len().max(1) as f64, rows.first().map_or(0, Vec::len));
+    let deviation = |column: usize| {
+        let mean = rows.iter().map(|row| row[column]).sum::<f64>() / count;
+        (rows.iter().map(|row| (row[column] - mean).powi(2)).sum::<f64>() / count).sqrt()
+    };
+    let deviations: Vec<f64> = (0..width).map(deviation).collect();
+    let least = deviations.iter().copied().filter(|deviation| *deviation > 0.0).fold(f64::INFINITY, f64::min);
+    let inverse = |deviation: &f64| if least.is_finite() { 1.0 / deviation.max(least) } else { 1.0 };
+    let whole: f64 = deviations.iter().map(inverse).sum();
+    deviations.iter().map(|deviation| inverse(deviation) / whole).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::RngExt;
+
+    use super::*;
+    use crate::numerics::streams::stream;
+
+    /// The sum at a cost, along the phases from the top down.
+    fn least(phases: &[Phase], whole: f64, mut cost: f64) -> f64 {
+        let mut sum = whole;
+        for phase in phases.iter().rev() {
+            let whole = phase.rate * (phase.high / phase.low).ln();
+            let level = if whole <= cost { phase.low } else { phase.high * (-cost / phase.rate).exp() };
+            sum = phase.fixed + phase.speed * level;
+            cost -= whole;
+            if cost <= 0.0 {
+                break;
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn no_move_of_the_same_cost_lowers_the_sum_further() {
+        let mut random = stream(5, "levelling", 0, 0);
+        for case in 0..40 {
+            let draw = |low: f64, high: f64, random: &mut _| low + (high - low) * RngExt::random::<f64>(random);
+            let positions: Vec<f64> = (0..3).map(|_| draw(0.0, 1.0, &mut random)).collect();
+            let share = if case % 2 == 0 { 0.0 } else { 0.6 };
+            let floors: Vec<f64> = positions.iter().map(|position| position * draw(0.0, share, &mut random)).collect();
+            let weights: Vec<f64> = (0..3).map(|_| draw(0.1, 1.0, &mut random)).collect();
+            let (rest, cost) = (draw(0.0, 0.5, &mut random), draw(0.0, 1.5, &mut random));
+            for ground in [Ground::Sup, Ground::Weighted(weights.clone())] {
+                let whole = rest + positions.iter().sum::<f64>();
+                let mut levelling = Levelling::default();
+                let found = least(levelling.phases(rest, &positions, &floors, &ground), whole, cost);
+                // All moves of this cost on a grid: of the sum, what is left of the budget moves the third position.
+                let steps = 400;
+                let mut best = f64::INFINITY;
+                for (first, second) in (0..=steps).flat_map(|first| (0..=steps).map(move |second| (first, second))) {
+                    let part = |index: usize, count: i32| match ground {
+                        Ground::Sup => cost,
+                        Ground::Weighted(_) => cost / weights[index] * f64::from(count) / f64::from(steps),
+                    };
+                    let spent = weights[0] * part(0, first) + weights[1] * part(1, second);
+                    let third = if ground == Ground::Sup { cost } else { (cost - spent) / weights[2] };
+                    if third < -1e-12 {
+                        continue;
+                    }
+                    let moves = [part(0, first), part(1, second), third];
+                    let lowered = |index: usize| (positions[index] * (-moves[index]).exp()).max(floors[index]);
+                    best = best.min(rest + (0..3).map(lowered).sum::<f64>());
+                    if ground == Ground::Sup {
+                        break;
+                    }
+                }
+                // A grid of a 400th of the budget is off by its square, times what is moved.
+                assert!(found <= best + 1e-12 && found > best - 2e-3, "{ground:?}: {found} {best}");
+            }
+        }
+    }
+}

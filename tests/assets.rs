@@ -1,0 +1,338 @@
+//! The one-step problem of several assets: against direct solutions, one asset, and laws of its own ball.
+
+use ballast::control::assets::{AssetsLaw, AssetsSolution, AssetsStep};
+use ballast::control::problem::actions::ActionInterval;
+use ballast::control::problem::utility::RelativeUtility;
+use ballast::control::request::specification::UtilitySpecification;
+use ballast::numerics::bridge::Quantile;
+use ballast::numerics::fund_bridges::FundBridges;
+use ballast::numerics::levelling::{Ground, inverse_volatility};
+use ballast::numerics::streams::stream;
+use ballast::numerics::wasserstein::WassersteinBall;
+use rand::RngExt;
+use serde_json::Value;
+
+/// A hundredth of a percent.
+const BP: f64 = 1e-4;
+const WHOLE: ActionInterval = ActionInterval { lowest: 0.0, highest: 1.0 };
+
+fn rows(value: &Value) -> Vec<Vec<f64>> {
+    serde_json::from_value(value.clone()).unwrap()
+}
+
+fn ground(name: &str, returns: &[Vec<f64>]) -> Ground {
+    match name {
+        "sup" => Ground::Sup,
+        _ => Ground::Weighted(inverse_volatility(returns)),
+    }
+}
+
+fn utility(case: &Value) -> RelativeUtility {
+    let risk_aversion = case["risk_aversion"].as_f64().unwrap();
+    let floor = case["wealth"].as_f64().unwrap() * (1.0 + case["rate_per_step"].as_f64().unwrap());
+    let utility = match case["utility"].as_str().unwrap() {
+        "power" => UtilitySpecification::Power { risk_aversion },
+        "log" => UtilitySpecification::Log {},
+        _ => UtilitySpecification::exponential(risk_aversion),
+    };
+    RelativeUtility::new(utility, floor)
+}
+
+fn certified(solution: &AssetsSolution) {
+    let gap = solution.bound - solution.value;
+    // The contract: a hundredth of a hundredth of a percent.
+    assert!((0.0..0.01 * BP).contains(&gap), "{} hundredths of a percent apart: {solution:?}", gap / BP);
+}
+
+#[test]
+fn direct_solutions_are_met() {
+    let oracle: Value = serde_json::from_str(include_str!("data/assets.json")).unwrap();
+    let cases = oracle["cases"].as_array().unwrap();
+    assert_eq!(cases.len(), 26);
+    for (index, case) in cases.iter().enumerate() {
+        let returns = rows(&case["returns"]);
+        let law = AssetsLaw {
+            returns: &returns,
+            radius: case["radius"].as_f64().unwrap(),
+            floor: case["floor"].as_f64().unwrap_or(f64::NEG_INFINITY),
+        };
+        let ground = ground(case["norm"].as_str().unwrap(), &returns);
+        let step = AssetsStep::new(law, ground, utility(case), case["rate_per_step"].as_f64().unwrap(), WHOLE);
+        let solution = step.solve(None);
+        certified(&solution);
+        let expected = case["log_certainty_equivalent_over_bank"].as_f64().unwrap();
+        assert!((solution.value - expected).abs() < 0.02 * BP, "{index}: {} {expected}", solution.value / BP);
+        let allocation: Vec<f64> = serde_json::from_value(case["allocation"].clone()).unwrap();
+        let apart = solution.allocation.iter().zip(&allocation).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        // Where the value is flat, another allocation of the same value.
+        let worth = step.worth(&allocation).value;
+        assert!(
+            apart < 0.005 || (solution.value - worth).abs() < 0.002 * BP,
+            "{index}: {:?} {allocation:?}",
+            solution.allocation
+        );
+    }
+}
+
+/// Log-returns of `assets` with a common part, of deviation 0.05 a period and mean 0.008 to 0.016.
+fn sample(assets: usize, dates: usize, seed: usize) -> Vec<Vec<f64>> {
+    let mut random = stream(11, "assets", seed, 0);
+    let mut normal = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+    let row = |_| {
+        let common = normal();
+        let own = |asset: usize| 0.008 * (1.0 + asset as f64 / assets as f64) + 0.035 * (common + normal());
+        (0..assets).map(own).collect()
+    };
+    (0..dates).map(row).collect()
+}
+
+const POWER: RelativeUtility = RelativeUtility::Power { eta: 3.0 };
+const UTILITIES: [RelativeUtility; 3] = [POWER, RelativeUtility::Log, RelativeUtility::Exponential { k: 2.0 }];
+
+fn step(returns: &[Vec<f64>], ground: &Ground, utility: RelativeUtility, radius: f64, floor: f64) -> AssetsStep {
+    AssetsStep::new(AssetsLaw { returns, radius, floor }, ground.clone(), utility, 0.002, WHOLE)
+}
+
+fn without_floor(returns: &[Vec<f64>], ground: &Ground, utility: RelativeUtility, radius: f64) -> AssetsStep {
+    step(returns, ground, utility, radius, f64::NEG_INFINITY)
+}
+
+#[test]
+fn identical_columns_are_one_asset() {
+    let oracle: Value = serde_json::from_str(include_str!("data/last_step.json")).unwrap();
+    let mut checked = 0;
+    for case in oracle["cases"].as_array().unwrap() {
+        let history: Vec<f64> = serde_json::from_value(case["history"].clone()).unwrap();
+        for assets in [1, 3] {
+            let returns: Vec<Vec<f64>> = history.iter().map(|z| vec![*z; assets]).collect();
+            let even = Ground::Weighted(vec![1.0 / assets as f64; assets]);
+            for ground in [Ground::Sup, even] {
+                let radius = case["radius"].as_f64().unwrap();
+                let law = AssetsLaw { returns: &returns, radius, floor: f64::NEG_INFINITY };
+                let rate = case["rate_per_step"].as_f64().unwrap();
+                let step = AssetsStep::new(law, ground, utility(case), rate, WHOLE);
+                let solution = step.solve(None);
+                certified(&solution);
+                let bank = case["wealth"].as_f64().unwrap() * (1.0 + rate);
+                let expected = (case["certainty_equivalent"].as_f64().unwrap() / bank).ln();
+                // The oracle states 1e-7.
+                assert!((solution.value - expected).abs() < 0.02 * BP, "{case}: {solution:?}");
+                let total: f64 = solution.allocation.iter().sum();
+                let share = case["allocation"].as_f64().unwrap();
+                let flat =
+                    || (step.worth(&vec![share / assets as f64; assets]).value - solution.value).abs() < 0.002 * BP;
+                assert!((total - share).abs() < 0.005 || flat(), "{case}: {solution:?}");
+                checked += 1;
+            }
+        }
+    }
+    assert_eq!(checked, 72 * 4);
+}
+
+#[test]
+fn the_order_of_assets_and_those_not_held_change_nothing() {
+    let returns = sample(4, 40, 1);
+    let weights = inverse_volatility(&returns);
+    let order = [2, 0, 3, 1];
+    let turned = |row: &[f64]| order.map(|asset| row[asset]).to_vec();
+    let turned_returns: Vec<Vec<f64>> = returns.iter().map(|row| turned(row)).collect();
+    for utility in UTILITIES {
+        for (ground, other) in
+            [(Ground::Sup, Ground::Sup), (Ground::Weighted(weights.clone()), Ground::Weighted(turned(&weights)))]
+        {
+            let one = without_floor(&returns, &ground, utility, 0.004).solve(None);
+            let two = without_floor(&turned_returns, &other, utility, 0.004).solve(None);
+            certified(&one);
+            assert!((one.value - two.value).abs() < 0.002 * BP, "{one:?} {two:?}");
+            let apart = |(a, b): (&f64, &f64)| (a - b).abs() < 0.005;
+            assert!(turned(&one.allocation).iter().zip(&two.allocation).all(apart), "{one:?} {two:?}");
+        }
+        // The first two alone, and with two that are not held.
+        let fewer: Vec<Vec<f64>> = returns.iter().map(|row| row[..2].to_vec()).collect();
+        for (ground, less) in
+            [(Ground::Sup, Ground::Sup), (Ground::Weighted(weights.clone()), Ground::Weighted(weights[..2].to_vec()))]
+        {
+            let all = without_floor(&returns, &ground, utility, 0.004).worth(&[0.2, 0.3, 0.0, 0.0]);
+            let two = without_floor(&fewer, &less, utility, 0.004).worth(&[0.2, 0.3]);
+            // Sums of the same numbers.
+            assert!(
+                (all.value - two.value).abs() < 1e-12 && (all.primal - two.primal).abs() < 1e-12,
+                "{all:?} {two:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn another_asset_never_lowers_the_value_and_a_wider_ball_never_raises_it() {
+    let returns = sample(5, 60, 2);
+    let weights = inverse_volatility(&returns);
+    for utility in UTILITIES {
+        for sup in [true, false] {
+            let value = |assets: usize, radius: f64| {
+                let some: Vec<Vec<f64>> = returns.iter().map(|row| row[..assets].to_vec()).collect();
+                let ground = if sup { Ground::Sup } else { Ground::Weighted(weights[..assets].to_vec()) };
+                let solution = without_floor(&some, &ground, utility, radius).solve(None);
+                certified(&solution);
+                solution.value
+            };
+            let values: Vec<f64> = (1..=5).map(|assets| value(assets, 0.003)).collect();
+            // What a certified value may fall short by.
+            assert!(values.windows(2).all(|pair| pair[1] > pair[0] - 0.01 * BP), "{values:?}");
+            let values = [0.0, 0.001, 0.004, 0.016].map(|radius| value(5, radius));
+            assert!(values.windows(2).all(|pair| pair[1] < pair[0] + 0.01 * BP), "{values:?}");
+        }
+    }
+}
+
+/// The worst expectation over laws on a grid of moves of two assets, up and down, by the dual of that transport programme, whose
+/// one variable is the price of distance.
+fn by_programme(
+    returns: &[Vec<f64>],
+    ground: &Ground,
+    utility: RelativeUtility,
+    radius: f64,
+    allocation: &[f64],
+) -> f64 {
+    let offsets: Vec<f64> = (-20..=600).map(|index| f64::from(index) * 0.005).collect();
+    // Distance and utility of every place on the grid, atom by atom; both assets together as finely as one alone.
+    let places = |row: &Vec<f64>| {
+        let mut places = Vec::new();
+        for &first in &offsets {
+            for &second in offsets.iter().step_by(4).chain([&first]) {
+                let cost = match ground {
+                    Ground::Sup => first.abs().max(second.abs()),
+                    Ground::Weighted(weights) => weights[0] * first.abs() + weights[1] * second.abs(),
+                };
+                let growth = |z: f64, down: f64| (z - down).exp() / 1.002 - 1.0;
+                let wealth = 1.0 + allocation[0] * growth(row[0], first) + allocation[1] * growth(row[1], second);
+                places.push((cost, utility.at(wealth).0));
+            }
+        }
+        places
+    };
+    let atoms: Vec<Vec<(f64, f64)>> = returns.iter().map(places).collect();
+    let dual = |price: f64| {
+        let least = |places: &Vec<(f64, f64)>| {
+            places.iter().map(|(cost, utility)| utility + price * cost).fold(f64::INFINITY, f64::min)
+        };
+        atoms.iter().map(least).sum::<f64>() / atoms.len() as f64 - price * radius
+    };
+    // Concave in the price: by golden section, to rounding.
+    let (mut low, mut high) = (0.0, 2.0);
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    for _ in 0..60 {
+        let (left, right) = (high - golden * (high - low), low + golden * (high - low));
+        if dual(left) < dual(right) { low = left } else { high = right }
+    }
+    dual(0.5 * (low + high))
+}
+
+#[test]
+fn what_an_allocation_is_worth_agrees_with_the_transport_programme() {
+    let returns = sample(2, 3, 3);
+    for (ground, utility) in [
+        (Ground::Sup, POWER),
+        (Ground::Weighted(vec![0.6, 0.4]), POWER),
+        (Ground::Weighted(vec![0.3, 0.7]), RelativeUtility::Log),
+        (Ground::Weighted(vec![0.5, 0.5]), RelativeUtility::Exponential { k: 2.0 }),
+    ] {
+        let worth = without_floor(&returns, &ground, utility, 0.02).worth(&[0.25, 0.3]);
+        assert!((worth.primal - worth.value).abs() < 1e-9, "{worth:?}");
+        let programme = utility.inverse(by_programme(&returns, &ground, utility, 0.02, &[0.25, 0.3]));
+        // The grid holds fewer laws, so that its worst is no worse; it misses the least by the square of its step.
+        let above = programme - worth.value;
+        assert!(above > -1e-9 && above < 4e-6, "{ground:?} {utility:?}: {programme} {worth:?}");
+    }
+}
+
+#[test]
+fn all_in_is_worth_nothing_to_power_utility_and_the_radius_less_to_log_utility() {
+    let returns = sample(2, 20, 6);
+    let worth = |utility| without_floor(&returns, &Ground::Sup, utility, 0.02).worth(&[0.4, 0.6]).value;
+    assert_eq!(worth(POWER), f64::NEG_INFINITY);
+    let fund = |row: &Vec<f64>| (0.4 * row[0].exp() + 0.6 * row[1].exp()).ln();
+    let mean = returns.iter().map(fund).sum::<f64>() / returns.len() as f64;
+    // Log utility is a straight line in the fund's log-return: every law that spends the radius is as bad.
+    assert!((worth(RelativeUtility::Log) - (mean - 1.002_f64.ln() - 0.02)).abs() < 1e-9);
+}
+
+#[test]
+fn the_bounds_hold_between_the_bounds_of_the_total_and_with_a_floor() {
+    let returns = sample(3, 50, 4);
+    let ground = Ground::Weighted(inverse_volatility(&returns));
+    let total = ActionInterval { lowest: 0.3, highest: 0.7 };
+    for floor in [-0.3, f64::NEG_INFINITY] {
+        for utility in UTILITIES {
+            let law = AssetsLaw { returns: &returns, radius: 0.01, floor };
+            let step = AssetsStep::new(law, ground.clone(), utility, 0.002, total);
+            let solution = step.solve(None);
+            certified(&solution);
+            let sum: f64 = solution.allocation.iter().sum();
+            assert!((0.3 - 1e-5..=0.7).contains(&sum), "{solution:?}");
+            // No allocation tried is worth more than the bound, and the solution is worth what it says.
+            let worth = step.worth(&solution.allocation);
+            assert!((worth.value - solution.value).abs() < 0.01 * BP && worth.primal - worth.value < 1e-9, "{worth:?}");
+            for tried in [[0.1, 0.1, 0.1], [0.3, 0.2, 0.2], [0.0, 0.0, 0.5], [0.0, 0.35, 0.35], [0.4, 0.0, 0.0]] {
+                assert!(step.worth(&tried).primal < solution.bound + 1e-9, "{tried:?} {solution:?}");
+            }
+            // From a similar step, the same answer.
+            let near = step.solve(Some(&solution));
+            assert!((near.value - solution.value).abs() < 0.002 * BP, "{near:?} {solution:?}");
+        }
+    }
+}
+
+#[test]
+fn a_large_radius_at_a_fixed_total_leads_to_inverse_volatilities() {
+    let returns: Vec<Vec<f64>> = sample(3, 60, 5).iter().map(|row| vec![0.5 * row[0], row[1], 1.5 * row[2]]).collect();
+    let weights = inverse_volatility(&returns);
+    let total = ActionInterval { lowest: 0.2, highest: 0.2 };
+    let apart = |radius: f64| {
+        let law = AssetsLaw { returns: &returns, radius, floor: f64::NEG_INFINITY };
+        let step = AssetsStep::new(law, Ground::Weighted(weights.clone()), RelativeUtility::Log, 0.002, total);
+        let solution = step.solve(None);
+        certified(&solution);
+        let apart = |(share, weight): (&f64, &f64)| (share / 0.2 - weight).abs();
+        solution.allocation.iter().zip(&weights).map(apart).fold(0.0, f64::max)
+    };
+    let found = [0.0, 0.005, 0.02, 0.06].map(apart);
+    assert!(found[0] > 0.3 && found[3] < 0.1 && found[3] < found[2] && found[2] < found[0], "{found:?}");
+}
+
+#[test]
+fn a_ball_restricted_to_its_sample_has_the_worst_law_of_another_program() {
+    // The unit test of SDDP.jl's Wasserstein risk measure: of a payoff, the least is worst.
+    let ball = WassersteinBall { support: &[0.3, 0.4, 0.5, 0.6], masses: &[0.2, 0.4, 0.1, 0.3], radius: 0.1 };
+    let mut masses = [0.0_f64; 4];
+    for moved in ball.worst_law(&[1.2, 1.3, 1.1, 0.6]).moves {
+        masses[moved.to] += moved.mass;
+    }
+    for (found, expected) in masses.iter().zip([1.0 / 6.0, 0.0, 0.0, 5.0 / 6.0]) {
+        assert!((found - expected).abs() < 1e-12, "{masses:?}");
+    }
+}
+
+#[test]
+fn the_joint_factor_agrees_with_an_independent_simulation() {
+    let oracle: Value = serde_json::from_str(include_str!("data/slices.json")).unwrap();
+    let cases = oracle["cases"].as_array().unwrap();
+    assert_eq!(cases.len(), 3);
+    for case in cases {
+        let returns = rows(&case["returns"]);
+        let funds: Vec<Vec<f64>> = rows(&case["slices"]);
+        let alpha = case["alpha"].as_f64().unwrap();
+        let bridges = FundBridges::simulate(&returns, 20_000, 3);
+        let check = |found: Quantile, expected: &Value, error: &Value| {
+            let allowed = 4.0 * found.standard_error.hypot(error.as_f64().unwrap());
+            let expected = expected.as_f64().unwrap();
+            assert!((found.value - expected).abs() < allowed + 1e-8, "{found:?} {expected}");
+        };
+        for (index, fund) in funds.iter().enumerate() {
+            check(bridges.quantile(fund, alpha), &case["quantiles"][index], &case["quantile_standard_errors"][index]);
+        }
+        check(bridges.factor_among(&funds, alpha), &case["joint_factor"], &case["joint_factor_standard_error"]);
+        // The search finds more funds than these.
+        assert!(bridges.joint_factor(alpha).value > 0.98 * case["joint_factor"].as_f64().unwrap());
+    }
+}
