@@ -69,10 +69,7 @@ fn what_is_wrong_is_said_by_line_or_option() {
         (&["advise", MARKET, "--wealth", "0"], "--wealth is 0: must be a number in"),
         (&["advise", MARKET, "--trading-cost", "0.2"], "--trading-cost is 0.2: must be a number in [0, 0.1]"),
         (&["advise", MARKET, "--risk-aversion", "0.5"], "--risk-aversion is 0.5: must lie in [1, 100]"),
-        (
-            &["backtest", MARKET, "--out", file, "--window", "1100"],
-            "the file is 1109 periods: must hold at least 1112",
-        ),
+        (&["backtest", MARKET, "--out", file, "--window", "1100"], "the file is 1109 periods: must hold at least 1112"),
     ] {
         let output = ballast(arguments);
         assert_eq!(output.status.code(), Some(1), "{output:?}");

@@ -195,6 +195,10 @@ async fn a_frozen_policy_takes_over_its_own_record_and_no_other() {
         let (status, answer) = renew(&app, number, json!({ "policy": app.policy })).await;
         assert_eq!(status, expected, "{answer}");
     }
+    // Its set would not follow.
+    let correction = json!({ "correction": 1, "period": 2, "log_return": 0.01, "reason": "revised" });
+    let (status, refused) = app.post(&format!("/sessions/{}/corrections", app.session), &correction).await;
+    assert_eq!((status, refused["field"].as_str()), (StatusCode::UNPROCESSABLE_ENTITY, Some("period")), "{refused}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -91,7 +91,8 @@ impl Live {
 
     /// Whether the next policy is to be trained.
     pub fn is_due(&self) -> bool {
-        self.renew.is_some_and(|renew| self.step() >= renew.every)
+        let due = self.renew.and_then(|renew| renew.due(self.renewals, &self.current));
+        due.is_some_and(|due| self.observed >= due)
     }
 
     /// Periods observed by its policy.

@@ -247,9 +247,12 @@ impl<'a> Passage<'a> {
 
     /// Goes on under the policies that begin here.
     fn renew(&mut self) -> Result<(), FieldError> {
-        while let Some(next) = self.periods.stretches.get(self.stretch + 1).filter(|next| next.after == self.step) {
-            self.standing = self.standing.renewed(&self.record, next.window, next.terms.learning)?;
-            self.stretch += 1;
+        let begin = self.periods.stretches[self.stretch + 1..].iter().take_while(|next| next.after == self.step);
+        // The last one makes its law of the same returns, whatever those before it did.
+        self.stretch += begin.count();
+        let Stretch { after, window, terms, .. } = self.stretch();
+        if self.stretch > 0 && *after == self.step {
+            self.standing = self.standing.renewed(&self.record, *window, terms.learning)?;
         }
         Ok(())
     }

@@ -9,13 +9,15 @@ use crate::control::error::FieldError;
 use crate::control::policy::advice::Uncertainty;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::contributions::Contributions;
+use crate::control::request::framework::Framework;
 use crate::control::request::rules;
 use crate::control::request::specification::ProblemSpecification;
 use crate::control::request::terms::Terms;
 use crate::store::SessionRow;
 
-/// Renewals of a session: a replay passes through all of them.
+/// Renewals of a session, and the periods that it may pass by them: a replay passes through all of them.
 pub const MOST_RENEWALS: usize = 1_000;
+pub const MOST_PERIODS: usize = 5_200;
 
 /// How a session is renewed by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -80,6 +82,12 @@ pub struct Renewed {
 }
 
 impl Renewing {
+    /// Periods after which a session is due that was renewed so many times; `None` where it may not go on any longer.
+    pub(super) fn due(self, renewals: usize, current: &Stretch) -> Option<usize> {
+        let due = current.after + self.every;
+        (renewals < MOST_RENEWALS && due + current.terms.horizon <= MOST_PERIODS).then_some(due)
+    }
+
     /// # Errors
     /// A field breaks a rule, or sessions by the policy of this problem are not renewed by themselves.
     pub(super) fn check(self, problem: &ProblemSpecification) -> Result<(), FieldError> {
@@ -132,6 +140,21 @@ impl Stretch {
     /// The last period that its policy advises.
     pub fn horizon(&self) -> usize {
         self.after + self.terms.horizon
+    }
+
+    /// Whether its policy, of this framework, follows a correction of `period`.
+    ///
+    /// # Errors
+    /// The set of the policy is frozen at the returns up to that period.
+    pub(super) fn follows(&self, period: usize, framework: Framework) -> Result<(), FieldError> {
+        if period > self.after || !framework.is_frozen() {
+            return Ok(());
+        }
+        let rule = format!(
+            "must be later than {}: the set of the static policy is frozen at the returns up to there; renew onto another first",
+            self.after
+        );
+        Err(FieldError::new("period", period, rule))
     }
 
     /// What becomes of money in the period after `observed` periods of the session.

@@ -99,6 +99,7 @@ impl Sessions {
             }
             let (observed, renewals, current) = (periods.all.len(), periods.renewals(), periods.current().clone());
             let advisor = self.policies.advisor(tenant, &current.policy).await?;
+            current.follows(correct.period, advisor.specification().problem.framework)?;
             let putting = correct.clone();
             let put_right = move || periods.put_right(&putting);
             let PutRight { before, standing, log_return } = self.advising.run(tenant, put_right).await??;

@@ -12,7 +12,7 @@ use super::content::json;
 use super::error::ServiceError;
 use super::live::{Live, measured};
 use super::periods::Periods;
-use super::plan::{MOST_RENEWALS, Plan, Renew, Renewed, Stretch, check_window};
+use super::plan::{MOST_PERIODS, MOST_RENEWALS, Plan, Renew, Renewed, Stretch, check_window};
 use super::recording::numbered;
 use super::sessions::Sessions;
 use super::spans;
@@ -75,7 +75,15 @@ impl Sessions {
     ) -> Result<Decided, ServiceError> {
         let advisor = self.policies.advisor(tenant, &renew.policy).await?;
         let (observed, corrections, before) = (periods.all.len(), periods.corrections, periods.current().horizon());
-        let terms = Terms::of(&advisor.specification().problem);
+        let (plan, problem) = (Plan::of(&facts.row)?, &advisor.specification().problem);
+        plan.renew.map_or(Ok(()), |renew| renew.check(problem))?;
+        let terms = Terms::of(problem);
+        if observed + terms.horizon > MOST_PERIODS {
+            let rule = format!(
+                "must end after {MOST_PERIODS} periods of the session at most: open one on the record as it is now"
+            );
+            return Err(FieldError::new("policy", &renew.policy, rule).into());
+        }
         let (onto, window, learning) = (advisor.clone(), renew.window, terms.learning);
         let go_on = move || {
             let passage = periods.replay()?;
@@ -107,8 +115,7 @@ impl Sessions {
             created_ms: self.clock.now_milliseconds(),
             key: by.key.to_string(),
         };
-        let renew_next = Plan::of(&facts.row)?.renew;
-        let due = renew_next.map(|renew| observed + renew.every);
+        let due = plan.renew.and_then(|next| next.due(renew.renewal, &current));
         let onto = Onto { policy: renew.policy.clone(), horizon, periods: horizon.saturating_sub(before), due };
         let next = Live {
             seen: facts.seen.followed_by(&new),
@@ -118,7 +125,7 @@ impl Sessions {
             corrections,
             renewals: renew.renewal,
             current: Arc::new(current),
-            renew: renew_next,
+            renew: plan.renew,
             radius,
             advice: None,
         };

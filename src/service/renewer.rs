@@ -7,7 +7,7 @@
 //!
 //! An attempt that fails leaves the session as it is, and is followed by the next after a while that doubles each time.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::time::Duration;
 
 use serde::Serialize;
@@ -26,7 +26,7 @@ use super::sessions::{Name, Sessions};
 use super::shutdown::Shutdown;
 use super::standing::last_of;
 use crate::control::request::specification::{Interval, Specification};
-use crate::store::{Actor, JobRow, JobState, Store};
+use crate::store::{Actor, JobRow, JobState, Store, Tenant};
 
 /// Between two looks at jobs that train next policies.
 const PAUSE: Duration = Duration::from_millis(500);
@@ -35,9 +35,11 @@ const ROUND: Duration = Duration::from_secs(60);
 /// Before the second attempt; doubled before each one after it, up to the longest.
 const FIRST_DELAY: Duration = Duration::from_secs(60);
 const LONGEST_DELAY: Duration = Duration::from_hours(24);
+/// A step that takes longer is left to a later round: no session is in the way of others for longer.
+const PATIENCE: Duration = Duration::from_secs(10);
 /// Sessions read in one step of a round.
 const PAGE: usize = 256;
-/// Renewals of one tenant under way at a time in this process.
+/// Renewals of one tenant under way at a time in this process, and begun with in one round.
 const OF_ONE: usize = 256;
 /// Sessions told of that are not looked at yet; of more a round finds out.
 pub(super) const TOLD: usize = 1024;
@@ -150,7 +152,7 @@ impl Renewer {
 
     /// Begins with all sessions that are due.
     async fn find(&self, under_way: &mut UnderWay) {
-        let mut after = 0;
+        let (mut after, mut begun) = (0, HashMap::<Tenant, usize>::new());
         loop {
             let page = match self.store.due_sessions(PAGE, after).await {
                 Ok(page) => page,
@@ -162,7 +164,11 @@ impl Renewer {
             let Some((last, ..)) = page.last() else { return };
             after = *last;
             for (_, tenant, session) in page {
-                self.begin((tenant, session), under_way).await;
+                let of_one = begun.entry(tenant.clone()).or_default();
+                *of_one += 1;
+                if *of_one <= OF_ONE {
+                    self.begin((tenant, session), under_way).await;
+                }
             }
         }
     }
@@ -182,6 +188,9 @@ impl Renewer {
         for name in names {
             let Some(job) = under_way.remove(&name) else { continue };
             match self.store.job(&job).await {
+                Ok(Some(row)) if matches!(row.state, JobState::Queued | JobState::Running) => {
+                    under_way.insert(name, job);
+                }
                 Ok(Some(row)) if row.state == JobState::Failed || row.state == JobState::Cancelled => {
                     metrics::counter!(RENEWALS, "outcome" => "failed").increment(1);
                     tracing::warn!(session = name.1, job, error = row.error, "a renewal failed");
@@ -193,7 +202,8 @@ impl Renewer {
 
     /// Does the next step for a session; a step that fails is done again in a later round.
     async fn go_on(&self, name: Name, under_way: &mut UnderWay) {
-        match self.step(&name).await {
+        let step = tokio::time::timeout(PATIENCE, self.step(&name)).await;
+        match step.unwrap_or(Err(ServiceError::Busy)) {
             Ok(Left::Nothing) => {}
             Ok(Left::Job(job)) => drop(under_way.insert(name, job)),
             Err(error) => {
@@ -217,18 +227,25 @@ impl Renewer {
             (JobState::Succeeded, Some(policy)) => {
                 match self.onto(&live, policy, renew, attempts.number).await {
                     Ok(()) => return Ok(Left::Nothing),
-                    // The policy was deleted, or does not fit where the session stands by now.
-                    Err(ServiceError::Unknown { what: "policy", .. } | ServiceError::Field(_)) => {}
+                    // The policy was deleted, or does not fit where the session stands by now: another is trained, in a while.
+                    Err(error @ (ServiceError::Unknown { what: "policy", .. } | ServiceError::Field(_))) => {
+                        if self.is_early(last, attempts.count) {
+                            return Err(error);
+                        }
+                    }
                     Err(error) => return Err(error),
                 }
             }
+            _ if self.is_early(last, attempts.count) => return Ok(Left::Nothing),
             _ => {}
         }
+        self.train(&live, renew, &attempts).await
+    }
+
+    /// Whether it is too early for the attempt after `count` of them, of which `last` was the last.
+    fn is_early(&self, last: &JobRow, count: usize) -> bool {
         let ended_ms = last.finished_ms.unwrap_or_default();
-        if self.clock.now_milliseconds() >= ended_ms.saturating_add(delay_ms(attempts.count)) {
-            return self.train(&live, renew, &attempts).await;
-        }
-        Ok(Left::Nothing)
+        self.clock.now_milliseconds() < ended_ms.saturating_add(delay_ms(count))
     }
 
     /// Goes on by the policy that was trained.

@@ -33,6 +33,9 @@ use crate::control::policy::advisor::Advisor;
 use crate::control::policy::content_hash;
 use crate::store::{CreateSession, RequestKey, SessionFacts, SessionRow, SessionSummary, Store, Tenant};
 
+/// Entries replayed in a few milliseconds.
+const PROMPT_ENTRIES: usize = 520;
+
 /// Whose session it is, and its name.
 pub(super) type Name = (Tenant, String);
 
@@ -240,7 +243,10 @@ impl Source<Live> for Rows<'_> {
 
     async fn read(&self) -> Result<Live, ServiceError> {
         let facts = self.sessions.facts(self.tenant, self.session).await?;
-        let live = Live::replayed(facts)?;
+        let live = match facts.entries.len() {
+            0..=PROMPT_ENTRIES => Live::replayed(facts)?,
+            _ => self.sessions.advising.run(self.tenant, move || Live::replayed(facts)).await??,
+        };
         self.sessions.weigh(&live);
         Ok(live)
     }
