@@ -108,7 +108,7 @@ class Session:
         return corrected
 
     def renew(self, policy: str, *, window: int | None = None, renewal: int | None = None) -> wire.Renewed:
-        """Goes on by another policy from the coming period, with the law of the last ``window`` returns seen, or of all.
+        """Goes on by another policy from the coming period; its law is of the last ``window`` returns seen, or of all.
 
         Exactly once as :meth:`observe` is: ``renewal`` is the number after the last one made unless given.
         """
