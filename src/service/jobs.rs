@@ -64,7 +64,6 @@ impl Jobs {
         specification: Specification,
         key: Option<String>,
     ) -> Result<Accepted, ServiceError> {
-        key.as_deref().map_or(Ok(()), idempotency::check)?;
         let sent = serde_json::to_vec(&specification).map_err(ServiceError::internal)?;
         let (tenant, by) = (&caller.tenant, caller.actor());
         let (job, completed) = self.queue_training(tenant, by, specification, &sent, key).await?;
@@ -98,8 +97,8 @@ impl Jobs {
         self.memory.admits(&estimate::training(&completed, self.threads))?;
         self.memory.keeps(&estimate::advising(&completed))?;
         let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
-        let new = self.new_job(tenant, JobKind::Train, sent, request_json, completed.problem.horizon, key)?;
-        Ok((self.queue(by, new).await?, completed))
+        let steps = completed.problem.horizon;
+        Ok((self.queue((tenant, by), JobKind::Train, sent, request_json, steps, key).await?, completed))
     }
 
     /// Queues an evaluation, whose policies the caller has looked at. The same key and request again give the same job.
@@ -112,14 +111,12 @@ impl Jobs {
         request: EvaluationRequest,
         key: Option<String>,
     ) -> Result<Accepted, ServiceError> {
-        key.as_deref().map_or(Ok(()), idempotency::check)?;
         let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
         let completed = request.completed()?;
         self.memory.admits(&estimate::evaluation(&completed, self.threads))?;
         let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
-        let steps = completed.step_count();
-        let new = self.new_job(&caller.tenant, JobKind::Evaluate, &sent, request_json, steps, key)?;
-        let job = self.queue(caller.actor(), new).await?;
+        let (of, steps) = ((&caller.tenant, caller.actor()), completed.step_count());
+        let job = self.queue(of, JobKind::Evaluate, &sent, request_json, steps, key).await?;
         Ok(Accepted { job, warnings: completed.problem.warnings() })
     }
 
@@ -133,40 +130,35 @@ impl Jobs {
         request: BacktestRequest,
         key: Option<String>,
     ) -> Result<Accepted, ServiceError> {
-        key.as_deref().map_or(Ok(()), idempotency::check)?;
         let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
         let backtest = Backtest::new(request)?;
         self.memory.admits(&estimate::backtest(&backtest, self.threads))?;
         let request_json = serde_json::to_string(&backtest.request).map_err(ServiceError::internal)?;
-        let steps = backtest.trainings();
-        let new = self.new_job(&caller.tenant, JobKind::Backtest, &sent, request_json, steps, key)?;
-        let job = self.queue(caller.actor(), new).await?;
+        let (of, steps) = ((&caller.tenant, caller.actor()), backtest.trainings());
+        let job = self.queue(of, JobKind::Backtest, &sent, request_json, steps, key).await?;
         Ok(Accepted { job, warnings: backtest.warnings() })
     }
 
-    fn new_job(
+    async fn queue(
         &self,
-        tenant: &Tenant,
+        (tenant, by): (&Tenant, Actor),
         kind: JobKind,
         sent: &[u8],
         request_json: String,
         steps_total: usize,
         key: Option<String>,
-    ) -> Result<NewJob, ServiceError> {
-        Ok(NewJob {
+    ) -> Result<Job, ServiceError> {
+        key.as_deref().map_or(Ok(()), idempotency::check)?;
+        let new = NewJob {
             job: identity::new_id("job")?,
             tenant: tenant.clone(),
             kind,
             request_json,
             request_hash: content_hash(sent),
-            idempotency_key: key,
+            idempotency_key: key.clone(),
             steps_total,
             created_ms: self.clock.now_milliseconds(),
-        })
-    }
-
-    async fn queue(&self, by: Actor, new: NewJob) -> Result<Job, ServiceError> {
-        let key = new.idempotency_key.clone();
+        };
         match self.store.by(by).create_job(new).await? {
             CreateJob::Created(row) => {
                 self.board.ring();

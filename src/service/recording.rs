@@ -90,12 +90,8 @@ impl Sessions {
         loop {
             let facts = self.facts(tenant, session).await?;
             let mut periods = Periods::of(&facts)?;
-            if number <= periods.corrections {
+            if is_repeat(EntryKind::Correction, number, periods.corrections)? {
                 return self.repeat(session, EntryKind::Correction, number, &content).await;
-            }
-            let expected = periods.corrections + 1;
-            if number > expected {
-                return Err(ServiceError::Gap { what: "correction", given: number, expected });
             }
             let (observed, renewals, current) = (periods.all.len(), periods.renewals(), periods.current().clone());
             let advisor = self.policies.advisor(tenant, &current.policy).await?;
@@ -197,6 +193,18 @@ impl Sessions {
             Append::NoPolicy => Err(ServiceError::unknown("policy", &next.current.policy)),
         }
     }
+}
+
+/// Whether the entry of a kind that is numbered so is among the `made`.
+///
+/// # Errors
+/// It is neither that nor the next.
+pub(super) fn is_repeat(kind: EntryKind, number: usize, made: usize) -> Result<bool, ServiceError> {
+    let expected = made + 1;
+    if number > expected {
+        return Err(ServiceError::Gap { what: kind.counted(), given: number, expected });
+    }
+    Ok(number < expected)
 }
 
 pub(super) fn numbered(field: &str, number: usize) -> Result<usize, FieldError> {

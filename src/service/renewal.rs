@@ -13,7 +13,7 @@ use super::error::ServiceError;
 use super::live::{Live, measured};
 use super::periods::Periods;
 use super::plan::{MOST_PERIODS, MOST_RENEWALS, Plan, Renew, Renewed, Stretch, check_window};
-use super::recording::numbered;
+use super::recording::{is_repeat, numbered};
 use super::sessions::Sessions;
 use super::spans;
 use super::standing::last_of;
@@ -42,19 +42,14 @@ impl Sessions {
         loop {
             let facts = self.facts(tenant, session).await?;
             let periods = Periods::of(&facts)?;
-            if number <= periods.renewals() {
+            if is_repeat(EntryKind::Renewal, number, periods.renewals())? {
                 return self.repeat(session, EntryKind::Renewal, number, &content).await;
-            }
-            let expected = periods.renewals() + 1;
-            if number > expected {
-                return Err(ServiceError::Gap { what: "renewal", given: number, expected });
             }
             if number > MOST_RENEWALS {
                 let rule = format!("must be at most {MOST_RENEWALS}: open a session on the record as it is now");
                 return Err(FieldError::new("renewal", number, rule).into());
             }
-            let decided = self.decided(tenant, &by, facts, periods, renew).await?;
-            let Decided { new, onto, next } = decided;
+            let Decided { new, onto, next } = self.decided(tenant, &by, facts, periods, renew).await?;
             let (store, answer_json) = (self.store.by(by.clone()), new.answer_json.clone());
             held.clear();
             let appended = store.renew(new, onto).instrument(spans::of_write("append an entry")).await?;

@@ -191,7 +191,7 @@ impl Renewer {
                 Ok(Some(row)) if matches!(row.state, JobState::Queued | JobState::Running) => {
                     under_way.insert(name, job);
                 }
-                Ok(Some(row)) if row.state == JobState::Failed || row.state == JobState::Cancelled => {
+                Ok(Some(row)) if matches!(row.state, JobState::Failed | JobState::Cancelled) => {
                     metrics::counter!(RENEWALS, "outcome" => "failed").increment(1);
                     tracing::warn!(session = name.1, job, error = row.error, "a renewal failed");
                 }
