@@ -6,9 +6,10 @@
 //!
 //! with a normal g for each date and the dates sorted by zeta, has the law of `numerics/bridge.rs`, and all funds share the
 //! normals, so that they vary together as the funds do. With Q_theta the (1 - alpha)-quantile of H_theta, the joint factor is that
-//! of the largest H_theta / Q_theta: 1 for one asset, where there is one fund. Source of the rate
-//! 1 / sqrt n in any dimension: Xu and Huang (2022), Central limit theorem for the max-sliced 1-Wasserstein distance,
-//! arXiv:2205.14624; the statistic is the project's.
+//! of the largest H_theta / Q_theta: 1 for one asset, where there is one fund. That
+//! laws of all linear slices come near at the rate 1 / sqrt n in any dimension is shown by Xu and Huang (2022), Central limit
+//! theorem for the sliced 1-Wasserstein distance and the max-sliced 1-Wasserstein distance, arXiv:2205.14624; the statistic, and
+//! that funds behave alike, are the project's, and `docs/measurements.md` counts how often the balls hold.
 //!
 //! The largest over all funds is searched over the single assets, equal shares, inverse volatilities and twenty fixed draws, then
 //! between the fund that is largest most often where it matters and the single assets. A finite search errs low, by little: the
