@@ -19,7 +19,8 @@ struct CommandLine {
     command: Command,
 }
 
-/// Its threads take little of the address space: a service whose address space is limited lives.
+/// Its threads take little of the address space, and so do those of SQLite, which it serves too: a service whose address
+/// space is limited lives (`tests/memory.rs`).
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
