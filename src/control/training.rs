@@ -3,8 +3,9 @@
 //! optimise (the robust step at every design point), train (both surrogates), go one step back. A step depends on
 //! the specification and the step after it alone, so a checkpoint per step resumes to the same bits.
 
+use std::cell::LazyCell;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::control::bellman::next_value::NextValue;
 use crate::control::bellman::problem::Problem;
@@ -19,17 +20,23 @@ use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::specification::Specification;
 use crate::control::solved_step::StepSolution;
 use crate::control::surrogate::design::Design;
-use crate::control::surrogate::features::Features;
+use crate::control::surrogate::features::{Features, LawSummary};
 use crate::control::surrogate::fitting::DesignPoint;
 use crate::control::surrogate::learning::{Candidates, Counts, Learning, diagnostics};
 use crate::control::surrogate::stored::{SingleSolution, Solution};
 use crate::control::uncertainty::measured::Measured;
 
+/// The laws of a design, summed up.
+pub type Summaries = Measured<LawSummary>;
+
+/// A wealth that nothing sees.
+const NO_WEALTH: f64 = 1.0;
+
 /// A prepared training job: the completed specification and its simulated design.
 pub struct Training {
     problem: Problem,
     design: Design,
-    measured: Arc<Measured>,
+    measured: Arc<Summaries>,
 }
 
 impl Training {
@@ -53,7 +60,7 @@ impl Training {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn among(specification: &Specification, kept: Kept, measured: Arc<Measured>) -> Result<Self, TrainError> {
+    pub fn among(specification: &Specification, kept: Kept, measured: Arc<Summaries>) -> Result<Self, TrainError> {
         let specification = specification.clone().completed()?;
         let design = Design::new(&specification);
         Ok(Training { design, problem: Problem::with(&specification, kept), measured })
@@ -78,8 +85,9 @@ impl Training {
     ) -> Result<StepSolution, TrainError> {
         let next = NextValue::new(&self.problem.specification, step + 1, after.map(|after| &after.solution));
         let bellman = BellmanStep { problem: &self.problem, step, next: &next };
-        let solver = DesignSolver { bellman, design: &self.design, measured: &self.measured };
         let count = self.design.count(step);
+        let radii = vec![OnceLock::new(); self.design.candidate_count(step)];
+        let solver = DesignSolver { bellman, design: &self.design, measured: &self.measured, radii };
         if count == 1 {
             watch.go_on()?;
             let solved = solver.solve_the_only()?;
@@ -120,20 +128,30 @@ impl Training {
 struct DesignSolver<'a> {
     bellman: BellmanStep<'a>,
     design: &'a Design,
-    measured: &'a Measured,
+    measured: &'a Summaries,
+    /// Of the candidates, where their features told them.
+    radii: Vec<OnceLock<f64>>,
 }
 
 impl Candidates for DesignSolver<'_> {
     fn features(&self, some: Range<usize>) -> Vec<Features> {
         let (problem, step) = (self.bellman.problem, self.bellman.step);
-        let states: Vec<State> = some.clone().map(|index| self.state(index)).collect();
-        match problem.sets.alpha().filter(|_| problem.selection.has_ball()) {
-            None => states.iter().map(|state| problem.features(step, state)).collect(),
-            Some(alpha) => {
-                let radii = self.measured.radii(alpha, (step, some), &problem.sets, &states);
-                states.iter().zip(radii).map(|(state, radii)| problem.features_knowing(step, state, radii)).collect()
+        let Some(alpha) = problem.sets.alpha().filter(|_| problem.selection.has_ball()) else {
+            return some.map(|index| problem.features(step, &self.state(index))).collect();
+        };
+        let states = LazyCell::new(|| some.clone().map(|index| self.state(index)).collect::<Vec<State>>());
+        let laws = self.measured.level(alpha, (step, some.clone()), |alphas| {
+            problem.summaries_of(&states.iter().map(|state| &state.law).collect::<Vec<_>>(), alphas)
+        });
+        let features = |(index, law): (usize, LawSummary)| {
+            if let Some(known) = self.radii.get(index) {
+                known.get_or_init(|| law.radii.radius);
             }
-        }
+            // Laws do not depend on what was held: states are only needed where wealth is seen.
+            let wealth = if problem.selection.has_wealth() { states[index - some.start].wealth } else { NO_WEALTH };
+            problem.features_of(step, wealth, &law)
+        };
+        some.clone().zip(laws).map(features).collect()
     }
 
     fn solve(&self, index: usize, features: Features) -> Result<DesignPoint, TrainError> {
@@ -155,7 +173,7 @@ impl DesignSolver<'_> {
     }
 
     fn solved(&self, point: usize, state: &State, holdings: Holdings) -> Result<DesignSolution, TrainError> {
-        let found = self.bellman.solve_for_design(state, holdings);
+        let found = self.bellman.solve_for_design(state, self.radii.get(point).and_then(OnceLock::get).copied(), holdings);
         let worst = |values: &[f64]| values.iter().copied().find(|value| !value.is_finite());
         let (gain, action) = (worst(&found.floor_gains), worst(&found.policy_targets));
         if gain.is_none() && action.is_none() && found.solution.floor_gain.is_finite() {

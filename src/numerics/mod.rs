@@ -16,6 +16,7 @@ pub mod fund_bridges;
 pub mod gp;
 pub mod gp_fit;
 pub mod gp_likelihood;
+pub mod grown_bridges;
 pub mod law;
 pub mod law_distance;
 pub mod levelling;

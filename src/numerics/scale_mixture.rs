@@ -24,7 +24,7 @@ const BLOCK: usize = 256;
 /// measured over the step before is off by about the length of that.
 const TOLERANCE: f64 = 1e-9;
 /// The same for one of many sets of draws.
-const NEXT_TOLERANCE: f64 = 1e-6;
+const NEXT_TOLERANCE: f64 = 5e-6;
 const LONGEST_STEP: f64 = 0.5;
 const STEP_LIMIT: usize = 60;
 /// The slope of the share in ln q is at least this.
@@ -51,10 +51,11 @@ pub struct LastQuantile {
 
 #[derive(Debug, Clone, Copy)]
 struct Found {
-    /// The quantile over the mean of the draws.
+    /// Of the draws, along the line that they lie on.
+    at: f64,
+    /// The quantile over the mean of the draws, and how it changes along the line.
     ratio: f64,
-    /// The ratio less that of the quantile before.
-    trend: f64,
+    rate: f64,
     slope: f64,
 }
 
@@ -78,18 +79,19 @@ impl ScaleMixture {
     /// The `share`-quantile of R h from draws of h, none negative; `share` in [0.001, 0.999], where the polynomial
     /// stands for F. Cost O(draws), which are overwritten, here and below.
     pub fn quantile(&self, share: f64, draws: &mut [f64]) -> f64 {
-        self.quantile_within(TOLERANCE, share, draws, &mut LastQuantile::default())
+        self.quantile_within(TOLERANCE, share, draws, 0.0, &mut LastQuantile::default())
     }
 
-    /// The same, to 1e-6 of itself, for one of many sets of draws that are alike.
-    pub fn quantile_next(&self, share: f64, draws: &mut [f64], last: &mut LastQuantile) -> f64 {
-        self.quantile_within(NEXT_TOLERANCE, share, draws, last)
+    /// The same, to 5e-6 of itself, for one of many sets of draws that are alike: where they change along a line, `at` is where
+    /// on it they lie, and else always the same.
+    pub fn quantile_next(&self, share: f64, draws: &mut [f64], at: f64, last: &mut LastQuantile) -> f64 {
+        self.quantile_within(NEXT_TOLERANCE, share, draws, at, last)
     }
 
     /// The quantile with its standard error: the deviation of F(q / h), over the density at q.
     pub fn quantile_with_error(&self, share: f64, draws: &mut [f64]) -> (f64, f64) {
         let mut last = LastQuantile::default();
-        let quantile = self.quantile_within(TOLERANCE, share, draws, &mut last);
+        let quantile = self.quantile_within(TOLERANCE, share, draws, 0.0, &mut last);
         let Some(Found { slope, .. }) = last.found else { return (0.0, 0.0) };
         let reciprocals = &*draws;
         let square = self.mean(quantile, reciprocals, |share| share * share);
@@ -98,7 +100,14 @@ impl ScaleMixture {
     }
 
     /// Leaves the reciprocals of the draws in their place, unless all of them are zero.
-    fn quantile_within(&self, tolerance: f64, share: f64, draws: &mut [f64], last: &mut LastQuantile) -> f64 {
+    fn quantile_within(
+        &self,
+        tolerance: f64,
+        share: f64,
+        draws: &mut [f64],
+        at: f64,
+        last: &mut LastQuantile,
+    ) -> f64 {
         let mean = sum(draws) / draws.len() as f64;
         if mean <= 0.0 {
             last.found = None;
@@ -107,7 +116,7 @@ impl ScaleMixture {
         let LastQuantile { found } = last;
         let start = match found {
             Some(last) => Start {
-                quantile: mean * (last.ratio + last.trend).max(0.5 * last.ratio),
+                quantile: mean * (last.ratio + last.rate * (at - last.at)).max(0.5 * last.ratio),
                 slope: last.slope,
                 slope_error: LAST_SLOPE_ERROR,
             },
@@ -116,7 +125,8 @@ impl ScaleMixture {
         dispatched!(draws.iter_mut().for_each(|draw| *draw = 1.0 / *draw));
         let (quantile, slope) = self.search(tolerance, share, draws, start);
         let ratio = quantile / mean;
-        *found = Some(Found { ratio, trend: found.map_or(0.0, |before| ratio - before.ratio), slope });
+        let rate = found.filter(|before| before.at != at).map(|before| (ratio - before.ratio) / (at - before.at));
+        *found = Some(Found { at, ratio, rate: rate.unwrap_or_default(), slope });
         quantile
     }
 
@@ -279,12 +289,12 @@ mod tests {
         let mixture = ScaleMixture::chi(19);
         for share in [0.001, 0.5, 0.9, 0.9999] {
             let mut last = LastQuantile::default();
-            for (scale, least) in [(1.0, 0.2), (1.01, 0.2), (1.01, 0.22), (3.0, 0.3), (1e-6, 0.9), (1e-6, 0.01)] {
+            for (at, (scale, least)) in [(1.0, 0.2), (1.01, 0.2), (1.01, 0.22), (3.0, 0.3), (1e-6, 0.9), (1e-6, 0.01)].into_iter().enumerate() {
                 let draws: Vec<f64> = (0..403).map(|k| scale * (least + f64::from(k * 7919 % 403) / 403.0)).collect();
                 let alone = mixture.quantile(share, &mut draws.clone());
                 let mean = draws.iter().map(|draw| mixture.share_of(alone / draw)).sum::<f64>() / 403.0;
                 assert!((mean - share).abs() < 1e-9, "{scale} {share}: {mean}");
-                let next = mixture.quantile_next(share, &mut draws.clone(), &mut last);
+                let next = mixture.quantile_next(share, &mut draws.clone(), at as f64, &mut last);
                 assert!((next / alone - 1.0).abs() < 1e-5, "{scale} {share}: {next} against {alone}");
             }
         }

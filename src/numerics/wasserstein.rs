@@ -1,14 +1,13 @@
 //! Worst expectation over a Wasserstein-1 ball on a finite support, solved exactly.
 //!
-//! The paper maximises a dual over the multiplier gamma, (3.3). Here the primal is solved instead, and gamma falls out of
-//! it; the dual at that gamma bounds the value from below, and the difference of the two is reported as the duality gap.
-//!
-//! Transporting the mass of one atom over a distance d buys, at best, the lower convex envelope of the payoff as a
-//! function of distance. Spending the radius on the steepest envelope segments of all atoms first is therefore
-//! optimal, the slope at which the radius runs out is the Lagrange multiplier, and the moves are the worst law.
-//! Where no atom gains by moving up (every monotone payoff), the envelopes of all atoms share one forest:
-//! the parent of a point is the previous vertex of the lower hull of the points up to it, and mass flows down the
-//! forest in order of slope. Otherwise each atom's two-sided envelope is built by itself.
+//! The paper maximises a dual over the multiplier gamma, (3.3). It is concave and made of finitely many lines: at any gamma
+//! every atom's mass goes where `v(z) + gamma |z - z_k|` is least, and what that plan costs in distance and pays is the line
+//! that touches the dual there. Here the two lines are found between which the radius lies, and they are enough: the multiplier
+//! is where they meet, and the worst law moves from the plan of the one to that of the other until the radius is spent.
+//! The value is that of this law, and so bounds the infimum from above; the dual at the multiplier bounds it from below, and
+//! the difference of the two is reported as the duality gap.
+
+use std::ops::Range;
 
 /// A ball around a discrete law: `masses[k]` sits at `support[k]` (ascending, distinct), the masses sum to 1.
 #[derive(Debug, Clone, Copy)]
@@ -45,80 +44,200 @@ pub struct WorstLaw {
     pub moves: Vec<Move>,
 }
 
-/// One segment of an envelope: moving `from`'s mass on from vertex `near` to vertex `far`.
+/// Where the mass of all atoms goes at one multiplier: what that takes, in distance, and by how much it lowers the mean.
 #[derive(Debug, Clone, Copy)]
-struct Segment {
-    slope: f64,
-    from: usize,
-    near: usize,
-    far: usize,
+struct Plan {
+    multiplier: f64,
+    cost: f64,
+    loss: f64,
 }
 
-/// Parents in the forest of lower hulls: the vertex before k on the lower hull of the points 0 to k, with the
-/// slope towards it. Cost O(K), Graham's scan.
-fn hull_forest(support: &[f64], payoff: &[f64]) -> Vec<(usize, f64)> {
-    let slope = |low: usize, high: usize| (payoff[high] - payoff[low]) / (support[high] - support[low]);
-    let mut stack: Vec<usize> = Vec::with_capacity(support.len());
-    let mut forest = Vec::with_capacity(support.len());
-    for point in 0..support.len() {
-        while let [.., second, top] = stack[..] {
-            if slope(second, top) < slope(top, point) {
+/// Where nothing moves.
+const STAYING: Plan = Plan { multiplier: f64::INFINITY, cost: 0.0, loss: 0.0 };
+/// Plans tried at most: each halves what is left, nearly.
+const PLAN_LIMIT: usize = 200;
+/// Factors of a guess at the multiplier that are tried, to bound it from both sides.
+const GUESSES: [f64; 3] = [0.99, 1.01, 0.8];
+/// A plan that is better than a mixture of two others by less than this share of what they lose is as good.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// The plans between which a law spends the radius, and the multiplier at which both are best.
+struct Edge {
+    near: Plan,
+    far: Plan,
+    multiplier: f64,
+}
+
+/// A search for places at which `v + gamma distance` is least.
+struct Search<'a> {
+    ball: &'a WassersteinBall<'a>,
+    payoff: &'a [f64],
+    /// The atoms that may still move: mass that stays at one multiplier stays at every greater one.
+    moving: Vec<usize>,
+    /// Where they and all that they may move to lie.
+    between: Range<usize>,
+    /// For every point the best at or below it, and the best at or above it.
+    below: Vec<usize>,
+    above: Vec<usize>,
+}
+
+impl<'a> Search<'a> {
+    fn new(ball: &'a WassersteinBall<'a>, payoff: &'a [f64]) -> Self {
+        let points = ball.support.len();
+        let moving = (0..points).filter(|&point| ball.masses[point] > 0.0).collect();
+        Search { ball, payoff, moving, between: 0..points, below: vec![0; points], above: vec![0; points] }
+    }
+
+    /// Cost O(points between): two scans.
+    fn look(&mut self, multiplier: f64) {
+        let Range { start, end } = self.between;
+        let (support, payoff) = (&self.ball.support[start..end], &self.payoff[start..end]);
+        let (below, above) = (&mut self.below[start..end], &mut self.above[start..end]);
+        let (mut low, mut low_at, mut high, mut high_at) = (f64::INFINITY, 0, f64::INFINITY, 0);
+        for up in 0..support.len() {
+            let down = support.len() - 1 - up;
+            let from_below = payoff[up] - multiplier * support[up];
+            let from_above = payoff[down] + multiplier * support[down];
+            low_at = if from_below <= low { up } else { low_at };
+            low = if from_below < low { from_below } else { low };
+            high_at = if from_above <= high { down } else { high_at };
+            high = if from_above < high { from_above } else { high };
+            (below[up], above[down]) = (start + low_at, start + high_at);
+        }
+    }
+
+    /// Where the mass at `from` goes, how far, and what that takes off its payoff; it stays where nothing is better.
+    #[inline(always)]
+    fn best(&self, from: usize, multiplier: f64) -> (usize, f64, f64) {
+        let support = self.ball.support;
+        let (below, above) = (self.below[from], self.above[from]);
+        let [down, up] = [support[from] - support[below], support[above] - support[from]];
+        let [lost_below, lost_above] = [below, above].map(|to| self.payoff[from] - self.payoff[to]);
+        let [gain_below, gain_above] = [lost_below - multiplier * down, lost_above - multiplier * up];
+        let is_above = gain_above > gain_below || (gain_above == gain_below && up < down);
+        let pick = |above: f64, below: f64| if is_above { above } else { below };
+        let moves = pick(gain_above, gain_below) > 0.0;
+        let some = |value: f64| if moves { value } else { 0.0 };
+        let to = if is_above { above } else { below };
+        (if moves { to } else { from }, some(pick(up, down)), some(pick(lost_above, lost_below)))
+    }
+
+    /// The best plan at a multiplier. Cost O(points between).
+    fn plan(&mut self, multiplier: f64) -> Plan {
+        self.look(multiplier);
+        let (mut cost, mut loss) = (0.0, 0.0);
+        for &from in &self.moving {
+            let (_, distance, lost) = self.best(from, multiplier);
+            cost += self.ball.masses[from] * distance;
+            loss += self.ball.masses[from] * lost;
+        }
+        Plan { multiplier, cost, loss }
+    }
+
+    /// Leaves out the atoms that stay in the plan found last, which is at a multiplier below that sought.
+    fn narrow(&mut self, multiplier: f64) {
+        let mut moving = std::mem::take(&mut self.moving);
+        let (mut start, mut end) = (self.payoff.len(), 0);
+        moving.retain(|&from| {
+            let (to, ..) = self.best(from, multiplier);
+            (start, end) = if to == from { (start, end) } else { (start.min(from).min(to), end.max(from + 1).max(to + 1)) };
+            to != from
+        });
+        (self.moving, self.between) = (moving, start.min(end)..end);
+    }
+
+    /// The edge of the frontier of cost and loss on which the radius lies. A chord of the frontier names the multiplier of the
+    /// plan farthest beyond it, which takes the place of one of its ends, until there is none.
+    fn edge(&mut self, guess: f64) -> Edge {
+        let radius = self.ball.radius;
+        let (mut near, mut far) = (STAYING, None);
+        let guesses = GUESSES.map(|factor| factor * guess).into_iter().filter(|guess| *guess > 0.0);
+        for multiplier in guesses.chain([0.0]) {
+            if far.is_some_and(|far: Plan| multiplier <= far.multiplier) || multiplier >= near.multiplier {
+                continue;
+            }
+            let plan = self.plan(multiplier);
+            if plan.cost > radius {
+                self.narrow(multiplier);
+                far = Some(plan);
+            } else {
+                near = plan;
+            }
+        }
+        let Some(mut far) = far else {
+            // The rest of the radius buys nothing.
+            return Edge { near, far: near, multiplier: 0.0 };
+        };
+        let chord = |near: Plan, far: Plan| (far.loss - near.loss) / (far.cost - near.cost);
+        for _ in 0..PLAN_LIMIT {
+            let multiplier = chord(near, far);
+            let plan = self.plan(multiplier);
+            let better = (plan.loss - near.loss) - multiplier * (plan.cost - near.cost);
+            if !(plan.cost > near.cost && plan.cost < far.cost && better > ROUNDING * far.loss) {
                 break;
             }
-            stack.pop();
+            if plan.cost > radius {
+                self.narrow(multiplier);
+                far = plan;
+            } else {
+                near = plan;
+            }
         }
-        match stack.last() {
-            Some(&top) => forest.push((top, slope(top, point))),
-            None => forest.push((point, 0.0)),
-        }
-        stack.push(point);
+        Edge { near, far, multiplier: chord(near, far) }
     }
-    forest
+
+    /// Where a plan sends the mass of the atoms that may move, and how far.
+    fn destinations(&mut self, plan: Plan) -> Vec<(usize, f64)> {
+        if plan.multiplier == f64::INFINITY {
+            return self.moving.iter().map(|&from| (from, 0.0)).collect();
+        }
+        self.look(plan.multiplier);
+        let place = |&from: &usize| {
+            let (to, distance, _) = self.best(from, plan.multiplier);
+            (to, distance)
+        };
+        self.moving.iter().map(place).collect()
+    }
 }
 
 impl WassersteinBall<'_> {
     /// `min { E_F[payoff] : W1(F, law) <= radius, F on the support }` and its multiplier.
     ///
-    /// `payoff[k]` is the payoff at `support[k]`, finite. Cost O(K ln K) for K support points where no atom gains by
-    /// moving up, O(n K) otherwise.
+    /// `payoff[k]` is the payoff at `support[k]`, finite. Cost O(K) for each of a dozen plans.
     pub fn worst_expectation(&self, payoff: &[f64]) -> (f64, f64) {
-        if self.one_sided(payoff) { self.flow(payoff, |_, _, _| {}) } else { self.spend(payoff, |_, _| {}) }
+        self.worst_expectation_near(payoff, 0.0)
     }
 
-    /// The worst law itself with both bounds. Cost as [`Self::worst_expectation`], plus O(K n) for the moves.
+    /// The same, to rounding, with a guess at the multiplier, or 0: half as many plans where it is good.
+    pub fn worst_expectation_near(&self, payoff: &[f64], guess: f64) -> (f64, f64) {
+        let edge = Search::new(self, payoff).edge(guess);
+        (self.expectation(payoff, &edge), edge.multiplier)
+    }
+
+    /// The worst law itself with both bounds; at most one atom's mass is split. Cost as [`Self::worst_expectation`].
     pub fn worst_law(&self, payoff: &[f64]) -> WorstLaw {
-        let mut moves = Vec::new();
-        let (expectation, multiplier) = if self.one_sided(payoff) {
-            let mut next: Vec<(usize, f64)> = (0..self.support.len()).map(|point| (point, 0.0)).collect();
-            let solved = self.flow(payoff, |from, to, share| next[from] = (to, share));
-            for from in (0..self.support.len()).filter(|&from| self.masses[from] > 0.0) {
-                let mut at = from;
-                while next[at].1 >= 1.0 {
-                    at = next[at].0;
-                }
-                let (to, share) = next[at];
-                push_move(&mut moves, from, to, self.masses[from] * share);
-                push_move(&mut moves, from, at, self.masses[from] * (1.0 - share));
-            }
-            solved
-        } else {
-            let mut steps: Vec<(Segment, f64)> = Vec::new();
-            let solved = self.spend(payoff, |segment, share| steps.push((segment, share)));
-            for from in (0..self.support.len()).filter(|&from| self.masses[from] > 0.0) {
-                let (mut at, mut split) = (from, None);
-                for (segment, share) in steps.iter().filter(|(segment, _)| segment.from == from) {
-                    if *share >= 1.0 {
-                        at = segment.far;
-                    } else {
-                        split = Some((segment.far, *share));
-                    }
-                }
-                let (to, share) = split.unwrap_or((at, 0.0));
-                push_move(&mut moves, from, to, self.masses[from] * share);
-                push_move(&mut moves, from, at, self.masses[from] * (1.0 - share));
-            }
-            solved
-        };
+        self.worst_law_near(payoff, 0.0)
+    }
+
+    /// The same with a guess at the multiplier, as [`Self::worst_expectation_near`].
+    pub fn worst_law_near(&self, payoff: &[f64], guess: f64) -> WorstLaw {
+        let mut search = Search::new(self, payoff);
+        let edge = search.edge(guess);
+        let [near, far] = [edge.near, edge.far].map(|plan| search.destinations(plan));
+        let (mut budget, mut moves) = (self.radius - edge.near.cost, Vec::new());
+        let mut places = search.moving.iter().zip(near.iter().zip(&far)).peekable();
+        for (from, &mass) in self.masses.iter().enumerate().filter(|(_, mass)| **mass > 0.0) {
+            let Some((_, (near, far))) = places.next_if(|(moving, _)| **moving == from) else {
+                push_move(&mut moves, from, from, mass);
+                continue;
+            };
+            let cost = mass * (far.1 - near.1);
+            let share = if near.0 == far.0 || cost <= budget { 1.0 } else { budget / cost };
+            budget -= share * cost;
+            push_move(&mut moves, from, far.0, mass * share);
+            push_move(&mut moves, from, near.0, mass * (1.0 - share));
+        }
+        let (expectation, multiplier) = (self.expectation(payoff, &edge), edge.multiplier);
         WorstLaw { expectation, dual: self.dual(payoff, multiplier), multiplier, moves }
     }
 
@@ -148,140 +267,15 @@ impl WassersteinBall<'_> {
         envelope
     }
 
-    /// True where no atom has a smaller payoff anywhere above it.
-    fn one_sided(&self, payoff: &[f64]) -> bool {
-        let mut smallest_above = f64::INFINITY;
-        for (&mass, &value) in self.masses.iter().zip(payoff).rev() {
-            if mass > 0.0 && smallest_above < value {
-                return false;
-            }
-            smallest_above = smallest_above.min(value);
-        }
-        true
-    }
-
-    fn mean(&self, payoff: &[f64]) -> f64 {
+    /// The expectation under the law in the middle of the ball.
+    pub fn mean(&self, payoff: &[f64]) -> f64 {
         payoff.iter().zip(self.masses).map(|(value, mass)| value * mass).sum()
     }
 
-    /// Lets mass flow down the forest, steepest slope first, until the radius is spent.
-    /// `record(from, to, share)` hears of each vertex emptied (share 1) or split.
-    fn flow(&self, payoff: &[f64], mut record: impl FnMut(usize, usize, f64)) -> (f64, f64) {
-        let mut expectation = self.mean(payoff);
-        if self.radius <= 0.0 {
-            return (expectation, self.steepest(payoff));
-        }
-        let forest = hull_forest(self.support, payoff);
-        let mut reached: Vec<bool> = self.masses.iter().map(|&mass| mass > 0.0).collect();
-        let mut order: Vec<usize> = Vec::with_capacity(self.support.len());
-        for point in (0..self.support.len()).rev() {
-            let (parent, slope) = forest[point];
-            if reached[point] && slope > 0.0 {
-                reached[parent] = true;
-                order.push(point);
-            }
-        }
-        order.sort_unstable_by(|&left, &right| forest[right].1.total_cmp(&forest[left].1).then(right.cmp(&left)));
-        let mut masses = self.masses.to_vec();
-        let mut budget = self.radius;
-        for point in order {
-            let (parent, slope) = forest[point];
-            let cost = masses[point] * (self.support[point] - self.support[parent]);
-            if cost > budget {
-                record(point, parent, budget / cost);
-                return (expectation - slope * budget, slope);
-            }
-            record(point, parent, 1.0);
-            expectation -= slope * cost;
-            budget -= cost;
-            masses[parent] += masses[point];
-        }
-        (expectation, 0.0)
+    /// That of the law that spends the radius between two plans.
+    fn expectation(&self, payoff: &[f64], edge: &Edge) -> f64 {
+        self.mean(payoff) - edge.near.loss - edge.multiplier * (self.radius - edge.near.cost)
     }
-
-    /// Spends the radius on the two-sided envelopes of all atoms, steepest segment first.
-    fn spend(&self, payoff: &[f64], mut record: impl FnMut(Segment, f64)) -> (f64, f64) {
-        let mut expectation = self.mean(payoff);
-        if self.radius <= 0.0 {
-            return (expectation, self.steepest(payoff));
-        }
-        let mut segments = self.segments(payoff);
-        segments.sort_by(|left, right| right.slope.total_cmp(&left.slope));
-        let mut budget = self.radius;
-        for segment in segments {
-            let distance = |point: usize| (self.support[point] - self.support[segment.from]).abs();
-            let cost = self.masses[segment.from] * (distance(segment.far) - distance(segment.near));
-            if cost > budget {
-                record(segment, budget / cost);
-                return (expectation - segment.slope * budget, segment.slope);
-            }
-            record(segment, 1.0);
-            expectation -= segment.slope * cost;
-            budget -= cost;
-        }
-        (expectation, 0.0)
-    }
-
-    /// The falling segments of every atom's envelope of payoff against distance, both directions together.
-    fn segments(&self, payoff: &[f64]) -> Vec<Segment> {
-        let left = hull_forest(self.support, payoff);
-        let right = mirrored_forest(self.support, payoff);
-        let mut segments = Vec::new();
-        for from in (0..self.support.len()).filter(|&from| self.masses[from] > 0.0) {
-            let distance = |point: usize| (self.support[point] - self.support[from]).abs();
-            let mut vertices = chain(&left, from);
-            vertices.extend(chain(&right, from).into_iter().skip(1));
-            vertices.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(payoff[a].total_cmp(&payoff[b])));
-            let mut hull: Vec<Segment> = Vec::new();
-            let mut last = from;
-            for vertex in vertices.into_iter().skip(1) {
-                if distance(vertex) <= distance(last) || payoff[vertex] >= payoff[last] {
-                    continue;
-                }
-                let mut near = last;
-                let fall = |near: usize| (payoff[near] - payoff[vertex]) / (distance(vertex) - distance(near));
-                while let Some(top) = hull.last() {
-                    if top.slope > fall(top.far) {
-                        break;
-                    }
-                    near = top.near;
-                    hull.pop();
-                }
-                hull.push(Segment { slope: fall(near), from, near, far: vertex });
-                last = vertex;
-            }
-            segments.append(&mut hull);
-        }
-        segments
-    }
-
-    /// Steepest fall of the payoff away from any atom: the smallest multiplier at which no mass wants to move.
-    fn steepest(&self, payoff: &[f64]) -> f64 {
-        let left = hull_forest(self.support, payoff);
-        let right = mirrored_forest(self.support, payoff);
-        let atoms = (0..self.support.len()).filter(|&point| self.masses[point] > 0.0);
-        atoms.map(|point| left[point].1.max(right[point].1)).fold(0.0, f64::max)
-    }
-}
-
-/// The forest towards the right: parents above, slopes positive where the payoff falls upwards.
-fn mirrored_forest(support: &[f64], payoff: &[f64]) -> Vec<(usize, f64)> {
-    let count = support.len();
-    let mirrored: Vec<f64> = support.iter().rev().map(|point| -point).collect();
-    let reversed: Vec<f64> = payoff.iter().rev().copied().collect();
-    let forest = hull_forest(&mirrored, &reversed);
-    forest.into_iter().rev().map(|(parent, slope)| (count - 1 - parent, slope)).collect()
-}
-
-/// The vertices from `start` along falling slopes of a forest, `start` first.
-fn chain(forest: &[(usize, f64)], start: usize) -> Vec<usize> {
-    let mut vertices = vec![start];
-    let mut at = start;
-    while forest[at].1 > 0.0 && forest[at].0 != at {
-        at = forest[at].0;
-        vertices.push(at);
-    }
-    vertices
 }
 
 fn push_move(moves: &mut Vec<Move>, from: usize, to: usize, mass: f64) {

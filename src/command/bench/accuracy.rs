@@ -151,7 +151,7 @@ pub(super) fn exact_last_value(specification: &Specification) -> NextValue {
     let holdings = problem.holdings(EXACT_HOLDINGS);
     let gains = move |state: &State| {
         let solver = BellmanStep { problem: &problem, step, next: &NextValue::Terminal };
-        solver.solve_for_design(state, holdings).floor_gains
+        solver.solve_for_design(state, None, holdings).floor_gains
     };
     NextValue::Exact(holdings, Box::new(gains))
 }

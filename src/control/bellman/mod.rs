@@ -27,6 +27,8 @@ pub mod problem;
 pub mod solution;
 mod transport;
 
+use std::borrow::Cow;
+
 use self::field::Field;
 use self::gain_field::GainField;
 use self::next_value::NextValue;
@@ -101,9 +103,14 @@ impl BellmanStep<'_> {
         self.optimum(state, &set, self.actions(state), |_, _| ()).0.at_least_the_bank()
     }
 
-    /// [`Self::solve`] with what the surrogates learn: the floor gains of the state with any of `holdings`, and the band.
-    pub fn solve_for_design(&self, state: &State, holdings: Holdings) -> DesignSolution {
-        let (set, actions) = (self.problem.uncertainty_set(state), self.actions(state));
+    /// [`Self::solve`] with what the surrogates learn: the floor gains of the state with any of `holdings`, and the band. Its
+    /// radius may be known.
+    pub fn solve_for_design(&self, state: &State, radius: Option<f64>, holdings: Holdings) -> DesignSolution {
+        let actions = self.actions(state);
+        let set = match radius {
+            Some(radius) => Cow::Owned(self.problem.uncertainty_set_within(state, radius)),
+            None => self.problem.uncertainty_set(state),
+        };
         let (utility, dynamics) = (self.utility(state), self.problem.dynamics(self.step));
         let unit = self.problem.unit_of_action(self.step, state);
         let curvature = utility.relative_risk_aversion() * set.variance();

@@ -118,7 +118,7 @@ impl Problem {
         }
     }
 
-    /// The same with another radius, in the same unit.
+    /// The same where the radius of the state is known already, in the same unit; with another, the set were it that.
     pub fn uncertainty_set_within(&self, state: &State, radius: f64) -> UncertaintySet {
         match self.learns() {
             true => self.learned_set(&state.law, radius),
@@ -192,10 +192,25 @@ impl Problem {
     }
 
     /// The same where both radii of the state are known already.
-    pub fn features_knowing(&self, step: usize, state: &State, radii: Radii) -> Features {
-        let (moments, total) = (CentralMoments::of(&state.law), self.dynamics(step).total(state.wealth, 0.0));
-        let worst = ExponentialMean::of(&state.law, self.lowest_return()).worst(radii.radius);
-        self.selection.of(total, &self.summary(moments, radii, worst))
+    fn features_knowing(&self, step: usize, state: &State, radii: Radii) -> Features {
+        self.features_of(step, state.wealth, &self.summaries(&state.law, &[radii])[0])
+    }
+
+    /// The same where the law is summed up already.
+    pub fn features_of(&self, step: usize, wealth: f64, law: &LawSummary) -> Features {
+        self.selection.of(self.dynamics(step).total(wealth, 0.0), law)
+    }
+
+    /// What the features are made of, of laws of one size: law by law, at each miscoverage.
+    pub fn summaries_of(&self, laws: &[&EmpiricalDistribution], alphas: &[f64]) -> Vec<Vec<LawSummary>> {
+        let radii = self.sets.radii_of(laws, alphas);
+        laws.iter().zip(radii).map(|(law, radii)| self.summaries(law, &radii)).collect()
+    }
+
+    /// The same of one law within each of `radii`.
+    fn summaries(&self, law: &EmpiricalDistribution, radii: &[Radii]) -> Vec<LawSummary> {
+        let (moments, mean) = (CentralMoments::of(law), ExponentialMean::of(law, self.lowest_return()));
+        radii.iter().map(|&radii| self.summary(moments, radii, mean.worst(radii.radius))).collect()
     }
 
     /// Features of the laws that follow from `law` when each of `returns` (ascending) is learned, for one total wealth.

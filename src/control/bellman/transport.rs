@@ -1,5 +1,7 @@
 //! Prices of actions against a Wasserstein ball: the worst law moves the centre's masses about a support.
 
+use std::cell::Cell;
+
 use super::Pricing;
 use super::field::{Field, Payoffs};
 use super::solution::{Adversary, LOSS_OF_ROUNDING, WorstExpectation};
@@ -10,7 +12,7 @@ use crate::numerics::wasserstein::{WassersteinBall, WorstLaw};
 
 /// The floor gain is flat in the action at its best: an action off by this costs less than rounding.
 const ACTION_TOLERANCE: f64 = 1e-7;
-/// Until the last refinement the action only has to say where the worst law puts its mass.
+/// Until the support is refined the action only has to say where the worst law puts its mass.
 const PLACING_TOLERANCE: f64 = 1e-4;
 /// Parts into which each interval between exact returns is cut for the support, and again around destinations: local cubics
 /// are good to far less than a part, and twice eight parts place a destination to 1/256 of an interval.
@@ -33,7 +35,9 @@ pub(super) struct TransportPricing<'f> {
     field: &'f dyn Field,
     grid: Grid,
     rows: Box<dyn Payoffs + 'f>,
-    refined: usize,
+    refined: bool,
+    /// The last multiplier found, over its action: those of actions near each other hardly differ.
+    steepness: Cell<f64>,
 }
 
 /// The support with the centre's masses on it.
@@ -47,17 +51,22 @@ impl<'f> TransportPricing<'f> {
     pub fn new(centre: &'f Centre, radius: f64, field: &'f dyn Field) -> Self {
         let grid = grid(centre, radius, subdivided(field.returns(), SUPPORT_PARTS, |_| true));
         let rows = field.at(&grid.support);
-        TransportPricing { centre, radius, field, grid, rows, refined: 0 }
+        TransportPricing { centre, radius, field, grid, rows, refined: false, steepness: Cell::new(0.0) }
     }
 
     fn ball(&self) -> WassersteinBall<'_> {
         WassersteinBall { support: &self.grid.support, masses: &self.grid.masses, radius: self.radius }
     }
 
+    /// The multiplier that is to be expected.
+    fn guess(&self, trade: Trade) -> f64 {
+        self.steepness.get() * trade.action
+    }
+
     /// The worst law; the centre itself where no law takes more than rounding, so that no moves are reported that
     /// rounding made.
-    fn worst_law(&self, payoff: &[f64]) -> WorstLaw {
-        let worst = self.ball().worst_law(payoff);
+    fn worst_law(&self, payoff: &[f64], trade: Trade) -> WorstLaw {
+        let worst = self.ball().worst_law_near(payoff, self.guess(trade));
         let centre = WassersteinBall { radius: 0.0, ..self.ball() }.worst_law(payoff);
         if centre.expectation - worst.expectation > LOSS_OF_ROUNDING { worst } else { centre }
     }
@@ -65,7 +74,8 @@ impl<'f> TransportPricing<'f> {
     /// Support points that receive mass from elsewhere.
     fn destinations(&self, trades: &[Trade]) -> Vec<bool> {
         let mut near = vec![false; self.grid.support.len()];
-        for moved in trades.iter().flat_map(|trade| self.ball().worst_law(&self.rows.payoff(*trade)).moves) {
+        let worst = |trade: &Trade| self.ball().worst_law_near(&self.rows.payoff(*trade), self.guess(*trade));
+        for moved in trades.iter().flat_map(|trade| worst(trade).moves) {
             near[moved.to] |= moved.to != moved.from;
         }
         near
@@ -112,30 +122,41 @@ impl<'f> TransportPricing<'f> {
 
 impl Pricing for TransportPricing<'_> {
     fn value(&self, trade: Trade) -> f64 {
-        self.ball().worst_expectation(&self.rows.payoff(trade)).0
+        let payoff = self.rows.payoff(trade);
+        if self.radius <= 0.0 {
+            return self.ball().mean(&payoff);
+        }
+        let (value, multiplier) = self.ball().worst_expectation_near(&payoff, self.guess(trade));
+        if trade.action > 0.0 {
+            self.steepness.set(multiplier / trade.action);
+        }
+        value
     }
 
     fn tolerance(&self) -> f64 {
-        if self.radius > 0.0 && self.refined < REFINEMENTS { PLACING_TOLERANCE } else { ACTION_TOLERANCE }
+        if self.radius > 0.0 && !self.refined { PLACING_TOLERANCE } else { ACTION_TOLERANCE }
     }
 
     fn refine(&mut self, trades: &[Trade]) -> bool {
         // No law can hurt all-bank: its mass need not be placed.
         let is_bank = trades.iter().all(|trade| trade.action <= 0.0);
-        if self.radius <= 0.0 || self.refined == REFINEMENTS || (self.refined == 0 && is_bank) {
+        if self.radius <= 0.0 || self.refined || is_bank {
             return false;
         }
-        let near = self.destinations(trades);
-        let support = subdivided(&self.grid.support, REFINED_PARTS, |interval| near[interval] || near[interval + 1]);
-        self.grid = grid(self.centre, self.radius, support);
-        self.rows = self.field.at(&self.grid.support);
-        self.refined += 1;
+        for _ in 0..REFINEMENTS {
+            let near = self.destinations(trades);
+            let support =
+                subdivided(&self.grid.support, REFINED_PARTS, |interval| near[interval] || near[interval + 1]);
+            self.grid = grid(self.centre, self.radius, support);
+            self.rows = self.field.at(&self.grid.support);
+        }
+        self.refined = true;
         true
     }
 
     fn worst(&self, trade: Trade) -> WorstExpectation {
         let payoff = self.rows.payoff(trade);
-        let worst = self.worst_law(&payoff);
+        let worst = self.worst_law(&payoff, trade);
         WorstExpectation {
             value: worst.expectation,
             dual: worst.dual,

@@ -19,8 +19,7 @@ use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{
     DesignSpecification, ProblemSpecification, Specification, SurrogateSpecification, UtilitySpecification,
 };
-use crate::control::training::Training;
-use crate::control::uncertainty::measured::Measured;
+use crate::control::training::{Summaries, Training};
 
 /// One period of the real world.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,7 +107,7 @@ impl Strategy {
 /// What the trainings of one stretch have in common; no bit of what is decided depends on it.
 pub struct Common {
     kept: Kept,
-    measured: Arc<Measured>,
+    measured: Arc<Summaries>,
 }
 
 impl Common {
@@ -122,7 +121,7 @@ impl Common {
                 alphas.push(alpha);
             }
         }
-        Common { kept, measured: Arc::new(Measured::at(alphas)) }
+        Common { kept, measured: Arc::new(Summaries::at(alphas)) }
     }
 }
 

@@ -23,14 +23,18 @@ use crate::numerics::streams::stream;
 
 /// Candidates simulated for each design point.
 pub const CANDIDATES_PER_POINT: usize = 3;
-/// States that set the guard: 5 of them lie beyond a guard that 99.5 % pass.
+/// States that set the guard, at most: 5 of them lie beyond a guard that 99.5 % pass.
 pub const GUARDS: usize = 1000;
+/// Of a small design so many for each design point: their features would cost more than solving it.
+const GUARDS_PER_POINT: usize = 10;
 /// One design point in this many is taken as drawn.
 pub const AS_DRAWN: usize = 4;
 
 /// The states that a training may be asked to solve.
 pub struct Design {
     problem: ProblemSpecification,
+    /// The law of the history.
+    history: EmpiricalDistribution,
     /// Of every period, and of the time after the last.
     periods: Vec<Dynamics>,
     law: ContinuousLaw,
@@ -67,6 +71,7 @@ impl Design {
             constant: !learns && !wealth_matters,
             start_is_single: !resampled && (start.min == start.max || !wealth_matters),
             periods: Dynamics::of(problem),
+            history: problem.learning.law(&problem.history),
             problem: problem.clone(),
         }
     }
@@ -91,31 +96,34 @@ impl Design {
     /// Independent draws of the design's law, to judge the surrogates by; none where the state is wealth alone.
     pub fn guards(&self, step: usize) -> Range<usize> {
         let candidates = self.candidate_count(step);
-        if self.ladder.is_empty() { candidates..candidates + GUARDS } else { 0..0 }
+        let guards = GUARDS.min(GUARDS_PER_POINT * self.count(step));
+        if self.ladder.is_empty() { candidates..candidates + guards } else { 0..0 }
     }
 
     /// State `index` of `step`; those beyond the candidates are independent draws of the same law. Streams:
-    /// ("initial", 0, index) for the start, ("design", t, index) for each step. Cost O((history + step) ln(..)).
+    /// ("initial", 0, index) for the start, ("design", t, index) for each step. Cost O(history) a step.
     pub fn state(&self, step: usize, index: usize) -> State {
         let problem = &self.problem;
         if let Some(wealths) = self.ladder.get(index) {
-            return self.holding_half(wealths[step], problem.learning.law(&problem.history));
+            return self.holding_half(wealths[step], self.history.clone());
         }
         let mut generator = stream(self.seed, "initial", 0, index);
         let mut wealth = self.start.min * (self.start.max / self.start.min).powf(generator.random::<f64>());
         let mut holding = stream(self.seed, "initial holding", 0, index).random::<f64>();
-        let mut sample = problem.history.clone();
-        if self.resampled {
-            sample.fill_with(|| admissible(self.law.draw(&mut generator), problem));
-        }
+        let mut law = if self.resampled {
+            let draw = |_: &f64| admissible(self.law.draw(&mut generator), problem);
+            problem.learning.law(&problem.history.iter().map(draw).collect::<Vec<f64>>())
+        } else {
+            self.history.clone()
+        };
         for (earlier, dynamics) in self.periods[..step].iter().enumerate() {
             let mut generator = stream(self.seed, "design", earlier, index);
             let action = dynamics.highest_action(wealth, problem.action_interval[1]) * generator.random::<f64>();
             let log_return = admissible(self.law.draw(&mut generator), problem);
             (wealth, holding) = dynamics.next(wealth, holding, action, log_return);
-            sample.push(log_return);
+            law.push(log_return);
         }
-        self.holding_half(wealth.max(self.periods[step].least_wealth()), problem.learning.law(&sample))
+        self.holding_half(wealth.max(self.periods[step].least_wealth()), law)
     }
 
     /// The band and the value are found for every holding from any one, best from one in the middle.

@@ -16,9 +16,8 @@ use crate::control::request::specification::Specification;
 use crate::control::solved_step::{StepDiagnostics, StepSolution};
 use crate::numerics::farthest::farthest_points;
 
-/// States whose features are found together: what they have in common is read from memory once, and their sums stay in the
-/// first-level cache.
-pub const FEATURES_AT_A_TIME: usize = 16;
+/// States whose features are found together, for what they have in common.
+const FEATURES_AT_A_TIME: usize = 128;
 /// Progress is reported about this often a step.
 const REPORTS_PER_STEP: usize = 100;
 
