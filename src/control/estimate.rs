@@ -28,7 +28,7 @@ const CANDIDATE_BYTES: usize = 160;
 /// A number of a finished policy: itself, its digits as JSON, and the copies of those that the store is given.
 const POLICY_NUMBER_BYTES: usize = 80;
 /// Statistics over all paths that a thread holds at a time.
-const STATISTICS: usize = 144;
+const STATISTICS: usize = 264;
 /// Numbers a value of the history that a thread holds while it solves a robust step.
 const STEP_NUMBERS: usize = 64;
 /// Predictions a function beyond those, where trading costs: at eight trades, while a refined table is made beside the one before.

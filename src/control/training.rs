@@ -173,7 +173,8 @@ impl DesignSolver<'_> {
     }
 
     fn solved(&self, point: usize, state: &State, holdings: Holdings) -> Result<DesignSolution, TrainError> {
-        let found = self.bellman.solve_for_design(state, self.radii.get(point).and_then(OnceLock::get).copied(), holdings);
+        let found =
+            self.bellman.solve_for_design(state, self.radii.get(point).and_then(OnceLock::get).copied(), holdings);
         let worst = |values: &[f64]| values.iter().copied().find(|value| !value.is_finite());
         let (gain, action) = (worst(&found.floor_gains), worst(&found.policy_targets));
         if gain.is_none() && action.is_none() && found.solution.floor_gain.is_finite() {

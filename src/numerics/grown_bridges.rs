@@ -23,6 +23,16 @@ type Block = [f64; PATHS];
 /// A value learned, and how many values of the base are at or below it.
 type Learned = (f64, usize);
 
+/// What of a block of paths laws are put together from.
+struct Tables {
+    /// `|B(t_(k-1))| - |B(t_k)|` for k from 1.
+    falls: Vec<Block>,
+    /// For each number of smaller values learned, the sums of value times fall over the first so many values of the base.
+    sums: Vec<Block>,
+    /// Sums of a number: one more than the base has values.
+    stride: usize,
+}
+
 impl AbsoluteBridges {
     /// The statistic over the direction of every path, law by law, to rounding; `base` ascending. `None` where some law does
     /// not have the values of the base, where weights decay, or where the laws are too few for tables to pay.
@@ -41,92 +51,92 @@ impl AbsoluteBridges {
         if base.is_empty() || laws.len() < LAWS_A_TABLE * (learned + 1) {
             return None;
         }
-        let learned: Option<Vec<Vec<Learned>>> = laws.iter().map(|law| beyond(law, base)).collect();
-        let learned = learned?;
+        let stride = base.len() + 1;
+        let beyond: Option<Vec<Vec<Learned>>> = laws.iter().map(|law| beyond(law, base)).collect();
+        let beyond = beyond?;
+        let mut tables =
+            Tables { falls: vec![[0.0; PATHS]; size], sums: vec![[0.0; PATHS]; (learned + 1) * stride], stride };
         let mut statistics = vec![vec![0.0; self.paths]; laws.len()];
         for start in (0..self.paths).step_by(PATHS) {
-            dispatched!(self.add_block(start, size, base, which, &learned, &mut statistics));
+            dispatched!({
+                tables.fill(self, start, which, base);
+                for (learned, statistic) in beyond.iter().zip(&mut statistics) {
+                    let block = &mut statistic[start..self.paths.min(start + PATHS)];
+                    block.copy_from_slice(&tables.law(learned)[..block.len()]);
+                }
+            });
         }
         Some(statistics)
     }
 
+    /// `|B|` at a time, from 1, over the paths from `start` on; at 0, and at 1 after the last, a bridge is 0.
     #[inline(always)]
-    fn add_block(
-        &self,
-        start: usize,
-        size: usize,
-        base: &[f64],
-        which: Statistic,
-        learned: &[Vec<Learned>],
-        statistics: &mut [Vec<f64>],
-    ) {
-        let falls = self.falls(start, size, which);
-        let shifts = size - base.len();
-        let tables: Vec<Vec<Block>> = (0..=shifts).map(|shift| sums(base, &falls[shift..])).collect();
-        let count = PATHS.min(self.paths - start);
-        for (learned, statistic) in learned.iter().zip(statistics) {
-            let (mut sum, mut from) = ([0.0; PATHS], 0);
-            for (shift, &(value, below)) in learned.iter().enumerate() {
-                add(&mut sum, 1.0, &tables[shift][below]);
-                add(&mut sum, -1.0, &tables[shift][from]);
-                add(&mut sum, value, &falls[below + shift]);
-                from = below;
+    fn block(&self, time: usize, start: usize) -> Block {
+        let mut block = [0.0; PATHS];
+        if time >= 1 && time * self.paths <= self.values.len() {
+            let values = &self.values[(time - 1) * self.paths..time * self.paths][start..];
+            if let Some(whole) = values.first_chunk::<PATHS>() {
+                for path in 0..PATHS {
+                    block[path] = f64::from(whole[path]);
+                }
+            } else {
+                block.iter_mut().zip(values).for_each(|(wide, value)| *wide = f64::from(*value));
             }
-            add(&mut sum, 1.0, &tables[shifts][base.len()]);
-            add(&mut sum, -1.0, &tables[shifts][from]);
-            statistic[start..start + count].copy_from_slice(&sum[..count]);
+        }
+        block
+    }
+}
+
+impl Tables {
+    /// For the paths from `start` on. Of [`Statistic::OneLater`], `|B|` is the mean of what it is over the laws that learn one
+    /// of the values again.
+    #[inline(always)]
+    fn fill(&mut self, bridges: &AbsoluteBridges, start: usize, which: Statistic, base: &[f64]) {
+        let size = self.falls.len() as f64;
+        let (mut before, mut node) = ([0.0; PATHS], bridges.block(1, start));
+        for (index, fall) in self.falls.iter_mut().enumerate() {
+            let next = bridges.block(index + 2, start);
+            let share = match which {
+                Statistic::Now => 0.0,
+                Statistic::OneLater => (index + 1) as f64 / size,
+            };
+            for path in 0..PATHS {
+                let here = (1.0 - share) * node[path] + share * next[path];
+                fall[path] = before[path] - here;
+                before[path] = here;
+            }
+            node = next;
+        }
+        for (smaller, sums) in self.sums.chunks_exact_mut(self.stride).enumerate() {
+            let mut sum = [0.0; PATHS];
+            for (to, (value, fall)) in sums[1..].iter_mut().zip(base.iter().zip(&self.falls[smaller..])) {
+                for path in 0..PATHS {
+                    sum[path] += value * fall[path];
+                }
+                *to = sum;
+            }
         }
     }
 
-    /// `|B(t_(k-1))| - |B(t_k)|` for k = 1 to `size`, over the paths from `start` on; of [`Statistic::OneLater`], `|B|` is the
-    /// mean of what it is over the laws that learn one of the values again.
+    /// The statistic of a law with these values learned.
     #[inline(always)]
-    fn falls(&self, start: usize, size: usize, which: Statistic) -> Vec<Block> {
-        let count = PATHS.min(self.paths - start);
-        let node = |time: usize| -> Block {
-            let mut block = [0.0; PATHS];
-            let read = time.checked_sub(1).and_then(|index| self.values.get(index * self.paths + start..));
-            let read = read.and_then(|values| values.get(..count)).unwrap_or_default();
-            block.iter_mut().zip(read).for_each(|(wide, value)| *wide = f64::from(*value));
-            block
-        };
-        let at = |k: usize| match which {
-            Statistic::Now => node(k),
-            Statistic::OneLater => {
-                let share = k as f64 / size as f64;
-                let mut block = [0.0; PATHS];
-                add(&mut block, 1.0 - share, &node(k));
-                add(&mut block, share, &node(k + 1));
-                block
+    fn law(&self, learned: &[Learned]) -> Block {
+        let (mut sum, mut from) = ([0.0; PATHS], 0);
+        for (smaller, &(value, below)) in learned.iter().enumerate() {
+            let sums = &self.sums[smaller * self.stride..][..self.stride];
+            let (low, high, fall) = (&sums[from], &sums[below], &self.falls[below + smaller]);
+            for path in 0..PATHS {
+                sum[path] += high[path] - low[path] + value * fall[path];
             }
-        };
-        let mut before = [0.0; PATHS];
-        let fall = |k: usize| {
-            let here = at(k);
-            let mut fall = before;
-            add(&mut fall, -1.0, &here);
-            before = here;
-            fall
-        };
-        (1..=size).map(fall).collect()
+            from = below;
+        }
+        let sums = &self.sums[learned.len() * self.stride..][..self.stride];
+        let (low, high) = (&sums[from], &sums[self.stride - 1]);
+        for path in 0..PATHS {
+            sum[path] += high[path] - low[path];
+        }
+        sum
     }
-}
-
-/// `sums[j]`: the sum of value times fall over the first j values.
-#[inline(always)]
-fn sums(values: &[f64], falls: &[Block]) -> Vec<Block> {
-    let mut sum = [0.0; PATHS];
-    let mut sums = vec![sum];
-    for (value, fall) in values.iter().zip(falls) {
-        add(&mut sum, *value, fall);
-        sums.push(sum);
-    }
-    sums
-}
-
-#[inline(always)]
-fn add(sum: &mut Block, weight: f64, block: &Block) {
-    sum.iter_mut().zip(block).for_each(|(sum, value)| *sum += weight * value);
 }
 
 /// What a law has learned beyond `base`, ascending; `None` where it has not all of the base, or its weights decay.

@@ -100,14 +100,7 @@ impl ScaleMixture {
     }
 
     /// Leaves the reciprocals of the draws in their place, unless all of them are zero.
-    fn quantile_within(
-        &self,
-        tolerance: f64,
-        share: f64,
-        draws: &mut [f64],
-        at: f64,
-        last: &mut LastQuantile,
-    ) -> f64 {
+    fn quantile_within(&self, tolerance: f64, share: f64, draws: &mut [f64], at: f64, last: &mut LastQuantile) -> f64 {
         let mean = sum(draws) / draws.len() as f64;
         if mean <= 0.0 {
             last.found = None;
@@ -289,7 +282,9 @@ mod tests {
         let mixture = ScaleMixture::chi(19);
         for share in [0.001, 0.5, 0.9, 0.9999] {
             let mut last = LastQuantile::default();
-            for (at, (scale, least)) in [(1.0, 0.2), (1.01, 0.2), (1.01, 0.22), (3.0, 0.3), (1e-6, 0.9), (1e-6, 0.01)].into_iter().enumerate() {
+            for (at, (scale, least)) in
+                [(1.0, 0.2), (1.01, 0.2), (1.01, 0.22), (3.0, 0.3), (1e-6, 0.9), (1e-6, 0.01)].into_iter().enumerate()
+            {
                 let draws: Vec<f64> = (0..403).map(|k| scale * (least + f64::from(k * 7919 % 403) / 403.0)).collect();
                 let alone = mixture.quantile(share, &mut draws.clone());
                 let mean = draws.iter().map(|draw| mixture.share_of(alone / draw)).sum::<f64>() / 403.0;

@@ -59,7 +59,7 @@ const PLAN_LIMIT: usize = 200;
 /// Factors of a guess at the multiplier that are tried, to bound it from both sides.
 const GUESSES: [f64; 3] = [0.99, 1.01, 0.8];
 /// A plan that is better than a mixture of two others by less than this share of what they lose is as good.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
+const ROUNDING: f64 = 1e-12;
 
 /// The plans between which a law spends the radius, and the multiplier at which both are best.
 struct Edge {
@@ -72,8 +72,9 @@ struct Edge {
 struct Search<'a> {
     ball: &'a WassersteinBall<'a>,
     payoff: &'a [f64],
-    /// The atoms that may still move: mass that stays at one multiplier stays at every greater one.
-    moving: Vec<usize>,
+    /// The atoms that may still move, for mass that stays at one multiplier stays at every greater one, and where the plan
+    /// found last sends them.
+    moving: Vec<(usize, usize)>,
     /// Where they and all that they may move to lie.
     between: Range<usize>,
     /// For every point the best at or below it, and the best at or above it.
@@ -84,7 +85,8 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     fn new(ball: &'a WassersteinBall<'a>, payoff: &'a [f64]) -> Self {
         let points = ball.support.len();
-        let moving = (0..points).filter(|&point| ball.masses[point] > 0.0).collect();
+        let atoms = (0..points).filter(|&point| ball.masses[point] > 0.0);
+        let moving = atoms.map(|atom| (atom, atom)).collect();
         Search { ball, payoff, moving, between: 0..points, below: vec![0; points], above: vec![0; points] }
     }
 
@@ -126,24 +128,36 @@ impl<'a> Search<'a> {
     fn plan(&mut self, multiplier: f64) -> Plan {
         self.look(multiplier);
         let (mut cost, mut loss) = (0.0, 0.0);
-        for &from in &self.moving {
-            let (_, distance, lost) = self.best(from, multiplier);
-            cost += self.ball.masses[from] * distance;
-            loss += self.ball.masses[from] * lost;
+        let mut moving = std::mem::take(&mut self.moving);
+        for (from, to) in &mut moving {
+            let (best, distance, lost) = self.best(*from, multiplier);
+            *to = best;
+            cost += self.ball.masses[*from] * distance;
+            loss += self.ball.masses[*from] * lost;
         }
+        self.moving = moving;
         Plan { multiplier, cost, loss }
     }
 
-    /// Leaves out the atoms that stay in the plan found last, which is at a multiplier below that sought.
-    fn narrow(&mut self, multiplier: f64) {
-        let mut moving = std::mem::take(&mut self.moving);
-        let (mut start, mut end) = (self.payoff.len(), 0);
-        moving.retain(|&from| {
-            let (to, ..) = self.best(from, multiplier);
-            (start, end) = if to == from { (start, end) } else { (start.min(from).min(to), end.max(from + 1).max(to + 1)) };
-            to != from
-        });
-        (self.moving, self.between) = (moving, start.min(end)..end);
+    /// Leaves out the atoms that stay in the plan found last, whose multiplier is below the one sought.
+    fn narrow(&mut self) {
+        let support = self.ball.support;
+        let (mut lowest, mut highest, mut kept) = (f64::INFINITY, f64::NEG_INFINITY, 0);
+        for index in 0..self.moving.len() {
+            let (from, to) = self.moving[index];
+            let distance = (support[to] - support[from]).abs();
+            self.moving[kept] = (from, to);
+            kept += usize::from(from != to);
+            // What moved to one side may move less far to the other.
+            let [down, up] = [support[from] - distance, support[from] + distance];
+            lowest = if from != to && down < lowest { down } else { lowest };
+            highest = if from != to && up > highest { up } else { highest };
+        }
+        self.moving.truncate(kept);
+        let first = support.partition_point(|&point| point < lowest);
+        let last = support.partition_point(|&point| point <= highest);
+        // A rounding may have left the farthest place out.
+        self.between = first.saturating_sub(1)..(last + 1).min(support.len());
     }
 
     /// The edge of the frontier of cost and loss on which the radius lies. A chord of the frontier names the multiplier of the
@@ -158,7 +172,7 @@ impl<'a> Search<'a> {
             }
             let plan = self.plan(multiplier);
             if plan.cost > radius {
-                self.narrow(multiplier);
+                self.narrow();
                 far = Some(plan);
             } else {
                 near = plan;
@@ -177,7 +191,7 @@ impl<'a> Search<'a> {
                 break;
             }
             if plan.cost > radius {
-                self.narrow(multiplier);
+                self.narrow();
                 far = plan;
             } else {
                 near = plan;
@@ -189,10 +203,10 @@ impl<'a> Search<'a> {
     /// Where a plan sends the mass of the atoms that may move, and how far.
     fn destinations(&mut self, plan: Plan) -> Vec<(usize, f64)> {
         if plan.multiplier == f64::INFINITY {
-            return self.moving.iter().map(|&from| (from, 0.0)).collect();
+            return self.moving.iter().map(|&(from, _)| (from, 0.0)).collect();
         }
         self.look(plan.multiplier);
-        let place = |&from: &usize| {
+        let place = |&(from, _): &(usize, usize)| {
             let (to, distance, _) = self.best(from, plan.multiplier);
             (to, distance)
         };
@@ -227,13 +241,13 @@ impl WassersteinBall<'_> {
         let (mut budget, mut moves) = (self.radius - edge.near.cost, Vec::new());
         let mut places = search.moving.iter().zip(near.iter().zip(&far)).peekable();
         for (from, &mass) in self.masses.iter().enumerate().filter(|(_, mass)| **mass > 0.0) {
-            let Some((_, (near, far))) = places.next_if(|(moving, _)| **moving == from) else {
+            let Some((_, (near, far))) = places.next_if(|((moving, _), _)| *moving == from) else {
                 push_move(&mut moves, from, from, mass);
                 continue;
             };
             let cost = mass * (far.1 - near.1);
             let share = if near.0 == far.0 || cost <= budget { 1.0 } else { budget / cost };
-            budget -= share * cost;
+            budget = if share < 1.0 { 0.0 } else { budget - cost };
             push_move(&mut moves, from, far.0, mass * share);
             push_move(&mut moves, from, near.0, mass * (1.0 - share));
         }
@@ -306,7 +320,13 @@ mod tests {
             for atom in atoms {
                 masses[atom] += 0.2;
             }
-            let ball = WassersteinBall { support: &support, masses: &masses, radius };
+            // Without a radius the multiplier is the steepest fall from an atom.
+            let centre = WassersteinBall { support: &support, masses: &masses, radius: 0.0 };
+            let fall = |from: usize, to: usize| (payoff[from] - payoff[to]) / (support[from] - support[to]).abs();
+            let falls = (0..144).filter(|pair| masses[pair / 12] > 0.0 && pair / 12 != pair % 12);
+            let steepest = falls.map(|pair| fall(pair / 12, pair % 12)).fold(0.0, f64::max);
+            prop_assert!((centre.worst_expectation(&payoff).1 - steepest).abs() < 1e-9 * (1.0 + steepest));
+            let ball = WassersteinBall { radius, ..centre };
             let worst = ball.worst_law(&payoff);
             // A dozen roundings of numbers below 2.
             prop_assert!((worst.expectation - worst.dual).abs() < 1e-12);
@@ -317,6 +337,14 @@ mod tests {
             prop_assert!(spent <= radius + 1e-12);
             prop_assert!((reached - worst.expectation).abs() < 1e-12);
             prop_assert_eq!(ball.worst_expectation(&payoff), (worst.expectation, worst.multiplier));
+            // Whatever is guessed; and at most one atom's mass is split.
+            for factor in [0.5, 0.97, 1.0, 1.005, 1.3, 9.0] {
+                let near = ball.worst_law_near(&payoff, factor * worst.multiplier);
+                prop_assert!((near.expectation - worst.expectation).abs() < 1e-12);
+                prop_assert!((near.dual - worst.expectation).abs() < 1e-12);
+            }
+            let sources: std::collections::BTreeSet<usize> = worst.moves.iter().map(|m| m.from).collect();
+            prop_assert!(worst.moves.len() <= sources.len() + 1);
         }
     }
 }

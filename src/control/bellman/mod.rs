@@ -48,6 +48,9 @@ use crate::numerics::minimise::maximise_concave_scalar;
 /// Doublings of an uncertified window, at most: sixteen times the first reach takes a return to e^-9.6.
 const WINDOW_GROWTHS: usize = 4;
 
+/// Refined prices move the best action by less than the width of its bracket over this.
+const MOVED_BY_REFINING: f64 = 8.0;
+
 /// The robust step at every state of one step.
 #[derive(Clone, Copy)]
 pub struct BellmanStep<'a> {
@@ -221,7 +224,7 @@ fn best_band(pricing: &mut dyn Pricing, actions: ActionInterval, dynamics: Dynam
         let bracket = actions.bracket(|action| pricing.rough_value(dynamics.trade(side, holding, action)));
         (side, bracket)
     };
-    let brackets: Vec<(Side, (f64, f64))> = dynamics.sides().iter().map(bracket).collect();
+    let mut brackets: Vec<(Side, (f64, f64))> = dynamics.sides().iter().map(bracket).collect();
     loop {
         let best = |&(side, (low, high)): &(Side, (f64, f64))| {
             let trade = |action: f64| dynamics.trade(side, holding, action);
@@ -232,6 +235,10 @@ fn best_band(pricing: &mut dyn Pricing, actions: ActionInterval, dynamics: Dynam
         let ends: Vec<Trade> = brackets.iter().map(best).collect();
         if !pricing.refine(&ends) {
             return Band::of(&ends.iter().map(|trade| trade.action).collect::<Vec<f64>>());
+        }
+        for ((_, (low, high)), Trade { action, .. }) in brackets.iter_mut().zip(&ends) {
+            let reach = (*high - *low) / MOVED_BY_REFINING;
+            (*low, *high) = (low.max(action - reach), high.min(action + reach));
         }
     }
 }

@@ -17,7 +17,7 @@ use crate::control::solved_step::{StepDiagnostics, StepSolution};
 use crate::numerics::farthest::farthest_points;
 
 /// States whose features are found together, for what they have in common.
-const FEATURES_AT_A_TIME: usize = 128;
+const FEATURES_AT_A_TIME: usize = 256;
 /// Progress is reported about this often a step.
 const REPORTS_PER_STEP: usize = 100;
 

@@ -14,15 +14,15 @@ use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
 
 /// Log-returns closer than this are one.
 pub const COINCIDENT: f64 = 1e-12;
-/// Exact returns across the atoms of a centre: intervals of a twentieth, between which local cubics are good to 1e-7.
-const CORE_RETURNS: usize = 20;
+/// Exact returns across the atoms of a centre: intervals of a sixteenth, between which local cubics are good to 3e-7.
+const CORE_RETURNS: usize = 16;
 /// Atoms may all but coincide: exact returns lie no closer than a hundredth of a percent.
 const SMALLEST_SPACING: f64 = 1e-4;
 /// Spacing of exact returns around an estimated mean, in estimated standard deviations, and how far that goes.
 const CORE_SPACING: f64 = 0.25;
 const CORE_REACH: f64 = 5.0;
 /// Ratio by which the spacing grows outside: what the field does there is smoother, and weighs less.
-const TAIL_RATIO: f64 = 1.3;
+const TAIL_RATIO: f64 = 1.4;
 
 /// The laws that the investor is robust against in one state.
 #[derive(Debug, Clone, PartialEq)]
