@@ -66,3 +66,38 @@ test("a session says what is added at the end of the period, reckons with it, an
   await page.getByText("At the end of the period 8.25 is withdrawn.").first().waitFor();
   assert.match(await main(), /beside 5\.00 added/);
 });
+
+test("a policy that forgets is asked for by the form, and sessions by it renew themselves or roll", async () => {
+  await page.goto(`${ballast.url}/#/train`);
+  await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
+  await page.getByLabel("Decisions").fill("2");
+  await page.getByLabel("Bank return per period").fill("0.2 %");
+  await page.getByLabel("Half-life of returns").fill("1");
+  const json = page.getByLabel("Training request as JSON");
+  await page.getByText("Every field, as JSON").click();
+  const request = JSON.parse(await json.inputValue());
+  assert.deepEqual(request.problem.learning, { kind: "decay", half_life: 1 });
+  await json.fill(JSON.stringify({ ...request, design: { count: 20, initial_laws: "resampled" } }));
+  const queued = page.waitForResponse((response) => response.url().endsWith("/train"));
+  await page.getByRole("button", { name: "Train" }).click();
+  const { job } = await (await queued).json();
+  let now;
+  do now = await call(ballast.url, `/jobs/${job}`);
+  while (now.finished_ms === null);
+  assert.equal(now.state, "succeeded", JSON.stringify(now));
+  for (const [choice, told] of [
+    ["Renewed by itself", { renew: { every: 1, window: null }, rolling: false }],
+    ["Rolling", { renew: null, rolling: true }],
+  ]) {
+    await page.goto(`${ballast.url}/#/sessions/new?policy=${now.policy}`);
+    await page.getByLabel("How it goes on").selectOption(choice);
+    if (choice === "Renewed by itself") await page.getByLabel("Periods by each policy").fill("1");
+    await page.getByRole("button", { name: "Open" }).click();
+    await page.getByRole("heading", { name: /^Period 1/ }).waitFor();
+    const session = page.url().split("/").at(-1);
+    const { renew, rolling } = await call(ballast.url, `/sessions/${session}`);
+    assert.deepEqual({ renew, rolling }, told);
+  }
+  assert.equal(await page.getByRole("heading", { name: "Period 1 of 2" }).count(), 0);
+  assert.match(await main(), /0 periods observed\n/);
+});
