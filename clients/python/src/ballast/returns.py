@@ -49,9 +49,10 @@ def log_returns_of_assets(
     Raises ``ValueError`` that names the asset, the entry, its value and the rule.
     """
     columns = getattr(returns, "columns", None)
-    if (assets is None) == (columns is None):
+    named = columns if assets is None else assets
+    if named is None or (assets is not None and columns is not None):
         raise ValueError(f"assets is {assets}: must name the columns where returns is no DataFrame, and only there")
-    names = [str(name) for name in (columns if assets is None else assets)]
+    names = [str(name) for name in named]
     rows = returns.to_numpy() if hasattr(returns, "to_numpy") else returns
     table = [[float(number) for number in row] for row in rows]
     for index, row in enumerate(table):
