@@ -28,7 +28,8 @@ export const agrees = (one, other) => Math.abs(one - other) <= TOLERANCE;
 export function adviceView(action, horizon, rest) {
   const amount = h("strong", {}, allocation(action.allocation));
   const order = h("p", { class: "sentence" }, trade(action));
-  const sentence = h("p", { class: "sentence" }, why(action, horizon === null ? "a horizon of the policy from now" : "at the horizon"));
+  const then = horizon === null ? "a horizon of the policy from now" : "at the horizon";
+  const sentence = h("p", { class: "sentence" }, why(action, then));
   const end = action.contribution === 0 ? "" : h("p", { class: "sentence" }, endWords(action.contribution));
   const read = action.source === "policy_surrogate";
   const note = h(
@@ -50,7 +51,7 @@ export function adviceView(action, horizon, rest) {
     }
     amount.textContent = allocation(anew.allocation);
     order.textContent = trade(anew);
-    sentence.replaceChildren(...why(anew));
+    sentence.replaceChildren(...why(anew, then));
     const apart = percent(Math.abs(anew.allocation - action.allocation)).replace("%", "points");
     const found = anew.source === "unsolved" ? exactly(anew) : "Solved anew";
     note.textContent = `${found}: what was read off the policy, ${allocation(action.allocation)}, is ${apart} away from it.`;
