@@ -17,7 +17,7 @@ use crate::numerics::levelling::{Ground, inverse_volatility};
 pub const MOST_ASSETS: usize = 30;
 /// Assets of a question.
 pub const ASSETS: std::ops::RangeInclusive<usize> = 2..=MOST_ASSETS;
-/// Dates of a history: some hundreds of megabytes of bridges and a second of search at the most.
+/// Dates of a history: so many of the most assets are some seconds of search.
 pub const DATES: std::ops::RangeInclusive<usize> = 2..=2000;
 /// Characters of the name of an asset.
 pub const NAME_LENGTH: std::ops::RangeInclusive<usize> = 1..=100;
