@@ -9,10 +9,11 @@
 //! has the radius 0. *Minimum variance* and *inverse volatility* are fully in the industries. What a year that starts with 100 is
 //! worth for certain is that of power utility over the 48 years; intervals of 90 % resample blocks of three years, the same for all.
 
+use std::collections::BTreeMap;
 use std::error::Error;
 
 use ballast::control::assets::{AssetsLaw, AssetsSolution, AssetsStep};
-use ballast::control::evaluation::account::yearly_certainty_equivalent;
+use ballast::control::evaluation::account::{Account, Annual, yearly_certainty_equivalent};
 use ballast::control::problem::actions::ActionInterval;
 use ballast::control::problem::utility::RelativeUtility;
 use ballast::control::request::specification::UtilitySpecification;
@@ -27,10 +28,10 @@ const FILE: &str = "data/us_industries_monthly.csv";
 const MONTHS: usize = 12;
 /// Twenty years: all strategies live through the months after them.
 const FIRST: usize = 240;
+const WINDOWS: [(usize, &str); 3] = [(120, "10 years"), (240, "20 years"), (usize::MAX, "all")];
 const ALPHA: f64 = 0.1;
 const PATHS: usize = 500;
-const RISK_AVERSION: f64 = 3.0;
-const UTILITY: UtilitySpecification = UtilitySpecification::Power { risk_aversion: RISK_AVERSION };
+const UTILITY: UtilitySpecification = UtilitySpecification::Power { risk_aversion: 3.0 };
 const WEALTH: f64 = 100.0;
 const RESAMPLES: usize = 2000;
 const YEARS_OF_A_BLOCK: usize = 3;
@@ -58,11 +59,23 @@ struct Strategy {
 
 /// What became of a strategy.
 struct Books {
-    /// At the start, and after each month.
-    wealth: Vec<f64>,
+    /// Its allocations are those in all industries together.
+    account: Account,
     /// Shares of wealth, month by month.
     held: Vec<Vec<f64>>,
-    traded: f64,
+}
+
+impl Record {
+    /// The returns before `month` that a strategy of this window knows.
+    fn known(&self, month: usize, window: usize) -> &[Vec<f64>] {
+        &self.rows[month.saturating_sub(window)..month]
+    }
+
+    /// The radius of all funds at once at the start of every year.
+    fn radii(&self, window: usize) -> Vec<f64> {
+        let years: Vec<usize> = (FIRST..self.rows.len()).step_by(MONTHS).collect();
+        years.into_par_iter().map(|month| joint_radius(self.known(month, window))).collect()
+    }
 }
 
 fn read() -> Result<Record, Box<dyn Error>> {
@@ -112,26 +125,29 @@ fn joint_radius(rows: &[Vec<f64>]) -> f64 {
     bridges.joint_factor(ALPHA).value * own / (rows.len() as f64).sqrt()
 }
 
-/// The shares of wealth of every month from [`FIRST`] on.
-fn decide(record: &Record, strategy: &Strategy) -> Vec<Vec<f64>> {
-    let (mut radius, mut last): (f64, Option<AssetsSolution>) = (0.0, None);
+/// Shares that are the same in every industry.
+fn equal(width: usize, share: f64) -> Vec<f64> {
+    vec![share / width as f64; width]
+}
+
+/// The shares of wealth of every month from [`FIRST`] on; `radii` are those of the years.
+fn decide(record: &Record, strategy: &Strategy, radii: &[f64]) -> Vec<Vec<f64>> {
+    let mut last: Option<AssetsSolution> = None;
     let decide = |month: usize| {
-        let rows = &record.rows[month.saturating_sub(strategy.window)..month];
+        let rows = record.known(month, strategy.window);
         match strategy.rule {
             Rule::MinimumVariance => minimum_variance(rows),
             Rule::InverseVolatility => inverse_volatility(rows),
-            Rule::Equal { share } => vec![share / rows[0].len() as f64; rows[0].len()],
+            Rule::Equal { share } => equal(rows[0].len(), share),
             Rule::Robust { sup, scale, is_static } => {
-                let is_new_year = (month - FIRST).is_multiple_of(MONTHS);
-                if is_new_year && scale > 0.0 {
-                    radius = scale * joint_radius(rows);
-                }
-                if let Some(last) = last.as_ref().filter(|_| is_static && !is_new_year) {
+                let months = month - FIRST;
+                if let Some(last) = last.as_ref().filter(|_| is_static && !months.is_multiple_of(MONTHS)) {
                     return last.allocation.clone();
                 }
                 let ground = if sup { Ground::Sup } else { Ground::Weighted(inverse_volatility(rows)) };
                 let rate = record.bills[month - 1];
                 let utility = RelativeUtility::new(UTILITY, WEALTH * (1.0 + rate));
+                let radius = scale * radii[months / MONTHS];
                 let law = AssetsLaw { returns: rows, radius, floor: f64::NEG_INFINITY };
                 let whole = ActionInterval { lowest: 0.0, highest: 1.0 };
                 let solution = AssetsStep::new(law, ground, utility, rate, whole).solve(last.as_ref());
@@ -146,53 +162,37 @@ fn decide(record: &Record, strategy: &Strategy) -> Vec<Vec<f64>> {
 
 /// Brings holdings to what was decided, month by month; `cost` is lost of what is traded.
 fn keep(record: &Record, held: Vec<Vec<f64>>, cost: f64) -> Books {
-    let (mut wealth, mut traded) = (vec![WEALTH], 0.0);
+    let (mut wealth, mut traded) = (vec![WEALTH], Vec::new());
     let mut drifted = vec![0.0; held[0].len()];
     for (month, shares) in (FIRST..).zip(&held) {
         let moved: f64 = shares.iter().zip(&drifted).map(|(share, had)| (share - had).abs()).sum();
         let grown: Vec<f64> = shares.iter().zip(&record.rows[month]).map(|(share, z)| share * z.exp()).collect();
-        let bank = (1.0 - shares.iter().sum::<f64>()) * (1.0 + record.bills[month]);
+        let bank = (1.0 - total(shares)) * (1.0 + record.bills[month]);
         let growth = bank + grown.iter().sum::<f64>();
-        traded += moved;
+        traded.push(moved);
         wealth.push(wealth[wealth.len() - 1] * (1.0 - cost * moved) * growth);
         drifted = grown.into_iter().map(|position| position / growth).collect();
     }
-    Books { wealth, held, traded }
+    let allocations = held.iter().map(|shares| total(shares)).collect();
+    Books { account: Account { wealth, allocations, traded }, held }
+}
+
+fn total(shares: &[f64]) -> f64 {
+    shares.iter().sum()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    total(values) / values.len() as f64
 }
 
 impl Books {
-    fn yearly_growth(&self) -> Vec<f64> {
-        self.wealth.windows(MONTHS + 1).step_by(MONTHS).map(|year| year[MONTHS] / year[0]).collect()
-    }
-
-    fn mean_share(&self) -> f64 {
-        self.held.iter().map(|shares| shares.iter().sum::<f64>()).sum::<f64>() / self.held.len() as f64
-    }
-
     /// `(sum a)^2 / sum a^2`, the mean over the months in which anything is held.
     fn effective_assets(&self) -> f64 {
         let of = |shares: &Vec<f64>| {
-            let (sum, squares) = (shares.iter().sum::<f64>(), shares.iter().map(|share| share * share).sum::<f64>());
-            (squares > 0.0).then(|| sum * sum / squares)
+            let squares = shares.iter().map(|share| share * share).sum::<f64>();
+            (squares > 0.0).then(|| total(shares).powi(2) / squares)
         };
-        let all: Vec<f64> = self.held.iter().filter_map(of).collect();
-        all.iter().sum::<f64>() / all.len() as f64
-    }
-
-    fn volatility(&self) -> f64 {
-        let returns: Vec<f64> = self.wealth.windows(2).map(|pair| pair[1] / pair[0] - 1.0).collect();
-        let mean = returns.iter().sum::<f64>() / returns.len() as f64;
-        let variance = returns.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / returns.len() as f64;
-        (MONTHS as f64 * variance).sqrt()
-    }
-
-    fn largest_fall(&self) -> f64 {
-        let mut highest = 0.0_f64;
-        let below = |&wealth: &f64| {
-            highest = highest.max(wealth);
-            1.0 - wealth / highest
-        };
-        self.wealth.iter().map(below).fold(0.0, f64::max)
+        mean(&self.held.iter().filter_map(of).collect::<Vec<f64>>())
     }
 }
 
@@ -206,7 +206,7 @@ fn estimate(years: usize, of: impl Fn(&[usize]) -> f64) -> String {
 
 fn strategies() -> Vec<Strategy> {
     let mut all = Vec::new();
-    for (window, words) in [(120, "10 years"), (240, "20 years"), (usize::MAX, "all")] {
+    for (window, words) in WINDOWS {
         let mut add = |name: String, rule| all.push(Strategy { name: format!("{name}, {words}"), rule, window });
         for (sup, norm) in [(false, "scaled_one"), (true, "sup")] {
             for scale in [0.5, 1.0] {
@@ -227,19 +227,28 @@ fn strategies() -> Vec<Strategy> {
 fn main() -> Result<(), Box<dyn Error>> {
     let cost: f64 = std::env::args().nth(1).map_or(Ok(0.0), |text| text.parse())?;
     let record = read()?;
-    let width = record.rows[0].len();
     let strategies = strategies();
-    let books: Vec<Books> =
-        strategies.par_iter().map(|strategy| keep(&record, decide(&record, strategy), cost)).collect();
-    let equal = |share: f64| keep(&record, vec![vec![share / width as f64; width]; record.rows.len() - FIRST], cost);
-    let all_equal = equal(1.0).yearly_growth();
+    let radii = BTreeMap::from(WINDOWS.map(|(window, _)| (window, record.radii(window))));
+    let live = |strategy: &Strategy| {
+        let radii = radii.get(&strategy.window).map_or(&[][..], Vec::as_slice);
+        keep(&record, decide(&record, strategy, radii), cost)
+    };
+    let books: Vec<Books> = strategies.par_iter().map(live).collect();
+    let months = record.rows.len() - FIRST;
+    let of_equal = |share: f64| {
+        keep(&record, vec![equal(record.rows[0].len(), share); months], cost).account.yearly_growth(MONTHS)
+    };
+    let all_equal = of_equal(1.0);
     let years = all_equal.len();
     println!(
         "| strategy | certainty equivalent of a year from 100 | less 1/N | less 1/N at its own mean share | volatility | largest fall | in industries | effective number | traded a year |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     for (strategy, books) in strategies.iter().zip(&books) {
-        let (own, alike) = (books.yearly_growth(), equal(books.mean_share()).yearly_growth());
+        let account = &books.account;
+        let share = mean(&account.allocations);
+        let (own, alike) = (account.yearly_growth(MONTHS), of_equal(share));
+        let annual = Annual::of(&account.returns(), &record.bills[FIRST..], MONTHS as f64);
         let worth = |growth: &[f64], years: &[usize]| {
             let picked: Vec<f64> = years.iter().map(|&year| growth[year]).collect();
             yearly_certainty_equivalent(UTILITY, &picked, WEALTH)
@@ -250,11 +259,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             estimate(years, |picked| worth(&own, picked)),
             estimate(years, |picked| worth(&own, picked) - worth(&all_equal, picked)),
             estimate(years, |picked| worth(&own, picked) - worth(&alike, picked)),
-            100.0 * books.volatility(),
-            100.0 * books.largest_fall(),
-            100.0 * books.mean_share(),
+            100.0 * annual.volatility,
+            100.0 * account.drawdowns().into_iter().fold(0.0, f64::max),
+            100.0 * share,
             books.effective_assets(),
-            books.traded * MONTHS as f64 / books.held.len() as f64,
+            MONTHS as f64 * mean(&account.traded),
         );
     }
     Ok(())
