@@ -155,3 +155,118 @@ async fn every_answer_to_a_problem_says_what_may_be_a_mistake_and_its_rates_a_ye
     let (_, advised) = app.post("/advise", &usual).await;
     assert_eq!((warned(&advised), advised.get("annualised")), (vec![], None));
 }
+
+/// Every direct solution whose radius may be asked for, through HTTP: values within 0.02 of a hundredth of a percent, allocations
+/// within 0.005 or where the value is flat.
+#[tokio::test(flavor = "multi_thread")]
+async fn several_assets_are_advised_by_name_as_solved_directly() {
+    const BP: f64 = 1e-4;
+    let app = App::start().await;
+    let oracle: Value = serde_json::from_str(include_str!("data/assets.json")).unwrap();
+    let mut held = 0;
+    for case in oracle["cases"].as_array().unwrap() {
+        let width = case["returns"][0].as_array().unwrap().len();
+        // Names whose order is not that of the columns.
+        let names: Vec<String> = (0..width).map(|asset| format!("asset {}", width - asset)).collect();
+        let (kind, risk_aversion) = (&case["utility"], &case["risk_aversion"]);
+        let utility = match kind.as_str().unwrap() {
+            "log" => json!({ "kind": "log" }),
+            _ => json!({ "kind": kind, "risk_aversion": risk_aversion }),
+        };
+        let mut problem = json!({ "assets": names, "ground_norm": case["norm"], "history": case["returns"], "utility": utility,
+            "rate_per_step": case["rate_per_step"], "radius": { "rule": "fixed", "radius": case["radius"] } });
+        if !case["floor"].is_null() {
+            problem["support"] = json!({ "min": case["floor"] });
+        }
+        let (status, advised) = app.post("/advise", &json!({ "problem": problem, "wealth": case["wealth"] })).await;
+        assert_eq!(status, 200, "{advised}");
+        let number = |field: &str| advised[field].as_f64().unwrap();
+        let expected = case["log_certainty_equivalent_over_bank"].as_f64().unwrap();
+        let gains = ["certainty_equivalent", "bound"].map(|field| (number(field) / number("floor")).ln());
+        assert!((gains[0] - expected).abs() < 0.02 * BP, "{case} {advised}");
+        assert!((0.0..0.01 * BP).contains(&(gains[1] - gains[0])), "{case} {advised}");
+        let shares: Vec<f64> = names.iter().map(|name| advised["allocation"][name].as_f64().unwrap()).collect();
+        let apart = |(asset, share): (usize, &f64)| (share - case["allocation"][asset].as_f64().unwrap()).abs();
+        // Two of the cases are flat between assets that are alike.
+        held += usize::from(shares.iter().enumerate().map(apart).fold(0.0, f64::max) < 0.005);
+        let total = number("total");
+        assert!((shares.iter().sum::<f64>() - total).abs() < 1e-12, "{advised}");
+        for name in &names {
+            let [seen, worst] = ["seen", "worst"].map(|mean| advised["worst_means"][name][mean].as_f64().unwrap());
+            assert!(worst <= seen, "{advised}");
+            let [share, part] = ["allocation", "composition"].map(|field| advised[field][name].as_f64().unwrap());
+            assert!(total < 1e-4 || (share - part * total).abs() < 1e-9, "{advised}");
+        }
+        assert_eq!(advised["caution"][0]["code"], "short_record");
+    }
+    assert!(held >= 22, "{held} of 26");
+}
+
+/// Columns that are one asset are advised as that asset, and the radius of all funds is that of the fund of inverse volatilities
+/// times the factor.
+#[tokio::test(flavor = "multi_thread")]
+async fn several_assets_that_are_one_are_advised_as_one() {
+    let app = App::start().await;
+    for radius in [json!({ "rule": "fixed", "radius": 0.002 }), json!({ "rule": "bridge", "alpha": 0.5, "scale": 0.2 })]
+    {
+        let one = json!({ "history": HISTORY, "rate_per_step": 0.002, "radius": radius });
+        let twice: Vec<[f64; 2]> = HISTORY.iter().map(|z| [*z, *z]).collect();
+        for norm in ["scaled_one", "sup"] {
+            let several = json!({ "assets": ["left", "right"], "ground_norm": norm, "history": twice, "rate_per_step": 0.002,
+                "radius": radius });
+            let single = app.post("/advise", &json!({ "problem": one })).await.1;
+            let (status, advised) = app.post("/advise", &json!({ "problem": several })).await;
+            assert_eq!(status, 200, "{advised}");
+            let number = |of: &Value, field: &str| of[field].as_f64().unwrap();
+            // All funds are one fund, whose returns are rounded once more.
+            assert!((number(&advised, "radius_factor") - 1.0).abs() < 1e-9, "{advised}");
+            for (field, within) in [("radius", 1e-9), ("floor", 1e-12), ("certainty_equivalent", 2e-6)] {
+                let apart = number(&advised, field) / number(&single, field) - 1.0;
+                assert!(apart.abs() < within, "{field}: {advised} {single}");
+            }
+            assert!((number(&advised, "total") - number(&single, "allocation")).abs() < 0.005, "{advised} {single}");
+            assert!(number(&single, "allocation") > 0.05, "{single}");
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_wrong_with_several_assets_is_named() {
+    let app = App::start().await;
+    let history: Vec<[f64; 2]> = HISTORY.iter().map(|z| [*z, 0.5 * z * z]).collect();
+    let good = json!({ "assets": ["stocks", "bonds"], "history": history, "rate_per_step": 0.002 });
+    let (status, advised) = app.post("/advise", &json!({ "problem": good })).await;
+    assert_eq!(status, 200, "{advised}");
+    // Two assets lie further apart than one.
+    assert!(advised["radius_factor"].as_f64().unwrap() > 1.0, "{advised}");
+    let with = |change: &dyn Fn(&mut Value)| {
+        let mut problem = good.clone();
+        change(&mut problem);
+        json!({ "problem": problem })
+    };
+    let cases: Vec<(Value, &str)> = vec![
+        (with(&|p| p["assets"] = json!(["stocks"])), "problem.assets"),
+        (with(&|p| p["assets"] = json!(["stocks", "stocks"])), "problem.assets[1]"),
+        (with(&|p| p["assets"] = json!(["stocks", ""])), "problem.assets[1]"),
+        (with(&|p| p["history"][3] = json!([0.01])), "problem.history[3]"),
+        (with(&|p| p["history"][3] = json!([0.01, 9.0])), "problem.history[3][1]"),
+        (with(&|p| p["history"] = json!([[0.01, 0.02]])), "problem.history"),
+        (with(&|p| p["history"] = json!([[0.01, 0.02], [0.03, 0.02]])), "problem.history, bonds"),
+        (with(&|p| p["support"] = json!({ "min": 0.0 })), "problem.support.min"),
+        (with(&|p| p["support"] = json!({ "min": -9.0 })), "problem.support.min"),
+        (with(&|p| p["ground_norm"] = json!("two")), "problem.ground_norm"),
+        (with(&|p| p["rate_per_step"] = json!(-2.0)), "problem.rate_per_step"),
+        (with(&|p| p["radius"] = json!({ "rule": "chi_square", "alpha": 0.5 })), "problem.radius.rule"),
+        (with(&|p| p["utility"] = json!({ "kind": "power", "risk_aversion": 0.5 })), "problem.utility.risk_aversion"),
+        (json!({ "problem": good, "wealth": -1.0 }), "wealth"),
+    ];
+    for (question, field) in cases {
+        let (status, refused) = app.post("/advise", &question).await;
+        assert_eq!((status.as_u16(), refused["field"].as_str()), (422, Some(field)), "{question}: {refused}");
+    }
+    for (field, value) in [("trading_cost", json!(0.01)), ("horizon", json!(1))] {
+        let (status, refused) = app.post("/advise", &with(&|problem| problem[field] = value.clone())).await;
+        let named = format!("problem.{field}");
+        assert_eq!((status.as_u16(), refused["field"].as_str()), (422, Some(named.as_str())), "{refused}");
+    }
+}

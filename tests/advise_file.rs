@@ -36,14 +36,17 @@ async fn it_answers_what_the_service_answers_to_the_last_bit() {
     let app = App::start().await;
     let rows = last(480);
     let history: Vec<f64> = rows.iter().map(|[risky, _]| risky.ln_1p()).collect();
-    for (rate, arguments) in [(rows[479][1], &[][..]), (0.0015, &["--rate", "0.0015"])] {
+    let (equal, decay) = (json!({ "kind": "equal" }), json!({ "kind": "decay", "half_life": 240.0 }));
+    for (rate, learning, arguments) in
+        [(rows[479][1], equal, &[][..]), (0.0015, decay, &["--rate", "0.0015", "--half-life", "240"])]
+    {
         let usual = ["advise", MARKET, "--window", "480", "--risk-aversion", "4.5", "--trading-cost", "0.004"];
         let more = ["--wealth", "80", "--holding", "0.25", "--json"];
         let output = ballast(&[&usual, &more[..], arguments].concat());
         assert!(output.status.success(), "{output:?}");
         let found: Value = serde_json::from_slice(&output.stdout).unwrap();
         let problem = json!({ "history": history, "rate_per_step": rate, "periods_per_year": 12,
-            "trading_cost": 0.004,
+            "trading_cost": 0.004, "learning": learning,
             "utility": { "kind": "power", "risk_aversion": 4.5 } });
         let question = json!({ "problem": problem, "wealth": 80.0, "holding": 0.25 });
         let (status, expected) = app.post("/advise", &question).await;
@@ -68,6 +71,7 @@ fn what_is_wrong_is_said_by_line_or_option() {
         (&["advise", MARKET, "--holding", "1.5"], "--holding is 1.5: must be a number in [0, 1]"),
         (&["advise", MARKET, "--wealth", "0"], "--wealth is 0: must be a number in"),
         (&["advise", MARKET, "--trading-cost", "0.2"], "--trading-cost is 0.2: must be a number in [0, 0.1]"),
+        (&["advise", MARKET, "--half-life", "0.5"], "--half-life is 0.5: must be a number in [1, "),
         (&["advise", MARKET, "--risk-aversion", "0.5"], "--risk-aversion is 0.5: must lie in [1, 100]"),
         (&["backtest", MARKET, "--out", file, "--window", "1100"], "the file is 1109 periods: must hold at least 1112"),
     ] {

@@ -18,7 +18,8 @@ const BEHIND_THE_FACE: [&str; 3] = ["bellman", "surrogate", "uncertainty"];
 /// Files of `control` whose types users send or read as they are, and which therefore describe themselves to the API. A
 /// copy of each for the API alone would be a second place for every field and every sentence about it. What computes is not
 /// among them: nothing of `numerics`, and of `control` neither the method nor the problem.
-const DOCUMENTS: [&str; 18] = [
+const DOCUMENTS: [&str; 20] = [
+    "control/assets/advice.rs",
     "control/evaluation/backtest_report.rs",
     "control/evaluation/report.rs",
     "control/policy/advice.rs",
@@ -27,6 +28,7 @@ const DOCUMENTS: [&str; 18] = [
     "control/policy/worst_case.rs",
     "control/progress.rs",
     "control/request/annualised.rs",
+    "control/request/assets.rs",
     "control/request/backtest.rs",
     "control/request/contributions.rs",
     "control/request/evaluation.rs",

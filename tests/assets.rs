@@ -300,6 +300,42 @@ fn a_large_radius_at_a_fixed_total_leads_to_inverse_volatilities() {
     assert!(found[0] > 0.3 && found[3] < 0.1 && found[3] < found[2] && found[2] < found[0], "{found:?}");
 }
 
+/// At the corners of what may be asked: whatever becomes of a search, what is told is finite, in order, and never less than the bank.
+#[test]
+fn extremes_are_answered_with_bounds_in_order() {
+    let mut held = 0;
+    for (assets, dates) in [(2, 2), (2, 9), (30, 12), (7, 40)] {
+        let calm = sample(assets, dates, 3);
+        let wild: Vec<Vec<f64>> =
+            calm.iter().map(|row| row.iter().map(|z| (60.0 * z).clamp(-5.0, 5.0)).collect()).collect();
+        let tiny: Vec<Vec<f64>> = calm.iter().map(|row| row.iter().map(|z| 1e-5 * z).collect()).collect();
+        for returns in [&calm, &wild, &tiny] {
+            for utility in [
+                POWER,
+                RelativeUtility::Power { eta: 100.0 },
+                RelativeUtility::Log,
+                RelativeUtility::Exponential { k: 1e3 },
+            ] {
+                for (radius, floor) in [(0.0, f64::NEG_INFINITY), (10.0, f64::NEG_INFINITY), (1e-9, -5.0), (10.0, -5.0)]
+                {
+                    for ground in [Ground::Sup, Ground::Weighted(inverse_volatility(returns))] {
+                        let told = step(returns, &ground, utility, radius, floor).solve(None);
+                        let total: f64 = told.allocation.iter().sum();
+                        assert!(told.value >= 0.0 && told.bound >= told.value && told.bound < 6.0, "{told:?}");
+                        assert!((0.0..=1.0 + 1e-9).contains(&total), "{told:?}");
+                        assert!(
+                            told.allocation.iter().chain(&told.mean_moves).all(|number| number.is_finite()),
+                            "{told:?}"
+                        );
+                        held += usize::from(total > 0.01);
+                    }
+                }
+            }
+        }
+    }
+    assert!(held > 50, "{held}");
+}
+
 #[test]
 fn a_ball_restricted_to_its_sample_has_the_worst_law_of_another_program() {
     // The unit test of SDDP.jl's Wasserstein risk measure: of a payoff, the least is worst.

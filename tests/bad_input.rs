@@ -249,6 +249,8 @@ fn faulty_sessions() -> Vec<(&'static str, &'static str)> {
         (r#""renew": {"every": 1.5}"#, "renew.every"),
         (r#""renew": {"every": 1, "window": 1}"#, "renew.window"),
         (r#""renew": {"every": 1, "horizon": 2}"#, "renew.horizon"),
+        (r#""rolling": true"#, "rolling"),
+        (r#""rolling": "yes""#, "rolling"),
         (r#""colour": 1"#, "colour"),
     ]
 }

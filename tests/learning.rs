@@ -87,22 +87,24 @@ fn the_value_of_a_decaying_law_is_that_of_steps_in_each_other() {
     }
 }
 
-/// By `request` with the laws of the design resampled, over a record nine half-lives long.
-fn settled() -> (Advisor, Vec<f64>) {
+/// `request` with the laws of the design resampled, over a record nine half-lives long.
+fn settled(horizon: usize, count: usize) -> Value {
     let record: Vec<f64> = (0..24).map(|k| 0.01 + 0.03 * f64::from(k * 7 % 13 - 6) / 6.0).collect();
-    let mut asked = request(3, bridge(), json!({ "kind": "decay", "half_life": 2.5 }));
+    let mut asked = request(horizon, bridge(), json!({ "kind": "decay", "half_life": 2.5 }));
     asked["problem"]["history"] = json!(record);
-    asked["design"] = json!({ "count": 60, "initial_laws": "resampled" });
-    (advisor(asked), record)
+    asked["design"] = json!({ "count": count, "initial_laws": "resampled" });
+    asked
 }
 
 #[test]
 fn the_first_step_serves_every_law_once_the_record_has_settled() {
-    let (solved, record) = settled();
+    let solved = advisor(settled(3, 60));
+    let record = &solved.specification().problem.history;
     let learning = Learning::Decay { half_life: 2.5 };
     // By hand: tanh(n ln(2) / 5) passes 0.99 between 19 and 20.
-    assert!(!solved.is_settled(19) && solved.is_settled(20) && solved.is_settled(record.len()));
-    assert!(!advisor(request(1, bridge(), json!({ "kind": "equal" }))).is_settled(100_000));
+    assert_eq!(solved.settled_from(), Some(20));
+    // Precision that grows for ever.
+    assert_eq!(advisor(request(1, bridge(), json!({ "kind": "equal" }))).settled_from(), None);
     let mut state = solved.initial_state(None, None).unwrap();
     let mut read_off = 0;
     for period in 0..40 {
@@ -231,4 +233,109 @@ async fn a_record_that_no_longer_varies_by_its_weights_is_refused() {
     assert!(refused["rule"].as_str().unwrap().contains("must vary: as learned"), "{refused}");
     problem["learning"]["half_life"] = json!(12.0);
     assert_eq!(app.post("/advise", &json!({ "problem": problem })).await.0, StatusCode::OK);
+}
+
+/// Beyond the horizon of its policy, each period by the policy's first step at the law as it then is, as the library says; through a
+/// restart, a correction and a policy put in the place of the first.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_rolls_beyond_its_horizon() {
+    let asked = settled(2, 20);
+    let library = advisor(asked.clone());
+    let mut app = App::start().await;
+    app.train(&asked).await;
+    app.open_with(json!({ "rolling": true })).await;
+    let path = format!("/sessions/{}", app.session);
+    let mut state = library.initial_state(None, None).unwrap();
+    let (mut earlier, mut supposed): (Vec<State>, Option<Value>) = (Vec::new(), None);
+    for period in 1..=8 {
+        let advice = library.advise(0, &state, AdviceMode::Surrogate);
+        let (status, action) = app.action().await;
+        assert_eq!(status, StatusCode::OK, "{action}");
+        assert_eq!((&action["period"], &action["radius"]), (&json!(period), &json!(advice.radius)));
+        if let Some(supposed) = supposed.take() {
+            for field in ["allocation", "certainty_equivalent", "floor", "radius", "source"] {
+                assert_eq!(action[field], supposed[field], "{field}: {supposed}");
+            }
+        }
+        assert_eq!(action["allocation"], json!(advice.allocation), "{period}");
+        let log_return = 0.012 + 0.03 * (f64::from(period) * 2.3).sin();
+        let foretold = app.post("/what-if", &json!({ "session": app.session, "log_return": log_return })).await.1;
+        let observed = app.observe(period as usize, log_return).await.1;
+        assert_eq!((&foretold["period"], &foretold["radius"]), (&json!(period + 1), &observed["radius"]), "{foretold}");
+        supposed = Some(foretold);
+        assert_eq!(observed["completed"], json!(false));
+        earlier.push(state.clone());
+        state = library.advance(0, &state, &Realised::of(advice.allocation, log_return));
+        assert_eq!(observed["wealth"], json!(state.wealth));
+        if period == 4 {
+            app.restart().await;
+        }
+    }
+    let told = app.get(&path).await.1;
+    assert_eq!((&told["state"], &told["rolling"], &told["period"]), (&json!("active"), &json!(true), &json!(9)));
+    // The fifth return becomes another: what was held for it, and after it, stays.
+    let correction = json!({ "correction": 1, "period": 5, "log_return": 0.05, "reason": "the index was revised" });
+    let (status, corrected) = app.post(&format!("{path}/corrections"), &correction).await;
+    assert_eq!(status, StatusCode::OK, "{corrected}");
+    let history = app.get(&format!("{path}/history")).await.1;
+    let held = |period: usize| history["observations"][period]["executed_allocation"].as_f64().unwrap();
+    let returned = |period: usize| history["observations"][period]["log_return"].as_f64().unwrap();
+    let mut state = earlier.swap_remove(4);
+    for period in 4..8 {
+        let log_return = if period == 4 { 0.05 } else { returned(period) };
+        state = library.advance(0, &state, &Realised::of(held(period), log_return));
+        let now = &history["observations"][period]["now"];
+        assert_eq!((&now["wealth"], &now["radius"]), (&json!(state.wealth), &json!(library.radius(&state))));
+    }
+    assert_eq!(app.action().await.1["radius"], json!(library.radius(&state)));
+    let (status, renewed) = app.post(&format!("{path}/renewals"), &json!({ "renewal": 1, "policy": app.policy })).await;
+    assert_eq!(status, StatusCode::OK, "{renewed}");
+    app.restart().await;
+    assert_eq!(app.action().await.1["radius"], renewed["radius"]);
+    assert_eq!(app.observe(9, 0.01).await.0, StatusCode::OK);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_that_cannot_roll_is_refused() {
+    let mut app = App::start().await;
+    let refused = async |app: &mut App, request: Value, words: &str| {
+        let mut opened = request;
+        (opened["policy"], opened["rolling"]) = (json!(app.policy), json!(true));
+        let (status, refused) = app.post("/sessions", &opened).await;
+        assert_eq!((status.as_u16(), &refused["field"]), (422, &json!("rolling")), "{refused}");
+        assert!(refused["rule"].as_str().unwrap().contains(words), "{refused}");
+    };
+    app.train(&request(2, bridge(), decay())).await;
+    refused(&mut app, json!({}), "design.initial_laws is resampled").await;
+    app.train(&settled(2, 12)).await;
+    refused(&mut app, json!({ "history": HISTORY }), "from 20 returns on by this half-life, and there are 10").await;
+    refused(&mut app, json!({ "renew": { "every": 1 } }), "renew").await;
+    let long = settled(2, 12)["problem"]["history"].clone();
+    let mut short = settled(2, 12);
+    short["problem"]["history"] = json!(HISTORY);
+    app.train(&short).await;
+    refused(&mut app, json!({ "history": long }), "the policy's own history has 10").await;
+    for (field, value) in [
+        ("contributions", json!(1.0)),
+        ("utility", json!({ "kind": "exponential", "risk_aversion": 0.01 })),
+        ("framework", json!("static")),
+    ] {
+        let mut other = settled(2, 12);
+        other["problem"][field] = value;
+        app.train(&other).await;
+        let words = if field == "framework" { "that learns" } else { "does not depend on wealth" };
+        refused(&mut app, json!({}), words).await;
+    }
+    app.train(&settled(2, 12)).await;
+    // A rolling session takes no policy that cannot serve it.
+    app.open_with(json!({ "rolling": true })).await;
+    let (path, settled_policy) = (format!("/sessions/{}/renewals", app.session), app.policy.clone());
+    let mut listed = settled(2, 12);
+    listed["problem"]["contributions"] = json!([1.0, 2.0]);
+    app.train(&listed).await;
+    let (status, answer) = app.post(&path, &json!({ "renewal": 1, "policy": app.policy })).await;
+    assert_eq!((status.as_u16(), &answer["field"]), (422, &json!("policy")), "{answer}");
+    let renewal = json!({ "renewal": 1, "policy": settled_policy, "window": 12 });
+    let (status, answer) = app.post(&path, &renewal).await;
+    assert_eq!((status.as_u16(), &answer["field"]), (422, &json!("policy")), "{answer}");
 }

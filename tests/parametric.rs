@@ -223,7 +223,7 @@ fn a_radius_supposed_is_the_radius_of_the_region() {
         let state = solved.initial_state(None, None).unwrap();
         let suppose = |radius: HypotheticalRadius| {
             let hypothesis = Hypothesis { radius: Some(radius), ..Hypothesis::default() };
-            let supposed = solved.suppose(2, &state, &hypothesis, AdviceMode::Surrogate).unwrap();
+            let supposed = solved.suppose(2, None, &state, &hypothesis, AdviceMode::Surrogate).unwrap();
             let worst = supposed.worst_case.unwrap();
             let (normal, summary) = (worst.normal.unwrap(), worst.summary().unwrap());
             assert_eq!((summary.mean, summary.standard_deviation), (normal.mean, normal.variance.sqrt()));

@@ -328,7 +328,7 @@ fn months(year: u32, window: usize, lived: usize) -> Vec<Period> {
 async fn ten_years_of_a_live_session_equal_the_backtest() {
     const LIVED: usize = 120;
     let walk =
-        WalkForward { window: 36, every: 12, horizon: 13, risk_aversion: 3.0, trading_cost: 0.0, count: 20, seed: 5 };
+        WalkForward { window: 36, every: 12, horizon: 13, risk_aversion: 3.0, trading_cost: 0.0, count: 12, seed: 5 };
     let (alpha, months) = (0.5, months(1991, walk.window, LIVED));
     let pool = TrainingPool::new(2).unwrap();
     let watch = Watch::unwatched();

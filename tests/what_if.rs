@@ -142,7 +142,7 @@ fn without_a_radius_the_last_step_is_the_plug_in_one() {
     let plug_in = advisor(&request);
     let state = adaptive.initial_state(None, None).unwrap();
     let none = Hypothesis { radius: Some(HypotheticalRadius::Scaled(0.0)), ..Hypothesis::default() };
-    let supposed = adaptive.suppose(0, &state, &none, AdviceMode::Surrogate).unwrap().advice;
+    let supposed = adaptive.suppose(0, None, &state, &none, AdviceMode::Surrogate).unwrap().advice;
     let expected = plug_in.advise(0, &state, AdviceMode::Resolve);
     assert!(expected.allocation > 0.0, "{expected:?}");
     assert_eq!(

@@ -4,6 +4,7 @@
 use std::error::Error;
 
 use ballast::control::error::FieldError;
+use ballast::control::request::learning::Learning;
 use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification, default_seed};
 use ballast::service::advise::Advise;
 use clap::Args;
@@ -19,6 +20,9 @@ pub struct AdviseArgs {
     /// Use the last so many returns; all of them unless given
     #[arg(long)]
     window: Option<usize>,
+    /// Periods in which the weight of a return halves; all weigh the same unless given
+    #[arg(long)]
+    half_life: Option<f64>,
     /// Relative risk aversion: 1 is log utility, more is more careful
     #[arg(long, default_value_t = 3.0)]
     risk_aversion: f64,
@@ -40,7 +44,8 @@ pub struct AdviseArgs {
 }
 
 /// The option that says what a field of the question is.
-const OPTIONS: [(&str, &str); 5] = [
+const OPTIONS: [(&str, &str); 6] = [
+    ("problem.learning.half_life", "--half-life"),
     ("problem.trading_cost", "--trading-cost"),
     ("problem.periods_per_year", "--periods-per-year"),
     ("wealth", "--wealth"),
@@ -74,6 +79,7 @@ impl AdviseArgs {
             horizon: 1,
             periods_per_year: Some(returns.periods_per_year as f64),
             trading_cost: self.trading_cost,
+            learning: self.half_life.map_or_else(Learning::default, |half_life| Learning::Decay { half_life }),
             utility: UtilitySpecification::relative(self.risk_aversion),
             ..ProblemSpecification::of(history, returns.rate())
         };

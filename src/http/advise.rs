@@ -5,8 +5,9 @@ use std::time::Instant;
 
 use axum::Json;
 use axum::extract::State;
-use serde::Deserialize;
 use serde::de::IgnoredAny;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 use super::access::{By, Heavy};
 use super::decode;
@@ -14,30 +15,54 @@ use super::extract::JsonBytes;
 use super::problem::Problem;
 use crate::service::Service;
 use crate::service::advise::{Advise, Advised};
+use crate::service::advise_assets::{AdviseAssets, AssetsAdvised};
 use crate::service::metrics::ACTION_SECONDS;
 
-/// What to hold through one period, from a record of returns: solved exactly, nothing is stored.
+/// A question about one asset, or about several, which `problem.assets` names.
+#[derive(Debug, ToSchema)]
+#[serde(untagged)]
+#[allow(clippy::large_enum_variant)]
+pub enum AdviseQuestion {
+    Asset(Advise),
+    Assets(AdviseAssets),
+}
+
+/// The answer to a question about one asset or several.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum AdviseAnswer {
+    Asset(Box<Advised>),
+    Assets(Box<AssetsAdvised>),
+}
+
+/// What to hold through one period, from a record of returns of one asset or several: solved exactly, nothing is stored.
 #[utoipa::path(post, path = "/advise", tag = "advice",
-    request_body(content = Advise, example = json!({
+    request_body(content = AdviseQuestion, example = json!({
         "problem": { "history": [0.012, -0.034, 0.021, 0.008, 0.017, -0.009], "rate_per_step": 0.001,
             "utility": { "kind": "power", "risk_aversion": 3.0 } },
         "wealth": 250000.0, "holding": 0.6
     })),
     responses(
-        (status = 200, description = "The allocation and its worst-case law.", body = Advised),
+        (status = 200, description = "The allocation and its worst-case law.", body = AdviseAnswer),
         (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn advise(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,
     JsonBytes(bytes): JsonBytes,
-) -> Result<Json<Advised>, Problem> {
+) -> Result<Json<AdviseAnswer>, Problem> {
     let started = Instant::now();
-    let advised = service.sessions.advise(&caller.tenant, question(&bytes)?).await?;
-    metrics::histogram!(ACTION_SECONDS, "mode" => "advise").record(started.elapsed().as_secs_f64());
-    Ok(Json(advised))
+    let (sessions, tenant) = (&service.sessions, &caller.tenant);
+    let (answer, mode) = match question(&bytes)? {
+        AdviseQuestion::Asset(asked) => (AdviseAnswer::Asset(sessions.advise(tenant, asked).await?.into()), "advise"),
+        AdviseQuestion::Assets(asked) => {
+            (AdviseAnswer::Assets(sessions.advise_assets(tenant, asked).await?.into()), "advise_assets")
+        }
+    };
+    metrics::histogram!(ACTION_SECONDS, "mode" => mode).record(started.elapsed().as_secs_f64());
+    Ok(Json(answer))
 }
 
-/// What tells whether a question says its horizon.
+/// What tells whether a question says its horizon, and whether it names assets.
 #[derive(Deserialize)]
 struct Said {
     problem: SaidOfProblem,
@@ -46,14 +71,18 @@ struct Said {
 #[derive(Deserialize)]
 struct SaidOfProblem {
     horizon: Option<IgnoredAny>,
+    assets: Option<IgnoredAny>,
 }
 
 /// The question, with the horizon that is meant where none is given.
-fn question(bytes: &[u8]) -> Result<Advise, Problem> {
+fn question(bytes: &[u8]) -> Result<AdviseQuestion, Problem> {
+    let Ok(Said { problem }) = decode::json(bytes) else { return Ok(AdviseQuestion::Asset(decode::json(bytes)?)) };
+    if problem.assets.is_some() {
+        return Ok(AdviseQuestion::Assets(decode::json(bytes)?));
+    }
     let mut question: Advise = decode::json(bytes)?;
-    let Said { problem } = decode::json(bytes)?;
     if problem.horizon.is_none() {
         question.problem.horizon = 1;
     }
-    Ok(question)
+    Ok(AdviseQuestion::Asset(question))
 }

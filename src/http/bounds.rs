@@ -6,6 +6,7 @@
 use serde_json::{Map, Value, json};
 use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
+use crate::control::request::assets::{ASSETS, DATES, NAME_LENGTH};
 use crate::control::request::backtest;
 use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
 use crate::control::request::learning::HALF_LIFE;
@@ -37,13 +38,8 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
     let history = listed(&HISTORY_LENGTH, within((-LOG_RETURN, LOG_RETURN)));
     let wealth = within(WEALTH);
     let probability = within((1e-3, 0.999));
-    let action = json!({ "minItems": 2, "maxItems": 2, "items": within((0.0, 1.0)) });
     let rules = [
         ("ProblemSpecification", "horizon", whole(&HORIZON)),
-        ("ProblemSpecification", "rate_per_step", within(RATE)),
-        ("ProblemSpecification", "periods_per_year", within(PERIODS_PER_YEAR)),
-        ("ProblemSpecification", "initial_wealth", wealth.clone()),
-        ("ProblemSpecification", "action_interval", action),
         ("ProblemSpecification", "trading_cost", within(TRADING_COST)),
         ("ProblemSpecification", "history", history),
         ("Learning", "half_life", within(HALF_LIFE)),
@@ -73,6 +69,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("HyperparameterBounds", "noise_variance", pair),
         ("Advise", "wealth", wealth.clone()),
         ("Advise", "holding", within((0.0, 1.0))),
+        ("AdviseAssets", "wealth", wealth.clone()),
         ("WhatIf", "session", json!({ "minLength": 1 })),
         ("WhatIf", "wealth", wealth),
         ("WhatIf", "holding", within((0.0, 1.0))),
@@ -86,7 +83,41 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("EvaluationRequest", "level", within(LEVEL)),
         ("InitialHistories", "count", whole(&HISTORIES)),
     ];
-    rules.into_iter().chain(of_sessions()).chain(walked()).chain(reported()).collect()
+    let investors = ["ProblemSpecification", "AssetsProblem"].into_iter().flat_map(of_investor);
+    rules
+        .into_iter()
+        .chain(investors)
+        .chain(of_assets())
+        .chain(of_sessions())
+        .chain(walked())
+        .chain(reported())
+        .collect()
+}
+
+/// Of the problems that have an investor and a bank.
+fn of_investor(problem: &'static str) -> impl Iterator<Item = (&'static str, &'static str, Value)> {
+    let action = json!({ "minItems": 2, "maxItems": 2, "items": within((0.0, 1.0)) });
+    let rules = [
+        (problem, "rate_per_step", within(RATE)),
+        (problem, "periods_per_year", within(PERIODS_PER_YEAR)),
+        (problem, "initial_wealth", within(WEALTH)),
+        (problem, "action_interval", action),
+    ];
+    rules.into_iter()
+}
+
+/// Of questions about several assets.
+fn of_assets() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
+    let (log_return, length) = (within((-LOG_RETURN, LOG_RETURN)), whole(&NAME_LENGTH));
+    let name = json!({ "minLength": length["minimum"], "maxLength": length["maximum"] });
+    let mut names = listed(&ASSETS, name);
+    names["uniqueItems"] = json!(true);
+    let rules = [
+        ("AssetsProblem", "assets", names),
+        ("AssetsProblem", "history", listed(&DATES, listed(&ASSETS, log_return.clone()))),
+        ("LowestReturn", "min", log_return),
+    ];
+    rules.into_iter()
 }
 
 /// Of sessions and what is recorded of them.

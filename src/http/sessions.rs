@@ -46,8 +46,8 @@ pub async fn open(
     headers: HeaderMap,
     JsonBody(request): JsonBody<wire::OpenSession>,
 ) -> Result<Response, Problem> {
-    let wire::OpenSession { policy, history, wealth, holding, renew } = request;
-    let start = Start { policy, history, wealth, holding, renew };
+    let wire::OpenSession { policy, history, wealth, holding, renew, rolling } = request;
+    let start = Start { policy, history, wealth, holding, renew, rolling };
     let live = service.sessions.open(&caller, start, idempotency_key(&headers)?).await?;
     let session = wire::Session::from(live);
     let location = [(header::LOCATION, format!("/sessions/{}", session.session))];

@@ -177,6 +177,9 @@ pub struct OpenSession {
     pub holding: Option<f64>,
     /// Train the next policy by itself, on the returns seen, and go on by it. Default: never.
     pub renew: Option<Renewing>,
+    /// Live every period by the first step of a policy whose learning is decay, for up to 5200 periods. Default: false.
+    #[serde(default)]
+    pub rolling: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
@@ -211,6 +214,8 @@ pub struct Session {
     pub renewals: usize,
     /// How it is renewed by itself; null where it is not.
     pub renew: Option<Renewing>,
+    /// Whether the first step of the policy advises every period.
+    pub rolling: bool,
     /// Where the next renewal is; null where it is not due.
     pub renewal: Option<RenewalDue>,
     /// Whether the returns still come as they came.
@@ -238,6 +243,7 @@ impl From<Live> for Session {
             horizon: live.horizon(),
             renewals: live.renewals,
             renew: live.renew,
+            rolling: live.current.is_rolling(),
             renewal: None,
             created_ms: live.row.created_ms,
         }

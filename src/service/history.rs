@@ -8,7 +8,7 @@ use super::answer::{Corrected, Observed};
 use super::content::read;
 use super::error::ServiceError;
 use super::periods::{Passage, Periods, Step};
-use super::plan::{Plan, Renew, Renewed, Stretch};
+use super::plan::{Plan, Renew, Renewed};
 use super::report::{Correct, Report};
 use super::sessions::Sessions;
 use crate::control::policy::advisor::AdviceMode;
@@ -146,11 +146,11 @@ impl Sessions {
     async fn told_now(&self, tenant: &Tenant, periods: &Periods, first: usize) -> Result<Vec<Now>, ServiceError> {
         let (mut passage, mut told): (Passage<'_>, Vec<Now>) = (periods.passage()?, Vec::new());
         for (step, period) in periods.all.iter().enumerate() {
-            let Stretch { policy, after, .. } = passage.stretch();
+            let stretch = passage.stretch();
             let passed = passage.next().map_err(ServiceError::of_recorded)?;
             let Some(Step { before, log_return, executed_allocation }) = passed else { break };
             if step >= first {
-                let (advising, local) = (self.policies.advisor(tenant, policy).await?, step - after);
+                let (advising, local) = (self.policies.advisor(tenant, &stretch.policy).await?, stretch.step(step));
                 let advise = move || advising.advise(local, &before.state, AdviceMode::Surrogate);
                 let advice = self.resolving.run(tenant, advise).await?;
                 // The radius after a period is the one that the next advice is within.

@@ -95,9 +95,15 @@ impl Live {
         due.is_some_and(|due| self.observed >= due)
     }
 
-    /// Periods observed by its policy.
+    /// The step of its policy that advises the coming period.
     pub(super) fn step(&self) -> usize {
-        self.observed - self.current.after
+        self.current.step(self.observed)
+    }
+
+    /// The step that advises the period after the coming one, if one does.
+    pub(super) fn following(&self) -> Option<usize> {
+        let observed = self.observed + 1;
+        (observed < self.horizon()).then(|| self.current.step(observed))
     }
 
     pub(super) fn expects(&self, period: usize) -> Result<(), ServiceError> {
@@ -155,7 +161,8 @@ impl Live {
         let passed = self.standing.after(dynamics, observe.period, report, allocation)?;
         let Passed { log_return, executed_allocation, standing } = passed;
         let (standing, uncertainty) =
-            measured(means.advising, &means.advisor, &self.row.tenant, self.step() + 1, standing).await?;
+            measured(means.advising, &means.advisor, &self.row.tenant, self.current.step(observe.period), standing)
+                .await?;
         let answer = Observed {
             session: observe.session.clone(),
             period: observe.period,
@@ -173,7 +180,7 @@ impl Live {
     }
 }
 
-/// The uncertainty set after `step` periods by the policy.
+/// The uncertainty set before `step` of the policy.
 pub(super) async fn measured(
     advising: &Bounded,
     advisor: &Arc<Advisor>,

@@ -5,6 +5,7 @@
 
 pub mod action;
 pub mod advise;
+pub mod advise_assets;
 pub mod allowance;
 pub mod answer;
 pub mod audit;

@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use super::content::read;
 use super::error::ServiceError;
-use super::plan::{Plan, Renew, Stretch};
+use super::plan::{Plan, Renew, Renewed, Stretch};
 use super::report::{Correct, Report};
 use super::standing::{Passed, Standing, usual};
 use crate::control::error::FieldError;
@@ -102,10 +102,10 @@ impl Periods {
     /// The entries are not those of the session.
     pub(super) fn of(facts: &SessionFacts) -> Result<Self, ServiceError> {
         let SessionFacts { row, entries, .. } = facts;
-        let terms = Plan::of(row)?.terms;
-        let state = State::new(&row.initial_history, row.initial_wealth, terms.learning)?;
+        let plan = Plan::of(row)?;
+        let state = State::new(&row.initial_history, row.initial_wealth, plan.terms.learning)?;
         let state = state.with_holding(row.initial_holding)?;
-        let first = Stretch { policy: row.policy.clone(), after: 0, terms, window: None };
+        let first = plan.stretch(row.policy.clone(), 0, plan.terms.clone(), None);
         let mut periods = Periods {
             all: Vec::new(),
             corrections: 0,
@@ -123,7 +123,8 @@ impl Periods {
                 EntryKind::Correction => periods.correct(&read(&entry.content_json)?)?,
                 EntryKind::Renewal => {
                     let renew: Renew = read(&entry.content_json)?;
-                    periods.stretches.push(Stretch::after(periods.all.len(), renew, read(&entry.answer_json)?));
+                    let Renewed { terms, .. } = read(&entry.answer_json)?;
+                    periods.stretches.push(plan.stretch(renew.policy, periods.all.len(), terms, renew.window));
                 }
             }
         }

@@ -7,6 +7,7 @@ use super::content::{json, read};
 use super::error::ServiceError;
 use crate::control::error::FieldError;
 use crate::control::policy::advice::Uncertainty;
+use crate::control::policy::advisor::Advisor;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::contributions::Contributions;
 use crate::control::request::framework::Framework;
@@ -37,6 +38,8 @@ pub struct Renewing {
 pub struct Plan {
     pub(super) terms: Terms,
     pub(super) renew: Option<Renewing>,
+    /// Whether every period is advised by the first step of the policy.
+    pub(super) rolling: bool,
 }
 
 /// The policy that a session lives by, from some period on.
@@ -48,6 +51,8 @@ pub struct Stretch {
     pub(super) terms: Terms,
     /// Of the last returns, which its law was made of.
     pub(super) window: Option<usize>,
+    /// Whether its first step advises every period.
+    rolling: bool,
 }
 
 /// The policy that a session goes on by.
@@ -112,9 +117,49 @@ pub(super) fn check_window(field: &str, window: Option<usize>) -> Result<(), Fie
 }
 
 impl Plan {
-    /// Of a session by the policy of a completed problem.
-    pub fn new(problem: &ProblemSpecification, renew: Option<Renewing>) -> Self {
-        Plan { terms: Terms::of(problem), renew }
+    /// Of a session that lives through the horizon of a policy and ends.
+    pub fn once(problem: &ProblemSpecification) -> Self {
+        Plan { terms: Terms::of(problem), renew: None, rolling: false }
+    }
+
+    /// Of a session that lives by a policy from `returns` on.
+    ///
+    /// # Errors
+    /// Sessions by this policy are not renewed by themselves as `renew` says, or do not roll.
+    pub fn new(advisor: &Advisor, returns: usize, renew: Option<Renewing>, rolling: bool) -> Result<Self, FieldError> {
+        let problem = &advisor.specification().problem;
+        renew.map_or(Ok(()), |renew| renew.check(problem))?;
+        if rolling && renew.is_some() {
+            let rule = "must be false where renew is given: a session that rolls goes on without";
+            return Err(FieldError::new("rolling", rolling, rule));
+        }
+        let plan = Plan { renew, rolling, ..Plan::once(problem) };
+        let terms = plan.terms(advisor, returns, 0).map_err(|rule| FieldError::new("rolling", rolling, rule))?;
+        Ok(Plan { terms, ..plan })
+    }
+
+    /// Of the periods after `observed` ones, by a policy that starts from `returns`: those of its horizon, or where the session
+    /// rolls as many as are left to it.
+    ///
+    /// # Errors
+    /// The rule that such a policy breaks.
+    pub(super) fn terms(&self, advisor: &Advisor, returns: usize, observed: usize) -> Result<Terms, String> {
+        let (terms, left) = (Terms::of(&advisor.specification().problem), MOST_PERIODS.saturating_sub(observed));
+        let horizon = if self.rolling { left } else { terms.horizon };
+        if horizon > left || left == 0 {
+            return Err(format!(
+                "must end after {MOST_PERIODS} periods of the session at most: open one on the record as it is now"
+            ));
+        }
+        if self.rolling {
+            advisor.check_rolling(returns)?;
+        }
+        Ok(Terms { horizon, ..terms })
+    }
+
+    /// By the policy, after `observed` periods.
+    pub(super) fn stretch(&self, policy: String, after: usize, terms: Terms, window: Option<usize>) -> Stretch {
+        Stretch { policy, after, terms, window, rolling: self.rolling }
     }
 
     /// As it is stored.
@@ -132,9 +177,9 @@ impl Plan {
 }
 
 impl Stretch {
-    /// The one that begins after `observed` periods.
-    pub(super) fn after(observed: usize, renew: Renew, renewed: Renewed) -> Self {
-        Stretch { policy: renew.policy, after: observed, terms: renewed.terms, window: renew.window }
+    /// Whether the first step of its policy advises every period.
+    pub fn is_rolling(&self) -> bool {
+        self.rolling
     }
 
     /// The last period that its policy advises.
@@ -157,8 +202,13 @@ impl Stretch {
         Err(FieldError::new("period", period, rule))
     }
 
-    /// What becomes of money in the period after `observed` periods of the session.
+    /// The step of its policy that advises the period after `observed` periods of the session.
+    pub(super) fn step(&self, observed: usize) -> usize {
+        if self.rolling { 0 } else { observed - self.after }
+    }
+
+    /// What becomes of money in that period.
     pub(super) fn dynamics(&self, observed: usize) -> Dynamics {
-        self.terms.period(observed - self.after)
+        self.terms.period(self.step(observed))
     }
 }

@@ -58,12 +58,12 @@ impl Policies {
         prepared.await.map_err(ServiceError::internal)?.map_err(ServiceError::internal)
     }
 
-    /// Whether sessions by a policy can start from so many returns.
+    /// Whether sessions of so many periods by a policy can start from so many returns.
     ///
     /// # Errors
     /// The bridges that they would ask for are too large to be kept ready.
-    pub(super) fn starts_from(&self, advisor: &Advisor, returns: usize) -> Result<(), FieldError> {
-        self.memory.keeps(&[Footprint::of("history", returns, advisor.heaviest_bridges(returns))])
+    pub(super) fn starts_from(&self, advisor: &Advisor, returns: usize, periods: usize) -> Result<(), FieldError> {
+        self.memory.keeps(&[Footprint::of("history", returns, advisor.heaviest_bridges(returns, periods))])
     }
 
     /// The investor of one period of a completed specification.

@@ -99,7 +99,7 @@ impl Sessions {
             let putting = correct.clone();
             let put_right = move || periods.put_right(&putting);
             let PutRight { before, standing, log_return } = self.advising.run(tenant, put_right).await??;
-            let step = observed - current.after;
+            let step = current.step(observed);
             let (standing, uncertainty) = measured(&self.advising, &advisor, tenant, step, standing).await?;
             let radius = Some(uncertainty.radius);
             let answer = Corrected {

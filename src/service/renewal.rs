@@ -12,14 +12,13 @@ use super::content::json;
 use super::error::ServiceError;
 use super::live::{Live, measured};
 use super::periods::Periods;
-use super::plan::{MOST_PERIODS, MOST_RENEWALS, Plan, Renew, Renewed, Stretch, check_window};
+use super::plan::{MOST_RENEWALS, Plan, Renew, Renewed, check_window};
 use super::recording::{is_repeat, numbered};
 use super::sessions::Sessions;
 use super::spans;
 use super::standing::last_of;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
-use crate::control::request::terms::Terms;
 use crate::store::{Actor, EntryKind, EntryRow, Onto, SessionFacts, Tenant};
 
 impl Sessions {
@@ -72,24 +71,20 @@ impl Sessions {
         let (observed, corrections, before) = (periods.all.len(), periods.corrections, periods.current().horizon());
         let (plan, problem) = (Plan::of(&facts.row)?, &advisor.specification().problem);
         plan.renew.map_or(Ok(()), |renew| renew.check(problem))?;
-        let terms = Terms::of(problem);
-        if observed + terms.horizon > MOST_PERIODS {
-            let rule = format!(
-                "must end after {MOST_PERIODS} periods of the session at most: open one on the record as it is now"
-            );
-            return Err(FieldError::new("policy", &renew.policy, rule).into());
-        }
-        let (onto, window, learning) = (advisor.clone(), renew.window, terms.learning);
+        let (onto, planned, Renew { policy, window, .. }) = (advisor.clone(), plan.clone(), renew.clone());
         let go_on = move || {
             let passage = periods.replay()?;
-            let standing = passage.standing.renewed(&passage.record, window, learning)?;
-            accepts(&onto, last_of(&passage.record, window), standing.state.wealth)?;
-            Ok::<_, ServiceError>(standing)
+            let last = last_of(&passage.record, window);
+            let terms = planned.terms(&onto, last.len(), observed);
+            let terms = terms.map_err(|rule| FieldError::new("policy", policy, rule))?;
+            let standing = passage.standing.renewed(&passage.record, window, terms.learning)?;
+            accepts(&onto, last, standing.state.wealth)?;
+            Ok::<_, ServiceError>((standing, terms))
         };
-        let standing = self.advising.run(tenant, go_on).await??;
-        self.policies.starts_from(&advisor, standing.state.law.sample_size())?;
+        let (standing, terms) = self.advising.run(tenant, go_on).await??;
+        self.policies.starts_from(&advisor, standing.state.law.sample_size(), terms.horizon)?;
         let (standing, uncertainty) = measured(&self.advising, &advisor, tenant, 0, standing).await?;
-        let current = Stretch { policy: renew.policy.clone(), after: observed, terms, window };
+        let current = plan.stretch(renew.policy.clone(), observed, terms, renew.window);
         let (horizon, radius) = (current.horizon(), Some(uncertainty.radius));
         let answer = Renewed {
             session: facts.row.session.clone(),

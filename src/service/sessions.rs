@@ -24,7 +24,7 @@ use super::identity;
 use super::keys::Caller;
 use super::live::{Live, Means, SESSION_BYTES};
 use super::memory::Memory;
-use super::plan::{Plan, Renewing, Stretch};
+use super::plan::{Plan, Renewing};
 use super::policies::Policies;
 use super::slots::{Generation, Held, Slots, Source};
 use super::spans;
@@ -47,6 +47,7 @@ pub struct Start {
     pub wealth: Option<f64>,
     pub holding: Option<f64>,
     pub renew: Option<Renewing>,
+    pub rolling: bool,
 }
 
 impl Start {
@@ -96,15 +97,14 @@ impl Sessions {
     pub async fn open(&self, caller: &Caller, start: Start, key: Option<String>) -> Result<Live, ServiceError> {
         let tenant = &caller.tenant;
         let key = key.map(|key| start.under(key)).transpose()?;
-        let Start { policy, history, wealth, holding, renew } = start;
+        let Start { policy, history, wealth, holding, renew, rolling } = start;
         let advisor = self.policies.advisor(tenant, &policy).await?;
         let state = advisor.initial_state(history.as_deref(), wealth)?.with_holding(holding.unwrap_or(0.0))?;
         // The policy's own wealth pays, whatever is held.
         advisor.check_withdrawals(&state)?;
-        self.policies.starts_from(&advisor, state.law.sample_size())?;
+        let plan = Plan::new(&advisor, state.law.sample_size(), renew, rolling)?;
+        self.policies.starts_from(&advisor, state.law.sample_size(), plan.terms.horizon)?;
         let problem = &advisor.specification().problem;
-        renew.map_or(Ok(()), |renew| renew.check(problem))?;
-        let plan = Plan::new(problem, renew);
         let row = SessionRow {
             session: identity::new_id("session")?,
             tenant: tenant.clone(),
@@ -112,7 +112,7 @@ impl Sessions {
             initial_wealth: state.wealth,
             initial_holding: state.holding,
             initial_history: history.unwrap_or_else(|| problem.history.clone()),
-            horizon: problem.horizon,
+            horizon: plan.terms.horizon,
             plan_json: plan.json()?,
             due: renew.map(|renew| renew.every),
             created_ms: self.clock.now_milliseconds(),
@@ -131,7 +131,7 @@ impl Sessions {
         };
         let seen = row.as_opened();
         let standing = Standing::at(&row.session, state);
-        let current = Stretch { policy: row.policy.clone(), after: 0, terms: plan.terms, window: None };
+        let current = plan.stretch(row.policy.clone(), 0, plan.terms.clone(), None);
         Ok(Live {
             row: Arc::new(row),
             standing,

@@ -211,12 +211,14 @@ impl Sessions {
         let mode = if solves { AdviceMode::Resolve } else { AdviceMode::Surrogate };
         let mut points = Vec::with_capacity(hypotheses.len());
         for hypothesis in hypotheses {
-            let (advisor, state, step) = (advisor.clone(), live.standing.state.clone(), live.step());
+            let (advisor, state) = (advisor.clone(), live.standing.state.clone());
+            let (step, following) = (live.step(), live.following());
             let turns = if solves || hypothesis.radius.is_some() { &self.resolving } else { &self.advising };
-            let supposed = turns.run(tenant, move || advisor.suppose(step, &state, &hypothesis, mode)).await?;
-            let mut supposed = supposed.map_err(|error| request.renamed(error))?;
-            supposed.step += live.current.after;
-            points.push(WhatIfPoint::new(&hypothesis, supposed, request.explain));
+            let supposed =
+                turns.run(tenant, move || advisor.suppose(step, following, &state, &hypothesis, mode)).await?;
+            let supposed = supposed.map_err(|error| request.renamed(error))?;
+            let period = live.observed + 1 + usize::from(hypothesis.log_return.is_some());
+            points.push(WhatIfPoint::new(period, &hypothesis, supposed, request.explain));
         }
         let session = request.session;
         match (request.sweep, points.pop()) {
@@ -227,14 +229,14 @@ impl Sessions {
 }
 
 impl WhatIfPoint {
-    fn new(hypothesis: &Hypothesis, supposed: Supposed, explain: Option<Explain>) -> Self {
+    fn new(period: usize, hypothesis: &Hypothesis, supposed: Supposed, explain: Option<Explain>) -> Self {
         let radius_scale = match hypothesis.radius {
             Some(HypotheticalRadius::Scaled(scale)) => Some(scale),
             _ => None,
         };
         let worst_case = supposed.worst_case;
         WhatIfPoint {
-            period: supposed.step + 1,
+            period,
             wealth: supposed.wealth,
             log_return: hypothesis.log_return,
             radius_scale,

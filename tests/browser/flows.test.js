@@ -66,3 +66,39 @@ test("a session says what is added at the end of the period, reckons with it, an
   await page.getByText("At the end of the period 8.25 is withdrawn.").first().waitFor();
   assert.match(await main(), /beside 5\.00 added/);
 });
+
+test("a policy that forgets is asked for by the form, and sessions by it renew themselves or roll", async () => {
+  await page.goto(`${ballast.url}/#/train`);
+  await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
+  await page.getByLabel("Decisions").fill("2");
+  await page.getByLabel("Bank return per period").fill("0.2 %");
+  await page.getByLabel("Half-life of returns").fill("1");
+  const sent = page.waitForRequest((request) => request.url().endsWith("/train"));
+  await page.getByRole("button", { name: "Train" }).click();
+  const request = (await sent).postDataJSON();
+  assert.deepEqual(request.problem.learning, { kind: "decay", half_life: 1 });
+  const design = { count: 20, initial_laws: "resampled" };
+  const { job } = await call(ballast.url, "/train", { ...request, design });
+  let now;
+  do now = await call(ballast.url, `/jobs/${job}`);
+  while (now.finished_ms === null);
+  assert.equal(now.state, "succeeded", JSON.stringify(now));
+  for (const [choice, told] of [
+    ["Renewed by itself", { renew: { every: 1, window: null }, rolling: false }],
+    ["Rolling", { renew: null, rolling: true }],
+  ]) {
+    await page.goto(`${ballast.url}/#/sessions/new?policy=${now.policy}`);
+    await page.getByLabel("How it goes on").selectOption(choice);
+    if (choice === "Renewed by itself") await page.getByLabel("Periods by each policy").fill("1");
+    await page.getByRole("button", { name: "Open" }).click();
+    await page.getByRole("heading", { name: /^Period 1/ }).waitFor();
+    const session = page.url().split("/").at(-1);
+    const { renew, rolling } = await call(ballast.url, `/sessions/${session}`);
+    assert.deepEqual({ renew, rolling }, told);
+  }
+  assert.equal(await page.getByRole("heading", { name: "Period 1 of 2" }).count(), 0);
+  await page.locator("#check").filter({ hasNotText: "Being checked" }).waitFor();
+  const words = await main();
+  assert.match(words, /0 periods observed\n/);
+  assert.doesNotMatch(words, /undefined|at the horizon/);
+});

@@ -65,6 +65,20 @@ def test_advice_without_a_policy(ballast: Ballast) -> None:
     assert refusal.value.field == "problem.horizon"
 
 
+def test_advice_on_several_assets(ballast: Ballast) -> None:
+    rows = [[value, value * value - 0.0005] for value in RETURNS]
+    advised = ballast.advise_assets(
+        rows, kind="log", assets=["stocks", "bonds"], rate_per_step=0.0, radius={"rule": "fixed", "radius": 1e-4}
+    )
+    assert sum(advised["allocation"].values()) == pytest.approx(advised["total"])
+    assert set(advised["composition"]) == set(advised["worst_means"]) == {"stocks", "bonds"}
+    assert advised["bound"] >= advised["certainty_equivalent"] >= advised["floor"]
+    with pytest.raises(ValueError, match=r"bonds: returns\[0\] is -1.0: must be above -1"):
+        ballast.advise_assets([[0.1, -1.0]], kind="simple", assets=["stocks", "bonds"], rate_per_step=0.0)
+    with pytest.raises(ValueError, match="assets is None: must name the columns"):
+        ballast.advise_assets(rows, kind="log", rate_per_step=0.0)
+
+
 def test_what_may_be_a_mistake_is_said(ballast: Ballast) -> None:
     training = train(ballast, rate_per_step=0.03, periods_per_year=12)
     assert [warning["code"] for warning in training.warnings] == ["rate_high", "rate_above_record"]

@@ -106,7 +106,7 @@ impl World {
             initial_holding: 0.0,
             initial_history: problem.history.clone(),
             horizon: self.horizon,
-            plan_json: Plan::new(problem, None).json()?,
+            plan_json: Plan::once(problem).json()?,
             due: None,
             created_ms: 0,
         })

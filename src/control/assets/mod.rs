@@ -17,6 +17,8 @@
 //! does not matter to them. Under `Ground::Sup` without a floor the step is that of one asset whose log-return is
 //! `ln(sum theta_i e^(z_i))`, theta = a / sum a. Source of the ball: paper (2.5); of the reduction, the levelling.
 
+pub mod advice;
+mod advising;
 mod branches;
 mod certificate;
 pub mod composition;
@@ -27,14 +29,15 @@ use self::branches::Branches;
 use self::interior::Interior;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
+use crate::control::request::assets::MOST_ASSETS;
 use crate::numerics::levelling::Ground;
 
-/// Assets at most.
-pub const MOST_ASSETS: usize = 30;
 /// Relative utility between the bounds at which a search ends.
 const TOLERANCE: f64 = 1e-8;
 /// Log certainty equivalent between the bounds that asks for no other search: a thousandth of a hundredth of a percent.
 const CONTENT: f64 = 1e-7;
+/// Of a mean of utilities: where a utility hardly grows any more, a value read back from above its rounding would be without end.
+const ROUNDING: f64 = 1e-14;
 /// First barriers of searches, in relative utility, and that of one near a similar step.
 const BARRIERS: [f64; 3] = [1e-3, 1e-2, 1e-1];
 const BARRIER_NEAR: f64 = 1e-4;
@@ -126,7 +129,19 @@ impl AssetsStep {
             let better = if next.value > best.value { next } else { best };
             best = AssetsSolution { bound, evaluations, ..better };
         }
-        best
+        self.at_least_the_bank(best)
+    }
+
+    /// A search that found nothing better leaves all in the bank where that is allowed, whatever became of it; and nothing is worth
+    /// more than the best growth seen.
+    fn at_least_the_bank(&self, found: AssetsSolution) -> AssetsSolution {
+        let most = self.growths.iter().copied().fold(1.0, f64::max).ln();
+        let bound = if found.bound < most { found.bound } else { most };
+        if found.value >= 0.0 || self.total.lowest > 0.0 {
+            return AssetsSolution { value: found.value.min(bound), bound, ..found };
+        }
+        let nothing = vec![0.0; self.assets];
+        AssetsSolution { allocation: nothing.clone(), value: 0.0, bound: bound.max(0.0), mean_moves: nothing, ..found }
     }
 
     fn search(&self, near: Option<&AssetsSolution>, barrier: f64) -> AssetsSolution {
@@ -145,7 +160,7 @@ impl AssetsStep {
         }
         AssetsSolution {
             allocation,
-            value: self.utility.inverse(value),
+            value: self.utility.inverse(value - ROUNDING * value.abs()),
             bound: self.utility.inverse(interior.upper.max(value)),
             multiplier: price,
             mean_moves: interior.mean_moves(),

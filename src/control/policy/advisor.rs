@@ -89,9 +89,9 @@ impl Advisor {
         prepared_bytes(&self.policy)
     }
 
-    /// Bytes of the largest bridges that a session asks for which starts from `sample_size` returns.
-    pub fn heaviest_bridges(&self, sample_size: usize) -> usize {
-        self.problem.sets.heaviest(sample_size, self.specification().problem.horizon)
+    /// Bytes of the largest bridges that a session of so many periods asks for which starts from `sample_size` returns.
+    pub fn heaviest_bridges(&self, sample_size: usize, periods: usize) -> usize {
+        self.problem.sets.heaviest(sample_size, periods)
     }
 
     /// The policy it answers by.

@@ -3,8 +3,6 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::advice::Advice;
-
 /// A record with fewer returns, by its effective size, is short: two years of months.
 const SHORT_RECORD: usize = 24;
 
@@ -30,8 +28,7 @@ pub enum CautionCode {
 
 impl Caution {
     /// Of an advice that rests on few returns, or on few by their weight.
-    pub(super) fn short_record(advice: &Advice) -> Option<Self> {
-        let Advice { sample_size, effective_size, .. } = *advice;
+    pub fn short_record(sample_size: usize, effective_size: f64) -> Option<Self> {
         if effective_size >= SHORT_RECORD as f64 {
             return None;
         }

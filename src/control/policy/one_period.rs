@@ -28,7 +28,7 @@ impl OnePeriod {
 
     /// Bytes of the bridges that its radius asks for.
     pub fn bridges(&self) -> usize {
-        self.advisor.heaviest_bridges(self.problem().history.len())
+        self.advisor.heaviest_bridges(self.problem().history.len(), 1)
     }
 
     /// The advice for who holds the share `holding` of the initial wealth, and the worst law behind it.
@@ -71,7 +71,16 @@ impl OnePeriod {
         self.advisor.initial_state(None, None)?.with_holding(holding)
     }
 
-    fn problem(&self) -> &ProblemSpecification {
+    /// Radius of the set.
+    ///
+    /// # Errors
+    /// The history breaks a rule, which a completed one does not.
+    pub fn radius(&self) -> Result<f64, FieldError> {
+        Ok(self.advisor.radius(&self.state(0.0)?))
+    }
+
+    /// The completed problem.
+    pub fn problem(&self) -> &ProblemSpecification {
         &self.advisor.specification().problem
     }
 }

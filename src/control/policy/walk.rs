@@ -3,6 +3,7 @@
 use super::advice::Advice;
 use super::advisor::{AdviceMode, Advisor};
 use crate::control::problem::state::{Realised, State};
+use crate::control::request::specification::{InitialLaws, Specification};
 
 /// Share of the largest effective size from which on a record counts as settled.
 const SETTLED: f64 = 0.99;
@@ -29,11 +30,39 @@ impl Iterator for Walk<'_> {
 }
 
 impl Advisor {
-    /// Whether a record of so many returns is as long as any to what is learned of it: its effective size is within a hundredth of
-    /// what that tends to. Then laws move on and their precision does not, and [`Self::advise`] at step 0 serves every period.
+    /// Returns from which on a record is as long as any to what is learned of it: its effective size is within a hundredth of what
+    /// that tends to, from where laws move on and their precision does not. `None` where it grows for ever.
     /// Checked by: `tests/learning.rs::the_first_step_serves_every_law_once_the_record_has_settled`.
-    pub fn is_settled(&self, returns: usize) -> bool {
-        self.specification().problem.learning.settled(returns) >= SETTLED
+    pub fn settled_from(&self) -> Option<usize> {
+        self.specification().problem.learning.settled_from(SETTLED)
+    }
+
+    /// Checks that [`Self::advise`] at step 0 serves every period of an investor who starts from so many returns: its surrogates were
+    /// trained over laws such as he meets, and nothing but the law tells one period from another.
+    /// Checked by: `tests/learning.rs::a_session_that_cannot_roll_is_refused`.
+    ///
+    /// # Errors
+    /// The rule that is broken.
+    pub fn check_rolling(&self, returns: usize) -> Result<(), String> {
+        let Specification { problem, design, .. } = self.specification();
+        let refused = |rule: &str| Err(format!("a session rolls only by a policy {rule}"));
+        let Some(settled) = self.settled_from().filter(|_| problem.framework.learns()) else {
+            return refused("that learns, with decay");
+        };
+        if design.initial_laws != InitialLaws::Resampled {
+            return refused("whose design.initial_laws is resampled");
+        }
+        if problem.depends_on_wealth() {
+            return refused("whose advice does not depend on wealth: without contributions, of power or log utility");
+        }
+        for (count, whose) in [(problem.history.len(), "the policy's own history has"), (returns, "there are")] {
+            if count < settled {
+                return Err(format!(
+                    "a session rolls from {settled} returns on by this half-life, and {whose} {count}"
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// The advice before each of `returns`, followed; at most `horizon` returns are used.

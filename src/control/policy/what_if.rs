@@ -32,8 +32,6 @@ pub enum HypotheticalRadius {
 /// The advice under a hypothesis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Supposed {
-    /// Periods observed by then.
-    pub step: usize,
     /// Wealth by then.
     pub wealth: f64,
     /// For the period after those observed by then.
@@ -70,7 +68,8 @@ impl Hypothesis {
 }
 
 impl Advisor {
-    /// The advice for `state` after `step` observed periods, were `hypothesis` so. A radius other than the state's
+    /// The advice for `state` after `step` observed periods, were `hypothesis` so; `following` is the step that advises the period
+    /// after that, if one does. A radius other than the state's
     /// own is beyond the policy surrogate: the robust step is solved over the value surrogate of the step after, as it
     /// always is under [`AdviceMode::Resolve`]. Cost: as [`Advisor::advise`], twice where a return is supposed.
     ///
@@ -79,12 +78,13 @@ impl Advisor {
     pub fn suppose(
         &self,
         step: usize,
+        following: Option<usize>,
         state: &State,
         hypothesis: &Hypothesis,
         mode: AdviceMode,
     ) -> Result<Supposed, FieldError> {
         hypothesis.check()?;
-        let (step, state) = self.supposed_state(step, state, hypothesis)?;
+        let (step, state) = self.supposed_state(step, following, state, hypothesis)?;
         let wealth = state.wealth;
         let (advice, worst_case) = if hypothesis.radius.is_none() && mode == AdviceMode::Surrogate {
             (self.advise(step, &state, AdviceMode::Surrogate), None)
@@ -98,13 +98,14 @@ impl Advisor {
             let (advice, worst_case) = self.explain_knowing(step, &state, own, radius);
             (advice, Some(worst_case))
         };
-        Ok(Supposed { step, wealth, advice, worst_case })
+        Ok(Supposed { wealth, advice, worst_case })
     }
 
     /// The state with the wealth supposed, and after the return supposed.
     fn supposed_state(
         &self,
         step: usize,
+        following: Option<usize>,
         state: &State,
         hypothesis: &Hypothesis,
     ) -> Result<(usize, State), FieldError> {
@@ -112,11 +113,10 @@ impl Advisor {
         let holding = hypothesis.holding.unwrap_or(state.holding);
         let now = State { wealth, holding, law: state.law.clone() };
         let Some(log_return) = hypothesis.log_return else { return Ok((step, now)) };
-        let horizon = self.specification().problem.horizon;
-        if step + 1 >= horizon {
-            let rule = format!("must be absent: period {horizon} is the last, and none is left to advise after it");
+        let Some(following) = following else {
+            let rule = "must be absent: the coming period is the last, and none is left to advise after it";
             return Err(FieldError::new("log_return", log_return, rule));
-        }
+        };
         let advised = self.advise(step, &now, AdviceMode::Surrogate).allocation;
         let then = self.advance(step, &now, &Realised::of(advised, log_return));
         let (low, high) = rules::WEALTH;
@@ -124,6 +124,6 @@ impl Advisor {
             let rule = format!("must leave a wealth in [{low}, {high}]");
             return Err(FieldError::new("log_return", log_return, rule));
         }
-        Ok((step + 1, then))
+        Ok((following, then))
     }
 }

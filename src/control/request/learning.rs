@@ -10,6 +10,9 @@ use crate::numerics::empirical::{EmpiricalDistribution, weights};
 /// at 1 the effective size is at most 3. Above the largest, weights are equal to rounding.
 pub const HALF_LIFE: (f64, f64) = (1.0, 1e15);
 
+/// Two observations closer than this are one value: the standard deviation must exceed it.
+const SMALLEST_DEVIATION: f64 = 1e-7;
+
 /// What a return weighs in the law that is learned: of the history and of what is seen after it alike.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
@@ -30,6 +33,22 @@ impl Default for Learning {
 }
 
 impl Learning {
+    /// Checks that a record, named `field` in messages, has a deviation.
+    ///
+    /// # Errors
+    /// It does not vary, as learned.
+    pub fn check_deviation(self, field: &str, record: &[f64]) -> Result<(), FieldError> {
+        if self.deviation(record) >= SMALLEST_DEVIATION {
+            return Ok(());
+        }
+        let rule = format!("must vary: as learned, its standard deviation must be at least {SMALLEST_DEVIATION:e}");
+        Err(FieldError::new(
+            field,
+            format!("{} values near {}", record.len(), record.first().copied().unwrap_or_default()),
+            rule,
+        ))
+    }
+
     /// Checks the half-life.
     ///
     /// # Errors
@@ -97,10 +116,20 @@ impl Learning {
     }
 
     /// The effective size of `count` returns over what it tends to: `tanh(n b / 2)`; 0 where it grows for ever.
-    pub fn settled(self, count: usize) -> f64 {
+    fn settled(self, count: usize) -> f64 {
         match self {
             Learning::Equal {} => 0.0,
             Learning::Decay { half_life } => (0.5 * std::f64::consts::LN_2 / half_life * count as f64).tanh(),
+        }
+    }
+
+    /// Returns from which on the effective size is at least `share` of what it tends to; none where it grows for ever.
+    pub fn settled_from(self, share: f64) -> Option<usize> {
+        match self {
+            Learning::Equal {} => None,
+            Learning::Decay { half_life } => {
+                Some((2.0 * half_life * share.atanh() / std::f64::consts::LN_2).ceil() as usize)
+            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! What may be asked: the requests, their defaults, and every rule they must keep. No mathematics.
 
 pub mod annualised;
+pub mod assets;
 pub mod backtest;
 pub mod completion;
 pub mod contributions;

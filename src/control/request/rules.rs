@@ -21,8 +21,6 @@ pub const HORIZON: std::ops::RangeInclusive<usize> = 1..=520;
 pub const HISTORY_LENGTH: std::ops::RangeInclusive<usize> = 2..=20_000;
 /// Largest log-return in absolute value: a factor of 148 in one step.
 pub const LOG_RETURN: f64 = 5.0;
-/// Two observations closer than this are one value: the standard deviation must exceed it.
-const SMALLEST_DEVIATION: f64 = 1e-7;
 /// Simulated bridge paths.
 pub const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
 /// Bridge matrix of 30 million numbers: 240 MB.
@@ -224,11 +222,7 @@ pub fn history(field: &str, values: &[f64], learning: Learning) -> Result<(), Fi
     for (index, &value) in values.iter().enumerate() {
         log_return(&format!("{field}[{index}]"), value)?;
     }
-    if learning.deviation(values) < SMALLEST_DEVIATION {
-        let rule = format!("must vary: as learned, its standard deviation must be at least {SMALLEST_DEVIATION:e}");
-        return Err(FieldError::new(field, format!("{} values near {}", values.len(), values[0]), rule));
-    }
-    Ok(())
+    learning.check_deviation(field, values)
 }
 
 /// Checks a wealth, named `field` in messages.

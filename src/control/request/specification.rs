@@ -326,7 +326,7 @@ pub fn default_seed() -> u64 {
 }
 
 /// Defaults that do not depend on other fields.
-mod defaults {
+pub(super) mod defaults {
     pub fn horizon() -> usize {
         10
     }

@@ -22,13 +22,14 @@ export const SOURCES = {
 export const agrees = (one, other) => Math.abs(one - other) <= TOLERANCE;
 
 /**
- * The advice of `action`, above `rest`. `checked(anew)` takes what `/action` says of the same state with the step solved
+ * The advice of `action`, above `rest`; `horizon` is null where there is none. `checked(anew)` takes what `/action` says of the same state with the step solved
  * anew, and gives the advice that stands; `unchecked(words)` says that it could not be.
  */
 export function adviceView(action, horizon, rest) {
   const amount = h("strong", {}, allocation(action.allocation));
   const order = h("p", { class: "sentence" }, trade(action));
-  const sentence = h("p", { class: "sentence" }, why(action));
+  const then = horizon === null ? "a horizon of the policy from now" : "at the horizon";
+  const sentence = h("p", { class: "sentence" }, why(action, then));
   const end = action.contribution === 0 ? "" : h("p", { class: "sentence" }, endWords(action.contribution));
   const read = action.source === "policy_surrogate";
   const note = h(
@@ -38,7 +39,7 @@ export function adviceView(action, horizon, rest) {
   );
   const big = h("p", { class: "big" }, h("span", {}, "Hold "), amount, h("span", {}, " in the risky asset"));
   const element = section(
-    `Period ${action.period} of ${horizon}`,
+    `Period ${action.period}${horizon === null ? "" : ` of ${horizon}`}`,
     h("div", { class: "advice", id: "advice", tabindex: -1 }, big, order, sentence, end, note),
     rest,
   );
@@ -50,7 +51,7 @@ export function adviceView(action, horizon, rest) {
     }
     amount.textContent = allocation(anew.allocation);
     order.textContent = trade(anew);
-    sentence.replaceChildren(...why(anew));
+    sentence.replaceChildren(...why(anew, then));
     const apart = percent(Math.abs(anew.allocation - action.allocation)).replace("%", "points");
     const found = anew.source === "unsolved" ? exactly(anew) : "Solved anew";
     note.textContent = `${found}: what was read off the policy, ${allocation(action.allocation)}, is ${apart} away from it.`;
@@ -71,7 +72,7 @@ function trade({ holding, band: [low, high], trade: change }) {
   return `${now}${change > 0 ? "buy" : "sell"} ${percent(Math.abs(change))} of wealth.${kept}`;
 }
 
-function why({ allocation, certainty_equivalent, floor }) {
+function why({ allocation, certainty_equivalent, floor }, then) {
   if (allocation === 0)
     return [
       "Against the worst law the returns seen cannot rule out, nothing beats the bank, which reaches ",
@@ -81,7 +82,7 @@ function why({ allocation, certainty_equivalent, floor }) {
   return [
     "Against the worst law the returns seen cannot rule out, this is worth ",
     h("b", {}, wealth(certainty_equivalent)),
-    " for certain at the horizon, where the bank alone reaches ",
+    ` for certain ${then}, where the bank alone reaches `,
     h("b", {}, wealth(floor)),
     ".",
   ];

@@ -63,7 +63,7 @@ async function fill(holder, shown) {
   }
   const action = await get(`/action?session=${id}`, leaving);
   const report = observeForm(action, shown);
-  const advice = adviceView(action, session.horizon, report.element);
+  const advice = adviceView(action, session.rolling ? null : session.horizon, report.element);
   const numbers = h("div", {}, figures(shown, action));
   const sofar = h("div", {}, course(shown, action));
   const settled = (stands) => {
@@ -91,13 +91,13 @@ function figures({ session, history }, action) {
   return facts([
     ["Wealth", wealth(session.wealth), `${change >= 0 ? "+" : ""}${percent(change)} since the start${apart}`],
     ["Held", allocation(session.holding), "of wealth, before trading"],
-    action && ["Certainty equivalent", wealth(action.certainty_equivalent), "for certain at the horizon"],
+    action && ["Certainty equivalent", wealth(action.certainty_equivalent), session.rolling ? "for certain a horizon of the policy from now" : "for certain at the horizon"],
     action && ["Floor", wealth(action.floor), "all sold now, and in the bank until then"],
     action && ["Radius", significant(action.radius, 3), "of the set of laws guarded against"],
     [
       "Returns seen",
       count(session.sample_size),
-      `${counted(session.period - 1, "period")} observed of ${session.horizon}`,
+      `${counted(session.period - 1, "period")} observed${session.rolling ? "" : ` of ${session.horizon}`}`,
     ],
   ]);
 }
@@ -141,7 +141,7 @@ function due({ session: { renewal } }) {
 function course({ session, history, policy }, action) {
   const { trading_cost } = policy.specification.problem;
   const { observations, initial_wealth } = history;
-  const { horizon } = session;
+  const horizon = session.rolling ? Math.max(12, observations.length + 1) : session.horizon;
   const periods = Array.from({ length: horizon + 1 }, (_, k) => k);
   const after = (period, read) => (observations[period - 1] ? read(observations[period - 1]) : null);
   const stands = (period, name) => after(period, (row) => (row.now ?? row)[name]);

@@ -26,6 +26,16 @@ function opening(policies, asked) {
     note: "In the risky asset. Blank: nothing.",
     unit: "percent",
   });
+  const going = select({
+    name: "rolling",
+    label: "How it goes on",
+    choices: { ends: "To the horizon of the policy", renews: "Renewed by itself", rolls: "Rolling" },
+    note: "Renewed, it goes on by policies trained on what was seen by then. Rolling needs a policy whose weights decay.",
+    changed: (choice) => [every, window].forEach(({ element }) => (element.hidden = choice !== "renews")),
+  });
+  const every = input({ name: "renew.every", label: "Periods by each policy", value: "12" });
+  const window = input({ name: "renew.window", label: "Returns it is trained on", note: "The last ones. Blank: all." });
+  every.element.hidden = window.element.hidden = true;
   let known = [];
   const history = returnsField({
     name: "history",
@@ -44,6 +54,7 @@ function opening(policies, asked) {
     "form",
     { novalidate: true },
     fieldset("Whose session", [policy, stake, holding]),
+    fieldset("How long", [going, every, window]),
     other,
     message,
     h("p", { class: "send" }, h("button", { type: "submit" }, "Open")),
@@ -58,6 +69,9 @@ function opening(policies, asked) {
     if (wealth !== null) request.wealth = wealth;
     const held = holding.control.value;
     if (held.trim() !== "") request.holding = fraction(held) ?? held;
+    if (going.control.value === "rolls") request.rolling = true;
+    if (going.control.value === "renews")
+      request.renew = { every: typed(every.control.value), window: typed(window.control.value) };
     try {
       const { session } = await post("/sessions", request);
       location.hash = `#/sessions/${session}`;

@@ -43,6 +43,9 @@ const initial = () => ({
   seed: 1,
 });
 
+/** What weighs less with age, if anything does. */
+const HALF_LIFE = "problem.learning.half_life";
+
 const at = (object, path) => path.split(".").reduce((value, key) => value?.[key], object);
 
 function put(object, path, value) {
@@ -202,6 +205,15 @@ function mainFields(changed) {
       note: "At its end; negative is withdrawn. One number, or one for each period, apart by semicolons.",
       changed: (text) => changed("problem.contributions", amounts(text)),
     }),
+    input({
+      name: HALF_LIFE,
+      label: "Half-life of returns",
+      note: "In periods: one so old weighs half. Blank: all weigh the same.",
+      changed: (text) => {
+        const half_life = typed(text);
+        changed("problem.learning", half_life === null ? { kind: "equal" } : { kind: "decay", half_life });
+      },
+    }),
     select({
       name: "problem.utility.kind",
       label: "Utility",
@@ -221,15 +233,16 @@ function mainFields(changed) {
   ];
   const show = (request) => {
     for (const part of parts) {
-      const value = at(request, part.name);
+      const found = at(request, part.name);
+      const value = found === undefined && part.name === HALF_LIFE ? "" : found;
       if (part.control !== document.activeElement) part.control.value = [value ?? ""].flat().join("; ");
       part.element.hidden = value === undefined;
     }
   };
   const elements = [
-    fieldset("The investor", parts.slice(1, 10)),
-    fieldset("What he guards against", [parts[0], parts[10], parts[11]]),
-    fieldset("Precision", parts.slice(12)),
+    fieldset("The investor", [...parts.slice(1, 7), ...parts.slice(8, 11)]),
+    fieldset("What he guards against", [parts[0], parts[7], parts[11], parts[12]]),
+    fieldset("Precision", parts.slice(13)),
   ];
   return { elements, show };
 }

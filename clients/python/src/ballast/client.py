@@ -12,7 +12,7 @@ import httpx
 
 from . import wire
 from .policy import Policy
-from .returns import Kind, Returns, log_returns
+from .returns import Kind, Returns, Table, log_returns, log_returns_of_assets
 from .session import Session
 from .training import Evaluation, Training, WalkForward
 from .transport import Transport, idempotent
@@ -116,6 +116,27 @@ class Ballast:
             "sensitivity": sensitivity,
         }
         return cast(wire.Advised, self._transport.json("POST", "/advise", body=_given(question)))
+
+    def advise_assets(
+        self,
+        returns: Table,
+        *,
+        kind: Kind,
+        rate_per_step: float,
+        assets: Sequence[str] | None = None,
+        wealth: float | None = None,
+        **problem: Any,
+    ) -> wire.AssetsAdvised:
+        """What to hold of each of several assets through one period. Nothing is trained or stored.
+
+        ``returns`` has a column for each asset, oldest date first: a DataFrame, whose columns are their names, or rows
+        of numbers with ``assets``. Every other field of the problem is given by name, such as ``ground_norm``,
+        ``utility``, ``radius`` or ``support``.
+        """
+        names, rows = log_returns_of_assets(returns, kind, assets)
+        whole = {"assets": names, "history": rows, "rate_per_step": rate_per_step, **_given(problem)}
+        question = _given({"problem": whole, "wealth": wealth})
+        return cast(wire.AssetsAdvised, self._transport.json("POST", "/advise", body=question))
 
     def submit(self, specification: wire.Specification, *, idempotency_key: str | None = None) -> Training:
         """Queues the training of a whole specification, such as ``Policy.detail`` shows."""

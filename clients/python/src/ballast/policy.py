@@ -41,16 +41,24 @@ class Policy:
         wealth: float | None = None,
         holding: float | None = None,
         renew: wire.Renewing | None = None,
+        rolling: bool = False,
         idempotency_key: str | None = None,
     ) -> Session:
         """Opens a session of an investor.
 
         ``history`` is what the investor has seen, ``wealth`` what he has; by default both are the policy's own.
-        ``holding`` is the share of it in the risky asset, by default none. The
-        same ``idempotency_key`` and arguments again, even from another process, give the same session, at its first
-        period; ``Session.refresh`` tells how far it is.
+        ``holding`` is the share of it in the risky asset, by default none. With ``rolling`` the first step of the
+        policy, whose learning must be decay, advises up to 5200 periods. The same ``idempotency_key`` and arguments
+        again, even from another process, give the same session, at its first period; ``Session.refresh`` tells how far
+        it is.
         """
-        request: wire.OpenSession = {"policy": self.id, "wealth": wealth, "holding": holding, "renew": renew}
+        request: wire.OpenSession = {
+            "policy": self.id,
+            "wealth": wealth,
+            "holding": holding,
+            "renew": renew,
+            "rolling": rolling,
+        }
         if history is not None:
             request["history"] = log_returns(history, kind)
         headers = idempotent(idempotency_key)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import Any, Literal, TypeAlias
 
@@ -35,6 +35,38 @@ def log_returns(returns: Returns, kind: Kind) -> list[float]:
     if not getattr(getattr(returns, "index", None), "is_monotonic_increasing", True):
         raise ValueError("the index of the prices is not increasing: prices must come oldest first")
     return [math.log(later / earlier) for earlier, later in pairwise(numbers)]
+
+
+#: A DataFrame, a two-dimensional array, a list of rows: a column for each asset.
+Table: TypeAlias = Any
+
+
+def log_returns_of_assets(
+    returns: Table, kind: Kind, assets: Sequence[str] | None = None
+) -> tuple[list[str], list[list[float]]]:
+    """Names and rows of log-returns, each column read as :func:`log_returns` reads one.
+
+    Raises ``ValueError`` that names the asset, the entry, its value and the rule.
+    """
+    columns = getattr(returns, "columns", None)
+    named = columns if assets is None else assets
+    if named is None or (assets is not None and columns is not None):
+        raise ValueError(f"assets is {assets}: must name the columns where returns is no DataFrame, and only there")
+    names = [str(name) for name in named]
+    rows = returns.to_numpy() if hasattr(returns, "to_numpy") else returns
+    table = [[float(number) for number in row] for row in rows]
+    for index, row in enumerate(table):
+        if len(row) != len(names):
+            raise ValueError(f"returns[{index}] has {len(row)} numbers: must have one for each of {names}")
+    if kind == "price" and not getattr(getattr(returns, "index", None), "is_monotonic_increasing", True):
+        raise ValueError("the index of the prices is not increasing: prices must come oldest first")
+    each = []
+    for asset, name in enumerate(names):
+        try:
+            each.append(log_returns([row[asset] for row in table], kind))
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
+    return names, [list(row) for row in zip(*each, strict=True)]
 
 
 def _column(returns: Returns) -> Iterable[Any]:

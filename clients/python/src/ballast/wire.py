@@ -21,6 +21,18 @@ class Annualised(TypedDict):
     """Standard deviation of the history's log-returns, of independent periods: `sqrt(p)` times that of one."""
 
 
+Asset: TypeAlias = str
+
+
+ActionIntervalItem: TypeAlias = float
+
+
+HistoryItemItem: TypeAlias = float
+
+
+HistoryItem: TypeAlias = list[HistoryItemItem]
+
+
 class AuditEntry(TypedDict):
     """One thing that was done."""
 
@@ -202,6 +214,10 @@ Framework: TypeAlias = Literal["adaptive", "static", "known_law", "plug_in", "pa
 """What the investor is robust against, and whether observing returns changes it."""
 
 
+GroundNorm: TypeAlias = Literal["scaled_one", "sup"]
+"""The distance between two dates' log-returns."""
+
+
 class Health(TypedDict):
     """The service in a few words."""
 
@@ -320,6 +336,13 @@ class LeftOut(TypedDict):
     """The share of wealth that would be advised."""
 
 
+class LowestReturn(TypedDict):
+    """The lowest log-return of any asset."""
+
+    min: float
+    """In log-return; at most the lowest of the history."""
+
+
 class MixtureComponent(TypedDict):
     """One normal law of a mixture, of log-returns per step."""
 
@@ -373,7 +396,7 @@ class Observe(TypedDict):
     """Wealth reached, with what was added, where it differs from what all of the above gives."""
 
 
-HistoryItem: TypeAlias = float
+HistoryItem1: TypeAlias = float
 
 
 Phase: TypeAlias = Literal["solving", "fitting", "simulating"]
@@ -432,9 +455,6 @@ class Problem(TypedDict):
     """What the field held."""
     rule: NotRequired[str | None]
     """What the field must be."""
-
-
-ActionIntervalItem: TypeAlias = float
 
 
 class RadiusRule1(TypedDict):
@@ -770,6 +790,15 @@ class WorstLawSummary(TypedDict):
     """Lowest log-return that mass moves to; absent where none moves."""
 
 
+class WorstMean(TypedDict):
+    """The mean of an asset's log-return."""
+
+    seen: float
+    """Of those seen."""
+    worst: float
+    """Under the worst law."""
+
+
 class WorstNormalLaw(TypedDict):
     """The worst mean and variance of the log-return of one period, within the confidence region of the estimates."""
 
@@ -818,6 +847,29 @@ class Advice(TypedDict):
     """Whether the state lies where the surrogates were trained."""
     source: AdviceSource
     """How it was found."""
+
+
+class AssetsProblem(TypedDict):
+    """What is known of several assets, and the investor who may hold them."""
+
+    assets: list[Asset]
+    """Names of the assets, each another, in the order of the columns of `history`."""
+    ground_norm: NotRequired[GroundNorm]
+    """What moving a law costs the adversary."""
+    rate_per_step: float
+    """Bank return per step, as a fraction."""
+    periods_per_year: NotRequired[float | None]
+    """Periods of the history in a year: what is said a year is said with it. It changes no advice."""
+    initial_wealth: NotRequired[float]
+    """Wealth, in any currency."""
+    action_interval: NotRequired[list[ActionIntervalItem]]
+    """Share of wealth that may be held in all assets together: `[0, highest]`."""
+    utility: NotRequired[UtilitySpecification]
+    """Of wealth at the end of the period."""
+    radius: NotRequired[RadiusRule | None]
+    support: NotRequired[LowestReturn | None]
+    history: list[HistoryItem]
+    """Log-returns, date by date, oldest first; each date has one for each asset."""
 
 
 class BacktestFigures(TypedDict):
@@ -1045,13 +1097,15 @@ class OpenSession(TypedDict):
 
     policy: str
     """The policy to live by."""
-    history: NotRequired[list[HistoryItem] | None]
+    history: NotRequired[list[HistoryItem1] | None]
     """Log-returns known at the start. Default: the policy's."""
     wealth: NotRequired[float | None]
     """Default: the policy's initial wealth."""
     holding: NotRequired[float | None]
     """Share of wealth in the risky asset at the start. Default: 0."""
     renew: NotRequired[Renewing | None]
+    rolling: NotRequired[bool]
+    """Live every period by the first step of a policy whose learning is decay, for up to 5200 periods. Default: false."""
 
 
 class PeriodReport(TypedDict):
@@ -1094,7 +1148,7 @@ class ProblemSpecification(TypedDict):
     radius: NotRequired[RadiusRule | None]
     support: NotRequired[Interval | None]
     law: NotRequired[SamplingLaw | None]
-    history: list[HistoryItem]
+    history: list[HistoryItem1]
     """The log-returns observed before the start, at least two of them distinct."""
 
 
@@ -1158,6 +1212,8 @@ class Session(TypedDict):
     renewals: int
     """Policies that followed the first; the next renewal is this and one more."""
     renew: NotRequired[Renewing | None]
+    rolling: bool
+    """Whether the first step of the policy advises every period."""
     renewal: NotRequired[RenewalDue | None]
     drift: Drift
     """Whether the returns still come as they came."""
@@ -1306,6 +1362,21 @@ class Advise(TypedDict):
     """Whether to say how near the advice is to changing."""
 
 
+class AdviseAssets(TypedDict):
+    """A question for one period of several assets."""
+
+    problem: AssetsProblem
+    """The assets and the investor."""
+    wealth: NotRequired[float | None]
+    """Wealth now. Default: the problem's initial wealth."""
+    seed: NotRequired[int]
+    """Of the simulated bridges."""
+
+
+AdviseQuestion: TypeAlias = Advise | AdviseAssets
+"""A question about one asset, or about several, which `problem.assets` names."""
+
+
 class Advised(Advice):
     """The advice, and the law that is worst for it."""
 
@@ -1313,6 +1384,41 @@ class Advised(Advice):
     caution: list[Caution]
     """What to know before the advice is followed."""
     sensitivity: NotRequired[Sensitivity | None]
+    annualised: NotRequired[Annualised | None]
+    warnings: list[Warning]
+    """What in the question may be a mistake."""
+
+
+class AssetsAdvice(TypedDict):
+    """What to hold of several assets through the coming period."""
+
+    allocation: dict[str, float]
+    """Share of wealth in each asset; the rest is in the bank."""
+    composition: dict[str, float]
+    """Share of each asset in what is held; where next to nothing is, that of inverse volatilities."""
+    total: float
+    """Share of wealth in all assets together."""
+    certainty_equivalent: float
+    """Wealth for certain that is worth as much as the allocation is against the worst law: at least this."""
+    bound: float
+    """No allocation is worth more than this."""
+    floor: float
+    """Wealth of the bank alone."""
+    radius: float
+    """Radius of the ball, in log-return."""
+    radius_factor: float
+    """What of it is there for all funds at once: the radius of the fund of inverse volatilities is multiplied by it."""
+    sample_size: int
+    """Number of dates seen."""
+    worst_means: dict[str, WorstMean]
+    """What the law behind `bound` makes of each asset, which is the worst law where the two sides meet."""
+    caution: list[Caution]
+    """What to know before the advice is followed."""
+
+
+class AssetsAdvised(AssetsAdvice):
+    """The advice on several assets."""
+
     annualised: NotRequired[Annualised | None]
     warnings: list[Warning]
     """What in the question may be a mistake."""
@@ -1490,6 +1596,10 @@ class AcceptedJob(Job):
 
     warnings: list[Warning]
     """What in the request may be a mistake."""
+
+
+AdviseAnswer: TypeAlias = Advised | AssetsAdvised
+"""The answer to a question about one asset or several."""
 
 
 class EvaluationReport(TypedDict):

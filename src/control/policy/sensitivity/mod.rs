@@ -111,6 +111,6 @@ pub struct Premium {
 
 /// The reasons to be careful with an advice, as far as they were asked for. Checked by: tests/sensitivity.rs.
 pub fn cautions(advice: &Advice, sensitivity: Option<&Sensitivity>) -> Vec<Caution> {
-    let short = Caution::short_record(advice);
+    let short = Caution::short_record(advice.sample_size, advice.effective_size);
     short.into_iter().chain(sensitivity.and_then(|found| found.caution.clone())).collect()
 }

@@ -1,0 +1,44 @@
+//! The advice of one robust step with several assets, by their names.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::control::policy::caution::Caution;
+
+/// What to hold of several assets through the coming period.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct AssetsAdvice {
+    /// Share of wealth in each asset; the rest is in the bank.
+    pub allocation: BTreeMap<String, f64>,
+    /// Share of each asset in what is held; where next to nothing is, that of inverse volatilities.
+    pub composition: BTreeMap<String, f64>,
+    /// Share of wealth in all assets together.
+    pub total: f64,
+    /// Wealth for certain that is worth as much as the allocation is against the worst law: at least this.
+    pub certainty_equivalent: f64,
+    /// No allocation is worth more than this.
+    pub bound: f64,
+    /// Wealth of the bank alone.
+    pub floor: f64,
+    /// Radius of the ball, in log-return.
+    pub radius: f64,
+    /// What of it is there for all funds at once: the radius of the fund of inverse volatilities is multiplied by it.
+    pub radius_factor: f64,
+    /// Number of dates seen.
+    pub sample_size: usize,
+    /// What the law behind `bound` makes of each asset, which is the worst law where the two sides meet.
+    pub worst_means: BTreeMap<String, WorstMean>,
+    /// What to know before the advice is followed.
+    pub caution: Vec<Caution>,
+}
+
+/// The mean of an asset's log-return.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct WorstMean {
+    /// Of those seen.
+    pub seen: f64,
+    /// Under the worst law.
+    pub worst: f64,
+}

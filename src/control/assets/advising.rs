@@ -1,0 +1,62 @@
+//! From a question about several assets to the advice.
+
+use super::advice::{AssetsAdvice, WorstMean};
+use super::composition::CompositionRule;
+use super::{AssetsLaw, AssetsStep};
+use crate::control::policy::caution::Caution;
+use crate::control::problem::actions::ActionInterval;
+use crate::control::problem::utility::RelativeUtility;
+use crate::control::request::assets::AssetsProblem;
+use crate::control::request::radius_rule::RadiusRule;
+use crate::control::request::specification::ProblemSpecification;
+use crate::numerics::fund_bridges::FundBridges;
+
+/// Paths of the joint factor: its standard error is then a hundredth of it.
+const FACTOR_PATHS: usize = 1000;
+
+impl AssetsAdvice {
+    /// The step of `problem`, whose fund of inverse volatilities has the completed problem `fund` and the radius `of_fund`, with the
+    /// seed of its simulations.
+    /// Cost: that of [`AssetsStep::solve`], and of the joint factor under a `bridge`.
+    /// Checked by: `tests/advise.rs::several_assets_are_advised_by_name_as_solved_directly`.
+    pub fn of(problem: &AssetsProblem, fund: &ProblemSpecification, of_fund: f64, seed: u64) -> Self {
+        let rows = &problem.history;
+        let radius_factor = match fund.radius_rule() {
+            RadiusRule::Bridge { alpha, .. } => {
+                FundBridges::simulate(rows, FACTOR_PATHS, seed).joint_factor(alpha).value
+            }
+            _ => 1.0,
+        };
+        let radius = radius_factor * of_fund;
+        let floor = fund.initial_wealth * (1.0 + fund.rate_per_step);
+        let lowest = problem.support.map_or(f64::NEG_INFINITY, |support| support.min);
+        let [lowest_total, highest_total] = fund.action_interval;
+        let step = AssetsStep::new(
+            AssetsLaw { returns: rows, radius, floor: lowest },
+            problem.ground(),
+            RelativeUtility::new(fund.utility, floor),
+            fund.rate_per_step,
+            ActionInterval { lowest: lowest_total, highest: highest_total },
+        );
+        let solution = step.solve(None);
+        let named = |shares: &[f64]| problem.assets.iter().cloned().zip(shares.iter().copied()).collect();
+        let composition = CompositionRule::OneStep.composition(rows, || solution.clone());
+        let worst = problem.assets.iter().zip(&solution.mean_moves).enumerate().map(|(asset, (name, moved))| {
+            let seen = rows.iter().map(|row| row[asset]).sum::<f64>() / rows.len() as f64;
+            (name.clone(), WorstMean { seen, worst: seen + moved })
+        });
+        AssetsAdvice {
+            allocation: named(&solution.allocation),
+            composition: named(&composition),
+            total: solution.allocation.iter().sum(),
+            certainty_equivalent: floor * solution.value.exp(),
+            bound: floor * solution.bound.exp(),
+            floor,
+            radius,
+            radius_factor,
+            sample_size: rows.len(),
+            worst_means: worst.collect(),
+            caution: Caution::short_record(rows.len(), rows.len() as f64).into_iter().collect(),
+        }
+    }
+}

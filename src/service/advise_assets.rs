@@ -1,0 +1,58 @@
+//! Advice on several assets without a policy or a session.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::error::ServiceError;
+use super::sessions::Sessions;
+use crate::control::assets::advice::AssetsAdvice;
+use crate::control::request::annualised::Annualised;
+use crate::control::request::assets::AssetsProblem;
+use crate::control::request::rules;
+use crate::control::request::specification::default_seed;
+use crate::control::request::warnings::Warning;
+use crate::store::Tenant;
+
+/// A question for one period of several assets.
+#[derive(Debug, Clone, PartialEq, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AdviseAssets {
+    /// The assets and the investor.
+    pub problem: AssetsProblem,
+    /// Wealth now. Default: the problem's initial wealth.
+    pub wealth: Option<f64>,
+    /// Of the simulated bridges.
+    #[serde(default = "default_seed")]
+    pub seed: u64,
+}
+
+/// The advice on several assets.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct AssetsAdvised {
+    #[serde(flatten)]
+    pub advice: AssetsAdvice,
+    /// Of the fund of inverse volatilities, where `problem.periods_per_year` is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub annualised: Option<Annualised>,
+    /// What in the question may be a mistake.
+    pub warnings: Vec<Warning>,
+}
+
+impl Sessions {
+    /// # Errors
+    /// A field breaks a rule; the radius asks for more memory than can be kept; no turn to solve.
+    pub async fn advise_assets(&self, tenant: &Tenant, question: AdviseAssets) -> Result<AssetsAdvised, ServiceError> {
+        let AdviseAssets { mut problem, wealth, seed } = question;
+        if let Some(wealth) = wealth {
+            rules::wealth("wealth", wealth)?;
+            problem.initial_wealth = wealth;
+        }
+        let fund = self.policies.one_period(&problem.fund(seed)?)?;
+        let solving = move || {
+            let advice = AssetsAdvice::of(&problem, fund.problem(), fund.radius()?, seed);
+            let (annualised, warnings) = (fund.problem().annualised(), fund.problem().warnings());
+            Ok::<_, ServiceError>(AssetsAdvised { advice, annualised, warnings })
+        };
+        self.resolving.run(tenant, solving).await?
+    }
+}
