@@ -12,9 +12,9 @@ use super::problem::holdings::{HOLDINGS, HOLDINGS_OF_ONE_LAW};
 use super::request::completion::DEFAULT_COUNT;
 use super::request::evaluation::EvaluationRequest;
 use super::request::framework::Framework;
-use super::request::radius_rule::RadiusRule;
 use super::request::specification::Specification;
 use super::surrogate::design::{CANDIDATES_PER_POINT, GUARDS};
+use super::surrogate::learning::{LAW_BYTES, together};
 use super::surrogate::stored::Solution;
 use crate::numerics::gp::GaussianProcess;
 
@@ -27,8 +27,8 @@ const FIT_MATRICES: usize = 8;
 const CANDIDATE_BYTES: usize = 160;
 /// A number of a finished policy: itself, its digits as JSON, and the copies of those that the store is given.
 const POLICY_NUMBER_BYTES: usize = 80;
-/// Statistics over all paths that a thread holds at a time.
-const STATISTICS: usize = 264;
+/// Statistics over all paths that a thread holds beside those of the states that it measures together.
+const STATISTICS: usize = 8;
 /// Numbers a value of the history that a thread holds while it solves a robust step.
 const STEP_NUMBERS: usize = 64;
 /// Predictions a function beyond those, where trading costs: at eight trades, while a refined table is made beside the one before.
@@ -109,10 +109,7 @@ impl Sizes {
         let single = !problem.framework.learns() && !problem.depends_on_wealth();
         let count = if single { 1 } else { specification.design.count.unwrap_or(DEFAULT_COUNT) };
         let framed = Problem::new(specification);
-        let paths = match problem.radius_rule() {
-            RadiusRule::Bridge { paths, .. } => paths,
-            _ => 0,
-        };
+        let paths = problem.radius_rule().paths();
         let bridges = framed.sets.heaviest(history, horizon);
         let holdings = framed.holdings(if single { HOLDINGS_OF_ONE_LAW } else { HOLDINGS });
         let functions = holdings.count() + framed.dynamics(0).sides().len();
@@ -144,11 +141,17 @@ impl Sizes {
     /// Bytes that threads hold while they solve robust steps.
     fn solving(&self, threads: usize) -> usize {
         let tabulated = TABLES * self.functions.saturating_sub(FUNCTIONS_WITHOUT_COST);
-        product(&[threads, self.history + self.horizon, STEP_NUMBERS + tabulated, NUMBER])
+        let values = self.history + self.horizon;
+        product(&[threads, values, (STEP_NUMBERS + tabulated) * NUMBER + self.together() * LAW_BYTES])
     }
 
     fn statistics(&self, threads: usize) -> usize {
-        product(&[threads, self.paths, STATISTICS, NUMBER])
+        product(&[threads, self.paths, STATISTICS + self.together(), NUMBER])
+    }
+
+    /// States of a design that a thread measures together.
+    fn together(&self) -> usize {
+        together(self.history + self.horizon, self.paths).min(CANDIDATES_PER_POINT * self.count)
     }
 }
 

@@ -76,6 +76,11 @@ impl RadiusRule {
         RadiusRule::Bridge { alpha, paths: defaults::paths(), scale: defaults::scale() }
     }
 
+    /// Simulated paths, 0 under rules that simulate none.
+    pub fn paths(&self) -> usize {
+        if let RadiusRule::Bridge { paths, .. } = *self { paths } else { 0 }
+    }
+
     /// The level of the rules that have one.
     pub fn alpha(&self) -> Option<f64> {
         match *self {

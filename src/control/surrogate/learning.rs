@@ -16,8 +16,12 @@ use crate::control::request::specification::Specification;
 use crate::control::solved_step::{StepDiagnostics, StepSolution};
 use crate::numerics::farthest::farthest_points;
 
-/// States whose features are found together, for what they have in common.
-const FEATURES_AT_A_TIME: usize = 256;
+/// States whose features are found together, for what they have in common, at most.
+const MOST_TOGETHER: usize = 256;
+/// Bytes that these take on a thread, at most, unless one alone takes more.
+const BYTES_TOGETHER: usize = 8 << 20;
+/// Bytes of a value of a law in such a state.
+pub const LAW_BYTES: usize = 40;
 /// Progress is reported about this often a step.
 const REPORTS_PER_STEP: usize = 100;
 
@@ -31,6 +35,11 @@ pub trait Candidates: Sync {
     /// # Errors
     /// The stop signal; a solution that is not finite.
     fn solve(&self, index: usize, features: Features) -> Result<DesignPoint, TrainError>;
+}
+
+/// States whose features are found together, where laws have so many values and their radii so many simulated paths.
+pub fn together(values: usize, paths: usize) -> usize {
+    (BYTES_TOGETHER / (LAW_BYTES * values + size_of::<f64>() * paths).max(1)).clamp(1, MOST_TOGETHER)
 }
 
 /// How many states there are of each kind.
@@ -91,10 +100,12 @@ impl Learning<'_> {
     }
 
     fn features(&self, states: &impl Candidates, some: Range<usize>) -> Result<Vec<Features>, TrainError> {
-        let parts: Vec<usize> = some.clone().step_by(FEATURES_AT_A_TIME).collect();
+        let problem = &self.specification.problem;
+        let together = together(problem.history.len() + self.step, problem.radius_rule().paths());
+        let parts: Vec<usize> = some.clone().step_by(together).collect();
         let features = |start: usize| {
             self.watch.go_on()?;
-            Ok(states.features(start..some.end.min(start + FEATURES_AT_A_TIME)))
+            Ok(states.features(start..some.end.min(start + together)))
         };
         let found: Result<Vec<Vec<Features>>, TrainError> = parts.into_par_iter().map(features).collect();
         Ok(found?.concat())
