@@ -15,7 +15,7 @@
 //! | X, A, S, the loss | `Controlled` | 2 | `control/problem/controlled.rs` | `tests/controlled.rs::the_investor_s_problem_is_solved_alike_by_the_general_solver` |
 //! | S | `next` | (2.1) | `control/problem/dynamics.rs` | `src/control/evaluation/account.rs::three_months_agree_with_pencil_and_paper` |
 //! | F^, R | `EmpiricalDistribution` | (2.3) | `numerics/empirical.rs` | `tests/parametric.rs::the_order_of_returns_and_the_way_they_arrive_change_nothing` |
-//! | H | `directional_statistic` | 2.1, after (2.4) | `numerics/bridge.rs` | `src/numerics/bridge.rs::the_statistic_is_the_plain_sum_to_the_last_bit` |
+//! | H | `directional_statistic` | 2.1, after (2.4) | `numerics/bridge.rs` | `src/numerics/bridge.rs::the_statistic_is_the_plain_sum_to_single_precision` |
 //! | Q^H(1 - alpha) | `bridge_quantile` | 2.1, after (2.4) | `numerics/bridge.rs` | `tests/control.rs::the_bridge_quantile_agrees_with_a_million_paths` |
 //! | radius of C | `RadiusEstimator` | (2.5), (2.7) | `control/uncertainty/radius.rs` | `src/control/uncertainty/radius.rs::every_rule_of_the_sample_size_has_its_formula` |
 //! | C | `UncertaintySet` | (2.5) | `control/uncertainty/mod.rs` | `tests/evaluate.rs::a_ball_holds_the_true_law_where_it_is_wide_enough` |

@@ -372,8 +372,8 @@ mod tests {
                         let mut larger = law.clone();
                         larger.push(*value);
                         let expected = bridges.bridge_quantile(&larger, which, 0.1);
-                        // Four times the tolerance of one of many quantiles, for values as far apart as these.
-                        assert!((quantile / expected - 1.0).abs() < 2e-5, "{retention} {value}: {quantile} {expected}");
+                        // Ten times the tolerance of one of many quantiles, for values as far apart as these.
+                        assert!((quantile / expected - 1.0).abs() < 5e-5, "{retention} {value}: {quantile} {expected}");
                     }
                 }
             }
