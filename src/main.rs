@@ -8,7 +8,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use command::{
-    advise, audit, backtest, backup, bench, check, demo, evaluate, healthcheck, keys, loadtest, reproduce, serve,
+    advise, audit, backtest, backup, bench, check, demo, evaluate, frontier, healthcheck, keys, loadtest, reproduce,
+    serve,
 };
 
 /// Nonparametric adaptive robust control of an investor, as a service.
@@ -34,6 +35,8 @@ enum Command {
     Serve(serve::Serve),
     /// Train on the past, live through the next year, roll: a report on real returns.
     Backtest(backtest::BacktestArgs),
+    /// Say what more or less caution would cost on records like the one in a file.
+    Frontier(frontier::FrontierArgs),
     /// Compare frameworks out of sample, in this process.
     Evaluate(evaluate::Evaluate),
     /// Compute the tables and figures of the paper's section 3 anew.
@@ -67,6 +70,7 @@ async fn main() -> ExitCode {
         Command::Serve(arguments) => serve::run(arguments).await,
         Command::Advise(arguments) => tokio::task::block_in_place(|| advise::run(&arguments)),
         Command::Backtest(arguments) => tokio::task::block_in_place(|| backtest::run(&arguments)).map_err(Into::into),
+        Command::Frontier(arguments) => tokio::task::block_in_place(|| frontier::run(&arguments)),
         Command::Evaluate(arguments) => tokio::task::block_in_place(|| evaluate::run(&arguments)),
         Command::Reproduce(arguments) => tokio::task::block_in_place(|| reproduce::run(&arguments)),
         Command::Loadtest(arguments) => tokio::task::block_in_place(|| loadtest::run(&arguments)),

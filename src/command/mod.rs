@@ -10,6 +10,7 @@ pub mod check;
 mod compare;
 pub mod demo;
 pub mod evaluate;
+pub mod frontier;
 pub mod healthcheck;
 mod host;
 pub mod keys;

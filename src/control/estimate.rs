@@ -12,6 +12,7 @@ use super::problem::holdings::{HOLDINGS, HOLDINGS_OF_ONE_LAW};
 use super::request::completion::DEFAULT_COUNT;
 use super::request::evaluation::EvaluationRequest;
 use super::request::framework::Framework;
+use super::request::frontier::FrontierQuestion;
 use super::request::specification::Specification;
 use super::surrogate::design::{CANDIDATES_PER_POINT, GUARDS};
 use super::surrogate::learning::{LAW_BYTES, together};
@@ -41,6 +42,8 @@ const PATH_BYTES: usize = 256;
 /// A period of a strategy's walk-forward: its decision and account, the series that are resampled, and the report with its
 /// digits and the copies that the store is given.
 const DECIDED_BYTES: usize = 1024;
+/// Atoms of the law that records are drawn from, beside those of the record.
+const RESAMPLED_VALUES: usize = 4096;
 /// What any job takes.
 const LEAST: usize = 8 << 20;
 
@@ -234,6 +237,19 @@ pub fn kept_by_evaluation(request: &EvaluationRequest) -> usize {
         .fold((0usize, 0usize), |(factors, bridges), (more, own)| (factors.saturating_add(more), bridges.max(own)));
     // Room for any of them to be half of all.
     factors.saturating_add(bridges).saturating_mul(2)
+}
+
+/// What a frontier takes on so many threads: the bridges of its record, and a record of its own with its step for each thread.
+pub fn frontier(question: &FrontierQuestion, threads: usize) -> Footprint {
+    let sizes = Sizes::of(&question.fund);
+    let values = product(&[question.assets.history.len(), question.assets.assets.len()]);
+    let records = product(&[threads + 1, values.saturating_add(RESAMPLED_VALUES), STEP_NUMBERS, NUMBER]);
+    let statistics = product(&[threads, sizes.paths, STATISTICS, NUMBER]);
+    Footprint::of("problem.history", question.assets.history.len(), records.saturating_add(LEAST)).and(
+        "problem.radius.paths",
+        sizes.paths,
+        sizes.bridges.saturating_mul(2).saturating_add(statistics),
+    )
 }
 
 /// What a walk-forward takes on so many threads.

@@ -50,7 +50,7 @@ pub fn access(method: &str, route: Option<&str>) -> Access {
         }
         ("POST", "/sessions" | "/observe" | "/sessions/{id}/corrections" | "/sessions/{id}/renewals")
         | ("DELETE", "/sessions/{id}") => Access::Role(KeyRole::Operate),
-        ("POST", "/train" | "/evaluate" | "/backtest" | "/jobs/{id}/cancel" | "/policies/import")
+        ("POST", "/train" | "/evaluate" | "/backtest" | "/frontier" | "/jobs/{id}/cancel" | "/policies/import")
         | ("DELETE", "/jobs/{id}" | "/policies/{id}") => Access::Role(KeyRole::Train),
         (_, "/health" | "/metrics" | "/audit") => Access::Role(KeyRole::Admin),
         ("GET" | "HEAD", _) | ("POST", "/what-if" | "/advise") => Access::Role(KeyRole::Read),

@@ -9,6 +9,7 @@ use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 use crate::control::request::assets::{ASSETS, DATES, NAME_LENGTH};
 use crate::control::request::backtest;
 use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
+use crate::control::request::frontier::{LARGEST_SCALE, RESAMPLES, SCALES};
 use crate::control::request::learning::HALF_LIFE;
 use crate::control::request::rules::{
     COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR, RADIUS_SCALE, RATE,
@@ -70,6 +71,9 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("Advise", "wealth", wealth.clone()),
         ("Advise", "holding", within((0.0, 1.0))),
         ("AdviseAssets", "wealth", wealth.clone()),
+        ("FrontierRequest", "scales", listed(&SCALES, within((0.0, LARGEST_SCALE)))),
+        ("FrontierRequest", "resamples", whole(&RESAMPLES)),
+        ("FrontierRequest", "block", json!({ "minimum": 1 })),
         ("WhatIf", "session", json!({ "minLength": 1 })),
         ("WhatIf", "wealth", wealth),
         ("WhatIf", "holding", within((0.0, 1.0))),

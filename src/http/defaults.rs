@@ -12,6 +12,7 @@ use super::bounds::{merged, with_field};
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::backtest::BacktestRequest;
 use crate::control::request::evaluation::EvaluationRequest;
+use crate::control::request::frontier::FrontierRequest;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{
     DesignSpecification, HyperparameterBounds, ProblemSpecification, Specification, SurrogateSpecification,
@@ -28,7 +29,7 @@ pub fn tell(description: &mut OpenApi) {
     }
 }
 
-fn told() -> [(&'static str, Map<String, Value>); 9] {
+fn told() -> [(&'static str, Map<String, Value>); 10] {
     let least = json!({ "history": [], "rate_per_step": 0.0 });
     [
         ("Specification", of::<Specification>(json!({ "problem": least }))),
@@ -40,6 +41,7 @@ fn told() -> [(&'static str, Map<String, Value>); 9] {
         ("RadiusRule", of::<RadiusRule>(json!({ "rule": "bridge" }))),
         ("EvaluationRequest", of::<EvaluationRequest>(json!({ "problem": least }))),
         ("BacktestRequest", of::<BacktestRequest>(json!({ "rate": 0.0 }))),
+        ("FrontierRequest", of::<FrontierRequest>(json!({ "problem": least }))),
     ]
 }
 

@@ -75,7 +75,9 @@ fn by_deed(method: &str, path: &str) -> &'static [ProblemKind] {
     use ProblemKind as Kind;
     match (method, path) {
         ("GET", _) => &[],
-        ("POST", "/train" | "/evaluate" | "/backtest") => &[Kind::StorageFull, Kind::QuotaExceeded, Kind::QueueFull],
+        ("POST", "/train" | "/evaluate" | "/backtest" | "/frontier") => {
+            &[Kind::StorageFull, Kind::QuotaExceeded, Kind::QueueFull]
+        }
         ("POST", "/sessions" | "/policies/import") => &[Kind::StorageFull, Kind::QuotaExceeded],
         _ => &[Kind::StorageFull],
     }

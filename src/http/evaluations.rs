@@ -46,7 +46,7 @@ pub async fn evaluate(
     Ok(accepted(service.evaluate(&caller, request, idempotency_key(&headers)?).await?))
 }
 
-/// The report of a succeeded evaluation or walk-forward.
+/// The report of a succeeded evaluation, walk-forward or frontier.
 #[utoipa::path(get, path = "/jobs/{id}/report", tag = "jobs", params(("id" = String, Path, description = "The job.")),
     responses(
         (status = 200, description = "The report.", body = wire::JobReport),

@@ -18,6 +18,7 @@ mod evaluations;
 mod events;
 mod extract;
 mod fault;
+mod frontiers;
 mod hosts;
 mod jobs;
 mod listener;

@@ -21,8 +21,8 @@ use super::documentation::Published;
 use super::hosts::Hosts;
 use super::problem::{Problem, ProblemKind};
 use super::{
-    access, advise, audit, backtests, bounds, dashboard, defaults, described, documentation, evaluations, events, jobs,
-    operations, policies, sessions, telemetry, what_if,
+    access, advise, audit, backtests, bounds, dashboard, defaults, described, documentation, evaluations, events,
+    frontiers, jobs, operations, policies, sessions, telemetry, what_if,
 };
 use crate::service::Service;
 use crate::service::config::Config;
@@ -56,6 +56,7 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(evaluations::evaluate))
         .routes(routes!(evaluations::report))
         .routes(routes!(backtests::backtest))
+        .routes(routes!(frontiers::frontier))
         .routes(routes!(policies::list))
         .routes(routes!(policies::get, policies::delete))
         .routes(routes!(policies::export))

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::evaluation::backtest_report::BacktestReport;
+use crate::control::evaluation::frontier::report::FrontierReport;
 use crate::control::evaluation::report::EvaluationReport;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::caution::Caution;
@@ -101,13 +102,14 @@ impl From<Accepted> for AcceptedJob {
     }
 }
 
-/// The report of a job: of an evaluation or of a walk-forward.
+/// The report of a job: of an evaluation, of a walk-forward or of a frontier.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(untagged)]
 #[expect(dead_code, reason = "reports travel as they are stored: this describes them")]
 pub enum JobReport {
     Evaluation(Box<EvaluationReport>),
     Backtest(Box<BacktestReport>),
+    Frontier(Box<FrontierReport>),
 }
 
 /// A page of jobs, newest first.

@@ -16,6 +16,7 @@ use crate::control::evaluation::backtest::Backtest;
 use crate::control::policy::content_hash;
 use crate::control::request::backtest::BacktestRequest;
 use crate::control::request::evaluation::EvaluationRequest;
+use crate::control::request::frontier::FrontierRequest;
 use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
 use crate::store::{Actor, CreateJob, DeleteJob, JobKind, JobRow, NewJob, Store, Tenant};
@@ -137,6 +138,25 @@ impl Jobs {
         let (of, steps) = ((&caller.tenant, caller.actor()), backtest.trainings());
         let job = self.queue(of, JobKind::Backtest, &sent, request_json, steps, key).await?;
         Ok(Accepted { job, warnings: backtest.warnings() })
+    }
+
+    /// Queues a frontier. The same key and request again give the same job.
+    ///
+    /// # Errors
+    /// As [`Self::train`].
+    pub async fn frontier(
+        &self,
+        caller: &Caller,
+        request: FrontierRequest,
+        key: Option<String>,
+    ) -> Result<Accepted, ServiceError> {
+        let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
+        let question = request.question()?;
+        self.memory.admits(&estimate::frontier(&question, self.threads))?;
+        let of = (&caller.tenant, caller.actor());
+        let request_json = serde_json::to_string(&question.request).map_err(ServiceError::internal)?;
+        let job = self.queue(of, JobKind::Frontier, &sent, request_json, 1, key).await?;
+        Ok(Accepted { job, warnings: question.fund.problem.warnings() })
     }
 
     async fn queue(

@@ -28,6 +28,7 @@ use crate::store::{ClaimedJob, JobKind, JobOutcome, Store, StoreError};
 
 mod backtesting;
 mod evaluating;
+mod frontier;
 mod training;
 
 /// The queue is looked at this often even if nobody rang: a lease may have run out, or another replica queued a job.
@@ -177,6 +178,7 @@ impl Worker {
             JobKind::Train => self.train(claimed, stop),
             JobKind::Evaluate => self.evaluate(claimed, stop),
             JobKind::Backtest => self.backtest(claimed, stop),
+            JobKind::Frontier => self.frontier(claimed, stop),
         };
         solved.map_or_else(|ended| ended, Ended::Finished)
     }

@@ -16,6 +16,7 @@ pub enum JobKind {
     Train,
     Evaluate,
     Backtest,
+    Frontier,
 }
 
 impl JobKind {
@@ -25,11 +26,13 @@ impl JobKind {
             JobKind::Train => "train",
             JobKind::Evaluate => "evaluate",
             JobKind::Backtest => "backtest",
+            JobKind::Frontier => "frontier",
         }
     }
 
     pub(super) fn parse(name: &str) -> Option<JobKind> {
-        [JobKind::Train, JobKind::Evaluate, JobKind::Backtest].into_iter().find(|kind| kind.as_str() == name)
+        let all = [JobKind::Train, JobKind::Evaluate, JobKind::Backtest, JobKind::Frontier];
+        all.into_iter().find(|kind| kind.as_str() == name)
     }
 }
 

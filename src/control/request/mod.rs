@@ -9,6 +9,7 @@ pub mod dates;
 pub mod evaluation;
 pub mod framework;
 pub mod frequency;
+pub mod frontier;
 pub mod learning;
 pub mod radius_rule;
 pub mod rules;

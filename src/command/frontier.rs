@@ -1,0 +1,131 @@
+//! `ballast frontier`: what multiples of the radius would lose on records like the one in a file. No server runs; the report is
+//! that of `POST /frontier`.
+
+use std::error::Error;
+use std::fmt::Write;
+
+use ballast::control::error::FieldError;
+use ballast::control::evaluation::frontier::Frontier;
+use ballast::control::evaluation::frontier::laws::Bootstrap;
+use ballast::control::evaluation::frontier::report::{FrontierReport, Resampled};
+use ballast::control::kept::Kept;
+use ballast::control::progress::Watch;
+use ballast::control::request::frontier::{FrontierProblem, FrontierRequest};
+use ballast::control::request::radius_rule::RadiusRule;
+use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification, default_seed};
+use clap::Args;
+
+use super::returns::{Returns, ReturnsFile};
+
+#[derive(Debug, Clone, Args)]
+pub struct FrontierArgs {
+    #[command(flatten)]
+    returns: ReturnsFile,
+    /// Use the last so many returns; all of them unless given
+    #[arg(long)]
+    window: Option<usize>,
+    /// Relative risk aversion: 1 is log utility, more is more careful
+    #[arg(long, default_value_t = 3.0)]
+    risk_aversion: f64,
+    /// Probability that the ball of scale 1 misses the true law
+    #[arg(long, default_value_t = 0.1)]
+    alpha: f64,
+    /// Multiples of the radius, ascending
+    #[arg(long, value_delimiter = ',', default_values_t = [0.0, 0.1, 0.25, 0.5, 1.0])]
+    scales: Vec<f64>,
+    /// Records drawn from each law
+    #[arg(long, default_value_t = 400)]
+    resamples: usize,
+    /// Periods in a row that are drawn together; the cube root of the number of returns unless given
+    #[arg(long)]
+    block: Option<usize>,
+    #[arg(long, default_value_t = default_seed())]
+    seed: u64,
+    /// Print the report of POST /frontier, and what was read on the standard error
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(arguments: &FrontierArgs) -> Result<(), Box<dyn Error>> {
+    if !(1.0..=100.0).contains(&arguments.risk_aversion) {
+        return Err(FieldError::new("--risk-aversion", arguments.risk_aversion, "must lie in [1, 100]").into());
+    }
+    let mut returns = arguments.returns.read()?;
+    if let Some(window) = arguments.window {
+        returns = returns.last(window)?;
+    }
+    let question = arguments.request(&returns).question().map_err(by_option)?;
+    let report = Frontier::new(question, Kept::default()).run(&Watch::unwatched())?;
+    if arguments.json {
+        eprintln!("{}", returns.sentence());
+        println!("{}", serde_json::to_string_pretty(&report)?);
+    } else {
+        println!("{}\n\n{}", returns.sentence(), told(&report));
+    }
+    Ok(())
+}
+
+impl FrontierArgs {
+    fn request(&self, returns: &Returns) -> FrontierRequest {
+        let history = returns.rows().iter().map(|row| row.period().log_return).collect();
+        let problem = ProblemSpecification {
+            horizon: 1,
+            periods_per_year: Some(returns.periods_per_year as f64),
+            utility: UtilitySpecification::relative(self.risk_aversion),
+            radius: Some(RadiusRule::bridge(self.alpha)),
+            ..ProblemSpecification::of(history, returns.rate())
+        };
+        let FrontierArgs { scales, resamples, block, seed, .. } = self.clone();
+        FrontierRequest { problem: FrontierProblem::Asset(problem), scales, resamples, block, seed }
+    }
+}
+
+/// The same error under the option by which the user knows the field.
+fn by_option(error: FieldError) -> FieldError {
+    let option = match error.field.as_str() {
+        "resamples" => "--resamples",
+        "block" => "--block",
+        "problem.radius.alpha" => "--alpha",
+        "problem.history" => "--window",
+        "problem.periods_per_year" => "--periods-per-year",
+        field if field.starts_with("scales") => "--scales",
+        _ => return error,
+    };
+    FieldError { field: option.into(), ..error }
+}
+
+/// A table for each law that records were drawn from, and what the figures say.
+fn told(report: &FrontierReport) -> String {
+    let mut text = String::new();
+    for resampled in &report.resampled {
+        table(&mut text, report, resampled);
+    }
+    text + &report.sentences.join("\n")
+}
+
+fn table(text: &mut String, report: &FrontierReport, Resampled { bootstrap, best, points }: &Resampled) {
+    let per = if report.per_year { "a year" } else { "a period" };
+    let records = match bootstrap {
+        Bootstrap::Smoothed { .. } => "Records drawn from the smoothed returns".to_owned(),
+        Bootstrap::Block { length } => format!("Records of blocks of {length} periods"),
+    };
+    let best = 100.0 * best.iter().sum::<f64>();
+    // Writing to a string cannot fail.
+    let _ = writeln!(text, "{records}; who knows their law holds {best:.1} %.");
+    let lost = format!("lost {per}, bp [90 %]");
+    let _ =
+        writeln!(text, "{:>8}{lost:>28}{:>20}{:>10}{:>16}", "scale", "from record to record", "held", "held on yours");
+    for (point, own) in points.iter().zip(&report.own) {
+        let lost = format!("{:.1} [{:.1}, {:.1}]", point.lost.value, point.lost.low, point.lost.high);
+        let (held, own) = (100.0 * point.total, 100.0 * own.iter().sum::<f64>());
+        let _ = writeln!(
+            text,
+            "{:>8}{lost:>28}{:>21.1}{:>10}{:>16}",
+            point.scale,
+            point.deviation.value,
+            format!("{held:.1} %"),
+            format!("{own:.1} %")
+        );
+    }
+    text.push('\n');
+}

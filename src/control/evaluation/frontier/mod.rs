@@ -1,0 +1,218 @@
+//! The frontier of caution: for multiples of the radius, what following the robust advice would have cost on records like the one
+//! at hand, on average and from record to record.
+//!
+//! Two laws stand for the unknown one, and what is drawn from each is known of it alone:
+//!   smoothed  every return seen, spread by a kernel ([`laws`]); records are independent draws of it,
+//!   block     the returns seen; records are blocks of them in a row, so that what follows what stays as it was.
+//! A record of the length of the own one is drawn, the advice at each multiple is solved on it, and is scored by the law that
+//! the record was drawn from. What is told is the loss against the best allocation for that law,
+//!
+//!   lost(a) = 1e4 (ln CE(a*) - ln CE(a)),   CE(a) = U^-1( E[ U(w(a, Z)) ] ),
+//!
+//! in basis points, times the periods of a year where they are known. Source: Gotoh, Kim and Lim (2021), Calibration of
+//! distributionally robust empirical optimization models, Operations Research 69: a little robustness costs the mean at second
+//! order and spares the deviation at first.
+
+pub mod laws;
+pub mod report;
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+
+use self::laws::{Bootstrap, RecordLaw};
+use self::report::{FORMAT, FrontierPoint, FrontierReport, Resampled};
+use crate::control::assets::{AssetsLaw, AssetsStep};
+use crate::control::error::TrainError;
+use crate::control::kept::Kept;
+use crate::control::problem::actions::ActionInterval;
+use crate::control::problem::utility::RelativeUtility;
+use crate::control::progress::{Phase, StepProgress, Watch};
+use crate::control::request::assets::GroundNorm;
+use crate::control::request::frontier::FrontierQuestion;
+use crate::control::uncertainty::radius::RadiusEstimator;
+use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::fund_bridges::{FundBridges, fund_returns};
+use crate::numerics::levelling::{Ground, inverse_volatility};
+use crate::numerics::summary::Clustered;
+
+/// Of all intervals.
+const LEVEL: f64 = 0.9;
+/// Basis points of one.
+const BASIS_POINTS: f64 = 1e4;
+/// Paths of the joint factor of several assets.
+const FACTOR_PATHS: usize = 1000;
+/// Progress is told about so often.
+const REPORTS: usize = 100;
+
+/// A question with what its answer needs made ready.
+pub struct Frontier {
+    question: FrontierQuestion,
+    radii: RadiusEstimator,
+    /// Of the radius of all funds at once over that of one.
+    factor: f64,
+    utility: RelativeUtility,
+}
+
+/// What was decided on one record at every scale.
+struct Decided {
+    /// Lost by each, in the unit of the report.
+    lost: Vec<f64>,
+    /// Share of wealth in all assets together.
+    totals: Vec<f64>,
+}
+
+impl Frontier {
+    /// With what can be made again in `kept`.
+    pub fn new(question: FrontierQuestion, kept: Kept) -> Self {
+        let fund = &question.fund.problem;
+        let alpha =
+            fund.radius_rule().alpha().filter(|_| fund.radius_rule().paths() > 0 && question.assets.assets.len() > 1);
+        let rows = &question.assets.history;
+        let factor = alpha.map_or(1.0, |alpha| {
+            FundBridges::simulate(rows, FACTOR_PATHS, question.request.seed).joint_factor(alpha).value
+        });
+        let utility = RelativeUtility::new(fund.utility, fund.initial_wealth * (1.0 + fund.rate_per_step));
+        Frontier { radii: RadiusEstimator::new(&question.fund, kept), factor, utility, question }
+    }
+
+    /// The report. Cost: a robust step for each scale and resample.
+    /// Checked by: `tests/frontier.rs`.
+    ///
+    /// # Errors
+    /// [`TrainError::Stopped`] soon after the stop signal.
+    pub fn run(&self, watch: &Watch) -> Result<FrontierReport, TrainError> {
+        let (request, assets) = (&self.question.request, &self.question.assets);
+        let own = self.decide(&assets.history);
+        let smoothed = RecordLaw::smoothed(&assets.history, self.floor(), request.seed);
+        let block = RecordLaw::of(&assets.history);
+        let bandwidth = smoothed.bandwidth;
+        let resampled =
+            [(Bootstrap::Smoothed { bandwidth }, smoothed), (Bootstrap::Block { length: self.question.block }, block)];
+        let done = AtomicUsize::new(0);
+        let drawn = resampled.into_iter().map(|(kind, law)| self.resampled(kind, &law, &done, watch));
+        let resampled = drawn.collect::<Result<Vec<Resampled>, TrainError>>()?;
+        let (evidence, per_year) = (self.evidence(), assets.periods_per_year.is_some());
+        Ok(FrontierReport {
+            format: FORMAT.to_owned(),
+            request: request.clone(),
+            level: LEVEL,
+            per_year,
+            radius: self.radius(&assets.history),
+            own,
+            evidence,
+            sentences: report::sentences(&resampled, evidence, per_year),
+            resampled,
+        })
+    }
+
+    /// `done` counts the records of all laws.
+    fn resampled(
+        &self,
+        kind: Bootstrap,
+        law: &RecordLaw,
+        done: &AtomicUsize,
+        watch: &Watch,
+    ) -> Result<Resampled, TrainError> {
+        let request = &self.question.request;
+        let best = self.step(&law.rows, 0.0).solve(None).allocation;
+        let best_worth = self.worth(law, &best);
+        let total = 2 * request.resamples;
+        let every = (total / REPORTS).max(1);
+        let decide = |index: usize| {
+            watch.go_on()?;
+            let rows = law.record(kind, self.question.assets.history.len(), request.seed, index);
+            let allocations = self.decide(&rows);
+            let lost = allocations.iter().map(|allocation| self.unit() * (best_worth - self.worth(law, allocation)));
+            let totals = allocations.iter().map(|allocation| allocation.iter().sum()).collect();
+            let decided = Decided { lost: lost.collect(), totals };
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            if done.is_multiple_of(every) || done == total {
+                (watch.progress)(StepProgress { step: 0, phase: Phase::Simulating, done, total });
+            }
+            Ok(decided)
+        };
+        let decided =
+            (0..request.resamples).into_par_iter().map(decide).collect::<Result<Vec<Decided>, TrainError>>()?;
+        let sample = Clustered::new(request.resamples, 1, LEVEL);
+        let least = least_on_average(&decided);
+        let points = request.scales.iter().enumerate().map(|(index, &scale)| {
+            let lost: Vec<f64> = decided.iter().map(|decided| decided.lost[index]).collect();
+            let apart: Vec<f64> = decided.iter().map(|decided| decided.lost[index] - decided.lost[least]).collect();
+            FrontierPoint {
+                scale,
+                lost: sample.mean(&lost),
+                deviation: sample.variance(&lost).mapped(|variance| variance.max(0.0).sqrt()),
+                beyond_least: (index != least).then(|| sample.mean(&apart)),
+                total: decided.iter().map(|decided| decided.totals[index]).sum::<f64>() / decided.len() as f64,
+            }
+        });
+        Ok(Resampled { bootstrap: kind, best, points: points.collect() })
+    }
+
+    /// The advice at every scale on a record.
+    fn decide(&self, rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let radius = self.radius(rows);
+        let mut near = None;
+        let advise = |&scale: &f64| {
+            let solution = self.step(rows, scale * radius).solve(near.as_ref());
+            let allocation = solution.allocation.clone();
+            near = Some(solution);
+            allocation
+        };
+        self.question.request.scales.iter().map(advise).collect()
+    }
+
+    /// Of the rule at a record.
+    fn radius(&self, rows: &[Vec<f64>]) -> f64 {
+        let fund = fund_returns(rows, &inverse_volatility(rows));
+        self.factor * self.radii.radius(&EmpiricalDistribution::new(&fund))
+    }
+
+    fn floor(&self) -> f64 {
+        self.question.assets.support.map_or(f64::NEG_INFINITY, |support| support.min)
+    }
+
+    fn step(&self, rows: &[Vec<f64>], radius: f64) -> AssetsStep {
+        let (assets, fund) = (&self.question.assets, &self.question.fund.problem);
+        let ground = match assets.ground_norm {
+            GroundNorm::ScaledOne => Ground::Weighted(inverse_volatility(rows)),
+            GroundNorm::Sup => Ground::Sup,
+        };
+        let [lowest, highest] = fund.action_interval;
+        let law = AssetsLaw { returns: rows, radius, floor: self.floor() };
+        AssetsStep::new(law, ground, self.utility, fund.rate_per_step, ActionInterval { lowest, highest })
+    }
+
+    /// Log certainty equivalent over the bank of an allocation under a law.
+    fn worth(&self, law: &RecordLaw, allocation: &[f64]) -> f64 {
+        let bank = 1.0 + self.question.fund.problem.rate_per_step;
+        let of_row = |row: &Vec<f64>| {
+            let excess: f64 = row.iter().zip(allocation).map(|(z, share)| share * (z.exp() / bank - 1.0)).sum();
+            self.utility.value(excess.ln_1p())
+        };
+        self.utility.inverse(law.rows.iter().map(of_row).sum::<f64>() / law.rows.len() as f64)
+    }
+
+    /// Basis points of a log certainty equivalent, a year where the periods of one are known.
+    fn unit(&self) -> f64 {
+        BASIS_POINTS * self.question.assets.periods_per_year.unwrap_or(1.0)
+    }
+
+    /// Standard errors that the mean simple return of the record, in the fund of inverse volatilities, lies above the bank's.
+    fn evidence(&self) -> f64 {
+        let rows = &self.question.assets.history;
+        let returns: Vec<f64> =
+            fund_returns(rows, &inverse_volatility(rows)).into_iter().map(|value| value.exp_m1()).collect();
+        let count = returns.len() as f64;
+        let mean = returns.iter().sum::<f64>() / count;
+        let square = returns.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        (mean - self.question.fund.problem.rate_per_step) * (count / square).sqrt()
+    }
+}
+
+fn least_on_average(decided: &[Decided]) -> usize {
+    let scales = decided.first().map_or(0, |decided| decided.lost.len());
+    let total = |index: usize| decided.iter().map(|decided| decided.lost[index]).sum::<f64>();
+    (0..scales).min_by(|&one, &other| total(one).total_cmp(&total(other))).unwrap_or(0)
+}
