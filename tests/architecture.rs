@@ -18,9 +18,10 @@ const BEHIND_THE_FACE: [&str; 3] = ["bellman", "surrogate", "uncertainty"];
 /// Files of `control` whose types users send or read as they are, and which therefore describe themselves to the API. A
 /// copy of each for the API alone would be a second place for every field and every sentence about it. What computes is not
 /// among them: nothing of `numerics`, and of `control` neither the method nor the problem.
-const DOCUMENTS: [&str; 20] = [
+const DOCUMENTS: [&str; 22] = [
     "control/assets/advice.rs",
     "control/evaluation/backtest_report.rs",
+    "control/evaluation/frontier/report.rs",
     "control/evaluation/report.rs",
     "control/policy/advice.rs",
     "control/policy/caution.rs",
@@ -33,6 +34,7 @@ const DOCUMENTS: [&str; 20] = [
     "control/request/contributions.rs",
     "control/request/evaluation.rs",
     "control/request/framework.rs",
+    "control/request/frontier.rs",
     "control/request/learning.rs",
     "control/request/radius_rule.rs",
     "control/request/specification.rs",

@@ -203,9 +203,12 @@ fn ends(schema: &Value) -> Vec<f64> {
 #[test]
 fn every_field_of_every_request_has_its_row_and_its_bounds() {
     let (description, page) = (description(), read("docs/requests.md"));
-    let linked =
-        [("[`POST /train`](#post-train)", "POST /train"), ("[`POST /observe`](#post-observe)", "POST /observe")]
-            .map(|(link, title)| (link, section(&page, title)));
+    let linked = [
+        ("[`POST /train`](#post-train)", "POST /train"),
+        ("[`POST /observe`](#post-observe)", "POST /observe"),
+        ("[`POST /advise`](#several-assets)", "POST /advise"),
+    ]
+    .map(|(link, title)| (link, section(&page, title)));
     let mut seen = 0;
     for (path, operations) in description["paths"].as_object().unwrap() {
         for (method, operation) in operations.as_object().unwrap() {
@@ -244,7 +247,8 @@ fn every_field_of_every_request_has_its_row_and_its_bounds() {
 #[test]
 fn every_answer_is_described_where_it_is_given() {
     let (description, page) = (description(), read("docs/requests.md"));
-    let report = [spans(&read("docs/evaluation.md")), spans(&read("docs/backtest.md"))].concat();
+    let frontier = section(&page, "POST /frontier");
+    let report = [read("docs/evaluation.md"), read("docs/backtest.md"), frontier].map(|text| spans(&text)).concat();
     let mut said: Vec<(String, Vec<String>, BTreeSet<String>)> = Vec::new();
     for (path, operations) in description["paths"].as_object().unwrap() {
         for (method, operation) in operations.as_object().unwrap() {
@@ -325,7 +329,7 @@ fn every_example_fits_its_request() {
         assert_eq!(operations["post"]["requestBody"]["content"]["application/json"]["example"], example, "{path}");
         examples += 1;
     }
-    assert_eq!(examples, 9);
+    assert_eq!(examples, 10);
 }
 
 #[test]

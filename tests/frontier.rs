@@ -17,7 +17,7 @@ const RATE: f64 = 0.002;
 const SCALES: [f64; 4] = [0.0, 0.25, 0.5, 1.0];
 
 fn history(count: usize) -> Vec<f64> {
-    (0..count).map(|k| 0.012 + 0.04 * ((k * 7919 % 101) as f64 / 50.0 - 1.0)).collect()
+    (0..count).map(|k| 0.006 + 0.08 * ((k * 7919 % 101) as f64 / 50.0 - 1.0)).collect()
 }
 
 fn problem(history: &[f64]) -> Value {
@@ -92,7 +92,9 @@ fn at_the_record_itself_it_advises_as_advise_does() {
     for (own, scale) in found.own.iter().zip(SCALES) {
         assert!((own[0] - advised(&history, scale)).abs() < 1e-3, "{scale}: {own:?}");
     }
-    assert!(found.per_year && found.sentences.len() == 4, "{:?}", found.sentences);
+    assert!(found.per_year && found.sentences.len() == 5, "{:?}", found.sentences);
+    let without = &found.resampled[2];
+    assert!(without.best[0] < 1e-6 && without.points[3].lost.value < without.points[0].lost.value, "{without:?}");
     assert_eq!(found.resampled[1].points.iter().filter(|point| point.beyond_least.is_none()).count(), 1);
 }
 

@@ -52,7 +52,7 @@ fn every_operation_lists_what_its_shape_can_answer() {
             }
         }
     }
-    assert_eq!(with_body, 10);
+    assert_eq!(with_body, 11);
 }
 
 #[test]
@@ -68,5 +68,5 @@ fn every_problem_is_in_the_table_and_a_full_quota_is_said_where_it_refuses() {
         operations["post"]["responses"]["413"]["description"].as_str().is_some_and(|meaning| meaning.contains(title))
     });
     let refusing: Vec<&String> = refusing.map(|(path, _)| path).collect();
-    assert_eq!(refusing, ["/backtest", "/evaluate", "/policies/import", "/sessions", "/train"]);
+    assert_eq!(refusing, ["/backtest", "/evaluate", "/frontier", "/policies/import", "/sessions", "/train"]);
 }

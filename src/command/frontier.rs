@@ -6,8 +6,7 @@ use std::fmt::Write;
 
 use ballast::control::error::FieldError;
 use ballast::control::evaluation::frontier::Frontier;
-use ballast::control::evaluation::frontier::laws::Bootstrap;
-use ballast::control::evaluation::frontier::report::{FrontierReport, Resampled};
+use ballast::control::evaluation::frontier::report::{Bootstrap, FrontierReport, Resampled};
 use ballast::control::kept::Kept;
 use ballast::control::progress::Watch;
 use ballast::control::request::frontier::{FrontierProblem, FrontierRequest};
@@ -108,19 +107,20 @@ fn table(text: &mut String, report: &FrontierReport, Resampled { bootstrap, best
     let records = match bootstrap {
         Bootstrap::Smoothed { .. } => "Records drawn from the smoothed returns".to_owned(),
         Bootstrap::Block { length } => format!("Records of blocks of {length} periods"),
+        Bootstrap::WithoutPremium { .. } => "Records of a law without the premium".to_owned(),
     };
     let best = 100.0 * best.iter().sum::<f64>();
     // Writing to a string cannot fail.
     let _ = writeln!(text, "{records}; who knows their law holds {best:.1} %.");
     let lost = format!("lost {per}, bp [90 %]");
     let _ =
-        writeln!(text, "{:>8}{lost:>28}{:>20}{:>10}{:>16}", "scale", "from record to record", "held", "held on yours");
+        writeln!(text, "{:>8}{lost:>26}{:>24}{:>10}{:>16}", "scale", "from record to record", "held", "held on yours");
     for (point, own) in points.iter().zip(&report.own) {
         let lost = format!("{:.1} [{:.1}, {:.1}]", point.lost.value, point.lost.low, point.lost.high);
         let (held, own) = (100.0 * point.total, 100.0 * own.iter().sum::<f64>());
         let _ = writeln!(
             text,
-            "{:>8}{lost:>28}{:>21.1}{:>10}{:>16}",
+            "{:>8}{lost:>26}{:>24.1}{:>10}{:>16}",
             point.scale,
             point.deviation.value,
             format!("{held:.1} %"),

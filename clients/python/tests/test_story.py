@@ -185,6 +185,10 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     assert ballast.evaluation(evaluation.id).report()["reference"] == "all_bank"
     walked = walk(ballast)
     assert ballast.walk_forward(walked.id).report()["choices"]["window"] == 8
+    tried = ballast.frontier(
+        [0.01 * math.sin(period) for period in range(12)], kind="log", rate_per_step=0.0, resamples=20
+    )
+    assert ballast.frontier_of(tried.id).report()["format"] == "ballast-frontier-1"
     ballast.training(training.id).delete()
     assert training.id not in [job["job"] for job in ballast.jobs()]
 
@@ -192,6 +196,7 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
         training.id: "{id}",
         evaluation.id: "{id}",
         walked.id: "{id}",
+        tried.id: "{id}",
         policy.id: "{id}",
         own.id: "{id}",
         session.id: "{id}",
@@ -242,6 +247,17 @@ def test_a_walk_forward_ends_in_a_report(ballast: Ballast) -> None:
         wealth *= 1.02 + 0.03 * math.sin(1.7 * quarter)
         assert found == pytest.approx(wealth, rel=1e-12)
     assert report["sentences"][0].startswith("adaptive, alpha 0.5: ")
+
+
+def test_a_frontier_tells_what_caution_costs(ballast: Ballast) -> None:
+    pd = pytest.importorskip("pandas")
+    record = [0.01 + 0.05 * math.sin(1.7 * period) for period in range(24)]
+    one = ballast.frontier(record, kind="log", rate_per_step=0.002, scales=[0.0, 1.0], resamples=20).report()
+    table = pd.DataFrame({"stocks": record, "bonds": [0.001 + 0.3 * value for value in reversed(record)]})
+    two = ballast.frontier(table, kind="log", rate_per_step=0.002, resamples=20, block=3).report()
+    assert [point["scale"] for point in one["resampled"][0]["points"]] == [0.0, 1.0]
+    assert [len(found["best"]) for found in one["resampled"] + two["resampled"]] == [1, 1, 1, 2, 2, 2]
+    assert all(point["lost"]["value"] > -1e-6 for found in two["resampled"] for point in found["points"])
 
 
 def test_every_field_of_a_walk_forward_is_an_argument() -> None:

@@ -10,7 +10,7 @@ const FOLLOWED = 2;
 /** Jobs that are not followed are asked for this often, in milliseconds. */
 const POLL = 1000;
 
-const WORDS = { train: "Training", evaluate: "Evaluation", backtest: "Walk-forward" };
+const WORDS = { train: "Training", evaluate: "Evaluation", backtest: "Walk-forward", frontier: "Frontier of caution" };
 const named = (kind) => WORDS[kind] ?? kind.replace(/_/g, " ");
 
 export async function view(_, leaving) {
@@ -157,8 +157,8 @@ function times({ created_ms, started_ms, finished_ms }) {
 function links(card) {
   const { job } = card;
   if (job.policy) return h("a", { class: "button quiet", href: `#/policies/${job.policy}` }, "See the policy");
-  if (job.state === "succeeded" && job.kind === "backtest") {
-    const name = `walk-forward-${short(job.job)}.json`;
+  if (job.state === "succeeded" && job.kind !== "evaluate") {
+    const name = `${WORDS[job.kind].toLowerCase().replaceAll(" ", "-")}-${short(job.job)}.json`;
     return h("a", { class: "button quiet", href: job.report, download: name, onclick: download }, "Export the report");
   }
   if (job.state === "succeeded")

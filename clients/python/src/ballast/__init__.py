@@ -44,7 +44,7 @@ from .errors import (
 )
 from .policy import Policy
 from .session import Session
-from .training import Evaluation, ProgressPrinter, Training, WalkForward
+from .training import Evaluation, Frontier, ProgressPrinter, Training, WalkForward
 
 __all__ = [
     "Ballast",
@@ -53,6 +53,7 @@ __all__ = [
     "DamagedPolicy",
     "Evaluation",
     "Forbidden",
+    "Frontier",
     "IdempotencyConflict",
     "InUse",
     "Internal",

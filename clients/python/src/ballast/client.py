@@ -14,7 +14,7 @@ from . import wire
 from .policy import Policy
 from .returns import Kind, Returns, Table, log_returns, log_returns_of_assets
 from .session import Session
-from .training import Evaluation, Training, WalkForward
+from .training import Evaluation, Frontier, Training, WalkForward
 from .transport import Transport, idempotent
 
 
@@ -200,6 +200,43 @@ class Ballast:
             "seed": seed,
         }
         return WalkForward(self._transport, self._queued("/backtest", _given(request), idempotency_key))
+
+    def frontier(
+        self,
+        returns: Returns | Table,
+        *,
+        kind: Kind,
+        rate_per_step: float,
+        assets: Sequence[str] | None = None,
+        scales: Sequence[float] | None = None,
+        resamples: int | None = None,
+        block: int | None = None,
+        seed: int | None = None,
+        idempotency_key: str | None = None,
+        **problem: Any,
+    ) -> Frontier:
+        """Queues the frontier of caution: what multiples of the radius lose on records like this one.
+
+        ``returns`` are of one asset as in ``advise``, or, with more than one column, of several as in
+        ``advise_assets``. Every other field of the problem is given by name, such as ``utility`` or ``radius``.
+        """
+        whole: dict[str, Any] = {"rate_per_step": rate_per_step, **_given(problem)}
+        if assets is None and len(getattr(returns, "columns", ())) < 2:
+            whole["history"] = log_returns(returns, kind)
+        else:
+            whole["assets"], whole["history"] = log_returns_of_assets(returns, kind, assets)
+        request = {
+            "problem": whole,
+            "scales": None if scales is None else list(scales),
+            "resamples": resamples,
+            "block": block,
+            "seed": seed,
+        }
+        return Frontier(self._transport, self._queued("/frontier", _given(request), idempotency_key))
+
+    def frontier_of(self, job: str) -> Frontier:
+        """A frontier that was queued before."""
+        return Frontier(self._transport, self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
 
     def walk_forward(self, job: str) -> WalkForward:
         """A walk-forward that was queued before."""

@@ -153,6 +153,17 @@ class WalkForward(Job):
         return cast(wire.BacktestReport, self._report(watch))
 
 
+class Frontier(Job):
+    """A job that ends in a report; ``Ballast.frontier_of(id)`` finds it again."""
+
+    def report(self, watch: Watch | None = None) -> wire.FrontierReport:
+        """Waits for the end, showing each change to ``watch``.
+
+        Raises :class:`JobEnded` where the job fails or is cancelled.
+        """
+        return cast(wire.FrontierReport, self._report(watch))
+
+
 class ProgressPrinter:
     """A ``watch`` that prints: one line that is rewritten on a terminal, a line for each finished step elsewhere."""
 

@@ -125,6 +125,34 @@ SimpleReturn: TypeAlias = float
 AlphaItem: TypeAlias = float
 
 
+class Bootstrap1(TypedDict):
+    """Independent draws of the returns seen, spread by a kernel."""
+
+    bandwidth: float
+    """Deviation of the kernel over that of the record."""
+    kind: Literal["smoothed"]
+
+
+class Bootstrap2(TypedDict):
+    """The same, every return moved down by what its asset's mean has over the bank: were there no premium."""
+
+    bandwidth: float
+    """Deviation of the kernel over that of the record."""
+    kind: Literal["without_premium"]
+
+
+class Bootstrap3(TypedDict):
+    """Blocks of the returns seen, in a row; the last is followed by the first."""
+
+    length: int
+    """Periods of a block."""
+    kind: Literal["block"]
+
+
+Bootstrap: TypeAlias = Bootstrap1 | Bootstrap2 | Bootstrap3
+"""How records are drawn from the one at hand."""
+
+
 class BootstrapEstimate(TypedDict):
     """A figure with its interval."""
 
@@ -214,6 +242,23 @@ Framework: TypeAlias = Literal["adaptive", "static", "known_law", "plug_in", "pa
 """What the investor is robust against, and whether observing returns changes it."""
 
 
+class FrontierPoint(TypedDict):
+    """What one multiple of the radius loses."""
+
+    scale: float
+    """Of the radius."""
+    lost: Estimate
+    """Basis points of certainty equivalent behind the best allocation, on average over records."""
+    deviation: Estimate
+    """Of that loss from record to record."""
+    beyond_least: NotRequired[Estimate | None]
+    total: float
+    """Share of wealth held in all assets together, on average over records."""
+
+
+Scale: TypeAlias = float
+
+
 GroundNorm: TypeAlias = Literal["scaled_one", "sup"]
 """The distance between two dates' log-returns."""
 
@@ -298,7 +343,7 @@ class Interval(TypedDict):
     """The upper end."""
 
 
-JobKind: TypeAlias = Literal["train", "evaluate", "backtest"]
+JobKind: TypeAlias = Literal["train", "evaluate", "backtest", "frontier"]
 """What a job computes."""
 
 
@@ -579,6 +624,17 @@ class Report(TypedDict):
     """Share of wealth held in the risky asset through the period. Default: the allocation advised for it."""
     wealth: NotRequired[float | None]
     """Wealth reached, with what was added, where it differs from what all of the above gives."""
+
+
+class Resampled(TypedDict):
+    """The frontier on records drawn from one law."""
+
+    bootstrap: Bootstrap
+    """How they were drawn."""
+    best: list[float]
+    """The best allocation for who knows the law: the share of wealth in each asset."""
+    points: list[FrontierPoint]
+    """Scale by scale."""
 
 
 class Return(TypedDict):
@@ -1490,6 +1546,25 @@ class EvaluationRequest(TypedDict):
     """Confidence of the intervals."""
 
 
+FrontierProblem: TypeAlias = ProblemSpecification | AssetsProblem
+"""The problem of one asset, or of several, which `assets` names."""
+
+
+class FrontierRequest(TypedDict):
+    """A record, an investor, and the radii to try."""
+
+    problem: FrontierProblem
+    """One asset as in `/advise`, or several."""
+    scales: NotRequired[list[Scale]]
+    """Multiples of the radius of the rule, ascending. 0 takes the record for the law."""
+    resamples: NotRequired[int]
+    """Resampled records of each kind."""
+    block: NotRequired[int | None]
+    """Periods in a row that are drawn together, 1 to half of the record. Default: the cube root of its length."""
+    seed: NotRequired[int]
+    """Of the resamples and of the simulated bridges."""
+
+
 class Job(TypedDict):
     """A job."""
 
@@ -1621,6 +1696,32 @@ class EvaluationReport(TypedDict):
     """What it took."""
 
 
+class FrontierReport(TypedDict):
+    """
+    What following the advice at multiples of the radius loses on records like the one at hand. The same request gives the same
+    report, bit for bit.
+    """
+
+    format: str
+    """`ballast-frontier-1`."""
+    request: FrontierRequest
+    """As sent, with what was left out."""
+    level: float
+    """Of the intervals, which tell how exactly the resamples tell a figure, not how like the true law they are."""
+    per_year: bool
+    """Whether losses are a year's: where `problem.periods_per_year` is given. Else they are a period's."""
+    radius: float
+    """Of the rule at the record itself, in log-return; scales are multiples of it."""
+    evidence: float
+    """Standard errors that the record's mean return lies above the bank's, in the fund of inverse volatilities."""
+    own: list[list[float]]
+    """What is advised at the record itself, scale by scale: the share of wealth in each asset, in the order of the request."""
+    resampled: list[Resampled]
+    """By the law that records were drawn from."""
+    sentences: list[str]
+    """What the figures say, and what they cannot."""
+
+
 class History(TypedDict):
     """Where a session started, and everything recorded of it."""
 
@@ -1640,8 +1741,8 @@ class History(TypedDict):
     """The policies that followed the first."""
 
 
-JobReport: TypeAlias = EvaluationReport | BacktestReport
-"""The report of a job: of an evaluation or of a walk-forward."""
+JobReport: TypeAlias = EvaluationReport | BacktestReport | FrontierReport
+"""The report of a job: of an evaluation, of a walk-forward or of a frontier."""
 
 
 class PolicyDetail(TypedDict):

@@ -2,26 +2,9 @@
 
 use rand::RngExt;
 use rand_distr::StandardNormal;
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
+use super::report::Bootstrap;
 use crate::numerics::streams::stream;
-
-/// How records are drawn from the one at hand.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Bootstrap {
-    /// Independent draws of the returns seen, spread by a kernel.
-    Smoothed {
-        /// Deviation of the kernel over that of the record.
-        bandwidth: f64,
-    },
-    /// Blocks of the returns seen, in a row; the last is followed by the first.
-    Block {
-        /// Periods of a block.
-        length: usize,
-    },
-}
 
 /// Atoms of a smoothed law, about; every return seen is spread over as many, two at least.
 const ATOMS: usize = 4096;
@@ -82,11 +65,22 @@ impl RecordLaw {
         RecordLaw { rows: spread, bandwidth }
     }
 
-    /// A record of so many dates. Stream: (seed, "resample smoothed" or "resample blocks", 0, index).
+    /// The same with every asset's mean simple return that of the bank, whose growth a period is `bank`. Where that lies above, it is
+    /// moved up.
+    pub(super) fn without_premium(&self, bank: f64, floor: f64) -> Self {
+        let width = self.rows.first().map_or(0, Vec::len);
+        let size = self.rows.len() as f64;
+        let mean = |asset: usize| self.rows.iter().map(|row| row[asset].exp()).sum::<f64>() / size;
+        let moves: Vec<f64> = (0..width).map(|asset| (bank / mean(asset)).ln()).collect();
+        let moved = |row: &Vec<f64>| row.iter().zip(&moves).map(|(value, moved)| (value + moved).max(floor)).collect();
+        RecordLaw { rows: self.rows.iter().map(moved).collect(), bandwidth: self.bandwidth }
+    }
+
+    /// A record of so many dates. Stream: (seed, "smoothed" or "blocks", 0, index).
     pub(super) fn record(&self, kind: Bootstrap, count: usize, seed: u64, index: usize) -> Vec<Vec<f64>> {
         let (purpose, length) = match kind {
-            Bootstrap::Smoothed { .. } => ("resample smoothed", 1),
-            Bootstrap::Block { length } => ("resample blocks", length),
+            Bootstrap::Smoothed { .. } | Bootstrap::WithoutPremium { .. } => ("smoothed", 1),
+            Bootstrap::Block { length } => ("blocks", length),
         };
         let mut generator = stream(seed, purpose, 0, index);
         let mut draw = || {
@@ -136,6 +130,10 @@ mod tests {
             }
             // By hand, at d = 1 and n = 60: (4 / 180)^(1/5).
             assert!(width > 1 || (law.bandwidth - 0.467_043_7).abs() < 1e-6, "{}", law.bandwidth);
+            let even = law.without_premium(1.01, f64::NEG_INFINITY);
+            let mean = even.rows.iter().map(|row| row[width - 1].exp()).sum::<f64>() / even.rows.len() as f64;
+            assert!((mean - 1.01).abs() < 1e-14 * 960.0);
+            assert!((moments(&even.rows).1[0] / deviations[0] - 1.0).abs() < 1e-12);
             let floored = RecordLaw::smoothed(&rows, -0.005, 5);
             assert!(floored.rows.iter().flatten().all(|value| *value >= -0.005));
         }

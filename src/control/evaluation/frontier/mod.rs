@@ -1,9 +1,10 @@
 //! The frontier of caution: for multiples of the radius, what following the robust advice would have cost on records like the one
 //! at hand, on average and from record to record.
 //!
-//! Two laws stand for the unknown one, and what is drawn from each is known of it alone:
-//!   smoothed  every return seen, spread by a kernel ([`laws`]); records are independent draws of it,
-//!   block     the returns seen; records are blocks of them in a row, so that what follows what stays as it was.
+//! Three laws stand for the unknown one:
+//!   smoothed         every return seen, spread by a kernel (`laws`); records are independent draws of it,
+//!   block            the returns seen; records are blocks of them in a row, so that what follows what stays as it was,
+//!   without premium  the smoothed law moved down to the bank's mean, as the record may have been luck.
 //! A record of the length of the own one is drawn, the advice at each multiple is solved on it, and is scored by the law that
 //! the record was drawn from. What is told is the loss against the best allocation for that law,
 //!
@@ -13,15 +14,16 @@
 //! distributionally robust empirical optimization models, Operations Research 69: a little robustness costs the mean at second
 //! order and spares the deviation at first.
 
-pub mod laws;
+mod laws;
 pub mod report;
+mod words;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use self::laws::{Bootstrap, RecordLaw};
-use self::report::{FORMAT, FrontierPoint, FrontierReport, Resampled};
+use self::laws::RecordLaw;
+use self::report::{Bootstrap, FORMAT, FrontierPoint, FrontierReport, Resampled};
 use crate::control::assets::{AssetsLaw, AssetsStep};
 use crate::control::error::TrainError;
 use crate::control::kept::Kept;
@@ -42,6 +44,8 @@ const LEVEL: f64 = 0.9;
 const BASIS_POINTS: f64 = 1e4;
 /// Paths of the joint factor of several assets.
 const FACTOR_PATHS: usize = 1000;
+/// Laws that records are drawn from.
+const LAWS: usize = 3;
 /// Progress is told about so often.
 const REPORTS: usize = 100;
 
@@ -85,10 +89,13 @@ impl Frontier {
         let (request, assets) = (&self.question.request, &self.question.assets);
         let own = self.decide(&assets.history);
         let smoothed = RecordLaw::smoothed(&assets.history, self.floor(), request.seed);
-        let block = RecordLaw::of(&assets.history);
-        let bandwidth = smoothed.bandwidth;
-        let resampled =
-            [(Bootstrap::Smoothed { bandwidth }, smoothed), (Bootstrap::Block { length: self.question.block }, block)];
+        let without = smoothed.without_premium(1.0 + self.question.fund.problem.rate_per_step, self.floor());
+        let (bandwidth, length) = (smoothed.bandwidth, self.question.block);
+        let resampled: [(Bootstrap, RecordLaw); LAWS] = [
+            (Bootstrap::Smoothed { bandwidth }, smoothed),
+            (Bootstrap::Block { length }, RecordLaw::of(&assets.history)),
+            (Bootstrap::WithoutPremium { bandwidth }, without),
+        ];
         let done = AtomicUsize::new(0);
         let drawn = resampled.into_iter().map(|(kind, law)| self.resampled(kind, &law, &done, watch));
         let resampled = drawn.collect::<Result<Vec<Resampled>, TrainError>>()?;
@@ -101,7 +108,7 @@ impl Frontier {
             radius: self.radius(&assets.history),
             own,
             evidence,
-            sentences: report::sentences(&resampled, evidence, per_year),
+            sentences: words::sentences(&resampled, evidence, per_year),
             resampled,
         })
     }
@@ -117,7 +124,7 @@ impl Frontier {
         let request = &self.question.request;
         let best = self.step(&law.rows, 0.0).solve(None).allocation;
         let best_worth = self.worth(law, &best);
-        let total = 2 * request.resamples;
+        let total = LAWS * request.resamples;
         let every = (total / REPORTS).max(1);
         let decide = |index: usize| {
             watch.go_on()?;

@@ -1,9 +1,8 @@
-//! The report of a frontier, as it travels, and what it says in sentences.
+//! The report of a frontier, as it travels.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::laws::Bootstrap;
 use crate::control::request::frontier::FrontierRequest;
 use crate::numerics::summary::Estimate;
 
@@ -34,6 +33,27 @@ pub struct FrontierReport {
     pub sentences: Vec<String>,
 }
 
+/// How records are drawn from the one at hand.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Bootstrap {
+    /// Independent draws of the returns seen, spread by a kernel.
+    Smoothed {
+        /// Deviation of the kernel over that of the record.
+        bandwidth: f64,
+    },
+    /// The same, every return moved down by what its asset's mean has over the bank: were there no premium.
+    WithoutPremium {
+        /// Deviation of the kernel over that of the record.
+        bandwidth: f64,
+    },
+    /// Blocks of the returns seen, in a row; the last is followed by the first.
+    Block {
+        /// Periods of a block.
+        length: usize,
+    },
+}
+
 /// The frontier on records drawn from one law.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Resampled {
@@ -58,49 +78,4 @@ pub struct FrontierPoint {
     pub beyond_least: Option<Estimate>,
     /// Share of wealth held in all assets together, on average over records.
     pub total: f64,
-}
-
-/// Standard errors beyond which a premium is told from none.
-const TOLD: f64 = 2.0;
-
-/// What the figures say, the most important first.
-pub(super) fn sentences(resampled: &[Resampled], evidence: f64, per_year: bool) -> Vec<String> {
-    let mut sentences: Vec<String> = resampled.iter().filter_map(|resampled| of_one(resampled, per_year)).collect();
-    let behind = if evidence < 0.0 { "below" } else { "above" };
-    let errors = evidence.abs();
-    let told = if errors < TOLD { "the record cannot tell it from none" } else { "the record tells it from none" };
-    sentences.push(format!(
-        "The mean return of the record lies {errors:.1} standard errors {behind} the bank's: {told}. Every record drawn here has that premium in it, so the figures say how much caution a premium like it repays, not that there is one; were there none, the largest radius would lose least."
-    ));
-    sentences.push(
-        "A scale that did best in the past says next to nothing about the future: choose by how much loss from record to record you can bear."
-            .to_owned(),
-    );
-    sentences
-}
-
-/// Which scale loses least, and which cannot be told apart from it.
-fn of_one(resampled: &Resampled, per_year: bool) -> Option<String> {
-    let least = resampled.points.iter().find(|point| point.beyond_least.is_none())?;
-    let steadiest =
-        resampled.points.iter().min_by(|one, other| one.deviation.value.total_cmp(&other.deviation.value))?;
-    let per = if per_year { "a year" } else { "a period" };
-    let records = match resampled.bootstrap {
-        Bootstrap::Smoothed { .. } => "On records drawn from the smoothed returns".to_owned(),
-        Bootstrap::Block { length } => format!("On records of blocks of {length} periods"),
-    };
-    let alike: Vec<String> = resampled
-        .points
-        .iter()
-        .filter(|point| point.beyond_least.is_some_and(|beyond| beyond.low <= 0.0))
-        .map(|point| point.scale.to_string())
-        .collect();
-    let alike = match alike.as_slice() {
-        [] => String::new(),
-        alike => format!("; {} cannot be told apart from it by so many records", alike.join(", ")),
-    };
-    Some(format!(
-        "{records} {} times the radius loses least on average, {:.1} basis points {per}{alike}. From record to record {} varies least, by {:.1}.",
-        least.scale, least.lost.value, steadiest.scale, steadiest.deviation.value
-    ))
 }
