@@ -48,7 +48,7 @@ fn worth(atoms: &[f64], share: f64) -> f64 {
 
 #[test]
 fn losses_on_blocks_agree_with_brute_force() {
-    let (history, block, draws) = (history(36), 3, 2000);
+    let (history, block, draws) = (history(36), 3, 1000);
     let request =
         json!({ "problem": problem(&history), "scales": SCALES, "resamples": draws, "block": block, "seed": 7 });
     let found = report(&request);
@@ -116,8 +116,9 @@ fn columns_that_are_one_asset_lose_what_it_loses() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_frontier_is_a_job_whose_report_is_the_library_s() {
     let app = App::start().await;
-    let request =
-        json!({ "problem": problem(&history(30)), "scales": [0.0, 0.5], "resamples": 30, "block": 4, "seed": 3 });
+    let mut problem = problem(&history(30));
+    problem["utility"] = json!({ "kind": "exponential", "risk_aversion_relative": 3.0 });
+    let request = json!({ "problem": problem, "scales": [0.0, 0.5], "resamples": 30, "seed": 3 });
     let (status, job) = app.post("/frontier", &request).await;
     assert_eq!(status.as_u16(), 202, "{job}");
     assert_eq!(job["kind"], "frontier");
@@ -144,6 +145,10 @@ async fn what_cannot_be_tried_is_refused_by_name() {
         ("/scales", json!([11.0]), "scales[0]"),
         ("/resamples", json!(5), "resamples"),
         ("/block", json!(16), "block"),
+        ("/problem/history", json!([0.1, "x"]), "problem.history[1]"),
+        ("/problem/utility", json!({ "kind": "log", "more": 1 }), "problem.utility.more"),
+        ("/problem/history", json!(history(5001)), "problem.history"),
+        ("/more", json!(1), "more"),
     ];
     for (pointer, value, field) in cases {
         let mut request = whole.clone();

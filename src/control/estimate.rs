@@ -18,6 +18,7 @@ use super::surrogate::design::{CANDIDATES_PER_POINT, GUARDS};
 use super::surrogate::learning::{LAW_BYTES, together};
 use super::surrogate::stored::Solution;
 use crate::numerics::gp::GaussianProcess;
+use crate::numerics::grown_bridges;
 
 /// Bytes of a double.
 const NUMBER: usize = 8;
@@ -149,7 +150,8 @@ impl Sizes {
     }
 
     fn statistics(&self, threads: usize) -> usize {
-        product(&[threads, self.paths, STATISTICS + self.together(), NUMBER])
+        let statistics = product(&[threads, self.paths, STATISTICS + self.together(), NUMBER]);
+        statistics.saturating_add(product(&[threads, grown_bridges::table_bytes(self.history, self.horizon)]))
     }
 
     /// States of a design that a thread measures together.
@@ -248,8 +250,13 @@ pub fn frontier(question: &FrontierQuestion, threads: usize) -> Footprint {
     Footprint::of("problem.history", question.assets.history.len(), records.saturating_add(LEAST)).and(
         "problem.radius.paths",
         sizes.paths,
-        sizes.bridges.saturating_mul(2).saturating_add(statistics),
+        kept_by_frontier(question).saturating_add(statistics),
     )
+}
+
+/// Bytes of the cache that a frontier should have: the bridges of its record, at most half.
+pub fn kept_by_frontier(question: &FrontierQuestion) -> usize {
+    Sizes::of(&question.fund).bridges.saturating_mul(2)
 }
 
 /// What a walk-forward takes on so many threads.

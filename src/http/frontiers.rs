@@ -5,13 +5,18 @@ use std::sync::Arc;
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
+use serde::Deserialize;
+use serde::de::{DeserializeOwned, IgnoredAny};
 
 use super::access::{By, Heavy};
-use super::extract::JsonBody;
+use super::decode;
+use super::extract::JsonBytes;
 use super::jobs::{accepted, idempotency_key};
 use super::problem::Problem;
 use super::wire;
+use crate::control::request::assets::AssetsProblem;
 use crate::control::request::frontier::FrontierRequest;
+use crate::control::request::specification::ProblemSpecification;
 use crate::service::Service;
 
 /// Queue the frontier of caution: what multiples of the radius lose on resampled records.
@@ -33,7 +38,34 @@ pub async fn frontier(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,
     headers: HeaderMap,
-    JsonBody(request): JsonBody<FrontierRequest>,
+    JsonBytes(bytes): JsonBytes,
 ) -> Result<Response, Problem> {
+    let request = request(&bytes)?;
     Ok(accepted(service.jobs.frontier(&caller, request, idempotency_key(&headers)?).await?))
+}
+
+/// A request of which the problem alone is read.
+#[derive(Deserialize)]
+struct Only<P> {
+    problem: P,
+}
+
+#[derive(Deserialize)]
+struct Said {
+    assets: Option<IgnoredAny>,
+}
+
+/// The request. Its problem is read by itself first, so that what is wrong in it is told by its own field.
+fn request(bytes: &[u8]) -> Result<FrontierRequest, Problem> {
+    if let Ok(Only { problem: Said { assets } }) = decode::json(bytes) {
+        match assets {
+            Some(_) => reads::<AssetsProblem>(bytes)?,
+            None => reads::<ProblemSpecification>(bytes)?,
+        }
+    }
+    decode::json(bytes)
+}
+
+fn reads<P: DeserializeOwned>(bytes: &[u8]) -> Result<(), Problem> {
+    decode::json::<Only<P>>(bytes).map(|Only { problem }| drop(problem))
 }

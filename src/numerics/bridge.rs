@@ -46,7 +46,7 @@ impl AbsoluteBridges {
         statistic
     }
 
-    /// The same for many laws of one size, to the same bits. Cost as one by one, with the bridges read from memory once.
+    /// The same for many laws of one size, to the same bits at the times of a sample. Cost as one by one, with the bridges read from memory once.
     ///
     /// Checked by: `many_laws_at_a_time_are_one_by_one_to_the_last_bit`.
     fn directional_statistics(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<Vec<f64>> {

@@ -14,6 +14,8 @@ use super::empirical::EmpiricalDistribution;
 
 /// Paths whose tables stay in the second-level cache: with 12 tables of 240 values, 0.7 MB.
 const PATHS: usize = 32;
+/// Larger ones do not.
+const MOST_BYTES: usize = 4 << 20;
 /// Tables pay where there are this many laws for each of them.
 const LAWS_A_TABLE: usize = 4;
 
@@ -33,6 +35,12 @@ struct Tables {
     stride: usize,
 }
 
+/// Bytes of the tables for laws that learned so many values beyond a base; 0 where they are not made.
+pub fn table_bytes(base: usize, learned: usize) -> usize {
+    let bytes = (learned + 1).saturating_mul(base + 1).saturating_mul(size_of::<Block>());
+    if bytes <= MOST_BYTES { bytes } else { 0 }
+}
+
 impl AbsoluteBridges {
     /// The statistic over the direction of every path, law by law, to rounding; `base` ascending. `None` where some law does
     /// not have the values of the base, where weights decay, or where the laws are too few for tables to pay.
@@ -48,7 +56,8 @@ impl AbsoluteBridges {
         let Times::Sample(_) = self.times else { return None };
         let size = laws.first()?.sample_size();
         let learned = size.checked_sub(base.len())?;
-        if base.is_empty() || laws.len() < LAWS_A_TABLE * (learned + 1) {
+        let are_made = table_bytes(base.len(), learned) > 0 && laws.len() >= LAWS_A_TABLE * (learned + 1);
+        if base.is_empty() || !are_made {
             return None;
         }
         let stride = base.len() + 1;

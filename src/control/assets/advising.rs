@@ -12,7 +12,7 @@ use crate::control::request::specification::ProblemSpecification;
 use crate::numerics::fund_bridges::FundBridges;
 
 /// Paths of the joint factor: its standard error is then a hundredth of it.
-const FACTOR_PATHS: usize = 1000;
+pub const FACTOR_PATHS: usize = 1000;
 
 impl AssetsAdvice {
     /// The step of `problem`, whose fund of inverse volatilities has the completed problem `fund` and the radius `of_fund`, with the

@@ -18,7 +18,7 @@
 //! `ln(sum theta_i e^(z_i))`, theta = a / sum a. Source of the ball: paper (2.5); of the reduction, the levelling.
 
 pub mod advice;
-mod advising;
+pub mod advising;
 mod branches;
 mod certificate;
 pub mod composition;

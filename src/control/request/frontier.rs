@@ -19,6 +19,8 @@ pub const RETURNS: RangeInclusive<usize> = 12..=5000;
 pub const SCALES: RangeInclusive<usize> = 1..=20;
 /// The largest of them.
 pub const LARGEST_SCALE: f64 = 10.0;
+/// Log-returns drawn from each law, times the scales: these are some minutes of two cores.
+pub const MOST_DRAWN: usize = 20_000_000;
 /// Resampled records of each kind.
 pub const RESAMPLES: RangeInclusive<usize> = 20..=2000;
 
@@ -61,23 +63,32 @@ pub enum FrontierProblem {
     Assets(AssetsProblem),
 }
 
+impl FrontierProblem {
+    fn periods(&self) -> usize {
+        match self {
+            FrontierProblem::Asset(problem) => problem.history.len(),
+            FrontierProblem::Assets(problem) => problem.history.len(),
+        }
+    }
+}
+
 impl<'de> Deserialize<'de> for FrontierProblem {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let mut value = serde_json::Value::deserialize(deserializer)?;
         if value.get("assets").is_some() {
-            return serde_path_to_error::deserialize(value).map(FrontierProblem::Assets).map_err(D::Error::custom);
+            return serde_json::from_value(value).map(FrontierProblem::Assets).map_err(D::Error::custom);
         }
         if let Some(problem) = value.as_object_mut() {
             problem.entry("horizon").or_insert(1.into());
         }
-        serde_path_to_error::deserialize(value).map(FrontierProblem::Asset).map_err(D::Error::custom)
+        serde_json::from_value(value).map(FrontierProblem::Asset).map_err(D::Error::custom)
     }
 }
 
 /// A request that keeps the rules, of however many assets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrontierQuestion {
-    /// As sent, with what was left out.
+    /// As completed: another reading of it gives the same question.
     pub request: FrontierRequest,
     /// The assets and the investor; one asset is called `asset`.
     pub assets: AssetsProblem,
@@ -85,14 +96,21 @@ pub struct FrontierQuestion {
     pub fund: Specification,
     /// Periods in a row that are drawn together.
     pub block: usize,
+    /// Between which all log-returns lie.
+    pub support: (f64, f64),
 }
 
 impl FrontierRequest {
     /// # Errors
     /// A field breaks a rule.
-    pub fn question(self) -> Result<FrontierQuestion, FieldError> {
+    pub fn question(mut self) -> Result<FrontierQuestion, FieldError> {
         self.check_scales()?;
         rules::whole("resamples", self.resamples, &RESAMPLES)?;
+        let count = self.problem.periods();
+        if !RETURNS.contains(&count) {
+            let rule = format!("must hold {} to {} periods", RETURNS.start(), RETURNS.end());
+            return Err(FieldError::new("problem.history", format!("{count} periods"), rule));
+        }
         let (assets, fund) = match &self.problem {
             FrontierProblem::Assets(assets) => (assets.clone(), assets.fund(self.seed)?),
             FrontierProblem::Asset(problem) => {
@@ -101,14 +119,30 @@ impl FrontierRequest {
                 (as_assets(&fund.problem), fund)
             }
         };
-        let count = assets.history.len();
-        if !RETURNS.contains(&count) {
-            let rule = format!("must hold {} to {} periods", RETURNS.start(), RETURNS.end());
-            return Err(FieldError::new("problem.history", format!("{count} periods"), rule));
+        let drawn = count * assets.assets.len() * self.scales.len();
+        if drawn * self.resamples > MOST_DRAWN {
+            let rule = format!(
+                "must be at most {}: periods, assets, scales and resamples multiply to at most {MOST_DRAWN}",
+                MOST_DRAWN / drawn
+            );
+            return Err(FieldError::new("resamples", self.resamples, rule));
         }
         let block = self.block.unwrap_or_else(|| (count as f64).cbrt().round() as usize);
         rules::whole("block", block, &(1..=count / 2))?;
-        Ok(FrontierQuestion { request: self, assets, fund, block })
+        self.block = Some(block);
+        let highest = match &mut self.problem {
+            FrontierProblem::Asset(problem) => {
+                problem.utility = fund.problem.utility;
+                problem.support.map(|support| support.max)
+            }
+            FrontierProblem::Assets(problem) => {
+                problem.utility = fund.problem.utility;
+                None
+            }
+        };
+        let lowest = assets.support.map(|support| support.min);
+        let support = (lowest.unwrap_or(f64::NEG_INFINITY), highest.unwrap_or(f64::INFINITY));
+        Ok(FrontierQuestion { request: self, assets, fund, block, support })
     }
 
     fn check_scales(&self) -> Result<(), FieldError> {

@@ -11,7 +11,7 @@ use crate::numerics::empirical::{EmpiricalDistribution, weights};
 pub const HALF_LIFE: (f64, f64) = (1.0, 1e15);
 
 /// Two observations closer than this are one value: the standard deviation must exceed it.
-const SMALLEST_DEVIATION: f64 = 1e-7;
+pub const SMALLEST_DEVIATION: f64 = 1e-7;
 
 /// What a return weighs in the law that is learned: of the history and of what is seen after it alike.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]

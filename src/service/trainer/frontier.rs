@@ -16,7 +16,8 @@ impl Worker {
             .map_err(|error| failed(format!("the stored request cannot be read: {error}")))?;
         let question = request.question().map_err(|error| failed(error.to_string()))?;
         let _reserved = self.reserve(&estimate::frontier(&question, self.threads))?;
-        let frontier = Frontier::new(question, Kept::default());
+        let kept = Kept::new(estimate::kept_by_frontier(&question));
+        let frontier = Frontier::new(question, kept);
         let watch = Watch { stop, progress: &|progress| self.board.advance(&claimed.row.job, progress) };
         let report = self.pool.install(|| frontier.run(&watch))?;
         let report_json = serde_json::to_string(&report)

@@ -129,15 +129,15 @@ class Bootstrap1(TypedDict):
     """Independent draws of the returns seen, spread by a kernel."""
 
     bandwidth: float
-    """Deviation of the kernel over that of the record."""
+    """Deviation of the kernel over that of the record, before the variance is brought back."""
     kind: Literal["smoothed"]
 
 
 class Bootstrap2(TypedDict):
-    """The same, every return moved down by what its asset's mean has over the bank: were there no premium."""
+    """The same, every return moved by as much, to where its asset's mean is the bank's: were there no premium."""
 
     bandwidth: float
-    """Deviation of the kernel over that of the record."""
+    """Deviation of the kernel over that of the record, before the variance is brought back."""
     kind: Literal["without_premium"]
 
 
@@ -1705,7 +1705,7 @@ class FrontierReport(TypedDict):
     format: str
     """`ballast-frontier-1`."""
     request: FrontierRequest
-    """As sent, with what was left out."""
+    """As completed."""
     level: float
     """Of the intervals, which tell how exactly the resamples tell a figure, not how like the true law they are."""
     per_year: bool

@@ -4,6 +4,8 @@ use rand::RngExt;
 use rand_distr::StandardNormal;
 
 use super::report::Bootstrap;
+use crate::control::error::FieldError;
+use crate::control::request::learning::SMALLEST_DEVIATION;
 use crate::numerics::streams::stream;
 
 /// Atoms of a smoothed law, about; every return seen is spread over as many, two at least.
@@ -27,10 +29,10 @@ impl RecordLaw {
 
     /// The returns seen, each spread over a few draws of a normal law with `bandwidth^2` times the covariance of the record, and
     /// brought back to its means and variances: Silverman's smoothed bootstrap that keeps the variance. The bandwidth is his rule of
-    /// thumb, `(4 / ((d + 2) n))^(1 / (d + 4))`. Nothing lies below `floor`.
+    /// thumb, `(4 / ((d + 2) n))^(1 / (d + 4))`. What lies beyond `support` is moved to its end, which moves means and variances.
     ///
     /// Source: Silverman (1986), Density estimation, sections 4.3.2 and 6.4.1. Checked by: `means_and_variances_stay`.
-    pub(super) fn smoothed(rows: &[Vec<f64>], floor: f64, seed: u64) -> Self {
+    pub(super) fn smoothed(rows: &[Vec<f64>], support: (f64, f64), seed: u64) -> Self {
         let (count, width) = (rows.len(), rows.first().map_or(0, Vec::len));
         let (size, dimension) = (count as f64, width as f64);
         let bandwidth = (4.0 / ((dimension + 2.0) * size)).powf(1.0 / (dimension + 4.0));
@@ -59,25 +61,34 @@ impl RecordLaw {
         for row in &mut spread {
             for (asset, value) in row.iter_mut().enumerate() {
                 let mean = means[asset];
-                *value = (mean + (*value - mean) * deviations[asset] / wider[asset]).max(floor);
+                *value = (mean + (*value - mean) * deviations[asset] / wider[asset]).clamp(support.0, support.1);
             }
         }
         RecordLaw { rows: spread, bandwidth }
     }
 
     /// The same with every asset's mean simple return that of the bank, whose growth a period is `bank`. Where that lies above, it is
-    /// moved up.
-    pub(super) fn without_premium(&self, bank: f64, floor: f64) -> Self {
+    /// moved up. The returns may leave the support.
+    pub(super) fn without_premium(&self, bank: f64) -> Self {
         let width = self.rows.first().map_or(0, Vec::len);
         let size = self.rows.len() as f64;
         let mean = |asset: usize| self.rows.iter().map(|row| row[asset].exp()).sum::<f64>() / size;
         let moves: Vec<f64> = (0..width).map(|asset| (bank / mean(asset)).ln()).collect();
-        let moved = |row: &Vec<f64>| row.iter().zip(&moves).map(|(value, moved)| (value + moved).max(floor)).collect();
+        let moved = |row: &Vec<f64>| row.iter().zip(&moves).map(|(value, moved)| value + moved).collect();
         RecordLaw { rows: self.rows.iter().map(moved).collect(), bandwidth: self.bandwidth }
     }
 
     /// A record of so many dates. Stream: (seed, "smoothed" or "blocks", 0, index).
-    pub(super) fn record(&self, kind: Bootstrap, count: usize, seed: u64, index: usize) -> Vec<Vec<f64>> {
+    ///
+    /// # Errors
+    /// An asset moves so rarely that no record drawn shows it.
+    pub(super) fn record(
+        &self,
+        kind: Bootstrap,
+        count: usize,
+        seed: u64,
+        index: usize,
+    ) -> Result<Vec<Vec<f64>>, FieldError> {
         let (purpose, length) = match kind {
             Bootstrap::Smoothed { .. } | Bootstrap::WithoutPremium { .. } => ("smoothed", 1),
             Bootstrap::Block { length } => ("blocks", length),
@@ -93,8 +104,12 @@ impl RecordLaw {
             }
             record
         };
-        let moves = |record: &Vec<Vec<f64>>| moments(record).1.iter().all(|deviation| *deviation > 0.0);
-        (0..DRAWS).map(|_| draw()).find(moves).unwrap_or_else(|| self.rows[..count.min(self.rows.len())].to_vec())
+        let varies =
+            |record: &Vec<Vec<f64>>| moments(record).1.iter().all(|deviation| *deviation >= SMALLEST_DEVIATION);
+        (0..DRAWS).map(|_| draw()).find(varies).ok_or_else(|| {
+            let rule = "must vary more often: of records drawn from it, hardly one shows how much each asset varies";
+            FieldError::new("problem.history", format!("{count} periods"), rule)
+        })
     }
 }
 
@@ -121,7 +136,7 @@ mod tests {
     fn means_and_variances_stay() {
         for width in [1, 3] {
             let rows = rows(60, width);
-            let law = RecordLaw::smoothed(&rows, f64::NEG_INFINITY, 5);
+            let law = RecordLaw::smoothed(&rows, (f64::NEG_INFINITY, f64::INFINITY), 5);
             let ((means, deviations), (smooth_means, smooth_deviations)) = (moments(&rows), moments(&law.rows));
             assert_eq!(law.rows.len(), 60 * 16);
             for asset in 0..width {
@@ -130,26 +145,28 @@ mod tests {
             }
             // By hand, at d = 1 and n = 60: (4 / 180)^(1/5).
             assert!(width > 1 || (law.bandwidth - 0.467_043_7).abs() < 1e-6, "{}", law.bandwidth);
-            let even = law.without_premium(1.01, f64::NEG_INFINITY);
+            let even = law.without_premium(1.01);
             let mean = even.rows.iter().map(|row| row[width - 1].exp()).sum::<f64>() / even.rows.len() as f64;
             assert!((mean - 1.01).abs() < 1e-14 * 960.0);
             assert!((moments(&even.rows).1[0] / deviations[0] - 1.0).abs() < 1e-12);
-            let floored = RecordLaw::smoothed(&rows, -0.005, 5);
-            assert!(floored.rows.iter().flatten().all(|value| *value >= -0.005));
+            let within = RecordLaw::smoothed(&rows, (-0.005, 0.005), 5);
+            assert!(within.rows.iter().flatten().all(|value| value.abs() <= 0.005));
         }
     }
 
     #[test]
     fn a_block_is_drawn_in_a_row_and_the_last_is_followed_by_the_first() {
         let rows: Vec<Vec<f64>> = (0..10).map(|date| vec![f64::from(date)]).collect();
-        let record = RecordLaw::of(&rows).record(Bootstrap::Block { length: 4 }, 10, 1, 3);
+        let record = RecordLaw::of(&rows).record(Bootstrap::Block { length: 4 }, 10, 1, 3).unwrap();
         assert_eq!(record.len(), 10);
         for block in record.chunks(4) {
             for pair in block.windows(2) {
                 assert_eq!(pair[1][0], (pair[0][0] + 1.0) % 10.0);
             }
         }
-        assert_eq!(record, RecordLaw::of(&rows).record(Bootstrap::Block { length: 4 }, 10, 1, 3));
-        assert_ne!(record, RecordLaw::of(&rows).record(Bootstrap::Block { length: 4 }, 10, 1, 4));
+        assert_eq!(record, RecordLaw::of(&rows).record(Bootstrap::Block { length: 4 }, 10, 1, 3).unwrap());
+        let still = RecordLaw::of(&vec![vec![0.01]; 10]);
+        assert_eq!(still.record(Bootstrap::Block { length: 1 }, 10, 1, 0).unwrap_err().field, "problem.history");
+        assert_ne!(record, RecordLaw::of(&rows).record(Bootstrap::Block { length: 4 }, 10, 1, 4).unwrap());
     }
 }

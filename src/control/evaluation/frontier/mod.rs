@@ -24,6 +24,7 @@ use rayon::prelude::*;
 
 use self::laws::RecordLaw;
 use self::report::{Bootstrap, FORMAT, FrontierPoint, FrontierReport, Resampled};
+use crate::control::assets::advising::FACTOR_PATHS;
 use crate::control::assets::{AssetsLaw, AssetsStep};
 use crate::control::error::TrainError;
 use crate::control::kept::Kept;
@@ -42,8 +43,6 @@ use crate::numerics::summary::Clustered;
 const LEVEL: f64 = 0.9;
 /// Basis points of one.
 const BASIS_POINTS: f64 = 1e4;
-/// Paths of the joint factor of several assets.
-const FACTOR_PATHS: usize = 1000;
 /// Laws that records are drawn from.
 const LAWS: usize = 3;
 /// Progress is told about so often.
@@ -53,7 +52,7 @@ const REPORTS: usize = 100;
 pub struct Frontier {
     question: FrontierQuestion,
     radii: RadiusEstimator,
-    /// Of the radius of all funds at once over that of one.
+    /// Of the radius of all funds at once over that of one, at the record at hand; records drawn from it take the same.
     factor: f64,
     utility: RelativeUtility,
 }
@@ -84,12 +83,12 @@ impl Frontier {
     /// Checked by: `tests/frontier.rs`.
     ///
     /// # Errors
-    /// [`TrainError::Stopped`] soon after the stop signal.
+    /// [`TrainError::Stopped`] soon after the stop signal; an asset that moves too rarely to be drawn.
     pub fn run(&self, watch: &Watch) -> Result<FrontierReport, TrainError> {
         let (request, assets) = (&self.question.request, &self.question.assets);
-        let own = self.decide(&assets.history);
-        let smoothed = RecordLaw::smoothed(&assets.history, self.floor(), request.seed);
-        let without = smoothed.without_premium(1.0 + self.question.fund.problem.rate_per_step, self.floor());
+        let own = self.decide(&assets.history, watch)?;
+        let smoothed = RecordLaw::smoothed(&assets.history, self.question.support, request.seed);
+        let without = smoothed.without_premium(1.0 + self.question.fund.problem.rate_per_step);
         let (bandwidth, length) = (smoothed.bandwidth, self.question.block);
         let resampled: [(Bootstrap, RecordLaw); LAWS] = [
             (Bootstrap::Smoothed { bandwidth }, smoothed),
@@ -127,9 +126,8 @@ impl Frontier {
         let total = LAWS * request.resamples;
         let every = (total / REPORTS).max(1);
         let decide = |index: usize| {
-            watch.go_on()?;
-            let rows = law.record(kind, self.question.assets.history.len(), request.seed, index);
-            let allocations = self.decide(&rows);
+            let rows = law.record(kind, self.question.assets.history.len(), request.seed, index)?;
+            let allocations = self.decide(&rows, watch)?;
             let lost = allocations.iter().map(|allocation| self.unit() * (best_worth - self.worth(law, allocation)));
             let totals = allocations.iter().map(|allocation| allocation.iter().sum()).collect();
             let decided = Decided { lost: lost.collect(), totals };
@@ -158,14 +156,15 @@ impl Frontier {
     }
 
     /// The advice at every scale on a record.
-    fn decide(&self, rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    fn decide(&self, rows: &[Vec<f64>], watch: &Watch) -> Result<Vec<Vec<f64>>, TrainError> {
         let radius = self.radius(rows);
         let mut near = None;
         let advise = |&scale: &f64| {
+            watch.go_on()?;
             let solution = self.step(rows, scale * radius).solve(near.as_ref());
             let allocation = solution.allocation.clone();
             near = Some(solution);
-            allocation
+            Ok(allocation)
         };
         self.question.request.scales.iter().map(advise).collect()
     }
@@ -176,10 +175,6 @@ impl Frontier {
         self.factor * self.radii.radius(&EmpiricalDistribution::new(&fund))
     }
 
-    fn floor(&self) -> f64 {
-        self.question.assets.support.map_or(f64::NEG_INFINITY, |support| support.min)
-    }
-
     fn step(&self, rows: &[Vec<f64>], radius: f64) -> AssetsStep {
         let (assets, fund) = (&self.question.assets, &self.question.fund.problem);
         let ground = match assets.ground_norm {
@@ -187,7 +182,7 @@ impl Frontier {
             GroundNorm::Sup => Ground::Sup,
         };
         let [lowest, highest] = fund.action_interval;
-        let law = AssetsLaw { returns: rows, radius, floor: self.floor() };
+        let law = AssetsLaw { returns: rows, radius, floor: self.question.support.0 };
         AssetsStep::new(law, ground, self.utility, fund.rate_per_step, ActionInterval { lowest, highest })
     }
 

@@ -15,7 +15,7 @@ pub const FORMAT: &str = "ballast-frontier-1";
 pub struct FrontierReport {
     /// `ballast-frontier-1`.
     pub format: String,
-    /// As sent, with what was left out.
+    /// As completed.
     pub request: FrontierRequest,
     /// Of the intervals, which tell how exactly the resamples tell a figure, not how like the true law they are.
     pub level: f64,
@@ -39,12 +39,12 @@ pub struct FrontierReport {
 pub enum Bootstrap {
     /// Independent draws of the returns seen, spread by a kernel.
     Smoothed {
-        /// Deviation of the kernel over that of the record.
+        /// Deviation of the kernel over that of the record, before the variance is brought back.
         bandwidth: f64,
     },
-    /// The same, every return moved down by what its asset's mean has over the bank: were there no premium.
+    /// The same, every return moved by as much, to where its asset's mean is the bank's: were there no premium.
     WithoutPremium {
-        /// Deviation of the kernel over that of the record.
+        /// Deviation of the kernel over that of the record, before the variance is brought back.
         bandwidth: f64,
     },
     /// Blocks of the returns seen, in a row; the last is followed by the first.

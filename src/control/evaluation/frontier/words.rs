@@ -12,7 +12,7 @@ pub(super) fn sentences(resampled: &[Resampled], evidence: f64, per_year: bool) 
     let errors = evidence.abs();
     let told = if errors < TOLD { "the record cannot tell it from none" } else { "the record tells it from none" };
     sentences.push(format!(
-        "The mean return of the record lies {errors:.1} standard errors {behind} the bank's: {told}. The first two figures are of laws with that premium, the third of one without; which is true the record says no better than that."
+        "The mean return of the record lies {errors:.1} standard errors {behind} the bank's: {told}. The first two figures are of laws with that mean, the third of one with the mean of the bank; which is true the record says no better than that."
     ));
     sentences.push(
         "A scale that did best in the past says next to nothing about the future: choose by how much loss from record to record you can bear."
