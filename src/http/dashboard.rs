@@ -46,6 +46,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "evaluations.js": SCRIPT,
         "flows.js": SCRIPT,
         "form.js": SCRIPT,
+        "frontier.js": SCRIPT,
         "format.js": SCRIPT,
         "heatmap.js": SCRIPT,
         "interval_chart.js": SCRIPT,

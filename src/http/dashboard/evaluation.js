@@ -1,18 +1,18 @@
 // The report of one evaluation, as docs/evaluation.md describes it.
 
-import { download, get, isOver } from "./api.js";
+import { download, get } from "./api.js";
 import { lineChart } from "./chart.js";
 import { facts, h, section, table } from "./dom.js";
 import { count, counted, duration, percent, percentTick, short, significant, tick, wealth } from "./format.js";
 import { intervalChart } from "./interval_chart.js";
-import { jobList } from "./jobs.js";
+import { until } from "./jobs.js";
 import { FRAMEWORKS, worth } from "./specification.js";
 
 export async function view(id, leaving) {
   const job = await get(`/jobs/${id}`, leaving);
   const trail = h("p", { class: "trail" }, h("a", { href: "#/evaluations" }, "Evaluations"));
   const title = `Evaluation ${short(id)}`;
-  if (job.state !== "succeeded") return { title, trail, body: waiting(job, leaving) };
+  if (job.state !== "succeeded") return { title, trail, body: until(job, leaving) };
   const report = await get(job.report, leaving);
   const names = report.strategies.map(named);
   const export_ = h(
@@ -26,11 +26,6 @@ export async function view(id, leaving) {
     actions: export_,
     body: [summary(report), outcomes(report, names), spreads(report, names), courses(report), coverage(report)],
   };
-}
-
-function waiting(job, leaving) {
-  const again = (now) => isOver(now) && now.state === "succeeded" && dispatchEvent(new HashChangeEvent("hashchange"));
-  return jobList([job], leaving, again).element;
 }
 
 const named = ({ framework, constant_mix }) =>

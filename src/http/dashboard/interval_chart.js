@@ -5,8 +5,8 @@ import { s, table } from "./dom.js";
 
 const LINE = 26;
 
-/** `rows`: `{name, value, low, high}`. */
-export function intervalChart({ title, rows, format, tick }) {
+/** `rows`: `{name, value, low, high}`; `noun` says what has the names. */
+export function intervalChart({ title, noun = "Strategy", rows, format, tick }) {
   const height = LINE * rows.length + 34;
   const bottom = LINE * rows.length + 4;
   const domain = extent(rows.flatMap(({ low, high }) => [low, high]));
@@ -40,7 +40,7 @@ export function intervalChart({ title, rows, format, tick }) {
       table(
         title,
         [
-          { name: "Strategy", cell: ({ name }) => name },
+          { name: noun, cell: ({ name }) => name },
           { name: "Estimate", numeric: true, cell: ({ value }) => format(value) },
           { name: "From", numeric: true, cell: ({ low }) => format(low) },
           { name: "To", numeric: true, cell: ({ high }) => format(high) },

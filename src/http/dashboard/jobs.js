@@ -11,6 +11,8 @@ const FOLLOWED = 2;
 const POLL = 1000;
 
 const WORDS = { train: "Training", evaluate: "Evaluation", backtest: "Walk-forward", frontier: "Frontier of caution" };
+/** Where the page of a report is. */
+const REPORTS = { evaluate: "evaluations", frontier: "frontiers" };
 const named = (kind) => WORDS[kind] ?? kind.replace(/_/g, " ");
 
 export async function view(_, leaving) {
@@ -20,6 +22,12 @@ export async function view(_, leaving) {
   if (entries.length === 0) return { title: "Jobs", body: welcome() };
   const jobs = jobList(entries, leaving);
   return { title: "Jobs", actions, body: [jobs.element, foot(pages, ["job", "jobs"], entries.length, jobs.add)] };
+}
+
+/** A job whose report this page will show, until it does. */
+export function until(job, leaving) {
+  const again = ({ state }) => state === "succeeded" && dispatchEvent(new HashChangeEvent("hashchange"));
+  return jobList([job], leaving, again).element;
 }
 
 /** `{element, add(entries)}`: jobs that stay up to date until `leaving`; `changed(job)` hears of every change. */
@@ -123,6 +131,7 @@ function summary({ state, progress, error, kind }) {
       : `${progress.steps_total} steps done.`;
   const left = progress.seconds_left === null ? "" : `, ${duration(progress.seconds_left)} left`;
   if (kind === "backtest") return `Trains policies and lives by them${left}`;
+  if (kind === "frontier") return `${count(progress.points_done ?? 0)} records are advised${left}`;
   const at =
     progress.step === null || progress.phase === null ? "Starting" : `Step ${progress.step}, ${progress.phase}`;
   const points = progress.points_total
@@ -157,12 +166,12 @@ function times({ created_ms, started_ms, finished_ms }) {
 function links(card) {
   const { job } = card;
   if (job.policy) return h("a", { class: "button quiet", href: `#/policies/${job.policy}` }, "See the policy");
-  if (job.state === "succeeded" && job.kind !== "evaluate") {
-    const name = `${WORDS[job.kind].toLowerCase().replaceAll(" ", "-")}-${short(job.job)}.json`;
+  if (job.state === "succeeded" && job.kind === "backtest") {
+    const name = `walk-forward-${short(job.job)}.json`;
     return h("a", { class: "button quiet", href: job.report, download: name, onclick: download }, "Export the report");
   }
   if (job.state === "succeeded")
-    return h("a", { class: "button quiet", href: `#/evaluations/${job.job}` }, "See the report");
+    return h("a", { class: "button quiet", href: `#/${REPORTS[job.kind]}/${job.job}` }, "See the report");
   if (isOver(job)) return null;
   const stop = h(
     "button",

@@ -5,6 +5,7 @@ import { announce, h } from "./dom.js";
 import * as evaluation from "./evaluation.js";
 import * as evaluationAsking from "./evaluation_asking.js";
 import * as evaluations from "./evaluations.js";
+import * as frontier from "./frontier.js";
 import * as jobs from "./jobs.js";
 import { keyForm } from "./key.js";
 import * as policies from "./policies.js";
@@ -26,6 +27,7 @@ const ROUTES = [
   [/^#\/evaluations$/, evaluations.view, "evaluations"],
   [/^#\/evaluations\/new(?:\?(.*))?$/, evaluationAsking.view, "evaluations"],
   [/^#\/evaluations\/([^/]+)$/, evaluation.view, "evaluations"],
+  [/^#\/frontiers\/([^/]+)$/, frontier.view, "jobs"],
   [/^#\/key$/, key, "key"],
 ];
 

@@ -18,6 +18,7 @@ import {
   tick,
   wealth,
 } from "./format.js";
+import { asking } from "./frontier.js";
 import { lawChart } from "./law_chart.js";
 import { observeForm } from "./observe.js";
 import { sensitivity } from "./sensitivity.js";
@@ -26,13 +27,14 @@ import { conservatism } from "./what_if.js";
 
 export async function view(id, leaving) {
   const session = await get(`/sessions/${id}`, leaving);
-  const [history, policy, canAsk] = await Promise.all([
+  const [history, policy, canAsk, canTry] = await Promise.all([
     get(`/sessions/${id}/history`, leaving),
     get(`/policies/${session.policy}`, leaving),
     offers("/what-if"),
+    offers("/frontier"),
   ]);
   const holder = h("div", {});
-  const shown = { id, policy, canAsk, leaving };
+  const shown = { id, policy, canAsk, canTry, leaving };
   const refresh = async (news) => {
     const [now, past] = await Promise.all([get(`/sessions/${id}`, leaving), get(`/sessions/${id}/history`, leaving)]);
     await fill(holder, { ...shown, session: now, history: past, refresh });
@@ -80,6 +82,7 @@ async function fill(holder, shown) {
     sensitivity(shown),
     worstCase(shown, advice, settled),
     shown.canAsk ? conservatism(shown, action) : "",
+    caution(shown),
     observed(shown),
   );
 }
@@ -234,6 +237,22 @@ function worstWords({ worst_case: { transport, sentence }, radius, sample_size }
   const share = moves.reduce((sum, { mass }) => sum + mass, 0);
   const lowest = Math.min(...moves.map(({ moved_to }) => moved_to));
   return `Against this advice, the worst law ${among} moves ${percent(share)} of the probability, down to a return of ${percent(Math.expm1(lowest))} in one period.`;
+}
+
+/** What more or less of it would lose, where the policy has a ball. */
+function caution({ session, policy, history, canTry }) {
+  const { problem } = policy.specification;
+  if (!canTry || problem.radius?.rule === "chi_square") return "";
+  const seen = history.observations.map((row) => (row.now ?? row).log_return).filter((value) => value !== null);
+  return section(
+    "How much caution",
+    h(
+      "p",
+      { class: "note" },
+      "What other multiples of the radius would lose on some hundreds of records drawn like this one, a period at a time: without a trading cost, without forgetting, and without money that comes and goes.",
+    ),
+    h("p", {}, asking(problem, [...history.history, ...seen], session.wealth)),
+  );
 }
 
 function observed(shown) {

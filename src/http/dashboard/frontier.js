@@ -1,0 +1,77 @@
+// What more or less caution would lose on records like the one at hand: asked for, and the report of it.
+
+import { download, get, post } from "./api.js";
+import { announce, h, section, table } from "./dom.js";
+import { percent, short, tick } from "./format.js";
+import { intervalChart } from "./interval_chart.js";
+import { until } from "./jobs.js";
+
+export async function view(id, leaving) {
+  const job = await get(`/jobs/${id}`, leaving);
+  const trail = h("p", { class: "trail" }, h("a", { href: "#/jobs" }, "Jobs"));
+  const title = `Frontier of caution ${short(id)}`;
+  if (job.state !== "succeeded") return { title, trail, body: until(job, leaving) };
+  const report = await get(job.report, leaving);
+  const name = `frontier-${short(id)}.json`;
+  const actions = h("a", { class: "button quiet", href: job.report, download: name, onclick: download }, "Export");
+  const words = h(
+    "div",
+    { class: "words" },
+    report.sentences.map((sentence) => h("p", {}, sentence)),
+  );
+  return { title, trail, actions, body: [words, ...report.resampled.map((resampled) => drawn(report, resampled))] };
+}
+
+const TITLES = {
+  smoothed: () => "Records drawn from the returns seen, smoothed",
+  block: ({ length }) => `Records of blocks of ${length} periods in a row`,
+  without_premium: () => "Records of a law without the premium",
+};
+
+const points = (value) => tick(value, 0.1);
+const scaled = (scale) => ({ 0: "No radius", 1: "The radius" })[scale] ?? `${scale} times it`;
+
+/** One law: what each scale loses, and how much that varies. */
+function drawn({ own, per_year }, { bootstrap, best, points: scales }) {
+  const total = (shares) => shares.reduce((sum, share) => sum + share, 0);
+  const lost = `Lost ${per_year ? "a year" : "a period"}, basis points`;
+  const rows = scales.map((point, index) => ({ ...point, name: scaled(point.scale), own: total(own[index]) }));
+  const number = (name, cell) => ({ name, numeric: true, cell });
+  return section(
+    TITLES[bootstrap.kind](bootstrap),
+    h("p", { class: "note" }, `Who knows this law holds ${percent(total(best))}.`),
+    intervalChart({ title: lost, noun: "Radius", rows: rows.map(({ name, lost }) => ({ name, ...lost })), format: points, tick }),
+    table(
+      `${lost}, at each multiple of the radius`,
+      [
+        { name: "Radius", cell: ({ name }) => name },
+        number("Lost on average", ({ lost }) => points(lost.value)),
+        number("Varies from record to record by", ({ deviation }) => points(deviation.value)),
+        number("Beyond the best", ({ beyond_least }) => (beyond_least ? points(beyond_least.value) : "\u2013")),
+        number("Held on average", ({ total }) => percent(total)),
+        number("Held on this record", ({ own }) => percent(own)),
+      ],
+      rows,
+    ),
+  );
+}
+
+/** A button that asks for it, of a problem as a policy has it with the returns and the wealth of now. */
+export function asking(asked, history, initial_wealth) {
+  const { rate_per_step, periods_per_year, action_interval, utility, radius, support } = asked;
+  const investor = { initial_wealth, action_interval, utility, radius, support };
+  const problem = { history, rate_per_step, periods_per_year, ...investor };
+  const button = h("button", { class: "quiet" }, "How much caution?");
+  button.addEventListener("click", async () => {
+    button.disabled = true;
+    try {
+      const { job } = await post("/frontier", { problem });
+      location.hash = `#/frontiers/${job}`;
+    } catch (error) {
+      announce(error.message);
+      button.after(h("p", { class: "error" }, error.message));
+    }
+    button.disabled = false;
+  });
+  return button;
+}

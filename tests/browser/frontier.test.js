@@ -1,0 +1,37 @@
+// What more or less caution would lose: asked for on a session's page, drawn when it is there.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { browser, call, service } from "./ballast.js";
+
+test("a session's page asks, and the report is drawn with its sentences and a table for each law", async () => {
+  const [ballast, chromium] = await Promise.all([service(), browser()]);
+  try {
+    const page = await chromium.newPage();
+    page.setDefaultTimeout(60_000);
+    const history = Array.from({ length: 24 }, (_, k) => 0.01 + 0.05 * Math.sin(1.7 * k));
+    const problem = { horizon: 2, rate_per_step: 0.002, periods_per_year: 12, history };
+    const { job } = await call(ballast.url, "/train", { problem, design: { count: 50 } });
+    let now;
+    do now = await call(ballast.url, `/jobs/${job}`);
+    while (now.finished_ms === null);
+    const { session } = await call(ballast.url, "/sessions", { policy: now.policy });
+    await page.goto(`${ballast.url}/#/sessions/${session}`);
+    await page.getByRole("button", { name: "How much caution?" }).click();
+    await page.getByText("Who knows this law holds").first().waitFor();
+    const asked = page.url().split("/").at(-1);
+    const report = await call(ballast.url, `/jobs/${asked}/report`);
+    assert.equal(report.request.problem.history.length, 24);
+    const shown = await page.locator("main").innerText();
+    for (const words of report.sentences) assert.ok(shown.includes(words), words);
+    assert.equal(await page.locator("main svg").count(), 3);
+    assert.equal(await page.getByRole("table").count(), 3);
+    assert.ok(!/undefined|NaN|null/.test(shown), shown);
+    await page.goto(`${ballast.url}/#/jobs`);
+    await page.getByRole("link", { name: "See the report" }).click();
+    await page.getByRole("heading", { name: /^Frontier of caution/ }).waitFor();
+  } finally {
+    await chromium.close();
+    await ballast.stop();
+  }
+});
