@@ -93,6 +93,10 @@ fn at_the_record_itself_it_advises_as_advise_does() {
         assert!((own[0] - advised(&history, scale)).abs() < 1e-3, "{scale}: {own:?}");
     }
     assert!(found.per_year && found.sentences.len() == 5, "{:?}", found.sentences);
+    let simple: Vec<f64> = history.iter().map(|value| value.exp() - 1.0).collect();
+    let mean = simple.iter().sum::<f64>() / 60.0;
+    let error = (simple.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / 59.0 / 60.0).sqrt();
+    assert!((found.evidence - (mean - RATE) / error).abs() < 1e-9, "{}", found.evidence);
     let without = &found.resampled[2];
     assert!(without.best[0] < 1e-6 && without.points[3].lost.value < without.points[0].lost.value, "{without:?}");
     assert_eq!(found.resampled[1].points.iter().filter(|point| point.beyond_least.is_none()).count(), 1);

@@ -5,27 +5,22 @@ use std::error::Error;
 
 use ballast::control::error::FieldError;
 use ballast::control::request::learning::Learning;
-use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification, default_seed};
+use ballast::control::request::specification::{ProblemSpecification, default_seed};
 use ballast::service::advise::Advise;
 use clap::Args;
 
-use super::returns::{Returns, ReturnsFile};
+use super::record::{Record, show};
+use super::returns::Returns;
 
 mod words;
 
 #[derive(Debug, Clone, Args)]
 pub struct AdviseArgs {
     #[command(flatten)]
-    returns: ReturnsFile,
-    /// Use the last so many returns; all of them unless given
-    #[arg(long)]
-    window: Option<usize>,
+    record: Record,
     /// Periods in which the weight of a return halves; all weigh the same unless given
     #[arg(long)]
     half_life: Option<f64>,
-    /// Relative risk aversion: 1 is log utility, more is more careful
-    #[arg(long, default_value_t = 3.0)]
-    risk_aversion: f64,
     /// Wealth now, in any currency
     #[arg(long, default_value_t = 100.0)]
     wealth: f64,
@@ -54,34 +49,19 @@ const OPTIONS: [(&str, &str); 6] = [
 ];
 
 pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
-    if !(1.0..=100.0).contains(&arguments.risk_aversion) {
-        return Err(FieldError::new("--risk-aversion", arguments.risk_aversion, "must lie in [1, 100]").into());
-    }
-    let mut returns = arguments.returns.read()?;
-    if let Some(window) = arguments.window {
-        returns = returns.last(window)?;
-    }
+    let returns = arguments.record.read()?;
     let count = returns.rows().len();
     let advised = arguments.question(&returns).answer().map_err(|error| by_option(error, count))?;
-    if arguments.json {
-        eprintln!("{}", returns.sentence());
-        println!("{}", serde_json::to_string_pretty(&advised)?);
-    } else {
-        println!("{}\n\n{}", returns.sentence(), words::told(&advised, arguments.wealth, returns.frequency));
-    }
-    Ok(())
+    let told = || words::told(&advised, arguments.wealth, returns.frequency);
+    Ok(show(&returns, arguments.json, &advised, told)?)
 }
 
 impl AdviseArgs {
     fn question(&self, returns: &Returns) -> Advise {
-        let history = returns.rows().iter().map(|row| row.period().log_return).collect();
         let problem = ProblemSpecification {
-            horizon: 1,
-            periods_per_year: Some(returns.periods_per_year as f64),
             trading_cost: self.trading_cost,
             learning: self.half_life.map_or_else(Learning::default, |half_life| Learning::Decay { half_life }),
-            utility: UtilitySpecification::relative(self.risk_aversion),
-            ..ProblemSpecification::of(history, returns.rate())
+            ..self.record.problem(returns)
         };
         Advise {
             problem,

@@ -9,31 +9,26 @@ use ballast::control::evaluation::frontier::Frontier;
 use ballast::control::evaluation::frontier::report::{Bootstrap, FrontierReport, Resampled};
 use ballast::control::kept::Kept;
 use ballast::control::progress::Watch;
-use ballast::control::request::frontier::{FrontierProblem, FrontierRequest};
+use ballast::control::request::frontier::{FrontierProblem, FrontierRequest, default_resamples, default_scales};
 use ballast::control::request::radius_rule::RadiusRule;
-use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification, default_seed};
+use ballast::control::request::specification::{ProblemSpecification, default_seed};
 use clap::Args;
 
-use super::returns::{Returns, ReturnsFile};
+use super::record::{Record, show};
+use super::returns::Returns;
 
 #[derive(Debug, Clone, Args)]
 pub struct FrontierArgs {
     #[command(flatten)]
-    returns: ReturnsFile,
-    /// Use the last so many returns; all of them unless given
-    #[arg(long)]
-    window: Option<usize>,
-    /// Relative risk aversion: 1 is log utility, more is more careful
-    #[arg(long, default_value_t = 3.0)]
-    risk_aversion: f64,
+    record: Record,
     /// Probability that the ball of scale 1 misses the true law
     #[arg(long, default_value_t = 0.1)]
     alpha: f64,
     /// Multiples of the radius, ascending
-    #[arg(long, value_delimiter = ',', default_values_t = [0.0, 0.1, 0.25, 0.5, 1.0])]
+    #[arg(long, value_delimiter = ',', default_values_t = default_scales())]
     scales: Vec<f64>,
     /// Records drawn from each law
-    #[arg(long, default_value_t = 400)]
+    #[arg(long, default_value_t = default_resamples())]
     resamples: usize,
     /// Periods in a row that are drawn together; the cube root of the number of returns unless given
     #[arg(long)]
@@ -46,34 +41,16 @@ pub struct FrontierArgs {
 }
 
 pub fn run(arguments: &FrontierArgs) -> Result<(), Box<dyn Error>> {
-    if !(1.0..=100.0).contains(&arguments.risk_aversion) {
-        return Err(FieldError::new("--risk-aversion", arguments.risk_aversion, "must lie in [1, 100]").into());
-    }
-    let mut returns = arguments.returns.read()?;
-    if let Some(window) = arguments.window {
-        returns = returns.last(window)?;
-    }
+    let returns = arguments.record.read()?;
     let question = arguments.request(&returns).question().map_err(by_option)?;
     let report = Frontier::new(question, Kept::default()).run(&Watch::unwatched())?;
-    if arguments.json {
-        eprintln!("{}", returns.sentence());
-        println!("{}", serde_json::to_string_pretty(&report)?);
-    } else {
-        println!("{}\n\n{}", returns.sentence(), told(&report));
-    }
-    Ok(())
+    Ok(show(&returns, arguments.json, &report, || told(&report))?)
 }
 
 impl FrontierArgs {
     fn request(&self, returns: &Returns) -> FrontierRequest {
-        let history = returns.rows().iter().map(|row| row.period().log_return).collect();
-        let problem = ProblemSpecification {
-            horizon: 1,
-            periods_per_year: Some(returns.periods_per_year as f64),
-            utility: UtilitySpecification::relative(self.risk_aversion),
-            radius: Some(RadiusRule::bridge(self.alpha)),
-            ..ProblemSpecification::of(history, returns.rate())
-        };
+        let radius = Some(RadiusRule::bridge(self.alpha));
+        let problem = ProblemSpecification { radius, ..self.record.problem(returns) };
         let FrontierArgs { scales, resamples, block, seed, .. } = self.clone();
         FrontierRequest { problem: FrontierProblem::Asset(problem), scales, resamples, block, seed }
     }

@@ -16,6 +16,7 @@ mod host;
 pub mod keys;
 pub mod loadtest;
 mod moments;
+mod record;
 pub mod reproduce;
 mod returns;
 pub mod serve;

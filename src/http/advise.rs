@@ -69,14 +69,19 @@ struct Said {
 }
 
 #[derive(Deserialize)]
-struct SaidOfProblem {
+pub(super) struct SaidOfProblem {
     horizon: Option<IgnoredAny>,
-    assets: Option<IgnoredAny>,
+    pub(super) assets: Option<IgnoredAny>,
+}
+
+/// `None` where there is no problem to be read.
+pub(super) fn said(bytes: &[u8]) -> Option<SaidOfProblem> {
+    decode::json(bytes).ok().map(|Said { problem }| problem)
 }
 
 /// The question, with the horizon that is meant where none is given.
 fn question(bytes: &[u8]) -> Result<AdviseQuestion, Problem> {
-    let Ok(Said { problem }) = decode::json(bytes) else { return Ok(AdviseQuestion::Asset(decode::json(bytes)?)) };
+    let Some(problem) = said(bytes) else { return Ok(AdviseQuestion::Asset(decode::json(bytes)?)) };
     if problem.assets.is_some() {
         return Ok(AdviseQuestion::Assets(decode::json(bytes)?));
     }

@@ -8,9 +8,8 @@ use axum::response::Response;
 
 use super::access::{By, Heavy};
 use super::extract::JsonBody;
-use super::jobs::{accepted, idempotency_key};
+use super::jobs::{Queueing, accepted, idempotency_key};
 use super::problem::Problem;
-use super::wire;
 use crate::control::request::backtest::BacktestRequest;
 use crate::service::Service;
 
@@ -24,13 +23,7 @@ use crate::service::Service;
         "trading_cost": 0.001, "cost_blind": false, "count": 100, "seed": 1
     })),
     params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
-    responses(
-        (status = 202, description = "Queued; poll the Location or follow its events.", body = wire::AcceptedJob, headers(
-            ("Location" = String, description = "The job."),
-            ("Retry-After" = u32, description = "Seconds to wait before asking for the job."))),
-        (status = 400, description = "The body is not JSON.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "The key was used with another body.", body = Problem, content_type = "application/problem+json"),
-        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+    responses(Queueing))]
 pub async fn backtest(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,

@@ -6,14 +6,14 @@ use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
 use serde::Deserialize;
-use serde::de::{DeserializeOwned, IgnoredAny};
+use serde::de::DeserializeOwned;
 
 use super::access::{By, Heavy};
+use super::advise::{SaidOfProblem, said};
 use super::decode;
 use super::extract::JsonBytes;
-use super::jobs::{accepted, idempotency_key};
+use super::jobs::{Queueing, accepted, idempotency_key};
 use super::problem::Problem;
-use super::wire;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::frontier::FrontierRequest;
 use crate::control::request::specification::ProblemSpecification;
@@ -27,13 +27,7 @@ use crate::service::Service;
         "scales": [0.0, 0.25, 1.0], "resamples": 100, "block": 3, "seed": 1
     })),
     params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
-    responses(
-        (status = 202, description = "Queued; poll the Location or follow its events.", body = wire::AcceptedJob, headers(
-            ("Location" = String, description = "The job."),
-            ("Retry-After" = u32, description = "Seconds to wait before asking for the job."))),
-        (status = 400, description = "The body is not JSON.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "The key was used with another body.", body = Problem, content_type = "application/problem+json"),
-        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+    responses(Queueing))]
 pub async fn frontier(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,
@@ -50,18 +44,12 @@ struct Only<P> {
     problem: P,
 }
 
-#[derive(Deserialize)]
-struct Said {
-    assets: Option<IgnoredAny>,
-}
-
 /// The request. Its problem is read by itself first, so that what is wrong in it is told by its own field.
 fn request(bytes: &[u8]) -> Result<FrontierRequest, Problem> {
-    if let Ok(Only { problem: Said { assets } }) = decode::json(bytes) {
-        match assets {
-            Some(_) => reads::<AssetsProblem>(bytes)?,
-            None => reads::<ProblemSpecification>(bytes)?,
-        }
+    match said(bytes) {
+        Some(SaidOfProblem { assets: Some(_), .. }) => reads::<AssetsProblem>(bytes)?,
+        Some(_) => reads::<ProblemSpecification>(bytes)?,
+        None => {}
     }
     decode::json(bytes)
 }

@@ -6,6 +6,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use utoipa::IntoResponses;
 
 use super::access::{By, Heavy, Live, Read};
 use super::extract::{Id, JsonBody, Parameters};
@@ -31,13 +32,7 @@ use crate::service::jobs::Accepted;
         "seed": 1
     })),
     params(("Idempotency-Key" = Option<String>, Header, description = "The same key and body again give the same job.")),
-    responses(
-        (status = 202, description = "Queued; poll the Location or follow its events.", body = wire::AcceptedJob, headers(
-            ("Location" = String, description = "The job."),
-            ("Retry-After" = u32, description = "Seconds to wait before asking for the job."))),
-        (status = 400, description = "The body is not JSON.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "The key was used with another body.", body = Problem, content_type = "application/problem+json"),
-        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+    responses(Queueing))]
 pub async fn train(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,
@@ -45,6 +40,26 @@ pub async fn train(
     JsonBody(specification): JsonBody<Specification>,
 ) -> Result<Response, Problem> {
     Ok(accepted(service.jobs.train(&caller, specification, idempotency_key(&headers)?).await?))
+}
+
+/// What a call that queues a job answers; told here for all of them.
+#[derive(IntoResponses)]
+#[expect(dead_code, reason = "answers are made of their parts: this describes them")]
+pub enum Queueing {
+    /// Queued; poll the Location or follow its events.
+    #[response(status = 202, headers(
+        ("Location" = String, description = "The job."),
+        ("Retry-After" = u32, description = "Seconds to wait before asking for the job.")))]
+    Queued(wire::AcceptedJob),
+    /// The body is not JSON.
+    #[response(status = 400, content_type = "application/problem+json")]
+    NotJson(Problem),
+    /// The key was used with another body.
+    #[response(status = 409, content_type = "application/problem+json")]
+    KeyConflict(Problem),
+    /// A field breaks a rule.
+    #[response(status = 422, content_type = "application/problem+json")]
+    BrokenRule(Problem),
 }
 
 /// The answer to a job that was queued.

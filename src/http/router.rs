@@ -22,7 +22,7 @@ use super::hosts::Hosts;
 use super::problem::{Problem, ProblemKind};
 use super::{
     access, advise, audit, backtests, bounds, dashboard, defaults, described, documentation, evaluations, events,
-    frontiers, jobs, operations, policies, sessions, telemetry, what_if,
+    frontiers, jobs, operations, policies, sessions, telemetry, what_if, wire,
 };
 use crate::service::Service;
 use crate::service::config::Config;
@@ -32,6 +32,8 @@ const BODY_BYTES: usize = 4 << 20;
 
 #[derive(OpenApi)]
 #[openapi(
+    // `jobs::Queueing` refers to it and does not describe it.
+    components(schemas(wire::AcceptedJob)),
     info(title = "Ballast", description = "Nonparametric adaptive robust control of an investor. Every error is a problem document (RFC 9457)."),
     tags(
         (name = "advice", description = "Ask now: nothing is trained, nothing is stored."),

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use serde::Serialize;
 use tokio::sync::watch;
 
 use super::clock::Clock;
@@ -97,9 +98,8 @@ impl Jobs {
         let completed = specification.completed()?;
         self.memory.admits(&estimate::training(&completed, self.threads))?;
         self.memory.keeps(&estimate::advising(&completed))?;
-        let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
         let steps = completed.problem.horizon;
-        Ok((self.queue((tenant, by), JobKind::Train, sent, request_json, steps, key).await?, completed))
+        Ok((self.queue((tenant, by), JobKind::Train, sent, &completed, steps, key).await?, completed))
     }
 
     /// Queues an evaluation, whose policies the caller has looked at. The same key and request again give the same job.
@@ -115,9 +115,8 @@ impl Jobs {
         let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
         let completed = request.completed()?;
         self.memory.admits(&estimate::evaluation(&completed, self.threads))?;
-        let request_json = serde_json::to_string(&completed).map_err(ServiceError::internal)?;
         let (of, steps) = ((&caller.tenant, caller.actor()), completed.step_count());
-        let job = self.queue(of, JobKind::Evaluate, &sent, request_json, steps, key).await?;
+        let job = self.queue(of, JobKind::Evaluate, &sent, &completed, steps, key).await?;
         Ok(Accepted { job, warnings: completed.problem.warnings() })
     }
 
@@ -134,9 +133,8 @@ impl Jobs {
         let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
         let backtest = Backtest::new(request)?;
         self.memory.admits(&estimate::backtest(&backtest, self.threads))?;
-        let request_json = serde_json::to_string(&backtest.request).map_err(ServiceError::internal)?;
         let (of, steps) = ((&caller.tenant, caller.actor()), backtest.trainings());
-        let job = self.queue(of, JobKind::Backtest, &sent, request_json, steps, key).await?;
+        let job = self.queue(of, JobKind::Backtest, &sent, &backtest.request, steps, key).await?;
         Ok(Accepted { job, warnings: backtest.warnings() })
     }
 
@@ -154,17 +152,17 @@ impl Jobs {
         let question = request.question()?;
         self.memory.admits(&estimate::frontier(&question, self.threads))?;
         let of = (&caller.tenant, caller.actor());
-        let request_json = serde_json::to_string(&question.request).map_err(ServiceError::internal)?;
-        let job = self.queue(of, JobKind::Frontier, &sent, request_json, 1, key).await?;
+        let job = self.queue(of, JobKind::Frontier, &sent, &question.request, 1, key).await?;
         Ok(Accepted { job, warnings: question.fund.problem.warnings() })
     }
 
+    /// Queues what was `sent`, as it was completed.
     async fn queue(
         &self,
         (tenant, by): (&Tenant, Actor),
         kind: JobKind,
         sent: &[u8],
-        request_json: String,
+        completed: &impl Serialize,
         steps_total: usize,
         key: Option<String>,
     ) -> Result<Job, ServiceError> {
@@ -173,7 +171,7 @@ impl Jobs {
             job: identity::new_id("job")?,
             tenant: tenant.clone(),
             kind,
-            request_json,
+            request_json: serde_json::to_string(completed).map_err(ServiceError::internal)?,
             request_hash: content_hash(sent),
             idempotency_key: key.clone(),
             steps_total,
@@ -189,7 +187,7 @@ impl Jobs {
         }
     }
 
-    /// The report of a succeeded evaluation or walk-forward, as JSON.
+    /// The report of a succeeded job that makes one, as JSON.
     ///
     /// # Errors
     /// There is no such job, or it has no report (yet).

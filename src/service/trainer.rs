@@ -12,6 +12,8 @@ use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use tokio::runtime::Handle;
 
 use super::clock::Clock;
@@ -300,6 +302,22 @@ async fn keep_lease(
             }
         }
     }
+}
+
+/// What was asked for, as stored.
+fn requested<T: DeserializeOwned>(claimed: &ClaimedJob) -> Result<T, Ended> {
+    let read = serde_json::from_str(&claimed.request_json);
+    read.map_err(|error| failed(format!("the stored request cannot be read: {error}")))
+}
+
+/// How a job ends that made a report.
+fn reported(report: &impl Serialize) -> Result<JobOutcome, Ended> {
+    let report_json = serde_json::to_string(report).map_err(unwritten)?;
+    Ok(JobOutcome::Reported { report_json })
+}
+
+fn unwritten(error: serde_json::Error) -> Ended {
+    failed(format!("the report cannot be written as JSON: {error}"))
 }
 
 fn failed(reason: String) -> Ended {

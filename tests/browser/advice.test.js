@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { browser, call, service } from "./ballast.js";
+import { browser, call, service, trained } from "./ballast.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 
@@ -13,14 +13,11 @@ before(async () => {
   page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
   page.setDefaultTimeout(20_000);
   const radius = { rule: "bridge", alpha: 0.1, scale: 0.2 };
-  const { job } = await call(ballast.url, "/train", {
+  const policy = await trained(ballast.url, {
     problem: { horizon: 4, rate_per_step: 0.002, utility: { kind: "exponential", risk_aversion: 0.01 }, history: HISTORY, radius },
     design: { count: 100 },
   });
-  let now;
-  do now = await call(ballast.url, `/jobs/${job}`);
-  while (now.finished_ms === null);
-  ({ session } = await call(ballast.url, "/sessions", { policy: now.policy }));
+  ({ session } = await call(ballast.url, "/sessions", { policy }));
   await call(ballast.url, "/observe", { session, period: 1, simple_return: 0.004 });
 });
 

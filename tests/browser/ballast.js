@@ -48,6 +48,17 @@ export function browser() {
   });
 }
 
+/** The policy of a training, once it is trained. */
+export async function trained(url, request) {
+  const { job } = await call(url, "/train", request);
+  for (;;) {
+    const { state, policy, error } = await call(url, `/jobs/${job}`);
+    if (policy) return policy;
+    if (state !== "queued" && state !== "running") throw new Error(`${state}: ${error}`);
+    await new Promise((resolve) => setTimeout(resolve, 50));
+  }
+}
+
 /** The service's answer to a request with a JSON body. */
 export async function call(url, path, body) {
   const request = body && {

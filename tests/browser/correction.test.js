@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { browser, call, service } from "./ballast.js";
+import { browser, call, service, trained } from "./ballast.js";
 
 let ballast, chromium, page, session;
 
@@ -10,7 +10,7 @@ before(async () => {
   [ballast, chromium] = await Promise.all([service(), browser()]);
   page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
   page.setDefaultTimeout(20_000);
-  const { job } = await call(ballast.url, "/train", {
+  const policy = await trained(ballast.url, {
     problem: {
       horizon: 4,
       rate_per_step: 0.002,
@@ -19,10 +19,7 @@ before(async () => {
     },
     design: { count: 20 },
   });
-  let now;
-  do now = await call(ballast.url, `/jobs/${job}`);
-  while (now.finished_ms === null);
-  ({ session } = await call(ballast.url, "/sessions", { policy: now.policy }));
+  ({ session } = await call(ballast.url, "/sessions", { policy }));
   for (const [period, simple_return] of [[1, 0.01], [2, -0.03]])
     await call(ballast.url, "/observe", { session, period, simple_return, executed_allocation: 0.5, date: `2008-0${period}-28` });
 });

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { browser, call, service } from "./ballast.js";
+import { browser, call, service, trained } from "./ballast.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 
@@ -36,7 +36,7 @@ test("a policy is trained with what is added and withdrawn as the form says", as
 });
 
 test("a session says what is added at the end of the period, reckons with it, and draws the band", async () => {
-  const { job } = await call(ballast.url, "/train", {
+  const policy = await trained(ballast.url, {
     problem: {
       horizon: 3,
       rate_per_step: 0.002,
@@ -48,12 +48,9 @@ test("a session says what is added at the end of the period, reckons with it, an
     },
     design: { count: 40 },
   });
-  let now;
-  do now = await call(ballast.url, `/jobs/${job}`);
-  while (now.finished_ms === null);
-  await page.goto(`${ballast.url}/#/policies/${now.policy}`);
+  await page.goto(`${ballast.url}/#/policies/${policy}`);
   await page.getByText(/In 1 of the periods money is added, 5\.00 in all, and in 1 withdrawn, 8\.25 in all\./).waitFor();
-  const { session } = await call(ballast.url, "/sessions", { policy: now.policy, holding: 0.2 });
+  const { session } = await call(ballast.url, "/sessions", { policy, holding: 0.2 });
   await page.goto(`${ballast.url}/#/sessions/${session}`);
   await page.getByText("At the end of the period 5.00 is added.").first().waitFor();
   assert.match(await main(), /Band, low end/);

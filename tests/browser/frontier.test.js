@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { browser, call, service } from "./ballast.js";
+import { browser, call, service, trained } from "./ballast.js";
 
 test("a session's page asks, and the report is drawn with its sentences and a table for each law", async () => {
   const [ballast, chromium] = await Promise.all([service(), browser()]);
@@ -11,11 +11,8 @@ test("a session's page asks, and the report is drawn with its sentences and a ta
     page.setDefaultTimeout(60_000);
     const history = Array.from({ length: 24 }, (_, k) => 0.01 + 0.05 * Math.sin(1.7 * k));
     const problem = { horizon: 2, rate_per_step: 0.002, periods_per_year: 12, history };
-    const { job } = await call(ballast.url, "/train", { problem, design: { count: 50 } });
-    let now;
-    do now = await call(ballast.url, `/jobs/${job}`);
-    while (now.finished_ms === null);
-    const { session } = await call(ballast.url, "/sessions", { policy: now.policy });
+    const policy = await trained(ballast.url, { problem, design: { count: 50 } });
+    const { session } = await call(ballast.url, "/sessions", { policy });
     await page.goto(`${ballast.url}/#/sessions/${session}`);
     await page.getByRole("button", { name: "How much caution?" }).click();
     await page.getByText("Who knows this law holds").first().waitFor();

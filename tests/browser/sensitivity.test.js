@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { browser, call, service } from "./ballast.js";
+import { browser, call, service, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
 
 const { sentences } = await dashboardModule("sensitivity.js");
@@ -54,11 +54,8 @@ test("the page asks when the button is pressed, and says it", async () => {
     page.setDefaultTimeout(20_000);
     const history = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
     const problem = { horizon: 2, rate_per_step: 0.002, history, radius: { rule: "bridge", alpha: 0.1, scale: 0.2 } };
-    const { job } = await call(ballast.url, "/train", { problem, design: { count: 50 } });
-    let now;
-    do now = await call(ballast.url, `/jobs/${job}`);
-    while (now.finished_ms === null);
-    const { session } = await call(ballast.url, "/sessions", { policy: now.policy });
+    const policy = await trained(ballast.url, { problem, design: { count: 50 } });
+    const { session } = await call(ballast.url, "/sessions", { policy });
     await page.goto(`${ballast.url}/#/sessions/${session}`);
     await page.getByRole("button", { name: "Ask how near" }).click();
     await page.getByText(/The record has paid/).waitFor();

@@ -12,7 +12,35 @@ use crate::control::request::specification::ProblemSpecification;
 use crate::numerics::fund_bridges::FundBridges;
 
 /// Paths of the joint factor: its standard error is then a hundredth of it.
-pub const FACTOR_PATHS: usize = 1000;
+const FACTOR_PATHS: usize = 1000;
+
+/// Of the radius of all funds at once over that of one; 1 where there is one, and under rules that look at the sample size alone.
+pub fn radius_factor(problem: &AssetsProblem, fund: &ProblemSpecification, seed: u64) -> f64 {
+    match fund.radius_rule() {
+        RadiusRule::Bridge { alpha, .. } if problem.assets.len() > 1 => {
+            FundBridges::simulate(&problem.history, FACTOR_PATHS, seed).joint_factor(alpha).value
+        }
+        _ => 1.0,
+    }
+}
+
+/// The utility of the investor, relative to what the bank makes of his wealth.
+pub fn utility(fund: &ProblemSpecification) -> RelativeUtility {
+    RelativeUtility::new(fund.utility, fund.initial_wealth * (1.0 + fund.rate_per_step))
+}
+
+/// The step of `problem`, whose fund has the completed problem `fund`, had `rows` been seen, in a ball of this radius.
+pub fn step(problem: &AssetsProblem, fund: &ProblemSpecification, rows: &[Vec<f64>], radius: f64) -> AssetsStep {
+    let floor = problem.support.map_or(f64::NEG_INFINITY, |support| support.min);
+    let [lowest, highest] = fund.action_interval;
+    AssetsStep::new(
+        AssetsLaw { returns: rows, radius, floor },
+        problem.ground_norm.at(rows),
+        utility(fund),
+        fund.rate_per_step,
+        ActionInterval { lowest, highest },
+    )
+}
 
 impl AssetsAdvice {
     /// The step of `problem`, whose fund of inverse volatilities has the completed problem `fund` and the radius `of_fund`, with the
@@ -21,24 +49,10 @@ impl AssetsAdvice {
     /// Checked by: `tests/advise.rs::several_assets_are_advised_by_name_as_solved_directly`.
     pub fn of(problem: &AssetsProblem, fund: &ProblemSpecification, of_fund: f64, seed: u64) -> Self {
         let rows = &problem.history;
-        let radius_factor = match fund.radius_rule() {
-            RadiusRule::Bridge { alpha, .. } => {
-                FundBridges::simulate(rows, FACTOR_PATHS, seed).joint_factor(alpha).value
-            }
-            _ => 1.0,
-        };
+        let radius_factor = radius_factor(problem, fund, seed);
         let radius = radius_factor * of_fund;
         let floor = fund.initial_wealth * (1.0 + fund.rate_per_step);
-        let lowest = problem.support.map_or(f64::NEG_INFINITY, |support| support.min);
-        let [lowest_total, highest_total] = fund.action_interval;
-        let step = AssetsStep::new(
-            AssetsLaw { returns: rows, radius, floor: lowest },
-            problem.ground(),
-            RelativeUtility::new(fund.utility, floor),
-            fund.rate_per_step,
-            ActionInterval { lowest: lowest_total, highest: highest_total },
-        );
-        let solution = step.solve(None);
+        let solution = step(problem, fund, rows, radius).solve(None);
         let named = |shares: &[f64]| problem.assets.iter().cloned().zip(shares.iter().copied()).collect();
         let composition = CompositionRule::OneStep.composition(rows, || solution.clone());
         let worst = problem.assets.iter().zip(&solution.mean_moves).enumerate().map(|(asset, (name, moved))| {

@@ -67,6 +67,16 @@ pub enum GroundNorm {
     Sup,
 }
 
+impl GroundNorm {
+    /// The ground cost at a history.
+    pub fn at(self, rows: &[Vec<f64>]) -> Ground {
+        match self {
+            GroundNorm::ScaledOne => Ground::Weighted(inverse_volatility(rows)),
+            GroundNorm::Sup => Ground::Sup,
+        }
+    }
+}
+
 /// The lowest log-return of any asset.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -97,14 +107,6 @@ impl AssetsProblem {
             )
         };
         Specification::of(problem, seed).completed()
-    }
-
-    /// The ground cost at this history.
-    pub fn ground(&self) -> Ground {
-        match self.ground_norm {
-            GroundNorm::ScaledOne => Ground::Weighted(inverse_volatility(&self.history)),
-            GroundNorm::Sup => Ground::Sup,
-        }
     }
 
     fn check_names(&self) -> Result<(), FieldError> {

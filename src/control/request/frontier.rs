@@ -44,11 +44,13 @@ pub struct FrontierRequest {
     pub seed: u64,
 }
 
-fn default_scales() -> Vec<f64> {
+/// Those tried unless others are given.
+pub fn default_scales() -> Vec<f64> {
     vec![0.0, 0.1, 0.25, 0.5, 1.0]
 }
 
-fn default_resamples() -> usize {
+/// Those drawn unless another number is given.
+pub fn default_resamples() -> usize {
     400
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
-use super::{Ended, Worker, failed};
+use super::{Ended, Worker, failed, reported, requested};
 use crate::control::estimate;
 use crate::control::evaluation::backtest::Backtest;
 use crate::control::evaluation::backtest_report::BacktestReport;
@@ -15,15 +15,10 @@ use crate::store::{ClaimedJob, JobOutcome};
 
 impl Worker {
     pub(super) fn backtest(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<JobOutcome, Ended> {
-        let request = serde_json::from_str(&claimed.request_json)
-            .map_err(|error| failed(format!("the stored request cannot be read: {error}")))?;
-        let backtest = Backtest::new(request).map_err(|error| failed(error.to_string()))?;
+        let backtest = Backtest::new(requested(claimed)?).map_err(|error| failed(error.to_string()))?;
         let _reserved = self.reserve(&estimate::backtest(&backtest, self.threads))?;
         let decisions = self.decided(claimed, &backtest, stop)?;
-        let report = BacktestReport::new(&backtest.walked(decisions));
-        let report_json = serde_json::to_string(&report)
-            .map_err(|error| failed(format!("the report cannot be written as JSON: {error}")))?;
-        Ok(JobOutcome::Reported { report_json })
+        reported(&BacktestReport::new(&backtest.walked(decisions)))
     }
 
     /// What each strategy decided in every period. The trainings of a stretch run side by side: policy `index` of them is

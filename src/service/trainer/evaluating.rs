@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use super::{Ended, Worker, failed};
+use super::{Ended, Worker, failed, reported, requested, unwritten};
 use crate::control::estimate;
 use crate::control::evaluation::paths::{Evaluation, Follower};
 use crate::control::evaluation::report::{Costs, EvaluationReport};
@@ -16,9 +16,7 @@ use crate::store::{ClaimedJob, JobOutcome};
 
 impl Worker {
     pub(super) fn evaluate(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<JobOutcome, Ended> {
-        let request = serde_json::from_str(&claimed.request_json)
-            .map_err(|error| failed(format!("the stored request cannot be read: {error}")))?;
-        let evaluation = Evaluation::new(request).map_err(|error| failed(error.to_string()))?;
+        let evaluation = Evaluation::new(requested(claimed)?).map_err(|error| failed(error.to_string()))?;
         let _reserved = self.reserve(&estimate::evaluation(&evaluation.request, self.threads))?;
         let kept = Kept::new(estimate::kept_by_evaluation(&evaluation.request));
         let evaluation = evaluation.keeping(kept.clone());
@@ -70,9 +68,6 @@ impl Worker {
         let watch = Watch { stop, progress: &|progress| self.board.advance(&claimed.row.job, progress) };
         let outcomes = evaluation.simulate(followers, &watch, &seconds)?;
         let costs = Costs::new(training_seconds, seconds(), &outcomes);
-        let report = EvaluationReport::new(evaluation, followers, &outcomes, costs);
-        let written = report.and_then(|report| serde_json::to_string(&report));
-        let report_json = written.map_err(|error| failed(format!("the report cannot be written as JSON: {error}")))?;
-        Ok(JobOutcome::Reported { report_json })
+        reported(&EvaluationReport::new(evaluation, followers, &outcomes, costs).map_err(unwritten)?)
     }
 }

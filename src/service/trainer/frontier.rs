@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::{Ended, Worker, failed};
+use super::{Ended, Worker, failed, reported, requested};
 use crate::control::estimate;
 use crate::control::evaluation::frontier::Frontier;
 use crate::control::kept::Kept;
@@ -12,16 +12,12 @@ use crate::store::{ClaimedJob, JobOutcome};
 
 impl Worker {
     pub(super) fn frontier(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<JobOutcome, Ended> {
-        let request: FrontierRequest = serde_json::from_str(&claimed.request_json)
-            .map_err(|error| failed(format!("the stored request cannot be read: {error}")))?;
-        let question = request.question().map_err(|error| failed(error.to_string()))?;
+        let question = requested::<FrontierRequest>(claimed)?.question().map_err(|error| failed(error.to_string()))?;
         let _reserved = self.reserve(&estimate::frontier(&question, self.threads))?;
         let kept = Kept::new(estimate::kept_by_frontier(&question));
         let frontier = Frontier::new(question, kept);
         let watch = Watch { stop, progress: &|progress| self.board.advance(&claimed.row.job, progress) };
         let report = self.pool.install(|| frontier.run(&watch))?;
-        let report_json = serde_json::to_string(&report)
-            .map_err(|error| failed(format!("the report cannot be written as JSON: {error}")))?;
-        Ok(JobOutcome::Reported { report_json })
+        reported(&report)
     }
 }

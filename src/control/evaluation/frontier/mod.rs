@@ -24,19 +24,16 @@ use rayon::prelude::*;
 
 use self::laws::RecordLaw;
 use self::report::{Bootstrap, FORMAT, FrontierPoint, FrontierReport, Resampled};
-use crate::control::assets::advising::FACTOR_PATHS;
-use crate::control::assets::{AssetsLaw, AssetsStep};
+use crate::control::assets::{AssetsStep, advising};
 use crate::control::error::TrainError;
 use crate::control::kept::Kept;
-use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::progress::{Phase, StepProgress, Watch};
-use crate::control::request::assets::GroundNorm;
 use crate::control::request::frontier::FrontierQuestion;
 use crate::control::uncertainty::radius::RadiusEstimator;
 use crate::numerics::empirical::EmpiricalDistribution;
-use crate::numerics::fund_bridges::{FundBridges, fund_returns};
-use crate::numerics::levelling::{Ground, inverse_volatility};
+use crate::numerics::fund_bridges::fund_returns;
+use crate::numerics::levelling::inverse_volatility;
 use crate::numerics::summary::Clustered;
 
 /// Of all intervals.
@@ -69,13 +66,8 @@ impl Frontier {
     /// With what can be made again in `kept`.
     pub fn new(question: FrontierQuestion, kept: Kept) -> Self {
         let fund = &question.fund.problem;
-        let alpha =
-            fund.radius_rule().alpha().filter(|_| fund.radius_rule().paths() > 0 && question.assets.assets.len() > 1);
-        let rows = &question.assets.history;
-        let factor = alpha.map_or(1.0, |alpha| {
-            FundBridges::simulate(rows, FACTOR_PATHS, question.request.seed).joint_factor(alpha).value
-        });
-        let utility = RelativeUtility::new(fund.utility, fund.initial_wealth * (1.0 + fund.rate_per_step));
+        let factor = advising::radius_factor(&question.assets, fund, question.request.seed);
+        let utility = advising::utility(fund);
         Frontier { radii: RadiusEstimator::new(&question.fund, kept), factor, utility, question }
     }
 
@@ -176,14 +168,7 @@ impl Frontier {
     }
 
     fn step(&self, rows: &[Vec<f64>], radius: f64) -> AssetsStep {
-        let (assets, fund) = (&self.question.assets, &self.question.fund.problem);
-        let ground = match assets.ground_norm {
-            GroundNorm::ScaledOne => Ground::Weighted(inverse_volatility(rows)),
-            GroundNorm::Sup => Ground::Sup,
-        };
-        let [lowest, highest] = fund.action_interval;
-        let law = AssetsLaw { returns: rows, radius, floor: self.question.support.0 };
-        AssetsStep::new(law, ground, self.utility, fund.rate_per_step, ActionInterval { lowest, highest })
+        advising::step(&self.question.assets, &self.question.fund.problem, rows, radius)
     }
 
     /// Log certainty equivalent over the bank of an allocation under a law.
@@ -201,7 +186,9 @@ impl Frontier {
         BASIS_POINTS * self.question.assets.periods_per_year.unwrap_or(1.0)
     }
 
-    /// Standard errors that the mean simple return of the record, in the fund of inverse volatilities, lies above the bank's.
+    /// Standard errors that the mean simple return of the record, in the fund of inverse volatilities, lies above the bank's:
+    /// `(mean - r) sqrt(n) / s`, s the sample deviation.
+    /// Checked by: `tests/frontier.rs::at_the_record_itself_it_advises_as_advise_does`.
     fn evidence(&self) -> f64 {
         let rows = &self.question.assets.history;
         let returns: Vec<f64> =
