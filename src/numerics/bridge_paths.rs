@@ -12,14 +12,17 @@ use super::streams::stream;
 
 /// Simulated `|B(t)|` over the length of the path, at ascending times: common random numbers for laws.
 ///
-/// Stored time by time (all paths of the first, then of the second, ...), because a statistic adds time after time. Single
-/// precision: a statistic reads them as fast as memory gives them, its rounding of 6e-8 is far below what 2000 paths tell,
-/// and what is kept for all policies is half as large.
+/// Whole numbers of 16 bits: a statistic reads them as fast as memory gives them, and is off by some 1e-6 of itself, another way in
+/// every path, which is far below what 2000 paths tell.
 #[derive(Debug, Clone)]
 pub struct AbsoluteBridges {
     pub(super) times: Times,
     pub(super) paths: usize,
-    pub(super) values: Vec<f32>,
+    /// In the unit of their time: block after block of paths, of which each is stored time by time, because a statistic adds time
+    /// after time. Paths that the last block lacks are 0.
+    pub(super) values: Vec<[u16; PATHS]>,
+    /// Of each time.
+    pub(super) units: Vec<f64>,
     /// The law of the lengths that the paths are divided by.
     pub(super) lengths: ScaleMixture,
 }
@@ -39,6 +42,12 @@ pub const GRADED_FROM: usize = 1025;
 const GRADED_CELLS: usize = 512;
 /// Halvings of the first and of the last cell: the tails of a large sample lie there.
 const HALVINGS: u32 = 14;
+
+/// Paths that are added up together: their sums stay in the first-level cache.
+pub(super) const PATHS: usize = 256;
+
+/// Deviations of `|B|` that 16 bits tell apart from none; one value in 500 million is larger, and counts as that.
+const LARGEST: f64 = 6.0;
 
 /// Cells of the dyadic grid that carries the paths, at least.
 const LEAST_CELLS: usize = 1024;
@@ -92,11 +101,11 @@ impl AbsoluteBridges {
     /// "bridge in cells", n, p), and the length, of which neighbouring sizes share most but not all, is theirs.
     /// Cost O(n paths) and a few thousand normals a path.
     pub fn simulate(sample_size: usize, paths: usize, seed: u64) -> Self {
-        AbsoluteBridges::simulated(sample_size, paths, seed, length)
+        AbsoluteBridges::simulated(sample_size, paths, seed, Divisor::Length)
     }
 
-    /// [`Self::simulate`], with every path divided by its `unit`.
-    fn simulated(sample_size: usize, paths: usize, seed: u64, unit: Unit) -> Self {
+    /// [`Self::simulate`], with every path over its divisor.
+    fn simulated(sample_size: usize, paths: usize, seed: u64, divisor: Divisor) -> Self {
         let nodes = sample_size.saturating_sub(1);
         let cells = LEAST_CELLS.max(4 * sample_size).next_power_of_two();
         let places: Vec<Place> = (1..=nodes).map(|node| Place::of(node, sample_size, cells)).collect();
@@ -107,18 +116,18 @@ impl AbsoluteBridges {
             let mut between = stream(seed, "bridge in cells", sample_size, index);
             path.iter_mut().zip(&places).for_each(|(value, place)| *value = place.value(&bridge, &mut between));
         };
-        AbsoluteBridges::gather(&times, Times::Sample(sample_size), paths, unit, path)
+        AbsoluteBridges::gather(&times, Times::Sample(sample_size), paths, divisor, path)
     }
 
     /// The same paths at times that serve every sample size from about [`GRADED_FROM`] on: 512 equal cells, of which the
     /// first and the last are halved 14 times towards the ends. Between two times `|B|` is interpolated and scaled to its
     /// exact mean; the product of two values within a cell is off by less than the cell.
     pub fn graded(paths: usize, seed: u64) -> Self {
-        AbsoluteBridges::simulated_graded(paths, seed, length)
+        AbsoluteBridges::simulated_graded(paths, seed, Divisor::Length)
     }
 
-    /// [`Self::graded`], with every path divided by its `unit`.
-    fn simulated_graded(paths: usize, seed: u64, unit: Unit) -> Self {
+    /// [`Self::graded`], with every path over its divisor.
+    fn simulated_graded(paths: usize, seed: u64, divisor: Divisor) -> Self {
         let cell = 1.0 / GRADED_CELLS as f64;
         let halved = |power: u32| cell * 0.5_f64.powi(power as i32);
         let ends = (1..=HALVINGS).rev().map(halved);
@@ -140,32 +149,61 @@ impl AbsoluteBridges {
                 (path[distance], path[last - distance]) = (low, high);
             }
         };
-        AbsoluteBridges::gather(&times, Times::Graded(times.clone()), paths, unit, path)
+        AbsoluteBridges::gather(&times, Times::Graded(times.clone()), paths, divisor, path)
     }
 
     /// Bytes that the paths of laws of `sample_size` values take.
     pub fn bytes_of(sample_size: usize, paths: usize) -> usize {
         let times = if sample_size < GRADED_FROM { sample_size } else { GRADED_CELLS + 2 * HALVINGS as usize };
-        size_of::<f32>().saturating_mul(times).saturating_mul(paths)
+        size_of::<u16>().saturating_mul(times).saturating_mul(paths.saturating_add(PATHS - 1) / PATHS * PATHS)
     }
 
-    /// All paths, each written by `draw` given its index, over their `unit`.
-    fn gather(at: &[f64], times: Times, paths: usize, unit: Unit, mut draw: impl FnMut(usize, &mut [f64])) -> Self {
-        let mut values = vec![0.0; at.len() * paths];
+    /// The values of each block of paths, time by time.
+    pub(super) fn blocks(&self) -> impl Iterator<Item = &[[u16; PATHS]]> {
+        self.values.chunks(self.units.len().max(1))
+    }
+
+    /// All paths, each written by `draw` given its index, over their divisors.
+    fn gather(
+        at: &[f64],
+        times: Times,
+        paths: usize,
+        divisor: Divisor,
+        mut draw: impl FnMut(usize, &mut [f64]),
+    ) -> Self {
+        let largest = match divisor {
+            Divisor::One => LARGEST,
+            // A value is no larger than its deviation times the length.
+            Divisor::Length => (LARGEST / (at.len() as f64).sqrt()).min(1.0),
+        };
+        let unit = |time: &f64| largest * (time * (1.0 - time)).sqrt() / f64::from(u16::MAX);
+        let units: Vec<f64> = at.iter().map(unit).collect();
+        let mut values = vec![[0; PATHS]; at.len() * paths.div_ceil(PATHS)];
         let mut path = vec![0.0; at.len()];
         for index in 0..paths {
             draw(index, &mut path);
-            let unit = unit(at, &path);
-            for (time, value) in path.iter().enumerate() {
-                values[time * paths + index] = (value.abs() / unit) as f32;
+            let divisor = match divisor {
+                Divisor::One => 1.0,
+                Divisor::Length => length(at, &path),
+            };
+            let block = &mut values[index / PATHS * at.len()..][..at.len()];
+            for (paths, (value, unit)) in block.iter_mut().zip(path.iter().zip(&units)) {
+                paths[index % PATHS] = (value.abs() / (divisor * unit)).round() as u16;
             }
         }
-        AbsoluteBridges { times, paths, values, lengths: ScaleMixture::chi(at.len().max(1)) }
+        AbsoluteBridges { times, paths, values, units, lengths: ScaleMixture::chi(at.len().max(1)) }
     }
 }
 
-/// What a path, at these times, is divided by.
-type Unit = fn(&[f64], &[f64]) -> f64;
+/// What a path is divided by.
+#[derive(Clone, Copy)]
+enum Divisor {
+    /// Its length, which leaves the direction.
+    Length,
+    /// Nothing: the statistic of whole paths is H itself, the plain form that directions are checked against.
+    #[cfg_attr(not(test), expect(dead_code))]
+    One,
+}
 
 /// `sqrt(sum (dB)^2 / dt)` over the intervals between 0, `times` and 1, of a path that is 0 at both ends.
 fn length(times: &[f64], path: &[f64]) -> f64 {
@@ -177,15 +215,20 @@ fn length(times: &[f64], path: &[f64]) -> f64 {
     sum.sqrt()
 }
 
-/// Whole paths, whose statistic is H itself: the plain form that directions are checked against.
 #[cfg(test)]
 impl AbsoluteBridges {
     pub(super) fn whole(sample_size: usize, paths: usize, seed: u64) -> Self {
-        AbsoluteBridges::simulated(sample_size, paths, seed, |_, _| 1.0)
+        AbsoluteBridges::simulated(sample_size, paths, seed, Divisor::One)
     }
 
     pub(super) fn whole_graded(paths: usize, seed: u64) -> Self {
-        AbsoluteBridges::simulated_graded(paths, seed, |_, _| 1.0)
+        AbsoluteBridges::simulated_graded(paths, seed, Divisor::One)
+    }
+
+    /// `|B|` at a time, path by path.
+    pub(super) fn at(&self, time: usize) -> impl Iterator<Item = f64> {
+        let of_block = move |block: &[[u16; PATHS]]| block[time].map(|value| f64::from(value) * self.units[time]);
+        self.blocks().flat_map(of_block).take(self.paths)
     }
 }
 
@@ -228,22 +271,21 @@ mod tests {
             assert!((mean - freedom).abs() < allowed, "{freedom}: {mean}");
         };
         let middle = |whole: &AbsoluteBridges, unit: &AbsoluteBridges, node: usize| -> Vec<f64> {
-            let range = node * 2000..(node + 1) * 2000;
-            let ratios = whole.values[range.clone()].iter().zip(&unit.values[range]);
-            ratios.map(|(value, direction)| f64::from(value / direction).powi(2)).collect()
+            // Where the direction is small its last bit counts; the length is independent of it.
+            let told = |(_, direction): &(f64, f64)| *direction > 1000.0 * unit.units[node];
+            let ratios = whole.at(node).zip(unit.at(node)).filter(told);
+            ratios.map(|(value, direction)| (value / direction).powi(2)).collect()
         };
         let (directions, paths) = (AbsoluteBridges::simulate(10, 2000, 7), AbsoluteBridges::whole(10, 2000, 7));
         chi_square(&middle(&paths, &directions, 4), 9.0);
         let (directions, paths) = (AbsoluteBridges::graded(2000, 7), AbsoluteBridges::whole_graded(2000, 7));
-        chi_square(&middle(&paths, &directions, 270), (directions.values.len() / 2000) as f64);
+        chi_square(&middle(&paths, &directions, 270), directions.units.len() as f64);
     }
 
     #[test]
     fn a_path_is_the_same_at_every_sample_size() {
         let (few, many) = (AbsoluteBridges::whole(4, 50, 3), AbsoluteBridges::whole(2048, 50, 3));
-        for path in 0..50 {
-            // Node 2 of 4 and node 1024 of 2048 are both the middle.
-            assert_eq!(few.values[50 + path], many.values[1023 * 50 + path]);
-        }
+        // Node 2 of 4 and node 1024 of 2048 are both the middle.
+        assert!(few.at(1).eq(many.at(1023)));
     }
 }

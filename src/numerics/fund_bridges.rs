@@ -80,7 +80,7 @@ impl<'a> FundBridges<'a> {
 
     /// The (1 - alpha)-quantile of a fund's H, with the standard error of its simulation.
     pub fn quantile(&self, fund: &[f64], alpha: f64) -> Quantile {
-        let (value, standard_error) = self.lengths.quantile_with_error(1.0 - alpha, &mut self.statistic(fund));
+        let (value, standard_error) = self.lengths.quantile_with_error(1.0 - alpha, &self.statistic(fund));
         Quantile { value, standard_error }
     }
 
@@ -144,7 +144,7 @@ impl<'b, 'a> Largest<'b, 'a> {
     /// A fund whose return does not vary is never the largest.
     fn admit(&mut self, fund: &[f64], alpha: f64) {
         let statistic = self.bridges.statistic(fund);
-        let quantile = self.bridges.lengths.quantile(1.0 - alpha, &mut statistic.clone());
+        let quantile = self.bridges.lengths.quantile(1.0 - alpha, &statistic);
         for ((ratio, whose), value) in self.ratios.iter_mut().zip(&mut self.whose).zip(statistic) {
             if value > *ratio * quantile {
                 (*ratio, *whose) = (value / quantile, self.funds.len());
@@ -154,7 +154,7 @@ impl<'b, 'a> Largest<'b, 'a> {
     }
 
     fn factor(&self, alpha: f64) -> Quantile {
-        let (value, standard_error) = self.bridges.lengths.quantile_with_error(1.0 - alpha, &mut self.ratios.clone());
+        let (value, standard_error) = self.bridges.lengths.quantile_with_error(1.0 - alpha, &self.ratios);
         Quantile { value, standard_error }
     }
 

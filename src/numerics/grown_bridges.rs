@@ -8,19 +8,20 @@
 //! the base has.
 
 use super::bridge::Statistic;
-use super::bridge_paths::{AbsoluteBridges, Times};
+use super::bridge_paths::{self, AbsoluteBridges, Times};
 use super::dispatch::dispatched;
 use super::empirical::EmpiricalDistribution;
 
 /// Paths whose tables stay in the second-level cache: with 12 tables of 240 values, 0.7 MB.
-const PATHS: usize = 32;
+const PATHS: usize = 64;
 /// Larger ones do not.
 const MOST_BYTES: usize = 4 << 20;
 /// Tables pay where there are this many laws for each of them.
 const LAWS_A_TABLE: usize = 4;
 
-/// A number for each path of a block.
-type Block = [f64; PATHS];
+/// A number for each path of a block. Single precision: a sum along the base is off by some 1e-6 of itself, another way in every
+/// path.
+type Block = [f32; PATHS];
 
 /// A value learned, and how many values of the base are at or below it.
 type Learned = (f64, usize);
@@ -42,7 +43,7 @@ pub fn table_bytes(base: usize, learned: usize) -> usize {
 }
 
 impl AbsoluteBridges {
-    /// The statistic over the direction of every path, law by law, to rounding; `base` ascending. `None` where some law does
+    /// The statistic over the direction of every path, law by law, to single precision; `base` ascending. `None` where some law does
     /// not have the values of the base, where weights decay, or where the laws are too few for tables to pay.
     /// Cost O((learned + 1) (base + laws) paths).
     ///
@@ -66,30 +67,27 @@ impl AbsoluteBridges {
         let mut tables =
             Tables { falls: vec![[0.0; PATHS]; size], sums: vec![[0.0; PATHS]; (learned + 1) * stride], stride };
         let mut statistics = vec![vec![0.0; self.paths]; laws.len()];
-        for start in (0..self.paths).step_by(PATHS) {
+        for first in (0..self.paths).step_by(PATHS) {
             dispatched!({
-                tables.fill(self, start, which, base);
+                tables.fill(self, first, which, base);
                 for (learned, statistic) in beyond.iter().zip(&mut statistics) {
-                    let block = &mut statistic[start..self.paths.min(start + PATHS)];
-                    block.copy_from_slice(&tables.law(learned)[..block.len()]);
+                    let block = &mut statistic[first..self.paths.min(first + PATHS)];
+                    block.iter_mut().zip(tables.law(learned)).for_each(|(wide, value)| *wide = f64::from(value));
                 }
             });
         }
         Some(statistics)
     }
 
-    /// `|B|` at a time, from 1, over the paths from `start` on; at 0, and at 1 after the last, a bridge is 0.
+    /// `|B|` at a time, from 1, over some paths from `first` on; at 0, and at 1 after the last, a bridge is 0.
     #[inline(always)]
-    fn block(&self, time: usize, start: usize) -> Block {
+    fn some(&self, time: usize, first: usize) -> Block {
         let mut block = [0.0; PATHS];
-        if time >= 1 && time * self.paths <= self.values.len() {
-            let values = &self.values[(time - 1) * self.paths..time * self.paths][start..];
-            if let Some(whole) = values.first_chunk::<PATHS>() {
-                for path in 0..PATHS {
-                    block[path] = f64::from(whole[path]);
-                }
-            } else {
-                block.iter_mut().zip(values).for_each(|(wide, value)| *wide = f64::from(*value));
+        if let Some(&unit) = time.checked_sub(1).and_then(|time| self.units.get(time)) {
+            let values = &self.values[first / bridge_paths::PATHS * self.units.len() + time - 1];
+            let values = &values[first % bridge_paths::PATHS..][..PATHS];
+            for path in 0..PATHS {
+                block[path] = unit as f32 * f32::from(values[path]);
             }
         }
         block
@@ -97,17 +95,17 @@ impl AbsoluteBridges {
 }
 
 impl Tables {
-    /// For the paths from `start` on. Of [`Statistic::OneLater`], `|B|` is the mean of what it is over the laws that learn one
+    /// For the paths from `first` on. Of [`Statistic::OneLater`], `|B|` is the mean of what it is over the laws that learn one
     /// of the values again.
     #[inline(always)]
-    fn fill(&mut self, bridges: &AbsoluteBridges, start: usize, which: Statistic, base: &[f64]) {
-        let size = self.falls.len() as f64;
-        let (mut before, mut node) = ([0.0; PATHS], bridges.block(1, start));
+    fn fill(&mut self, bridges: &AbsoluteBridges, first: usize, which: Statistic, base: &[f64]) {
+        let size = self.falls.len() as f32;
+        let (mut before, mut node) = ([0.0; PATHS], bridges.some(1, first));
         for (index, fall) in self.falls.iter_mut().enumerate() {
-            let next = bridges.block(index + 2, start);
+            let next = bridges.some(index + 2, first);
             let share = match which {
                 Statistic::Now => 0.0,
-                Statistic::OneLater => (index + 1) as f64 / size,
+                Statistic::OneLater => (index + 1) as f32 / size,
             };
             for path in 0..PATHS {
                 let here = (1.0 - share) * node[path] + share * next[path];
@@ -119,8 +117,9 @@ impl Tables {
         for (smaller, sums) in self.sums.chunks_exact_mut(self.stride).enumerate() {
             let mut sum = [0.0; PATHS];
             for (to, (value, fall)) in sums[1..].iter_mut().zip(base.iter().zip(&self.falls[smaller..])) {
+                let value = *value as f32;
                 for path in 0..PATHS {
-                    sum[path] += value * fall[path];
+                    sum[path] = value.mul_add(fall[path], sum[path]);
                 }
                 *to = sum;
             }
@@ -134,8 +133,9 @@ impl Tables {
         for (smaller, &(value, below)) in learned.iter().enumerate() {
             let sums = &self.sums[smaller * self.stride..][..self.stride];
             let (low, high, fall) = (&sums[from], &sums[below], &self.falls[below + smaller]);
+            let value = value as f32;
             for path in 0..PATHS {
-                sum[path] += high[path] - low[path] + value * fall[path];
+                sum[path] += value.mul_add(fall[path], high[path] - low[path]);
             }
             from = below;
         }

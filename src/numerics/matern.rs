@@ -125,23 +125,12 @@ pub(super) fn squared_distances(columns: &[f64], stride: usize, first: usize, ce
         let at = first + count - tail.len();
         tail.fill(0.0);
         for (column, &centre) in columns.chunks_exact(stride).zip(centre) {
-            add_squares(&column[at..at + tail.len()], centre, tail, false);
+            for (out, &x) in tail.iter_mut().zip(&column[at..]) {
+                let difference = x - centre;
+                *out = difference.mul_add(difference, *out);
+            }
         }
     });
-}
-
-#[inline(always)]
-fn add_squares(column: &[f64], centre: f64, out: &mut [f64], overwrite: bool) {
-    if overwrite {
-        for (out, &x) in out.iter_mut().zip(column) {
-            *out = (x - centre) * (x - centre);
-        }
-    } else {
-        for (out, &x) in out.iter_mut().zip(column) {
-            let difference = x - centre;
-            *out = difference.mul_add(difference, *out);
-        }
-    }
 }
 
 /// One column of the contraction of a symmetric weight matrix with the derivatives of the kernel matrix.
@@ -164,12 +153,15 @@ pub fn weighted_squares(column: &[f64], centre: f64, weights: &[f64]) -> f64 {
     assert_eq!(column.len(), weights.len());
     dispatched!({
         let mut lanes = [0.0; LANES];
-        let mut staged = [0.0; BLOCK];
-        for (column, weights) in column.chunks(BLOCK).zip(weights.chunks(BLOCK)) {
-            let staged = &mut staged[..column.len()];
-            add_squares(column, centre, staged, true);
-            accumulate(&mut lanes, staged, weights);
+        let (columns, weights) = (column.chunks_exact(LANES), weights.chunks_exact(LANES));
+        let tail = columns.remainder().iter().zip(weights.remainder());
+        let add = |lane: &mut f64, x: f64, weight: f64| *lane = ((x - centre) * (x - centre)).mul_add(weight, *lane);
+        for (column, weights) in columns.zip(weights) {
+            for lane in 0..LANES {
+                add(&mut lanes[lane], column[lane], weights[lane]);
+            }
         }
+        lanes.iter_mut().zip(tail).for_each(|(lane, (x, weight))| add(lane, *x, *weight));
         total(&lanes)
     })
 }

@@ -20,6 +20,8 @@ const COEFFICIENTS: usize = 18;
 const HALF_WIDTH: f64 = 3.0;
 /// Shares staged on the stack between the two passes of a sum.
 const BLOCK: usize = 256;
+/// Quantiles so far from where a search starts, as a share, are searched among the same draws.
+const REACH: f64 = 0.06;
 /// What a search may leave in ln q. After a step that is the step times the relative error of its slope, and a slope
 /// measured over the step before is off by about the length of that.
 const TOLERANCE: f64 = 1e-7;
@@ -47,6 +49,7 @@ pub struct ScaleMixture {
 #[derive(Debug, Clone, Default)]
 pub struct LastQuantile {
     found: Option<Found>,
+    among: Undecided,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -57,6 +60,26 @@ struct Found {
     ratio: f64,
     rate: f64,
     slope: f64,
+}
+
+/// The draws whose shares depend on where the quantile lies in a range. The polynomial stands still outside its interval, and
+/// where a chi law has many degrees of freedom, that decides most draws.
+#[derive(Debug, Clone, Default)]
+struct Undecided {
+    /// The range, as quantiles.
+    low: f64,
+    high: f64,
+    /// Of the draws, in the first places; what lies behind is of searches before.
+    reciprocals: Vec<f64>,
+    count: usize,
+    /// Draws of which F is at the lower and at the upper end of its interval.
+    ends: [f64; 2],
+}
+
+impl Undecided {
+    fn reciprocals(&self) -> &[f64] {
+        &self.reciprocals[..self.count]
+    }
 }
 
 /// Where a search starts: a quantile, the slope of the share in ln q there, and the relative error of that slope.
@@ -77,36 +100,34 @@ impl ScaleMixture {
     }
 
     /// The `share`-quantile of R h from draws of h, none negative; `share` in [0.001, 0.999], where the polynomial
-    /// stands for F. Cost O(draws), which are overwritten, here and below.
-    pub fn quantile(&self, share: f64, draws: &mut [f64]) -> f64 {
+    /// stands for F. Cost O(draws), here and below.
+    pub fn quantile(&self, share: f64, draws: &[f64]) -> f64 {
         self.quantile_within(TOLERANCE, share, draws, 0.0, &mut LastQuantile::default())
     }
 
     /// The same, to 5e-6 of itself, for one of many sets of draws that are alike: where they change along a line, `at` is where
     /// on it they lie, and else always the same.
-    pub fn quantile_next(&self, share: f64, draws: &mut [f64], at: f64, last: &mut LastQuantile) -> f64 {
+    pub fn quantile_next(&self, share: f64, draws: &[f64], at: f64, last: &mut LastQuantile) -> f64 {
         self.quantile_within(NEXT_TOLERANCE, share, draws, at, last)
     }
 
     /// The quantile with its standard error: the deviation of F(q / h), over the density at q.
-    pub fn quantile_with_error(&self, share: f64, draws: &mut [f64]) -> (f64, f64) {
+    pub fn quantile_with_error(&self, share: f64, draws: &[f64]) -> (f64, f64) {
         let mut last = LastQuantile::default();
         let quantile = self.quantile_within(TOLERANCE, share, draws, 0.0, &mut last);
         let Some(Found { slope, .. }) = last.found else { return (0.0, 0.0) };
-        let reciprocals = &*draws;
-        let square = self.mean(quantile, reciprocals, |share| share * share);
+        let square = self.mean(quantile, draws, &mut last.among, |share| share * share);
         let variance = (square - share * share).max(0.0);
         (quantile, (variance / draws.len() as f64).sqrt() * quantile / slope)
     }
 
-    /// Leaves the reciprocals of the draws in their place, unless all of them are zero.
-    fn quantile_within(&self, tolerance: f64, share: f64, draws: &mut [f64], at: f64, last: &mut LastQuantile) -> f64 {
+    fn quantile_within(&self, tolerance: f64, share: f64, draws: &[f64], at: f64, last: &mut LastQuantile) -> f64 {
         let mean = sum(draws) / draws.len() as f64;
         if mean <= 0.0 {
             last.found = None;
             return 0.0;
         }
-        let LastQuantile { found } = last;
+        let LastQuantile { found, among } = last;
         let start = match found {
             Some(last) => Start {
                 quantile: mean * (last.ratio + last.rate * (at - last.at)).max(0.5 * last.ratio),
@@ -115,8 +136,10 @@ impl ScaleMixture {
             },
             None => self.lognormal(share, mean, draws),
         };
-        dispatched!(draws.iter_mut().for_each(|draw| *draw = 1.0 / *draw));
-        let (quantile, slope) = self.search(tolerance, share, draws, start);
+        // Of other draws.
+        among.high = 0.0;
+        let (quantile, slope) =
+            self.search(tolerance, share, start, |quantile| self.mean(quantile, draws, among, |share| share));
         let ratio = quantile / mean;
         let rate = found.filter(|before| before.at != at).map(|before| (ratio - before.ratio) / (at - before.at));
         *found = Some(Found { at, ratio, rate: rate.unwrap_or_default(), slope });
@@ -139,12 +162,12 @@ impl ScaleMixture {
 
     /// The q with mean F(q / h) = `share`, and the slope there in ln q: secants from a start, and halves of the bracket
     /// where they leave it, until no more than the tolerance is left.
-    fn search(&self, tolerance: f64, share: f64, reciprocals: &[f64], start: Start) -> (f64, f64) {
+    fn search(&self, tolerance: f64, share: f64, start: Start, mut share_below: impl FnMut(f64) -> f64) -> (f64, f64) {
         let Start { mut quantile, mut slope, mut slope_error } = start;
         let (mut low, mut high) = (0.0, f64::INFINITY);
         let mut before: Option<(f64, f64)> = None;
         for _ in 0..STEP_LIMIT {
-            let missing = share - self.share(quantile, reciprocals);
+            let missing = share - share_below(quantile);
             if let Some((missed, step)) = before {
                 slope = ((missed - missing) / step).max(LEAST_SLOPE);
                 slope_error = step.abs();
@@ -169,18 +192,17 @@ impl ScaleMixture {
         (quantile, slope)
     }
 
-    /// The mean of F(q / h). Cost O(draws), no allocation.
-    fn share(&self, quantile: f64, reciprocals: &[f64]) -> f64 {
-        self.mean(quantile, reciprocals, |share| share)
-    }
-
-    /// The mean of a function of F(q / h). What is fused is written so, and the sum has fixed accumulators: the bits do
-    /// not depend on the processor.
+    /// The mean of a function of F(q / h) over the draws. What is fused is written so, and the sum has fixed accumulators: the
+    /// bits do not depend on the processor.
     #[inline(always)]
-    fn mean(&self, quantile: f64, reciprocals: &[f64], function: impl Fn(f64) -> f64) -> f64 {
+    fn mean(&self, quantile: f64, draws: &[f64], among: &mut Undecided, function: impl Fn(f64) -> f64) -> f64 {
+        if !(among.low..=among.high).contains(&quantile) {
+            self.part(quantile, draws, among);
+        }
+        let [lowest, highest] = [-1.0, 1.0].map(|position| function(self.polynomial(position)));
+        let mut total = among.ends[0] * lowest + among.ends[1] * highest;
         let mut staged = [0.0; BLOCK];
-        let mut total = 0.0;
-        for block in reciprocals.chunks(BLOCK) {
+        for block in among.reciprocals().chunks(BLOCK) {
             let staged = &mut staged[..block.len()];
             // Dispatched apart: in one function with the sum, LLVM leaves the loop over the polynomial scalar.
             dispatched!({
@@ -190,7 +212,26 @@ impl ScaleMixture {
             });
             total += sum(staged);
         }
-        total / reciprocals.len() as f64
+        total / draws.len() as f64
+    }
+
+    /// Parts the draws into those whose F is the same wherever within reach of `quantile` the quantile lies, and the others.
+    fn part(&self, quantile: f64, draws: &[f64], among: &mut Undecided) {
+        (among.low, among.high) = (quantile * (1.0 - REACH), quantile * (1.0 + REACH));
+        // F stands still below the first and above the second.
+        let [low, high] = [-1.0, 1.0].map(|position| (position - self.offset) / self.rate);
+        let (least, most) = (among.low / high, if low > 0.0 { among.high / low } else { f64::INFINITY });
+        among.reciprocals.resize(draws.len().max(among.reciprocals.len()), 0.0);
+        let mut count = 0;
+        for &draw in draws {
+            among.reciprocals[count] = draw;
+            count += usize::from((draw > least) & (draw < most));
+        }
+        let beyond = dispatched!(draws.iter().filter(|draw| **draw >= most).count());
+        among.count = count;
+        among.ends = [beyond as f64, (draws.len() - count - beyond) as f64];
+        let undecided = &mut among.reciprocals[..count];
+        dispatched!(undecided.iter_mut().for_each(|draw| *draw = 1.0 / *draw));
     }
 
     /// F(x).
@@ -198,7 +239,11 @@ impl ScaleMixture {
     fn share_of(&self, x: f64) -> f64 {
         let position = x.mul_add(self.rate, self.offset);
         let position = if position < -1.0 { -1.0 } else { position };
-        let position = if position > 1.0 { 1.0 } else { position };
+        self.polynomial(if position > 1.0 { 1.0 } else { position })
+    }
+
+    #[inline(always)]
+    fn polynomial(&self, position: f64) -> f64 {
         let [lower @ .., highest] = &self.coefficients;
         lower.iter().rev().fold(*highest, |sum, coefficient| sum.mul_add(position, *coefficient))
     }
@@ -270,11 +315,11 @@ mod tests {
         for (freedom, share, expected) in
             [(1, 0.9, 1.6448536270), (2, 0.5, 1.1774100225), (29, 0.9, 6.2519972625), (29, 0.5, 5.3231688745)]
         {
-            let (found, error) = ScaleMixture::chi(freedom).quantile_with_error(share, &mut [2.0; 37]);
+            let (found, error) = ScaleMixture::chi(freedom).quantile_with_error(share, &[2.0; 37]);
             assert!((found - 2.0 * expected).abs() < 6e-4, "{freedom} {share}: {found} against {}", 2.0 * expected);
             assert!(error < 1e-4, "nothing is simulated: {error}");
         }
-        assert_eq!(ScaleMixture::chi(3).quantile_with_error(0.9, &mut [0.0; 9]), (0.0, 0.0));
+        assert_eq!(ScaleMixture::chi(3).quantile_with_error(0.9, &[0.0; 9]), (0.0, 0.0));
     }
 
     #[test]
@@ -286,10 +331,10 @@ mod tests {
                 [(1.0, 0.2), (1.01, 0.2), (1.01, 0.22), (3.0, 0.3), (1e-6, 0.9), (1e-6, 0.01)].into_iter().enumerate()
             {
                 let draws: Vec<f64> = (0..403).map(|k| scale * (least + f64::from(k * 7919 % 403) / 403.0)).collect();
-                let alone = mixture.quantile(share, &mut draws.clone());
+                let alone = mixture.quantile(share, &draws);
                 let mean = draws.iter().map(|draw| mixture.share_of(alone / draw)).sum::<f64>() / 403.0;
                 assert!((mean - share).abs() < 1e-7, "{scale} {share}: {mean}");
-                let next = mixture.quantile_next(share, &mut draws.clone(), at as f64, &mut last);
+                let next = mixture.quantile_next(share, &draws, at as f64, &mut last);
                 // Twenty times the tolerance: slopes of draws as different as these are off by as much more.
                 assert!((next / alone - 1.0).abs() < 1e-4, "{scale} {share}: {next} against {alone}");
             }

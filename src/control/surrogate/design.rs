@@ -26,7 +26,7 @@ pub const CANDIDATES_PER_POINT: usize = 3;
 /// States that set the guard, at most: 5 of them lie beyond a guard that 99.5 % pass.
 pub const GUARDS: usize = 1000;
 /// Of a small design so many for each design point: their features would cost more than solving it.
-const GUARDS_PER_POINT: usize = 25;
+const GUARDS_PER_POINT: usize = 10;
 /// One design point in this many is taken as drawn.
 pub const AS_DRAWN: usize = 4;
 

@@ -18,7 +18,7 @@ use crate::numerics::empirical::EmpiricalDistribution;
 const ALL_BUT_EQUAL: f64 = 0.999;
 
 /// Returns at which the radius one return later is found of those at which a value must be exact, at least.
-const LEAST_THINNED: usize = 10;
+const LEAST_THINNED: usize = 9;
 
 /// The radius rule of a specification, with its common random numbers.
 pub struct RadiusEstimator {
