@@ -147,7 +147,7 @@ impl Interior<'_> {
         for index in (0..last).filter(moving) {
             let (growth, share) = (weight * (excess[index] + 1.0), self.point[index]);
             system.matrix[index * system.size + index] += growth / share;
-            system.matrix[last * system.size + index] -= growth / price;
+            // Of the two entries that mirror each other the lower one, which alone is read.
             system.matrix[index * system.size + last] -= growth / price;
             system.matrix[last * system.size + last] += growth * share / (price * price);
         }
