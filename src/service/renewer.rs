@@ -175,9 +175,7 @@ impl Renewer {
 
     /// Begins with a session, unless as many of its tenant are under way as may be.
     async fn begin(&self, name: Name, under_way: &mut UnderWay) {
-        let from = (name.0.clone(), String::new());
-        let of_one = under_way.range(from..).take_while(|((tenant, _), _)| *tenant == name.0).take(OF_ONE).count();
-        if of_one < OF_ONE && !under_way.contains_key(&name) {
+        if of_tenant(&name.0, under_way) < OF_ONE && !under_way.contains_key(&name) {
             self.go_on(name, under_way).await;
         }
     }
@@ -307,6 +305,12 @@ fn next(specification: &Specification, history: &[f64], rate: Option<f64>, wealt
     next
 }
 
+/// Renewals of a tenant under way, counted up to as many as may be.
+fn of_tenant(tenant: &Tenant, under_way: &UnderWay) -> usize {
+    let from = (tenant.clone(), String::new());
+    under_way.range(from..).take_while(|((of, _), _)| of == tenant).take(OF_ONE).count()
+}
+
 /// Before the attempt after `count` of them.
 fn delay_ms(count: usize) -> i64 {
     let doublings = u32::try_from(count.saturating_sub(1)).unwrap_or(u32::MAX).min(20);
@@ -317,6 +321,19 @@ fn delay_ms(count: usize) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_under_way_is_counted_tenant_by_tenant() {
+        let tenant = |name: &str| name.parse::<Tenant>().unwrap();
+        let mut under_way = UnderWay::new();
+        for (name, count) in [("alpha", 2), ("beta", 3), ("gamma", OF_ONE + 1)] {
+            under_way
+                .extend((0..count).map(|session| ((tenant(name), format!("session_{session}")), "job".to_owned())));
+        }
+        let counted =
+            ["aaa", "alpha", "beta", "betas", "gamma", "zeta"].map(|name| of_tenant(&tenant(name), &under_way));
+        assert_eq!(counted, [0, 2, 3, 0, OF_ONE, 0]);
+    }
 
     #[test]
     fn attempts_follow_each_other_ever_more_slowly_up_to_a_day() {
