@@ -300,6 +300,19 @@ fn a_large_radius_at_a_fixed_total_leads_to_inverse_volatilities() {
     assert!(found[0] > 0.3 && found[3] < 0.1 && found[3] < found[2] && found[2] < found[0], "{found:?}");
 }
 
+/// A coin of 5.002 % and -4.998 % beyond the bank: Kelly's share is p / b - q / a, worth some 8e-8 in the logarithm.
+#[test]
+fn a_premium_that_is_just_above_what_is_told_apart_is_taken() {
+    let (up, down) = (0.050_02_f64, 0.049_98_f64);
+    let returns: Vec<Vec<f64>> = [1.0 + up, 1.0 - down].iter().map(|growth| vec![(1.002 * growth).ln()]).collect();
+    let kelly = 0.5 / down - 0.5 / up;
+    let best = 0.5 * (kelly * up).ln_1p() + 0.5 * (-kelly * down).ln_1p();
+    assert!((7.9e-8..8.1e-8).contains(&best), "{best}");
+    let solution = without_floor(&returns, &Ground::Sup, RelativeUtility::Log, 0.0).solve(None);
+    // A search ends where its bounds are 1e-8 apart.
+    assert!((solution.value - best).abs() < 2e-8 && solution.allocation[0] > 0.0, "{best} {solution:?}");
+}
+
 /// At the corners of what may be asked: whatever becomes of a search, what is told is finite, in order, and never less than the bank.
 #[test]
 fn extremes_are_answered_with_bounds_in_order() {

@@ -10,6 +10,10 @@ use support::{App, specification};
 
 /// Changes to the request, and the field each must be answered with.
 fn faults() -> Vec<(&'static str, Value, &'static str)> {
+    let alike = |count: usize| {
+        json!({ "kind": "gaussian_mixture",
+        "components": vec![json!({ "weight": 1.0 / count as f64, "mean": 0.0, "variance": 0.01 }); count] })
+    };
     let mixture = |weight: f64, mean: f64, variance: f64| json!({"kind": "gaussian_mixture", "components": [{"weight": weight, "mean": mean, "variance": variance}]});
     let student = |location: f64, scale: f64, degrees: f64| json!({"kind": "student_t", "location": location, "scale": scale, "degrees_of_freedom": degrees});
     vec![
@@ -71,6 +75,8 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
         ("/design/sampling_law", mixture(0.0, 0.0, 0.01), "design.sampling_law.components[0].weight"),
         ("/design/sampling_law", mixture(1.0, 9.0, 0.01), "design.sampling_law.components[0].mean"),
         ("/design/sampling_law", mixture(1.0, 0.0, 0.0), "design.sampling_law.components[0].variance"),
+        ("/design/sampling_law", alike(0), "design.sampling_law.components"),
+        ("/design/sampling_law", alike(33), "design.sampling_law.components"),
         ("/design/sampling_law", student(9.0, 0.1, 5.0), "design.sampling_law.location"),
         ("/design/sampling_law", student(0.0, 0.0, 5.0), "design.sampling_law.scale"),
         ("/design/sampling_law", student(0.0, 0.1, 1.0), "design.sampling_law.degrees_of_freedom"),

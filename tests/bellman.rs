@@ -94,11 +94,29 @@ fn a_window_that_is_too_small_grows_until_it_is_certified() {
     assert!((whole.floor_gain - grown.floor_gain).abs() < 1e-6, "{} {}", whole.floor_gain, grown.floor_gain);
 }
 
-/// The first of two steps at the history; what is learned of a return is worth this in the second.
+/// Sixteen equal gaps from the lowest return do not end at the highest to the last digit. Mass that moved from one to the other
+/// would be told as moved.
+#[test]
+fn returns_that_rounding_tells_apart_are_one() {
+    let (lowest, highest) = (-0.3, 0.1);
+    assert!(lowest + 16.0 * ((highest - lowest) / 16.0) != highest);
+    let history = [0.05, lowest, 0.02, highest];
+    let request = json!({ "problem": { "horizon": 1, "rate_per_step": 0.002, "history": history,
+        "utility": { "kind": "log" }, "action_interval": [0.0, 0.95], "radius": { "rule": "fixed", "radius": 0.004 } } });
+    let problem = Problem::new(&serde_json::from_value::<Specification>(request).unwrap().completed().unwrap());
+    let state = State::new(&history, 100.0, Learning::default()).unwrap();
+    let found = BellmanStep { problem: &problem, step: 0, next: &NextValue::Terminal }.price(&state, 0.5);
+    let Adversary::Transport { support, .. } = &found.adversary else { panic!("{found:?}") };
+    assert!(support.contains(&highest) && support.windows(2).all(|pair| pair[1] - pair[0] > 1e-12), "{support:?}");
+}
+
+/// The first of two steps at the history; what is learned of a return is worth this in the second, whatever is held.
 fn first_step(problem: &Problem) -> RobustSolution {
-    let gain = |state: &State| {
+    let holdings = problem.holdings(1).count();
+    let gain = move |state: &State| {
         let atoms = state.law.atoms();
-        vec![0.05 * (10.0 * atoms.iter().sum::<f64>() / atoms.len() as f64).tanh().max(0.0)]
+        let worth = 0.05 * (10.0 * atoms.iter().sum::<f64>() / atoms.len() as f64).tanh().max(0.0);
+        vec![worth; holdings]
     };
     let state = State::new(&HISTORY, 100.0, Learning::default()).unwrap();
     BellmanStep { problem, step: 0, next: &NextValue::Exact(problem.holdings(1), Box::new(gain)) }.solve(&state)
@@ -119,6 +137,23 @@ fn a_certified_value_is_that_over_all_returns_where_steps_follow() {
         assert!(found.certified && found.floor_gain > 0.0, "{radius}: {found:?}");
         // The next value bends where its mean passes 0, between returns at which it is exact: a cubic is off by a few 1e-6.
         assert!((found.floor_gain - wide.floor_gain).abs() < 1e-5, "{radius}: {found:?} {wide:?}");
+    }
+}
+
+/// What is held after a crash is worth next to nothing, and selling it costs a share of that.
+#[test]
+fn a_certificate_goes_down_to_a_total_loss_where_trading_costs() {
+    let request = |cost: f64, radius: f64| {
+        json!({ "problem": { "horizon": 2, "rate_per_step": 0.002, "history": HISTORY, "action_interval": [0.0, 0.95],
+            "trading_cost": cost, "utility": { "kind": "power", "risk_aversion": 4.0 },
+            "radius": { "rule": "fixed", "radius": radius } } })
+    };
+    for radius in RADII {
+        for cost in [0.001, 0.02] {
+            let request = serde_json::from_value::<Specification>(request(cost, radius)).unwrap();
+            let found = first_step(&Problem::new(&request.completed().unwrap()));
+            assert!(found.certified, "{cost} {radius}: {found:?}");
+        }
     }
 }
 

@@ -4,9 +4,11 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+use ballast::control::error::TrainError;
 use ballast::control::estimate;
 use ballast::control::evaluation::backtest::Backtest;
 use ballast::control::evaluation::backtest_report::BacktestReport;
+use ballast::control::evaluation::frontier::Frontier;
 use ballast::control::evaluation::paths::Evaluation;
 use ballast::control::evaluation::report::{Costs, EvaluationReport};
 use ballast::control::evaluation::rolling::{Common, Decision, Period};
@@ -15,8 +17,9 @@ use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
 use ballast::control::pool::{self, TrainingPool};
 use ballast::control::problem::actions::Band;
-use ballast::control::progress::Watch;
+use ballast::control::progress::{StepProgress, Watch};
 use ballast::control::request::evaluation::EvaluationRequest;
+use ballast::control::request::frontier::FrontierRequest;
 use ballast::control::request::specification::Specification;
 use ballast::control::training::Training;
 use serde_json::{Value, json};
@@ -129,6 +132,36 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
         holds(what, estimate::evaluation(&request, THREADS).bytes(), taken);
     }
     walk_forwards(&pool);
+    frontiers();
+}
+
+/// What frontiers take: a long record of many assets, and many bridges. Every drawn record takes much the same, so that one is
+/// enough.
+fn frontiers() {
+    let assets: Vec<String> = (0..30).map(|asset| format!("asset {asset}")).collect();
+    let row = |date: usize| (0..30).map(|asset| 0.004 + 0.03 * ((date * (7 + asset) * 7919) as f64).sin()).collect();
+    let question = |dates: usize, paths: usize| {
+        let rows: Vec<Vec<f64>> = (0..dates).map(row).collect();
+        let problem = json!({ "assets": assets, "rate_per_step": 0.002, "history": rows,
+            "utility": { "kind": "power", "risk_aversion": 3.0 }, "radius": { "rule": "bridge", "paths": paths } });
+        let request = json!({ "problem": problem, "scales": [0.3], "resamples": 20 });
+        serde_json::from_value::<FrontierRequest>(request).unwrap().question().unwrap()
+    };
+    for (what, question) in [("a long record", question(1500, 100)), ("bridges of a record", question(24, 20_000))] {
+        // On one thread, the record at hand counts most beside the drawn ones.
+        let estimated = estimate::frontier(&question, 1).bytes();
+        let kept = Kept::new(estimate::kept_by_frontier(&question));
+        let stop = AtomicBool::new(false);
+        let progress = |progress: StepProgress| stop.store(progress.done > 0, Ordering::Relaxed);
+        let watch = Watch { stop: &stop, progress: &progress };
+        let pool = TrainingPool::new(1).unwrap();
+        let (taken, ended) = most_bytes(|| {
+            let frontier = Frontier::new(question, kept);
+            pool.install(|| frontier.run(&watch))
+        });
+        assert_eq!(ended.err(), Some(TrainError::Stopped), "{what}");
+        holds(what, estimated, taken);
+    }
 }
 
 /// What walk-forwards take: the trainings of a stretch side by side, and the books of a long record.

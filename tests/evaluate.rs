@@ -6,12 +6,13 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use ballast::control::error::TrainError;
-use ballast::control::evaluation::paths::{Evaluation, Follower, Outcomes};
+use ballast::control::evaluation::paths::{Evaluation, Follower, Outcome, Outcomes};
 use ballast::control::evaluation::report::{Costs, EvaluationReport};
 use ballast::control::pool::TrainingPool;
 use ballast::control::problem::utility::utility;
 use ballast::control::progress::Watch;
 use ballast::control::request::evaluation::EvaluationRequest;
+use ballast::numerics::summary::Estimate;
 use reqwest::Method;
 use serde_json::{Value, json};
 use support::App;
@@ -130,20 +131,56 @@ fn differences_are_paired() {
     let report = EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS).unwrap();
     assert_eq!((report.reference.as_str(), report.strategies[0].difference.is_none()), ("plug_in", true));
     let kind = evaluation.request.problem.utility;
-    let apart = |outcome: &ballast::control::evaluation::paths::Outcome| {
-        utility(kind, outcome.wealth[1]) - utility(kind, outcome.wealth[0])
-    };
+    let apart = |outcome: &Outcome| utility(kind, outcome.wealth[1]) - utility(kind, outcome.wealth[0]);
     let mean = outcomes.outcomes.iter().map(apart).sum::<f64>() / 400.0;
     let (found, own) = (report.strategies[1].difference.as_ref().unwrap(), &report.strategies[1]);
     assert!((found.utility.value - mean).abs() < 1e-12);
     let reference = &report.strategies[0];
     let certain = own.certainty_equivalent.value - reference.certainty_equivalent.value;
     assert!((found.certainty_equivalent.value - certain).abs() < 1e-9);
+    // To first order a utility counts as wealth by e^(l CE) for exponential utility, each at its own strategy's mean.
+    let slopes = [reference, own].map(|strategy| (0.01 * strategy.certainty_equivalent.value).exp());
+    let linear =
+        |outcome: &Outcome| slopes[1] * utility(kind, outcome.wealth[1]) - slopes[0] * utility(kind, outcome.wealth[0]);
+    let deviation = |of: &dyn Fn(&Outcome) -> f64| {
+        let values: Vec<f64> = outcomes.outcomes.iter().map(of).collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.iter().map(|value| (value - mean).powi(2)).sum::<f64>().sqrt()
+    };
+    let width = |estimate: Estimate| estimate.high - estimate.low;
+    let (wide, expected) =
+        (width(found.certainty_equivalent) / width(found.utility), deviation(&linear) / deviation(&apart));
+    assert!((wide / expected - 1.0).abs() < 1e-6, "{wide} {expected}");
     // Two mixes that are close lose and win together: the pair is far narrower than either.
     let close = json!({ "frameworks": [], "constant_mixes": [0.4, 0.5], "paths": 400 });
     let close = reported(small(close)).strategies[1].clone();
     let (pair, alone) = (close.difference.unwrap().utility, close.utility.mean);
     assert!(pair.high - pair.low < 0.5 * (alone.high - alone.low), "{pair:?} {alone:?}");
+}
+
+/// Of 100 paths of four periods a known part holds nothing, and a known part is solved anew, another of each framework.
+#[test]
+fn what_was_lived_is_told_period_by_period() {
+    let (evaluation, followers, mut outcomes) = simulated(small(json!({ "frameworks": ["adaptive", "plug_in"] })));
+    for (path, outcome) in outcomes.outcomes.iter_mut().enumerate() {
+        for (position, lived) in outcome.lived.iter_mut().enumerate() {
+            let (framework, step) = (position / 4, position % 4);
+            lived.allocation = if path < 10 * (framework + 1) + 20 * step { 0.0 } else { 0.5 };
+            lived.resolved = step == 0 && path < 40 * (framework + 1);
+        }
+    }
+    let report = EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS).unwrap();
+    for (strategy, banked) in report.strategies.iter().zip([[0.1, 0.3, 0.5, 0.7], [0.2, 0.4, 0.6, 0.8]]) {
+        let periods = strategy.periods.as_ref().unwrap();
+        assert_eq!(periods.iter().map(|period| period.all_bank_share).collect::<Vec<_>>(), banked);
+        assert_eq!(periods.iter().map(|period| period.period).collect::<Vec<_>>(), [1, 2, 3, 4]);
+        // Twenty returns were known before the first.
+        assert_eq!(periods.iter().map(|period| period.sample_size).collect::<Vec<_>>(), [20, 21, 22, 23]);
+        for (period, banked) in periods.iter().zip(banked) {
+            assert!((period.allocation.mean - 0.5 * (1.0 - banked)).abs() < 1e-12, "{period:?}");
+        }
+    }
+    assert_eq!([0, 1].map(|index| report.strategies[index].resolved_share), [Some(0.1), Some(0.2)]);
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod support;
 use ballast::control::bellman::BellmanStep;
 use ballast::control::bellman::next_value::NextValue;
 use ballast::control::bellman::problem::Problem;
+use ballast::control::bellman::solution::Adversary;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::policy::what_if::{Hypothesis, HypotheticalRadius};
@@ -72,6 +73,23 @@ fn one_step_agrees_with_a_search_of_the_whole_region() {
         }
     }
     assert!(inside > 80, "only {inside} allocations lie inside: the test shows little");
+}
+
+/// All in while prices fall is worse than the bank under every law of the region, and under the worst still worse than under
+/// the estimate.
+#[test]
+fn a_loss_has_a_worst_law_too() {
+    let history: Vec<f64> = (0..20).map(|k| -0.04 + 0.02 * (f64::from(k * 7 % 20) / 10.0 - 0.95)).collect();
+    for framework in FRAMEWORKS {
+        let specification = specification(json!({ "problem": { "framework": framework, "horizon": 1,
+            "rate_per_step": 0.002, "utility": { "kind": "log" }, "radius": { "rule": "chi_square", "alpha": 0.1 },
+            "history": history } }));
+        let problem = Problem::new(&specification);
+        let state = State::new(&history, 100.0, Learning::default()).unwrap();
+        let priced = BellmanStep { problem: &problem, step: 0, next: &NextValue::Terminal }.price(&state, 1.0);
+        let Adversary::Normal { worst, estimate } = priced.adversary else { panic!("{priced:?}") };
+        assert!(priced.floor_gain < -0.04 && worst.mean < estimate.mean - 0.001, "{priced:?}");
+    }
 }
 
 #[test]

@@ -2,13 +2,14 @@
 
 mod support;
 
-use std::process::{Child, Command, ExitStatus};
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use ballast::store::{JobRow, JobState, Store};
 use reqwest::Client;
 use serde_json::{Value, json};
-use support::patience::{assert_within, until, within};
+use support::patience::{assert_within, patience, until, within};
 use support::{App, specification};
 
 /// `Config::drain`: the time an operator gives the process to end.
@@ -176,4 +177,40 @@ async fn a_process_asked_to_stop_in_a_long_fit_does_not_wait_for_it() {
     assert_eq!(process.terminate().code(), Some(0));
     assert_within(Duration::from_secs(3), asked, "the end of a process in a long fit");
     assert_eq!(process.left(&job).await.state, JobState::Queued);
+}
+
+/// The processor time that a process tells of fits into the time that it ran, on as many processors as there are.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_process_tells_the_seconds_that_it_computed() {
+    let started = Instant::now();
+    let mut process = Process::start();
+    process.app.train(&specification(2)).await;
+    let metrics = process.app.get("/metrics").await.1;
+    let told = metrics.as_str().unwrap().lines().find_map(|line| line.strip_prefix("process_cpu_seconds_total "));
+    let seconds: f64 = told.unwrap().parse().unwrap();
+    let processors = std::thread::available_parallelism().unwrap().get();
+    let most = started.elapsed().as_secs_f64() * processors as f64;
+    assert!(seconds <= most + 1.0, "{seconds} seconds computed, {most} at most");
+}
+
+/// A store that refuses is asked again in a while, and not at once.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_worker_that_cannot_claim_says_so_once_a_second_until_it_can() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut child, url) = support::process::serve(|command| {
+        command.arg("--data").arg(folder.path()).env("RUST_LOG", "error").stderr(Stdio::piped());
+    });
+    let (said, heard) = std::sync::mpsc::channel();
+    let lines = BufReader::new(child.stderr.take().unwrap()).lines().map_while(Result::ok);
+    std::thread::spawn(move || {
+        lines
+            .filter(|line| line.contains("claiming a job"))
+            .for_each(|_| said.send(Instant::now()).unwrap_or_default());
+    });
+    support::execute(folder.path(), "ALTER TABLE jobs RENAME TO hidden").await;
+    let moments: Vec<Instant> = (0..3).map(|_| heard.recv_timeout(patience()).expect("a word of it")).collect();
+    assert!(moments[2] - moments[0] > Duration::from_millis(1500), "{moments:?}");
+    support::execute(folder.path(), "ALTER TABLE hidden RENAME TO jobs").await;
+    let mut process = Process { child, app: App::at(url, folder) };
+    process.app.train(&specification(1)).await;
 }

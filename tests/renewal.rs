@@ -15,6 +15,7 @@ use ballast::control::request::framework::Framework;
 use ballast::control::request::learning::Learning;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
+use support::patience::until;
 use support::{App, specification};
 
 const HISTORY: [f64; 10] = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
@@ -289,6 +290,34 @@ async fn a_renewal_that_fails_is_told_of_and_leaves_the_session_as_it_is() {
     let (status, renewed) = renew(&app, 1, json!({ "policy": first })).await;
     assert_eq!(status, 200, "{renewed}");
     assert_eq!(session(&app).await["renewal"], json!(null));
+}
+
+/// The second attempt comes a minute after the first one ended, and no sooner.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_renewal_that_failed_is_tried_again_after_a_while() {
+    let mut app = App::start().await;
+    app.train(&request(3)).await;
+    app.open_with(json!({ "renew": { "every": 1 } })).await;
+    let mut busy = request(12);
+    busy["design"]["count"] = json!(1500);
+    let busy = app.queue(&busy).await;
+    app.until(&busy, |job| job["state"] == "running").await;
+    observe(&app, 1..=1).await;
+    let training = async || session(&app).await["renewal"]["job"].as_str().map(str::to_owned);
+    let job = until("the job of the renewal", training).await;
+    app.cancel(&job).await;
+    app.cancel(&busy).await;
+    app.until(&busy, |job| job["state"] == "cancelled").await;
+    app.restart_after("UPDATE jobs SET finished_ms = finished_ms - 30000 WHERE state = 'cancelled'").await;
+    // All that are due were looked at when the service started: another session that becomes due now is looked at after them.
+    let waiting = app.session.clone();
+    app.open_with(json!({ "renew": { "every": 1 } })).await;
+    observe(&app, 1..=1).await;
+    until_renewed(&app, 1).await;
+    app.session = waiting;
+    assert_eq!(session(&app).await["renewal"]["attempts"], 1);
+    app.restart_after("UPDATE jobs SET finished_ms = finished_ms - 31000 WHERE state = 'cancelled'").await;
+    until_renewed(&app, 1).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -291,3 +291,36 @@ async fn a_burst_of_resolves_is_told_to_come_back_and_starves_nobody() {
     assert_eq!(app.action().await.0, 200);
     assert_eq!(app.observe(1, 0.01).await.0, 200);
 }
+
+/// The share of the record that lies further from its median than `value`, and the share that lies as far or further.
+fn as_far(record: &[f64], value: f64) -> [f64; 2] {
+    let mut sorted = record.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let median = 0.5 * (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2]);
+    let share = |counts: &dyn Fn(f64) -> bool| {
+        sorted.iter().filter(|atom| counts((*atom - median).abs())).count() as f64 / sorted.len() as f64
+    };
+    [share(&|far| far > (value - median).abs()), share(&|far| far >= (value - median).abs())]
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_tells_whether_its_returns_come_as_those_before_did() {
+    let mut app = trained(&specification(HORIZON)).await;
+    app.open().await;
+    let drift = async |app: &App| app.get(&format!("/sessions/{}", app.session)).await.1["drift"].clone();
+    assert_eq!(drift(&app).await, json!({ "p_value": null, "capital": 1.0, "highest": 1.0, "level": "none" }));
+    let mut record: Vec<f64> = serde_json::from_value(specification(1)["problem"]["history"].clone()).unwrap();
+    let mut before = 1.0;
+    for (period, log_return) in (1..).zip([0.17, 0.014, -0.16]) {
+        assert_eq!(app.observe(period, log_return).await.0, 200);
+        record.push(log_return);
+        let told = drift(&app).await;
+        let ([further, as_far], capital) = (as_far(&record, log_return), number(&told["capital"]));
+        let p_value = number(&told["p_value"]);
+        assert!(further < p_value && p_value <= as_far, "{further} {told} {as_far}");
+        // A bet on returns that lie far out wins with these and loses with one from the middle.
+        assert_eq!(capital > before, log_return.abs() > 0.1, "{told}");
+        assert!(number(&told["highest"]) >= capital.max(before), "{told}");
+        before = capital;
+    }
+}

@@ -671,6 +671,33 @@ async fn a_file_that_is_no_database_is_fatal() {
     assert!(refused.is_fatal(), "{refused:?}");
 }
 
+/// Of a log with a damaged page SQLite drops every commit from there on, without a word.
+#[tokio::test]
+async fn a_damaged_log_is_refused_and_a_sound_one_is_not() {
+    const LOG: &str = "ballast.sqlite-wal";
+    let (running, crashed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let store = Store::open(running.path()).await.unwrap();
+    for job in ["first", "second", "third"] {
+        queued(&store, job).await;
+    }
+    // As a crash leaves them.
+    for file in ["ballast.sqlite", LOG] {
+        std::fs::copy(running.path().join(file), crashed.path().join(file)).unwrap();
+    }
+    store.close().await;
+    let log = crashed.path().join(LOG);
+    let sound = std::fs::read(&log).unwrap();
+    let mut damaged = sound.clone();
+    // In the first page, after the head of the log, of 32 bytes, and that of the page, of 24.
+    damaged[32 + 24 + 100] ^= 1;
+    std::fs::write(&log, damaged).unwrap();
+    let refused = Store::open(crashed.path()).await.err().expect("a refusal");
+    assert!(matches!(refused, StoreError::Corrupt { .. }), "{refused:?}");
+    std::fs::write(&log, sound).unwrap();
+    let store = Store::open(crashed.path()).await.unwrap();
+    assert!(store.job("third").await.unwrap().is_some());
+}
+
 #[tokio::test]
 async fn a_schema_that_is_not_text_is_refused() {
     const COLUMN: &[u8] = b"answer_json";

@@ -294,6 +294,18 @@ mod tests {
     }
 
     #[test]
+    fn twice_the_paths_are_twice_the_numbers_read_once_they_are_there() {
+        // Bridges are ready for all of a process: of these numbers of paths no other test asks for any.
+        let costs = [370, 740].map(|paths| {
+            let sets = estimator("adaptive", json!({ "rule": "bridge", "alpha": 0.1, "paths": paths }));
+            assert_eq!(sets.cost(4), None);
+            sets.prepare(4);
+            sets.cost(4).unwrap()
+        });
+        assert!(costs[0] >= 370 && costs[1] == 2 * costs[0], "{costs:?}");
+    }
+
+    #[test]
     fn laws_measured_together_are_measured_as_one_by_one() {
         let laws =
             [[0.02, -0.01, 0.04, 0.01], [0.03, -0.05, 0.0, 0.01]].map(|sample| EmpiricalDistribution::new(&sample));

@@ -50,6 +50,14 @@ mod tests {
         assert_eq!([FULL, 4874].map(of_code), [Cause::Full; 2]);
     }
 
+    /// What cannot be read as what was written is damage to that row alone.
+    #[test]
+    fn what_cannot_be_read_is_a_damaged_row() {
+        let column = sqlx::Error::ColumnDecode { index: "seal".into(), source: "not text".into() };
+        let value = sqlx::Error::Decode("not a number".into());
+        assert_eq!([column, value].map(|error| cause(&error)), [Cause::DamagedRow; 2]);
+    }
+
     #[test]
     fn a_broken_constraint_is_refused() {
         const CONSTRAINT_UNIQUE: i32 = 2067;
