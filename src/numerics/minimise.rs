@@ -11,7 +11,7 @@ use basin::{
 /// Largest component of the projected gradient at a point called a minimum.
 const GRADIENT_TOLERANCE: f64 = 1e-6;
 /// An accepted step that lowers the value by less than this share of it ends the search.
-const REDUCTION_TOLERANCE: f64 = 1e-7;
+const REDUCTION_TOLERANCE: f64 = 1e-9;
 /// Golden ratio squared, inverted: the share of an interval at which Brent's method probes it.
 const GOLDEN_SHARE: f64 = 0.381_966_011_250_105_1;
 /// Golden sections alone shrink any interval by 1e-20 in this many probes.

@@ -127,8 +127,7 @@ impl Live {
                     means.turn.begin()?;
                     let (advisor, state) = (means.advisor.clone(), self.standing.state.clone());
                     let tenant = &self.row.tenant;
-                    Box::pin(means.resolving.run(tenant, move || advisor.advise_outside(step, &state, &outside)))
-                        .await?
+                    means.resolving.run(tenant, move || advisor.advise_outside(step, &state, &outside)).await?
                 }
             },
         };
@@ -145,7 +144,7 @@ impl Live {
             return Ok(predict(&means.advisor, &self.standing.state, self.radius));
         }
         let (advisor, state, radius) = (means.advisor.clone(), self.standing.state.clone(), self.radius);
-        Box::pin(means.advising.run(&self.row.tenant, move || predict(&advisor, &state, radius))).await
+        means.advising.run(&self.row.tenant, move || predict(&advisor, &state, radius)).await
     }
 
     /// Where the report leads, and the answer to it; nothing is changed yet but the memoised advice.
@@ -195,7 +194,7 @@ pub(super) async fn measured(
     }
     let measuring = advisor.clone();
     let measure = move || (measuring.uncertainty(&standing.state), standing);
-    let (uncertainty, standing) = Box::pin(advising.run(tenant, measure)).await?;
+    let (uncertainty, standing) = advising.run(tenant, measure).await?;
     // The first session to get this far: the next advice finds its common random numbers simulated.
     let (advisor, reached) = (advisor.clone(), standing.state.clone());
     tokio::task::spawn_blocking(move || advisor.prepare(step, &reached));

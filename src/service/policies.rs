@@ -45,9 +45,7 @@ impl Policies {
     /// # Errors
     /// There is no such policy, or it cannot be prepared.
     pub async fn advisor(&self, tenant: &Tenant, policy: &str) -> Result<Arc<Advisor>, ServiceError> {
-        // Rare and large: who finds it kept does not carry the future of preparing it.
-        let prepare = async { Box::pin(self.prepared(tenant, policy)).await };
-        self.kept.get_or_prepare(&key(tenant, policy), Advisor::bytes, prepare).await
+        self.kept.get_or_prepare(&key(tenant, policy), Advisor::bytes, self.prepared(tenant, policy)).await
     }
 
     async fn prepared(&self, tenant: &Tenant, policy: &str) -> Result<Advisor, ServiceError> {

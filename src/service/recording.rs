@@ -36,7 +36,7 @@ impl Sessions {
         loop {
             let live = held.current(&self.rows(tenant, session)).await?;
             if period <= live.observed {
-                return Box::pin(self.repeat(session, EntryKind::Observation, period, &content)).await;
+                return self.repeat(session, EntryKind::Observation, period, &content).await;
             }
             live.expects(period)?;
             let means = self.means(tenant, live, turn).await?;

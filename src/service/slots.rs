@@ -184,8 +184,7 @@ impl<N: Eq + Hash + Clone, S> Held<N, S> {
         }
         let state = match self.state.take() {
             Some(state) => state,
-            // Rare and large: who has a state does not carry the future of a reading.
-            None => Box::pin(source.read()).await?,
+            None => source.read().await?,
         };
         Ok(self.state.insert(state))
     }

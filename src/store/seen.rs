@@ -34,7 +34,7 @@ impl Store {
         if change.is_some() && change == seen.change {
             return Ok(true);
         }
-        let is_as_seen = Box::pin(self.head(session)).await?.as_ref() == Some(&seen.head);
+        let is_as_seen = self.head(session).await?.as_ref() == Some(&seen.head);
         if is_as_seen {
             seen.change = change;
         }

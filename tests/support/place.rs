@@ -7,6 +7,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{AssertSqlSafe, Connection};
 use tempfile::TempDir;
 
+use super::patience::until;
 use super::postgres;
 
 /// Runs each test over either engine, in a place of its own.
@@ -64,9 +65,14 @@ impl Place {
         }
     }
 
+    /// A program that another test of this process starts has a copy of the folder's lock until it runs.
     pub async fn reopen(&self, store: Store) -> Store {
         store.close().await;
-        self.open().await
+        let opened = async || match self.try_open().await {
+            Err(StoreError::Locked { .. }) => None,
+            opened => Some(opened.unwrap()),
+        };
+        until("the lock of a folder that was closed", opened).await
     }
 
     /// What a second worker or client holds: of the same process over a folder, else of another.

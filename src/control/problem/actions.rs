@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 /// Equal parts of the interval that are tried before a search between the best one's neighbours: robust values are concave
 /// in the action but for the error of the surrogate, whose dents are narrower than an eighth.
 const COARSE_ACTIONS: usize = 8;
+/// Falls in a row after which no action further on is tried.
+const FALLS: usize = 2;
 
 /// A closed interval of shares of wealth.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,16 +54,18 @@ impl From<Band> for [f64; 2] {
 }
 
 impl ActionInterval {
-    /// The neighbours of the best of the actions that cut the interval into equal parts.
+    /// The neighbours of the best of the actions that cut the interval into equal parts. Values rise to the best and fall from
+    /// there, but for dents: one fall is not the end of the search, and two in a row are.
     pub fn bracket(self, value: impl Fn(f64) -> f64) -> (f64, f64) {
         let ActionInterval { lowest, highest } = self;
         let part = (highest - lowest) / COARSE_ACTIONS as f64;
-        let mut best = (lowest, value(lowest));
+        let (mut best, mut falls) = ((lowest, value(lowest)), 0);
         for index in 1..=COARSE_ACTIONS {
             let action = lowest + index as f64 * part;
             let tried = value(action);
-            if tried > best.1 {
-                best = (action, tried);
+            (best, falls) = if tried > best.1 { ((action, tried), 0) } else { (best, falls + 1) };
+            if falls == FALLS {
+                break;
             }
         }
         ((best.0 - part).max(lowest), (best.0 + part).min(highest))

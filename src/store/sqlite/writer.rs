@@ -9,7 +9,6 @@
 use std::fs::File;
 
 use sqlx::{Connection, SqliteConnection};
-use tokio::runtime::Handle;
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::batch::{self, Appending, Waiting};
@@ -30,8 +29,7 @@ pub(super) enum Request {
     Close(oneshot::Sender<()>),
 }
 
-/// Starts the writer on a thread of its own: its many short waits for SQLite do not queue behind requests. Callers are answered on
-/// the runtime of who starts it: woken from another thread, each of them would cost a call of the system.
+/// Starts the writer on a thread of its own: its many short waits for SQLite do not queue behind requests.
 pub(super) fn start(
     connection: SqliteConnection,
     requests: mpsc::Receiver<Request>,
@@ -40,8 +38,7 @@ pub(super) fn start(
 ) -> Result<(), StoreError> {
     let unavailable = |_| StoreError::Unavailable { doing: "starting the writer", source: None };
     let runtime = tokio::runtime::Builder::new_current_thread().build().map_err(unavailable)?;
-    let callers = Handle::current();
-    let serving = move || runtime.block_on(serve(connection, requests, fatal, lock, callers));
+    let serving = move || runtime.block_on(serve(connection, requests, fatal, lock));
     std::thread::Builder::new().name("writer".into()).spawn(serving).map(drop).map_err(unavailable)
 }
 
@@ -52,12 +49,11 @@ async fn serve(
     mut requests: mpsc::Receiver<Request>,
     fatal: watch::Sender<Option<StoreError>>,
     lock: Option<File>,
-    callers: Handle,
 ) {
     let mut waiting = Waiting::default();
     let mut closed = Vec::new();
     while !waiting.is_empty() || receive(&mut requests, &mut waiting, &mut closed).await {
-        if let Err(error) = commit_group(&mut connection, &mut waiting, &callers).await
+        if let Err(error) = commit_group(&mut connection, &mut waiting).await
             && error.is_fatal()
         {
             fatal.send_replace(Some(error));
@@ -97,19 +93,16 @@ async fn receive(
 ///
 /// # Errors
 /// What ended the group before its commit.
-async fn commit_group(
-    connection: &mut SqliteConnection,
-    waiting: &mut Waiting,
-    callers: &Handle,
-) -> Result<(), StoreError> {
+async fn commit_group(connection: &mut SqliteConnection, waiting: &mut Waiting) -> Result<(), StoreError> {
     let mut answers = Vec::new();
     let end = run_group(connection, waiting, &mut answers).await;
     if end.is_err() {
         // Refused where SQLite rolled back by itself, which is as good.
         let _ = execute(connection, "ROLLBACK").await;
     }
-    let told = end.clone();
-    callers.spawn(async move { answers.into_iter().for_each(|answer| answer(told.clone())) });
+    for answer in answers {
+        answer(end.clone());
+    }
     end
 }
 
