@@ -40,15 +40,7 @@ pub struct Quantile {
 impl AbsoluteBridges {
     /// The statistic over the direction of every path: H divided by the length of the path. Cost O(min(n, 540) paths).
     pub(super) fn directional_statistic(&self, law: &EmpiricalDistribution, which: Statistic) -> Vec<f64> {
-        let mut weights = Weights::of(self, law, which);
-        let mut statistic = vec![0.0; self.paths];
-        let waiting = weights.take();
-        for (block, statistic) in self.blocks().zip(statistic.chunks_mut(PATHS)) {
-            let mut sums = [0.0; PATHS];
-            waiting.pour(block, &mut sums);
-            statistic.copy_from_slice(&sums[..statistic.len()]);
-        }
-        statistic
+        self.poured(&Weights::of(self, law, which).take())
     }
 
     /// The same for many laws of one size, to the same bits at the times of a sample. Cost as one by one, with the bridges read from memory once.
@@ -144,31 +136,52 @@ impl AbsoluteBridges {
             [carried, weights.take()]
         };
         let entered: Vec<[Waiting; 2]> = values.iter().map(enter).collect();
-        let statistics = self.carried(&start, &entered);
+        let mut carried = self.poured(&start);
         let mut last = LastQuantile::default();
-        let mut quantile =
-            |(statistic, &value): (&[f64], &f64)| self.lengths.quantile_next(1.0 - alpha, statistic, value, &mut last);
-        statistics.chunks_exact(self.paths).zip(values).map(&mut quantile).collect()
+        let mut quantiles = Vec::with_capacity(values.len());
+        let together = (BYTES_TOGETHER / (size_of::<f64>() * self.paths)).max(1);
+        for (entered, values) in entered.chunks(together).zip(values.chunks(together)) {
+            let statistics = self.carry_on(&mut carried, entered);
+            let quantile = |(statistic, &value): (&[f64], &f64)| {
+                self.lengths.quantile_next(1.0 - alpha, statistic, value, &mut last)
+            };
+            quantiles.extend(statistics.chunks_exact(self.paths).zip(values).map(quantile));
+        }
+        quantiles
     }
 
-    /// Sums to which more and more is added: from a start, what is carried on at each entry and what it has for itself. Entry by
+    /// The statistic of weights alone.
+    fn poured(&self, waiting: &Waiting) -> Vec<f64> {
+        let mut statistic = vec![0.0; self.paths];
+        for (block, statistic) in self.blocks().zip(statistic.chunks_mut(PATHS)) {
+            let mut sums = [0.0; PATHS];
+            waiting.pour(block, &mut sums);
+            statistic.copy_from_slice(&sums[..statistic.len()]);
+        }
+        statistic
+    }
+
+    /// Sums to which more and more is added: what is carried on from each entry to the next, and what it has for itself. Entry by
     /// entry; block by block of paths, so that what entries have in common is read from memory once.
-    fn carried(&self, start: &Waiting, entered: &[[Waiting; 2]]) -> Vec<f64> {
+    fn carry_on(&self, carried: &mut [f64], entered: &[[Waiting; 2]]) -> Vec<f64> {
         let mut all = vec![0.0; entered.len() * self.paths];
-        for (block, first) in self.blocks().zip((0..).step_by(PATHS)) {
-            let mut carried = [0.0; PATHS];
-            start.pour(block, &mut carried);
+        for ((block, carried), first) in self.blocks().zip(carried.chunks_mut(PATHS)).zip((0..).step_by(PATHS)) {
+            let mut on_the_way = [0.0; PATHS];
+            on_the_way[..carried.len()].copy_from_slice(carried);
             for ([on, own], all) in entered.iter().zip(all.chunks_exact_mut(self.paths)) {
-                on.pour(block, &mut carried);
-                let mut sums = carried;
+                on.pour(block, &mut on_the_way);
+                let mut sums = on_the_way;
                 own.pour(block, &mut sums);
-                let some = &mut all[first..self.paths.min(first + PATHS)];
-                some.copy_from_slice(&sums[..some.len()]);
+                all[first..first + carried.len()].copy_from_slice(&sums[..carried.len()]);
             }
+            carried.copy_from_slice(&on_the_way[..carried.len()]);
         }
         all
     }
 }
+
+/// Bytes of the statistics that are found together, at most, unless one alone takes more.
+const BYTES_TOGETHER: usize = 1 << 20;
 
 /// Mass below or above a gap that counts as none: the bridge is within 1e-7 of 0.
 const NO_MASS: f64 = 1e-14;
