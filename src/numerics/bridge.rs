@@ -49,7 +49,8 @@ impl AbsoluteBridges {
     fn directional_statistics(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<Vec<f64>> {
         let mut statistics = vec![vec![0.0; self.paths]; laws.len()];
         for (laws, statistics) in laws.chunks(LAWS).zip(statistics.chunks_mut(LAWS)) {
-            let weights: Vec<Vec<f32>> = laws.iter().map(|law| Weights::of(self, law, which).all()).collect();
+            let all = |law: &&_| Weights::of(self, law, which).weights.iter().map(|weight| *weight as f32).collect();
+            let weights: Vec<Vec<f32>> = laws.iter().map(all).collect();
             for (block, first) in self.blocks().zip((0..).step_by(PATHS)) {
                 let mut sums = [[0.0; PATHS]; LAWS];
                 dispatched!(add_nodes_of_many(&weights, block, &mut sums));
@@ -74,11 +75,11 @@ impl AbsoluteBridges {
         let mut last = vec![LastQuantile::default(); alphas.len()];
         let statistics =
             self.grown_statistics(laws, base, which).unwrap_or_else(|| self.directional_statistics(laws, which));
-        let mut at_levels = |statistic: Vec<f64>| {
+        let at_levels = |statistic: Vec<f64>| {
             let quantile = |(alpha, last): (&f64, _)| self.lengths.quantile_next(1.0 - alpha, &statistic, 0.0, last);
             alphas.iter().zip(&mut last).map(quantile).collect()
         };
-        statistics.into_iter().map(&mut at_levels).collect()
+        statistics.into_iter().map(at_levels).collect()
     }
 
     /// The (1 - alpha)-quantile of a statistic of `law`; `alpha` in [0.001, 0.999], here and below.
@@ -142,10 +143,9 @@ impl AbsoluteBridges {
         let together = (BYTES_TOGETHER / (size_of::<f64>() * self.paths)).max(1);
         for (entered, values) in entered.chunks(together).zip(values.chunks(together)) {
             let statistics = self.carry_on(&mut carried, entered);
-            let quantile = |(statistic, &value): (&[f64], &f64)| {
-                self.lengths.quantile_next(1.0 - alpha, statistic, value, &mut last)
-            };
-            quantiles.extend(statistics.chunks_exact(self.paths).zip(values).map(quantile));
+            for (statistic, &value) in statistics.chunks_exact(self.paths).zip(values) {
+                quantiles.push(self.lengths.quantile_next(1.0 - alpha, statistic, value, &mut last));
+            }
         }
         quantiles
     }
@@ -275,11 +275,6 @@ impl<'a> Weights<'a> {
         self.weights[time] += weight * self.bridges.units[time];
         let Range { start, end } = self.touched;
         self.touched = if start == end { time..time + 1 } else { start.min(time)..end.max(time + 1) };
-    }
-
-    /// What is waiting at every time.
-    fn all(&self) -> Vec<f32> {
-        self.weights.iter().map(|weight| *weight as f32).collect()
     }
 
     /// What is waiting; nothing is any more.
