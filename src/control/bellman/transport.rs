@@ -13,7 +13,7 @@ use crate::numerics::wasserstein::{WassersteinBall, WorstLaw};
 /// The floor gain is flat in the action at its best: an action off by this costs less than rounding.
 const ACTION_TOLERANCE: f64 = 1e-7;
 /// Until the support is refined the action only has to say where the worst law puts its mass.
-const PLACING_TOLERANCE: f64 = 1e-3;
+const PLACING_TOLERANCE: f64 = 1e-4;
 /// Parts into which each interval between exact returns is cut for the support, and again around destinations: local cubics
 /// are good to far less than a part, and twice eight parts place a destination to 1/256 of an interval.
 const SUPPORT_PARTS: usize = 4;
