@@ -40,24 +40,20 @@ pub struct Quantile {
 impl AbsoluteBridges {
     /// The statistic over the direction of every path: H divided by the length of the path. Cost O(min(n, 540) paths).
     pub(super) fn directional_statistic(&self, law: &EmpiricalDistribution, which: Statistic) -> Vec<f64> {
-        self.poured(&Weights::of(self, law, which).take())
+        self.directional_statistics(&[law], which).concat()
     }
 
-    /// The same for many laws of one size, to the same bits at the times of a sample. Cost as one by one, with the bridges read from memory once.
+    /// The same for many laws of one size, to the same bits. Cost as one by one, with the bridges read from memory once.
     ///
     /// Checked by: `many_laws_at_a_time_are_one_by_one_to_the_last_bit`.
     fn directional_statistics(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<Vec<f64>> {
+        let weights: Vec<Waiting> = laws.iter().map(|law| Weights::of(self, law, which).take()).collect();
         let mut statistics = vec![vec![0.0; self.paths]; laws.len()];
-        for (laws, statistics) in laws.chunks(LAWS).zip(statistics.chunks_mut(LAWS)) {
-            let all = |law: &&_| Weights::of(self, law, which).weights.iter().map(|weight| *weight as f32).collect();
-            let weights: Vec<Vec<f32>> = laws.iter().map(all).collect();
-            for (block, first) in self.blocks().zip((0..).step_by(PATHS)) {
-                let mut sums = [[0.0; PATHS]; LAWS];
-                dispatched!(add_nodes_of_many(&weights, block, &mut sums));
-                for (statistic, sums) in statistics.iter_mut().zip(sums) {
-                    let statistic = &mut statistic[first..self.paths.min(first + PATHS)];
-                    statistic.copy_from_slice(&sums[..statistic.len()]);
-                }
+        for (block, first) in self.blocks().zip((0..).step_by(PATHS)) {
+            for (waiting, statistic) in weights.iter().zip(&mut statistics) {
+                let mut sums = [0.0; PATHS];
+                waiting.pour(block, &mut sums);
+                keep(&sums, first, statistic);
             }
         }
         statistics
@@ -114,7 +110,6 @@ impl AbsoluteBridges {
         });
         let first: Vec<f64> = std::iter::once(0.0).chain(sums).collect();
         (1..count).for_each(|j| weights.place(first[j] + 1.0, gap(j)));
-        let start = weights.take();
         let mut below = 0;
         let enter = |&value: &f64| {
             while below < count && atoms[below] <= value {
@@ -137,7 +132,7 @@ impl AbsoluteBridges {
             [carried, weights.take()]
         };
         let entered: Vec<[Waiting; 2]> = values.iter().map(enter).collect();
-        let mut carried = self.poured(&start);
+        let mut carried = vec![0.0; self.paths];
         let mut last = LastQuantile::default();
         let mut quantiles = Vec::with_capacity(values.len());
         let together = (BYTES_TOGETHER / (size_of::<f64>() * self.paths)).max(1);
@@ -150,34 +145,29 @@ impl AbsoluteBridges {
         quantiles
     }
 
-    /// The statistic of weights alone.
-    fn poured(&self, waiting: &Waiting) -> Vec<f64> {
-        let mut statistic = vec![0.0; self.paths];
-        for (block, statistic) in self.blocks().zip(statistic.chunks_mut(PATHS)) {
-            let mut sums = [0.0; PATHS];
-            waiting.pour(block, &mut sums);
-            statistic.copy_from_slice(&sums[..statistic.len()]);
-        }
-        statistic
-    }
-
     /// Sums to which more and more is added: what is carried on from each entry to the next, and what it has for itself. Entry by
     /// entry; block by block of paths, so that what entries have in common is read from memory once.
     fn carry_on(&self, carried: &mut [f64], entered: &[[Waiting; 2]]) -> Vec<f64> {
         let mut all = vec![0.0; entered.len() * self.paths];
-        for ((block, carried), first) in self.blocks().zip(carried.chunks_mut(PATHS)).zip((0..).step_by(PATHS)) {
+        for (block, first) in self.blocks().zip((0..).step_by(PATHS)) {
             let mut on_the_way = [0.0; PATHS];
-            on_the_way[..carried.len()].copy_from_slice(carried);
+            let some = &carried[first..self.paths.min(first + PATHS)];
+            on_the_way[..some.len()].copy_from_slice(some);
             for ([on, own], all) in entered.iter().zip(all.chunks_exact_mut(self.paths)) {
                 on.pour(block, &mut on_the_way);
                 let mut sums = on_the_way;
                 own.pour(block, &mut sums);
-                all[first..first + carried.len()].copy_from_slice(&sums[..carried.len()]);
+                keep(&sums, first, all);
             }
-            carried.copy_from_slice(&on_the_way[..carried.len()]);
+            keep(&on_the_way, first, carried);
         }
         all
     }
+}
+
+/// Puts the sums of a block in their place in a statistic of all paths, from `first` on.
+fn keep(sums: &[f64; PATHS], first: usize, statistic: &mut [f64]) {
+    statistic[first..].iter_mut().zip(sums).for_each(|(place, sum)| *place = *sum);
 }
 
 /// Bytes of the statistics that are found together, at most, unless one alone takes more.
@@ -304,43 +294,24 @@ impl Waiting {
 /// widened. It is off by some 1e-7 of itself, another way in every path.
 const NODES: usize = 16;
 
+/// Paths whose sums stay in registers.
+const LANES: usize = 32;
+
 /// Adds `gaps[i]` times node i of a block of paths to `sums`, [`NODES`] at a time. What is fused is written so, and the order is
 /// that of the nodes: the bits do not depend on the processor.
 #[inline(always)]
 fn add_nodes(gaps: &[f32], nodes: &[[u16; PATHS]], sums: &mut [f64; PATHS]) {
     for (gaps, nodes) in gaps.chunks(NODES).zip(nodes.chunks(NODES)) {
-        add_group(gaps, nodes, sums);
-    }
-}
-
-/// Paths whose sums stay in registers.
-const LANES: usize = 32;
-
-/// Adds as many nodes as go together.
-#[inline(always)]
-fn add_group(gaps: &[f32], nodes: &[[u16; PATHS]], sums: &mut [f64; PATHS]) {
-    for start in (0..PATHS).step_by(LANES) {
-        let mut group = [0.0; LANES];
-        for (gap, node) in gaps.iter().zip(nodes) {
-            for lane in 0..LANES {
-                group[lane] = gap.mul_add(f32::from(node[start + lane]), group[lane]);
+        for start in (0..PATHS).step_by(LANES) {
+            let mut group = [0.0; LANES];
+            for (gap, node) in gaps.iter().zip(nodes) {
+                for lane in 0..LANES {
+                    group[lane] = gap.mul_add(f32::from(node[start + lane]), group[lane]);
+                }
             }
-        }
-        for lane in 0..LANES {
-            sums[start + lane] += f64::from(group[lane]);
-        }
-    }
-}
-
-/// Laws for which the nodes of a path are read together.
-const LAWS: usize = 16;
-
-/// [`add_nodes`] for the weights of all nodes of each of many laws, in the same order for each.
-#[inline(always)]
-fn add_nodes_of_many(weights: &[Vec<f32>], block: &[[u16; PATHS]], sums: &mut [[f64; PATHS]; LAWS]) {
-    for (nodes, first) in block.chunks(NODES).zip((0..).step_by(NODES)) {
-        for (weights, sums) in weights.iter().zip(&mut *sums) {
-            add_group(&weights[first..first + nodes.len()], nodes, sums);
+            for lane in 0..LANES {
+                sums[start + lane] += f64::from(group[lane]);
+            }
         }
     }
 }
@@ -352,7 +323,7 @@ mod tests {
     #[test]
     fn many_laws_at_a_time_are_one_by_one_to_the_last_bit() {
         // Blocks and nodes that come out even, and that do not.
-        for (size, paths) in [(2, 40), (5, 256), (9, 300), (12, 700)] {
+        for (size, paths) in [(2, 40), (5, 256), (9, 300), (12, 700), (17, 256), (40, 300)] {
             let bridges = AbsoluteBridges::simulate(size, paths, 4);
             let law = |shift: usize| {
                 let sample: Vec<f64> = (0..size).map(|k| ((k + shift) as f64).powf(1.3)).collect();

@@ -283,6 +283,27 @@ mod tests {
     }
 
     #[test]
+    fn sixteen_bits_are_off_by_half_of_the_last_at_most() {
+        for size in [2, 10, 600] {
+            let bridges = AbsoluteBridges::simulate(size, 300, 5);
+            let cells = LEAST_CELLS.max(4 * size).next_power_of_two();
+            let places: Vec<Place> = (1..size).map(|node| Place::of(node, size, cells)).collect();
+            let times: Vec<f64> = (1..size).map(|node| node as f64 / size as f64).collect();
+            let mut bridge = vec![0.0; cells + 1];
+            for index in 0..300 {
+                refine(&mut bridge, &mut stream(5, "bridge", 0, index));
+                let mut between = stream(5, "bridge in cells", size, index);
+                let path: Vec<f64> = places.iter().map(|place| place.value(&bridge, &mut between)).collect();
+                let length = length(&times, &path);
+                for ((time, value), unit) in path.iter().enumerate().zip(&bridges.units) {
+                    let kept = f64::from(bridges.values[index / PATHS * (size - 1) + time][index % PATHS]);
+                    assert!((kept - value.abs() / length / unit).abs() < 0.5 + 1e-9, "{size} {index} {time}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn a_path_is_the_same_at_every_sample_size() {
         let (few, many) = (AbsoluteBridges::whole(4, 50, 3), AbsoluteBridges::whole(2048, 50, 3));
         // Node 2 of 4 and node 1024 of 2048 are both the middle.

@@ -76,12 +76,6 @@ struct Undecided {
     ends: [f64; 2],
 }
 
-impl Undecided {
-    fn reciprocals(&self) -> &[f64] {
-        &self.reciprocals[..self.count]
-    }
-}
-
 /// Where a search starts: a quantile, the slope of the share in ln q there, and the relative error of that slope.
 struct Start {
     quantile: f64,
@@ -139,7 +133,7 @@ impl ScaleMixture {
         // Of other draws.
         among.high = 0.0;
         let (quantile, slope) =
-            self.search(tolerance, share, start, |quantile| self.mean(quantile, draws, among, |share| share));
+            search(tolerance, share, start, |quantile| self.mean(quantile, draws, among, |share| share));
         let ratio = quantile / mean;
         let rate = found.filter(|before| before.at != at).map(|before| (ratio - before.ratio) / (at - before.at));
         *found = Some(Found { at, ratio, rate: rate.unwrap_or_default(), slope });
@@ -160,38 +154,6 @@ impl ScaleMixture {
         }
     }
 
-    /// The q with mean F(q / h) = `share`, and the slope there in ln q: secants from a start, and halves of the bracket
-    /// where they leave it, until no more than the tolerance is left.
-    fn search(&self, tolerance: f64, share: f64, start: Start, mut share_below: impl FnMut(f64) -> f64) -> (f64, f64) {
-        let Start { mut quantile, mut slope, mut slope_error } = start;
-        let (mut low, mut high) = (0.0, f64::INFINITY);
-        let mut before: Option<(f64, f64)> = None;
-        for _ in 0..STEP_LIMIT {
-            let missing = share - share_below(quantile);
-            if let Some((missed, step)) = before {
-                slope = ((missed - missing) / step).max(LEAST_SLOPE);
-                slope_error = step.abs();
-            }
-            if missing > 0.0 {
-                low = quantile
-            } else {
-                high = quantile
-            }
-            let mut step = (missing / slope).clamp(-LONGEST_STEP, LONGEST_STEP);
-            let beyond = quantile * step.exp();
-            if beyond < low || beyond > high {
-                step = 0.5 * (low.max(quantile * (-LONGEST_STEP).exp()) * high.min(quantile * LONGEST_STEP.exp())).ln()
-                    - quantile.ln();
-            }
-            quantile *= step.exp();
-            if step.abs() * slope_error < tolerance {
-                break;
-            }
-            before = Some((missing, step));
-        }
-        (quantile, slope)
-    }
-
     /// The mean of a function of F(q / h) over the draws. What is fused is written so, and the sum has fixed accumulators: the
     /// bits do not depend on the processor.
     #[inline(always)]
@@ -202,7 +164,7 @@ impl ScaleMixture {
         let [lowest, highest] = [-1.0, 1.0].map(|position| function(self.polynomial(position)));
         let mut total = among.ends[0] * lowest + among.ends[1] * highest;
         let mut staged = [0.0; BLOCK];
-        for block in among.reciprocals().chunks(BLOCK) {
+        for block in among.reciprocals[..among.count].chunks(BLOCK) {
             let staged = &mut staged[..block.len()];
             // Dispatched apart: in one function with the sum, LLVM leaves the loop over the polynomial scalar.
             dispatched!({
@@ -247,6 +209,38 @@ impl ScaleMixture {
         let [lower @ .., highest] = &self.coefficients;
         lower.iter().rev().fold(*highest, |sum, coefficient| sum.mul_add(position, *coefficient))
     }
+}
+
+/// The q at which `share_below`, the mean of F(q / h), is `share`, and the slope there in ln q: secants from a start, and halves of the bracket
+/// where they leave it, until no more than the tolerance is left.
+fn search(tolerance: f64, share: f64, start: Start, mut share_below: impl FnMut(f64) -> f64) -> (f64, f64) {
+    let Start { mut quantile, mut slope, mut slope_error } = start;
+    let (mut low, mut high) = (0.0, f64::INFINITY);
+    let mut before: Option<(f64, f64)> = None;
+    for _ in 0..STEP_LIMIT {
+        let missing = share - share_below(quantile);
+        if let Some((missed, step)) = before {
+            slope = ((missed - missing) / step).max(LEAST_SLOPE);
+            slope_error = step.abs();
+        }
+        if missing > 0.0 {
+            low = quantile
+        } else {
+            high = quantile
+        }
+        let mut step = (missing / slope).clamp(-LONGEST_STEP, LONGEST_STEP);
+        let beyond = quantile * step.exp();
+        if beyond < low || beyond > high {
+            step = 0.5 * (low.max(quantile * (-LONGEST_STEP).exp()) * high.min(quantile * LONGEST_STEP.exp())).ln()
+                - quantile.ln();
+        }
+        quantile *= step.exp();
+        if step.abs() * slope_error < tolerance {
+            break;
+        }
+        before = Some((missing, step));
+    }
+    (quantile, slope)
 }
 
 /// Of the standard normal law, to 0.003 for shares in [0.001, 0.999]. Source: Shore (1982), Simple approximations for the

@@ -71,3 +71,21 @@ impl ActionInterval {
         ((best.0 - part).max(lowest), (best.0 + part).min(highest))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Wherever the best action of [0.2, 1] lies, and where the value after it dips once below a dent.
+    #[test]
+    fn a_bracket_holds_the_best_action() {
+        let actions = ActionInterval { lowest: 0.2, highest: 1.0 };
+        for best in (0..=40).map(|index| 0.2 + 0.02 * f64::from(index)) {
+            let dented = |action: f64| if (action - 0.5).abs() < 0.02 { -9.0 } else { -(action - best).powi(2) };
+            for value in [&dented as &dyn Fn(f64) -> f64, &|action: f64| -(action - best).powi(2)] {
+                let (low, high) = actions.bracket(value);
+                assert!(low <= best + 1e-12 && best - 1e-12 <= high && high - low < 0.21, "{best}: [{low}, {high}]");
+            }
+        }
+    }
+}
