@@ -18,7 +18,8 @@ use support::{App, specification};
 
 /// Long enough for a loaded machine to renew in, short enough to wait for.
 const LEASE: Duration = Duration::from_secs(3);
-const STEPS: usize = 40;
+/// Trainings that last for seconds, so that a fault or a look every second falls inside.
+const STEPS: usize = 120;
 
 struct Replica {
     child: Child,
