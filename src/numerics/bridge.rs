@@ -40,7 +40,7 @@ pub struct Quantile {
 impl AbsoluteBridges {
     /// The statistic over the direction of every path: H divided by the length of the path. Cost O(min(n, 540) paths).
     pub(super) fn directional_statistic(&self, law: &EmpiricalDistribution, which: Statistic) -> Vec<f64> {
-        self.directional_statistics(&[law], which).concat()
+        self.directional_statistics(&[law], which).swap_remove(0)
     }
 
     /// The same for many laws of one size, to the same bits. Cost as one by one, with the bridges read from memory once.
@@ -48,14 +48,14 @@ impl AbsoluteBridges {
     /// Checked by: `many_laws_at_a_time_are_one_by_one_to_the_last_bit`.
     fn directional_statistics(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<Vec<f64>> {
         let weights: Vec<Waiting> = laws.iter().map(|law| Weights::of(self, law, which).take()).collect();
-        let mut statistics = vec![vec![0.0; self.paths]; laws.len()];
-        for (block, first) in self.blocks().zip((0..).step_by(PATHS)) {
+        // Whole blocks of paths, of which the last may be longer than what there is of them.
+        let mut statistics: Vec<_> = laws.iter().map(|_| vec![0.0; self.paths.next_multiple_of(PATHS)]).collect();
+        for (index, block) in self.blocks().enumerate() {
             for (waiting, statistic) in weights.iter().zip(&mut statistics) {
-                let mut sums = [0.0; PATHS];
-                waiting.pour(block, &mut sums);
-                keep(&sums, first, statistic);
+                waiting.pour(block, &mut statistic.as_chunks_mut().0[index]);
             }
         }
+        statistics.iter_mut().for_each(|statistic| statistic.truncate(self.paths));
         statistics
     }
 

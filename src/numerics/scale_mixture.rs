@@ -69,9 +69,8 @@ struct Undecided {
     /// The range, as quantiles.
     low: f64,
     high: f64,
-    /// Of the draws, in the first places; what lies behind is of searches before.
+    /// Of the draws.
     reciprocals: Vec<f64>,
-    count: usize,
     /// Draws of which F is at the lower and at the upper end of its interval.
     ends: [f64; 2],
 }
@@ -164,7 +163,7 @@ impl ScaleMixture {
         let [lowest, highest] = [-1.0, 1.0].map(|position| function(self.polynomial(position)));
         let mut total = among.ends[0] * lowest + among.ends[1] * highest;
         let mut staged = [0.0; BLOCK];
-        for block in among.reciprocals[..among.count].chunks(BLOCK) {
+        for block in among.reciprocals.chunks(BLOCK) {
             let staged = &mut staged[..block.len()];
             // Dispatched apart: in one function with the sum, LLVM leaves the loop over the polynomial scalar.
             dispatched!({
@@ -183,16 +182,21 @@ impl ScaleMixture {
         // F stands still below the first and above the second.
         let [low, high] = [-1.0, 1.0].map(|position| (position - self.offset) / self.rate);
         let (least, most) = (among.low / high, if low > 0.0 { among.high / low } else { f64::INFINITY });
-        among.reciprocals.resize(draws.len().max(among.reciprocals.len()), 0.0);
-        let mut count = 0;
-        for &draw in draws {
-            among.reciprocals[count] = draw;
-            count += usize::from((draw > least) & (draw < most));
+        among.reciprocals.clear();
+        among.reciprocals.reserve(draws.len());
+        let mut staged = [0.0; BLOCK];
+        for block in draws.chunks(BLOCK) {
+            // Without a branch, which nobody could foretell.
+            let mut count = 0;
+            for &draw in block {
+                staged[count] = draw;
+                count += usize::from((draw > least) & (draw < most));
+            }
+            among.reciprocals.extend_from_slice(&staged[..count]);
         }
         let beyond = dispatched!(draws.iter().filter(|draw| **draw >= most).count());
-        among.count = count;
-        among.ends = [beyond as f64, (draws.len() - count - beyond) as f64];
-        let undecided = &mut among.reciprocals[..count];
+        let undecided = &mut among.reciprocals;
+        among.ends = [beyond as f64, (draws.len() - undecided.len() - beyond) as f64];
         dispatched!(undecided.iter_mut().for_each(|draw| *draw = 1.0 / *draw));
     }
 
