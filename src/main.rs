@@ -8,8 +8,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use command::{
-    advise, audit, backtest, backup, bench, check, demo, evaluate, frontier, healthcheck, keys, loadtest, reproduce,
-    serve,
+    advise, audit, backtest, backup, bench, check, coverage, demo, evaluate, frontier, healthcheck, keys, loadtest,
+    reproduce, serve,
 };
 
 /// Nonparametric adaptive robust control of an investor, as a service.
@@ -37,6 +37,8 @@ enum Command {
     Backtest(backtest::BacktestArgs),
     /// Say what more or less caution would cost on records like the one in a file.
     Frontier(frontier::FrontierArgs),
+    /// Say how often balls hold the law that records come from, and what they cost.
+    Coverage(coverage::CoverageArgs),
     /// Compare frameworks out of sample, in this process.
     Evaluate(evaluate::Evaluate),
     /// Compute the tables and figures of the paper's section 3 anew.
@@ -71,6 +73,7 @@ async fn main() -> ExitCode {
         Command::Advise(arguments) => tokio::task::block_in_place(|| advise::run(&arguments)),
         Command::Backtest(arguments) => tokio::task::block_in_place(|| backtest::run(&arguments)).map_err(Into::into),
         Command::Frontier(arguments) => tokio::task::block_in_place(|| frontier::run(&arguments)),
+        Command::Coverage(arguments) => tokio::task::block_in_place(|| coverage::run(&arguments)),
         Command::Evaluate(arguments) => tokio::task::block_in_place(|| evaluate::run(&arguments)),
         Command::Reproduce(arguments) => tokio::task::block_in_place(|| reproduce::run(&arguments)),
         Command::Loadtest(arguments) => tokio::task::block_in_place(|| loadtest::run(&arguments)),

@@ -125,6 +125,29 @@ fn the_known_law_promises_its_value_and_keeps_it() {
 }
 
 #[test]
+fn the_own_mix_is_what_a_constant_mix_of_the_average_allocation_earns() {
+    let request = |mixes: Vec<f64>| small(json!({ "frameworks": ["plug_in"], "constant_mixes": mixes, "paths": 400 }));
+    let (_, _, outcomes) = simulated(request(vec![]));
+    let held = outcomes.outcomes.iter().flat_map(|outcome| &outcome.lived).map(|lived| lived.allocation);
+    let average = held.sum::<f64>() / (4.0 * 400.0);
+    let report = reported(request(vec![average]));
+    let own = report.strategies[0].own_mix.unwrap();
+    assert!((own.allocation - average).abs() < 1e-12 && report.strategies[1].own_mix.is_none());
+    // The mix was asked for by name here, and is compared with the framework as its reference.
+    let apart = report.strategies[1].difference.as_ref().unwrap().certainty_equivalent;
+    for (found, expected) in
+        [(own.beyond.value, -apart.value), (own.beyond.low, -apart.high), (own.beyond.high, -apart.low)]
+    {
+        assert!((found - expected).abs() < 1e-9, "{own:?} {apart:?}");
+    }
+    assert!(
+        report.sentences.len() == 1 && report.sentences[0].contains("plug_in differs by"),
+        "{:?}",
+        report.sentences
+    );
+}
+
+#[test]
 fn differences_are_paired() {
     let (evaluation, followers, outcomes) =
         simulated(small(json!({ "frameworks": ["plug_in"], "constant_mixes": [0.4, 0.5], "paths": 400 })));

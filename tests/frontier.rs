@@ -58,6 +58,7 @@ fn losses_on_blocks_agree_with_brute_force() {
     // Records of its own, advised by the one-asset solver.
     let mut generator = rand_chacha::ChaCha8Rng::seed_from_u64(99);
     let mut lost = vec![Vec::new(); SCALES.len()];
+    let mut average = [0.0; SCALES.len()];
     for _ in 0..draws {
         let starts: Vec<usize> = (0..36 / block).map(|_| generator.random_range(0..36)).collect();
         let record: Vec<f64> = starts
@@ -65,11 +66,13 @@ fn losses_on_blocks_agree_with_brute_force() {
             .flat_map(|start| (0..block).map(move |k| (start + k) % 36))
             .map(|date| history[date])
             .collect();
-        for (lost, scale) in lost.iter_mut().zip(SCALES) {
-            lost.push(12e4 * (best - worth(&history, advised(&record, scale))));
+        for ((lost, average), scale) in lost.iter_mut().zip(&mut average).zip(SCALES) {
+            let allocation = advised(&record, scale);
+            lost.push(12e4 * (best - worth(&history, allocation)));
+            *average += allocation / f64::from(draws);
         }
     }
-    for (point, lost) in blocks.points.iter().zip(lost) {
+    for ((point, lost), average) in blocks.points.iter().zip(lost).zip(average) {
         let count = lost.len() as f64;
         let mean = lost.iter().sum::<f64>() / count;
         let deviation = (lost.iter().map(|lost| (lost - mean).powi(2)).sum::<f64>() / count).sqrt();
@@ -77,6 +80,9 @@ fn losses_on_blocks_agree_with_brute_force() {
         let tolerance = 4.0 * 2.0_f64.sqrt() * (point.lost.high - point.lost.low) / (2.0 * 1.645);
         assert!((point.lost.value - mean).abs() < tolerance, "{point:?} {mean} {tolerance}");
         assert!((point.deviation.value / deviation - 1.0).abs() < 0.15, "{point:?} {deviation}");
+        let beyond = 12e4 * (best - worth(&history, average)) - mean;
+        assert!((point.beyond_own_mix.value - beyond).abs() < tolerance, "{point:?} {beyond} {tolerance}");
+        assert!(point.beyond_own_mix.value < 1e-9, "{point:?}");
     }
     let lost: Vec<f64> = blocks.points.iter().map(|point| point.lost.value).collect();
     assert!(
@@ -92,7 +98,7 @@ fn at_the_record_itself_it_advises_as_advise_does() {
     for (own, scale) in found.own.iter().zip(SCALES) {
         assert!((own[0] - advised(&history, scale)).abs() < 1e-3, "{scale}: {own:?}");
     }
-    assert!(found.per_year && found.sentences.len() == 5, "{:?}", found.sentences);
+    assert!(found.per_year && found.sentences.len() == 6, "{:?}", found.sentences);
     let simple: Vec<f64> = history.iter().map(|value| value.exp() - 1.0).collect();
     let mean = simple.iter().sum::<f64>() / 60.0;
     let error = (simple.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / 59.0 / 60.0).sqrt();

@@ -90,16 +90,20 @@ fn table(text: &mut String, report: &FrontierReport, Resampled { bootstrap, best
     // Writing to a string cannot fail.
     let _ = writeln!(text, "{records}; who knows their law holds {best:.1} %.");
     let lost = format!("lost {per}, bp [90 %]");
-    let _ =
-        writeln!(text, "{:>8}{lost:>26}{:>24}{:>10}{:>16}", "scale", "from record to record", "held", "held on yours");
+    let _ = writeln!(
+        text,
+        "{:>8}{lost:>26}{:>24}{:>20}{:>10}{:>16}",
+        "scale", "from record to record", "beyond its own mix", "held", "held on yours"
+    );
     for (point, own) in points.iter().zip(&report.own) {
         let lost = format!("{:.1} [{:.1}, {:.1}]", point.lost.value, point.lost.low, point.lost.high);
         let (held, own) = (100.0 * point.total, 100.0 * own.iter().sum::<f64>());
         let _ = writeln!(
             text,
-            "{:>8}{lost:>26}{:>24.1}{:>10}{:>16}",
+            "{:>8}{lost:>26}{:>24.1}{:>20.1}{:>10}{:>16}",
             point.scale,
             point.deviation.value,
+            point.beyond_own_mix.value,
             format!("{held:.1} %"),
             format!("{own:.1} %")
         );

@@ -8,6 +8,7 @@ pub mod backup;
 pub mod bench;
 pub mod check;
 mod compare;
+pub mod coverage;
 pub mod demo;
 pub mod evaluate;
 pub mod frontier;

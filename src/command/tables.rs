@@ -23,6 +23,7 @@ pub fn estimates(strategy: &StrategyReport) -> Vec<(&'static str, Estimate)> {
         found.push(("difference_utility", difference.utility));
         found.push(("difference_certainty_equivalent", difference.certainty_equivalent));
     }
+    found.extend(strategy.own_mix.map(|own_mix| ("beyond_own_mix", own_mix.beyond)));
     found
 }
 
@@ -53,7 +54,7 @@ pub fn screen(report: &EvaluationReport) -> String {
             strategy.certainty_equivalent.value,
         );
     }
-    text
+    text + "\n" + &report.sentences.join("\n") + "\n"
 }
 
 /// One row a strategy and statistic.

@@ -3,6 +3,7 @@
 pub mod block_bootstrap;
 pub mod bridge;
 pub mod bridge_paths;
+pub mod calibration;
 pub mod chebyshev;
 pub mod cholesky;
 pub mod confidence_region;

@@ -29,7 +29,8 @@ fn strategies(shown: &Shown) -> String {
             ("sharpe_ratio", figures.sharpe_ratio),
             ("annual_turnover", figures.annual_turnover),
         ];
-        for (name, estimate) in estimates {
+        let beyond = figures.beyond_own_mix.map(|beyond| ("beyond_own_mix", beyond));
+        for (name, estimate) in estimates.into_iter().chain(beyond) {
             let [low, high] = estimate.interval;
             let fields: [&dyn Display; 5] = [&figures.strategy, &name, &estimate.value, &low, &high];
             csv.row(fields);

@@ -173,6 +173,7 @@ fn utility_table(shown: &Shown) -> Table {
             "strategy",
             "certainty equivalent",
             &format!("{main} less this"),
+            "beyond its own mix",
             "mean allocation, %",
             &format!("all-bank {}s, %", noun(shown)),
         ],
@@ -182,6 +183,7 @@ fn utility_table(shown: &Shown) -> Table {
             figures.strategy.as_str().into(),
             estimate(figures.yearly_certainty_equivalent, 1.0, 2),
             if figures.strategy == *main { number(f64::NAN, 2) } else { estimate(figures.adaptive_ahead, 1.0, 2) },
+            figures.beyond_own_mix.map_or_else(|| number(f64::NAN, 2), |beyond| estimate(beyond, 1.0, 2)),
             number(100.0 * figures.mean_allocation, 1),
             number(100.0 * figures.all_bank_share, 0),
         ])

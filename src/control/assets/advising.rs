@@ -17,7 +17,7 @@ const FACTOR_PATHS: usize = 1000;
 /// Of the radius of all funds at once over that of one; 1 where there is one, and under rules that look at the sample size alone.
 pub fn radius_factor(problem: &AssetsProblem, fund: &ProblemSpecification, seed: u64) -> f64 {
     match fund.radius_rule() {
-        RadiusRule::Bridge { alpha, .. } if problem.assets.len() > 1 => {
+        RadiusRule::Bridge { alpha, .. } | RadiusRule::Calibrated { alpha, .. } if problem.assets.len() > 1 => {
             FundBridges::simulate(&problem.history, FACTOR_PATHS, seed).joint_factor(alpha).value
         }
         _ => 1.0,

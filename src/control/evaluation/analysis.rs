@@ -53,6 +53,12 @@ impl Line {
         Line { hindsight: true, ..Line::new(name, vec![decision; periods.len()], periods, cost) }
     }
 
+    /// Whether it holds one share throughout: such a line times nothing.
+    fn is_constant(&self) -> bool {
+        let first = self.decisions.first().map(|decision| decision.band);
+        self.decisions.iter().all(|decision| Some(decision.band) == first && decision.band.low == decision.band.high)
+    }
+
     fn mean_allocation(&self) -> f64 {
         self.account.allocations.iter().sum::<f64>() / self.account.allocations.len() as f64
     }
@@ -64,6 +70,8 @@ pub struct Scale {
     pub periods_per_year: usize,
     /// Of a year's wealth.
     pub utility: UtilitySpecification,
+    /// Lost of what is traded, as a share of it.
+    pub trading_cost: f64,
     /// Of the resamples.
     pub seed: u64,
 }
@@ -73,6 +81,8 @@ struct Measured {
     annual: Annual,
     turnover: f64,
     certainty_equivalent: f64,
+    /// That of the constant mix of its own average; the same where it is one.
+    of_own_mix: f64,
 }
 
 /// The series of one strategy that are resampled.
@@ -80,6 +90,8 @@ struct Series<'a> {
     returns: Vec<f64>,
     traded: &'a [f64],
     growth: Vec<f64>,
+    /// Of the constant mix of its own average, unless it is one.
+    growth_of_own_mix: Option<Vec<f64>>,
 }
 
 impl Series<'_> {
@@ -88,14 +100,13 @@ impl Series<'_> {
             |values: &[f64], indices: &[usize]| -> Vec<f64> { indices.iter().map(|&index| values[index]).collect() };
         let per_year = scale.periods_per_year as f64;
         let traded: f64 = periods.iter().map(|&period| self.traded[period]).sum();
+        let worth = |growth: &[f64]| yearly_certainty_equivalent(scale.utility, &pick(growth, years), INITIAL_WEALTH);
+        let certainty_equivalent = worth(&self.growth);
         Measured {
             annual: Annual::of(&pick(&self.returns, periods), &pick(bank, periods), per_year),
             turnover: per_year * traded / periods.len() as f64,
-            certainty_equivalent: yearly_certainty_equivalent(
-                scale.utility,
-                &pick(&self.growth, years),
-                INITIAL_WEALTH,
-            ),
+            certainty_equivalent,
+            of_own_mix: self.growth_of_own_mix.as_deref().map_or(certainty_equivalent, worth),
         }
     }
 }
@@ -111,6 +122,8 @@ impl Analysis {
                 returns: line.account.returns(),
                 traded: &line.account.traded,
                 growth: line.account.yearly_growth(scale.periods_per_year),
+                growth_of_own_mix: (!line.is_constant())
+                    .then(|| line.hindsight(periods, scale.trading_cost).account.yearly_growth(scale.periods_per_year)),
             })
             .collect();
         let years = periods.len() / scale.periods_per_year;
@@ -143,6 +156,10 @@ impl Analysis {
                 hindsight: line.hindsight,
                 yearly_certainty_equivalent: estimate(&|all| all[index].certainty_equivalent),
                 adaptive_ahead: estimate(&|all| all[main].certainty_equivalent - all[index].certainty_equivalent),
+                beyond_own_mix: series[index]
+                    .growth_of_own_mix
+                    .is_some()
+                    .then(|| estimate(&|all| all[index].certainty_equivalent - all[index].of_own_mix)),
                 annual_mean: estimate(&|all| all[index].annual.mean),
                 annual_volatility: estimate(&|all| all[index].annual.volatility),
                 sharpe_ratio: estimate(&|all| all[index].annual.sharpe_ratio),

@@ -159,7 +159,7 @@ impl Backtest {
             names.zip(decisions).map(|(name, decisions)| Line::new(name, decisions, lived, cost)).collect();
         lines.push(lines[main].hindsight(lived, cost));
         let (periods_per_year, seed) = (self.periods_per_year, self.walk.seed);
-        let scale = Scale { periods_per_year, utility: self.walk.utility(), seed };
+        let scale = Scale { periods_per_year, utility: self.walk.utility(), trading_cost: cost, seed };
         let analysis = Analysis::of(&lines, main, lived, &scale);
         Walked { backtest: self, lines, analysis }
     }

@@ -88,6 +88,9 @@ pub struct BacktestFigures {
     pub yearly_certainty_equivalent: BootstrapEstimate,
     /// That of the main adaptive strategy less this one.
     pub adaptive_ahead: BootstrapEstimate,
+    /// Its own less that of a constant mix of its average allocation, which nobody could have chosen beforehand: what changing the
+    /// allocation earned. Null for constant mixes.
+    pub beyond_own_mix: Option<BootstrapEstimate>,
     /// Of simple returns.
     pub annual_mean: BootstrapEstimate,
     /// Standard deviation of simple returns.

@@ -4,6 +4,7 @@ pub mod account;
 pub mod analysis;
 pub mod backtest;
 pub mod backtest_report;
+pub mod coverage;
 pub mod frontier;
 pub mod paths;
 pub mod report;

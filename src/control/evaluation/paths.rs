@@ -185,6 +185,14 @@ impl Evaluation {
     }
 }
 
+/// Terminal wealth of a constant mix.
+pub fn mix_wealth(periods: &[Dynamics], initial_wealth: f64, mix: f64, returns: &[f64]) -> f64 {
+    let step = |(wealth, holding): (f64, f64), (dynamics, &log_return): (&Dynamics, &f64)| {
+        dynamics.next(wealth, holding, dynamics.highest_action(wealth, mix), log_return)
+    };
+    periods.iter().zip(returns).fold((initial_wealth, 0.0), step).0
+}
+
 fn true_law(request: &EvaluationRequest) -> ContinuousLaw {
     let law = request.problem.law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
     continuous_law(law, &request.problem)
@@ -265,10 +273,7 @@ impl Simulator<'_> {
             )?);
         }
         for &mix in self.evaluation.request.mixes() {
-            let step = |(wealth, holding): (f64, f64), (dynamics, &log_return): (&Dynamics, &f64)| {
-                dynamics.next(wealth, holding, dynamics.highest_action(wealth, mix), log_return)
-            };
-            outcome.wealth.push(self.periods.iter().zip(&returns).fold((problem.initial_wealth, 0.0), step).0);
+            outcome.wealth.push(mix_wealth(&self.periods, problem.initial_wealth, mix, &returns));
         }
         self.report_path();
         Ok((outcome, seconds))

@@ -25,6 +25,8 @@ pub struct EvaluationReport {
     pub histogram_edges: Vec<f64>,
     /// In the order they were drawn.
     pub histories: Vec<HistoryReport>,
+    /// What the figures say of each framework that changes its allocation.
+    pub sentences: Vec<String>,
     /// What it took.
     pub costs: Costs,
 }
@@ -59,6 +61,8 @@ pub struct StrategyReport {
     pub wealth: WealthReport,
     /// This strategy less the reference, on the same returns; null for the reference.
     pub difference: Option<Difference>,
+    /// Beside the constant mix of its own average; null for constant mixes.
+    pub own_mix: Option<OwnMix>,
     /// Counts of the bins between `histogram_edges`.
     pub histogram: Vec<usize>,
     /// Period by period; null for constant mixes.
@@ -100,6 +104,15 @@ pub struct Difference {
     pub utility: Estimate,
     /// Of the certainty equivalent, in terminal wealth.
     pub certainty_equivalent: Estimate,
+}
+
+/// The constant mix of a strategy's own average allocation, which nobody could have chosen beforehand, on the same returns.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct OwnMix {
+    /// The average, over all periods of all paths.
+    pub allocation: f64,
+    /// Certainty equivalent of the strategy less that of the mix, in terminal wealth: what changing the allocation earned.
+    pub beyond: Estimate,
 }
 
 /// One period over all paths.

@@ -2,11 +2,12 @@
 
 use rayon::prelude::*;
 
-use crate::control::evaluation::paths::{Evaluation, Follower, HistoryStart, Lived, Outcomes};
+use crate::control::evaluation::paths::{Evaluation, Follower, HistoryStart, Lived, Outcomes, mix_wealth};
 use crate::control::evaluation::report::{
-    Costs, Coverage, CoverageAtSize, Difference, EvaluationReport, FORMAT, HistoryReport, PeriodReport, RadiusSpread,
-    Spread, StrategyReport, UtilityReport, WealthReport,
+    Costs, Coverage, CoverageAtSize, Difference, EvaluationReport, FORMAT, HistoryReport, OwnMix, PeriodReport,
+    RadiusSpread, Spread, StrategyReport, UtilityReport, WealthReport,
 };
+use crate::control::evaluation::verdict::what_timing_did;
 use crate::control::policy::content_hash;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::utility::{RelativeUtility, utility};
@@ -53,6 +54,7 @@ impl EvaluationReport {
             format: FORMAT.to_owned(),
             reference: strategies.get(reference).map_or(String::new(), |strategy| strategy.strategy.clone()),
             histories: table.histories(),
+            sentences: strategies.iter().filter_map(sentence).collect(),
             strategies,
             request: request.clone(),
             costs,
@@ -104,7 +106,8 @@ impl Table<'_> {
             constant_mix: mix,
             policy: policy.map(|json| content_hash(&json)),
             utility: self.utility(utilities),
-            certainty_equivalent: self.certainty_equivalent(index),
+            certainty_equivalent: self.certainty_equivalent(&self.wealth[index]),
+            own_mix: follower.map(|_| self.own_mix(index)),
             wealth: WealthReport { mean: self.sample.mean(&self.wealth[index]) },
             difference: (index != self.reference).then(|| self.difference(index)),
             histogram: self.histogram(utilities),
@@ -128,29 +131,48 @@ impl Table<'_> {
     }
 
     /// The mean in units of the floor, where nothing saturates, taken back to wealth; no further than wealths seen.
-    fn certainty_equivalent(&self, index: usize) -> Estimate {
+    fn certainty_equivalent(&self, wealth: &[f64]) -> Estimate {
         let (relative, floor) = self.relative_utility();
-        let extreme = |pick: fn(f64, f64) -> f64, start: f64| self.wealth[index].iter().copied().fold(start, pick);
+        let extreme = |pick: fn(f64, f64) -> f64, start: f64| wealth.iter().copied().fold(start, pick);
         let (lowest, highest) = (extreme(f64::min, f64::INFINITY), extreme(f64::max, f64::NEG_INFINITY));
         let [least, most] = [lowest, highest].map(|wealth| relative.value((wealth / floor).ln()));
-        let mean = self.sample.mean(&self.relative_utilities(index));
+        let mean = self.sample.mean(&self.relative_utilities(wealth));
         mean.mapped(|value| floor * relative.inverse(value.clamp(least, most)).exp())
     }
 
-    /// Certainty equivalents by the delta method: each utility weighs as U^{-1} is steep at its strategy's mean.
     fn difference(&self, index: usize) -> Difference {
-        let (relative, floor) = self.relative_utility();
-        let linear = |index: usize| {
-            let values = self.relative_utilities(index);
-            let mean = self.sample.mean(&values).value;
-            let slope = floor * wealth_slope(relative, mean);
-            let found = self.certainty_equivalent(index).value;
-            values.into_iter().map(move |value| found + slope * (value - mean))
-        };
-        let apart: Vec<f64> = linear(index).zip(linear(self.reference)).map(|(own, other)| own - other).collect();
         let pairs = self.utilities[index].iter().zip(&self.utilities[self.reference]);
         let utility: Vec<f64> = pairs.map(|(own, other)| own - other).collect();
-        Difference { utility: self.sample.mean(&utility), certainty_equivalent: self.sample.mean(&apart) }
+        let certainty_equivalent = self.apart(&self.wealth[index], &self.wealth[self.reference]);
+        Difference { utility: self.sample.mean(&utility), certainty_equivalent }
+    }
+
+    /// Certainty equivalents by the delta method: each utility weighs as U^{-1} is steep at its strategy's mean.
+    fn apart(&self, own: &[f64], other: &[f64]) -> Estimate {
+        let (relative, floor) = self.relative_utility();
+        let linear = |wealth: &[f64]| {
+            let values = self.relative_utilities(wealth);
+            let mean = self.sample.mean(&values).value;
+            let slope = floor * wealth_slope(relative, mean);
+            let found = self.certainty_equivalent(wealth).value;
+            values.into_iter().map(move |value| found + slope * (value - mean))
+        };
+        let apart: Vec<f64> = linear(own).zip(linear(other)).map(|(own, other)| own - other).collect();
+        self.sample.mean(&apart)
+    }
+
+    /// The mix goes through the returns of every path anew, since its share is known only now.
+    fn own_mix(&self, index: usize) -> OwnMix {
+        let Evaluation { request, .. } = self.evaluation;
+        let (sum, count) = self.lived(index).fold((0.0, 0), |(sum, count), lived| (sum + lived.allocation, count + 1));
+        let allocation = sum / f64::from(count);
+        let periods = Dynamics::of(&request.problem);
+        let of_path = |path: usize| {
+            let returns = self.evaluation.returns(path / request.paths, path % request.paths);
+            mix_wealth(&periods, request.problem.initial_wealth, allocation, &returns)
+        };
+        let wealth: Vec<f64> = (0..self.outcomes.outcomes.len()).into_par_iter().map(of_path).collect();
+        OwnMix { allocation, beyond: self.apart(&self.wealth[index], &wealth) }
     }
 
     /// Utility in units of the terminal wealth of all-bank, and that wealth.
@@ -160,9 +182,9 @@ impl Table<'_> {
         (RelativeUtility::new(problem.utility, floor), floor)
     }
 
-    fn relative_utilities(&self, index: usize) -> Vec<f64> {
+    fn relative_utilities(&self, wealth: &[f64]) -> Vec<f64> {
         let (relative, floor) = self.relative_utility();
-        self.wealth[index].iter().map(|wealth| relative.value((wealth / floor).ln())).collect()
+        wealth.iter().map(|wealth| relative.value((wealth / floor).ln())).collect()
     }
 
     fn histogram(&self, utilities: &[f64]) -> Vec<usize> {
@@ -238,6 +260,18 @@ impl Table<'_> {
         };
         starts.map(report).collect()
     }
+}
+
+/// Whether changing the allocation earned anything.
+fn sentence(strategy: &StrategyReport) -> Option<String> {
+    let OwnMix { allocation, beyond: Estimate { value, low, high } } = strategy.own_mix?;
+    Some(format!(
+        "Against a constant mix of its own average allocation, {:.1} %, which nobody knew beforehand, {} differs by {value:+.3} \
+         [{low:.3}, {high:.3}]: {}.",
+        100.0 * allocation,
+        strategy.strategy,
+        what_timing_did([low, high], "these paths do")
+    ))
 }
 
 /// True where the framework's uncertainty set is a Wasserstein ball.

@@ -26,6 +26,7 @@ pub fn sentences(walked: &Walked) -> Vec<String> {
     } else {
         sentences.push(against(others));
         sentences.extend(timing(figures, main));
+        sentences.push(timing_of_others(figures, main));
     }
     sentences.push(holding(&figures[main], backtest));
     sentences.extend(drawdown(figures, main));
@@ -51,42 +52,55 @@ fn ranking(figures: &[BacktestFigures], main: usize) -> String {
 
 /// Which strategies are behind, ahead, or not to be told apart.
 fn against<'a>(others: impl Iterator<Item = &'a BacktestFigures>) -> String {
-    let mut groups: [Vec<&str>; 3] = Default::default();
-    for other in others {
-        let BootstrapEstimate { interval: [low, high], .. } = other.adaptive_ahead;
-        let group = if low > 0.0 {
-            0
-        } else if high < 0.0 {
-            1
-        } else {
-            2
-        };
-        groups[group].push(&other.strategy);
-    }
-    let named = |names: &[&str]| if names.is_empty() { "none".into() } else { names.join("; ") };
+    let [better, worse, unclear] = grouped(others.map(|other| (other.strategy.as_str(), other.adaptive_ahead)));
     format!(
-        "By the interval of the difference it is better than: {}. Worse than: {}. Not to be told apart from: {}.",
-        named(&groups[0]),
-        named(&groups[1]),
-        named(&groups[2])
+        "By the interval of the difference it is better than: {better}. Worse than: {worse}. Not to be told apart from: {unclear}."
     )
+}
+
+/// Who has an interval above zero, who below, and who around it.
+fn grouped<'a>(differences: impl Iterator<Item = (&'a str, BootstrapEstimate)>) -> [String; 3] {
+    let mut groups: [Vec<&str>; 3] = Default::default();
+    for (name, BootstrapEstimate { interval: [low, high], .. }) in differences {
+        let group = match () {
+            () if low > 0.0 => 0,
+            () if high < 0.0 => 1,
+            () => 2,
+        };
+        groups[group].push(name);
+    }
+    groups.map(|names| if names.is_empty() { "none".into() } else { names.join("; ") })
+}
+
+/// What changing the allocation earned by its interval, as `witness` shows it.
+pub fn what_timing_did([low, high]: [f64; 2], witness: &str) -> String {
+    match () {
+        () if low > 0.0 => "changing the allocation paid".into(),
+        () if high < 0.0 => "changing the allocation cost".into(),
+        () => format!("{witness} not show that changing the allocation did anything"),
+    }
 }
 
 /// Whether moving in and out did anything that its average would not have done.
 fn timing(figures: &[BacktestFigures], main: usize) -> Option<String> {
-    let constant = figures.iter().find(|figures| figures.hindsight)?;
-    let BootstrapEstimate { value, interval: [low, high] } = constant.adaptive_ahead;
-    let verdict = match () {
-        () if low > 0.0 => "changing the allocation paid",
-        () if high < 0.0 => "changing the allocation cost",
-        () => "the record does not show that changing the allocation did anything",
-    };
+    let BootstrapEstimate { value, interval: [low, high] } = figures[main].beyond_own_mix?;
+    let verdict = what_timing_did([low, high], "the record does");
     Some(format!(
         "Against a constant mix of its own average allocation, {:.1} %, which nobody knew beforehand, {} differs \
          by {value:+.2} [{low:.2}, {high:.2}]: {verdict}.",
         100.0 * figures[main].mean_allocation,
         figures[main].strategy
     ))
+}
+
+/// The same of every other strategy that changes its allocation.
+fn timing_of_others(figures: &[BacktestFigures], main: usize) -> String {
+    let others = figures.iter().enumerate().filter(|(index, _)| *index != main);
+    let [paid, cost, unclear] =
+        grouped(others.filter_map(|(_, other)| Some((other.strategy.as_str(), other.beyond_own_mix?))));
+    format!(
+        "Against such mixes of their own, changing the allocation paid for: {paid}. It cost: {cost}. The record shows neither for: {unclear}."
+    )
 }
 
 fn holding(figures: &BacktestFigures, backtest: &Backtest) -> String {
@@ -199,6 +213,7 @@ mod tests {
             hindsight,
             yearly_certainty_equivalent: at(value, [value - 1.0, value + 1.0]),
             adaptive_ahead: at(0.5 * (ahead[0] + ahead[1]), ahead),
+            beyond_own_mix: None,
             annual_mean: none,
             annual_volatility: none,
             sharpe_ratio: none,
@@ -227,10 +242,24 @@ mod tests {
             against(all[1..4].iter()),
             "By the interval of the difference it is better than: plug-in. Worse than: all-bank. Not to be told apart from: 60/40."
         );
-        assert!(timing(&all, 0).unwrap().ends_with("-2.00 [-3.00, -1.00]: changing the allocation cost."));
-        for (ahead, verdict) in [([1.0, 2.0], "changing the allocation paid."), ([-1.0, 2.0], "did anything.")] {
-            let hindsight = figures("constant", 100.0, ahead, true);
-            assert!(timing(&[all[0].clone(), hindsight], 0).unwrap().ends_with(verdict));
+        assert_eq!(timing(&all, 0), None);
+        let timed = |low: f64, high: f64| {
+            let beyond = BootstrapEstimate { value: 0.5 * (low + high), interval: [low, high] };
+            BacktestFigures { beyond_own_mix: Some(beyond), ..all[0].clone() }
+        };
+        for (beyond, verdict) in [
+            ([-3.0, -1.0], "-2.00 [-3.00, -1.00]: changing the allocation cost."),
+            ([1.0, 2.0], "changing the allocation paid."),
+            ([-1.0, 2.0], "did anything."),
+        ] {
+            assert!(timing(&[timed(beyond[0], beyond[1])], 0).unwrap().ends_with(verdict));
         }
+        let named = |name: &str, low, high| BacktestFigures { strategy: name.into(), ..timed(low, high) };
+        let some =
+            [named("a", 1.0, 2.0), named("b", -2.0, -1.0), named("c", -1.0, 1.0), named("d", 0.5, 1.0), all[1].clone()];
+        assert_eq!(
+            timing_of_others(&some, 0),
+            "Against such mixes of their own, changing the allocation paid for: d. It cost: b. The record shows neither for: c."
+        );
     }
 }

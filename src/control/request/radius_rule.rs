@@ -22,6 +22,19 @@ pub enum RadiusRule {
         #[serde(default = "defaults::scale")]
         scale: f64,
     },
+    /// That of `bridge` times a factor found once, from the history: with it, the balls of a share 1 - alpha of records drawn from the
+    /// smoothed law of the history hold that law.
+    Calibrated {
+        /// Miscoverage.
+        #[serde(default = "defaults::alpha")]
+        alpha: f64,
+        /// Simulated paths.
+        #[serde(default = "defaults::paths")]
+        paths: usize,
+        /// One more factor on the radius.
+        #[serde(default = "defaults::scale")]
+        scale: f64,
+    },
     /// `sqrt(ln(C / alpha) / (c n))`, the concentration inequality of Fournier and Guillin.
     Concentration {
         /// Miscoverage.
@@ -58,6 +71,7 @@ impl RadiusRule {
     pub fn name(&self) -> &'static str {
         match self {
             RadiusRule::Bridge { .. } => "bridge",
+            RadiusRule::Calibrated { .. } => "calibrated",
             RadiusRule::Concentration { .. } => "concentration",
             RadiusRule::RootN { .. } => "root_n",
             RadiusRule::Fixed { .. } => "fixed",
@@ -78,13 +92,17 @@ impl RadiusRule {
 
     /// Simulated paths, 0 under rules that simulate none.
     pub fn paths(&self) -> usize {
-        if let RadiusRule::Bridge { paths, .. } = *self { paths } else { 0 }
+        match *self {
+            RadiusRule::Bridge { paths, .. } | RadiusRule::Calibrated { paths, .. } => paths,
+            _ => 0,
+        }
     }
 
     /// The level of the rules that have one.
     pub fn alpha(&self) -> Option<f64> {
         match *self {
             RadiusRule::Bridge { alpha, .. }
+            | RadiusRule::Calibrated { alpha, .. }
             | RadiusRule::Concentration { alpha, .. }
             | RadiusRule::ChiSquare { alpha } => Some(alpha),
             RadiusRule::RootN { .. } | RadiusRule::Fixed { .. } => None,

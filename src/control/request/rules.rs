@@ -192,7 +192,7 @@ fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), Field
         _ => {}
     }
     match *rule {
-        RadiusRule::Bridge { alpha, paths, scale } => {
+        RadiusRule::Bridge { alpha, paths, scale } | RadiusRule::Calibrated { alpha, paths, scale } => {
             within("problem.radius.alpha", alpha, 1e-3, 0.999)?;
             whole("problem.radius.paths", paths, &PATHS)?;
             within("problem.radius.scale", scale, RADIUS_SCALE.0, RADIUS_SCALE.1)?;

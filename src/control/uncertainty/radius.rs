@@ -1,7 +1,7 @@
 //! The radius of the Wasserstein ball around an empirical law, or of the confidence region of a normal law's estimates, rule by
 //! rule.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::control::kept::{Kept, Key};
 use crate::control::request::framework::Framework;
@@ -9,6 +9,7 @@ use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::Specification;
 use crate::numerics::bridge::{Quantile, Statistic};
 use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
+use crate::numerics::calibration::calibration_factor;
 use crate::numerics::chebyshev::local_cubic;
 use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
@@ -22,8 +23,11 @@ const LEAST_THINNED: usize = 9;
 
 /// The radius rule of a specification, with its common random numbers.
 pub struct RadiusEstimator {
-    /// That of the specification; a radius of 0 where the framework has no uncertainty (known law, plug-in).
+    /// That of the specification, `bridge` in the place of `calibrated`; a radius of 0 where the framework has no uncertainty
+    /// (known law, plug-in).
     rule: RadiusRule,
+    /// Under `calibrated`.
+    calibration: Option<Calibration>,
     seed: u64,
     /// Sample size at the last step.
     last_size: usize,
@@ -33,6 +37,14 @@ pub struct RadiusEstimator {
     base: Vec<f64>,
     /// Where the common random numbers are kept.
     kept: Kept,
+}
+
+/// The factor on the radius that the history asks for, found when a radius is first asked for.
+struct Calibration {
+    /// Oldest first.
+    history: Vec<f64>,
+    retention: f64,
+    factor: OnceLock<f64>,
 }
 
 /// The uncertainty set of a law: its radius, and the quantile behind it under the bridge rule.
@@ -60,12 +72,21 @@ impl RadiusEstimator {
             Framework::KnownLaw | Framework::PlugIn => RadiusRule::Fixed { radius: 0.0 },
             _ => specification.problem.radius_rule(),
         };
+        let (rule, calibrated) = match rule {
+            RadiusRule::Calibrated { alpha, paths, scale } => (RadiusRule::Bridge { alpha, paths, scale }, true),
+            rule => (rule, false),
+        };
         let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
         let learning = specification.problem.learning;
+        let calibration = calibrated.then(|| Calibration {
+            history: specification.problem.history.clone(),
+            retention: learning.retention(),
+            factor: OnceLock::new(),
+        });
         let decays = learning.retention().powf(last_size as f64) < ALL_BUT_EQUAL;
         let mut base = specification.problem.history.clone();
         base.sort_by(f64::total_cmp);
-        RadiusEstimator { rule, seed: specification.seed, last_size, decays, base, kept }
+        RadiusEstimator { rule, calibration, seed: specification.seed, last_size, decays, base, kept }
     }
 
     /// True where laws of one sample size have different radii.
@@ -120,7 +141,8 @@ impl RadiusEstimator {
     pub fn cost(&self, sample_size: usize) -> Option<usize> {
         match self.rule {
             RadiusRule::Bridge { paths, .. } => {
-                let ready = |size: usize| self.kept.has(&self.key(size, paths));
+                let calibrated = self.calibration.as_ref().is_none_or(|known| known.factor.get().is_some());
+                let ready = |size: usize| calibrated && self.kept.has(&self.key(size, paths));
                 self.sizes(sample_size).all(ready).then_some(2 * self.bridged(sample_size) * paths)
             }
             _ => Some(sample_size),
@@ -129,7 +151,8 @@ impl RadiusEstimator {
 
     /// Simulates what measuring laws of this size takes, where that is yet to be done.
     pub fn prepare(&self, sample_size: usize) {
-        if let RadiusRule::Bridge { paths, .. } = self.rule {
+        if let RadiusRule::Bridge { alpha, paths, scale } = self.rule {
+            self.factor(scale, alpha, paths);
             self.sizes(sample_size).for_each(|size| drop(self.bridges(size, paths)));
         }
     }
@@ -139,10 +162,18 @@ impl RadiusEstimator {
         match self.rule {
             RadiusRule::Bridge { alpha, paths, scale } => {
                 let bridges = self.bridges(law.sample_size(), paths);
+                let scale = self.factor(scale, alpha, paths);
                 radius(scale, bridges.bridge_quantile(law, Statistic::Now, alpha), law.effective_size())
             }
             _ => self.radius_of_size(law.effective_size()),
         }
+    }
+
+    /// `scale`, times what the calibration finds. Every radius by the bridge takes it.
+    fn factor(&self, scale: f64, alpha: f64, paths: usize) -> f64 {
+        let Some(Calibration { history, retention, factor }) = &self.calibration else { return scale };
+        let find = || calibration_factor(&self.bridges(history.len(), paths), history, *retention, alpha, self.seed);
+        scale * factor.get_or_init(find)
     }
 
     /// The radius of `law` and what it is made of.
@@ -151,6 +182,7 @@ impl RadiusEstimator {
         match self.rule {
             RadiusRule::Bridge { alpha, paths, scale } => {
                 let quantile = self.bridges(law.sample_size(), paths).bridge_quantile_with_error(law, alpha);
+                let scale = self.factor(scale, alpha, paths);
                 Measure { radius: radius(scale, quantile.value, size), quantile: Some(quantile) }
             }
             _ => Measure { radius: self.radius_of_size(size), quantile: None },
@@ -164,6 +196,7 @@ impl RadiusEstimator {
             RadiusRule::Bridge { .. } if !self.looks_ahead(size) => known,
             RadiusRule::Bridge { alpha, paths, scale } => {
                 let bridges = self.bridges(size + 1, paths);
+                let scale = self.factor(scale, alpha, paths);
                 radius(scale, bridges.bridge_quantile(law, Statistic::OneLater, alpha), law.effective_sizes_ahead()[0])
             }
             _ => self.radius_of_size(law.effective_size()),
@@ -178,10 +211,11 @@ impl RadiusEstimator {
     pub fn radii_of(&self, laws: &[&EmpiricalDistribution], alphas: &[f64]) -> Vec<Vec<Radii>> {
         let Some(first) = laws.first() else { return Vec::new() };
         let (size, effective_size) = (first.sample_size(), first.effective_size());
-        let RadiusRule::Bridge { paths, scale, .. } = self.rule else {
+        let RadiusRule::Bridge { alpha, paths, scale } = self.rule else {
             let radius = self.radius_of_size(effective_size);
             return vec![vec![Radii { radius, radius_ahead: radius }; alphas.len()]; laws.len()];
         };
+        let scale = self.factor(scale, alpha, paths);
         let quantiles = |which, size| self.bridges(size, paths).bridge_quantiles(laws, &self.base, which, alphas);
         let now = quantiles(Statistic::Now, size);
         let ahead = self.looks_ahead(size).then(|| quantiles(Statistic::OneLater, size + 1));
@@ -197,9 +231,10 @@ impl RadiusEstimator {
         now.into_iter().enumerate().map(of_law).collect()
     }
 
-    /// The miscoverage of the rule, where laws of one size have different radii by it.
+    /// The miscoverage of the rule, where laws of one size have different radii by it, which differ between levels in their
+    /// quantiles alone.
     pub fn alpha(&self) -> Option<f64> {
-        self.rule.alpha().filter(|_| self.varies())
+        self.rule.alpha().filter(|_| self.varies() && self.calibration.is_none())
     }
 
     /// The same for `law` with one more value, for every value in ascending `values`. What a radius loses until one return
@@ -210,6 +245,7 @@ impl RadiusEstimator {
         let [next_size, size_after] = law.effective_sizes_ahead();
         match self.rule {
             RadiusRule::Bridge { alpha, paths, scale } => {
+                let scale = self.factor(scale, alpha, paths);
                 let radii = |values: &[f64], which, size, effective_size| {
                     let found = self.bridges(size, paths).bridge_quantiles_with(law, values, which, alpha);
                     found.into_iter().map(|quantile| radius(scale, quantile, effective_size)).collect::<Vec<f64>>()
@@ -239,7 +275,7 @@ impl RadiusEstimator {
     /// The radius under the rules that look at the effective sample size alone.
     fn radius_of_size(&self, size: f64) -> f64 {
         match self.rule {
-            RadiusRule::Bridge { .. } => 0.0,
+            RadiusRule::Bridge { .. } | RadiusRule::Calibrated { .. } => 0.0,
             RadiusRule::Concentration { alpha, numerator, rate } => ((numerator / alpha).ln() / (rate * size)).sqrt(),
             RadiusRule::RootN { kappa } => kappa / size.sqrt(),
             RadiusRule::Fixed { radius } => radius,
@@ -290,6 +326,29 @@ mod tests {
         for (framework, rule, expected) in rules {
             let found = radius_of(framework, rule.clone());
             assert!((found - expected).abs() < 1e-7, "{framework} {rule}: {found}");
+        }
+    }
+
+    #[test]
+    fn a_calibrated_radius_is_that_of_the_bridge_times_one_factor() {
+        let rule = |name: &str| json!({ "rule": name, "alpha": 0.2, "paths": 500, "scale": 0.7 });
+        let [bridge, calibrated] = ["bridge", "calibrated"].map(|name| estimator("adaptive", rule(name)));
+        let law = EmpiricalDistribution::new(&[0.02, -0.01, 0.04, 0.01]);
+        let factor = calibrated.radius(&law) / bridge.radius(&law);
+        // Four returns show too little of their law's spread.
+        assert!(factor > 1.05, "{factor}");
+        let known = calibrated.radius(&law);
+        let mut pairs = vec![(bridge.measure(&law).radius, calibrated.measure(&law).radius)];
+        pairs.push((bridge.radii(&law, known).radius_ahead, calibrated.radii(&law, known).radius_ahead));
+        let of = |sets: &RadiusEstimator| {
+            let with = sets.radii_with(&law, &[-0.02, 0.03]);
+            let together = sets.radii_of(&[&law], &[0.2]).remove(0);
+            with.into_iter().chain(together).flat_map(|radii| [radii.radius, radii.radius_ahead]).collect::<Vec<f64>>()
+        };
+        pairs.extend(of(&bridge).into_iter().zip(of(&calibrated)));
+        for (plain, scaled) in pairs {
+            // To rounding.
+            assert!((scaled / plain / factor - 1.0).abs() < 1e-12, "{plain} {scaled} {factor}");
         }
     }
 

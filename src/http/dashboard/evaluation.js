@@ -64,7 +64,7 @@ function summary({ request, histories, level = request.level, costs }) {
 }
 
 /** Quantiles and extremes of utility are those of wealth, utility being increasing; its mean and variance are not. */
-function outcomes({ strategies, reference, request }, names) {
+function outcomes({ strategies, reference, request, sentences }, names) {
   const rows = strategies.map((strategy, index) => ({ ...strategy, name: names[index] }));
   const estimate = (name, read, format) => ({
     name,
@@ -96,6 +96,11 @@ function outcomes({ strategies, reference, request }, names) {
           ({ difference }) => difference?.certainty_equivalent,
           (value) => tick(value, 0.01),
         ),
+        estimate(
+          "Beyond its own mix",
+          ({ own_mix }) => own_mix?.beyond,
+          (value) => tick(value, 0.01),
+        ),
         estimate("Mean wealth", (row) => row.wealth.mean, wealth),
         inWealth("20 % below", ({ quantile_20 }) => quantile_20),
         inWealth("90 % below", ({ quantile_90 }) => quantile_90),
@@ -106,6 +111,7 @@ function outcomes({ strategies, reference, request }, names) {
       ],
       rows,
     ),
+    h("div", { class: "words" }, ...sentences.map((sentence) => h("p", {}, sentence))),
   );
 }
 

@@ -48,6 +48,7 @@ function drawn({ own, per_year }, { bootstrap, best, points: scales }) {
         number("Lost on average", ({ lost }) => points(lost.value)),
         number("Varies from record to record by", ({ deviation }) => points(deviation.value)),
         number("Beyond the best", ({ beyond_least }) => (beyond_least ? points(beyond_least.value) : "\u2013")),
+        number("Beyond its own mix", ({ beyond_own_mix }) => points(beyond_own_mix.value)),
         number("Held on average", ({ total }) => percent(total)),
         number("Held on this record", ({ own }) => percent(own)),
       ],

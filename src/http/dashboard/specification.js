@@ -43,9 +43,11 @@ export function worth({ kind, risk_aversion: aversion }, value) {
 /** The rule of the radius in a few words. */
 export function radiusRule(radius) {
   switch (radius.rule) {
-    case "bridge": {
+    case "bridge":
+    case "calibrated": {
       const times = radius.scale === 1 ? "" : `${significant(radius.scale)} times `;
-      return `${times}the ${percent(1 - radius.alpha, 0)} quantile of the bridge statistic over \u221an`;
+      const factor = radius.rule === "bridge" ? "" : ", times the factor that the history asks for";
+      return `${times}the ${percent(1 - radius.alpha, 0)} quantile of the bridge statistic over \u221an${factor}`;
     }
     case "concentration":
       return `the concentration bound at ${percent(1 - radius.alpha, 0)} (C ${significant(radius.C)}, c ${significant(radius.c)})`;

@@ -252,6 +252,11 @@ class FrontierPoint(TypedDict):
     deviation: Estimate
     """Of that loss from record to record."""
     beyond_least: NotRequired[Estimate | None]
+    beyond_own_mix: Estimate
+    """
+    What the advice gains over a constant mix of its own average allocation over all records, in the unit of `lost`: at most 0, up
+    to rounding, since what an allocation is worth under one law is concave in it.
+    """
     total: float
     """Share of wealth held in all assets together, on average over records."""
 
@@ -444,6 +449,15 @@ class Observe(TypedDict):
 HistoryItem1: TypeAlias = float
 
 
+class OwnMix(TypedDict):
+    """The constant mix of a strategy's own average allocation, which nobody could have chosen beforehand, on the same returns."""
+
+    allocation: float
+    """The average, over all periods of all paths."""
+    beyond: Estimate
+    """Certainty equivalent of the strategy less that of the mix, in terminal wealth: what changing the allocation earned."""
+
+
 Phase: TypeAlias = Literal["solving", "fitting", "simulating"]
 """What a job is doing."""
 
@@ -515,6 +529,21 @@ class RadiusRule1(TypedDict):
 
 
 class RadiusRule2(TypedDict):
+    """
+    That of `bridge` times a factor found once, from the history: with it, the balls of a share 1 - alpha of records drawn from the
+    smoothed law of the history hold that law.
+    """
+
+    alpha: NotRequired[float]
+    """Miscoverage."""
+    paths: NotRequired[int]
+    """Simulated paths."""
+    scale: NotRequired[float]
+    """One more factor on the radius."""
+    rule: Literal["calibrated"]
+
+
+class RadiusRule3(TypedDict):
     """`sqrt(ln(C / alpha) / (c n))`, the concentration inequality of Fournier and Guillin."""
 
     alpha: NotRequired[float]
@@ -526,7 +555,7 @@ class RadiusRule2(TypedDict):
     rule: Literal["concentration"]
 
 
-class RadiusRule3(TypedDict):
+class RadiusRule4(TypedDict):
     """`kappa / sqrt(n)`."""
 
     kappa: float
@@ -534,7 +563,7 @@ class RadiusRule3(TypedDict):
     rule: Literal["root_n"]
 
 
-class RadiusRule4(TypedDict):
+class RadiusRule5(TypedDict):
     """The same radius at every sample size."""
 
     radius: float
@@ -542,7 +571,7 @@ class RadiusRule4(TypedDict):
     rule: Literal["fixed"]
 
 
-class RadiusRule5(TypedDict):
+class RadiusRule6(TypedDict):
     """
     `sqrt(kappa / n)` estimated standard deviations, kappa the (1 - alpha)-quantile of chi-square with two degrees
     of freedom: `n (mu - m)^2 / v + n (s2 - v)^2 / (2 v^2) <= kappa`, m and v the sample's mean and variance.
@@ -553,7 +582,7 @@ class RadiusRule5(TypedDict):
     rule: Literal["chi_square"]
 
 
-RadiusRule: TypeAlias = RadiusRule1 | RadiusRule2 | RadiusRule3 | RadiusRule4 | RadiusRule5
+RadiusRule: TypeAlias = RadiusRule1 | RadiusRule2 | RadiusRule3 | RadiusRule4 | RadiusRule5 | RadiusRule6
 """
 How the radius of the uncertainty set follows from the sample of size n: `chi_square` of the parametric frameworks'
 confidence region, every other of the Wasserstein ball.
@@ -939,6 +968,7 @@ class BacktestFigures(TypedDict):
     """Of mean utility over the whole years, each from wealth 100."""
     adaptive_ahead: BootstrapEstimate
     """That of the main adaptive strategy less this one."""
+    beyond_own_mix: NotRequired[BootstrapEstimate | None]
     annual_mean: BootstrapEstimate
     """Of simple returns."""
     annual_volatility: BootstrapEstimate
@@ -1640,6 +1670,7 @@ class StrategyReport(TypedDict):
     wealth: WealthReport
     """Terminal, in units of the initial wealth's currency."""
     difference: NotRequired[Difference | None]
+    own_mix: NotRequired[OwnMix | None]
     histogram: list[int]
     """Counts of the bins between `histogram_edges`."""
     periods: NotRequired[list[PeriodReport] | None]
@@ -1692,6 +1723,8 @@ class EvaluationReport(TypedDict):
     """Common bin edges of terminal utility, ascending."""
     histories: list[HistoryReport]
     """In the order they were drawn."""
+    sentences: list[str]
+    """What the figures say of each framework that changes its allocation."""
     costs: Costs
     """What it took."""
 

@@ -58,8 +58,8 @@ pub struct Frontier {
 struct Decided {
     /// Lost by each, in the unit of the report.
     lost: Vec<f64>,
-    /// Share of wealth in all assets together.
-    totals: Vec<f64>,
+    /// Shares of wealth in the assets.
+    allocations: Vec<Vec<f64>>,
 }
 
 impl Frontier {
@@ -121,8 +121,7 @@ impl Frontier {
             let rows = law.record(kind, self.question.assets.history.len(), request.seed, index)?;
             let allocations = self.decide(&rows, watch)?;
             let lost = allocations.iter().map(|allocation| self.unit() * (best_worth - self.worth(law, allocation)));
-            let totals = allocations.iter().map(|allocation| allocation.iter().sum()).collect();
-            let decided = Decided { lost: lost.collect(), totals };
+            let decided = Decided { lost: lost.collect(), allocations };
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             if done.is_multiple_of(every) || done == total {
                 (watch.progress)(StepProgress { step: 0, phase: Phase::Simulating, done, total });
@@ -136,12 +135,16 @@ impl Frontier {
         let points = request.scales.iter().enumerate().map(|(index, &scale)| {
             let lost: Vec<f64> = decided.iter().map(|decided| decided.lost[index]).collect();
             let apart: Vec<f64> = decided.iter().map(|decided| decided.lost[index] - decided.lost[least]).collect();
+            let average = average(decided.iter().map(|decided| decided.allocations[index].as_slice()));
+            let of_average = self.unit() * (best_worth - self.worth(law, &average));
+            let beyond: Vec<f64> = lost.iter().map(|lost| of_average - lost).collect();
             FrontierPoint {
                 scale,
                 lost: sample.mean(&lost),
                 deviation: sample.variance(&lost).mapped(|variance| variance.max(0.0).sqrt()),
                 beyond_least: (index != least).then(|| sample.mean(&apart)),
-                total: decided.iter().map(|decided| decided.totals[index]).sum::<f64>() / decided.len() as f64,
+                beyond_own_mix: sample.mean(&beyond),
+                total: average.iter().sum(),
             }
         });
         Ok(Resampled { bootstrap: kind, best, points: points.collect() })
@@ -198,6 +201,17 @@ impl Frontier {
         let square = returns.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
         (mean - self.question.fund.problem.rate_per_step) * (count / square).sqrt()
     }
+}
+
+/// Of allocations to the same assets.
+fn average<'a>(allocations: impl ExactSizeIterator<Item = &'a [f64]>) -> Vec<f64> {
+    let count = allocations.len() as f64;
+    let add = |mut sum: Vec<f64>, allocation: &[f64]| {
+        sum.resize(allocation.len(), 0.0);
+        sum.iter_mut().zip(allocation).for_each(|(sum, share)| *sum += share / count);
+        sum
+    };
+    allocations.fold(Vec::new(), add)
 }
 
 fn least_on_average(decided: &[Decided]) -> usize {

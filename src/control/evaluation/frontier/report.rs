@@ -76,6 +76,9 @@ pub struct FrontierPoint {
     pub deviation: Estimate,
     /// What more is lost than at the scale that loses least on average, record by record; null at that scale.
     pub beyond_least: Option<Estimate>,
+    /// What the advice gains over a constant mix of its own average allocation over all records, in the unit of `lost`: at most 0, up
+    /// to rounding, since what an allocation is worth under one law is concave in it.
+    pub beyond_own_mix: Estimate,
     /// Share of wealth held in all assets together, on average over records.
     pub total: f64,
 }

@@ -8,6 +8,7 @@ const TOLD: f64 = 2.0;
 /// What the figures say, the most important first.
 pub(super) fn sentences(resampled: &[Resampled], evidence: f64, per_year: bool) -> Vec<String> {
     let mut sentences: Vec<String> = resampled.iter().filter_map(|resampled| of_one(resampled, per_year)).collect();
+    sentences.extend(resampled.first().map(|first| of_own_mix(first, per_year)));
     let behind = if evidence < 0.0 { "below" } else { "above" };
     let errors = evidence.abs();
     let told = if errors < TOLD { "the record cannot tell it from none" } else { "the record tells it from none" };
@@ -19,6 +20,18 @@ pub(super) fn sentences(resampled: &[Resampled], evidence: f64, per_year: bool) 
             .to_owned(),
     );
     sentences
+}
+
+/// What following each record earned beside holding what is advised on average.
+fn of_own_mix(resampled: &Resampled, per_year: bool) -> String {
+    let per = if per_year { "a year" } else { "a period" };
+    let lost = resampled.points.iter().map(|point| format!("{:.1}", -point.beyond_own_mix.value));
+    let scales = resampled.points.iter().map(|point| point.scale.to_string());
+    format!(
+        "While the law stays as it is, an allocation that follows the record earns nothing beyond a constant mix of its own average: at scales {} it is {} basis points {per} behind on the first records.",
+        scales.collect::<Vec<_>>().join(", "),
+        lost.collect::<Vec<_>>().join(", ")
+    )
 }
 
 /// Which scale loses least, and which cannot be told apart from it.

@@ -113,10 +113,7 @@ pub(in crate::control::policy) fn check_cost(
     returns: usize,
     design: usize,
 ) -> Result<(), FieldError> {
-    let paths = match problem.radius_rule() {
-        RadiusRule::Bridge { paths, .. } => paths,
-        _ => 0,
-    };
+    let paths = problem.radius_rule().paths();
     let of_returns = |count: usize| returns.saturating_mul(count);
     for (found, most, what) in [
         (returns, LONGEST_RECORD, "returns"),

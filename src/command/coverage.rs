@@ -1,0 +1,117 @@
+//! `ballast coverage`: how often balls hold the law that records were drawn from, how wide they are, and what advice that fears
+//! them loses.
+
+use std::error::Error;
+
+use ballast::control::error::FieldError;
+use ballast::control::evaluation::coverage::{Coverage, CoverageQuestion, DrawnLaw, coverage};
+use ballast::control::problem::sampling_law::continuous_law;
+use ballast::control::request::radius_rule::RadiusRule;
+use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification};
+use ballast::numerics::law::ContinuousLaw;
+use clap::Args;
+
+use super::bench::paper;
+use super::returns::{Returns, ReturnsError};
+
+/// Of the paper's mixture, and of the laws that have its mean and variance.
+const RATE: f64 = 0.002;
+const DEGREES_OF_FREEDOM: f64 = 4.0;
+/// Months of the market that are drawn together.
+const BLOCK: usize = 12;
+/// Of the intervals.
+const LEVEL: f64 = 0.9;
+/// Behind the quantiles of the bridge.
+const PATHS: usize = 2000;
+
+#[derive(Debug, Clone, Args)]
+pub struct CoverageArgs {
+    /// Probability that a ball may miss the law
+    #[arg(long, default_value_t = 0.1)]
+    alpha: f64,
+    /// Returns in a record
+    #[arg(long, value_delimiter = ',', default_values_t = [20, 60, 240])]
+    sizes: Vec<usize>,
+    /// Records drawn from each law at each size
+    #[arg(long, default_value_t = 1000)]
+    records: usize,
+    /// Relative risk aversion: 1 is log utility, more is more careful
+    #[arg(long, default_value_t = 3.0)]
+    risk_aversion: f64,
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// A law, what it is called, and what the bank pays beside it.
+struct Named {
+    name: &'static str,
+    law: DrawnLaw,
+    rate_per_step: f64,
+}
+
+pub fn run(arguments: &CoverageArgs) -> Result<(), Box<dyn Error>> {
+    if !(2..=100_000).contains(&arguments.records) {
+        return Err(FieldError::new("--records", arguments.records, "must lie in [2, 100000]").into());
+    }
+    let CoverageArgs { alpha, records, seed, .. } = *arguments;
+    let bridge = |scale: f64| RadiusRule::Bridge { alpha, paths: PATHS, scale };
+    let rules = [bridge(0.0), bridge(0.5), bridge(1.0), RadiusRule::Calibrated { alpha, paths: PATHS, scale: 1.0 }];
+    println!(
+        "{:<22}{:>6}{:>14}{:>22}{:>10}{:>28}{:>8}",
+        "law", "n", "rule", "holds the law [90 %]", "radius", "lost a period, bp [90 %]", "held"
+    );
+    for Named { name, law, rate_per_step } in laws()? {
+        for &size in &arguments.sizes {
+            let utility = UtilitySpecification::relative(arguments.risk_aversion);
+            let rules = rules.to_vec();
+            let question = CoverageQuestion { size, records, rate_per_step, utility, rules, seed, level: LEVEL };
+            let found = coverage(&law, &question).map_err(by_option)?;
+            question.rules.iter().zip(found).for_each(|(rule, found)| println!("{}", line(name, size, rule, &found)));
+        }
+    }
+    Ok(())
+}
+
+fn line(name: &str, size: usize, rule: &RadiusRule, found: &Coverage) -> String {
+    let rule = match *rule {
+        RadiusRule::Bridge { scale: 0.0, .. } => "none".to_owned(),
+        RadiusRule::Bridge { scale, .. } if scale != 1.0 => format!("{scale} bridge"),
+        rule => rule.name().to_owned(),
+    };
+    let Coverage { held, radius, lost, allocation } = found;
+    let percent = |share: f64| 100.0 * share;
+    let held = format!("{:.1} [{:.1}, {:.1}] %", percent(held.value), percent(held.low), percent(held.high));
+    let lost = format!("{:.2} [{:.2}, {:.2}]", lost.value, lost.low, lost.high);
+    format!("{name:<22}{size:>6}{rule:>14}{held:>22}{:>10.5}{lost:>28}{:>6.0} %", radius.value, percent(*allocation))
+}
+
+fn laws() -> Result<Vec<Named>, ReturnsError> {
+    let mixture = continuous_law(&paper::mixture(), &ProblemSpecification::of(Vec::new(), RATE));
+    let (atoms, masses) = mixture.quadrature();
+    let mean = mixture.mean();
+    let variance: f64 = atoms.iter().zip(&masses).map(|(z, mass)| mass * (z - mean).powi(2)).sum();
+    let scale = (variance * (DEGREES_OF_FREEDOM - 2.0) / DEGREES_OF_FREEDOM).sqrt();
+    let normal = ContinuousLaw::GaussianMixture(vec![(1.0, mean, variance.sqrt())]);
+    let student = ContinuousLaw::StudentT { location: mean, scale, degrees_of_freedom: DEGREES_OF_FREEDOM };
+    let market = Returns::bundled()?;
+    let returns = market.rows().iter().map(|row| row.period().log_return).collect();
+    let bank = market.rows().iter().map(|row| row.risk_free_return).sum::<f64>() / market.rows().len() as f64;
+    let of = |name, law| Named { name, law: DrawnLaw::Continuous(law), rate_per_step: RATE };
+    Ok(vec![
+        of("normal", normal),
+        of("the paper's mixture", mixture),
+        of("Student, 4 degrees", student),
+        Named { name: "market, in blocks", law: DrawnLaw::Blocks { returns, length: BLOCK }, rate_per_step: bank },
+    ])
+}
+
+/// The same error under the option by which the user knows the field.
+fn by_option(error: FieldError) -> FieldError {
+    let option = match error.field.as_str() {
+        "problem.radius.alpha" => "--alpha",
+        "problem.history" => "--sizes",
+        "problem.utility.risk_aversion" => "--risk-aversion",
+        _ => return error,
+    };
+    FieldError { field: option.into(), ..error }
+}

@@ -1,0 +1,204 @@
+//! How often a ball holds the law that a record was drawn from, how wide it is, and what advice that fears it loses.
+//!
+//! Records of n log-returns are drawn from a law that is known. Each is a history of its own: the rule gives the radius, the
+//! ball around the record holds the law where their Wasserstein distance is at most that, and the one-step advice in the ball
+//! is scored by the law,
+//!
+//!   lost(a) = 1e4 (ln CE(a*) - ln CE(a)),   CE(a) = U^-1( E[ U(w(a, Z)) ] ),   a* the best for the law itself,
+//!
+//! in basis points a period. All rules see the same records.
+
+use rayon::prelude::*;
+
+use crate::control::assets::{AssetsLaw, AssetsStep};
+use crate::control::error::FieldError;
+use crate::control::kept::Kept;
+use crate::control::problem::actions::ActionInterval;
+use crate::control::problem::utility::RelativeUtility;
+use crate::control::request::radius_rule::RadiusRule;
+use crate::control::request::rules::LOG_RETURN;
+use crate::control::request::specification::{ProblemSpecification, Specification, UtilitySpecification};
+use crate::control::uncertainty::radius::RadiusEstimator;
+use crate::numerics::block_bootstrap::circular_blocks;
+use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::law::ContinuousLaw;
+use crate::numerics::law_distance::{LawDistance, distance_of_masses};
+use crate::numerics::levelling::Ground;
+use crate::numerics::minimise::maximise_concave_scalar;
+use crate::numerics::streams::stream;
+use crate::numerics::summary::{Clustered, Estimate};
+
+/// Basis points of one.
+const BASIS_POINTS: f64 = 1e4;
+/// Of the best allocation for a law.
+const ALLOCATION_TOLERANCE: f64 = 1e-6;
+/// A record of one return over and over has no ball; it is drawn again, so often at most.
+const DRAWS: usize = 100;
+
+/// A law that records are drawn from.
+#[derive(Debug, Clone)]
+pub enum DrawnLaw {
+    /// Independent draws.
+    Continuous(ContinuousLaw),
+    /// Of returns seen, oldest first, blocks of so many in a row: what follows what stays as it was.
+    Blocks {
+        /// Log-returns.
+        returns: Vec<f64>,
+        /// Periods in a block.
+        length: usize,
+    },
+}
+
+/// What is asked.
+#[derive(Debug, Clone)]
+pub struct CoverageQuestion {
+    /// Returns in a record.
+    pub size: usize,
+    /// Records drawn.
+    pub records: usize,
+    /// Of the bank, per period.
+    pub rate_per_step: f64,
+    /// Of the investor, who starts with 100.
+    pub utility: UtilitySpecification,
+    /// Of the balls; none looks at the law.
+    pub rules: Vec<RadiusRule>,
+    /// Of all draws.
+    pub seed: u64,
+    /// Of the intervals.
+    pub level: f64,
+}
+
+/// What a rule does under a law.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coverage {
+    /// Share of records whose ball holds the law.
+    pub held: Estimate,
+    /// The mean radius, in log-return.
+    pub radius: Estimate,
+    /// Mean of the lost certainty equivalent, in basis points a period.
+    pub lost: Estimate,
+    /// Mean share of wealth in the asset.
+    pub allocation: f64,
+}
+
+/// A law prepared for records of one size.
+struct Prepared<'a> {
+    law: &'a DrawnLaw,
+    distance: Option<LawDistance>,
+    /// Atoms of the law, ascending, and their masses: by quadrature where it is continuous.
+    atoms: Vec<f64>,
+    masses: Vec<f64>,
+}
+
+impl<'a> Prepared<'a> {
+    fn of(law: &'a DrawnLaw, size: usize) -> Self {
+        match law {
+            DrawnLaw::Continuous(continuous) => {
+                let (mut atoms, masses) = continuous.quadrature();
+                atoms.iter_mut().for_each(|atom| *atom = accepted(*atom));
+                Prepared { law, distance: Some(LawDistance::new(continuous.clone(), 1.0, [size])), atoms, masses }
+            }
+            DrawnLaw::Blocks { returns, .. } => {
+                let mut atoms = returns.clone();
+                atoms.sort_by(f64::total_cmp);
+                let masses = vec![1.0 / atoms.len() as f64; atoms.len()];
+                Prepared { law, distance: None, atoms, masses }
+            }
+        }
+    }
+
+    /// One record. Stream: (seed, "coverage", n, index).
+    fn record(&self, question: &CoverageQuestion, index: usize) -> Vec<f64> {
+        let mut generator = stream(question.seed, "coverage", question.size, index);
+        let mut draw = || match self.law {
+            DrawnLaw::Continuous(law) => {
+                (0..question.size).map(|_| accepted(law.draw(&mut generator))).collect::<Vec<f64>>()
+            }
+            DrawnLaw::Blocks { returns, length } => {
+                let mut record: Vec<f64> = Vec::new();
+                while record.len() < question.size {
+                    let indices = circular_blocks(returns.len(), *length, &mut generator);
+                    record.extend(indices.into_iter().map(|at| returns[at]));
+                }
+                record.truncate(question.size);
+                record
+            }
+        };
+        let varies = |record: &Vec<f64>| record.iter().any(|value| *value != record[0]);
+        (0..DRAWS).map(|_| draw()).find(varies).unwrap_or_default()
+    }
+
+    /// From the record's law to the law itself.
+    fn distance(&self, record: &[f64]) -> f64 {
+        if let Some(distance) = &self.distance {
+            let mut sample = Vec::with_capacity(record.len());
+            record.iter().for_each(|&value| distance.learn(&mut sample, distance.place(value)));
+            return distance.distance(&sample);
+        }
+        let mut apart: Vec<f64> = self.masses.iter().map(|mass| -mass).collect();
+        for value in record {
+            apart[self.atoms.partition_point(|atom| atom < value)] += 1.0 / record.len() as f64;
+        }
+        distance_of_masses(&self.atoms, &apart)
+    }
+
+    /// Log certainty equivalent of an allocation over the bank.
+    fn worth(&self, allocation: f64, bank: f64, utility: RelativeUtility) -> f64 {
+        let of_atom = |(z, mass): (&f64, &f64)| mass * utility.value((allocation * (z.exp() / bank - 1.0)).ln_1p());
+        utility.inverse(self.atoms.iter().zip(&self.masses).map(of_atom).sum())
+    }
+}
+
+/// The nearest log-return that a history may hold.
+fn accepted(log_return: f64) -> f64 {
+    log_return.clamp(-LOG_RETURN, LOG_RETURN)
+}
+
+/// What each rule of the question does under `law`, in the order of the rules. Cost: a robust step for each record and rule.
+///
+/// Checked by: `tests/coverage.rs`.
+///
+/// # Errors
+/// A rule that a training would not take either.
+pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<Coverage>, FieldError> {
+    let prepared = Prepared::of(law, question.size);
+    let utility = RelativeUtility::new(question.utility, 100.0 * (1.0 + question.rate_per_step));
+    let bank = 1.0 + question.rate_per_step;
+    let worth = |allocation: f64| prepared.worth(allocation, bank, utility);
+    let (_, best) = maximise_concave_scalar(worth, 0.0, 1.0, ALLOCATION_TOLERANCE);
+    let kept = Kept::default();
+    let of_record = |index: usize| -> Result<Vec<[f64; 4]>, FieldError> {
+        let record = prepared.record(question, index);
+        let (seen, distance) = (EmpiricalDistribution::new(&record), prepared.distance(&record));
+        let rows: Vec<Vec<f64>> = record.iter().map(|value| vec![*value]).collect();
+        let of_rule = |rule: &RadiusRule| {
+            let problem = ProblemSpecification {
+                horizon: 1,
+                utility: question.utility,
+                radius: Some(*rule),
+                ..ProblemSpecification::of(record.clone(), question.rate_per_step)
+            };
+            let specification = Specification::of(problem, question.seed).completed()?;
+            let radius = RadiusEstimator::new(&specification, kept.clone()).radius(&seen);
+            let law = AssetsLaw { returns: &rows, radius, floor: f64::NEG_INFINITY };
+            let total = ActionInterval { lowest: 0.0, highest: 1.0 };
+            let step = AssetsStep::new(law, Ground::Sup, utility, question.rate_per_step, total);
+            let allocation = step.solve(None).allocation[0];
+            let lost = BASIS_POINTS * (best - worth(allocation));
+            Ok([f64::from(u8::from(distance <= radius)), radius, lost, allocation])
+        };
+        question.rules.iter().map(of_rule).collect()
+    };
+    let found = (0..question.records).into_par_iter().map(of_record).collect::<Result<Vec<_>, FieldError>>()?;
+    let sample = Clustered::new(question.records, 1, question.level);
+    let of_rule = |rule: usize| {
+        let figure = |figure: usize| found.iter().map(|record| record[rule][figure]).collect::<Vec<f64>>();
+        Coverage {
+            held: sample.share(&figure(0), |held| *held > 0.0),
+            radius: sample.mean(&figure(1)),
+            lost: sample.mean(&figure(2)),
+            allocation: sample.mean(&figure(3)).value,
+        }
+    };
+    Ok((0..question.rules.len()).map(of_rule).collect())
+}
