@@ -6,6 +6,7 @@ use clap::Subcommand;
 
 mod accuracy;
 mod action;
+mod assets;
 mod horizons;
 mod kernels;
 pub mod paper;
@@ -22,6 +23,8 @@ pub enum Bench {
     Accuracy(accuracy::AccuracyBench),
     /// Compare policies for one history with brute force, in basis points and in allocation.
     Horizons(horizons::HorizonsBench),
+    /// Time the robust step of several assets, from nothing and near that of the month before.
+    Assets(assets::AssetsBench),
     /// Time GET /action on loopback beside GET /livez.
     Action(action::ActionBench),
 }
@@ -31,6 +34,7 @@ pub async fn run(bench: Bench) -> Result<(), Box<dyn Error>> {
         Bench::Training(arguments) => tokio::task::block_in_place(|| training::run(&arguments)),
         Bench::Accuracy(arguments) => tokio::task::block_in_place(|| accuracy::run(&arguments)),
         Bench::Horizons(arguments) => tokio::task::block_in_place(|| horizons::run(&arguments)),
+        Bench::Assets(arguments) => tokio::task::block_in_place(|| assets::run(&arguments)),
         Bench::Kernels(arguments) => tokio::task::block_in_place(|| kernels::run(&arguments)),
         Bench::Action(arguments) => action::run(&arguments).await,
     }

@@ -83,6 +83,13 @@ impl Levelling {
     pub fn phases(&mut self, rest: f64, positions: &[f64], floors: &[f64], ground: &Ground) -> &[Phase] {
         self.turns.clear();
         self.phases.clear();
+        if ground.is_sup() && floors.iter().all(|floor| *floor <= 0.0) {
+            // All fall together, without an end.
+            let speed = positions.iter().sum();
+            let whole = Phase { fixed: rest, speed, rate: 1.0, high: 1.0, low: 0.0 };
+            self.phases.extend((speed > 0.0).then_some(whole));
+            return &self.phases;
+        }
         let (mut fixed, mut speed, mut rate, mut moving, mut low) = (rest, 0.0, 0.0, 0_usize, 0.0);
         for (index, (&position, &floor)) in positions.iter().zip(floors).enumerate() {
             if position <= floor || position <= 0.0 {

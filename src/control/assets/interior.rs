@@ -40,6 +40,11 @@ const DRAWN_INSIDE: f64 = 0.02;
 /// Prices tried for the start at most, and how far its law may be, over the radius or under it.
 const PRICES: usize = 8;
 const SPREAD: f64 = 3.0;
+/// Factors by which the first prices tried are apart, near a similar step and elsewhere, and the share at which they are near
+/// enough: where all atoms begin to move at about one price, no price has a law as far away as the radius.
+const PRICE_NEAR: f64 = 1.03;
+const PRICE_FAR: f64 = 1.5;
+const PRICE_WIDTH: f64 = 0.02;
 /// Room that the sum of the shares has at least.
 const LEAST_ROOM: f64 = 1e-6;
 
@@ -152,13 +157,14 @@ impl<'a> Interior<'a> {
             upper: f64::INFINITY,
             evaluations: 0,
         };
-        interior.price_the_start();
+        interior.price_the_start(if near.is_some() { PRICE_NEAR } else { PRICE_FAR });
         interior.open();
         interior
     }
 
     /// Finds a price at which the centred laws at the start are about as far away as the radius: by bisection.
-    fn price_the_start(&mut self) {
+    /// The first prices are apart by the factor `wider`, and further apart until one is too low and one too high.
+    fn price_the_start(&mut self, mut wider: f64) {
         let assets = self.step.assets();
         let (mut low, mut high) = (0.0, f64::INFINITY);
         for _ in 0..PRICES {
@@ -178,7 +184,15 @@ impl<'a> Interior<'a> {
             } else {
                 break;
             }
-            self.point[assets] = if high.is_infinite() { 1.5 * price } else { 0.5 * (low + high) };
+            self.point[assets] = match (low > 0.0, high.is_finite()) {
+                (true, true) => 0.5 * (low + high),
+                (true, false) => wider * price,
+                _ => price / wider,
+            };
+            if high - low < PRICE_WIDTH * high {
+                break;
+            }
+            wider *= wider;
         }
     }
 
