@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import datetime
+import math
 import os
 import signal
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
 
-from ballast import Ballast, Session, Training
+from ballast import Ballast, Evaluation, Session, Training, WalkForward, wire
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 BINARY = Path(os.environ.get("BALLAST_BINARY", REPOSITORY / "target/debug/ballast")).resolve()
@@ -107,6 +110,19 @@ def train(ballast: Ballast, **changes: object) -> Training:
     """A small training: three periods, 20 design points."""
     settings = {"horizon": 3, "rate_per_step": 0.001, "design": {"count": 20}, **changes}
     return ballast.train(RETURNS, kind="log", **settings)  # type: ignore[arg-type]
+
+
+def compare(ballast: Ballast) -> Evaluation:
+    """Constant mixes alone, which need no training."""
+    problem: wire.ProblemSpecification = {"history": RETURNS, "rate_per_step": 0.002, "horizon": 2}
+    return ballast.evaluate({"problem": problem, "frameworks": [], "constant_mixes": [0.0, 0.5], "paths": 200})
+
+
+def walk(ballast: Ballast, **more: Any) -> WalkForward:
+    """Three years of quarters, the last of them lived through."""
+    dates = [datetime.date(2020 + quarter // 4, 3 * (quarter % 4) + 1, 1) for quarter in range(12)]
+    simple = [0.02 + 0.03 * math.sin(1.7 * quarter) for quarter in range(12)]
+    return ballast.backtest(simple, kind="simple", rate=0.002, dates=dates, window=8, count=10, **more)
 
 
 @pytest.fixture

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import datetime
 import inspect
 import json
 import math
-from typing import Any
 
 import pytest
-from conftest import REPOSITORY, RETURNS, Network, train
+from conftest import REPOSITORY, RETURNS, Network, compare, train, walk
 
 import ballast as package
-from ballast import Ballast, Evaluation, Session, WalkForward, wire
+from ballast import Ballast, Session, wire
 
 
 def test_an_investor_lives_to_the_horizon(session: Session) -> None:
@@ -208,12 +206,6 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     assert described - reached == set()
 
 
-def compare(ballast: Ballast) -> Evaluation:
-    """Constant mixes alone, which need no training."""
-    problem: wire.ProblemSpecification = {"history": RETURNS, "rate_per_step": 0.002, "horizon": 2}
-    return ballast.evaluate({"problem": problem, "frameworks": [], "constant_mixes": [0.0, 0.5], "paths": 200})
-
-
 def test_what_if_supposes_and_touches_nothing(session: Session) -> None:
     before = session.action()
     answer = session.what_if(sweep={"radius_scale": {"from": 0.0, "to": 2.0, "points": 3}})
@@ -229,13 +221,6 @@ def test_an_evaluation_ends_in_a_report(ballast: Ballast) -> None:
     # Every path of the bank ends alike, up to rounding.
     assert bank["utility"]["variance"]["value"] == pytest.approx(0.0, abs=1e-20)
     assert half["utility"]["mean"]["low"] <= half["utility"]["mean"]["value"] <= half["utility"]["mean"]["high"]
-
-
-def walk(ballast: Ballast, **more: Any) -> WalkForward:
-    """Three years of quarters, the last of them lived through."""
-    dates = [datetime.date(2020 + quarter // 4, 3 * (quarter % 4) + 1, 1) for quarter in range(12)]
-    simple = [0.02 + 0.03 * math.sin(1.7 * quarter) for quarter in range(12)]
-    return ballast.backtest(simple, kind="simple", rate=0.002, dates=dates, window=8, count=10, **more)
 
 
 def test_a_walk_forward_ends_in_a_report(ballast: Ballast) -> None:

@@ -8,11 +8,11 @@
             allocation = session.action()["allocation"]
             session.observe(simple_return=...)
 
-Requests and answers are the JSON of the service, typed in :mod:`ballast.wire`; what goes wrong is in
-:mod:`ballast.errors`.
+Requests and answers are the JSON of the service, typed in :mod:`ballast.wire`; :mod:`ballast.frames` has them as pandas
+objects and :mod:`ballast.plots` as pictures; what goes wrong is in :mod:`ballast.errors`.
 """
 
-from . import wire
+from . import frames, plots, wire
 from .client import Ballast
 from .errors import (
     BallastError,
@@ -81,5 +81,7 @@ __all__ = [
     "Unreachable",
     "UnusualReturn",
     "WalkForward",
+    "frames",
+    "plots",
     "wire",
 ]

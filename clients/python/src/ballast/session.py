@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal, cast
+from typing import TYPE_CHECKING, Literal, cast
 from urllib.parse import quote
 
 from typing_extensions import Unpack
 
-from . import wire
+from . import frames, wire
 from .transport import Transport
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class Session:
@@ -152,6 +155,15 @@ class Session:
     def history(self) -> wire.History:
         """Where the session started, what was reported and told, and what would be told now."""
         return cast(wire.History, self._transport.json("GET", f"{self._path}/history"))
+
+    def frame(self, as_of: Literal["now", "then"] = "now") -> pd.DataFrame:
+        """The history as a DataFrame, a row for each period observed: dates, returns, what was advised and held, and
+        what wealth became (:func:`ballast.frames.history` names the columns and their units).
+
+        ``as_of="now"`` has every correction made, ``"then"`` tells what was told at the time. Raises ``ImportError``
+        without pandas.
+        """
+        return frames.history(self.history(), as_of)
 
     def refresh(self) -> Session:
         """Reads from the service where the session stands, and by which policy it lives."""

@@ -7,18 +7,22 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from typing import TextIO, cast
+from typing import TYPE_CHECKING, TextIO, cast
 from urllib.parse import quote
 
 import httpx
 
-from . import wire
+from . import frames, plots, wire
 from .errors import JobEnded, ProblemError, Unreachable
 from .events import parsed
 from .policy import Policy
 from .returns import Kind, Returns
 from .session import Session
 from .transport import RETRIED_STATUS, Transport, growing_pause
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 #: Called with the job at every change of it.
 Watch = Callable[[wire.Job], object]
@@ -141,6 +145,11 @@ class Evaluation(Job):
         """
         return cast(wire.EvaluationReport, self._report(watch))
 
+    def frame(self, watch: Watch | None = None) -> pd.DataFrame:
+        """The report's strategies, one a row (:func:`ballast.frames.evaluation`). Waits as ``report`` does, and raises
+        what it raises, and ``ImportError`` without pandas."""
+        return frames.evaluation(self.report(watch))
+
 
 class WalkForward(Job):
     """A job that ends in a report; ``Ballast.walk_forward(id)`` finds it again."""
@@ -152,6 +161,22 @@ class WalkForward(Job):
         """
         return cast(wire.BacktestReport, self._report(watch))
 
+    def frame(self, watch: Watch | None = None) -> pd.DataFrame:
+        """The report's strategies, one a row (:func:`ballast.frames.walk_forward`). Waits as ``report`` does, and
+        raises what it raises, and ``ImportError`` without pandas."""
+        return frames.walk_forward(self.report(watch))
+
+    def periods(self, figure: frames.Figure = "wealth", watch: Watch | None = None) -> pd.DataFrame:
+        """What each strategy did or had, by date: ``"wealth"``, ``"allocation"`` and so on
+        (:func:`ballast.frames.periods`). Waits as ``report`` does, and raises what it raises, ``ValueError`` for
+        another figure and ``ImportError`` without pandas."""
+        return frames.periods(self.report(watch), figure)
+
+    def plot(self, ax: Axes | None = None, watch: Watch | None = None) -> Axes:
+        """Draws the wealth of every strategy (:func:`ballast.plots.walk_forward`). Waits as ``report`` does, and raises
+        what it raises, and ``ImportError`` without pandas and matplotlib."""
+        return plots.walk_forward(self.report(watch), ax)
+
 
 class Frontier(Job):
     """A job that ends in a report; ``Ballast.frontier_of(id)`` finds it again."""
@@ -162,6 +187,16 @@ class Frontier(Job):
         Raises :class:`JobEnded` where the job fails or is cancelled.
         """
         return cast(wire.FrontierReport, self._report(watch))
+
+    def frame(self, watch: Watch | None = None) -> pd.DataFrame:
+        """What is lost at each multiple of the radius (:func:`ballast.frames.frontier`). Waits as ``report`` does, and
+        raises what it raises, and ``ImportError`` without pandas."""
+        return frames.frontier(self.report(watch))
+
+    def plot(self, ax: Axes | None = None, watch: Watch | None = None) -> Axes:
+        """Draws what is lost with its interval (:func:`ballast.plots.frontier`). Waits as ``report`` does, and raises
+        what it raises, and ``ImportError`` without pandas and matplotlib."""
+        return plots.frontier(self.report(watch), ax)
 
 
 class ProgressPrinter:

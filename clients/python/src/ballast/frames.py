@@ -1,0 +1,185 @@
+"""Answers of the service as pandas objects.
+
+Each function takes the JSON as it came, from a call or from a file such as the ``report.json`` that ``ballast
+backtest`` writes, and leaves it as it is. pandas is imported when a function is called, and not before: where it is
+missing, the call raises ``ImportError`` and says what to install.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
+
+from . import wire
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Whatever is robust against a worst law: ``Ballast.advise``, ``Session.action(explain="worst_case")``, a what-if.
+Explained: TypeAlias = wire.Advised | wire.Action | wire.WhatIfPoint
+
+#: The figures of a walk-forward that have a number for each period.
+Figure: TypeAlias = Literal["wealth", "allocation", "low", "high", "radius", "traded"]
+
+
+def history(history: wire.History, as_of: Literal["now", "then"] = "now") -> pd.DataFrame:
+    """What ``Session.history`` tells, a row for each period observed, with the period as index.
+
+    ``date`` is the last day of the period, ``NaT`` where none was reported. ``log_return`` and ``simple_return`` are
+    NaN where the return is missing. ``advised_allocation``, ``executed_allocation`` and ``holding`` are shares of
+    wealth, ``wealth`` is a currency, ``radius`` a log-return, after the period as the last two are. With
+    ``as_of="now"`` all of them have every correction made; with ``"then"`` they are what was told at the time.
+    ``corrected`` says whether the two may differ. Raises ``ImportError`` without pandas.
+    """
+    pd = _pandas()
+    rows = []
+    for observation in history["observations"]:
+        changed = observation.get("now")
+        told: Mapping[str, Any] = observation if as_of == "then" or changed is None else changed
+        reported = told.get("reported") or observation["reported"]
+        log_return = told.get("log_return")
+        rows.append(
+            {
+                "period": observation["period"],
+                "date": reported.get("date"),
+                "log_return": math.nan if log_return is None else log_return,
+                "simple_return": math.nan if log_return is None else math.expm1(log_return),
+                **{name: told[name] for name in _STANDING},
+                "corrected": changed is not None,
+            }
+        )
+    columns = ["period", "date", "log_return", "simple_return", *_STANDING, "corrected"]
+    frame = pd.DataFrame(rows, columns=columns).set_index("period")
+    return frame.assign(date=pd.to_datetime(frame["date"]))
+
+
+_STANDING = ("advised_allocation", "executed_allocation", "wealth", "holding", "radius")
+
+
+def worst_case(advice: Explained) -> pd.DataFrame:
+    """The law that an advice is robust against, as what moves: ``mass``, a probability, goes from the log-return
+    ``atom``, which was seen, to ``moved_to``.
+
+    So ``moved_to`` with the weights ``mass`` is the worst law, and ``atom`` with the same weights the law that was
+    learned. Raises ``ValueError`` where the advice came without one (``Session.action`` needs
+    ``explain="worst_case"``) or the law is a normal one, which is no transport; and ``ImportError`` without pandas.
+    """
+    law = advice.get("worst_case")
+    if law is None:
+        raise ValueError("the advice has no worst_case: ask for it with explain='worst_case'")
+    if not law["transport"]:
+        raise ValueError("the worst law is normal, and no transport: see advice['worst_case']['normal']")
+    return _pandas().DataFrame(law["transport"], columns=["atom", "moved_to", "mass"])
+
+
+def allocation(advised: wire.AssetsAdvised) -> pd.Series[float]:
+    """What ``Ballast.advise_assets`` advises: the share of wealth in each asset, by its name; the rest is in the bank.
+
+    Raises ``ImportError`` without pandas.
+    """
+    return _pandas().Series(advised["allocation"], name="allocation", dtype=float)
+
+
+def worst_means(advised: wire.AssetsAdvised) -> pd.DataFrame:
+    """The mean log-return of each asset as it was ``seen`` and under the ``worst`` law, an asset a row.
+
+    Raises ``ImportError`` without pandas.
+    """
+    return _pandas().DataFrame.from_dict(advised["worst_means"], orient="index", columns=["seen", "worst"])
+
+
+def walk_forward(report: wire.BacktestReport) -> pd.DataFrame:
+    """The strategies of a walk-forward, one a row by its name, the figures of the report as columns.
+
+    A figure with an interval has two columns more, its ends, under its name with ``_low`` and ``_high``. Returns,
+    volatilities and shares are fractions, certainty equivalents and wealth are from 100. Raises ``ImportError`` without
+    pandas.
+    """
+    rows = []
+    for figures in report["strategies"]:
+        row: dict[str, Any] = {}
+        for name, value in cast(dict[str, Any], figures).items():
+            row |= _estimate(name, value) if isinstance(value, Mapping) else {name: value}
+        rows.append(row)
+    return _pandas().DataFrame(rows).set_index("strategy")
+
+
+def periods(report: wire.BacktestReport, figure: Figure = "wealth") -> pd.DataFrame:
+    """One figure of a walk-forward, a row for each period and a column for each strategy.
+
+    ``wealth`` is at the end of the period, from 100; ``allocation``, the ends ``low`` and ``high`` of the band and
+    ``traded`` are shares of wealth; ``radius`` is a log-return. The index has the dates that were given for the
+    periods, a month as its first day, or counts from 1 where there are none. Raises ``ValueError`` for another figure,
+    and ``ImportError`` without pandas.
+    """
+    pd = _pandas()
+    if figure not in _FIGURES:
+        raise ValueError(f"figure is {figure!r}: must be one of {', '.join(_FIGURES)}")
+    frame = pd.DataFrame({strategy["strategy"]: strategy[figure] for strategy in report["periods"]})
+    dates = report.get("dates")
+    if dates is None:
+        return frame.set_axis(pd.RangeIndex(1, len(frame) + 1, name="period"))
+    return frame.set_axis(pd.to_datetime(pd.Index(dates, name="date"), format="ISO8601"))
+
+
+_FIGURES = ("wealth", "allocation", "low", "high", "radius", "traded")
+
+
+def evaluation(report: wire.EvaluationReport) -> pd.DataFrame:
+    """The strategies of an evaluation, one a row by its name.
+
+    ``certainty_equivalent`` and ``wealth_mean`` are currencies; ``utility_mean``, ``utility_variance`` and so on are
+    of terminal utility; ``difference_certainty_equivalent`` and ``difference_utility`` are to the reference, for
+    which they are NaN. Each has its interval in the columns with ``_low`` and ``_high``. Raises ``ImportError``
+    without pandas.
+    """
+    rows = []
+    for strategy in report["strategies"]:
+        difference: Mapping[str, Any] = strategy.get("difference") or {}
+        row: dict[str, Any] = {"strategy": strategy["strategy"]}
+        row |= _estimate("certainty_equivalent", strategy["certainty_equivalent"])
+        for name in ("certainty_equivalent", "utility"):
+            row |= _estimate(f"difference_{name}", difference.get(name))
+        for group in ("wealth", "utility"):
+            for name, value in cast(dict[str, Any], strategy)[group].items():
+                row |= _estimate(f"{group}_{name}", value)
+        rows.append(row)
+    return _pandas().DataFrame(rows).set_index("strategy")
+
+
+def frontier(report: wire.FrontierReport) -> pd.DataFrame:
+    """What caution costs, a row for each law that records were drawn from (``law``) and multiple of the radius
+    (``scale``), which are the index.
+
+    ``lost`` is in basis points of certainty equivalent behind the best allocation, a year where the report is
+    ``per_year`` and else a period; ``deviation`` is of that from record to record, ``beyond_least`` what more is lost
+    than at the best scale, NaN there; each with its interval in ``_low`` and ``_high``. ``total`` is the share of
+    wealth held in all assets on average. Raises ``ImportError`` without pandas.
+    """
+    rows = []
+    for resampled in report["resampled"]:
+        for point in resampled["points"]:
+            row: dict[str, Any] = {"law": resampled["bootstrap"]["kind"], "scale": point["scale"]}
+            row |= _estimate("lost", point["lost"]) | _estimate("deviation", point["deviation"])
+            rows.append(row | _estimate("beyond_least", point.get("beyond_least")) | {"total": point["total"]})
+    return _pandas().DataFrame(rows).set_index(["law", "scale"])
+
+
+def _estimate(name: str, figure: Mapping[str, Any] | None) -> dict[str, float]:
+    """A figure and the ends of its interval, which walk-forwards tell as a list."""
+    ends = (name, f"{name}_low", f"{name}_high")
+    if figure is None:
+        return dict.fromkeys(ends, math.nan)
+    low, high = figure["interval"] if "interval" in figure else (figure["low"], figure["high"])
+    return dict(zip(ends, (figure["value"], low, high), strict=True))
+
+
+def _pandas() -> ModuleType:
+    try:
+        import pandas
+    except ImportError as error:
+        raise ImportError("frames are pandas objects: pip install 'ballast-client[pandas]'") from error
+    module: ModuleType = pandas
+    return module

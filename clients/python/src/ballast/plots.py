@@ -1,0 +1,62 @@
+"""Pictures of answers, by matplotlib and pandas, which are imported when a function is called, and not before.
+
+Each function takes the JSON as :mod:`ballast.frames` does, draws on ``ax`` or else on a new figure, and returns the
+axes, which can be changed further. Where one of the two packages is missing, the call raises ``ImportError`` and says
+what to install.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from . import frames, wire
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def walk_forward(report: wire.BacktestReport, ax: Axes | None = None) -> Axes:
+    """The wealth of every strategy of a walk-forward from 100, over the periods, on a logarithmic scale."""
+    axes = _axes(ax)
+    frames.periods(report).plot(ax=axes, logy=True, linewidth=1.2)
+    axes.set_ylabel("wealth, from 100")
+    return axes
+
+
+def frontier(report: wire.FrontierReport, ax: Axes | None = None) -> Axes:
+    """What caution costs: basis points of certainty equivalent lost over the multiple of the radius, a line for each
+    law that records were drawn from, in the band of its interval."""
+    axes = _axes(ax)
+    for law, points in frames.frontier(report).groupby(level="law", sort=False):
+        points = points.droplevel("law")
+        (line,) = axes.plot(points.index, points["lost"], marker="o", label=law)
+        axes.fill_between(points.index, points["lost_low"], points["lost_high"], alpha=0.2, color=line.get_color())
+    axes.set_xlabel("multiple of the radius")
+    axes.set_ylabel(f"basis points lost a {'year' if report['per_year'] else 'period'}")
+    axes.legend(title="records drawn")
+    return axes
+
+
+def worst_case(advice: frames.Explained, ax: Axes | None = None) -> Axes:
+    """The law that was learned, upwards, and the worst law that the advice is robust against, downwards: the
+    probability of each log-return. Raises ``ValueError`` as :func:`ballast.frames.worst_case` does."""
+    axes = _axes(ax)
+    moves = frames.worst_case(advice)
+    for column, sign, colour, label in (("atom", 1.0, "C0", "seen"), ("moved_to", -1.0, "C3", "worst case")):
+        law = moves.groupby(column)["mass"].sum()
+        axes.vlines(law.index, 0.0, sign * law, color=colour, label=label, linewidth=1.5)
+    axes.axhline(0.0, color="black", linewidth=0.8)
+    axes.set_xlabel("log-return of the period")
+    axes.set_ylabel("probability, of the worst case downwards")
+    axes.legend()
+    return axes
+
+
+def _axes(ax: Axes | None) -> Axes:
+    if ax is not None:
+        return ax
+    try:
+        from matplotlib import pyplot
+    except ImportError as error:
+        raise ImportError("plots are drawn by matplotlib: pip install 'ballast-client[plots]'") from error
+    return pyplot.subplots()[1]

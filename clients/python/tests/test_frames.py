@@ -1,0 +1,188 @@
+"""Answers as pandas objects and pictures: every number is the one of the JSON, under the name that the docs give it."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import RETURNS, compare, walk
+
+from ballast import Ballast, Frontier, Session, frames, plots
+
+matplotlib.use("Agg")
+
+RECORD = [0.01 + 0.05 * math.sin(1.7 * period) for period in range(24)]
+
+
+def tried(ballast: Ballast) -> Frontier:
+    return ballast.frontier(
+        RECORD, kind="log", rate_per_step=0.002, scales=[0.0, 0.5, 1.0], resamples=20, idempotency_key="of the frames"
+    )
+
+
+def test_a_session_is_a_frame_with_and_without_its_corrections(session: Session) -> None:
+    assert list(session.frame().index) == [] and "wealth" in session.frame()
+    session.observe(simple_return=0.05, date="2008-01-31", executed_allocation=0.5)
+    session.observe(missing=True)
+    session.observe(log_return=-0.02, date="2008-03-31")
+    then = session.frame()
+    assert then.index.name == "period" and list(then.index) == [1, 2, 3] and not then["corrected"].any()
+    rows = session.history()["observations"]
+    for name in ("advised_allocation", "executed_allocation", "wealth", "holding", "radius"):
+        assert then[name].tolist() == [row[name] for row in rows]
+    assert then["simple_return"].tolist() == pytest.approx([0.05, math.nan, math.expm1(-0.02)], nan_ok=True)
+    assert then["date"].tolist() == [pd.Timestamp("2008-01-31"), pd.NaT, pd.Timestamp("2008-03-31")]
+
+    session.correct(2, "it was found", simple_return=0.03, date="2008-02-29")
+    now = session.frame()
+    assert now["corrected"].tolist() == [False, True, True]
+    assert now.loc[2, "simple_return"] == pytest.approx(0.03) and now.loc[2, "date"] == pd.Timestamp("2008-02-29")
+    assert now.loc[3, "wealth"] == session.wealth != then.loc[3, "wealth"]
+    pd.testing.assert_frame_equal(session.frame(as_of="then").drop(columns="corrected"), then.drop(columns="corrected"))
+
+
+def test_the_worst_case_is_a_transport(ballast: Ballast, session: Session) -> None:
+    advised = ballast.advise(RETURNS, kind="log", rate_per_step=0.002)
+    answers: list[frames.Explained] = [advised, session.action(explain="worst_case")]
+    for advice in answers:
+        moves = frames.worst_case(advice)
+        assert moves["mass"].sum() == pytest.approx(1.0)
+        # Every return seen has its mass, 1 of 10, wherever that goes, and the mean distance fits in the ball.
+        seen = moves.groupby("atom")["mass"].sum()
+        assert sorted(seen.index) == sorted(RETURNS) and seen.tolist() == pytest.approx([0.1] * 10)
+        distance = (moves["mass"] * (moves["atom"] - moves["moved_to"]).abs()).sum()
+        assert 0.0 < distance <= advice["radius"] * (1 + 1e-9)
+    with pytest.raises(ValueError, match="ask for it with explain='worst_case'"):
+        frames.worst_case(session.action())
+    normal = ballast.advise(RETURNS, kind="log", rate_per_step=0.002, framework="parametric_static")
+    with pytest.raises(ValueError, match="the worst law is normal"):
+        frames.worst_case(normal)
+
+
+def test_allocations_have_the_names_of_the_assets(ballast: Ballast) -> None:
+    table = pd.DataFrame({"stocks": RETURNS, "bonds": [value * value - 0.0005 for value in RETURNS]})
+    advised = ballast.advise_assets(table, kind="log", rate_per_step=0.0, radius={"rule": "fixed", "radius": 1e-4})
+    held = frames.allocation(advised)
+    assert held.name == "allocation" and held.to_dict() == advised["allocation"]
+    assert held.sum() == pytest.approx(advised["total"]) and held["stocks"] > 0.0
+    means = frames.worst_means(advised)
+    assert means.loc["stocks", "seen"] == pytest.approx(table["stocks"].mean())
+    assert (means["worst"] <= means["seen"]).all()
+
+
+def test_a_walk_forward_is_frames(ballast: Ballast) -> None:
+    walked = walk(ballast, alpha=[0.5])
+    report = walked.report()
+    table = walked.frame()
+    assert list(table.index) == [line["strategy"] for line in report["strategies"]]
+    for line in report["strategies"]:
+        row, figure = table.loc[line["strategy"]], line["annual_mean"]
+        assert [row["annual_mean"], row["annual_mean_low"], row["annual_mean_high"]] == [
+            figure["value"],
+            *figure["interval"],
+        ]
+        assert (row["final_wealth"], row["hindsight"]) == (line["final_wealth"], line["hindsight"])
+    wealth = walked.periods()
+    assert list(wealth.columns) == list(table.index)
+    assert wealth.index.tolist() == pd.date_range("2022-01", periods=4, freq="QS").tolist()
+    assert wealth.iloc[-1].to_dict() == pytest.approx(table["final_wealth"].to_dict(), rel=1e-12)
+    assert walked.periods("allocation")["all-stock"].tolist() == [1.0] * 4
+    with pytest.raises(ValueError, match="figure is 'return': must be one of wealth, allocation"):
+        walked.periods("return")  # type: ignore[arg-type]
+    # A report as `ballast backtest` writes it, of periods without dates.
+    undated = json.loads(json.dumps({**report, "dates": None}))
+    assert frames.periods(undated).index.tolist() == [1, 2, 3, 4]
+
+
+def test_an_evaluation_is_a_frame(ballast: Ballast) -> None:
+    evaluation = compare(ballast)
+    report, table = evaluation.report(), evaluation.frame()
+    bank, half = report["strategies"]
+    assert list(table.index) == [bank["strategy"], half["strategy"]]
+    assert table.loc["mix_0.5", "wealth_mean_high"] == half["wealth"]["mean"]["high"]
+    assert table.loc["mix_0.5", "utility_quantile_20"] == half["utility"]["quantile_20"]["value"]
+    ahead = table["certainty_equivalent"] - table.loc["all_bank", "certainty_equivalent"]
+    assert table.loc["mix_0.5", "difference_certainty_equivalent"] == pytest.approx(ahead["mix_0.5"])
+    assert table.loc["all_bank"].filter(like="difference").isna().all()
+
+
+def test_a_frontier_is_a_frame(ballast: Ballast) -> None:
+    found = tried(ballast)
+    report, table = found.report(), found.frame()
+    assert table.index.names == ["law", "scale"] and len(table) == 9
+    for resampled in report["resampled"]:
+        for point in resampled["points"]:
+            row = table.loc[(resampled["bootstrap"]["kind"], point["scale"])]
+            assert (row["lost"], row["lost_low"], row["total"]) == (
+                point["lost"]["value"],
+                point["lost"]["low"],
+                point["total"],
+            )
+    # At the best scale of each law nothing more is lost than at the best.
+    least = table["beyond_least"].isna()
+    assert least.groupby(level="law").sum().tolist() == [1, 1, 1]
+    assert table.loc[least, "lost"].tolist() == table.groupby(level="law", sort=False)["lost"].min().tolist()
+
+
+def test_pictures_show_the_frames(ballast: Ballast) -> None:
+    walked = walk(ballast, alpha=[0.5])
+    lines = {line.get_label(): line for line in walked.plot().get_lines()}
+    wealth = walked.periods()
+    assert set(wealth.columns) <= set(lines)
+    assert list(lines["all-stock"].get_ydata()) == wealth["all-stock"].tolist()  # type: ignore[arg-type]
+
+    found = tried(ballast)
+    axes = found.plot()
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["smoothed", "block", "without_premium"]  # type: ignore[union-attr]
+    smoothed = found.frame().loc["smoothed"]
+    assert list(axes.get_lines()[0].get_ydata()) == smoothed["lost"].tolist()  # type: ignore[arg-type]
+    (band,) = axes.collections[0].get_paths()
+    heights = np.asarray(band.vertices)[:, 1]
+    assert (heights.min(), heights.max()) == (smoothed["lost_low"].min(), smoothed["lost_high"].max())
+    assert plots.frontier(found.report(), axes) is axes
+
+    advice = ballast.advise(RETURNS, kind="log", rate_per_step=0.002)
+    seen, worst = plots.worst_case(advice).collections
+    assert len(seen.get_paths()) == len(RETURNS)
+    # Upwards and downwards, all of the probability.
+    for law, sign in ((seen, 1.0), (worst, -1.0)):
+        assert sum(np.asarray(path.vertices)[1, 1] for path in law.get_paths()) == pytest.approx(sign)
+
+
+def missing(package: str, call: str) -> str:
+    """What a call says where a package is not installed."""
+    code = f"import sys; sys.modules[{package!r}] = None\nfrom ballast import frames, plots\n{call}"
+    return subprocess.run([sys.executable, "-c", code], text=True, capture_output=True).stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("package", "call", "message"),
+    [
+        ("pandas", "frames.allocation({'allocation': {}})", "pip install 'ballast-client[pandas]'"),
+        ("pandas", "frames.frontier({'resampled': []})", "pip install 'ballast-client[pandas]'"),
+        ("matplotlib", "plots.worst_case({})", "pip install 'ballast-client[plots]'"),
+    ],
+)
+def test_what_to_install_is_said(package: str, call: str, message: str) -> None:
+    said = missing(package, call)
+    assert said.startswith("ImportError: ") and said.endswith(message)
+
+
+def test_every_frame_says_what_it_needs() -> None:
+    public: list[Callable[..., Any]] = [
+        made
+        for module in (frames, plots)
+        for name, made in vars(module).items()
+        if callable(made) and getattr(made, "__module__", "") == module.__name__ and not name.startswith("_")
+    ]
+    assert len(public) >= 11
+    for made in public:
+        assert made.__doc__, made
