@@ -10,7 +10,7 @@ import pytest
 from conftest import REPOSITORY, RETURNS, Network, compare, train, walk
 
 import ballast as package
-from ballast import Ballast, Session, wire
+from ballast import Ballast, Policy, Session, Training, wire
 
 
 def test_an_investor_lives_to_the_horizon(session: Session) -> None:
@@ -266,6 +266,12 @@ def test_every_field_of_a_specification_is_an_argument() -> None:
     arguments = set(inspect.signature(Ballast.train).parameters) - {"self", "returns", "kind", "idempotency_key"}
     problem, whole = wire.ProblemSpecification.__annotations__, wire.Specification.__annotations__
     assert arguments == (set(problem) - {"history"}) | (set(whole) - {"problem"})
+
+
+def test_a_training_opens_sessions_as_its_policy_does() -> None:
+    training, policy = inspect.signature(Training.session).parameters, inspect.signature(Policy.session).parameters
+    assert set(training) - {"watch"} == set(policy)
+    assert set(policy) - {"self", "kind", "idempotency_key"} == set(wire.OpenSession.__annotations__) - {"policy"}
 
 
 def test_every_field_of_a_report_is_an_argument() -> None:

@@ -12,7 +12,7 @@ import httpx
 
 from . import wire
 from .policy import Policy
-from .returns import Kind, Returns, Table, log_returns, log_returns_of_assets
+from .returns import Kind, Returns, Table, day, log_returns, log_returns_of_assets, per_period
 from .session import Session
 from .training import Evaluation, Frontier, Training, WalkForward
 from .transport import Transport, idempotent
@@ -180,14 +180,12 @@ class Ballast:
         ``periods_per_year`` says so without them. What is left out the service chooses, and the report tells.
         """
         record = log_returns(returns, kind)
-        days = None if dates is None else [str(date)[:10] for date in dates]
-        rates = rate if isinstance(rate, (int, float)) else [float(paid) for paid in rate]
-        # The first price has no return.
-        first = 1 if kind == "price" else 0
+        days = None if dates is None else per_period("dates", map(day, dates), len(record), kind)
+        rates = rate if isinstance(rate, (int, float)) else per_period("rate", map(float, rate), len(record), kind)
         request = {
             "log_returns": record,
-            "rate": rates[first:] if first and isinstance(rates, list) else rates,
-            "dates": days if days is None else days[first:],
+            "rate": rates,
+            "dates": days,
             "periods_per_year": periods_per_year,
             "window": window,
             "every": every,

@@ -33,7 +33,7 @@ def history(history: wire.History, as_of: Literal["now", "then"] = "now") -> pd.
     ``as_of="now"`` all of them have every correction made; with ``"then"`` they are what was told at the time.
     ``corrected`` says whether the two may differ. Raises ``ImportError`` without pandas.
     """
-    pd = _pandas()
+    pd = require_pandas()
     rows = []
     for observation in history["observations"]:
         changed = observation.get("now")
@@ -71,7 +71,7 @@ def worst_case(advice: Explained) -> pd.DataFrame:
         raise ValueError("the advice has no worst_case: ask for it with explain='worst_case'")
     if not law["transport"]:
         raise ValueError("the worst law is normal, and no transport: see advice['worst_case']['normal']")
-    return _pandas().DataFrame(law["transport"], columns=["atom", "moved_to", "mass"])
+    return require_pandas().DataFrame(law["transport"], columns=["atom", "moved_to", "mass"])
 
 
 def allocation(advised: wire.AssetsAdvised) -> pd.Series[float]:
@@ -79,7 +79,7 @@ def allocation(advised: wire.AssetsAdvised) -> pd.Series[float]:
 
     Raises ``ImportError`` without pandas.
     """
-    return _pandas().Series(advised["allocation"], name="allocation", dtype=float)
+    return require_pandas().Series(advised["allocation"], name="allocation", dtype=float)
 
 
 def worst_means(advised: wire.AssetsAdvised) -> pd.DataFrame:
@@ -87,7 +87,7 @@ def worst_means(advised: wire.AssetsAdvised) -> pd.DataFrame:
 
     Raises ``ImportError`` without pandas.
     """
-    return _pandas().DataFrame.from_dict(advised["worst_means"], orient="index", columns=["seen", "worst"])
+    return require_pandas().DataFrame.from_dict(advised["worst_means"], orient="index", columns=["seen", "worst"])
 
 
 def walk_forward(report: wire.BacktestReport) -> pd.DataFrame:
@@ -103,7 +103,7 @@ def walk_forward(report: wire.BacktestReport) -> pd.DataFrame:
         for name, value in cast(dict[str, Any], figures).items():
             row |= _estimate(name, value) if isinstance(value, Mapping) else {name: value}
         rows.append(row)
-    return _pandas().DataFrame(rows).set_index("strategy")
+    return require_pandas().DataFrame(rows).set_index("strategy")
 
 
 def periods(report: wire.BacktestReport, figure: Figure = "wealth") -> pd.DataFrame:
@@ -114,7 +114,7 @@ def periods(report: wire.BacktestReport, figure: Figure = "wealth") -> pd.DataFr
     periods, a month as its first day, or counts from 1 where there are none. Raises ``ValueError`` for another figure,
     and ``ImportError`` without pandas.
     """
-    pd = _pandas()
+    pd = require_pandas()
     if figure not in _FIGURES:
         raise ValueError(f"figure is {figure!r}: must be one of {', '.join(_FIGURES)}")
     frame = pd.DataFrame({strategy["strategy"]: strategy[figure] for strategy in report["periods"]})
@@ -146,7 +146,7 @@ def evaluation(report: wire.EvaluationReport) -> pd.DataFrame:
             for name, value in cast(dict[str, Any], strategy)[group].items():
                 row |= _estimate(f"{group}_{name}", value)
         rows.append(row)
-    return _pandas().DataFrame(rows).set_index("strategy")
+    return require_pandas().DataFrame(rows).set_index("strategy")
 
 
 def frontier(report: wire.FrontierReport) -> pd.DataFrame:
@@ -164,7 +164,7 @@ def frontier(report: wire.FrontierReport) -> pd.DataFrame:
             row: dict[str, Any] = {"law": resampled["bootstrap"]["kind"], "scale": point["scale"]}
             row |= _estimate("lost", point["lost"]) | _estimate("deviation", point["deviation"])
             rows.append(row | _estimate("beyond_least", point.get("beyond_least")) | {"total": point["total"]})
-    return _pandas().DataFrame(rows).set_index(["law", "scale"])
+    return require_pandas().DataFrame(rows).set_index(["law", "scale"])
 
 
 def _estimate(name: str, figure: Mapping[str, Any] | None) -> dict[str, float]:
@@ -176,7 +176,8 @@ def _estimate(name: str, figure: Mapping[str, Any] | None) -> dict[str, float]:
     return dict(zip(ends, (figure["value"], low, high), strict=True))
 
 
-def _pandas() -> ModuleType:
+def require_pandas() -> ModuleType:
+    """pandas itself. Raises ``ImportError`` without it."""
     try:
         import pandas
     except ImportError as error:

@@ -69,6 +69,35 @@ def log_returns_of_assets(
     return names, [list(row) for row in zip(*each, strict=True)]
 
 
+def days_of(returns: Returns) -> list[str] | None:
+    """The days that the index of a pandas object names, one for each entry, as ``2008-01-31``; of a month or another
+    span in a PeriodIndex the last. ``None`` where there is no index of dates."""
+    index: Any = getattr(returns, "index", None)
+    if getattr(index, "inferred_type", None) not in _DATED:
+        return None
+    return [day(date) for date in (index.to_timestamp(how="end") if hasattr(index, "to_timestamp") else index)]
+
+
+#: What pandas calls the values of an index of dates.
+_DATED = ("datetime64", "datetime", "date", "period")
+
+
+def day(date: object) -> str:
+    """A date, a time or a text as the service takes it: the day alone."""
+    return str(date)[:10]
+
+
+def per_period(name: str, values: Iterable[Any], periods: int, kind: Kind) -> list[Any]:
+    """What was given for each entry of the returns, as one for each period: the first price has none.
+
+    Raises ``ValueError`` that names the argument and the rule.
+    """
+    found, entries = list(values), periods + (kind == "price")
+    if len(found) != entries:
+        raise ValueError(f"{name} has {len(found)} entries: must have {entries}, one for each entry of returns")
+    return found[entries - periods :]
+
+
 def _column(returns: Returns) -> Iterable[Any]:
     """The one column of a table; anything else as it is."""
     shape: tuple[int, ...] = getattr(returns, "shape", (0,))

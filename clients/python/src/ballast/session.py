@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import itertools
+import time
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Literal, cast
 from urllib.parse import quote
 
 from typing_extensions import Unpack
 
-from . import frames, wire
-from .transport import Transport
+from . import frames, replay, wire
+from .errors import JobEnded
+from .returns import Kind, Returns
+from .transport import Transport, growing_pause
 
 if TYPE_CHECKING:
     import pandas as pd
+
+#: Longest pause between two looks at a renewal that is due, in seconds.
+_LOOK = 0.5
 
 
 class Session:
@@ -80,6 +88,56 @@ class Session:
             self.period, self.wealth = observed["period"] + 1, observed["wealth"]
             self.holding = observed["holding"]
         return self
+
+    def replay(
+        self,
+        returns: Returns,
+        *,
+        kind: Kind,
+        period: int = 1,
+        dates: Iterable[object] | None = None,
+        rate: replay.Numbers | None = None,
+        flow: replay.Numbers | None = None,
+        executed_allocation: replay.Numbers | None = None,
+        confirm: bool = False,
+    ) -> pd.DataFrame:
+        """Reports a record period by period, from ``period`` on, and answers what was advised and what became of
+        wealth, a row for each.
+
+        ``returns`` and ``kind`` are as in :meth:`Ballast.train <ballast.Ballast.train>`. ``dates`` are the last days of
+        the periods, by default those of the index of a pandas object, as they stand there. ``rate``, ``flow`` and
+        ``executed_allocation`` are as in :meth:`observe`: one number for all periods, or one for each entry of
+        ``returns``, as ``dates`` are.
+
+        Each report carries the number of its period, so the same call again, be it after :class:`Unreachable`,
+        reports nothing twice and answers the same. A record that goes on where the session stands has
+        ``period=session.period``. A session that renews itself is waited for wherever a renewal is due: what is
+        advised does not depend on how long trainings take.
+
+        The rows have the index of ``returns`` where that is a pandas object, and else the periods. The columns are
+        those of :func:`ballast.frames.history`, as they were told. Raises ``ValueError`` where an argument breaks a
+        rule and ``ImportError`` without pandas, both before anything is sent; :class:`JobEnded` where the training of
+        a renewal fails; and what :meth:`observe` raises.
+        """
+        frames.require_pandas()
+        reports = replay.reports(returns, kind, dates, rate, flow, executed_allocation)
+        renewing = self._read().get("renew") is not None
+        for number, report in enumerate(reports, start=period):
+            if renewing:
+                self._await_renewal()
+            self.observe(period=number, confirm=confirm, **report)
+        return replay.told(self.history(), period, returns, kind, len(reports))
+
+    def _await_renewal(self) -> None:
+        """Waits until no renewal is due. The service looks at those under way twice a second."""
+        for attempt in itertools.count():
+            due = self._read().get("renewal")
+            if due is None:
+                return
+            job = due.get("job")
+            if due["state"] == "failed" and job is not None:
+                raise JobEnded(self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
+            time.sleep(min(growing_pause(attempt), _LOOK))
 
     def correct(
         self,
@@ -167,11 +225,15 @@ class Session:
 
     def refresh(self) -> Session:
         """Reads from the service where the session stands, and by which policy it lives."""
+        self._read()
+        return self
+
+    def _read(self) -> wire.Session:
         session: wire.Session = self._transport.json("GET", self._path)
         self.renewals, self.policy, self.horizon = session["renewals"], session["policy"], session["horizon"]
         self.corrections = session["corrections"]
         self.period, self.wealth, self.holding = session["period"], session["wealth"], session["holding"]
-        return self
+        return session
 
     def delete(self) -> None:
         """Deletes the session and all that is recorded of it. Raises :class:`NotFound` where there is none."""

@@ -125,13 +125,20 @@ class Training(Job):
         kind: Kind = "log",
         wealth: float | None = None,
         holding: float | None = None,
+        renew: wire.Renewing | None = None,
+        rolling: bool = False,
         idempotency_key: str | None = None,
         watch: Watch | None = None,
     ) -> Session:
         """Waits for the policy and opens a session of it, as :meth:`Policy.session` does."""
-        policy = self.policy(watch)
-        return policy.session(
-            history=history, kind=kind, wealth=wealth, holding=holding, idempotency_key=idempotency_key
+        return self.policy(watch).session(
+            history=history,
+            kind=kind,
+            wealth=wealth,
+            holding=holding,
+            renew=renew,
+            rolling=rolling,
+            idempotency_key=idempotency_key,
         )
 
 

@@ -1,0 +1,53 @@
+"""A record as reports of periods: what is sent is worked out, and refused, before anything is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
+
+from . import frames, wire
+from .returns import Kind, Returns, day, days_of, log_returns, per_period
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: One number for all periods, or one for each entry of the returns.
+Numbers: TypeAlias = float | Sequence[float]
+
+
+def reports(
+    returns: Returns,
+    kind: Kind,
+    dates: Iterable[object] | None,
+    rate: Numbers | None,
+    flow: Numbers | None,
+    executed_allocation: Numbers | None,
+) -> list[wire.Report]:
+    """The report of each period. Raises ``ValueError`` that names the argument and the rule."""
+    record = log_returns(returns, kind)
+    fields: dict[str, list[Any]] = {"log_return": record}
+    days = days_of(returns) if dates is None else [day(date) for date in dates]
+    if days is not None:
+        fields["date"] = per_period("dates", days, len(record), kind)
+    for name, values in (("rate", rate), ("flow", flow), ("executed_allocation", executed_allocation)):
+        if values is not None:
+            fields[name] = _numbers(name, values, len(record), kind)
+    return [cast(wire.Report, dict(zip(fields, row, strict=True))) for row in zip(*fields.values(), strict=True)]
+
+
+def told(history: wire.History, period: int, returns: Returns, kind: Kind, count: int) -> pd.DataFrame:
+    """The rows of a history from ``period`` on, under the index of ``returns`` where that is a pandas object."""
+    rows = frames.history(history, as_of="then").loc[period : period + count - 1].drop(columns="corrected")
+    if not hasattr(returns, "iloc"):
+        return rows
+    return rows.reset_index().set_axis(returns.index[kind == "price" :], axis="index")
+
+
+def _numbers(name: str, values: Numbers, periods: int, kind: Kind) -> list[float]:
+    each = per_period(name, values, periods, kind) if isinstance(values, Iterable) else [values] * periods
+    found = [float(value) for value in each]
+    for number, value in enumerate(found, start=1):
+        if not math.isfinite(value):
+            raise ValueError(f"{name} of period {number} is {value}: must be finite")
+    return found
