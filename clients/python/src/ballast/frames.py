@@ -75,7 +75,8 @@ def worst_case(advice: Explained) -> pd.DataFrame:
 
 
 def allocation(advised: wire.AssetsAdvised) -> pd.Series[float]:
-    """What ``Ballast.advise_assets`` advises: the share of wealth in each asset, by its name; the rest is in the bank.
+    """What ``Ballast.advise_assets`` advises: the share of wealth in each asset, by its name, in no
+    particular order; the rest is in the bank.
 
     Raises ``ImportError`` without pandas.
     """

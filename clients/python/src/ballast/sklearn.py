@@ -1,0 +1,124 @@
+"""The advice on several assets as a scikit-learn estimator. It needs scikit-learn: ``pip install
+'ballast-client[sklearn]'``; nothing else of this package imports it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator
+from sklearn.utils.validation import check_is_fitted, validate_data
+from typing_extensions import Self
+
+from . import wire
+from .client import Ballast
+
+#: Where the service listens unless told.
+URL = "http://127.0.0.1:8080"
+
+
+class Advised:
+    """What estimators of this package share: they keep the arguments of their constructors and ask the service."""
+
+    url: str
+    rate_per_step: float | None
+    bank: str | int | None
+    weights_: NDArray[np.float64]
+
+    #: Constructor's arguments that are fields of the problem.
+    _PROBLEM = ("initial_wealth", "utility", "radius", "ground_norm", "action_interval", "support", "periods_per_year")
+
+    def _fit(self, X: Any) -> None:
+        table: NDArray[np.float64] = validate_data(self, X, dtype=np.float64, ensure_min_samples=2)
+        columns = list(getattr(X, "columns", [f"x{number}" for number in range(table.shape[1])]))
+        if (self.bank is None) == (self.rate_per_step is None):
+            raise ValueError("rate_per_step and bank: exactly one of the two must be given")
+        bank = None if self.bank is None else _place(self.bank, columns)
+        rate = float(self.rate_per_step or 0.0) if bank is None else float(table[-1, bank])
+        assets = [place for place in range(len(columns)) if place != bank]
+        problem = {name: getattr(self, name) for name in self._PROBLEM}
+        names = [str(columns[asset]) for asset in assets]
+        framed = hasattr(X, "iloc")
+        record = X.iloc[:, assets] if framed else table[:, assets]
+        with Ballast(self.url) as ballast:
+            advice = ballast.advise_assets(
+                record, kind="simple", rate_per_step=rate, assets=None if framed else names, **problem
+            )
+        self.advice_: wire.AssetsAdvised = advice
+        self.rate_per_step_ = rate
+        weights = np.zeros(len(columns))
+        weights[assets] = [advice["allocation"][name] for name in names]
+        if bank is not None:
+            weights[bank] = 1.0 - math.fsum(weights)
+        self.weights_ = weights
+
+
+class RobustAllocation(Advised, BaseEstimator):
+    """What to hold of several assets, robustly, as ``Ballast.advise_assets`` advises.
+
+    ``X`` has the simple returns of an asset in each column, as fractions, the oldest period first. What the bank pays
+    a period is ``rate_per_step``, or the last number of the column ``bank`` of ``X``, which is then no asset: its
+    name in a DataFrame, its place in an array. Exactly one of the two is given. ``url`` is where the service listens;
+    its key comes from ``BALLAST_KEY``. ``initial_wealth``, ``utility``, ``radius``, ``ground_norm``,
+    ``action_interval``, ``support`` and ``periods_per_year`` are fields of the problem of ``POST /advise``; what is
+    left out the service chooses.
+
+    After ``fit``, ``weights_`` is the share of wealth in each column of ``X``: in the assets what is advised, in the
+    column ``bank`` the rest. Without such a column the rest is in the bank all the same, and the weights sum to less
+    than 1. ``advice_`` is the whole answer and ``rate_per_step_`` the rate that was used.
+    """
+
+    def __init__(
+        self,
+        *,
+        url: str = URL,
+        rate_per_step: float | None = None,
+        bank: str | int | None = None,
+        initial_wealth: float | None = None,
+        utility: wire.UtilitySpecification | None = None,
+        radius: wire.RadiusRule | None = None,
+        ground_norm: wire.GroundNorm | None = None,
+        action_interval: Sequence[float] | None = None,
+        support: wire.LowestReturn | None = None,
+        periods_per_year: float | None = None,
+    ) -> None:
+        self.url = url
+        self.rate_per_step = rate_per_step
+        self.bank = bank
+        self.initial_wealth = initial_wealth
+        self.utility = utility
+        self.radius = radius
+        self.ground_norm = ground_norm
+        self.action_interval = action_interval
+        self.support = support
+        self.periods_per_year = periods_per_year
+
+    def fit(self, X: Any, y: object = None) -> Self:
+        """Asks the service for the advice on the returns ``X``; ``y`` is not used.
+
+        Raises ``ValueError`` where ``X`` or an argument cannot be meant, and what ``Ballast.advise_assets`` raises.
+        """
+        self._fit(X)
+        return self
+
+    def predict(self, X: Any) -> NDArray[np.float64]:
+        """The weights to hold through each row of ``X``, which are the same in every row: an array of its shape.
+
+        Raises ``sklearn.exceptions.NotFittedError`` before ``fit``, and ``ValueError`` for other columns than its.
+        """
+        check_is_fitted(self)
+        rows: NDArray[np.float64] = validate_data(self, X, reset=False, dtype=np.float64)
+        return np.tile(self.weights_, (len(rows), 1))
+
+
+def _place(bank: str | int, columns: Sequence[Any]) -> int:
+    """Where the column is, from 0; a number counts from the end where it is negative."""
+    places = range(len(columns))
+    if isinstance(bank, int) and -len(places) <= bank < len(places):
+        return places[bank]
+    if bank not in columns:
+        raise ValueError(f"bank is {bank!r}: must be one of the columns {columns}")
+    return columns.index(bank)
