@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 import re
 
@@ -52,8 +53,10 @@ def test_conflicts_have_their_kinds(ballast: Ballast, session: Session) -> None:
 def test_a_session_stays_where_it_was_after_a_refusal(session: Session) -> None:
     with pytest.raises(package.InvalidField):
         session.observe(log_return=0.01, simple_return=0.01)
-    with pytest.raises(ValueError, match="not JSON compliant"):
+    with pytest.raises(ValueError, match=r"^log_return is nan: must be finite$"):
         session.observe(log_return=float("nan"))
+    with pytest.raises(ValueError, match=r"^sweep\.radius_scale\.to is inf: must be finite$"):
+        session.what_if(sweep={"radius_scale": {"from": 0.0, "to": math.inf, "points": 3}})
     assert (session.period, session.wealth, session.observed) == (1, 100.0, None)
 
 

@@ -12,7 +12,7 @@ import pytest
 from conftest import RETURNS, train
 
 from ballast import Ballast
-from ballast.returns import Kind, log_returns
+from ballast.returns import Kind, dates_of, log_returns, log_returns_of_assets
 
 SIMPLE = [0.02, -0.05, 0.0]
 LOGS = [math.log(1.02), math.log(0.95), 0.0]
@@ -56,11 +56,84 @@ def test_kinds_agree() -> None:
         ([0.1], "prices", "kind is 'prices': must be"),
         (pd.DataFrame({"a": [0.1], "b": [0.2]}), "log", r"\(1, 2\), \['a', 'b'\]: must be one column"),
         (pd.Series([1.0, 2.0], index=[2, 1]), "price", "must come oldest first"),
+        (pd.Series([0.1, pd.NA]), "log", r"returns\[1\] is <NA>: must be a number"),
+        ([0.1, "n/a"], "log", r"returns\[1\] is 'n/a': must be a number"),
+        (pd.Series(SIMPLE, index=INDEX[::-1]), "simple", "has 2008-02-01 after 2008-03-01: dates must increase"),
+        (pd.Series(SIMPLE, index=INDEX[[0, 1, 1]]), "log", "returns has 2008-02-01 twice: must have each date once"),
+        (pd.Series(SIMPLE, index=[INDEX[0], pd.NaT, INDEX[2]]), "log", "has NaT after 2008-01-01: dates must increase"),
+        (pd.Series(SIMPLE, index=["2008-02", "2008-01", "2008-03"]), "log", "has 2008-01 after 2008-02"),
+        (pd.DataFrame({"a": SIMPLE}, index=INDEX[[1, 0, 2]].to_period("M")), "log", "has 2008-01-31 after 2008-02-29"),
+        ([100 * value for value in SIMPLE], "log", r"a standard deviation of 2\.94 a period: must be at most 0\.3"),
+        ([2.0, -0.5, 0.0], "simple", r"must be at most 0\.3, as fractions are, 0\.01 for 1 %"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(returns: Any, kind: Kind, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         log_returns(returns, kind)
+
+
+def test_what_cannot_be_meant_of_several_assets_is_refused() -> None:
+    table = pd.DataFrame({"stocks": SIMPLE, "bonds": SIMPLE}, index=INDEX)
+    refused = {
+        "index of returns has 2008-01-01 after 2008-03-01": table.iloc[[2, 0, 1]],
+        r"bonds: returns\[1\] is nan: must be finite": table.assign(bonds=[0.1, math.nan, 0.2]),
+        r"bonds: returns has a standard deviation of 2\.05": table.assign(bonds=100 * table["bonds"].abs()),
+        "assets has 'stocks' twice": table.set_axis(["stocks", "stocks"], axis="columns"),
+    }
+    for message, wrong in refused.items():
+        with pytest.raises(ValueError, match=message):
+            log_returns_of_assets(wrong, "simple")
+    names, rows = log_returns_of_assets(table, "simple")
+    assert names == ["stocks", "bonds"] and [row[0] for row in rows] == [row[1] for row in rows] == pytest.approx(
+        LOGS, abs=1e-15
+    )
+
+
+def test_a_volatile_record_can_be_given_as_prices() -> None:
+    assert log_returns([1.0, 3.0, 1.0, 4.0], "price") == [math.log(3.0), -math.log(3.0), math.log(4.0)]
+    assert log_returns([1.5], "log") == [1.5]
+
+
+@pytest.mark.parametrize(
+    ("index", "dates"),
+    [
+        (INDEX, ["2008-01-01", "2008-02-01", "2008-03-01"]),
+        (INDEX.tz_localize("America/New_York"), ["2008-01-01", "2008-02-01", "2008-03-01"]),
+        (INDEX.to_period("M"), ["2008-01-31", "2008-02-29", "2008-03-31"]),
+        (pd.period_range("2008Q1", periods=3, freq="Q"), ["2008-03-31", "2008-06-30", "2008-09-30"]),
+        (pd.Index([date.date() for date in INDEX]), ["2008-01-01", "2008-02-01", "2008-03-01"]),
+        (["2008-01", "2008-02", "2008-03"], ["2008-01", "2008-02", "2008-03"]),
+        (["a", "b", "c"], None),
+        ([2008, 2009, 2010], None),
+        (None, None),
+    ],
+)
+def test_dates_come_from_the_index(index: Any, dates: list[str] | None) -> None:
+    assert dates_of(pd.Series(SIMPLE, index=index)) == dates_of(pd.DataFrame({"a": SIMPLE}, index=index)) == dates
+    assert dates_of(SIMPLE) is None
+
+
+def test_a_walk_forward_takes_dates_and_rates_from_pandas(ballast: Ballast) -> None:
+    quarters = pd.date_range("2020-01", periods=13, freq="QS")
+    simple = [0.02 + 0.03 * math.sin(1.7 * quarter) for quarter in range(12)]
+    prices = pd.Series(100.0, quarters) * pd.Series([1.0, *(1.0 + pd.Series(simple)).cumprod()], quarters)
+    rate = pd.Series([math.nan] + [0.002] * 12, quarters)
+    choices: dict[str, Any] = {"window": 8, "count": 10, "alpha": [0.5]}
+    report = ballast.backtest(prices, kind="price", rate=rate, **choices).report()
+    assert report["dates"] == ["2022-04", "2022-07", "2022-10", "2023-01"] and report["frequency"] == "quarterly"
+    plain = ballast.backtest(
+        prices.to_list(), kind="price", rate=rate.to_list(), dates=[str(date) for date in quarters], **choices
+    ).report()
+    assert plain == report
+    with pytest.raises(ValueError, match="rate has another index than returns: align the two first"):
+        ballast.backtest(prices, kind="price", rate=rate.shift(freq="D"), **choices)
+    with pytest.raises(ValueError, match="dates has 12 entries: must have 13, one for each entry of returns"):
+        ballast.backtest(prices, kind="price", rate=0.002, dates=quarters[1:], **choices)
+
+
+def test_the_history_of_a_session_is_named(ballast: Ballast) -> None:
+    with pytest.raises(ValueError, match=r"^history\[1\] is nan: must be finite"):
+        ballast.policy("x").session(history=[0.1, math.nan])
 
 
 def test_a_series_trains_as_its_list_does(ballast: Ballast) -> None:

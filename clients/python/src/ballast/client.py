@@ -12,7 +12,7 @@ import httpx
 
 from . import wire
 from .policy import Policy
-from .returns import Kind, Returns, Table, day, log_returns, log_returns_of_assets, per_period
+from .returns import Kind, Returns, Table, dates_of, day, log_returns, log_returns_of_assets, per_period
 from .session import Session
 from .training import Evaluation, Frontier, Training, WalkForward
 from .transport import Transport, idempotent
@@ -68,10 +68,12 @@ class Ballast:
     ) -> Training:
         """Queues a training on the returns seen so far, and does not wait for it.
 
-        ``returns`` is a list, an array, a Series or a DataFrame of one column, and ``kind`` says of what: ``"simple"``
-        or ``"log"`` returns or ``"price"``. ``rate_per_step`` is what the bank pays per period of the returns, as a
-        fraction: 0.00247 a month for 3 % a year. What is left out the service chooses, and ``Policy.detail`` tells. The
-        same ``idempotency_key`` and arguments again, even from another process, give the same job.
+        ``returns`` is a list, an array, a Series or a DataFrame of one column, and ``kind`` says of what:
+        ``"simple"`` or ``"log"`` returns or ``"price"``, oldest first. ``rate_per_step`` is what the bank pays per
+        period of the returns, as a fraction: 0.00247 a month for 3 % a year. What is left out the service chooses,
+        and ``Policy.detail`` tells. The same ``idempotency_key`` and arguments again, even from another process, give
+        the same job. Raises ``ValueError`` where ``returns`` cannot be meant (a number that is missing, dates of an
+        index that do not increase, percents), before anything is sent.
         """
         problem = {
             "history": log_returns(returns, kind),
@@ -176,15 +178,20 @@ class Ballast:
         """Queues a walk-forward through a record of returns, as ``ballast backtest`` does, and does not wait for it.
 
         ``returns`` and ``kind`` are as in ``train``; ``rate`` is what the bank paid, one fraction for all periods or
-        one for each. ``dates`` are texts or dates, one for each number, and tell how many periods make a year;
-        ``periods_per_year`` says so without them. What is left out the service chooses, and the report tells.
+        one for each. ``dates`` are texts or dates, one for each number, by default those of the index of a pandas
+        object, and tell how many periods make a year; ``periods_per_year`` says so without them. What is left out the
+        service chooses, and the report tells. Raises ``ValueError`` where ``returns``, ``rate`` or ``dates`` cannot be
+        meant, before anything is sent.
         """
         record = log_returns(returns, kind)
-        days = None if dates is None else per_period("dates", map(day, dates), len(record), kind)
-        rates = rate if isinstance(rate, (int, float)) else per_period("rate", map(float, rate), len(record), kind)
+        days = dates_of(returns) if dates is None else [day(date) for date in dates]
+        if days is not None:
+            days = per_period("dates", days, returns, len(record), kind)
+        if isinstance(rate, Iterable):
+            rate = [float(paid) for paid in per_period("rate", rate, returns, len(record), kind)]
         request = {
             "log_returns": record,
-            "rate": rates,
+            "rate": rate,
             "dates": days,
             "periods_per_year": periods_per_year,
             "window": window,

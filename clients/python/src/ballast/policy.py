@@ -60,7 +60,7 @@ class Policy:
             "rolling": rolling,
         }
         if history is not None:
-            request["history"] = log_returns(history, kind)
+            request["history"] = log_returns(history, kind, "history")
         headers = idempotent(idempotency_key)
         return Session(self._transport, self._transport.json("POST", "/sessions", body=request, headers=headers))
 

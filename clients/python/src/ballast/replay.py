@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import calendar
 import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from . import frames, wire
-from .returns import Kind, Returns, day, days_of, log_returns, per_period
+from .returns import Kind, Returns, dates_of, day, log_returns, per_period
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,12 +28,12 @@ def reports(
     """The report of each period. Raises ``ValueError`` that names the argument and the rule."""
     record = log_returns(returns, kind)
     fields: dict[str, list[Any]] = {"log_return": record}
-    days = days_of(returns) if dates is None else [day(date) for date in dates]
+    days = dates_of(returns) if dates is None else [day(date) for date in dates]
     if days is not None:
-        fields["date"] = per_period("dates", days, len(record), kind)
+        fields["date"] = per_period("dates", map(_last_day, days), returns, len(record), kind)
     for name, values in (("rate", rate), ("flow", flow), ("executed_allocation", executed_allocation)):
         if values is not None:
-            fields[name] = _numbers(name, values, len(record), kind)
+            fields[name] = _numbers(name, values, returns, len(record), kind)
     return [cast(wire.Report, dict(zip(fields, row, strict=True))) for row in zip(*fields.values(), strict=True)]
 
 
@@ -44,8 +45,14 @@ def told(history: wire.History, period: int, returns: Returns, kind: Kind, count
     return rows.reset_index().set_axis(returns.index[kind == "price" :], axis="index")
 
 
-def _numbers(name: str, values: Numbers, periods: int, kind: Kind) -> list[float]:
-    each = per_period(name, values, periods, kind) if isinstance(values, Iterable) else [values] * periods
+def _last_day(date: str) -> str:
+    """Of a month; a day is itself."""
+    year, _, month = date.partition("-")
+    return date if len(month) != 2 else f"{date}-{calendar.monthrange(int(year), int(month))[1]}"
+
+
+def _numbers(name: str, values: Numbers, returns: Returns, periods: int, kind: Kind) -> list[float]:
+    each = per_period(name, values, returns, periods, kind) if isinstance(values, Iterable) else [values] * periods
     found = [float(value) for value in each]
     for number, value in enumerate(found, start=1):
         if not math.isfinite(value):

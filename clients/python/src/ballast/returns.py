@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
+from statistics import pstdev
 from typing import Any, Literal, TypeAlias
 
 #: What the numbers are, with the names ``observe`` has for them.
@@ -14,27 +16,35 @@ Kind: TypeAlias = Literal["log", "simple", "price"]
 Returns: TypeAlias = Any
 
 
-def log_returns(returns: Returns, kind: Kind) -> list[float]:
+#: Largest standard deviation of returns, a period, that is taken for what was meant: percents in the place of fractions
+#: have more. So have the years of some single shares; as prices, which cannot be in percent, they have no such bound.
+LARGEST_DEVIATION = 0.3
+
+
+def log_returns(returns: Returns, kind: Kind, name: str = "returns") -> list[float]:
     """``log``: as they are. ``simple``: ln(1 + R). ``price``: ln(P_i / P_(i-1)), oldest first, one fewer than prices.
 
-    Raises ``ValueError`` that names the entry, its value and the rule.
+    Raises ``ValueError`` that names the argument (``name``), the entry, its value and the rule: numbers are finite,
+    dates of an index increase, and returns do not deviate by more than :data:`LARGEST_DEVIATION`, as percents would.
     """
-    numbers = [float(number) for number in _column(returns)]
+    numbers = [_number(number, f"{name}[{index}]") for index, number in enumerate(_column(returns, name))]
     above = {"log": -math.inf, "simple": -1.0, "price": 0.0}.get(kind)
     if above is None:
         raise ValueError(f"kind is {kind!r}: must be 'log', 'simple' or 'price'")
     for index, number in enumerate(numbers):
         if not math.isfinite(number):
-            raise ValueError(f"returns[{index}] is {number}: must be finite (drop missing values first)")
+            raise ValueError(f"{name}[{index}] is {number}: must be finite (drop missing values first)")
         if number <= above:
-            raise ValueError(f"returns[{index}] is {number}: must be above {above:g}, since kind is {kind!r}")
-    if kind == "log":
-        return numbers
-    if kind == "simple":
-        return [math.log1p(number) for number in numbers]
-    if not getattr(getattr(returns, "index", None), "is_monotonic_increasing", True):
-        raise ValueError("the index of the prices is not increasing: prices must come oldest first")
-    return [math.log(later / earlier) for earlier, later in pairwise(numbers)]
+            raise ValueError(f"{name}[{index}] is {number}: must be above {above:g}, since kind is {kind!r}")
+    _check_order(returns, kind, name)
+    if kind == "price":
+        return [math.log(later / earlier) for earlier, later in pairwise(numbers)]
+    if len(numbers) > 1 and (deviation := pstdev(numbers)) > LARGEST_DEVIATION:
+        raise ValueError(
+            f"{name} has a standard deviation of {deviation:.3g} a period: must be at most {LARGEST_DEVIATION}, as "
+            "fractions are, 0.01 for 1 % (give prices with kind='price' where so much is meant)"
+        )
+    return [math.log1p(number) for number in numbers] if kind == "simple" else numbers
 
 
 #: A DataFrame, a two-dimensional array, a list of rows: a column for each asset.
@@ -54,12 +64,13 @@ def log_returns_of_assets(
         raise ValueError(f"assets is {assets}: must name the columns where returns is no DataFrame, and only there")
     names = [str(name) for name in named]
     rows = returns.to_numpy() if hasattr(returns, "to_numpy") else returns
-    table = [[float(number) for number in row] for row in rows]
+    table = [list(row) for row in rows]
     for index, row in enumerate(table):
         if len(row) != len(names):
             raise ValueError(f"returns[{index}] has {len(row)} numbers: must have one for each of {names}")
-    if kind == "price" and not getattr(getattr(returns, "index", None), "is_monotonic_increasing", True):
-        raise ValueError("the index of the prices is not increasing: prices must come oldest first")
+    if twice := next((name for place, name in enumerate(names) if name in names[:place]), None):
+        raise ValueError(f"assets has {twice!r} twice: each asset must have a name of its own")
+    _check_order(returns, kind, "returns")
     each = []
     for asset, name in enumerate(names):
         try:
@@ -69,17 +80,22 @@ def log_returns_of_assets(
     return names, [list(row) for row in zip(*each, strict=True)]
 
 
-def days_of(returns: Returns) -> list[str] | None:
-    """The days that the index of a pandas object names, one for each entry, as ``2008-01-31``; of a month or another
-    span in a PeriodIndex the last. ``None`` where there is no index of dates."""
+def dates_of(returns: Returns) -> list[str] | None:
+    """The dates in the index of a pandas object, one for each entry, as ``2008-01-31`` or ``2008-01``; of a span in a
+    PeriodIndex the last day. ``None`` where there is no index of dates."""
     index: Any = getattr(returns, "index", None)
-    if getattr(index, "inferred_type", None) not in _DATED:
+    kind = getattr(index, "inferred_type", None)
+    if kind == "string" and len(index) and all(_DATE.match(text) for text in index):
+        return [day(text) for text in index]
+    if kind not in _DATED:
         return None
     return [day(date) for date in (index.to_timestamp(how="end") if hasattr(index, "to_timestamp") else index)]
 
 
 #: What pandas calls the values of an index of dates.
 _DATED = ("datetime64", "datetime", "date", "period")
+#: A month or a day, maybe with a time.
+_DATE = re.compile(r"\d{4}-\d{2}(-\d{2}([ T].*)?)?$")
 
 
 def day(date: object) -> str:
@@ -87,18 +103,46 @@ def day(date: object) -> str:
     return str(date)[:10]
 
 
-def per_period(name: str, values: Iterable[Any], periods: int, kind: Kind) -> list[Any]:
+def per_period(name: str, values: Iterable[Any], returns: Returns, periods: int, kind: Kind) -> list[Any]:
     """What was given for each entry of the returns, as one for each period: the first price has none.
 
-    Raises ``ValueError`` that names the argument and the rule.
+    Raises ``ValueError`` that names the argument and the rule: as many entries, and the same index where both have one.
     """
     found, entries = list(values), periods + (kind == "price")
     if len(found) != entries:
         raise ValueError(f"{name} has {len(found)} entries: must have {entries}, one for each entry of returns")
+    own: Any = getattr(values, "index", None)
+    index: Any = getattr(returns, "index", None)
+    if hasattr(own, "equals") and hasattr(index, "equals") and not own.equals(index):
+        raise ValueError(f"{name} has another index than returns: align the two first")
     return found[entries - periods :]
 
 
-def _column(returns: Returns) -> Iterable[Any]:
+def _number(value: Any, place: str) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{place} is {value!r}: must be a number") from None
+
+
+def _check_order(returns: Returns, kind: Kind, name: str) -> None:
+    """Dates increase; where the index has none, prices must still come in its order."""
+    index: Any = getattr(returns, "index", None)
+    dates = dates_of(returns)
+    if dates is None:
+        if kind == "price" and not getattr(index, "is_monotonic_increasing", True):
+            raise ValueError("the index of the prices is not increasing: prices must come oldest first")
+        return
+    for place, (earlier, later) in enumerate(pairwise(index), start=1):
+        if earlier == later:
+            raise ValueError(f"the index of {name} has {dates[place]} twice: must have each date once")
+        if not earlier < later:
+            raise ValueError(
+                f"the index of {name} has {dates[place]} after {dates[place - 1]}: dates must increase (sort_index)"
+            )
+
+
+def _column(returns: Returns, name: str) -> Iterable[Any]:
     """The one column of a table; anything else as it is."""
     shape: tuple[int, ...] = getattr(returns, "shape", (0,))
     if len(shape) == 1:
@@ -106,6 +150,6 @@ def _column(returns: Returns) -> Iterable[Any]:
         return values
     if len(shape) != 2 or shape[1] != 1:
         names = f", {list(returns.columns)}" if hasattr(returns, "columns") else ""
-        raise ValueError(f"returns has the shape {shape}{names}: must be one column; choose it first")
+        raise ValueError(f"{name} has the shape {shape}{names}: must be one column; choose it first")
     rows = returns.to_numpy() if hasattr(returns, "to_numpy") else returns
     return [row[0] for row in rows]

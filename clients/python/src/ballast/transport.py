@@ -8,6 +8,7 @@ of an observation).
 from __future__ import annotations
 
 import json
+import math
 import random
 import time
 import uuid
@@ -117,14 +118,32 @@ class Transport:
 
 
 def encoded(body: Mapping[str, Any]) -> bytes:
-    """JSON. NumPy's scalars are numbers; NaN and infinities are not JSON (``ValueError``)."""
+    """JSON. NumPy's scalars are numbers; NaN and infinities are not JSON: ``ValueError`` names the first of them."""
 
     def plain(value: Any) -> Any:
         if hasattr(value, "item"):
             return value.item()
         raise TypeError(f"{value!r} of type {type(value).__name__} is not JSON")
 
-    return json.dumps(body, allow_nan=False, default=plain).encode()
+    try:
+        return json.dumps(body, allow_nan=False, default=plain).encode()
+    except ValueError:
+        for path, value in _numbers(body, ""):
+            if not math.isfinite(value):
+                raise ValueError(f"{path} is {value}: must be finite") from None
+        raise
+
+
+def _numbers(value: Any, path: str) -> Iterator[tuple[str, float]]:
+    """The floating-point numbers of a body, each with its dotted path."""
+    if isinstance(value, float):
+        yield path, value
+    elif isinstance(value, Mapping):
+        for name, inner in value.items():
+            yield from _numbers(inner, f"{path}.{name}" if path else str(name))
+    elif isinstance(value, (list, tuple)):
+        for index, inner in enumerate(value):
+            yield from _numbers(inner, f"{path}[{index}]")
 
 
 def retry_after(response: httpx.Response) -> float | None:
