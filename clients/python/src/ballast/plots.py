@@ -19,6 +19,8 @@ def walk_forward(report: wire.BacktestReport, ax: Axes | None = None) -> Axes:
     """The wealth of every strategy of a walk-forward from 100, over the periods, on a logarithmic scale."""
     axes = _axes(ax)
     frames.periods(report).plot(ax=axes, logy=True, linewidth=1.2)
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter("{x:g}")
     axes.set_ylabel("wealth, from 100")
     return axes
 
