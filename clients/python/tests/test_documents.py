@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -24,10 +25,12 @@ def run(code: str, service: Service) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_readme_of_the_client_runs(service: Service) -> None:
-    quick_start, error = blocks((HERE / "README.md").read_text())
+    quick_start, awaited, error = blocks((HERE / "README.md").read_text())
     lines = run(quick_start, service).stdout.splitlines()
     assert [line.split()[0] for line in lines[:3]] == ["1", "2", "3"]
     assert lines[0].endswith(" 100.0") and lines[3].count("'log_return'") == 3
+    together = json.loads(run(quick_start + awaited, service).stdout.splitlines()[-1])
+    assert len(together) == 2 and all(0.0 <= allocation <= 1.0 for allocation in together)
     said = error.split("#")[1].strip()
     assert run(quick_start + error, service).stdout.splitlines()[-1] == said
 
@@ -60,6 +63,9 @@ def table(text: str) -> list[str]:
 CALLS = [
     ('session.action()["allocation"] + 1.0', None),
     ('session.action()["alocation"]', "typeddict-item"),
+    ('[job["state"] for job in ballast.jobs() if job["stat"]]', "typeddict-item"),
+    ("advised: wire.Advised = ballast.advise([0.1, 0.2], kind='log', rate_per_step=0.0)", None),
+    ("wrong: wire.AssetsAdvised = ballast.advise([0.1, 0.2], kind='log', rate_per_step=0.0)", "assignment"),
     ('ballast.train([0.1, 0.2], kind="price", rate_per_step=0.0)', None),
     ('ballast.train([0.1, 0.2], kind="prices", rate_per_step=0.0)', "arg-type"),
     ('ballast.train([0.1, 0.2], kind="price")', "call-arg"),
@@ -67,12 +73,20 @@ CALLS = [
     ('ballast.train([0.1, 0.2], kind="log", rate_per_step=0.0, radius={"rule": "fixed", "kappa": 0.01})', "arg-type"),
     ("session.observe(simple_return=0.01).action()", None),
     ("session.observe(0.01)", "misc"),
+    ("session.observe(simple_retrun=0.01)", "call-arg"),
+    ('session.replay([0.1], kind="log").empty', None),
+    ('(await (await other.training("x")).session(wealth=1.0)).period + 1', None),
+    ('(await (await other.session("x")).action())["alocation"]', "typeddict-item"),
+    ('(await other.session("x")).action()["allocation"]', "index"),
 ]
 
 
 def test_types_reach_those_who_install_it(tmp_path: Path) -> None:
     """In another folder, where mypy finds the package as installed, by its py.typed."""
-    lines = ["from ballast import Ballast, Session", "def use(ballast: Ballast, session: Session) -> None:"]
+    lines = [
+        "from ballast import AsyncBallast, Ballast, Session, wire",
+        "async def use(ballast: Ballast, session: Session, other: AsyncBallast) -> None:",
+    ]
     first = len(lines) + 1
     (tmp_path / "use.py").write_text("\n".join(lines + [f"    {call}" for call, _ in CALLS]) + "\n")
     command = [sys.executable, "-m", "mypy", "--strict", "--hide-error-context", "use.py"]

@@ -11,7 +11,7 @@ import pytest
 from conftest import Network, Service, train
 
 from ballast import Ballast, JobEnded, JobNotEnded, ProgressPrinter, Unreachable, wire
-from ballast.events import Event, parsed
+from ballast.events import Event, Parser
 
 #: Steps of a training that outlasts a restart.
 LONG = 12
@@ -113,4 +113,5 @@ def test_events_are_parsed_however_they_are_cut() -> None:
     ).encode()
     whole = [Event("a", "state", '{"x": "\u2028"}'), Event("b", "message", "1\n2")]
     for size in range(1, len(stream) + 1):
-        assert list(parsed(stream[at : at + size] for at in range(0, len(stream), size))) == whole
+        parser, chunks = Parser(), [stream[at : at + size] for at in range(0, len(stream), size)]
+        assert [event for chunk in chunks for event in parser.feed(chunk)] == whole

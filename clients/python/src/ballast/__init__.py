@@ -3,17 +3,18 @@
     from ballast import Ballast
 
     with Ballast("http://127.0.0.1:8080") as ballast:
-        session = ballast.train(returns, kind="simple", horizon=12).session()
+        session = ballast.train(returns, kind="simple", rate_per_step=0.0025, horizon=12).session()
         while not session.completed:
             allocation = session.action()["allocation"]
             session.observe(simple_return=...)
 
-Requests and answers are the JSON of the service, typed in :mod:`ballast.wire`; :mod:`ballast.frames` has them as pandas
-objects and :mod:`ballast.plots` as pictures; what goes wrong is in :mod:`ballast.errors`.
+:class:`AsyncBallast` is the same to be awaited. Requests and answers are the JSON of the service, typed in
+:mod:`ballast.wire`; :mod:`ballast.frames` has them as pandas objects and :mod:`ballast.plots` as pictures; what goes
+wrong is in :mod:`ballast.errors`.
 """
 
 from . import frames, plots, wire
-from .client import Ballast
+from .client import AsyncBallast, Ballast
 from .errors import (
     BallastError,
     BodyTooLarge,
@@ -42,11 +43,28 @@ from .errors import (
     Unreachable,
     UnusualReturn,
 )
-from .policy import Policy
-from .session import Session
-from .training import Evaluation, Frontier, ProgressPrinter, Training, WalkForward
+from .policy import AsyncPolicy, Policy
+from .session import AsyncSession, Session
+from .training import (
+    AsyncEvaluation,
+    AsyncFrontier,
+    AsyncTraining,
+    AsyncWalkForward,
+    Evaluation,
+    Frontier,
+    ProgressPrinter,
+    Training,
+    WalkForward,
+)
 
 __all__ = [
+    "AsyncBallast",
+    "AsyncEvaluation",
+    "AsyncFrontier",
+    "AsyncPolicy",
+    "AsyncSession",
+    "AsyncTraining",
+    "AsyncWalkForward",
     "Ballast",
     "BallastError",
     "BodyTooLarge",

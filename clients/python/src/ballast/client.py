@@ -3,47 +3,38 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import Any, cast
 from urllib.parse import quote
 
 import httpx
+from typing_extensions import Self
 
 from . import wire
-from .policy import Policy
+from .driving import Answering, awaiting_into, blocking, blocking_into
+from .policy import AsyncPolicy, Policy
 from .returns import Kind, Returns, Table, dates_of, day, log_returns, log_returns_of_assets, per_period
-from .session import Session
-from .training import Evaluation, Frontier, Training, WalkForward
-from .transport import Transport, idempotent
+from .session import AsyncSession, Session
+from .training import (
+    AsyncEvaluation,
+    AsyncFrontier,
+    AsyncTraining,
+    AsyncWalkForward,
+    Evaluation,
+    Frontier,
+    Training,
+    WalkForward,
+)
+from .transport import Awaiting, Transport, Waiting, idempotent
 
 
-class Ballast:
-    """A service at ``url``.
+class _Ballast:
+    """The calls of a service, however they wait."""
 
-    ``key`` is shown with every request: ``BALLAST_KEY`` of the environment unless given.
-    ``timeout`` bounds each wait for the network, in seconds. A request that is lost or put off is sent again up to
-    ``retries`` times, after 0.2 s, 0.4 s and so on (``ballast.transport`` says which, and why that is safe).
-    ``headers`` go with every request, and ``transport`` replaces the connections themselves (proxies, certificates).
-    Safe to share between threads; as a context manager it closes its connections at the end.
-    """
+    _transport: Transport
 
-    def __init__(
-        self,
-        url: str = "http://127.0.0.1:8080",
-        *,
-        key: str | None = None,
-        timeout: float = 30.0,
-        retries: int = 6,
-        headers: Mapping[str, str] | None = None,
-        transport: httpx.BaseTransport | None = None,
-    ) -> None:
-        key = os.environ.get("BALLAST_KEY") if key is None else key
-        shown = {"authorization": f"Bearer {key}"} if key else {}
-        http = httpx.Client(base_url=url, timeout=timeout, headers={**shown, **(headers or {})}, transport=transport)
-        self._transport = Transport(http, retries)
-
-    def train(
+    async def _train(
         self,
         returns: Returns,
         *,
@@ -65,7 +56,7 @@ class Ballast:
         surrogate: wire.SurrogateSpecification | None = None,
         seed: int | None = None,
         idempotency_key: str | None = None,
-    ) -> Training:
+    ) -> wire.Job:
         """Queues a training on the returns seen so far, and does not wait for it.
 
         ``returns`` is a list, an array, a Series or a DataFrame of one column, and ``kind`` says of what:
@@ -92,10 +83,11 @@ class Ballast:
             "law": law,
         }
         whole = {"problem": _given(problem), "design": design, "surrogate": surrogate, "seed": seed}
-        return self.submit(cast(wire.Specification, _given(whole)), idempotency_key=idempotency_key)
+        return await self._submit(cast(wire.Specification, _given(whole)), idempotency_key=idempotency_key)
 
-    def advise(
+    async def _advise(
         self,
+        /,
         returns: Returns,
         *,
         kind: Kind,
@@ -117,10 +109,11 @@ class Ballast:
             "holding": holding,
             "sensitivity": sensitivity,
         }
-        return cast(wire.Advised, self._transport.json("POST", "/advise", body=_given(question)))
+        return cast(wire.Advised, await self._transport.json("POST", "/advise", body=_given(question)))
 
-    def advise_assets(
+    async def _advise_assets(
         self,
+        /,
         returns: Table,
         *,
         kind: Kind,
@@ -138,25 +131,21 @@ class Ballast:
         names, rows = log_returns_of_assets(returns, kind, assets)
         whole = {"assets": names, "history": rows, "rate_per_step": rate_per_step, **_given(problem)}
         question = _given({"problem": whole, "wealth": wealth})
-        return cast(wire.AssetsAdvised, self._transport.json("POST", "/advise", body=question))
+        return cast(wire.AssetsAdvised, await self._transport.json("POST", "/advise", body=question))
 
-    def submit(self, specification: wire.Specification, *, idempotency_key: str | None = None) -> Training:
+    async def _submit(self, specification: wire.Specification, *, idempotency_key: str | None = None) -> wire.Job:
         """Queues the training of a whole specification, such as ``Policy.detail`` shows."""
-        return Training(self._transport, self._queued("/train", specification, idempotency_key))
+        return await self._queued("/train", specification, idempotency_key)
 
-    def training(self, job: str) -> Training:
-        """A training that was queued before."""
-        return Training(self._transport, self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
+    async def _job(self, job: str) -> wire.Job:
+        """A training, an evaluation, a walk-forward or a frontier that was queued before."""
+        return cast(wire.Job, await self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
 
-    def evaluate(self, request: wire.EvaluationRequest, *, idempotency_key: str | None = None) -> Evaluation:
+    async def _evaluate(self, request: wire.EvaluationRequest, *, idempotency_key: str | None = None) -> wire.Job:
         """Queues a comparison of strategies on common simulated returns, and does not wait for it."""
-        return Evaluation(self._transport, self._queued("/evaluate", request, idempotency_key))
+        return await self._queued("/evaluate", request, idempotency_key)
 
-    def evaluation(self, job: str) -> Evaluation:
-        """An evaluation that was queued before."""
-        return Evaluation(self._transport, self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
-
-    def backtest(
+    async def _backtest(
         self,
         returns: Returns,
         *,
@@ -174,7 +163,7 @@ class Ballast:
         count: int | None = None,
         seed: int | None = None,
         idempotency_key: str | None = None,
-    ) -> WalkForward:
+    ) -> wire.Job:
         """Queues a walk-forward through a record of returns, as ``ballast backtest`` does, and does not wait for it.
 
         ``returns`` and ``kind`` are as in ``train``; ``rate`` is what the bank paid, one fraction for all periods or
@@ -204,10 +193,11 @@ class Ballast:
             "count": count,
             "seed": seed,
         }
-        return WalkForward(self._transport, self._queued("/backtest", _given(request), idempotency_key))
+        return await self._queued("/backtest", _given(request), idempotency_key)
 
-    def frontier(
+    async def _frontier(
         self,
+        /,
         returns: Returns | Table,
         *,
         kind: Kind,
@@ -219,7 +209,7 @@ class Ballast:
         seed: int | None = None,
         idempotency_key: str | None = None,
         **problem: Any,
-    ) -> Frontier:
+    ) -> wire.Job:
         """Queues the frontier of caution: what multiples of the radius lose on records like this one.
 
         ``returns`` are of one asset as in ``advise``, or, with more than one column, of several as in
@@ -237,66 +227,108 @@ class Ballast:
             "block": block,
             "seed": seed,
         }
-        return Frontier(self._transport, self._queued("/frontier", _given(request), idempotency_key))
+        return await self._queued("/frontier", _given(request), idempotency_key)
 
-    def frontier_of(self, job: str) -> Frontier:
-        """A frontier that was queued before."""
-        return Frontier(self._transport, self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
+    async def _import_policy(self, document: bytes) -> str:
+        """Stores an exported policy; one that the service knows already stays as it is."""
+        imported: wire.Imported = await self._transport.json("POST", "/policies/import", body=document)
+        return imported["policy"]
 
-    def walk_forward(self, job: str) -> WalkForward:
-        """A walk-forward that was queued before."""
-        return WalkForward(self._transport, self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
+    async def _session(self, session: str) -> wire.Session:
+        """A session that was opened before, at the period it has come to."""
+        return cast(wire.Session, await self._transport.json("GET", f"/sessions/{quote(session, safe='')}"))
+
+    def _jobs(self) -> AsyncIterator[wire.Job]:
+        """All jobs, newest first."""
+        return self._listed("/jobs", "jobs")
+
+    def _policies(self) -> AsyncIterator[wire.PolicyEntry]:
+        """All policies, newest first."""
+        return self._listed("/policies", "policies")
+
+    def _sessions(self) -> AsyncIterator[wire.SessionEntry]:
+        """All sessions, newest first."""
+        return self._listed("/sessions", "sessions")
+
+    def _audit(self, *, tenant: str | None = None, object: str | None = None) -> AsyncIterator[wire.AuditEntry]:
+        """Who did what, newest first, of all tenants and things unless told; for keys with the role ``admin``."""
+        return self._listed("/audit", "entries", tenant=tenant, object=object)
+
+    async def _health(self) -> wire.Health:
+        """The service in a few words. Raises :class:`Overloaded` where it is draining."""
+        return cast(wire.Health, await self._transport.json("GET", "/health"))
+
+    async def _close(self) -> None:
+        """Closes the connections."""
+        await self._transport.close()
+
+    async def _queued(self, path: str, request: Mapping[str, Any], idempotency_key: str | None) -> wire.Job:
+        return cast(
+            wire.Job, await self._transport.json("POST", path, body=request, headers=idempotent(idempotency_key))
+        )
+
+    async def _listed(self, path: str, name: str, **wanted: str | None) -> AsyncIterator[Any]:
+        after: int | None = None
+        while True:
+            page = await self._transport.json("GET", path, params={"after": after, "limit": _PAGE, **wanted})
+            for entry in page[name]:
+                yield entry
+            after = page.get("next")
+            if after is None:
+                return
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} at {self._transport.http.base_url}>"
+
+
+class Ballast(_Ballast):
+    """A service at ``url``.
+
+    ``key`` is shown with every request: ``BALLAST_KEY`` of the environment unless given.
+    ``timeout`` bounds each wait for the network, in seconds. A request that is lost or put off is sent again up to
+    ``retries`` times, after 0.2 s, 0.4 s and so on (``ballast.transport`` says which, and why that is safe).
+    ``headers`` go with every request, and ``transport`` replaces the connections themselves (proxies, certificates).
+    Safe to share between threads; as a context manager it closes its connections at the end.
+    """
+
+    def __init__(
+        self,
+        url: str = "http://127.0.0.1:8080",
+        *,
+        key: str | None = None,
+        timeout: float = 30.0,
+        retries: int = 6,
+        headers: Mapping[str, str] | None = None,
+        transport: httpx.BaseTransport | None = None,
+    ) -> None:
+        http = httpx.Client(base_url=url, timeout=timeout, headers=_headers(key, headers), transport=transport)
+        self._transport = Waiting(http, retries)
+
+    train = blocking_into(_Ballast._train, Training)
+    submit = blocking_into(_Ballast._submit, Training)
+    training = blocking_into(_Ballast._job, Training)
+    evaluate = blocking_into(_Ballast._evaluate, Evaluation)
+    evaluation = blocking_into(_Ballast._job, Evaluation)
+    backtest = blocking_into(_Ballast._backtest, WalkForward)
+    walk_forward = blocking_into(_Ballast._job, WalkForward)
+    frontier = blocking_into(_Ballast._frontier, Frontier)
+    frontier_of = blocking_into(_Ballast._job, Frontier)
+    import_policy = blocking_into(_Ballast._import_policy, Policy)
+    session = blocking_into(_Ballast._session, Session)
+    advise = Answering(wire.Advised).blocking(_Ballast._advise)
+    advise_assets = Answering(wire.AssetsAdvised).blocking(_Ballast._advise_assets)
+    health = Answering(wire.Health).blocking(_Ballast._health)
+    close = blocking(_Ballast._close)
+    jobs = Answering(wire.Job).iterating(_Ballast._jobs)
+    policies = Answering(wire.PolicyEntry).iterating(_Ballast._policies)
+    sessions = Answering(wire.SessionEntry).iterating(_Ballast._sessions)
+    audit = Answering(wire.AuditEntry).iterating(_Ballast._audit)
 
     def policy(self, policy: str) -> Policy:
         """A policy by its name. Asks nothing of the service yet."""
         return Policy(self._transport, policy)
 
-    def import_policy(self, document: bytes) -> Policy:
-        """Stores an exported policy; one that the service knows already stays as it is."""
-        imported: wire.Imported = self._transport.json("POST", "/policies/import", body=document)
-        return Policy(self._transport, imported["policy"])
-
-    def session(self, session: str) -> Session:
-        """A session that was opened before, at the period it has come to."""
-        return Session(self._transport, self._transport.json("GET", f"/sessions/{quote(session, safe='')}"))
-
-    def jobs(self) -> Iterator[wire.Job]:
-        """All jobs, newest first."""
-        return self._listed("/jobs", "jobs")
-
-    def policies(self) -> Iterator[wire.PolicyEntry]:
-        """All policies, newest first."""
-        return self._listed("/policies", "policies")
-
-    def sessions(self) -> Iterator[wire.SessionEntry]:
-        """All sessions, newest first."""
-        return self._listed("/sessions", "sessions")
-
-    def audit(self, *, tenant: str | None = None, object: str | None = None) -> Iterator[wire.AuditEntry]:
-        """Who did what, newest first, of all tenants and things unless told; for keys with the role ``admin``."""
-        return self._listed("/audit", "entries", tenant=tenant, object=object)
-
-    def health(self) -> wire.Health:
-        """The service in a few words. Raises :class:`Overloaded` where it is draining."""
-        return cast(wire.Health, self._transport.json("GET", "/health"))
-
-    def close(self) -> None:
-        """Closes the connections."""
-        self._transport.http.close()
-
-    def _queued(self, path: str, request: Mapping[str, Any], idempotency_key: str | None) -> wire.Job:
-        return cast(wire.Job, self._transport.json("POST", path, body=request, headers=idempotent(idempotency_key)))
-
-    def _listed(self, path: str, name: str, **wanted: str | None) -> Iterator[Any]:
-        after: int | None = None
-        while True:
-            page = self._transport.json("GET", path, params={"after": after, "limit": _PAGE, **wanted})
-            yield from page[name]
-            after = page.get("next")
-            if after is None:
-                return
-
-    def __enter__(self) -> Ballast:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
@@ -304,8 +336,60 @@ class Ballast:
     ) -> None:
         self.close()
 
-    def __repr__(self) -> str:
-        return f"<Ballast at {self._transport.http.base_url}>"
+
+class AsyncBallast(_Ballast):
+    """A :class:`Ballast` whose calls are awaited: the same names, arguments, answers and errors, for asyncio.
+
+    ``jobs()``, ``policies()``, ``sessions()``, ``audit()`` and ``events()`` are for ``async for``, ``async with``
+    closes the connections at the end, and objects that come out of calls (:class:`AsyncTraining`,
+    :class:`AsyncSession`) are awaited likewise. For the tasks of one event loop. The arguments are those of
+    :class:`Ballast`, but ``transport``, which is an asynchronous one.
+    """
+
+    def __init__(
+        self,
+        url: str = "http://127.0.0.1:8080",
+        *,
+        key: str | None = None,
+        timeout: float = 30.0,
+        retries: int = 6,
+        headers: Mapping[str, str] | None = None,
+        transport: httpx.AsyncBaseTransport | None = None,
+    ) -> None:
+        http = httpx.AsyncClient(base_url=url, timeout=timeout, headers=_headers(key, headers), transport=transport)
+        self._transport = Awaiting(http, retries)
+
+    train = awaiting_into(_Ballast._train, AsyncTraining)
+    submit = awaiting_into(_Ballast._submit, AsyncTraining)
+    training = awaiting_into(_Ballast._job, AsyncTraining)
+    evaluate = awaiting_into(_Ballast._evaluate, AsyncEvaluation)
+    evaluation = awaiting_into(_Ballast._job, AsyncEvaluation)
+    backtest = awaiting_into(_Ballast._backtest, AsyncWalkForward)
+    walk_forward = awaiting_into(_Ballast._job, AsyncWalkForward)
+    frontier = awaiting_into(_Ballast._frontier, AsyncFrontier)
+    frontier_of = awaiting_into(_Ballast._job, AsyncFrontier)
+    import_policy = awaiting_into(_Ballast._import_policy, AsyncPolicy)
+    session = awaiting_into(_Ballast._session, AsyncSession)
+    advise = _Ballast._advise
+    advise_assets = _Ballast._advise_assets
+    health = _Ballast._health
+    close = _Ballast._close
+    jobs = _Ballast._jobs
+    policies = _Ballast._policies
+    sessions = _Ballast._sessions
+    audit = _Ballast._audit
+
+    def policy(self, policy: str) -> AsyncPolicy:
+        """A policy by its name. Asks nothing of the service yet."""
+        return AsyncPolicy(self._transport, policy)
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        await self.close()
 
 
 #: Entries asked for at a time.
@@ -318,3 +402,9 @@ def _amounts(contributions: float | Sequence[float] | None) -> float | list[floa
 
 def _given(fields: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in fields.items() if value is not None}
+
+
+def _headers(key: str | None, more: Mapping[str, str] | None) -> dict[str, str]:
+    """What goes with every request: the key, from the environment unless given, and ``more``."""
+    key = os.environ.get("BALLAST_KEY") if key is None else key
+    return {**({"authorization": f"Bearer {key}"} if key else {}), **(more or {})}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 
@@ -15,25 +15,28 @@ class Event:
     data: str
 
 
-def parsed(chunks: Iterable[bytes]) -> Iterator[Event]:
-    """The events in a stream of bytes; one that was cut off is left out."""
-    fields: dict[str, str] = {}
-    for line in _lines(chunks):
+class Parser:
+    """The events in a stream of bytes, fed as they come; one that is cut off is left out."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+        self._fields: dict[str, str] = {}
+
+    def feed(self, chunk: bytes) -> Iterator[Event]:
+        """The events that end in this chunk."""
+        # Split at line feeds alone: str.splitlines would also cut at characters that JSON may hold.
+        *whole, self._rest = (self._rest + chunk).split(b"\n")
+        for line in whole:
+            yield from self._line(line.removesuffix(b"\r").decode())
+
+    def _line(self, line: str) -> Iterator[Event]:
+        fields = self._fields
         if line:
             name, _, value = line.partition(":")
             value = value.removeprefix(" ")
             # Several lines of data are one text; a line without a name is a comment, here the sign of life.
             fields[name] = f"{fields['data']}\n{value}" if name == "data" and "data" in fields else value
-        else:
-            if "data" in fields:
-                yield Event(fields.get("id", ""), fields.get("event", "message"), fields["data"])
-            fields = {}
-
-
-def _lines(chunks: Iterable[bytes]) -> Iterator[str]:
-    """Split at line feeds alone: str.splitlines would also cut at characters that JSON may hold."""
-    rest = b""
-    for chunk in chunks:
-        *whole, rest = (rest + chunk).split(b"\n")
-        for line in whole:
-            yield line.removesuffix(b"\r").decode()
+            return
+        self._fields = {}
+        if "data" in fields:
+            yield Event(fields.get("id", ""), fields.get("event", "message"), fields["data"])

@@ -7,13 +7,14 @@ from typing import cast
 from urllib.parse import quote
 
 from . import wire
+from .driving import Answering, awaiting_into, blocking, blocking_into
 from .errors import DamagedPolicy
 from .returns import Kind, Returns, log_returns
-from .session import Session
+from .session import AsyncSession, Session
 from .transport import Transport, idempotent
 
 
-class Policy:
+class _Policy:
     """A policy of the service, by its name."""
 
     def __init__(self, transport: Transport, policy: str) -> None:
@@ -21,19 +22,19 @@ class Policy:
         self._path = f"/policies/{quote(policy, safe='')}"
         self.id = policy
 
-    def detail(self) -> wire.PolicyDetail:
+    async def _detail(self) -> wire.PolicyDetail:
         """The completed specification and the diagnostics of every step."""
-        return cast(wire.PolicyDetail, self._transport.json("GET", self._path))
+        return cast(wire.PolicyDetail, await self._transport.json("GET", self._path))
 
-    def export(self) -> bytes:
+    async def _export(self) -> bytes:
         """The portable document, as ``Ballast.import_policy`` takes it. Raises :class:`DamagedPolicy` where the bytes
         that arrive do not hash to the policy's name."""
-        document = self._transport.call("GET", f"{self._path}/export").content
+        document = (await self._transport.call("GET", f"{self._path}/export")).content
         if (found := hashlib.sha256(document).hexdigest()) != self.id:
             raise DamagedPolicy(f"the exported bytes hash to {found}: must be {self.id}")
         return document
 
-    def session(
+    async def _session(
         self,
         *,
         history: Returns | None = None,
@@ -43,7 +44,7 @@ class Policy:
         renew: wire.Renewing | None = None,
         rolling: bool = False,
         idempotency_key: str | None = None,
-    ) -> Session:
+    ) -> wire.Session:
         """Opens a session of an investor.
 
         ``history`` is what the investor has seen, ``wealth`` what he has; by default both are the policy's own.
@@ -62,11 +63,29 @@ class Policy:
         if history is not None:
             request["history"] = log_returns(history, kind, "history")
         headers = idempotent(idempotency_key)
-        return Session(self._transport, self._transport.json("POST", "/sessions", body=request, headers=headers))
+        return cast(wire.Session, await self._transport.json("POST", "/sessions", body=request, headers=headers))
 
-    def delete(self) -> None:
+    async def _delete(self) -> None:
         """Deletes it. Raises :class:`InUse` while sessions live by it, and :class:`NotFound` where there is none."""
-        self._transport.call("DELETE", self._path)
+        await self._transport.call("DELETE", self._path)
 
     def __repr__(self) -> str:
-        return f"<Policy {self.id:.12}>"
+        return f"<{type(self).__name__} {self.id:.12}>"
+
+
+class Policy(_Policy):
+    """A policy of the service, by its name."""
+
+    detail = Answering(wire.PolicyDetail).blocking(_Policy._detail)
+    export = blocking(_Policy._export)
+    session = blocking_into(_Policy._session, Session)
+    delete = blocking(_Policy._delete)
+
+
+class AsyncPolicy(_Policy):
+    """A :class:`Policy` whose calls are awaited."""
+
+    detail = _Policy._detail
+    export = _Policy._export
+    session = awaiting_into(_Policy._session, AsyncSession)
+    delete = _Policy._delete

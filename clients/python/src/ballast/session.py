@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import itertools
-import time
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Literal, cast
 from urllib.parse import quote
 
-from typing_extensions import Unpack
+from typing_extensions import Self, Unpack
 
 from . import frames, replay, wire
+from .driving import Answering, blocking
 from .errors import JobEnded
 from .returns import Kind, Returns
 from .transport import Transport, growing_pause
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _LOOK = 0.5
 
 
-class Session:
+class _Session:
     """A session of the service, and the period it has come to.
 
     ``observe`` numbers its reports, which makes them exactly-once: a report whose answer was lost is sent again under
@@ -53,7 +53,7 @@ class Session:
     def completed(self) -> bool:
         return self.period > self.horizon
 
-    def action(
+    async def _action(
         self,
         *,
         mode: Literal["surrogate", "resolve"] | None = None,
@@ -67,9 +67,11 @@ class Session:
         :class:`SessionCompleted` after the horizon.
         """
         params = {"session": self.id, "mode": mode, "explain": explain, "sensitivity": "true" if sensitivity else None}
-        return cast(wire.Action, self._transport.json("GET", "/action", params=params))
+        return cast(wire.Action, await self._transport.json("GET", "/action", params=params))
 
-    def observe(self, *, period: int | None = None, confirm: bool = False, **report: Unpack[wire.Report]) -> Session:
+    async def _observe(
+        self, *, period: int | None = None, confirm: bool = False, **report: Unpack[wire.Report]
+    ) -> Self:
         """Reports the coming period: its return in exactly one of three ways, or ``missing=True``; the answer is in
         ``observed``.
 
@@ -82,14 +84,14 @@ class Session:
         """
         number = self.period if period is None else period
         body: wire.Observe = {"session": self.id, "period": number, "confirm": confirm, **report}
-        observed: wire.Observed = self._transport.json("POST", "/observe", body=body)
+        observed: wire.Observed = await self._transport.json("POST", "/observe", body=body)
         self.observed = observed
         if observed["period"] >= self.period:
             self.period, self.wealth = observed["period"] + 1, observed["wealth"]
             self.holding = observed["holding"]
         return self
 
-    def replay(
+    async def _replay(
         self,
         returns: Returns,
         *,
@@ -121,25 +123,25 @@ class Session:
         """
         frames.require_pandas()
         reports = replay.reports(returns, kind, dates, rate, flow, executed_allocation)
-        renewing = self._read().get("renew") is not None
+        renewing = (await self._read()).get("renew") is not None
         for number, report in enumerate(reports, start=period):
             if renewing:
-                self._await_renewal()
-            self.observe(period=number, confirm=confirm, **report)
-        return replay.told(self.history(), period, returns, kind, len(reports))
+                await self._await_renewal()
+            await self._observe(period=number, confirm=confirm, **report)
+        return replay.told(await self._history(), period, returns, kind, len(reports))
 
-    def _await_renewal(self) -> None:
+    async def _await_renewal(self) -> None:
         """Waits until no renewal is due. The service looks at those under way twice a second."""
         for attempt in itertools.count():
-            due = self._read().get("renewal")
+            due = (await self._read()).get("renewal")
             if due is None:
                 return
             job = due.get("job")
             if due["state"] == "failed" and job is not None:
-                raise JobEnded(self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
-            time.sleep(min(growing_pause(attempt), _LOOK))
+                raise JobEnded(await self._transport.json("GET", f"/jobs/{quote(job, safe='')}"))
+            await self._transport.pause(min(growing_pause(attempt), _LOOK))
 
-    def correct(
+    async def _correct(
         self,
         period: int,
         reason: str,
@@ -162,26 +164,26 @@ class Session:
             "confirm": confirm,
             **report,
         }
-        corrected: wire.Corrected = self._transport.json("POST", f"{self._path}/corrections", body=body)
+        corrected: wire.Corrected = await self._transport.json("POST", f"{self._path}/corrections", body=body)
         if number > self.corrections:
             self.corrections, self.wealth, self.holding = number, corrected["wealth"], corrected["holding"]
             self.period = corrected["observed"] + 1
         return corrected
 
-    def renew(self, policy: str, *, window: int | None = None, renewal: int | None = None) -> wire.Renewed:
+    async def _renew(self, policy: str, *, window: int | None = None, renewal: int | None = None) -> wire.Renewed:
         """Goes on by another policy from the coming period; its law is of the last ``window`` returns seen, or of all.
 
         Exactly once as :meth:`observe` is: ``renewal`` is the number after the last one made unless given.
         """
         number = self.renewals + 1 if renewal is None else renewal
         body: wire.Renew = {"renewal": number, "policy": policy, "window": window}
-        renewed: wire.Renewed = self._transport.json("POST", f"{self._path}/renewals", body=body)
+        renewed: wire.Renewed = await self._transport.json("POST", f"{self._path}/renewals", body=body)
         if number > self.renewals:
             self.renewals, self.policy, self.horizon = number, renewed["policy"], renewed["horizon"]
             self.period = renewed["period"]
         return renewed
 
-    def what_if(
+    async def _what_if(
         self,
         *,
         wealth: float | None = None,
@@ -208,36 +210,66 @@ class Session:
             "explain": explain,
             "sweep": sweep,
         }
-        return cast(wire.WhatIfAnswer, self._transport.json("POST", "/what-if", body=supposed))
+        return cast(wire.WhatIfAnswer, await self._transport.json("POST", "/what-if", body=supposed))
 
-    def history(self) -> wire.History:
+    async def _history(self) -> wire.History:
         """Where the session started, what was reported and told, and what would be told now."""
-        return cast(wire.History, self._transport.json("GET", f"{self._path}/history"))
+        return cast(wire.History, await self._transport.json("GET", f"{self._path}/history"))
 
-    def frame(self, as_of: Literal["now", "then"] = "now") -> pd.DataFrame:
+    async def _frame(self, as_of: Literal["now", "then"] = "now") -> pd.DataFrame:
         """The history as a DataFrame, a row for each period observed: dates, returns, what was advised and held, and
         what wealth became (:func:`ballast.frames.history` names the columns and their units).
 
         ``as_of="now"`` has every correction made, ``"then"`` tells what was told at the time. Raises ``ImportError``
         without pandas.
         """
-        return frames.history(self.history(), as_of)
+        return frames.history(await self._history(), as_of)
 
-    def refresh(self) -> Session:
+    async def _refresh(self) -> Self:
         """Reads from the service where the session stands, and by which policy it lives."""
-        self._read()
+        await self._read()
         return self
 
-    def _read(self) -> wire.Session:
-        session: wire.Session = self._transport.json("GET", self._path)
+    async def _read(self) -> wire.Session:
+        session: wire.Session = await self._transport.json("GET", self._path)
         self.renewals, self.policy, self.horizon = session["renewals"], session["policy"], session["horizon"]
         self.corrections = session["corrections"]
         self.period, self.wealth, self.holding = session["period"], session["wealth"], session["holding"]
         return session
 
-    def delete(self) -> None:
+    async def _delete(self) -> None:
         """Deletes the session and all that is recorded of it. Raises :class:`NotFound` where there is none."""
-        self._transport.call("DELETE", self._path)
+        await self._transport.call("DELETE", self._path)
 
     def __repr__(self) -> str:
-        return f"<Session {self.id} at period {self.period} of {self.horizon}>"
+        return f"<{type(self).__name__} {self.id} at period {self.period} of {self.horizon}>"
+
+
+class Session(_Session):
+    __doc__ = _Session.__doc__
+
+    action = Answering(wire.Action).blocking(_Session._action)
+    observe = blocking(_Session._observe)
+    replay = blocking(_Session._replay)
+    correct = Answering(wire.Corrected).blocking(_Session._correct)
+    renew = Answering(wire.Renewed).blocking(_Session._renew)
+    what_if = blocking(_Session._what_if)
+    history = Answering(wire.History).blocking(_Session._history)
+    frame = blocking(_Session._frame)
+    refresh = blocking(_Session._refresh)
+    delete = blocking(_Session._delete)
+
+
+class AsyncSession(_Session):
+    """A :class:`Session` whose calls are awaited."""
+
+    action = _Session._action
+    observe = _Session._observe
+    replay = _Session._replay
+    correct = _Session._correct
+    renew = _Session._renew
+    what_if = _Session._what_if
+    history = _Session._history
+    frame = _Session._frame
+    refresh = _Session._refresh
+    delete = _Session._delete

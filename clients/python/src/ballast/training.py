@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import json
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, TextIO, cast
+from typing import TYPE_CHECKING, Any, TextIO, cast
 from urllib.parse import quote
 
 import httpx
 
 from . import frames, plots, wire
+from .driving import Answering, awaiting_into, blocking, blocking_into
 from .errors import JobEnded, ProblemError, Unreachable
-from .events import parsed
-from .policy import Policy
+from .events import Parser
+from .policy import AsyncPolicy, Policy, _Policy
 from .returns import Kind, Returns
-from .session import Session
+from .session import AsyncSession, Session
 from .transport import RETRIED_STATUS, Transport, growing_pause
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ Watch = Callable[[wire.Job], object]
 _TERMINAL = ("succeeded", "failed", "cancelled")
 
 
-class Job:
+class _Job:
     """A job of the service. It goes on whether or not anybody waits for it."""
 
     def __init__(self, transport: Transport, job: wire.Job) -> None:
@@ -45,36 +45,38 @@ class Job:
     def id(self) -> str:
         return self.job["job"]
 
-    def refresh(self) -> wire.Job:
+    async def _refresh(self) -> wire.Job:
         """The job as it is now."""
-        self.job = self._transport.json("GET", self._path)
+        self.job = await self._transport.json("GET", self._path)
         return self.job
 
-    def cancel(self) -> wire.Job:
+    async def _cancel(self) -> wire.Job:
         """Asks the job to stop, which it does within a second; a job that has ended stays as it is."""
-        self.job = self._transport.json("POST", f"{self._path}/cancel")
+        self.job = await self._transport.json("POST", f"{self._path}/cancel")
         return self.job
 
-    def delete(self) -> None:
+    async def _delete(self) -> None:
         """Deletes a job that has ended, its report and its idempotency key; a policy that it made stays.
 
         Raises :class:`JobNotEnded` while it is queued or runs, and :class:`NotFound` where there is none.
         """
-        self._transport.call("DELETE", self._path)
+        await self._transport.call("DELETE", self._path)
 
-    def events(self) -> Iterator[wire.Job]:
+    async def _events(self) -> AsyncIterator[wire.Job]:
         """The job now, then at every change of it, up to its end. A stream that breaks is taken up where it was."""
         last_id, failures = "", 0
         while True:
             reason = "the service ended them"
             try:
-                with self._transport.stream(f"{self._path}/events", last_id) as response:
-                    for event in parsed(response.iter_bytes()):
-                        last_id, failures = event.id, 0
-                        self.job = json.loads(event.data)
-                        yield self.job
-                        if self.job["state"] in _TERMINAL:
-                            return
+                async with self._transport.stream(f"{self._path}/events", last_id) as chunks:
+                    parser = Parser()
+                    async for chunk in chunks:
+                        for event in parser.feed(chunk):
+                            last_id, failures = event.id, 0
+                            self.job = json.loads(event.data)
+                            yield self.job
+                            if self.job["state"] in _TERMINAL:
+                                return
             except httpx.RequestError as error:
                 reason = repr(error)
             except ProblemError as error:
@@ -84,41 +86,41 @@ class Job:
             # A service that stops ends its streams in good order, and comes back.
             if failures >= self._transport.retries:
                 raise Unreachable(f"no more events of the job {self.id}: {reason}")
-            time.sleep(growing_pause(failures))
+            await self._transport.pause(growing_pause(failures))
             failures += 1
 
-    def _watched(self, watch: Watch | None) -> wire.Job:
-        for job in self.events():
+    async def _watched(self, watch: Watch | None) -> wire.Job:
+        async for job in self._events():
             if watch is not None:
                 watch(job)
         if self.job["state"] != "succeeded":
             raise JobEnded(self.job)
         return self.job
 
-    def _report(self, watch: Watch | None) -> object:
-        path = self._watched(watch).get("report")
+    async def _ended(self, watch: Watch | None) -> Any:
+        path = (await self._watched(watch)).get("report")
         if path is None:
             raise JobEnded(self.job)
-        return self._transport.json("GET", path)
+        return await self._transport.json("GET", path)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.id} {self.job['state']}>"
 
 
-class Training(Job):
+class _Training(_Job):
     """A job that ends in a policy; ``Ballast.training(id)`` finds it again."""
 
-    def policy(self, watch: Watch | None = None) -> Policy:
+    async def _policy(self, watch: Watch | None = None) -> str:
         """Waits for the end of the training, showing each change to ``watch``.
 
         Raises :class:`JobEnded` where the job fails or is cancelled.
         """
-        policy = self._watched(watch).get("policy")
+        policy = (await self._watched(watch)).get("policy")
         if policy is None:
             raise JobEnded(self.job)
-        return Policy(self._transport, policy)
+        return policy
 
-    def session(
+    async def _session(
         self,
         *,
         history: Returns | None = None,
@@ -129,9 +131,10 @@ class Training(Job):
         rolling: bool = False,
         idempotency_key: str | None = None,
         watch: Watch | None = None,
-    ) -> Session:
+    ) -> wire.Session:
         """Waits for the policy and opens a session of it, as :meth:`Policy.session` does."""
-        return self.policy(watch).session(
+        policy = _Policy(self._transport, await self._policy(watch))
+        return await policy._session(
             history=history,
             kind=kind,
             wealth=wealth,
@@ -142,68 +145,148 @@ class Training(Job):
         )
 
 
-class Evaluation(Job):
+class _Evaluation(_Job):
     """A job that ends in a report; ``Ballast.evaluation(id)`` finds it again."""
 
-    def report(self, watch: Watch | None = None) -> wire.EvaluationReport:
+    async def _report(self, watch: Watch | None = None) -> wire.EvaluationReport:
         """Waits for the end of the evaluation, showing each change to ``watch``.
 
         Raises :class:`JobEnded` where the job fails or is cancelled.
         """
-        return cast(wire.EvaluationReport, self._report(watch))
+        return cast(wire.EvaluationReport, await self._ended(watch))
 
-    def frame(self, watch: Watch | None = None) -> pd.DataFrame:
+    async def _frame(self, watch: Watch | None = None) -> pd.DataFrame:
         """The report's strategies, one a row (:func:`ballast.frames.evaluation`). Waits as ``report`` does, and raises
         what it raises, and ``ImportError`` without pandas."""
-        return frames.evaluation(self.report(watch))
+        return frames.evaluation(await self._report(watch))
 
 
-class WalkForward(Job):
+class _WalkForward(_Job):
     """A job that ends in a report; ``Ballast.walk_forward(id)`` finds it again."""
 
-    def report(self, watch: Watch | None = None) -> wire.BacktestReport:
+    async def _report(self, watch: Watch | None = None) -> wire.BacktestReport:
         """Waits for the end of the walk-forward, showing each change to ``watch``.
 
         Raises :class:`JobEnded` where the job fails or is cancelled.
         """
-        return cast(wire.BacktestReport, self._report(watch))
+        return cast(wire.BacktestReport, await self._ended(watch))
 
-    def frame(self, watch: Watch | None = None) -> pd.DataFrame:
+    async def _frame(self, watch: Watch | None = None) -> pd.DataFrame:
         """The report's strategies, one a row (:func:`ballast.frames.walk_forward`). Waits as ``report`` does, and
         raises what it raises, and ``ImportError`` without pandas."""
-        return frames.walk_forward(self.report(watch))
+        return frames.walk_forward(await self._report(watch))
 
-    def periods(self, figure: frames.Figure = "wealth", watch: Watch | None = None) -> pd.DataFrame:
+    async def _periods(self, figure: frames.Figure = "wealth", watch: Watch | None = None) -> pd.DataFrame:
         """What each strategy did or had, by date: ``"wealth"``, ``"allocation"`` and so on
         (:func:`ballast.frames.periods`). Waits as ``report`` does, and raises what it raises, ``ValueError`` for
         another figure and ``ImportError`` without pandas."""
-        return frames.periods(self.report(watch), figure)
+        return frames.periods(await self._report(watch), figure)
 
-    def plot(self, ax: Axes | None = None, watch: Watch | None = None) -> Axes:
+    async def _plot(self, ax: Axes | None = None, watch: Watch | None = None) -> Axes:
         """Draws the wealth of every strategy (:func:`ballast.plots.walk_forward`). Waits as ``report`` does, and raises
         what it raises, and ``ImportError`` without pandas and matplotlib."""
-        return plots.walk_forward(self.report(watch), ax)
+        return plots.walk_forward(await self._report(watch), ax)
 
 
-class Frontier(Job):
+class _Frontier(_Job):
     """A job that ends in a report; ``Ballast.frontier_of(id)`` finds it again."""
 
-    def report(self, watch: Watch | None = None) -> wire.FrontierReport:
+    async def _report(self, watch: Watch | None = None) -> wire.FrontierReport:
         """Waits for the end, showing each change to ``watch``.
 
         Raises :class:`JobEnded` where the job fails or is cancelled.
         """
-        return cast(wire.FrontierReport, self._report(watch))
+        return cast(wire.FrontierReport, await self._ended(watch))
 
-    def frame(self, watch: Watch | None = None) -> pd.DataFrame:
+    async def _frame(self, watch: Watch | None = None) -> pd.DataFrame:
         """What is lost at each multiple of the radius (:func:`ballast.frames.frontier`). Waits as ``report`` does, and
         raises what it raises, and ``ImportError`` without pandas."""
-        return frames.frontier(self.report(watch))
+        return frames.frontier(await self._report(watch))
 
-    def plot(self, ax: Axes | None = None, watch: Watch | None = None) -> Axes:
+    async def _plot(self, ax: Axes | None = None, watch: Watch | None = None) -> Axes:
         """Draws what is lost with its interval (:func:`ballast.plots.frontier`). Waits as ``report`` does, and raises
         what it raises, and ``ImportError`` without pandas and matplotlib."""
-        return plots.frontier(self.report(watch), ax)
+        return plots.frontier(await self._report(watch), ax)
+
+
+class Job(_Job):
+    __doc__ = _Job.__doc__
+
+    refresh = Answering(wire.Job).blocking(_Job._refresh)
+    cancel = Answering(wire.Job).blocking(_Job._cancel)
+    delete = blocking(_Job._delete)
+    events = Answering(wire.Job).iterating(_Job._events)
+
+
+class Training(Job, _Training):
+    __doc__ = _Training.__doc__
+
+    policy = blocking_into(_Training._policy, Policy)
+    session = blocking_into(_Training._session, Session)
+
+
+class Evaluation(Job, _Evaluation):
+    __doc__ = _Evaluation.__doc__
+
+    report = Answering(wire.EvaluationReport).blocking(_Evaluation._report)
+    frame = blocking(_Evaluation._frame)
+
+
+class WalkForward(Job, _WalkForward):
+    __doc__ = _WalkForward.__doc__
+
+    report = Answering(wire.BacktestReport).blocking(_WalkForward._report)
+    frame = blocking(_WalkForward._frame)
+    periods = blocking(_WalkForward._periods)
+    plot = blocking(_WalkForward._plot)
+
+
+class Frontier(Job, _Frontier):
+    __doc__ = _Frontier.__doc__
+
+    report = Answering(wire.FrontierReport).blocking(_Frontier._report)
+    frame = blocking(_Frontier._frame)
+    plot = blocking(_Frontier._plot)
+
+
+class AsyncJob(_Job):
+    """A :class:`Job` whose calls are awaited."""
+
+    refresh = _Job._refresh
+    cancel = _Job._cancel
+    delete = _Job._delete
+    events = _Job._events
+
+
+class AsyncTraining(AsyncJob, _Training):
+    """A :class:`Training` whose calls are awaited."""
+
+    policy = awaiting_into(_Training._policy, AsyncPolicy)
+    session = awaiting_into(_Training._session, AsyncSession)
+
+
+class AsyncEvaluation(AsyncJob, _Evaluation):
+    """A :class:`Evaluation` whose calls are awaited."""
+
+    report = _Evaluation._report
+    frame = _Evaluation._frame
+
+
+class AsyncWalkForward(AsyncJob, _WalkForward):
+    """A :class:`WalkForward` whose calls are awaited."""
+
+    report = _WalkForward._report
+    frame = _WalkForward._frame
+    periods = _WalkForward._periods
+    plot = _WalkForward._plot
+
+
+class AsyncFrontier(AsyncJob, _Frontier):
+    """A :class:`Frontier` whose calls are awaited."""
+
+    report = _Frontier._report
+    frame = _Frontier._frame
+    plot = _Frontier._plot
 
 
 class ProgressPrinter:

@@ -1,4 +1,5 @@
-"""Requests over one pool of connections, repeated where that is safe.
+"""Requests over one pool of connections, repeated where that is safe: what is repeated is written once, and two
+transports differ in how they wait.
 
 Every call of this client can be repeated without harm, for one of four reasons: it reads; it deletes; its content names
 it (an imported policy); or the service knows the request again (the idempotency key of a job or a session, the period
@@ -7,13 +8,15 @@ of an observation).
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 import random
 import time
 import uuid
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from abc import ABC, abstractmethod
+from collections.abc import AsyncIterator, Iterator, Mapping
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from email.utils import parsedate_to_datetime
 from typing import Any
 
@@ -41,14 +44,29 @@ def idempotent(key: str | None) -> dict[str, str]:
     return {"Idempotency-Key": str(uuid.uuid4()) if key is None else key}
 
 
-class Transport:
-    """Sends requests to one service. Safe to share between threads."""
+class Transport(ABC):
+    """Sends requests to one service."""
 
-    def __init__(self, http: httpx.Client, retries: int) -> None:
-        self.http = http
-        self.retries = retries
+    http: httpx.Client | httpx.AsyncClient
+    retries: int
 
-    def call(
+    @abstractmethod
+    async def send(self, request: httpx.Request) -> httpx.Response:
+        """The answer, read to its end, whatever its status."""
+
+    @abstractmethod
+    async def pause(self, seconds: float) -> None:
+        """Lets the time pass."""
+
+    @abstractmethod
+    def stream(self, path: str, last_event_id: str) -> AbstractAsyncContextManager[AsyncIterator[bytes]]:
+        """An open stream of events, from the one after ``last_event_id``, as it comes."""
+
+    @abstractmethod
+    async def close(self) -> None:
+        """Closes the connections."""
+
+    async def call(
         self,
         method: str,
         path: str,
@@ -71,7 +89,7 @@ class Transport:
         for attempt in range(self.retries + 1):
             last = attempt == self.retries
             try:
-                response = self.http.send(request)
+                response = await self.send(request)
             except httpx.RequestError as error:
                 if last or not isinstance(error, _LOST):
                     raise Unreachable(f"no answer to {method} {request.url}: {error!r}") from error
@@ -85,10 +103,10 @@ class Transport:
                 if last or response.status_code not in RETRIED_STATUS or asked is None or asked > LONGEST_PAUSE:
                     raise of_response(response, asked)
                 pause = max(asked, growing_pause(attempt))
-            time.sleep(pause)
+            await self.pause(pause)
         raise AssertionError("the last attempt returns or raises")
 
-    def json(
+    async def json(
         self,
         method: str,
         path: str,
@@ -98,23 +116,71 @@ class Transport:
         headers: Mapping[str, str] | None = None,
     ) -> Any:
         """What a successful answer holds; as :meth:`call` otherwise."""
-        response = self.call(method, path, body=body, params=params, headers=headers)
+        response = await self.call(method, path, body=body, params=params, headers=headers)
         try:
             return response.json()
         except ValueError as error:
             # Something in between, such as a page to sign in at.
             raise of_response(response, None) from error
 
-    @contextmanager
-    def stream(self, path: str, last_event_id: str) -> Iterator[httpx.Response]:
-        """An open stream of events, from the one after ``last_event_id``."""
+    def _listening(self, last_event_id: str) -> dict[str, Any]:
         headers = {"accept": "text/event-stream"} | ({"last-event-id": last_event_id} if last_event_id else {})
-        timeout = httpx.Timeout(self.http.timeout.connect, read=STREAM_SILENCE)
-        with self.http.stream("GET", path, headers=headers, timeout=timeout) as response:
+        return {"headers": headers, "timeout": httpx.Timeout(self.http.timeout.connect, read=STREAM_SILENCE)}
+
+
+class Waiting(Transport):
+    """Waits on the spot, so that its coroutines never suspend. Safe to share between threads."""
+
+    def __init__(self, http: httpx.Client, retries: int) -> None:
+        self.http: httpx.Client = http
+        self.retries = retries
+
+    async def send(self, request: httpx.Request) -> httpx.Response:
+        return self.http.send(request)
+
+    async def pause(self, seconds: float) -> None:
+        time.sleep(seconds)
+
+    @asynccontextmanager
+    async def stream(self, path: str, last_event_id: str) -> AsyncIterator[AsyncIterator[bytes]]:
+        with self.http.stream("GET", path, **self._listening(last_event_id)) as response:
             if not response.is_success:
                 response.read()
                 raise of_response(response, retry_after(response))
-            yield response
+            yield _in_turn(response.iter_bytes())
+
+    async def close(self) -> None:
+        self.http.close()
+
+
+class Awaiting(Transport):
+    """Waits in asyncio's event loop, beside others. For the tasks of one loop."""
+
+    def __init__(self, http: httpx.AsyncClient, retries: int) -> None:
+        self.http: httpx.AsyncClient = http
+        self.retries = retries
+
+    async def send(self, request: httpx.Request) -> httpx.Response:
+        return await self.http.send(request)
+
+    async def pause(self, seconds: float) -> None:
+        await asyncio.sleep(seconds)
+
+    @asynccontextmanager
+    async def stream(self, path: str, last_event_id: str) -> AsyncIterator[AsyncIterator[bytes]]:
+        async with self.http.stream("GET", path, **self._listening(last_event_id)) as response:
+            if not response.is_success:
+                await response.aread()
+                raise of_response(response, retry_after(response))
+            yield response.aiter_bytes()
+
+    async def close(self) -> None:
+        await self.http.aclose()
+
+
+async def _in_turn(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:
+    for chunk in chunks:
+        yield chunk
 
 
 def encoded(body: Mapping[str, Any]) -> bytes:
