@@ -72,6 +72,8 @@ def test_what_cannot_be_replayed_is_refused_before_anything_is_sent(session: Ses
         session.replay([0.01, math.nan], kind="log")
     with pytest.raises(ValueError, match="dates has 3 entries: must have 2, one for each entry of returns"):
         session.replay([0.01, 0.02], kind="log", dates=["2008-01-31", "2008-02-29", "2008-03-31"])
+    with pytest.raises(ValueError, match="dates has 2008-01-31 after 2008-02-29: must increase"):
+        session.replay([0.01, 0.02], kind="log", dates=["2008-02", "2008-01"])
     with pytest.raises(ValueError, match="rate has 1 entries: must have 3, one for each entry of returns"):
         session.replay([1.0, 1.1, 1.0], kind="price", rate=[0.1])
     with pytest.raises(ValueError, match="flow of period 2 is nan: must be finite"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import calendar
 import math
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from . import frames, wire
@@ -31,6 +32,9 @@ def reports(
     days = dates_of(returns) if dates is None else [day(date) for date in dates]
     if days is not None:
         fields["date"] = per_period("dates", map(_last_day, days), returns, len(record), kind)
+        for earlier, later in pairwise(fields["date"]):
+            if not earlier < later:
+                raise ValueError(f"dates has {later} after {earlier}: must increase")
     for name, values in (("rate", rate), ("flow", flow), ("executed_allocation", executed_allocation)):
         if values is not None:
             fields[name] = _numbers(name, values, returns, len(record), kind)
