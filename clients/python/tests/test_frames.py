@@ -121,9 +121,10 @@ def test_a_frontier_is_a_frame(ballast: Ballast) -> None:
     for resampled in report["resampled"]:
         for point in resampled["points"]:
             row = table.loc[(resampled["bootstrap"]["kind"], point["scale"])]
-            assert (row["lost"], row["lost_low"], row["total"]) == (
+            assert (row["lost"], row["lost_low"], row["beyond_own_mix_high"], row["total"]) == (
                 point["lost"]["value"],
                 point["lost"]["low"],
+                point["beyond_own_mix"]["high"],
                 point["total"],
             )
     # At the best scale of each law nothing more is lost than at the best.

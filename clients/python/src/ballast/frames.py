@@ -133,8 +133,8 @@ def evaluation(report: wire.EvaluationReport) -> pd.DataFrame:
 
     ``certainty_equivalent`` and ``wealth_mean`` are currencies; ``utility_mean``, ``utility_variance`` and so on are
     of terminal utility; ``difference_certainty_equivalent`` and ``difference_utility`` are to the reference, for
-    which they are NaN. Each has its interval in the columns with ``_low`` and ``_high``. Raises ``ImportError``
-    without pandas.
+    which they are NaN; ``beyond_own_mix`` is what changing the allocation earned, NaN for constant mixes. Each has its
+    interval in the columns with ``_low`` and ``_high``. Raises ``ImportError`` without pandas.
     """
     rows = []
     for strategy in report["strategies"]:
@@ -143,6 +143,8 @@ def evaluation(report: wire.EvaluationReport) -> pd.DataFrame:
         row |= _estimate("certainty_equivalent", strategy["certainty_equivalent"])
         for name in ("certainty_equivalent", "utility"):
             row |= _estimate(f"difference_{name}", difference.get(name))
+        own_mix: Mapping[str, Any] = strategy.get("own_mix") or {}
+        row |= _estimate("beyond_own_mix", own_mix.get("beyond"))
         for group in ("wealth", "utility"):
             for name, value in cast(dict[str, Any], strategy)[group].items():
                 row |= _estimate(f"{group}_{name}", value)
@@ -156,15 +158,17 @@ def frontier(report: wire.FrontierReport) -> pd.DataFrame:
 
     ``lost`` is in basis points of certainty equivalent behind the best allocation, a year where the report is
     ``per_year`` and else a period; ``deviation`` is of that from record to record, ``beyond_least`` what more is lost
-    than at the best scale, NaN there; each with its interval in ``_low`` and ``_high``. ``total`` is the share of
-    wealth held in all assets on average. Raises ``ImportError`` without pandas.
+    than at the best scale, NaN there, and ``beyond_own_mix`` what is gained over a constant mix of the average advice;
+    each with its interval in ``_low`` and ``_high``. ``total`` is the share of wealth held in all assets on average.
+    Raises ``ImportError`` without pandas.
     """
     rows = []
     for resampled in report["resampled"]:
         for point in resampled["points"]:
             row: dict[str, Any] = {"law": resampled["bootstrap"]["kind"], "scale": point["scale"]}
             row |= _estimate("lost", point["lost"]) | _estimate("deviation", point["deviation"])
-            rows.append(row | _estimate("beyond_least", point.get("beyond_least")) | {"total": point["total"]})
+            row |= _estimate("beyond_least", point.get("beyond_least"))
+            rows.append(row | _estimate("beyond_own_mix", point["beyond_own_mix"]) | {"total": point["total"]})
     return require_pandas().DataFrame(rows).set_index(["law", "scale"])
 
 
