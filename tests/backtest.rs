@@ -47,6 +47,12 @@ async fn a_job_reports_what_the_command_reports() {
     let app = App::start().await;
     let job = queue(&app, &request(2, &json!({}))).await;
     let reported = report(&app, &job).await;
+    // Of the main line the mix is a line of its own, kept with the same cost.
+    let strategies = reported["strategies"].as_array().unwrap();
+    let own = strategies.iter().find(|strategy| strategy["strategy"] == "adaptive, alpha 0.9").unwrap();
+    let mix = strategies.iter().find(|strategy| strategy["hindsight"] == true).unwrap();
+    assert_eq!(own["beyond_own_mix"], mix["adaptive_ahead"]);
+    assert!(own["annual_turnover"]["value"].as_f64() > Some(0.0) && mix["beyond_own_mix"].is_null(), "{own} {mix}");
 
     let folder = tempfile::tempdir().unwrap();
     let (risky, bank, dates) = record(20);

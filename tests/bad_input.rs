@@ -28,6 +28,7 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
         ("/problem/action_interval", json!([0.1, 1.0]), "problem.action_interval[0]"),
         ("/problem/action_interval", json!([0.0, 1.5]), "problem.action_interval[1]"),
         ("/problem/action_interval", json!([0.0, 5e-324]), "problem.action_interval[1]"),
+        ("/problem/radius", json!({ "rule": "calibrated", "alpha": 0.005 }), "problem.radius.alpha"),
         ("/problem/trading_cost", json!(-0.001), "problem.trading_cost"),
         ("/problem/contributions", json!([1.0]), "problem.contributions"),
         ("/problem/contributions", json!(1e16), "problem.contributions"),

@@ -126,7 +126,10 @@ fn the_known_law_promises_its_value_and_keeps_it() {
 
 #[test]
 fn the_own_mix_is_what_a_constant_mix_of_the_average_allocation_earns() {
-    let request = |mixes: Vec<f64>| small(json!({ "frameworks": ["plug_in"], "constant_mixes": mixes, "paths": 400 }));
+    let costly = json!({ "trading_cost": 0.01 });
+    let request = |mixes: Vec<f64>| {
+        small(json!({ "frameworks": ["plug_in"], "constant_mixes": mixes, "paths": 400, "problem": costly }))
+    };
     let (_, _, outcomes) = simulated(request(vec![]));
     let held = outcomes.outcomes.iter().flat_map(|outcome| &outcome.lived).map(|lived| lived.allocation);
     let average = held.sum::<f64>() / (4.0 * 400.0);

@@ -4,9 +4,10 @@
 use std::error::Error;
 
 use ballast::control::error::FieldError;
-use ballast::control::evaluation::coverage::{Coverage, CoverageQuestion, DrawnLaw, coverage};
+use ballast::control::evaluation::coverage::{CoverageQuestion, DrawnLaw, RuleCoverage, coverage};
 use ballast::control::problem::sampling_law::continuous_law;
 use ballast::control::request::radius_rule::RadiusRule;
+use ballast::control::request::rules::HISTORY_LENGTH;
 use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification};
 use ballast::numerics::law::ContinuousLaw;
 use clap::Args;
@@ -53,11 +54,15 @@ pub fn run(arguments: &CoverageArgs) -> Result<(), Box<dyn Error>> {
     if !(2..=100_000).contains(&arguments.records) {
         return Err(FieldError::new("--records", arguments.records, "must lie in [2, 100000]").into());
     }
+    if let Some(&size) = arguments.sizes.iter().find(|size| !HISTORY_LENGTH.contains(size)) {
+        let rule = format!("must lie in [{}, {}]", HISTORY_LENGTH.start(), HISTORY_LENGTH.end());
+        return Err(FieldError::new("--sizes", size, rule).into());
+    }
     let CoverageArgs { alpha, records, seed, .. } = *arguments;
     let bridge = |scale: f64| RadiusRule::Bridge { alpha, paths: PATHS, scale };
     let rules = [bridge(0.0), bridge(0.5), bridge(1.0), RadiusRule::Calibrated { alpha, paths: PATHS, scale: 1.0 }];
     println!(
-        "{:<22}{:>6}{:>14}{:>22}{:>10}{:>28}{:>8}",
+        "{:<22}{:>6}{:>14}{:>24}{:>10}{:>28}{:>8}",
         "law", "n", "rule", "holds the law [90 %]", "radius", "lost a period, bp [90 %]", "held"
     );
     for Named { name, law, rate_per_step } in laws()? {
@@ -72,17 +77,18 @@ pub fn run(arguments: &CoverageArgs) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn line(name: &str, size: usize, rule: &RadiusRule, found: &Coverage) -> String {
+fn line(name: &str, size: usize, rule: &RadiusRule, found: &RuleCoverage) -> String {
     let rule = match *rule {
         RadiusRule::Bridge { scale: 0.0, .. } => "none".to_owned(),
         RadiusRule::Bridge { scale, .. } if scale != 1.0 => format!("{scale} bridge"),
         rule => rule.name().to_owned(),
     };
-    let Coverage { held, radius, lost, allocation } = found;
+    let RuleCoverage { covered, radius, lost, allocation } = found;
     let percent = |share: f64| 100.0 * share;
-    let held = format!("{:.1} [{:.1}, {:.1}] %", percent(held.value), percent(held.low), percent(held.high));
+    let covered =
+        format!("{:.1} [{:.1}, {:.1}] %", percent(covered.value), percent(covered.low), percent(covered.high));
     let lost = format!("{:.2} [{:.2}, {:.2}]", lost.value, lost.low, lost.high);
-    format!("{name:<22}{size:>6}{rule:>14}{held:>22}{:>10.5}{lost:>28}{:>6.0} %", radius.value, percent(*allocation))
+    format!("{name:<22}{size:>6}{rule:>14}{covered:>24}{:>10.5}{lost:>28}{:>6.0} %", radius.value, percent(*allocation))
 }
 
 fn laws() -> Result<Vec<Named>, ReturnsError> {
@@ -109,7 +115,6 @@ fn laws() -> Result<Vec<Named>, ReturnsError> {
 fn by_option(error: FieldError) -> FieldError {
     let option = match error.field.as_str() {
         "problem.radius.alpha" => "--alpha",
-        "problem.history" => "--sizes",
         "problem.utility.risk_aversion" => "--risk-aversion",
         _ => return error,
     };

@@ -48,7 +48,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("UtilitySpecification exponential", "risk_aversion_relative", within(RISK_AVERSION_RELATIVE)),
         ("UtilitySpecification power", "risk_aversion", json!({ "exclusiveMinimum": 1, "maximum": 100 })),
         ("RadiusRule bridge", "alpha", probability.clone()),
-        ("RadiusRule calibrated", "alpha", probability.clone()),
+        ("RadiusRule calibrated", "alpha", within((1e-2, 0.999))),
         ("RadiusRule concentration", "alpha", probability),
         ("RadiusRule concentration", "C", json!({ "exclusiveMinimum": 0, "maximum": 1e9 })),
         ("RadiusRule chi_square", "alpha", within((1e-3, 1.0))),

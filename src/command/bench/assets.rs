@@ -105,14 +105,19 @@ fn measure(
     months: usize,
 ) -> Result<Found, Box<dyn Error>> {
     let columns = rows.first().map_or(0, Vec::len);
-    if assets == 0 || assets > columns || months < 2 || bench.windows == 0 || rows.len() < months + bench.windows {
-        return Err(format!("the file has {columns} assets and {} months: too few", rows.len()).into());
+    if assets == 0 || assets > columns || months < 2 || bench.windows == 0 || rows.len() + 1 < months + bench.windows {
+        let found = format!("{assets} assets, {months} months and {} windows", bench.windows);
+        return Err(format!(
+            "{found}: the file has {columns} assets and {} months, and a window two months at least",
+            rows.len()
+        )
+        .into());
     }
     let rows: Vec<Vec<f64>> = rows.iter().map(|row| row[..assets].to_vec()).collect();
     let (mut cold, mut warm, mut gap): (Vec<f64>, Vec<f64>, f64) = (Vec::new(), Vec::new(), 0.0);
     let mut evaluations = 0.0;
     let mut last: Option<(AssetsSolution, f64)> = None;
-    for end in rows.len() - bench.windows..=rows.len() {
+    for end in rows.len() + 1 - bench.windows..=rows.len() {
         let window = &rows[end - months..end];
         let (step, radius) = step(window, sup);
         let started = Instant::now();
@@ -124,7 +129,7 @@ fn measure(
         for solution in near.iter().chain([&found]) {
             gap = gap.max(1e4 * (solution.bound - solution.value));
         }
-        evaluations += found.evaluations as f64 / (bench.windows + 1) as f64;
+        evaluations += found.evaluations as f64 / bench.windows as f64;
         last = Some((found, radius));
     }
     let Some((AssetsSolution { allocation, value, .. }, radius)) = last else { return Err("no window".into()) };

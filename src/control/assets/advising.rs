@@ -45,7 +45,7 @@ pub fn step(problem: &AssetsProblem, fund: &ProblemSpecification, rows: &[Vec<f6
 impl AssetsAdvice {
     /// The step of `problem`, whose fund of inverse volatilities has the completed problem `fund` and the radius `of_fund`, with the
     /// seed of its simulations.
-    /// Cost: that of [`AssetsStep::solve`], and of the joint factor under a `bridge`.
+    /// Cost: that of [`AssetsStep::solve`], and of the joint factor under `bridge` and `calibrated`.
     /// Checked by: `tests/advise.rs::several_assets_are_advised_by_name_as_solved_directly`.
     pub fn of(problem: &AssetsProblem, fund: &ProblemSpecification, of_fund: f64, seed: u64) -> Self {
         let rows = &problem.history;

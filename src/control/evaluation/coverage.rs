@@ -70,9 +70,9 @@ pub struct CoverageQuestion {
 
 /// What a rule does under a law.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Coverage {
+pub struct RuleCoverage {
     /// Share of records whose ball holds the law.
-    pub held: Estimate,
+    pub covered: Estimate,
     /// The mean radius, in log-return.
     pub radius: Estimate,
     /// Mean of the lost certainty equivalent, in basis points a period.
@@ -160,7 +160,7 @@ fn accepted(log_return: f64) -> f64 {
 ///
 /// # Errors
 /// A rule that a training would not take either.
-pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<Coverage>, FieldError> {
+pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<RuleCoverage>, FieldError> {
     let prepared = Prepared::of(law, question.size);
     let utility = RelativeUtility::new(question.utility, 100.0 * (1.0 + question.rate_per_step));
     let bank = 1.0 + question.rate_per_step;
@@ -193,8 +193,8 @@ pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<Cover
     let sample = Clustered::new(question.records, 1, question.level);
     let of_rule = |rule: usize| {
         let figure = |figure: usize| found.iter().map(|record| record[rule][figure]).collect::<Vec<f64>>();
-        Coverage {
-            held: sample.share(&figure(0), |held| *held > 0.0),
+        RuleCoverage {
+            covered: sample.share(&figure(0), |covered| *covered > 0.0),
             radius: sample.mean(&figure(1)),
             lost: sample.mean(&figure(2)),
             allocation: sample.mean(&figure(3)).value,

@@ -179,7 +179,7 @@ pub struct CoverageAtSize {
 /// One initial history.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct HistoryReport {
-    /// The bridge quantile there; null under other radius rules.
+    /// The bridge quantile there; null under other radius rules than `bridge` and `calibrated`.
     pub quantile: Option<f64>,
     /// Of the first framework with a ball, in log-return; 0 where there is none.
     pub radius: f64,

@@ -7,7 +7,7 @@ use crate::control::evaluation::report::{
     Costs, Coverage, CoverageAtSize, Difference, EvaluationReport, FORMAT, HistoryReport, OwnMix, PeriodReport,
     RadiusSpread, Spread, StrategyReport, UtilityReport, WealthReport,
 };
-use crate::control::evaluation::verdict::what_timing_did;
+use crate::control::evaluation::verdict::beside_own_mix;
 use crate::control::policy::content_hash;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::utility::{RelativeUtility, utility};
@@ -265,13 +265,7 @@ impl Table<'_> {
 /// Whether changing the allocation earned anything.
 fn sentence(strategy: &StrategyReport) -> Option<String> {
     let OwnMix { allocation, beyond: Estimate { value, low, high } } = strategy.own_mix?;
-    Some(format!(
-        "Against a constant mix of its own average allocation, {:.1} %, which nobody knew beforehand, {} differs by {value:+.3} \
-         [{low:.3}, {high:.3}]: {}.",
-        100.0 * allocation,
-        strategy.strategy,
-        what_timing_did([low, high], "these paths do")
-    ))
+    Some(beside_own_mix(&strategy.strategy, allocation, value, [low, high], "these paths do"))
 }
 
 /// True where the framework's uncertainty set is a Wasserstein ball.

@@ -72,25 +72,26 @@ fn grouped<'a>(differences: impl Iterator<Item = (&'a str, BootstrapEstimate)>) 
     groups.map(|names| if names.is_empty() { "none".into() } else { names.join("; ") })
 }
 
-/// What changing the allocation earned by its interval, as `witness` shows it.
-pub fn what_timing_did([low, high]: [f64; 2], witness: &str) -> String {
-    match () {
+/// What a strategy earned beside a constant mix of its own average allocation, and whether `witness` shows that changing the
+/// allocation did anything.
+pub fn beside_own_mix(strategy: &str, allocation: f64, value: f64, [low, high]: [f64; 2], witness: &str) -> String {
+    let verdict = match () {
         () if low > 0.0 => "changing the allocation paid".into(),
         () if high < 0.0 => "changing the allocation cost".into(),
         () => format!("{witness} not show that changing the allocation did anything"),
-    }
+    };
+    format!(
+        "Against a constant mix of its own average allocation, {:.1} %, which nobody knew beforehand, {strategy} differs \
+         by {value:+.2} [{low:.2}, {high:.2}]: {verdict}.",
+        100.0 * allocation
+    )
 }
 
 /// Whether moving in and out did anything that its average would not have done.
 fn timing(figures: &[BacktestFigures], main: usize) -> Option<String> {
-    let BootstrapEstimate { value, interval: [low, high] } = figures[main].beyond_own_mix?;
-    let verdict = what_timing_did([low, high], "the record does");
-    Some(format!(
-        "Against a constant mix of its own average allocation, {:.1} %, which nobody knew beforehand, {} differs \
-         by {value:+.2} [{low:.2}, {high:.2}]: {verdict}.",
-        100.0 * figures[main].mean_allocation,
-        figures[main].strategy
-    ))
+    let main = &figures[main];
+    let BootstrapEstimate { value, interval } = main.beyond_own_mix?;
+    Some(beside_own_mix(&main.strategy, main.mean_allocation, value, interval, "the record does"))
 }
 
 /// The same of every other strategy that changes its allocation.

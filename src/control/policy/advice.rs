@@ -65,7 +65,7 @@ pub struct Uncertainty {
     pub effective_size: f64,
     /// Raw moments of the law learned, first to the specification's count.
     pub moments: Vec<f64>,
-    /// (1 - alpha)-quantile of the bridge statistic; absent under other radius rules.
+    /// (1 - alpha)-quantile of the bridge statistic; absent under other radius rules than `bridge` and `calibrated`.
     pub quantile: Option<f64>,
     /// Simulation standard error of the quantile.
     pub quantile_standard_error: Option<f64>,

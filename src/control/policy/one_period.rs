@@ -12,6 +12,7 @@ use crate::control::problem::state::State;
 use crate::control::request::framework::Framework;
 use crate::control::request::specification::{ProblemSpecification, Specification};
 use crate::control::solved_step::StepSolution;
+use crate::control::uncertainty::radius::RadiusEstimator;
 
 /// An investor whose horizon is the end of this period.
 pub struct OnePeriod {
@@ -42,14 +43,16 @@ impl OnePeriod {
         Ok(self.advisor.explain(0, &state))
     }
 
-    /// The sensitivity of that advice, of which another record is another history. Cost: as [`Advisor::sensitivity`].
+    /// The sensitivity of that advice, of which another record is another history; a calibrated radius keeps its factor. Cost: as
+    /// [`Advisor::sensitivity`].
     ///
     /// # Errors
     /// A holding that is no share.
     pub fn sensitivity(&self, holding: f64, advice: &Advice) -> Result<Sensitivity, FieldError> {
         let state = self.state(holding)?;
+        let radius = Some(RadiusEstimator::new(self.advisor.specification(), self.kept.clone()).found_rule());
         let of = |record: &[f64]| {
-            let problem = ProblemSpecification { history: record.to_vec(), ..self.problem().clone() };
+            let problem = ProblemSpecification { history: record.to_vec(), radius, ..self.problem().clone() };
             let specification = Specification { problem, ..self.advisor.specification().clone() };
             let law = self.problem().learning.law(record);
             let state = State { law, ..state };

@@ -25,6 +25,8 @@ pub const LOG_RETURN: f64 = 5.0;
 pub const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
 /// Bridge matrix of 30 million numbers: 240 MB.
 const BRIDGE_NUMBERS: usize = 30_000_000;
+/// The same where a calibration reads them for each of a thousand records: about a second.
+const CALIBRATED_NUMBERS: usize = 3_000_000;
 /// Simulated returns of the design: 800 MB.
 const DESIGN_NUMBERS: usize = 100_000_000;
 /// Above this product of risk aversion and wealth, exponential utility is flat in double precision over the design.
@@ -193,11 +195,13 @@ fn radius(rule: &RadiusRule, problem: &ProblemSpecification) -> Result<(), Field
     }
     match *rule {
         RadiusRule::Bridge { alpha, paths, scale } | RadiusRule::Calibrated { alpha, paths, scale } => {
-            within("problem.radius.alpha", alpha, 1e-3, 0.999)?;
+            let calibrated = matches!(rule, RadiusRule::Calibrated { .. });
+            let (least_alpha, numbers) = if calibrated { (1e-2, CALIBRATED_NUMBERS) } else { (1e-3, BRIDGE_NUMBERS) };
+            within("problem.radius.alpha", alpha, least_alpha, 0.999)?;
             whole("problem.radius.paths", paths, &PATHS)?;
             within("problem.radius.scale", scale, RADIUS_SCALE.0, RADIUS_SCALE.1)?;
-            if paths.saturating_mul(problem.history.len() + problem.horizon) > BRIDGE_NUMBERS {
-                let rule = format!("times the final sample size must be at most {BRIDGE_NUMBERS}");
+            if paths.saturating_mul(problem.history.len() + problem.horizon) > numbers {
+                let rule = format!("times the final sample size must be at most {numbers}");
                 return Err(FieldError::new("problem.radius.paths", paths, rule));
             }
             Ok(())

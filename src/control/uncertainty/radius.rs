@@ -47,12 +47,12 @@ struct Calibration {
     factor: OnceLock<f64>,
 }
 
-/// The uncertainty set of a law: its radius, and the quantile behind it under the bridge rule.
+/// The uncertainty set of a law: its radius, and the quantile behind it under the rules of the bridge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measure {
     /// In log-return; of a confidence region, in estimated standard deviations.
     pub radius: f64,
-    /// Absent under other rules than the bridge's.
+    /// Absent under other rules than `bridge` and `calibrated`.
     pub quantile: Option<Quantile>,
 }
 
@@ -169,9 +169,21 @@ impl RadiusEstimator {
         }
     }
 
+    /// The rule with what a calibration finds: it gives every law the same radius, and looks at no history.
+    pub fn found_rule(&self) -> RadiusRule {
+        match self.rule {
+            RadiusRule::Bridge { alpha, paths, scale } => {
+                RadiusRule::Bridge { alpha, paths, scale: self.factor(scale, alpha, paths) }
+            }
+            rule => rule,
+        }
+    }
+
     /// `scale`, times what the calibration finds. Every radius by the bridge takes it.
     fn factor(&self, scale: f64, alpha: f64, paths: usize) -> f64 {
-        let Some(Calibration { history, retention, factor }) = &self.calibration else { return scale };
+        let Some(Calibration { history, retention, factor }) = self.calibration.as_ref().filter(|_| scale > 0.0) else {
+            return scale;
+        };
         let find = || calibration_factor(&self.bridges(history.len(), paths), history, *retention, alpha, self.seed);
         scale * factor.get_or_init(find)
     }
@@ -338,6 +350,8 @@ mod tests {
         // Four returns show too little of their law's spread.
         assert!(factor > 1.05, "{factor}");
         let known = calibrated.radius(&law);
+        let RadiusRule::Bridge { scale, .. } = calibrated.found_rule() else { panic!("no bridge") };
+        assert!((scale / 0.7 / factor - 1.0).abs() < 1e-12, "{scale}");
         let mut pairs = vec![(bridge.measure(&law).radius, calibrated.measure(&law).radius)];
         pairs.push((bridge.radii(&law, known).radius_ahead, calibrated.radii(&law, known).radius_ahead));
         let of = |sets: &RadiusEstimator| {

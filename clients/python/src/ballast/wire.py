@@ -282,7 +282,7 @@ class HistoryReport(TypedDict):
     """One initial history."""
 
     quantile: NotRequired[float | None]
-    """The bridge quantile there; null under other radius rules."""
+    """The bridge quantile there; null under other radius rules than `bridge` and `calibrated`."""
     radius: float
     """Of the first framework with a ball, in log-return; 0 where there is none."""
     promised: list[float]
@@ -790,7 +790,7 @@ class Uncertainty(TypedDict):
     moments: list[float]
     """Raw moments of the law learned, first to the specification's count."""
     quantile: NotRequired[float | None]
-    """(1 - alpha)-quantile of the bridge statistic; absent under other radius rules."""
+    """(1 - alpha)-quantile of the bridge statistic; absent under other radius rules than `bridge` and `calibrated`."""
     quantile_standard_error: NotRequired[float | None]
     """Simulation standard error of the quantile."""
     radius: float

@@ -49,7 +49,8 @@ const REPORTS: usize = 100;
 pub struct Frontier {
     question: FrontierQuestion,
     radii: RadiusEstimator,
-    /// Of the radius of all funds at once over that of one, at the record at hand; records drawn from it take the same.
+    /// Of the radius of all funds at once over that of one, at the record at hand; records drawn from it take the same, and so they
+    /// do the factor of a calibrated radius.
     factor: f64,
     utility: RelativeUtility,
 }

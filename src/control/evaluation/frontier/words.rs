@@ -25,7 +25,7 @@ pub(super) fn sentences(resampled: &[Resampled], evidence: f64, per_year: bool) 
 /// What following each record earned beside holding what is advised on average.
 fn of_own_mix(resampled: &Resampled, per_year: bool) -> String {
     let per = if per_year { "a year" } else { "a period" };
-    let lost = resampled.points.iter().map(|point| format!("{:.1}", -point.beyond_own_mix.value));
+    let lost = resampled.points.iter().map(|point| format!("{:.1}", (-point.beyond_own_mix.value).max(0.0)));
     let scales = resampled.points.iter().map(|point| point.scale.to_string());
     format!(
         "While the law stays as it is, an allocation that follows the record earns nothing beyond a constant mix of its own average: at scales {} it is {} basis points {per} behind on the first records.",
