@@ -35,7 +35,9 @@ struct SmoothedLaw {
     masses: Vec<f64>,
     /// The place of atom k of value i among all, at `SPREAD i + k`.
     places: Vec<usize>,
-    /// Of the values, oldest first, summed up.
+    /// Of the values, oldest first; of as many draws as well.
+    shares: Vec<f64>,
+    /// The same summed up.
     cumulative: Vec<f64>,
 }
 
@@ -59,12 +61,13 @@ impl SmoothedLaw {
         let mut places = vec![0; order.len()];
         order.iter().enumerate().for_each(|(place, &atom)| places[atom] = place);
         let (atoms, masses) = order.iter().map(|&atom| spread[atom]).unzip();
-        let mut sum = 0.0;
-        let cumulative = weights.iter().map(|weight| {
-            sum += weight / total;
-            sum
-        });
-        SmoothedLaw { atoms, masses, places, cumulative: cumulative.collect() }
+        let shares: Vec<f64> = weights.iter().map(|weight| weight / total).collect();
+        let sum_up = |sum: &mut f64, share: &f64| {
+            *sum += share;
+            Some(*sum)
+        };
+        let cumulative = shares.iter().scan(0.0, sum_up).collect();
+        SmoothedLaw { atoms, masses, places, shares, cumulative }
     }
 
     /// The places of as many draws as the record has values, oldest first.
@@ -78,10 +81,10 @@ impl SmoothedLaw {
         (0..count).map(one).collect()
     }
 
-    /// The Wasserstein-1 distance to the law of draws in these places, of these masses. Cost O(atoms).
-    fn distance(&self, places: &[usize], masses: &[f64]) -> f64 {
+    /// The Wasserstein-1 distance to the law of draws in these places, oldest first. Cost O(atoms).
+    fn distance(&self, places: &[usize]) -> f64 {
         let mut apart = self.masses.iter().map(|mass| -mass).collect::<Vec<f64>>();
-        places.iter().zip(masses).for_each(|(&place, mass)| apart[place] += mass);
+        places.iter().zip(&self.shares).for_each(|(&place, share)| apart[place] += share);
         distance_of_masses(&self.atoms, &apart)
     }
 }
@@ -114,9 +117,6 @@ fn needed<R: Rng>(
     generator: impl Fn(usize) -> R,
 ) -> Vec<f64> {
     let law = SmoothedLaw::of(record, retention);
-    let weights = weights(record.len(), retention);
-    let total: f64 = weights.iter().sum();
-    let masses: Vec<f64> = weights.iter().map(|weight| weight / total).collect();
     let of_record = |index: usize| {
         let mut generator = generator(index);
         let needed = (0..DRAWS).find_map(|_| {
@@ -124,7 +124,7 @@ fn needed<R: Rng>(
             let values: Vec<f64> = places.iter().map(|&place| law.atoms[place]).collect();
             let seen = EmpiricalDistribution::decaying(&values, retention);
             let radius = bridges.bridge_quantile(&seen, Statistic::Now, alpha) / seen.effective_size().sqrt();
-            (radius > 0.0).then(|| law.distance(&places, &masses) / radius)
+            (radius > 0.0).then(|| law.distance(&places) / radius)
         });
         needed.unwrap_or(1.0)
     };
@@ -178,7 +178,7 @@ mod tests {
             let places = law.draw(&mut stream(5, "draws", 0, index));
             let mut sample = Vec::new();
             places.iter().for_each(|&place| mixture.learn(&mut sample, mixture.place(law.atoms[place])));
-            let (found, expected) = (law.distance(&places, &[0.02; 50]), mixture.distance(&sample));
+            let (found, expected) = (law.distance(&places), mixture.distance(&sample));
             // Sixteen atoms in the place of a normal law of half a deviation.
             assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
         }

@@ -215,8 +215,8 @@ impl ScaleMixture {
     }
 }
 
-/// The q at which `share_below`, the mean of F(q / h), is `share`, and the slope there in ln q: secants from a start, and halves of the bracket
-/// where they leave it, until no more than the tolerance is left.
+/// The q at which `share_below`, the mean of F(q / h), is `share`, and the slope there in ln q: secants from a start, and
+/// halves of the bracket where they leave it, until no more than the tolerance is left.
 fn search(tolerance: f64, share: f64, start: Start, mut share_below: impl FnMut(f64) -> f64) -> (f64, f64) {
     let Start { mut quantile, mut slope, mut slope_error } = start;
     let (mut low, mut high) = (0.0, f64::INFINITY);
