@@ -269,7 +269,7 @@ fn the_tabulated_field_is_the_value_of_the_next_state() {
             let trade = dynamics.trade_to(state.holding, action);
             for (z, found) in returns.iter().zip(field.at(&returns).payoff(trade)) {
                 let then = solved.advance(0, &state, &Realised::of(action, *z));
-                let gain = (problem.floor(1, &then) / floor).ln() + solved.surrogate_gain(1, &then);
+                let gain = (problem.floor(1, &then) / floor).ln() + solved.surrogate(1, &then).1;
                 // The cubics are good to 1e-6 of the gain; where trading costs, a value bends where its law's band passes the
                 // holding, and they are good to a tenth of the half basis point that a surrogate may err by.
                 let (error, tolerance) = (found - relative.value(gain), if cost > 0.0 { 5e-6 } else { 1e-6 });

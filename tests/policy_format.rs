@@ -146,7 +146,7 @@ fn another_program_that_follows_the_page_answers_what_the_service_answers() {
                 let apart = (found - number(field)).abs();
                 assert!(apart < 1e-8 * (1.0 + found.abs()), "{what}: {field} {found} and {answer}");
             };
-            agree("floor_gain", solved.surrogate_gain(*step, state));
+            agree("floor_gain", solved.surrogate(*step, state).1);
             let advice = solved.advise(*step, state, AdviceMode::Surrogate);
             if advice.source == AdviceSource::PolicySurrogate {
                 agree("allocation", advice.allocation);

@@ -71,7 +71,7 @@ fn judged(step: usize, count: usize) -> Vec<Judged> {
         let truth = solver.solve(state).floor_gain;
         let advice = TRAINED.advise(step, state, AdviceMode::Surrogate);
         Judged {
-            error: BASIS_POINTS * (TRAINED.surrogate_gain(step, state) - truth),
+            error: BASIS_POINTS * (TRAINED.surrogate(step, state).1 - truth),
             regret: BASIS_POINTS * (truth - solver.price(state, advice.allocation).floor_gain),
             deviation: BASIS_POINTS * advice.surrogate_sd,
             in_design: advice.in_design,

@@ -6,7 +6,7 @@
 use serde_json::{Map, Value, json};
 use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
-use crate::control::request::assets::{ASSETS, DATES, NAME_LENGTH};
+use crate::control::request::assets::{ASSETS, DATES, LARGEST_FACTOR, NAME_LENGTH};
 use crate::control::request::backtest;
 use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
 use crate::control::request::frontier::{LARGEST_SCALE, RESAMPLES, SCALES};
@@ -118,6 +118,11 @@ fn of_assets() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     let mut names = listed(&ASSETS, name);
     names["uniqueItems"] = json!(true);
     let rules = [
+        ("AssetsProblem", "horizon", whole(&HORIZON)),
+        ("AssetsProblem", "trading_cost", within(TRADING_COST)),
+        ("FundSpecification", "assets", names.clone()),
+        ("FundSpecification", "radius_factor", within((1.0, LARGEST_FACTOR))),
+        ("FundSpecification", "history", listed(&DATES, listed(&ASSETS, log_return.clone()))),
         ("AssetsProblem", "assets", names),
         ("AssetsProblem", "history", listed(&DATES, listed(&ASSETS, log_return.clone()))),
         ("LowestReturn", "min", log_return),
@@ -129,7 +134,7 @@ fn of_assets() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
 fn of_sessions() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
     let rules = [
         ("OpenSession", "policy", json!({ "minLength": 1 })),
-        ("OpenSession", "history", listed(&HISTORY_LENGTH, within((-LOG_RETURN, LOG_RETURN)))),
+        ("OpenSession", "holdings", each(within((0.0, 1.0)))),
         ("OpenSession", "wealth", within(WEALTH)),
         ("OpenSession", "holding", within((0.0, 1.0))),
         ("Observe", "session", json!({ "minLength": 1 })),
@@ -174,7 +179,12 @@ fn reported() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
             ("previous_price", within(PRICE)),
             ("rate", within(RATE)),
             ("flow", within((-WEALTH.1, WEALTH.1))),
+            ("log_returns", each(within((-LOG_RETURN, LOG_RETURN)))),
+            ("simple_returns", each(within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())))),
+            ("prices", each(within(PRICE))),
+            ("previous_prices", each(within(PRICE))),
             ("executed_allocation", within((0.0, 1.0))),
+            ("executed_allocations", each(within((0.0, 1.0)))),
             ("wealth", within(WEALTH)),
         ];
         fields.map(|(field, rule)| (schema, field, rule))
@@ -187,6 +197,11 @@ fn whole(range: &std::ops::RangeInclusive<usize>) -> Value {
 
 fn listed(counts: &std::ops::RangeInclusive<usize>, items: Value) -> Value {
     json!({ "minItems": counts.start(), "maxItems": counts.end(), "items": items })
+}
+
+/// Of each asset, by its name.
+fn each(value: Value) -> Value {
+    json!({ "additionalProperties": value })
 }
 
 fn within((low, high): (f64, f64)) -> Value {

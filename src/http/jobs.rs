@@ -6,21 +6,28 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use utoipa::IntoResponses;
+use serde::Deserialize;
+use utoipa::{IntoResponses, ToSchema};
 
 use super::access::{By, Heavy, Live, Read};
-use super::extract::{Id, JsonBody, Parameters};
+use super::advise::{SaidOfProblem, said};
+use super::decode;
+use super::extract::{Id, JsonBytes, Parameters};
 use super::page::{self, Page};
 use super::problem::{Problem, ProblemKind};
 use super::wire;
 use crate::control::error::FieldError;
-use crate::control::request::specification::Specification;
+use crate::control::request::assets::AssetsProblem;
+use crate::control::request::specification::{
+    DesignSpecification, Specification, SurrogateSpecification, default_seed,
+};
 use crate::service::Service;
+use crate::service::error::ServiceError;
 use crate::service::jobs::Accepted;
 
 /// Queue a training.
 #[utoipa::path(post, path = "/train", tag = "jobs",
-    request_body(content = Specification, example = json!({
+    request_body(content = TrainQuestion, example = json!({
         "problem": {
             "framework": "adaptive", "horizon": 12, "rate_per_step": 0.0027, "periods_per_year": 12,
             "initial_wealth": 100.0, "action_interval": [0.0, 1.0], "utility": { "kind": "power", "risk_aversion": 3.0 },
@@ -37,9 +44,48 @@ pub async fn train(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,
     headers: HeaderMap,
-    JsonBody(specification): JsonBody<Specification>,
+    JsonBytes(bytes): JsonBytes,
 ) -> Result<Response, Problem> {
-    Ok(accepted(service.jobs.train(&caller, specification, idempotency_key(&headers)?).await?))
+    let key = idempotency_key(&headers)?;
+    let specification = match said(&bytes) {
+        Some(SaidOfProblem { assets: Some(_), .. }) => trained(decode::json(&bytes)?).await?,
+        _ => decode::json(&bytes)?,
+    };
+    Ok(accepted(service.jobs.train(&caller, specification, key).await?))
+}
+
+/// A training of a policy for one asset, or for several, which `problem.assets` names.
+#[derive(Debug, ToSchema)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "a body is read as the one that it is: this describes both")]
+pub enum TrainQuestion {
+    Asset(Box<Specification>),
+    Assets(TrainAssets),
+}
+
+/// A training of a policy for several assets.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TrainAssets {
+    /// The assets and the investor.
+    pub problem: AssetsProblem,
+    /// Where the surrogates are trained; laws start resampled.
+    #[serde(default)]
+    pub design: DesignSpecification,
+    /// How the surrogates are made.
+    #[serde(default)]
+    pub surrogate: SurrogateSpecification,
+    /// The same request and seed give the same policy, bit for bit.
+    #[serde(default = "default_seed")]
+    pub seed: u64,
+}
+
+/// The radius for all funds at once is simulated.
+async fn trained(asked: TrainAssets) -> Result<Specification, Problem> {
+    let TrainAssets { problem, design, surrogate, seed } = asked;
+    let trained = tokio::task::spawn_blocking(move || problem.training(design, surrogate, seed));
+    let trained = trained.await.map_err(ServiceError::internal)?;
+    Ok(trained.map_err(ServiceError::from)?)
 }
 
 /// What a call that queues a job answers; told here for all of them.

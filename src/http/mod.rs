@@ -1,6 +1,7 @@
 //! Floor 4: translation between the wire and the use cases, and nothing else.
 
 mod access;
+mod action;
 mod advise;
 mod asset;
 mod audit;

@@ -11,6 +11,7 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::access::{self, Asked, By, Live, Read};
+use super::action::ActionAnswer;
 use super::extract::{Id, JsonBody, Parameters};
 use super::jobs::idempotency_key;
 use super::page::{self, Page};
@@ -46,8 +47,8 @@ pub async fn open(
     headers: HeaderMap,
     JsonBody(request): JsonBody<wire::OpenSession>,
 ) -> Result<Response, Problem> {
-    let wire::OpenSession { policy, history, wealth, holding, renew, rolling } = request;
-    let start = Start { policy, history, wealth, holding, renew, rolling };
+    let wire::OpenSession { policy, history, wealth, holding, holdings, renew, rolling } = request;
+    let start = Start { policy, history, wealth, holding, holdings, renew, rolling };
     let live = service.sessions.open(&caller, start, idempotency_key(&headers)?).await?;
     let session = wire::Session::from(live);
     let location = [(header::LOCATION, format!("/sessions/{}", session.session))];
@@ -225,7 +226,7 @@ impl access::Question for Ask {
            ("explain" = inline(Option<Explain>), Query, description = "`worst_case`: re-solve, and show the worst-case law."),
            ("sensitivity" = Option<bool>, Query, description = "`true`: say how near the advice is to changing.")),
     responses(
-        (status = 200, description = "The allocation.", body = wire::Action),
+        (status = 200, description = "The allocation.", body = ActionAnswer),
         (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json"),
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
         (status = 409, description = "The session has reached its horizon.", body = Problem, content_type = "application/problem+json"),
@@ -233,7 +234,7 @@ impl access::Question for Ask {
 pub async fn action(
     State(service): State<Arc<Service>>,
     Asked(caller, ask): Asked<Ask>,
-) -> Result<Json<wire::Action>, Problem> {
+) -> Result<Json<ActionAnswer>, Problem> {
     let (mode, label) = match (ask.explain, ask.mode) {
         (Some(Explain::WorstCase), _) => (AdviceMode::Resolve, "explain"),
         (None, Some(Mode::Resolve)) => (AdviceMode::Resolve, "resolve"),
@@ -245,5 +246,5 @@ pub async fn action(
     let started = Instant::now();
     let action = service.sessions.action(&caller.tenant, &ask.session, question, &caller.turn).await?;
     metrics::histogram!(ACTION_SECONDS, "mode" => label).record(started.elapsed().as_secs_f64());
-    Ok(Json(wire::Action::new(ask.session, action)))
+    Ok(Json(ActionAnswer::new(ask.session, action)))
 }

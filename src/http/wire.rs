@@ -1,5 +1,7 @@
 //! Requests and answers as they travel.
 
+use std::collections::BTreeMap;
+
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -7,19 +9,16 @@ use utoipa::ToSchema;
 use crate::control::evaluation::backtest_report::BacktestReport;
 use crate::control::evaluation::frontier::report::FrontierReport;
 use crate::control::evaluation::report::EvaluationReport;
-use crate::control::policy::advice::Advice;
-use crate::control::policy::caution::Caution;
-use crate::control::policy::sensitivity::{Sensitivity, cautions};
-use crate::control::policy::worst_case::WorstCase;
 use crate::control::progress::Phase;
 use crate::control::request::annualised::Annualised;
 use crate::control::request::framework::Framework;
 use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
 use crate::control::solved_step::StepDiagnostics;
-use crate::service::action::Action as ServiceAction;
+use crate::service::assets::Composed;
 use crate::service::drift::Drift;
 use crate::service::jobs::{Accepted, Job as ServiceJob};
+use crate::service::known::KnownReturns;
 use crate::service::live::Live;
 use crate::service::plan::Renewing;
 use crate::service::renewer::RenewalDue;
@@ -171,12 +170,14 @@ pub struct Imported {
 pub struct OpenSession {
     /// The policy to live by.
     pub policy: String,
-    /// Log-returns known at the start. Default: the policy's.
-    pub history: Option<Vec<f64>>,
+    /// Log-returns known at the start, of several assets date by date. Default: the policy's.
+    pub history: Option<KnownReturns>,
     /// Default: the policy's initial wealth.
     pub wealth: Option<f64>,
     /// Share of wealth in the risky asset at the start. Default: 0.
     pub holding: Option<f64>,
+    /// Share of wealth in each of several assets at the start, by their names. Default: 0.
+    pub holdings: Option<BTreeMap<String, f64>>,
     /// Train the next policy by itself, on the returns seen, and go on by it. Default: never.
     pub renew: Option<Renewing>,
     /// Live every period by the first step of a policy whose learning is decay, for up to 5200 periods. Default: false.
@@ -207,8 +208,11 @@ pub struct Session {
     #[schema(value_type = Option<String>, format = Date)]
     pub date: Option<Date>,
     pub wealth: f64,
-    /// Share of wealth in the risky asset, before trading.
+    /// Share of wealth in the risky asset, before trading; of several assets in all of them.
     pub holding: f64,
+    /// Of several assets, before the coming period.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub assets: Option<Composed>,
     pub sample_size: usize,
     /// Corrections of what periods reported; the next one is this and one more.
     pub corrections: usize,
@@ -237,6 +241,7 @@ impl From<Live> for Session {
             date: live.standing.date,
             wealth: live.standing.state.wealth,
             holding: live.standing.state.holding,
+            assets: live.standing.assets.as_ref().map(|assets| assets.composed()),
             sample_size: live.standing.state.law.sample_size(),
             corrections: live.corrections,
             drift: live.standing.bet.told(),
@@ -286,29 +291,4 @@ pub struct SessionPage {
     pub sessions: Vec<SessionEntry>,
     /// Give it as `after` for the next page; null on the last.
     pub next: Option<i64>,
-}
-
-/// The robust allocation for the coming period.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct Action {
-    pub session: String,
-    pub period: usize,
-    #[serde(flatten)]
-    pub advice: Advice,
-    /// The law that is worst for this allocation, where it was asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub worst_case: Option<WorstCase>,
-    /// What to know before the advice is followed.
-    pub caution: Vec<Caution>,
-    /// How near it is to changing, where that was asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sensitivity: Option<Sensitivity>,
-}
-
-impl Action {
-    pub fn new(session: String, action: ServiceAction) -> Self {
-        let ServiceAction { period, advice, worst_case, sensitivity } = action;
-        let caution = cautions(&advice, sensitivity.as_ref());
-        Action { session, period, advice, worst_case, caution, sensitivity }
-    }
 }

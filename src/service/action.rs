@@ -1,10 +1,12 @@
 //! The advice of a session for its coming period.
 
 use super::allowance::HeavyTurn;
+use super::assets::Assets;
 use super::error::ServiceError;
 use super::live::Live;
 use super::periods::{Passage, Periods};
 use super::sessions::Sessions;
+use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
 use crate::control::policy::sensitivity::Sensitivity;
@@ -15,7 +17,10 @@ use crate::store::Tenant;
 /// What [`Sessions::action`] found.
 pub struct Action {
     pub period: usize,
+    /// Of several assets, of their fund.
     pub advice: Advice,
+    /// Where there are several.
+    pub assets: Option<Box<Assets>>,
     pub worst_case: Option<WorstCase>,
     pub sensitivity: Option<Sensitivity>,
 }
@@ -49,15 +54,17 @@ impl Sessions {
         let Question { mode, explain, sensitivity } = question;
         let surrogate = mode == AdviceMode::Surrogate && !explain;
         if let Some(advice) = live.advice.clone().filter(|_| surrogate && !sensitivity) {
-            return Ok(Action { period, advice, worst_case: None, sensitivity: None });
+            let assets = live.standing.assets.clone();
+            return Ok(Action { period, advice, assets, worst_case: None, sensitivity: None });
         }
         let means = self.means(tenant, live, turn).await?;
         if surrogate && !sensitivity {
             let advice = live.surrogate_advice(&means).await?.clone();
-            return Ok(Action { period, advice, worst_case: None, sensitivity: None });
+            let assets = live.standing.assets.clone();
+            return Ok(Action { period, advice, assets, worst_case: None, sensitivity: None });
         }
         let advisor = means.advisor;
-        let (mut state, step) = (live.standing.state.clone(), live.step());
+        let (mut state, step, assets) = (live.standing.state.clone(), live.step(), live.standing.assets.clone());
         let mut record = None;
         if sensitivity {
             let (same, seen) = self.record(tenant, live, &advisor).await?;
@@ -75,7 +82,7 @@ impl Sessions {
             };
             let mode = if explain { AdviceMode::Resolve } else { mode };
             let sensitivity = record.map(|record| advisor.sensitivity(step, &state, &record, (&advice, mode)));
-            Action { period, advice, worst_case, sensitivity }
+            Action { period, advice, assets, worst_case, sensitivity }
         });
         solving.await
     }
@@ -85,6 +92,10 @@ impl Sessions {
     /// # Errors
     /// There is no such session; its sensitivity would take too long.
     async fn record(&self, tenant: &Tenant, live: &Live, advisor: &Advisor) -> Result<(State, Vec<f64>), ServiceError> {
+        if live.standing.assets.is_some() {
+            let rule = "must be left out: it is not told of several assets";
+            return Err(FieldError::new("sensitivity", true, rule).into());
+        }
         let mut facts = self.facts(tenant, &live.row.session).await?;
         // What another process recorded since then is of the next question.
         facts.entries.truncate(live.seen.entries());
@@ -92,7 +103,7 @@ impl Sessions {
         let periods = Periods::of(&facts)?;
         let Passage { standing, record, .. } = periods.replay()?;
         // The law is of the last of them.
-        let older = record.len() - standing.state.law.sample_size();
-        Ok((standing.state, record[older..].to_vec()))
+        let older = record.all().len() - standing.state.law.sample_size();
+        Ok((standing.state, record.all()[older..].to_vec()))
     }
 }

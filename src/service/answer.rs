@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::assets::{Composed, ObservedAssets};
 use super::drift::Drift;
 use crate::control::policy::advice::Uncertainty;
 use crate::control::problem::actions::Band;
@@ -24,6 +25,9 @@ pub struct Observed {
     pub wealth: f64,
     /// Share of it in the risky asset, as the return left it.
     pub holding: f64,
+    /// Of several assets, by their names: what is told beside is of their fund.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub assets: Option<ObservedAssets>,
     /// Whether the horizon is reached.
     pub completed: bool,
     /// Whether the returns still come as they came.
@@ -47,6 +51,9 @@ pub struct Corrected {
     pub wealth: f64,
     /// Share of it in the risky asset.
     pub holding: f64,
+    /// Of several assets, before the coming period.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub assets: Option<Composed>,
     /// Whether the returns, as they stand, come as they came.
     pub drift: Drift,
     #[serde(flatten)]

@@ -5,8 +5,10 @@ use utoipa::ToSchema;
 
 use super::allowance::HeavyTurn;
 use super::answer::{Corrected, Observed};
+use super::assets::Composed;
 use super::content::read;
 use super::error::ServiceError;
+use super::known::KnownReturns;
 use super::periods::{Passage, Periods, Step};
 use super::plan::{Plan, Renew, Renewed};
 use super::report::{Correct, Report};
@@ -26,8 +28,14 @@ pub struct History {
     pub initial_wealth: f64,
     /// Share of it in the risky asset.
     pub initial_holding: f64,
+    /// Names of the assets, where there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub assets: Option<Vec<String>>,
+    /// What was told of them at the start.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub composed: Option<Composed>,
     /// Log-returns known at the start.
-    pub history: Vec<f64>,
+    pub history: KnownReturns,
     pub observations: Vec<Observation>,
     pub corrections: Vec<Correction>,
     /// The policies that followed the first.
@@ -126,7 +134,8 @@ impl Sessions {
                 observation.now = Some(now);
             }
         }
-        let terms = Plan::of(&facts.row)?.terms;
+        let Plan { terms, assets, .. } = Plan::of(&facts.row)?;
+        let (assets, composed) = assets.map(|planned| (planned.names, planned.composed)).unzip();
         let SessionRow { session, policy, initial_wealth, initial_holding, initial_history: history, .. } = facts.row;
         Ok(History {
             session,
@@ -134,7 +143,9 @@ impl Sessions {
             terms,
             initial_wealth,
             initial_holding,
-            history,
+            history: KnownReturns::of(history, assets.as_ref().map(Vec::len)),
+            assets,
+            composed,
             observations,
             corrections,
             renewals,
@@ -148,7 +159,7 @@ impl Sessions {
         for (step, period) in periods.all.iter().enumerate() {
             let stretch = passage.stretch();
             let passed = passage.next().map_err(ServiceError::of_recorded)?;
-            let Some(Step { before, log_return, executed_allocation }) = passed else { break };
+            let Some(Step { before, log_return, executed_allocation, .. }) = passed else { break };
             if step >= first {
                 let (advising, local) = (self.policies.advisor(tenant, &stretch.policy).await?, stretch.step(step));
                 let advise = move || advising.advise(local, &before.state, AdviceMode::Surrogate);
@@ -157,7 +168,7 @@ impl Sessions {
                 told.last_mut().into_iter().for_each(|before| before.radius = advice.radius);
                 let then = &passage.standing.state;
                 told.push(Now {
-                    reported: period.is_corrected.then_some(period.report),
+                    reported: period.is_corrected.then(|| period.report.clone()),
                     log_return,
                     advised_allocation: advice.allocation,
                     executed_allocation,

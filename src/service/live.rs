@@ -4,12 +4,14 @@ use std::sync::Arc;
 
 use super::allowance::HeavyTurn;
 use super::answer::Observed;
+use super::assets::ObservedAssets;
 use super::bounded::Bounded;
 use super::error::ServiceError;
 use super::periods::Periods;
 use super::plan::{Plan, Renewing, Stretch};
 use super::report::{Observe, Report};
-use super::standing::{self, Passed, Standing};
+use super::standing::{Passed, Standing};
+use crate::control::assets::advice::named;
 use crate::control::policy::advice::{Advice, Uncertainty};
 use crate::control::policy::advisor::{Advisor, OutsideDesign};
 use crate::control::problem::state::State;
@@ -154,12 +156,12 @@ impl Live {
         report: &Report,
         means: &Means<'_>,
     ) -> Result<(Standing, Observed), ServiceError> {
-        let log_return = self.standing.log_return(report)?;
-        standing::usual(report, &self.standing.state.law, log_return, observe.confirm)?;
+        self.standing.usual(report, &self.standing.read(report)?, observe.confirm)?;
         let Advice { allocation, band, .. } = *self.surrogate_advice(means).await?;
         let dynamics = self.current.dynamics(self.observed);
         let passed = self.standing.after(dynamics, observe.period, report, allocation)?;
-        let Passed { log_return, executed_allocation, standing } = passed;
+        let Passed { seen, log_return, executed_allocation, executed, standing } = passed;
+        let advised = self.standing.assets.as_ref().map(|assets| assets.shares(allocation));
         let (standing, uncertainty) =
             measured(means.advising, &means.advisor, &self.row.tenant, self.current.step(observe.period), standing)
                 .await?;
@@ -172,6 +174,12 @@ impl Live {
             executed_allocation,
             wealth: standing.state.wealth,
             holding: standing.state.holding,
+            assets: standing.assets.as_ref().map(|assets| ObservedAssets {
+                log_returns: seen.row().map(|row| named(&assets.names, row)),
+                advised_allocations: named(&assets.names, &advised.unwrap_or_default()),
+                executed_allocations: named(&assets.names, &executed),
+                composed: assets.composed(),
+            }),
             completed: observe.period == self.horizon(),
             drift: standing.bet.told(),
             uncertainty,
@@ -180,20 +188,23 @@ impl Live {
     }
 }
 
-/// The uncertainty set before `step` of the policy.
+/// The uncertainty set before `step` of the policy; of several assets, once their composition is chosen.
 pub(super) async fn measured(
     advising: &Bounded,
     advisor: &Arc<Advisor>,
     tenant: &Tenant,
     step: usize,
-    standing: Standing,
+    mut standing: Standing,
 ) -> Result<(Standing, Uncertainty), ServiceError> {
-    if advisor.is_prompt(step, &standing.state) {
+    if standing.assets.is_none() && advisor.is_prompt(step, &standing.state) {
         let uncertainty = advisor.uncertainty(&standing.state);
         return Ok((standing, uncertainty));
     }
     let measuring = advisor.clone();
-    let measure = move || (measuring.uncertainty(&standing.state), standing);
+    let measure = move || {
+        standing.compose(&measuring, step);
+        (measuring.uncertainty(&standing.state), standing)
+    };
     let (uncertainty, standing) = advising.run(tenant, measure).await?;
     // The first session to get this far: the next advice finds its common random numbers simulated.
     let (advisor, reached) = (advisor.clone(), standing.state.clone());

@@ -6,11 +6,14 @@
 
 use serde::Deserialize;
 
+use super::answer::Corrected;
+use super::assets::{Assets, Composed, ObservedAssets, PlannedAssets};
 use super::content::read;
 use super::error::ServiceError;
 use super::plan::{Plan, Renew, Renewed, Stretch};
+use super::record::{Record, Seen};
 use super::report::{Correct, Report};
-use super::standing::{Passed, Standing, usual};
+use super::standing::{Passed, Standing};
 use crate::control::error::FieldError;
 use crate::control::problem::state::State;
 use crate::store::{EntryKind, SessionFacts};
@@ -37,7 +40,9 @@ pub struct Periods {
     /// The first policy, and those that followed it.
     pub stretches: Vec<Stretch>,
     start: Standing,
-    history: Vec<f64>,
+    history: Record,
+    /// What was told last of several assets.
+    composed: Option<Composed>,
 }
 
 /// What the session starts from, up to some period.
@@ -46,7 +51,7 @@ pub struct Passage<'a> {
     /// Where it stands, under the policy that comes next.
     pub standing: Standing,
     /// All returns seen, in their order.
-    pub record: Vec<f64>,
+    pub record: Record,
     /// Periods passed.
     step: usize,
     /// Of the policy that comes next.
@@ -57,7 +62,8 @@ pub struct Passage<'a> {
 pub struct Step {
     /// Where the session stood.
     pub before: Standing,
-    /// `None` where it is missing.
+    pub seen: Seen,
+    /// `None` where it is missing; of several assets that of what was held.
     pub log_return: Option<f64>,
     pub executed_allocation: f64,
 }
@@ -73,27 +79,43 @@ pub struct PutRight {
 }
 
 /// What is read of the answer to an observation.
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Deserialize)]
 struct Told {
     log_return: Option<f64>,
     advised_allocation: f64,
     executed_allocation: f64,
     wealth: f64,
+    assets: Option<ObservedAssets>,
 }
 
 impl Told {
     /// The report in the numbers that were acknowledged, which no other processor or library computes otherwise.
-    fn report(self, reported: &Report) -> Report {
-        Report {
-            log_return: self.log_return,
-            missing: self.log_return.is_none(),
-            executed_allocation: Some(self.executed_allocation),
-            wealth: Some(self.wealth),
-            date: reported.date,
-            rate: reported.rate,
-            flow: reported.flow,
-            ..Report::default()
+    fn report(&self, reported: &Report) -> Report {
+        let Report { date, rate, flow, .. } = *reported;
+        let common = Report { wealth: Some(self.wealth), date, rate, flow, ..Report::default() };
+        match &self.assets {
+            Some(assets) => Report {
+                log_returns: assets.log_returns.clone(),
+                missing: assets.log_returns.is_none(),
+                executed_allocations: Some(assets.executed_allocations.clone()),
+                ..common
+            },
+            None => Report {
+                log_return: self.log_return,
+                missing: self.log_return.is_none(),
+                executed_allocation: Some(self.executed_allocation),
+                ..common
+            },
         }
+    }
+
+    /// The report, of several assets with what was advised for those that were held as advised.
+    fn held_as_advised(&self, reported: &Report) -> Report {
+        let mut report = reported.clone();
+        if let Some(assets) = &self.assets {
+            report.executed_allocations.get_or_insert_with(|| assets.advised_allocations.clone());
+        }
+        report
     }
 }
 
@@ -103,27 +125,40 @@ impl Periods {
     pub(super) fn of(facts: &SessionFacts) -> Result<Self, ServiceError> {
         let SessionFacts { row, entries, .. } = facts;
         let plan = Plan::of(row)?;
-        let state = State::new(&row.initial_history, row.initial_wealth, plan.terms.learning)?;
-        let state = state.with_holding(row.initial_holding)?;
+        let history =
+            Record::new(plan.assets.as_ref().map_or(1, |assets| assets.names.len()), row.initial_history.clone());
+        let assets = plan.assets.as_ref().map(|PlannedAssets { names, composed }| {
+            Assets::told(names, history.rows_of(history.all()), composed).map(Box::new)
+        });
+        let assets = assets.transpose()?;
+        let returns = assets.as_ref().map(|assets| assets.fund.returns());
+        let returns = returns.as_deref().unwrap_or(history.all());
+        let state = State::new(returns, row.initial_wealth, plan.terms.learning)?.with_holding(row.initial_holding)?;
         let first = plan.stretch(row.policy.clone(), 0, plan.terms.clone(), None);
         let mut periods = Periods {
             all: Vec::new(),
             corrections: 0,
             stretches: vec![first],
-            start: Standing::at(&row.session, state),
-            history: row.initial_history.clone(),
+            start: Standing::at(&row.session, state, assets),
+            history,
+            composed: None,
         };
         for entry in entries {
             match entry.kind {
                 EntryKind::Observation => {
                     let report = read(&entry.content_json)?;
-                    let told = read(&entry.answer_json)?;
+                    let told: Told = read(&entry.answer_json)?;
+                    periods.composed = told.assets.as_ref().map(|assets| assets.composed.clone());
                     periods.all.push(Period { report, told, stands: true, is_corrected: false });
                 }
-                EntryKind::Correction => periods.correct(&read(&entry.content_json)?)?,
+                EntryKind::Correction => {
+                    periods.correct(&read(&entry.content_json)?)?;
+                    periods.composed = read::<Corrected>(&entry.answer_json)?.assets;
+                }
                 EntryKind::Renewal => {
                     let renew: Renew = read(&entry.content_json)?;
-                    let Renewed { terms, .. } = read(&entry.answer_json)?;
+                    let Renewed { terms, assets, .. } = read(&entry.answer_json)?;
+                    periods.composed = assets;
                     periods.stretches.push(plan.stretch(renew.policy, periods.all.len(), terms, renew.window));
                 }
             }
@@ -186,21 +221,21 @@ impl Periods {
     pub(super) fn put_right(&mut self, correction: &Correct) -> Result<PutRight, ServiceError> {
         let (mut stood, mut passage) = (Vec::with_capacity(self.all.len()), self.passage()?);
         while let Some(step) = passage.next().map_err(ServiceError::of_recorded)? {
-            stood.push(step.log_return);
+            stood.push(step.seen);
         }
         let before = passage.standing;
         self.correct(correction)?;
         let (mut corrected, mut passage) = (None, self.passage()?);
         for (period, stood) in (1..).zip(stood) {
             let passed = passage.next().map_err(|(period, error)| in_period(period, correction, error))?;
-            let Some(Step { before, log_return, .. }) = passed else { break };
+            let Some(Step { before, seen, log_return, .. }) = passed else { break };
             if period == correction.period {
                 corrected = log_return;
             }
             // Of a price that is put right, the return after it is another too.
-            if stood != log_return {
+            if stood != seen {
                 let report = &self.all[period - 1].report;
-                usual(report, &before.state.law, log_return, correction.confirm).map_err(|error| match error {
+                before.usual(report, &seen, correction.confirm).map_err(|error| match error {
                     ServiceError::UnusualReturn(field) => {
                         ServiceError::UnusualReturn(in_period(period, correction, field))
                     }
@@ -208,7 +243,8 @@ impl Periods {
                 })?;
             }
         }
-        Ok(PutRight { before, standing: passage.standing, log_return: corrected })
+        let standing = passage.last()?;
+        Ok(PutRight { before, standing, log_return: corrected })
     }
 
     /// Where the session stands after all of them.
@@ -218,6 +254,7 @@ impl Periods {
     pub(super) fn replay(&self) -> Result<Passage<'_>, ServiceError> {
         let mut passage = self.passage()?;
         while passage.next().map_err(ServiceError::of_recorded)?.is_some() {}
+        passage.standing = passage.last()?;
         Ok(passage)
     }
 }
@@ -230,15 +267,27 @@ impl<'a> Passage<'a> {
     pub(super) fn next(&mut self) -> Result<Option<Step>, (usize, FieldError)> {
         let Some(Period { report, told, stands, .. }) = self.periods.all.get(self.step) else { return Ok(None) };
         let (dynamics, period) = (self.stretch().dynamics(self.step), self.step + 1);
-        let report_told = if *stands { told.report(report) } else { *report };
+        let report_told = if *stands { told.report(report) } else { told.held_as_advised(report) };
         let passed = self.standing.after(dynamics, period, &report_told, told.advised_allocation);
-        let Passed { log_return, executed_allocation, mut standing } = passed.map_err(|error| (period, error))?;
-        standing.price = report.price;
+        let passed = passed.map_err(|error| (period, error))?;
+        let Passed { seen, log_return, executed_allocation, mut standing, .. } = passed;
+        standing.price_as(report);
+        if let Some(assets) = &told.assets {
+            standing.take(&assets.composed, self.stretch().terms.learning).map_err(|error| (period, error))?;
+        }
         let before = std::mem::replace(&mut self.standing, standing);
-        self.record.extend(log_return);
+        self.record.learn(&seen);
         self.step = period;
         self.renew().map_err(|error| (period, error))?;
-        Ok(Some(Step { before, log_return, executed_allocation }))
+        Ok(Some(Step { before, seen, log_return, executed_allocation }))
+    }
+
+    /// Where it stands after the last period, with the composition of several assets that was told last.
+    fn last(&self) -> Result<Standing, FieldError> {
+        let mut standing = self.standing.clone();
+        let told = self.periods.composed.as_ref();
+        told.map_or(Ok(()), |told| standing.take(told, self.stretch().terms.learning))?;
+        Ok(standing)
     }
 
     /// The policy that advises the period after those passed.

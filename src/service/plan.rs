@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::assets::{Composed, PlannedAssets};
 use super::content::{json, read};
 use super::error::ServiceError;
 use crate::control::error::FieldError;
@@ -40,6 +41,9 @@ pub struct Plan {
     pub(super) renew: Option<Renewing>,
     /// Whether every period is advised by the first step of the policy.
     pub(super) rolling: bool,
+    /// Several assets, in the order of the record, as they were told at the start.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) assets: Option<PlannedAssets>,
 }
 
 /// The policy that a session lives by, from some period on.
@@ -82,6 +86,9 @@ pub struct Renewed {
     pub horizon: usize,
     /// Rate, cost and flows of its periods, where none other are reported.
     pub terms: Terms,
+    /// Of several assets, before the coming period.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub assets: Option<Composed>,
     #[serde(flatten)]
     pub uncertainty: Uncertainty,
 }
@@ -119,7 +126,7 @@ pub(super) fn check_window(field: &str, window: Option<usize>) -> Result<(), Fie
 impl Plan {
     /// Of a session that lives through the horizon of a policy and ends.
     pub fn once(problem: &ProblemSpecification) -> Self {
-        Plan { terms: Terms::of(problem), renew: None, rolling: false }
+        Plan { terms: Terms::of(problem), renew: None, rolling: false, assets: None }
     }
 
     /// Of a session that lives by a policy from `returns` on.

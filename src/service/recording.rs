@@ -110,6 +110,7 @@ impl Sessions {
                 observed,
                 wealth: standing.state.wealth,
                 holding: standing.state.holding,
+                assets: standing.assets.as_ref().map(|assets| assets.composed()),
                 drift: standing.bet.told(),
                 uncertainty,
             };

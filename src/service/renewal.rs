@@ -16,7 +16,7 @@ use super::plan::{MOST_RENEWALS, Plan, Renew, Renewed, check_window};
 use super::recording::{is_repeat, numbered};
 use super::sessions::Sessions;
 use super::spans;
-use super::standing::last_of;
+use super::standing::Standing;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
 use crate::store::{Actor, EntryKind, EntryRow, Onto, SessionFacts, Tenant};
@@ -74,11 +74,11 @@ impl Sessions {
         let (onto, planned, Renew { policy, window, .. }) = (advisor.clone(), plan.clone(), renew.clone());
         let go_on = move || {
             let passage = periods.replay()?;
-            let last = last_of(&passage.record, window);
-            let terms = planned.terms(&onto, last.len(), observed);
+            let dates = passage.record.last(window).len() / passage.record.assets();
+            let terms = planned.terms(&onto, dates, observed);
             let terms = terms.map_err(|rule| FieldError::new("policy", policy, rule))?;
             let standing = passage.standing.renewed(&passage.record, window, terms.learning)?;
-            accepts(&onto, last, standing.state.wealth)?;
+            accepts(&onto, passage.record.last(window), &standing)?;
             Ok::<_, ServiceError>((standing, terms))
         };
         let (standing, terms) = self.advising.run(tenant, go_on).await??;
@@ -93,6 +93,7 @@ impl Sessions {
             period: observed + 1,
             horizon,
             terms: current.terms.clone(),
+            assets: standing.assets.as_ref().map(|assets| assets.composed()),
             uncertainty,
         };
         let new = EntryRow {
@@ -130,8 +131,16 @@ struct Decided {
     next: Live,
 }
 
-/// Whether a session that has seen `record` and has `wealth` can live by the policy.
-fn accepts(advisor: &Advisor, record: &[f64], wealth: f64) -> Result<(), FieldError> {
-    let state = advisor.initial_state(Some(record), Some(wealth))?;
+/// Whether a session that has seen `record` and stands there can live by the policy.
+fn accepts(advisor: &Advisor, record: &[f64], standing: &Standing) -> Result<(), FieldError> {
+    let (own, fund) = (standing.assets.as_deref(), advisor.specification().fund.as_deref());
+    let (own, of_policy) = (own.map_or(&[][..], |assets| &assets.names), fund.map_or(&[][..], |fund| &fund.assets));
+    if own != of_policy {
+        let told = |names: &[String]| if names.is_empty() { "one asset".to_owned() } else { names.join(", ") };
+        let rule = format!("must be of the assets of the session, in their order: {}", told(own));
+        return Err(FieldError::new("policy", format!("a policy of {}", told(of_policy)), rule));
+    }
+    let returns = standing.assets.as_ref().map(|assets| assets.fund.returns());
+    let state = advisor.initial_state(Some(returns.as_deref().unwrap_or(record)), Some(standing.state.wealth))?;
     advisor.check_withdrawals(&state)
 }

@@ -22,9 +22,11 @@ use super::live::Live;
 use super::metrics::RENEWALS;
 use super::periods::Periods;
 use super::plan::{Renew, Renewing};
+use super::record::Record;
 use super::sessions::{Name, Sessions};
 use super::shutdown::Shutdown;
-use super::standing::last_of;
+use crate::control::error::FieldError;
+use crate::control::request::assets::AssetsProblem;
 use crate::control::request::specification::{Interval, Specification};
 use crate::store::{Actor, JobRow, JobState, Store, Tenant};
 
@@ -274,7 +276,7 @@ impl Renewer {
             let periods = Periods::of(&facts)?;
             let record = periods.replay()?.record;
             let rate = periods.all.iter().rev().find_map(|period| period.report.rate);
-            Ok::<_, ServiceError>(next(advisor.specification(), last_of(&record, renew.window), rate, wealth))
+            Ok::<_, ServiceError>(next(advisor.specification(), &record, renew.window, rate, wealth)?)
         };
         let specification = self.sessions.advising.run(tenant, specify).await??;
         let (by, key) = (Actor::service(self.clock.now_milliseconds()), key(session, attempts.number, attempts.count));
@@ -291,10 +293,19 @@ impl Renewer {
 
 /// What the next policy is trained for: the same, from the returns seen and the rate observed last. Where wealth matters, the
 /// one reached takes the place of the one at first, and design points move with it.
-fn next(specification: &Specification, history: &[f64], rate: Option<f64>, wealth: f64) -> Specification {
+fn next(
+    specification: &Specification,
+    record: &Record,
+    window: Option<usize>,
+    rate: Option<f64>,
+    wealth: f64,
+) -> Result<Specification, FieldError> {
     let mut next = specification.clone();
+    let last = record.last(window);
     let problem = &mut next.problem;
-    problem.history = history.to_vec();
+    if record.assets() == 1 {
+        problem.history = last.to_vec();
+    }
     problem.rate_per_step = rate.unwrap_or(problem.rate_per_step);
     if problem.depends_on_wealth() {
         let factor = wealth / problem.initial_wealth;
@@ -302,7 +313,10 @@ fn next(specification: &Specification, history: &[f64], rate: Option<f64>, wealt
         let moved = |Interval { min, max }| Interval { min: min * factor, max: max * factor };
         next.design.wealth = next.design.wealth.map(moved);
     }
-    next
+    match AssetsProblem::of(&next, record.rows_of(last)) {
+        Some(problem) => problem.training(next.design, next.surrogate, next.seed),
+        None => Ok(next),
+    }
 }
 
 /// Renewals of a tenant under way, counted up to as many as may be.

@@ -1,5 +1,6 @@
 //! What an investor reports of a period, and how it is read.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use jiff::civil::Date;
@@ -16,6 +17,9 @@ pub const MOST_CORRECTIONS: usize = 1_000;
 /// Letters of a reason.
 pub const LONGEST_REASON: usize = 200;
 const ONE_RETURN: &str = "must be the only one of log_return, simple_return, price and missing";
+const RETURNS_ONCE: &str = "must be the only one of log_returns, simple_returns, prices and missing";
+const OF_SEVERAL: &str = "must be absent: the session is of one asset, and the field of several";
+const OF_ONE: &str = "must be absent: the session is of several assets, and the field of one";
 
 /// A struct with fields of its own and those of a report.
 ///
@@ -39,7 +43,20 @@ macro_rules! reporting {
             /// Price at the start of the period. Default: the price reported for the period before.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub previous_price: Option<f64>,
-            /// In the place of a return where none is known: the law stays as it is, and the asset counts as unmoved.
+            /// Of several assets, by their names; each has one.
+            #[schema(example = json!({ "stocks": 0.012, "bonds": 0.004 }))]
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub log_returns: Option<BTreeMap<String, f64>>,
+            /// Of several assets, `price / previous price - 1` each.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub simple_returns: Option<BTreeMap<String, f64>>,
+            /// Prices of several assets at the end of the period.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub prices: Option<BTreeMap<String, f64>>,
+            /// Their prices at the start of the period. Default: those reported for the period before.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub previous_prices: Option<BTreeMap<String, f64>>,
+            /// In the place of a return where none is known: the law stays as it is, and what is held counts as unmoved.
             #[serde(default, skip_serializing_if = "std::ops::Not::not")]
             pub missing: bool,
             /// The last day of the period, later than that of the period before.
@@ -55,6 +72,9 @@ macro_rules! reporting {
             /// Share of wealth held in the risky asset through the period. Default: the allocation advised for it.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub executed_allocation: Option<f64>,
+            /// Share of wealth held in each of several assets through the period. Default: what was advised for it.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub executed_allocations: Option<BTreeMap<String, f64>>,
             /// Wealth reached, with what was added, where it differs from what all of the above gives.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub wealth: Option<f64>,
@@ -64,7 +84,6 @@ macro_rules! reporting {
 
 reporting! {
     /// What is recorded of a period: its return, given in exactly one of three ways or as missing, and what was done in it.
-    #[derive(Copy)]
     Report {}
 }
 
@@ -116,8 +135,17 @@ macro_rules! report_of {
             pub(super) fn report(&self) -> Report {
                 let $name { log_return, simple_return, price, previous_price, missing, date, .. } = *self;
                 let $name { rate, flow, executed_allocation, wealth, .. } = *self;
+                let $name { log_returns, simple_returns, prices, previous_prices, executed_allocations, .. } = self;
                 let done = Report { rate, flow, executed_allocation, wealth, ..Report::default() };
-                Report { log_return, simple_return, price, previous_price, missing, date, ..done }
+                let one = Report { log_return, simple_return, price, previous_price, missing, date, ..done };
+                Report {
+                    log_returns: log_returns.clone(),
+                    simple_returns: simple_returns.clone(),
+                    prices: prices.clone(),
+                    previous_prices: previous_prices.clone(),
+                    executed_allocations: executed_allocations.clone(),
+                    ..one
+                }
             }
         }
     };
@@ -163,6 +191,7 @@ impl Report {
     /// # Errors
     /// None is given, or more than one, or one out of bounds.
     pub(super) fn log_return(&self, known_price: Option<f64>) -> Result<Option<f64>, FieldError> {
+        self.none_of(&self.of_several(), OF_SEVERAL)?;
         match (self.log_return, self.simple_return, self.price, self.missing) {
             (Some(value), None, None, false) => rules::log_return("log_return", value).map(|()| Some(value)),
             (None, Some(value), None, false) => log_return_of("simple_return", value).map(Some),
@@ -178,6 +207,76 @@ impl Report {
         }
     }
 
+    /// The same of several assets with these names; `known` are the prices reported for the period before.
+    ///
+    /// # Errors
+    /// They are not given in exactly one way, one is out of bounds, or an asset has none.
+    pub(super) fn log_returns(&self, names: &[String], known: Option<&[f64]>) -> Result<Option<Vec<f64>>, FieldError> {
+        let of_one = ["log_return", "simple_return", "price", "previous_price", "executed_allocation"];
+        let values = [self.log_return, self.simple_return, self.price, self.previous_price, self.executed_allocation];
+        self.none_of(&std::array::from_fn::<_, 5, _>(|index| (of_one[index], values[index].is_some())), OF_ONE)?;
+        if self.previous_prices.is_some() && self.prices.is_none() {
+            return Err(FieldError::new("previous_prices", "an object", "must be absent unless prices are given"));
+        }
+        let read = |field: &str, values, of: &dyn Fn(&str, usize, f64) -> Result<f64, FieldError>| {
+            let values = by_name(field, values, names)?;
+            let one = |(asset, value): (usize, f64)| of(&format!("{field}.{}", names[asset]), asset, value);
+            values.into_iter().enumerate().map(one).collect::<Result<Vec<f64>, FieldError>>().map(Some)
+        };
+        match (&self.log_returns, &self.simple_returns, &self.prices, self.missing) {
+            (Some(values), None, None, false) => {
+                read("log_returns", values, &|field, _, value| rules::log_return(field, value).map(|()| value))
+            }
+            (None, Some(values), None, false) => {
+                read("simple_returns", values, &|field, _, value| log_return_of(field, value))
+            }
+            (None, None, Some(prices), false) => {
+                let given = self.previous_prices.as_ref().map(|before| by_name("previous_prices", before, names));
+                let given = given.transpose()?;
+                let before = given.as_deref().or(known).ok_or_else(|| {
+                    let rule = "must be given with prices where the period before was not reported by its prices";
+                    FieldError::new("previous_prices", "null", rule)
+                })?;
+                read("prices", prices, &|field, asset, price| {
+                    between(field, price, (&format!("previous_{field}"), before[asset]))
+                })
+            }
+            (None, None, None, true) => Ok(None),
+            (None, None, None, false) => {
+                let rule = "must be given, or simple_returns, prices or missing instead of it";
+                Err(FieldError::new("log_returns", "null", rule))
+            }
+            (.., true) => Err(FieldError::new("missing", true, RETURNS_ONCE)),
+            (Some(_), ..) => Err(FieldError::new("log_returns", "an object", RETURNS_ONCE)),
+            (None, ..) => Err(FieldError::new("simple_returns", "an object", RETURNS_ONCE)),
+        }
+    }
+
+    /// What is said of several assets.
+    fn of_several(&self) -> [(&'static str, bool); 5] {
+        [
+            ("log_returns", self.log_returns.is_some()),
+            ("simple_returns", self.simple_returns.is_some()),
+            ("prices", self.prices.is_some()),
+            ("previous_prices", self.previous_prices.is_some()),
+            ("executed_allocations", self.executed_allocations.is_some()),
+        ]
+    }
+
+    fn none_of(&self, fields: &[(&'static str, bool)], rule: &str) -> Result<(), FieldError> {
+        let given = fields.iter().find(|(_, is_given)| *is_given);
+        given.map_or(Ok(()), |(field, _)| Err(FieldError::new(*field, "given", rule)))
+    }
+
+    /// What the return of one of several assets was given by, and its value.
+    pub(super) fn given_of(&self, asset: &str) -> (String, Option<f64>) {
+        let ways = [("simple_returns", &self.simple_returns), ("prices", &self.prices)];
+        let given = ways.into_iter().find_map(|(field, values)| values.as_ref().map(|values| (field, values)));
+        let (field, values) =
+            given.map_or(("log_returns", self.log_returns.as_ref()), |(field, all)| (field, Some(all)));
+        (format!("{field}.{asset}"), values.and_then(|values| values.get(asset).copied()))
+    }
+
     /// What the return was given by, and its value.
     pub(super) fn given(&self) -> (&'static str, f64) {
         match (self.log_return, self.simple_return, self.price) {
@@ -188,7 +287,6 @@ impl Report {
     }
 
     fn between_prices(&self, price: f64, known: Option<f64>) -> Result<f64, FieldError> {
-        rules::within("price", price, PRICE.0, PRICE.1)?;
         let before = self.previous_price.or(known).ok_or_else(|| {
             FieldError::new(
                 "previous_price",
@@ -196,12 +294,31 @@ impl Report {
                 "must be given with price where the period before was not reported by its price",
             )
         })?;
-        rules::within("previous_price", before, PRICE.0, PRICE.1)?;
-        let log_return = (price / before).ln();
-        let rule = format!("must give a log-return in [-{0}, {0}] from {before}", rules::LOG_RETURN);
-        rules::log_return("price", log_return).map_err(|_| FieldError::new("price", price, rule))?;
-        Ok(log_return)
+        between("price", price, ("previous_price", before))
     }
+}
+
+/// The values in the order of the assets, each of which has one.
+pub(super) fn by_name(field: &str, values: &BTreeMap<String, f64>, names: &[String]) -> Result<Vec<f64>, FieldError> {
+    if let Some((other, value)) = values.iter().find(|(name, _)| !names.contains(name)) {
+        let rule = format!("must name one of the assets: {}", names.join(", "));
+        return Err(FieldError::new(format!("{field}.{other}"), *value, rule));
+    }
+    let of = |name: &String| {
+        let value = values.get(name).copied();
+        value.ok_or_else(|| FieldError::new(format!("{field}.{name}"), "null", "must be given: every asset has one"))
+    };
+    names.iter().map(of).collect()
+}
+
+/// The log-return between two prices, by the names of their fields.
+fn between(field: &str, price: f64, (named, before): (&str, f64)) -> Result<f64, FieldError> {
+    rules::within(field, price, PRICE.0, PRICE.1)?;
+    rules::within(named, before, PRICE.0, PRICE.1)?;
+    let log_return = (price / before).ln();
+    let rule = format!("must give a log-return in [-{0}, {0}] from {before}", rules::LOG_RETURN);
+    rules::log_return(field, log_return).map_err(|_| FieldError::new(field, price, rule))?;
+    Ok(log_return)
 }
 
 impl Correct {

@@ -8,6 +8,7 @@
 //! A session is its tenant's: to everybody else it does not exist. Slots are named by tenant and session, so nobody's
 //! call waits for, fills or empties the slot of another tenant.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use serde::Serialize;
@@ -15,6 +16,7 @@ use tokio::sync::mpsc::Sender;
 use tracing::Instrument;
 
 use super::allowance::HeavyTurn;
+use super::assets::Assets;
 use super::bounded::{Bounded, Size};
 use super::clock::Clock;
 use super::config::Config;
@@ -22,6 +24,7 @@ use super::error::ServiceError;
 use super::idempotency;
 use super::identity;
 use super::keys::Caller;
+use super::known::KnownReturns;
 use super::live::{Live, Means, SESSION_BYTES};
 use super::memory::Memory;
 use super::plan::{Plan, Renewing};
@@ -29,8 +32,12 @@ use super::policies::Policies;
 use super::slots::{Generation, Held, Slots, Source};
 use super::spans;
 use super::standing::Standing;
+use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
 use crate::control::policy::content_hash;
+use crate::control::problem::state::State;
+use crate::control::request::assets::check_rows;
+use crate::control::request::specification::Specification;
 use crate::store::{CreateSession, RequestKey, SessionFacts, SessionRow, SessionSummary, Store, Tenant};
 
 /// Entries replayed in a few milliseconds.
@@ -43,9 +50,10 @@ pub(super) type Name = (Tenant, String);
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Start {
     pub policy: String,
-    pub history: Option<Vec<f64>>,
+    pub history: Option<KnownReturns>,
     pub wealth: Option<f64>,
     pub holding: Option<f64>,
+    pub holdings: Option<BTreeMap<String, f64>>,
     pub renew: Option<Renewing>,
     pub rolling: bool,
 }
@@ -56,6 +64,42 @@ impl Start {
         idempotency::check(&key)?;
         let sent = serde_json::to_vec(self).map_err(ServiceError::internal)?;
         Ok(RequestKey { key, request_hash: content_hash(&sent) })
+    }
+
+    /// The first state by the policy of `advisor`, several assets, and the log-returns known, date after date.
+    fn begins(self, advisor: &Advisor) -> Result<(State, Option<Box<Assets>>, Vec<f64>), FieldError> {
+        let Start { history, wealth, holding, holdings, .. } = self;
+        let Specification { problem, fund, .. } = advisor.specification();
+        let Some(fund) = fund else {
+            if let Some(KnownReturns::Several(rows)) = &history {
+                let rule = "must be a list of numbers: the policy is of one asset";
+                return Err(FieldError::new("history", format!("{} rows", rows.len()), rule));
+            }
+            if holdings.is_some() {
+                return Err(FieldError::new("holdings", "an object", "must be absent: the policy is of one asset"));
+            }
+            let history = history.map(KnownReturns::values);
+            let state = advisor.initial_state(history.as_deref(), wealth)?.with_holding(holding.unwrap_or(0.0))?;
+            return Ok((state, None, history.unwrap_or_else(|| problem.history.clone())));
+        };
+        if let Some(holding) = holding {
+            let rule = "must be absent: the policy is of several assets, and holdings says it of each";
+            return Err(FieldError::new("holding", holding, rule));
+        }
+        let rows = match history {
+            None => fund.history.clone(),
+            Some(KnownReturns::Several(rows)) => rows,
+            Some(KnownReturns::One(values)) => {
+                let rule = format!("must be a list of rows, each a log-return of {}", fund.assets.join(", "));
+                return Err(FieldError::new("history", format!("{} values", values.len()), rule));
+            }
+        };
+        check_rows("history", &rows, &fund.assets, None)?;
+        let history = rows.concat();
+        let assets = Assets::at(&fund.assets, rows, holdings.as_ref())?;
+        let holding = assets.fund.holdings.iter().sum::<f64>().min(1.0);
+        let state = advisor.initial_state(Some(&assets.fund.returns()), wealth)?.with_holding(holding)?;
+        Ok((state, Some(assets.into()), history))
     }
 }
 
@@ -97,21 +141,22 @@ impl Sessions {
     pub async fn open(&self, caller: &Caller, start: Start, key: Option<String>) -> Result<Live, ServiceError> {
         let tenant = &caller.tenant;
         let key = key.map(|key| start.under(key)).transpose()?;
-        let Start { policy, history, wealth, holding, renew, rolling } = start;
+        let Start { policy, renew, rolling, .. } = start.clone();
         let advisor = self.policies.advisor(tenant, &policy).await?;
-        let state = advisor.initial_state(history.as_deref(), wealth)?.with_holding(holding.unwrap_or(0.0))?;
+        let (state, assets, history) = start.begins(&advisor)?;
         // The policy's own wealth pays, whatever is held.
         advisor.check_withdrawals(&state)?;
         let plan = Plan::new(&advisor, state.law.sample_size(), renew, rolling)?;
+        let (state, assets) = self.composed(tenant, &advisor, state, assets).await?;
+        let plan = Plan { assets: assets.as_ref().map(|assets| assets.planned()), ..plan };
         self.policies.starts_from(&advisor, state.law.sample_size(), plan.terms.horizon)?;
-        let problem = &advisor.specification().problem;
         let row = SessionRow {
             session: identity::new_id("session")?,
             tenant: tenant.clone(),
             policy,
             initial_wealth: state.wealth,
             initial_holding: state.holding,
-            initial_history: history.unwrap_or_else(|| problem.history.clone()),
+            initial_history: history,
             horizon: plan.terms.horizon,
             plan_json: plan.json()?,
             due: renew.map(|renew| renew.every),
@@ -130,7 +175,7 @@ impl Sessions {
             CreateSession::Exists => return Err(ServiceError::internal("a session of this random name exists")),
         };
         let seen = row.as_opened();
-        let standing = Standing::at(&row.session, state);
+        let standing = Standing::at(&row.session, state, assets);
         let current = plan.stretch(row.policy.clone(), 0, plan.terms.clone(), None);
         Ok(Live {
             row: Arc::new(row),
@@ -144,6 +189,20 @@ impl Sessions {
             radius: None,
             advice: None,
         })
+    }
+
+    /// The composition of several assets before the first period, and the state of their fund.
+    async fn composed(
+        &self,
+        tenant: &Tenant,
+        advisor: &Arc<Advisor>,
+        state: State,
+        assets: Option<Box<Assets>>,
+    ) -> Result<(State, Option<Box<Assets>>), ServiceError> {
+        let Some(mut assets) = assets else { return Ok((state, None)) };
+        let advisor = advisor.clone();
+        let compose = move || (assets.compose(&advisor, 0, &state), Some(assets));
+        self.advising.run(tenant, compose).await
     }
 
     /// Bytes of the sessions in memory.

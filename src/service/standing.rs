@@ -1,15 +1,20 @@
 //! Where a session stands, and where a report leads from there.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use jiff::civil::Date;
 
+use super::assets::{Assets, Composed, mean};
 use super::drift::Bet;
 use super::error::ServiceError;
-use super::report::Report;
+use super::record::{Record, Seen};
+use super::report::{Report, by_name};
 use crate::control::error::FieldError;
+use crate::control::policy::advisor::Advisor;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::state::{Realised, State};
+use crate::control::request::assets::check_rows;
 use crate::control::request::learning::Learning;
 use crate::control::request::rules;
 use crate::numerics::empirical::EmpiricalDistribution;
@@ -18,14 +23,17 @@ use crate::numerics::moments::CentralMoments;
 /// Where a session stands between two periods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Standing {
+    /// Of several assets, that of their fund.
     pub state: State,
+    /// The assets, where there are several.
+    pub assets: Option<Box<Assets>>,
     /// The price reported for the last period, if one was.
     pub price: Option<f64>,
     /// The last date reported.
     pub date: Option<Date>,
     /// Against the returns' coming as they came.
     pub bet: Bet,
-    /// All returns seen, where the law is of the last of them alone.
+    /// All returns seen, where the law is of the last of them alone; of several assets always, their mean date by date.
     seen: Option<EmpiricalDistribution>,
     session: Arc<str>,
 }
@@ -33,52 +41,69 @@ pub struct Standing {
 /// What a report makes of a period.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Passed {
+    pub seen: Seen,
+    /// Of several assets, that of what was held.
     pub log_return: Option<f64>,
     pub executed_allocation: f64,
+    /// Shares of wealth held in several assets; none of one.
+    pub executed: Vec<f64>,
     pub standing: Standing,
 }
 
 impl Standing {
     /// At the start of `session`.
-    pub(super) fn at(session: &str, state: State) -> Self {
-        Standing { state, price: None, date: None, bet: Bet::default(), seen: None, session: session.into() }
+    pub(super) fn at(session: &str, state: State, assets: Option<Box<Assets>>) -> Self {
+        let seen = assets.as_ref().map(|assets| Assets::means(&assets.fund.rows));
+        Standing { state, assets, price: None, date: None, bet: Bet::default(), seen, session: session.into() }
     }
 
-    /// The same with the law that the last `window` returns of `record` teach, which holds all that were seen.
+    /// The same with the law that the last `window` dates of `record` teach, which holds all that were seen.
     ///
     /// # Errors
     /// They are no history.
     pub(super) fn renewed(
         &self,
-        record: &[f64],
+        record: &Record,
         window: Option<usize>,
         learning: Learning,
     ) -> Result<Self, FieldError> {
-        let last = last_of(record, window);
-        let state = State::new(last, self.state.wealth, learning)?.with_holding(self.state.holding)?;
-        let seen = (last.len() < record.len()).then(|| EmpiricalDistribution::new(record));
+        let last = record.last(window);
+        let (mut assets, mut returns) = (self.assets.clone(), Cow::Borrowed(last));
+        if let Some(assets) = &mut assets {
+            assets.fund.rows = record.rows_of(last);
+            check_rows("history", &assets.fund.rows, &assets.names, None)?;
+            returns = Cow::Owned(assets.fund.returns());
+        }
+        let state = State::new(&returns, self.state.wealth, learning)?.with_holding(self.state.holding)?;
+        let seen = match &assets {
+            Some(_) => Some(Assets::means(&record.rows_of(record.all()))),
+            None => (last.len() < record.all().len()).then(|| EmpiricalDistribution::new(record.all())),
+        };
         let Standing { price, date, bet, .. } = *self;
-        Ok(Standing { state, price, date, bet, seen, session: self.session.clone() })
+        Ok(Standing { state, assets, price, date, bet, seen, session: self.session.clone() })
     }
 
-    /// The log-return that `report` tells of the coming period, `None` where it is missing.
+    /// What `report` tells of the coming period.
     ///
     /// # Errors
     /// A field breaks a rule; the date is none after the last.
-    pub(super) fn log_return(&self, report: &Report) -> Result<Option<f64>, FieldError> {
+    pub(super) fn read(&self, report: &Report) -> Result<Seen, FieldError> {
         report.check()?;
         if let (Some(date), Some(last)) = (report.date, self.date)
             && date <= last
         {
             return Err(FieldError::new("date", date, format!("must be later than {last}, that of a period before")));
         }
-        report.log_return(self.price)
+        match &self.assets {
+            Some(assets) => assets.log_returns(report).map(Seen::Several),
+            None => report.log_return(self.price).map(Seen::One),
+        }
     }
 
-    /// After `period`, of which `report` tells, and for which `advised` was advised.
+    /// After `period`, of which `report` tells, and for which `advised` was advised of all assets.
     ///
     /// # Errors
-    /// As [`Standing::log_return`]; wealth leaves the range that is taken.
+    /// As [`Standing::read`]; wealth leaves the range that is taken.
     pub(super) fn after(
         &self,
         dynamics: Dynamics,
@@ -86,34 +111,114 @@ impl Standing {
         report: &Report,
         advised: f64,
     ) -> Result<Passed, FieldError> {
-        let log_return = self.log_return(report)?;
-        let executed_allocation = report.executed_allocation.unwrap_or(advised);
+        let seen = self.read(report)?;
+        let (executed, traded) = match &self.assets {
+            Some(assets) => {
+                let executed = assets.executed(report, advised)?;
+                let traded = assets.fund.traded(&executed);
+                (executed, Some(traded))
+            }
+            None => (Vec::new(), None),
+        };
+        let executed_allocation = match &self.assets {
+            Some(_) => executed.iter().sum::<f64>().min(1.0),
+            None => report.executed_allocation.unwrap_or(advised),
+        };
+        let log_return = match (&seen, &self.assets) {
+            (Seen::Several(Some(row)), Some(assets)) => Some(assets.fund.log_return(&executed, row)),
+            (Seen::One(log_return), _) => *log_return,
+            _ => None,
+        };
         let Report { rate, flow, .. } = *report;
-        let realised = Realised { action: executed_allocation, log_return, rate, flow };
+        let realised = Realised { action: executed_allocation, log_return, rate, flow, traded };
         let mut state = self.state.next_state(dynamics, &realised);
         state.wealth = match report.wealth {
             Some(reported) => reported,
             None => reached(state.wealth, report)?,
         };
-        let mut seen = self.seen.clone();
-        seen.iter_mut().zip(log_return).for_each(|(seen, log_return)| seen.push(log_return));
-        let bet = self.bet.after(seen.as_ref().unwrap_or(&state.law), log_return, &self.session, period);
-        let (price, date, session) = (report.price, report.date.or(self.date), self.session.clone());
-        let standing = Standing { state, price, date, bet, seen, session };
-        Ok(Passed { log_return, executed_allocation, standing })
+        let Standing { assets, bet, seen: known, session, .. } = self;
+        let (price, date) = (report.price, report.date.or(self.date));
+        let (assets, known, session) = (assets.clone(), known.clone(), session.clone());
+        let mut standing = Standing { state, assets, price, date, bet: *bet, seen: known, session };
+        standing.learn(&seen, &executed, period);
+        Ok(Passed { seen, log_return, executed_allocation, executed, standing })
+    }
+
+    /// The record, the bet and the holdings after a period.
+    fn learn(&mut self, seen: &Seen, executed: &[f64], period: usize) {
+        let row = seen.row();
+        if let Some(assets) = &mut self.assets {
+            assets.fund.passed(executed, row, self.state.holding);
+        }
+        let told = match seen {
+            Seen::One(log_return) => *log_return,
+            Seen::Several(_) => row.map(mean),
+        };
+        self.seen.iter_mut().zip(told).for_each(|(seen, told)| seen.push(told));
+        self.bet = self.bet.after(self.seen.as_ref().unwrap_or(&self.state.law), told, &self.session, period);
+    }
+
+    /// The prices that were reported with what was passed.
+    pub(super) fn price_as(&mut self, report: &Report) {
+        self.price = report.price;
+        if let Some(assets) = &mut self.assets {
+            assets.prices = report.prices.as_ref().and_then(|prices| by_name("prices", prices, &assets.names).ok());
+        }
+    }
+
+    /// Takes the composition that was told, and the law of its fund.
+    ///
+    /// # Errors
+    /// It is of other assets.
+    pub(super) fn take(&mut self, told: &Composed, learning: Learning) -> Result<(), FieldError> {
+        let Some(assets) = &mut self.assets else { return Ok(()) };
+        assets.take(told)?;
+        self.state.law = learning.law(&assets.fund.returns());
+        Ok(())
+    }
+
+    /// Chooses the composition before the period after `step`, where there are several assets and the policy advises it.
+    pub(super) fn compose(&mut self, advisor: &Advisor, step: usize) {
+        let Some(assets) = self.assets.as_mut().filter(|_| step < advisor.specification().problem.horizon) else {
+            return;
+        };
+        self.state = assets.compose(advisor, step, &self.state);
     }
 
     /// Returns that it holds.
     pub(super) fn returns(&self) -> usize {
         let seen = self.seen.as_ref().map_or(0, EmpiricalDistribution::sample_size);
-        self.state.law.sample_size() + seen
+        let of_assets = self.assets.as_ref().map_or(0, |assets| assets.fund.rows.len() * assets.names.len());
+        self.state.law.sample_size() + seen + of_assets
     }
-}
 
-/// The last `window` of the returns seen, or as many as a history may hold.
-pub(super) fn last_of(record: &[f64], window: Option<usize>) -> &[f64] {
-    let most = window.unwrap_or(usize::MAX).min(*rules::HISTORY_LENGTH.end());
-    &record[record.len().saturating_sub(most)..]
+    /// Asks about a return z that lies far from a record of mean m and standard deviation s: `|z - m| > 8 s` and
+    /// `|e^z - 1| > 0.2`; of several assets about each.
+    /// Checked by: `tests/account.rs::a_return_that_is_most_likely_a_slip_is_asked_about`.
+    ///
+    /// # Errors
+    /// It is most likely a slip, and nobody confirms it.
+    pub(super) fn usual(&self, report: &Report, seen: &Seen, is_confirmed: bool) -> Result<(), ServiceError> {
+        match (seen, &self.assets) {
+            _ if is_confirmed => Ok(()),
+            (Seen::One(Some(log_return)), _) => {
+                let (field, value) = report.given();
+                usual(field, value, || CentralMoments::of(&self.state.law), *log_return)
+            }
+            (Seen::Several(Some(row)), Some(assets)) => {
+                for (asset, (name, log_return)) in assets.names.iter().zip(row).enumerate() {
+                    let (field, value) = report.given_of(name);
+                    let column = || {
+                        let column: Vec<f64> = assets.fund.rows.iter().map(|row| row[asset]).collect();
+                        CentralMoments::of(&EmpiricalDistribution::new(&column))
+                    };
+                    usual(&field, value.unwrap_or(*log_return), column, *log_return)?;
+                }
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// Returns further from the record than so many of its standard deviations are unusual, where they are also large.
@@ -121,22 +226,18 @@ const UNUSUAL_DEVIATIONS: f64 = 8.0;
 /// Of a simple return, either way: what is smaller is never unusual.
 const UNUSUAL_RETURN: f64 = 0.2;
 
-/// Asks about a return z that lies far from a record of mean m and standard deviation s: `|z - m| > 8 s` and `|e^z - 1| > 0.2`.
-/// Checked by: `tests/account.rs::a_return_that_is_most_likely_a_slip_is_asked_about`.
-///
-/// # Errors
-/// It is most likely a slip, and nobody confirms it.
-pub(super) fn usual(
-    report: &Report,
-    record: &EmpiricalDistribution,
-    log_return: Option<f64>,
-    is_confirmed: bool,
+/// Whether a log-return is usual in a record of these moments.
+fn usual(
+    field: &str,
+    value: f64,
+    record: impl FnOnce() -> CentralMoments,
+    log_return: f64,
 ) -> Result<(), ServiceError> {
-    let unless_confirmed = log_return.filter(|_| !is_confirmed).map(|log_return| (log_return, log_return.exp_m1()));
-    let Some((log_return, simple_return)) = unless_confirmed.filter(|(_, simple)| simple.abs() > UNUSUAL_RETURN) else {
+    let simple_return = log_return.exp_m1();
+    if simple_return.abs() <= UNUSUAL_RETURN {
         return Ok(());
-    };
-    let moments = CentralMoments::of(record);
+    }
+    let moments = record();
     let deviations = (log_return - moments.mean()).abs() / moments.variance().sqrt();
     if deviations <= UNUSUAL_DEVIATIONS {
         return Ok(());
@@ -145,7 +246,6 @@ pub(super) fn usual(
     let rule = format!(
         "must come with \"confirm\": true where it is meant: a return of {percent:.1} % lies {deviations:.1} standard deviations from the record"
     );
-    let (field, value) = report.given();
     Err(ServiceError::UnusualReturn(FieldError::new(field, value, rule)))
 }
 

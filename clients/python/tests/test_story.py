@@ -10,7 +10,7 @@ import pytest
 from conftest import REPOSITORY, RETURNS, Network, compare, train, walk
 
 import ballast as package
-from ballast import Ballast, Policy, Session, Training, wire
+from ballast import Ballast, Policy, Session, Training, frames, wire
 
 
 def test_an_investor_lives_to_the_horizon(session: Session) -> None:
@@ -75,6 +75,23 @@ def test_advice_on_several_assets(ballast: Ballast) -> None:
         ballast.advise_assets([[0.1, -1.0]], kind="simple", assets=["stocks", "bonds"], rate_per_step=0.0)
     with pytest.raises(ValueError, match="assets is None: must name the columns"):
         ballast.advise_assets(rows, kind="log", rate_per_step=0.0)
+
+
+def test_a_session_of_several_assets(ballast: Ballast) -> None:
+    pd = pytest.importorskip("pandas")
+    record = pd.DataFrame({"stocks": RETURNS, "bonds": [value * value - 0.0005 for value in RETURNS]})
+    training = ballast.train_assets(
+        record, kind="log", rate_per_step=0.0, horizon=2, radius={"rule": "fixed", "radius": 1e-4}, design={"count": 20}
+    )
+    session = training.policy().session(wealth=100.0)
+    advised = frames.allocation(session.assets_action())
+    assert set(advised.index) == {"stocks", "bonds"} and 0.0 < advised.sum() <= 1.0
+    held = advised * 0.5
+    session.observe(simple_returns=pd.Series({"stocks": 0.1, "bonds": -0.01}), executed_allocations=held)
+    assert session.wealth == pytest.approx(100.0 + 100.0 * (0.1 * held["stocks"] - 0.01 * held["bonds"]))
+    assert session.observed is not None and session.observed["assets"]["one_step"]["bound"] > 0.0  # type: ignore[index]
+    session.correct(1, "a slip", simple_returns={"stocks": 0.2, "bonds": 0.0}, executed_allocations=held)
+    assert session.wealth == pytest.approx(100.0 + 20.0 * held["stocks"])
 
 
 def test_what_may_be_a_mistake_is_said(ballast: Ballast) -> None:

@@ -240,7 +240,7 @@ fn judge(advisor: &Advisor, solver: BellmanStep, truth: &Truth) -> Judged {
     let Advice { allocation, surrogate_sd, in_design, .. } = advisor.advise(step, &truth.state, AdviceMode::Surrogate);
     let served = solver.price(&truth.state, allocation).floor_gain;
     Judged {
-        error: BASIS_POINTS * (advisor.surrogate_gain(step, &truth.state) - truth.floor_gain),
+        error: BASIS_POINTS * (advisor.surrogate(step, &truth.state).1 - truth.floor_gain),
         regret: BASIS_POINTS * (truth.floor_gain - served).max(0.0),
         deviation: surrogate_sd,
         in_design,

@@ -37,6 +37,7 @@ pub fn problem(sample_size: usize, horizon: usize) -> ProblemSpecification {
 pub fn specification(sample_size: usize, horizon: usize, count: usize, initial_laws: InitialLaws) -> Specification {
     let mut specification = Specification {
         problem: problem(sample_size, horizon),
+        fund: None,
         design: Default::default(),
         surrogate: Default::default(),
         seed: 1,

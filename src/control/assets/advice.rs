@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::AssetsSolution;
 use crate::control::policy::caution::Caution;
 
 /// What to hold of several assets through the coming period.
@@ -34,11 +35,38 @@ pub struct AssetsAdvice {
     pub caution: Vec<Caution>,
 }
 
+/// The one-step problem of several assets, by their names.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct OneStep {
+    /// Shares of wealth that are best for who looks one period ahead.
+    pub allocation: BTreeMap<String, f64>,
+    /// Wealth for certain after the period that they are worth against the worst law: at least this.
+    pub certainty_equivalent: f64,
+    /// No allocation is worth more than this.
+    pub bound: f64,
+    /// What the worst law makes of each asset.
+    pub worst_means: BTreeMap<String, WorstMean>,
+}
+
 /// The mean of an asset's log-return.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WorstMean {
     /// Of those seen.
     pub seen: f64,
     /// Under the worst law.
     pub worst: f64,
+}
+
+/// By the names of the assets.
+pub fn named(names: &[String], values: &[f64]) -> BTreeMap<String, f64> {
+    names.iter().cloned().zip(values.iter().copied()).collect()
+}
+
+/// What the law behind the bound of a solution makes of each asset.
+pub fn worst_means(names: &[String], rows: &[Vec<f64>], solution: &AssetsSolution) -> BTreeMap<String, WorstMean> {
+    let of = |(asset, (name, moved)): (usize, (&String, &f64))| {
+        let seen = rows.iter().map(|row| row[asset]).sum::<f64>() / rows.len() as f64;
+        (name.clone(), WorstMean { seen, worst: seen + moved })
+    };
+    names.iter().zip(&solution.mean_moves).enumerate().map(of).collect()
 }

@@ -1,12 +1,12 @@
 //! From a question about several assets to the advice.
 
-use super::advice::{AssetsAdvice, WorstMean};
-use super::composition::CompositionRule;
+use super::advice::{AssetsAdvice, named, worst_means};
 use super::{AssetsLaw, AssetsStep};
 use crate::control::policy::caution::Caution;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::assets::AssetsProblem;
+use crate::control::request::fund::CompositionRule;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::ProblemSpecification;
 use crate::numerics::fund_bridges::FundBridges;
@@ -53,15 +53,10 @@ impl AssetsAdvice {
         let radius = radius_factor * of_fund;
         let floor = fund.initial_wealth * (1.0 + fund.rate_per_step);
         let solution = step(problem, fund, rows, radius).solve(None);
-        let named = |shares: &[f64]| problem.assets.iter().cloned().zip(shares.iter().copied()).collect();
         let composition = CompositionRule::OneStep.composition(rows, || solution.clone());
-        let worst = problem.assets.iter().zip(&solution.mean_moves).enumerate().map(|(asset, (name, moved))| {
-            let seen = rows.iter().map(|row| row[asset]).sum::<f64>() / rows.len() as f64;
-            (name.clone(), WorstMean { seen, worst: seen + moved })
-        });
         AssetsAdvice {
-            allocation: named(&solution.allocation),
-            composition: named(&composition),
+            allocation: named(&problem.assets, &solution.allocation),
+            composition: named(&problem.assets, &composition),
             total: solution.allocation.iter().sum(),
             certainty_equivalent: floor * solution.value.exp(),
             bound: floor * solution.bound.exp(),
@@ -69,7 +64,7 @@ impl AssetsAdvice {
             radius,
             radius_factor,
             sample_size: rows.len(),
-            worst_means: worst.collect(),
+            worst_means: worst_means(&problem.assets, rows, &solution),
             caution: Caution::short_record(rows.len(), rows.len() as f64).into_iter().collect(),
         }
     }

@@ -1,23 +1,11 @@
 //! The composition of a fund: what share of it each asset has, whatever the share of wealth in the fund.
 
 use super::AssetsSolution;
+use crate::control::request::fund::CompositionRule;
 use crate::numerics::levelling::inverse_volatility;
 
 /// A total below this says nothing about its parts.
 const LEAST_TOTAL: f64 = 1e-4;
-
-/// How the composition of the fund is chosen.
-#[derive(Debug, Clone, PartialEq)]
-pub enum CompositionRule {
-    /// That of the allocation that solves the one-step problem; inverse volatilities where it holds nothing.
-    OneStep,
-    /// Equal shares.
-    Equal,
-    /// Shares in inverse proportion to the deviations of the returns.
-    InverseVolatility,
-    /// These shares, which sum to 1.
-    Given(Vec<f64>),
-}
 
 impl CompositionRule {
     /// The composition after the log-returns `rows`, date by date; `one_step` solves the one-step problem, where it is asked.
@@ -29,7 +17,10 @@ impl CompositionRule {
                 vec![1.0 / assets as f64; assets]
             }
             CompositionRule::InverseVolatility => inverse_volatility(rows),
-            CompositionRule::Given(shares) => shares.clone(),
+            CompositionRule::Given(shares) => {
+                let whole: f64 = shares.iter().sum();
+                shares.iter().map(|share| share / whole).collect()
+            }
         }
     }
 }

@@ -22,6 +22,7 @@ pub mod advising;
 mod branches;
 mod certificate;
 pub mod composition;
+pub mod fund;
 mod interior;
 pub mod worst;
 

@@ -155,6 +155,7 @@ impl WalkForward {
                     past.last().map_or(0.0, |last| last.bank_return),
                 )
             },
+            fund: None,
             design: DesignSpecification { count: Some(self.count), ..DesignSpecification::default() },
             surrogate: SurrogateSpecification::default(),
             seed: self.seed,

@@ -35,7 +35,6 @@ pub enum AdviceMode {
 pub struct Advisor {
     policy: Policy,
     problem: Problem,
-    /// Of the steps that have surrogates.
     prepared: Vec<OnceLock<PreparedStep>>,
     kept: Kept,
 }
@@ -89,7 +88,7 @@ impl Advisor {
         prepared_bytes(&self.policy)
     }
 
-    /// Bytes of the largest bridges that a session of so many periods asks for which starts from `sample_size` returns.
+    /// Bytes of the largest bridges that a session of so many periods from `sample_size` returns asks for.
     pub fn heaviest_bridges(&self, sample_size: usize, periods: usize) -> usize {
         self.problem.sets.heaviest(sample_size, periods)
     }
@@ -227,9 +226,10 @@ impl Advisor {
         self.problem.radius(state)
     }
 
-    /// The floor gain that the value surrogate predicts, wherever the state lies.
-    pub fn surrogate_gain(&self, step: usize, state: &State) -> f64 {
-        self.predict(step, state, self.radius(state)).floor_gain
+    /// The allocation and the floor gain that the surrogates predict, wherever the state lies.
+    pub fn surrogate(&self, step: usize, state: &State) -> (f64, f64) {
+        let Prediction { band, floor_gain, .. } = self.predict(step, state, self.radius(state));
+        (band.nearest(state.holding), floor_gain)
     }
 
     fn resolved(&self, asked: &Asked, predicted: &Prediction) -> (Advice, Option<RobustSolution>) {

@@ -82,9 +82,9 @@ impl Dynamics {
         (1.0 - action) * (1.0 + self.rate_per_step) + action * log_return.exp()
     }
 
-    /// Wealth after trading, per unit of wealth before: `1 - c |a - h|`.
-    pub fn left(self, holding: f64, action: f64) -> f64 {
-        1.0 - self.trading_cost * f64::abs(action - holding)
+    /// Wealth after the share `traded` of it was bought and sold, per unit of wealth before: `1 - c |a - h|`.
+    pub fn left(self, traded: f64) -> f64 {
+        1.0 - self.trading_cost * traded
     }
 
     /// Wealth after selling everything, per unit of wealth: `1 - c h`.
@@ -94,8 +94,13 @@ impl Dynamics {
 
     /// S(x, a, z): wealth and the share of it held, after the holding was brought to `action` and held through `log_return`.
     pub fn next(self, wealth: f64, holding: f64, action: f64, log_return: f64) -> (f64, f64) {
+        self.next_after(wealth, f64::abs(action - holding), action, log_return)
+    }
+
+    /// The same after the share `traded` of wealth was bought and sold, which of several assets is more than their total moved.
+    pub fn next_after(self, wealth: f64, traded: f64, action: f64, log_return: f64) -> (f64, f64) {
         let growth = self.growth(action, log_return);
-        let grown = wealth * self.left(holding, action) * growth;
+        let grown = wealth * self.left(traded) * growth;
         let (next, share) = (grown + self.contribution, action * log_return.exp() / growth);
         // Of what cannot pay for a withdrawal nothing is left, and of what hardly can the asset is sold as well.
         (next, if next > 0.0 { (share * (grown / next)).min(1.0) } else { share })

@@ -58,7 +58,8 @@ impl Holdings {
         if !self.matter() || holding <= highest {
             return 0.0;
         }
-        let kept = dynamics.left(holding, highest) * dynamics.liquidation(highest) / dynamics.liquidation(holding);
+        let kept =
+            dynamics.left(f64::abs(highest - holding)) * dynamics.liquidation(highest) / dynamics.liquidation(holding);
         (in_hand * kept + (1.0 - in_hand)).ln()
     }
 

@@ -17,12 +17,14 @@ pub struct Realised {
     pub rate: Option<f64>,
     /// What was added at its end, where that was not the contribution of the problem.
     pub flow: Option<f64>,
+    /// Share of wealth bought and sold for it, where that is not what the holding was changed by: of several assets.
+    pub traded: Option<f64>,
 }
 
 impl Realised {
     /// A period as the problem has it.
     pub fn of(action: f64, log_return: f64) -> Self {
-        Realised { action, log_return: Some(log_return), rate: None, flow: None }
+        Realised { action, log_return: Some(log_return), rate: None, flow: None, traded: None }
     }
 }
 
@@ -60,11 +62,12 @@ impl State {
     /// G(y, a, z): next wealth and holding after a period of `dynamics` that became `realised`, and the law with the return
     /// learned.
     pub fn next_state(&self, dynamics: Dynamics, realised: &Realised) -> State {
-        let Realised { action, log_return, rate, flow } = *realised;
+        let Realised { action, log_return, rate, flow, traded } = *realised;
         let rate_per_step = rate.unwrap_or(dynamics.rate_per_step);
         let contribution = flow.unwrap_or(dynamics.contribution);
         let dynamics = Dynamics { rate_per_step, contribution, ..dynamics };
-        let (wealth, holding) = dynamics.next(self.wealth, self.holding, action, log_return.unwrap_or(0.0));
+        let traded = traded.unwrap_or_else(|| f64::abs(action - self.holding));
+        let (wealth, holding) = dynamics.next_after(self.wealth, traded, action, log_return.unwrap_or(0.0));
         let mut law = self.law.clone();
         log_return.into_iter().for_each(|seen| law.push(seen));
         State { wealth, holding, law }

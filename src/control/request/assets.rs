@@ -5,13 +5,16 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::contributions::Contributions;
+use super::framework::Framework;
+use super::fund::{CompositionRule, FundSpecification, GroundNorm, LowestReturn};
 use super::learning::Learning;
 use super::radius_rule::RadiusRule;
 use super::rules;
 use super::specification::{ProblemSpecification, Specification, UtilitySpecification, defaults};
 use crate::control::error::FieldError;
 use crate::numerics::fund_bridges::fund_returns;
-use crate::numerics::levelling::{Ground, inverse_volatility};
+use crate::numerics::levelling::inverse_volatility;
 
 /// Assets at most.
 pub const MOST_ASSETS: usize = 30;
@@ -32,6 +35,12 @@ pub struct AssetsProblem {
     /// What moving a law costs the adversary.
     #[serde(default)]
     pub ground_norm: GroundNorm,
+    /// How the shares of the assets in what is held are chosen, period after period.
+    #[serde(default)]
+    pub composition: CompositionRule,
+    /// Number of decisions that a policy is trained for. Default: 10 of a policy, 1 of an advice.
+    #[serde(default)]
+    pub horizon: Option<usize>,
     /// Bank return per step, as a fraction.
     pub rate_per_step: f64,
     /// Periods of the history in a year: what is said a year is said with it. It changes no advice.
@@ -43,7 +52,13 @@ pub struct AssetsProblem {
     /// Share of wealth that may be held in all assets together: `[0, highest]`.
     #[serde(default = "defaults::action_interval")]
     pub action_interval: [f64; 2],
-    /// Of wealth at the end of the period.
+    /// Lost of what is moved between the bank and any asset, as a share of it; 0 of an advice.
+    #[serde(default)]
+    pub trading_cost: f64,
+    /// Money added at the end of each period, withdrawn where it is negative; none of an advice.
+    #[serde(default)]
+    pub contributions: Contributions,
+    /// Of wealth at the horizon.
     #[serde(default)]
     pub utility: UtilitySpecification,
     /// Default: `bridge`. That of the fund of inverse volatilities, made wide enough for all funds at once.
@@ -56,35 +71,6 @@ pub struct AssetsProblem {
     pub history: Vec<Vec<f64>>,
 }
 
-/// The distance between two dates' log-returns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum GroundNorm {
-    /// The sum of the moves, each times its asset's inverse volatility, which sum to 1: moving all assets by s costs s.
-    #[default]
-    ScaledOne,
-    /// The largest move.
-    Sup,
-}
-
-impl GroundNorm {
-    /// The ground cost at a history.
-    pub fn at(self, rows: &[Vec<f64>]) -> Ground {
-        match self {
-            GroundNorm::ScaledOne => Ground::Weighted(inverse_volatility(rows)),
-            GroundNorm::Sup => Ground::Sup,
-        }
-    }
-}
-
-/// The lowest log-return of any asset.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LowestReturn {
-    /// In log-return; at most the lowest of the history.
-    pub min: f64,
-}
-
 impl AssetsProblem {
     /// The problem of the fund of inverse volatilities, for one period: rate, utility and radius are checked and completed there,
     /// and its radius is what that of all funds is a multiple of.
@@ -92,70 +78,160 @@ impl AssetsProblem {
     /// # Errors
     /// A field breaks a rule.
     pub fn fund(&self, seed: u64) -> Result<Specification, FieldError> {
-        self.check_names()?;
-        self.check_history()?;
-        let problem = ProblemSpecification {
-            horizon: 1,
+        self.check()?;
+        if let Some(horizon) = self.horizon.filter(|horizon| *horizon != 1) {
+            let rule = "must be 1 or left out: one period is advised, and a policy is trained for more";
+            return Err(FieldError::new("problem.horizon", horizon, rule));
+        }
+        if self.trading_cost != 0.0 || !self.contributions.are_none() {
+            let (field, value) = match self.trading_cost == 0.0 {
+                true => ("problem.contributions", "not 0".to_owned()),
+                false => ("problem.trading_cost", self.trading_cost.to_string()),
+            };
+            return Err(FieldError::new(field, value, "must be 0 or left out: a policy is trained for it"));
+        }
+        Specification::of(ProblemSpecification { horizon: 1, ..self.of_fund() }, seed).completed()
+    }
+
+    /// The investor with the fund of inverse volatilities as his one asset.
+    pub fn of_fund(&self) -> ProblemSpecification {
+        let returns = fund_returns(&self.history, &inverse_volatility(&self.history));
+        ProblemSpecification {
+            horizon: self.horizon.unwrap_or_else(defaults::horizon),
             periods_per_year: self.periods_per_year,
             initial_wealth: self.initial_wealth,
             action_interval: self.action_interval,
+            trading_cost: self.trading_cost,
+            contributions: self.contributions.clone(),
             utility: self.utility,
             radius: self.radius,
-            ..ProblemSpecification::of(
-                fund_returns(&self.history, &inverse_volatility(&self.history)),
-                self.rate_per_step,
-            )
-        };
-        Specification::of(problem, seed).completed()
+            ..ProblemSpecification::of(returns, self.rate_per_step)
+        }
     }
 
-    fn check_names(&self) -> Result<(), FieldError> {
-        let assets = &self.assets;
-        if !ASSETS.contains(&assets.len()) {
-            let rule =
-                format!("must name {} to {} assets, each with a column of history", ASSETS.start(), ASSETS.end());
-            return Err(FieldError::new("problem.assets", format!("{} names", assets.len()), rule));
-        }
-        let mut seen = BTreeSet::new();
-        for (index, name) in assets.iter().enumerate() {
-            let field = || format!("problem.assets[{index}]");
-            if !NAME_LENGTH.contains(&name.chars().count()) {
-                let rule = format!("must have {} to {} characters", NAME_LENGTH.start(), NAME_LENGTH.end());
-                return Err(FieldError::new(field(), format!("{} characters", name.chars().count()), rule));
-            }
-            if !seen.insert(name) {
-                return Err(FieldError::new(field(), name, "must be a name of its own"));
-            }
-        }
-        Ok(())
+    /// Checks what is said of the assets.
+    ///
+    /// # Errors
+    /// The first field that breaks a rule.
+    pub fn check(&self) -> Result<(), FieldError> {
+        check_names("problem.assets", &self.assets)?;
+        check_rows("problem.history", &self.history, &self.assets, self.support)?;
+        check_composition("problem.composition", &self.composition, self.assets.len())
     }
+}
 
-    fn check_history(&self) -> Result<(), FieldError> {
-        let (rows, width) = (&self.history, self.assets.len());
-        if !DATES.contains(&rows.len()) {
-            let rule = format!("must hold {} to {} dates", DATES.start(), DATES.end());
-            return Err(FieldError::new("problem.history", format!("{} dates", rows.len()), rule));
+/// Checks the names of assets, in the field `named`.
+fn check_names(named: &str, assets: &[String]) -> Result<(), FieldError> {
+    if !ASSETS.contains(&assets.len()) {
+        let rule = format!("must name {} to {} assets, each with a column of history", ASSETS.start(), ASSETS.end());
+        return Err(FieldError::new(named, format!("{} names", assets.len()), rule));
+    }
+    let mut seen = BTreeSet::new();
+    for (index, name) in assets.iter().enumerate() {
+        let field = || format!("{named}[{index}]");
+        if !NAME_LENGTH.contains(&name.chars().count()) {
+            let rule = format!("must have {} to {} characters", NAME_LENGTH.start(), NAME_LENGTH.end());
+            return Err(FieldError::new(field(), format!("{} characters", name.chars().count()), rule));
         }
-        for (date, row) in rows.iter().enumerate() {
-            if row.len() != width {
-                let rule = format!("must have one log-return for each of the {width} assets");
-                return Err(FieldError::new(format!("problem.history[{date}]"), format!("{} values", row.len()), rule));
-            }
-            for (asset, &value) in row.iter().enumerate() {
-                rules::log_return(&format!("problem.history[{date}][{asset}]"), value)?;
-            }
+        if !seen.insert(name) {
+            return Err(FieldError::new(field(), name, "must be a name of its own"));
         }
-        for (asset, name) in self.assets.iter().enumerate() {
-            let column: Vec<f64> = rows.iter().map(|row| row[asset]).collect();
-            Learning::Equal {}.check_deviation(&format!("problem.history, {name}"), &column)?;
+    }
+    Ok(())
+}
+
+/// Checks log-returns of assets, date by date, in the field `named`.
+///
+/// # Errors
+/// The first that breaks a rule.
+pub fn check_rows(
+    named: &str,
+    rows: &[Vec<f64>],
+    assets: &[String],
+    support: Option<LowestReturn>,
+) -> Result<(), FieldError> {
+    if !DATES.contains(&rows.len()) {
+        let rule = format!("must hold {} to {} dates", DATES.start(), DATES.end());
+        return Err(FieldError::new(named, format!("{} dates", rows.len()), rule));
+    }
+    for (date, row) in rows.iter().enumerate() {
+        if row.len() != assets.len() {
+            let rule = format!("must have one log-return for each of the {} assets", assets.len());
+            return Err(FieldError::new(format!("{named}[{date}]"), format!("{} values", row.len()), rule));
         }
-        let Some(LowestReturn { min }) = self.support else { return Ok(()) };
-        rules::log_return("problem.support.min", min)?;
-        let lowest = rows.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-        if min > lowest {
-            let rule = format!("must be at most {lowest}, the lowest log-return of the history");
-            return Err(FieldError::new("problem.support.min", min, rule));
+        for (asset, &value) in row.iter().enumerate() {
+            rules::log_return(&format!("{named}[{date}][{asset}]"), value)?;
         }
-        Ok(())
+    }
+    for (asset, name) in assets.iter().enumerate() {
+        let column: Vec<f64> = rows.iter().map(|row| row[asset]).collect();
+        Learning::Equal {}.check_deviation(&format!("{named}, {name}"), &column)?;
+    }
+    let Some(LowestReturn { min }) = support else { return Ok(()) };
+    rules::log_return("problem.support.min", min)?;
+    let lowest = rows.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+    if min > lowest {
+        let rule = format!("must be at most {lowest}, the lowest log-return of the history");
+        return Err(FieldError::new("problem.support.min", min, rule));
+    }
+    Ok(())
+}
+
+/// Shares that sum to 1 but for so much are taken as they are.
+const WHOLE: f64 = 1e-6;
+
+/// Checks shares that are given for so many assets, in the field `named`: as many, each a share, which sum to 1.
+fn check_composition(named: &str, rule: &CompositionRule, assets: usize) -> Result<(), FieldError> {
+    let CompositionRule::Given(shares) = rule else { return Ok(()) };
+    let field = format!("{named}.given");
+    if shares.len() != assets {
+        let rule = format!("must hold a share for each of the {assets} assets");
+        return Err(FieldError::new(field, format!("{} shares", shares.len()), rule));
+    }
+    for (index, &share) in shares.iter().enumerate() {
+        rules::share(&format!("{field}[{index}]"), share)?;
+    }
+    let whole: f64 = shares.iter().sum();
+    if (whole - 1.0).abs() > WHOLE {
+        return Err(FieldError::new(field, format!("shares summing to {whole}"), "must sum to 1"));
+    }
+    Ok(())
+}
+/// Largest multiple of one fund's radius.
+pub const LARGEST_FACTOR: f64 = 100.0;
+/// Between a log-return of the fund and what its assets give, on another machine.
+const ROUNDING: f64 = 1e-9;
+
+/// Checks that a fund keeps the rules and that `problem` is that of its investor.
+///
+/// # Errors
+/// The first field that breaks a rule.
+pub(super) fn check_fund(fund: &FundSpecification, problem: &ProblemSpecification) -> Result<(), FieldError> {
+    if problem.framework != Framework::Adaptive {
+        let rule = "must be adaptive for a fund of several assets";
+        return Err(FieldError::new("problem.framework", problem.framework.name(), rule));
+    }
+    if problem.learning.decays() {
+        let rule = "must be equal for a fund of several assets";
+        return Err(FieldError::new("problem.learning", "decay", rule));
+    }
+    check_names("fund.assets", &fund.assets)?;
+    check_rows("fund.history", &fund.history, &fund.assets, fund.support)?;
+    check_composition("fund.composition", &fund.composition, fund.assets.len())?;
+    rules::within("fund.radius_factor", fund.radius_factor, 1.0, LARGEST_FACTOR)?;
+    let returns = fund_returns(&fund.history, &inverse_volatility(&fund.history));
+    let differs = |(index, (given, of_fund)): (usize, (&f64, f64))| {
+        ((given - of_fund).abs() > ROUNDING).then(|| (index, *given, of_fund))
+    };
+    if returns.len() != problem.history.len() {
+        let rule = format!("must hold {} log-returns, one for each date of fund.history", returns.len());
+        return Err(FieldError::new("problem.history", format!("{} values", problem.history.len()), rule));
+    }
+    match problem.history.iter().zip(returns).enumerate().find_map(differs) {
+        None => Ok(()),
+        Some((index, given, of_fund)) => {
+            let rule = format!("must be {of_fund}, that of the fund of inverse volatilities of fund.history");
+            Err(FieldError::new(format!("problem.history[{index}]"), given, rule))
+        }
     }
 }

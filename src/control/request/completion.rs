@@ -1,6 +1,7 @@
 //! What a specification leaves out, filled in.
 
 use crate::control::error::FieldError;
+use crate::control::request::assets::check_fund;
 use crate::control::request::rules;
 use crate::control::request::specification::{Interval, SamplingLaw, Specification};
 
@@ -16,6 +17,7 @@ impl Specification {
     /// The first field, in the order of the request, that breaks its rule.
     pub fn completed(mut self) -> Result<Self, FieldError> {
         rules::check(&self)?;
+        self.fund.as_ref().map_or(Ok(()), |fund| check_fund(fund, &self.problem))?;
         let learns = self.problem.framework.learns();
         let wealth = self.problem.initial_wealth;
         self.problem.contributions = self.problem.contributions.canonical();

@@ -220,7 +220,7 @@ impl EvaluationRequest {
         if self.histories != InitialHistories::Given && framework.learns() {
             design.initial_laws = InitialLaws::Resampled;
         }
-        Specification { problem, design, surrogate: self.surrogate.clone(), seed: self.seed }
+        Specification { problem, fund: None, design, surrogate: self.surrogate.clone(), seed: self.seed }
     }
 
     /// Whether a policy trained from `found` may stand in for the training of `framework`.

@@ -6,8 +6,10 @@ use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
-use super::assets::{AssetsProblem, GroundNorm, LowestReturn};
+use super::assets::AssetsProblem;
+use super::contributions::Contributions;
 use super::framework::Framework;
+use super::fund::{CompositionRule, GroundNorm, LowestReturn};
 use super::learning::Learning;
 use super::rules;
 use super::specification::{ProblemSpecification, Specification, default_seed};
@@ -198,6 +200,10 @@ fn as_assets(problem: &ProblemSpecification) -> AssetsProblem {
     AssetsProblem {
         assets: vec!["asset".to_owned()],
         ground_norm: GroundNorm::default(),
+        composition: CompositionRule::default(),
+        horizon: None,
+        trading_cost: 0.0,
+        contributions: Contributions::default(),
         rate_per_step: problem.rate_per_step,
         periods_per_year: problem.periods_per_year,
         initial_wealth: problem.initial_wealth,

@@ -10,6 +10,7 @@ pub mod evaluation;
 pub mod framework;
 pub mod frequency;
 pub mod frontier;
+pub mod fund;
 pub mod learning;
 pub mod radius_rule;
 pub mod rules;

@@ -8,15 +8,19 @@ use utoipa::ToSchema;
 
 use crate::control::request::contributions::Contributions;
 use crate::control::request::framework::Framework;
+use crate::control::request::fund::FundSpecification;
 use crate::control::request::learning::Learning;
 use crate::control::request::radius_rule::RadiusRule;
 
-/// A whole training job: the problem, the design that samples its states, the surrogates, one seed.
+/// A whole training job.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Specification {
-    /// What the investor is and may do.
+    /// What the investor is and may do; of several assets, with their fund in the place of one.
     pub problem: ProblemSpecification,
+    /// The assets of that fund, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fund: Option<Box<FundSpecification>>,
     /// Where the surrogates are trained.
     #[serde(default)]
     pub design: DesignSpecification,
@@ -31,12 +35,7 @@ pub struct Specification {
 impl Specification {
     /// Of a problem, with the defaults of all else.
     pub fn of(problem: ProblemSpecification, seed: u64) -> Self {
-        Specification {
-            problem,
-            design: DesignSpecification::default(),
-            surrogate: SurrogateSpecification::default(),
-            seed,
-        }
+        Specification { problem, fund: None, design: Default::default(), surrogate: Default::default(), seed }
     }
 }
 

@@ -133,6 +133,31 @@ class _Ballast:
         question = _given({"problem": whole, "wealth": wealth})
         return cast(wire.AssetsAdvised, await self._transport.json("POST", "/advise", body=question))
 
+    async def _train_assets(
+        self,
+        /,
+        returns: Table,
+        *,
+        kind: Kind,
+        rate_per_step: float,
+        assets: Sequence[str] | None = None,
+        design: wire.DesignSpecification | None = None,
+        surrogate: wire.SurrogateSpecification | None = None,
+        seed: int | None = None,
+        idempotency_key: str | None = None,
+        **problem: Any,
+    ) -> wire.Job:
+        """Queues the training of a policy for several assets, and does not wait for it.
+
+        ``returns``, ``kind``, ``assets`` and ``rate_per_step`` are as in ``advise_assets``, and so is every other field
+        of the problem that is given by name; also ``horizon``, ``trading_cost``, ``contributions`` and ``composition``.
+        ``design``, ``surrogate``, ``seed`` and ``idempotency_key`` are as in ``train``.
+        """
+        names, rows = log_returns_of_assets(returns, kind, assets)
+        of_assets = {"assets": names, "history": rows, "rate_per_step": rate_per_step, **_given(problem)}
+        whole = {"problem": of_assets, "design": design, "surrogate": surrogate, "seed": seed}
+        return await self._queued("/train", _given(whole), idempotency_key)
+
     async def _submit(self, specification: wire.Specification, *, idempotency_key: str | None = None) -> wire.Job:
         """Queues the training of a whole specification, such as ``Policy.detail`` shows."""
         return await self._queued("/train", specification, idempotency_key)
@@ -305,6 +330,7 @@ class Ballast(_Ballast):
         self._transport = Waiting(http, retries)
 
     train = blocking_into(_Ballast._train, Training)
+    train_assets = blocking_into(_Ballast._train_assets, Training)
     submit = blocking_into(_Ballast._submit, Training)
     training = blocking_into(_Ballast._job, Training)
     evaluate = blocking_into(_Ballast._evaluate, Evaluation)
@@ -360,6 +386,7 @@ class AsyncBallast(_Ballast):
         self._transport = Awaiting(http, retries)
 
     train = awaiting_into(_Ballast._train, AsyncTraining)
+    train_assets = awaiting_into(_Ballast._train_assets, AsyncTraining)
     submit = awaiting_into(_Ballast._submit, AsyncTraining)
     training = awaiting_into(_Ballast._job, AsyncTraining)
     evaluate = awaiting_into(_Ballast._evaluate, AsyncEvaluation)

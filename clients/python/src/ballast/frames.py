@@ -74,9 +74,9 @@ def worst_case(advice: Explained) -> pd.DataFrame:
     return require_pandas().DataFrame(law["transport"], columns=["atom", "moved_to", "mass"])
 
 
-def allocation(advised: wire.AssetsAdvised) -> pd.Series[float]:
-    """What ``Ballast.advise_assets`` advises: the share of wealth in each asset, by its name, in no
-    particular order; the rest is in the bank.
+def allocation(advised: wire.AssetsAdvised | wire.AssetsAction) -> pd.Series[float]:
+    """What ``Ballast.advise_assets`` or ``Session.assets_action`` advises: the share of wealth in each asset, by its
+    name, in no particular order; the rest is in the bank.
 
     Raises ``ImportError`` without pandas.
     """

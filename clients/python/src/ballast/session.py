@@ -69,6 +69,14 @@ class _Session:
         params = {"session": self.id, "mode": mode, "explain": explain, "sensitivity": "true" if sensitivity else None}
         return cast(wire.Action, await self._transport.json("GET", "/action", params=params))
 
+    async def _assets_action(
+        self, *, mode: Literal["surrogate", "resolve"] | None = None, explain: Literal["worst_case"] | None = None
+    ) -> wire.AssetsAction:
+        """The same of a session of several assets: what to hold of each by its name, of which
+        :func:`ballast.frames.allocation` makes a Series."""
+        params = {"session": self.id, "mode": mode, "explain": explain}
+        return cast(wire.AssetsAction, await self._transport.json("GET", "/action", params=params))
+
     async def _observe(
         self, *, period: int | None = None, confirm: bool = False, **report: Unpack[wire.Report]
     ) -> Self:
@@ -77,13 +85,14 @@ class _Session:
 
         :class:`wire.Report <ballast.wire.Report>` names all that can be said: ``executed_allocation`` is what was
         really held, by default what was advised; ``rate`` what the bank paid, ``flow`` what was added, by default the
-        policy's; ``wealth`` what was really reached; ``date`` the last day. ``period`` is the coming one unless given:
-        an earlier one with the content first reported for it gets its first answer again. Raises
-        :class:`UnusualReturn` for a return far from the record, unless ``confirm`` says that it is meant, and
-        :class:`ReportConflict`, :class:`ReportGap` and :class:`SessionCompleted`.
+        policy's; ``wealth`` what was really reached; ``date`` the last day. Of several assets ``log_returns``,
+        ``simple_returns``, ``prices`` and ``executed_allocations`` are a dict or a Series by their names. ``period``
+        is the coming one unless given: an earlier one with the content first reported for it gets its first answer
+        again. Raises :class:`UnusualReturn` for a return far from the record, unless ``confirm`` says that it is
+        meant, and :class:`ReportConflict`, :class:`ReportGap` and :class:`SessionCompleted`.
         """
         number = self.period if period is None else period
-        body: wire.Observe = {"session": self.id, "period": number, "confirm": confirm, **report}
+        body: wire.Observe = {"session": self.id, "period": number, "confirm": confirm, **_by_name(report)}
         observed: wire.Observed = await self._transport.json("POST", "/observe", body=body)
         self.observed = observed
         if observed["period"] >= self.period:
@@ -162,7 +171,7 @@ class _Session:
             "period": period,
             "reason": reason,
             "confirm": confirm,
-            **report,
+            **_by_name(report),
         }
         corrected: wire.Corrected = await self._transport.json("POST", f"{self._path}/corrections", body=body)
         if number > self.corrections:
@@ -245,10 +254,17 @@ class _Session:
         return f"<{type(self).__name__} {self.id} at period {self.period} of {self.horizon}>"
 
 
+def _by_name(report: wire.Report) -> wire.Report:
+    """The report with dicts in the place of Series."""
+    plain = {name: value.to_dict() if hasattr(value, "to_dict") else value for name, value in report.items()}
+    return cast(wire.Report, plain)
+
+
 class Session(_Session):
     __doc__ = _Session.__doc__
 
     action = Answering(wire.Action).blocking(_Session._action)
+    assets_action = Answering(wire.AssetsAction).blocking(_Session._assets_action)
     observe = blocking(_Session._observe)
     replay = blocking(_Session._replay)
     correct = Answering(wire.Corrected).blocking(_Session._correct)
@@ -264,6 +280,7 @@ class AsyncSession(_Session):
     """A :class:`Session` whose calls are awaited."""
 
     action = _Session._action
+    assets_action = _Session._assets_action
     observe = _Session._observe
     replay = _Session._replay
     correct = _Session._correct

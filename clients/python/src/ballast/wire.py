@@ -166,6 +166,17 @@ CautionCode: TypeAlias = Literal["short_record", "one_return"]
 """The reasons."""
 
 
+class CompositionRule1(TypedDict):
+    """These shares, in the order of the assets, which sum to 1."""
+
+    given: list[float]
+    """These shares, in the order of the assets, which sum to 1."""
+
+
+CompositionRule: TypeAlias = Literal["one_step"] | Literal["equal"] | Literal["inverse_volatility"] | CompositionRule1
+"""How the composition of the fund is chosen."""
+
+
 Contributions: TypeAlias = float | list[float]
 """C, money added at the end of each period."""
 
@@ -188,8 +199,16 @@ class Correct(TypedDict):
     """Price at the end of the period."""
     previous_price: NotRequired[float | None]
     """Price at the start of the period. Default: the price reported for the period before."""
+    log_returns: NotRequired[dict[str, float]]
+    """Of several assets, by their names; each has one."""
+    simple_returns: NotRequired[dict[str, float]]
+    """Of several assets, `price / previous price - 1` each."""
+    prices: NotRequired[dict[str, float]]
+    """Prices of several assets at the end of the period."""
+    previous_prices: NotRequired[dict[str, float]]
+    """Their prices at the start of the period. Default: those reported for the period before."""
     missing: NotRequired[bool]
-    """In the place of a return where none is known: the law stays as it is, and the asset counts as unmoved."""
+    """In the place of a return where none is known: the law stays as it is, and what is held counts as unmoved."""
     date: NotRequired[str | None]
     """The last day of the period, later than that of the period before."""
     rate: NotRequired[float | None]
@@ -198,6 +217,8 @@ class Correct(TypedDict):
     """Money added at the end of the period, negative where it was taken. Default: the policy's contribution."""
     executed_allocation: NotRequired[float | None]
     """Share of wealth held in the risky asset through the period. Default: the allocation advised for it."""
+    executed_allocations: NotRequired[dict[str, float]]
+    """Share of wealth held in each of several assets through the period. Default: what was advised for it."""
     wealth: NotRequired[float | None]
     """Wealth reached, with what was added, where it differs from what all of the above gives."""
 
@@ -262,6 +283,12 @@ class FrontierPoint(TypedDict):
 
 
 Scale: TypeAlias = float
+
+
+HistoryItem1Item: TypeAlias = float
+
+
+HistoryItem1: TypeAlias = list[HistoryItem1Item]
 
 
 GroundNorm: TypeAlias = Literal["scaled_one", "sup"]
@@ -355,6 +382,10 @@ JobKind: TypeAlias = Literal["train", "evaluate", "backtest", "frontier"]
 JobState: TypeAlias = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 
 
+KnownReturns: TypeAlias = list[float] | list[list[float]]
+"""Log-returns known at the start of a session, oldest first."""
+
+
 class Learning1(TypedDict):
     """As much as any other."""
 
@@ -432,8 +463,16 @@ class Observe(TypedDict):
     """Price at the end of the period."""
     previous_price: NotRequired[float | None]
     """Price at the start of the period. Default: the price reported for the period before."""
+    log_returns: NotRequired[dict[str, float]]
+    """Of several assets, by their names; each has one."""
+    simple_returns: NotRequired[dict[str, float]]
+    """Of several assets, `price / previous price - 1` each."""
+    prices: NotRequired[dict[str, float]]
+    """Prices of several assets at the end of the period."""
+    previous_prices: NotRequired[dict[str, float]]
+    """Their prices at the start of the period. Default: those reported for the period before."""
     missing: NotRequired[bool]
-    """In the place of a return where none is known: the law stays as it is, and the asset counts as unmoved."""
+    """In the place of a return where none is known: the law stays as it is, and what is held counts as unmoved."""
     date: NotRequired[str | None]
     """The last day of the period, later than that of the period before."""
     rate: NotRequired[float | None]
@@ -442,11 +481,10 @@ class Observe(TypedDict):
     """Money added at the end of the period, negative where it was taken. Default: the policy's contribution."""
     executed_allocation: NotRequired[float | None]
     """Share of wealth held in the risky asset through the period. Default: the allocation advised for it."""
+    executed_allocations: NotRequired[dict[str, float]]
+    """Share of wealth held in each of several assets through the period. Default: what was advised for it."""
     wealth: NotRequired[float | None]
     """Wealth reached, with what was added, where it differs from what all of the above gives."""
-
-
-HistoryItem1: TypeAlias = float
 
 
 class OwnMix(TypedDict):
@@ -514,6 +552,9 @@ class Problem(TypedDict):
     """What the field held."""
     rule: NotRequired[str | None]
     """What the field must be."""
+
+
+HistoryItem2: TypeAlias = float
 
 
 class RadiusRule1(TypedDict):
@@ -641,8 +682,16 @@ class Report(TypedDict):
     """Price at the end of the period."""
     previous_price: NotRequired[float | None]
     """Price at the start of the period. Default: the price reported for the period before."""
+    log_returns: NotRequired[dict[str, float]]
+    """Of several assets, by their names; each has one."""
+    simple_returns: NotRequired[dict[str, float]]
+    """Of several assets, `price / previous price - 1` each."""
+    prices: NotRequired[dict[str, float]]
+    """Prices of several assets at the end of the period."""
+    previous_prices: NotRequired[dict[str, float]]
+    """Their prices at the start of the period. Default: those reported for the period before."""
     missing: NotRequired[bool]
-    """In the place of a return where none is known: the law stays as it is, and the asset counts as unmoved."""
+    """In the place of a return where none is known: the law stays as it is, and what is held counts as unmoved."""
     date: NotRequired[str | None]
     """The last day of the period, later than that of the period before."""
     rate: NotRequired[float | None]
@@ -651,6 +700,8 @@ class Report(TypedDict):
     """Money added at the end of the period, negative where it was taken. Default: the policy's contribution."""
     executed_allocation: NotRequired[float | None]
     """Share of wealth held in the risky asset through the period. Default: the allocation advised for it."""
+    executed_allocations: NotRequired[dict[str, float]]
+    """Share of wealth held in each of several assets through the period. Default: what was advised for it."""
     wealth: NotRequired[float | None]
     """Wealth reached, with what was added, where it differs from what all of the above gives."""
 
@@ -941,6 +992,10 @@ class AssetsProblem(TypedDict):
     """Names of the assets, each another, in the order of the columns of `history`."""
     ground_norm: NotRequired[GroundNorm]
     """What moving a law costs the adversary."""
+    composition: NotRequired[CompositionRule]
+    """How the shares of the assets in what is held are chosen, period after period."""
+    horizon: NotRequired[int | None]
+    """Number of decisions that a policy is trained for. Default: 10 of a policy, 1 of an advice."""
     rate_per_step: float
     """Bank return per step, as a fraction."""
     periods_per_year: NotRequired[float | None]
@@ -949,8 +1004,12 @@ class AssetsProblem(TypedDict):
     """Wealth, in any currency."""
     action_interval: NotRequired[list[ActionIntervalItem]]
     """Share of wealth that may be held in all assets together: `[0, highest]`."""
+    trading_cost: NotRequired[float]
+    """Lost of what is moved between the bank and any asset, as a share of it; 0 of an advice."""
+    contributions: NotRequired[Contributions]
+    """Money added at the end of each period, withdrawn where it is negative; none of an advice."""
     utility: NotRequired[UtilitySpecification]
-    """Of wealth at the end of the period."""
+    """Of wealth at the horizon."""
     radius: NotRequired[RadiusRule | None]
     support: NotRequired[LowestReturn | None]
     history: list[HistoryItem]
@@ -1102,6 +1161,25 @@ class Drift(TypedDict):
     """By the highest: `warning` from 20 on, `alarm` from 100 on."""
 
 
+class FundSpecification(TypedDict):
+    """What a policy for several assets knows beside the problem of their fund, whose shares are those of inverse volatilities."""
+
+    assets: list[Asset]
+    """Names of the assets."""
+    ground_norm: GroundNorm
+    """What moving a law costs the adversary."""
+    composition: CompositionRule
+    """How the shares of the assets in what is held are chosen."""
+    support: NotRequired[LowestReturn | None]
+    radius_factor: float
+    """
+    What the radius of one fund was multiplied by, for laws of all funds to lie in their balls at once: the scale of the
+    problem's radius holds it. 1 under rules that look at the sample size alone.
+    """
+    history: list[HistoryItem1]
+    """Log-returns, date by date, oldest first; each date has one for each asset."""
+
+
 class JobProgress(TypedDict):
     """How far a job is."""
 
@@ -1154,28 +1232,17 @@ class Now(TypedDict):
     """Radius of the uncertainty set after it, in the unit of an advice's."""
 
 
-class Observed(Uncertainty):
-    """The session after an observation."""
+class OneStep(TypedDict):
+    """The one-step problem of several assets, by their names."""
 
-    session: str
-    period: int
-    log_return: NotRequired[float | None]
-    """Null where it is missing."""
-    band: list[float]
-    """
-    The holdings that were best kept at the start of the period; where trading costs nothing both ends are the advised
-    allocation.
-    """
-    advised_allocation: float
-    executed_allocation: float
-    wealth: float
-    """Wealth at the end of the period, with what was added to it."""
-    holding: float
-    """Share of it in the risky asset, as the return left it."""
-    completed: bool
-    """Whether the horizon is reached."""
-    drift: Drift
-    """Whether the returns still come as they came."""
+    allocation: dict[str, float]
+    """Shares of wealth that are best for who looks one period ahead."""
+    certainty_equivalent: float
+    """Wealth for certain after the period that they are worth against the worst law: at least this."""
+    bound: float
+    """No allocation is worth more than this."""
+    worst_means: dict[str, WorstMean]
+    """What the worst law makes of each asset."""
 
 
 class OpenSession(TypedDict):
@@ -1183,12 +1250,13 @@ class OpenSession(TypedDict):
 
     policy: str
     """The policy to live by."""
-    history: NotRequired[list[HistoryItem1] | None]
-    """Log-returns known at the start. Default: the policy's."""
+    history: NotRequired[KnownReturns | None]
     wealth: NotRequired[float | None]
     """Default: the policy's initial wealth."""
     holding: NotRequired[float | None]
     """Share of wealth in the risky asset at the start. Default: 0."""
+    holdings: NotRequired[dict[str, float]]
+    """Share of wealth in each of several assets at the start, by their names. Default: 0."""
     renew: NotRequired[Renewing | None]
     rolling: NotRequired[bool]
     """Live every period by the first step of a policy whose learning is decay, for up to 5200 periods. Default: false."""
@@ -1234,7 +1302,7 @@ class ProblemSpecification(TypedDict):
     radius: NotRequired[RadiusRule | None]
     support: NotRequired[Interval | None]
     law: NotRequired[SamplingLaw | None]
-    history: list[HistoryItem1]
+    history: list[HistoryItem2]
     """The log-returns observed before the start, at least two of them distinct."""
 
 
@@ -1252,20 +1320,6 @@ class RenewalDue(TypedDict):
     """Jobs so far."""
 
 
-class Renewed(Uncertainty):
-    """The session after a renewal."""
-
-    session: str
-    renewal: int
-    policy: str
-    period: int
-    """The coming period, the first that the policy advises."""
-    horizon: int
-    """The last period that it advises."""
-    terms: Terms
-    """Rate, cost and flows of its periods, where none other are reported."""
-
-
 class Sensitivity(TypedDict):
     """How near an advice is to changing."""
 
@@ -1274,36 +1328,6 @@ class Sensitivity(TypedDict):
     """With one more return."""
     premium: Premium
     """With another mean, and with more returns like those seen."""
-
-
-class Session(TypedDict):
-    """A live investor."""
-
-    session: str
-    policy: str
-    """The one that advises the coming period."""
-    period: int
-    """The coming period, from 1; `horizon + 1` once completed."""
-    horizon: int
-    """The last period that the policy advises."""
-    state: SessionState
-    date: NotRequired[str | None]
-    """The last day of the last period that was reported with one."""
-    wealth: float
-    holding: float
-    """Share of wealth in the risky asset, before trading."""
-    sample_size: int
-    corrections: int
-    """Corrections of what periods reported; the next one is this and one more."""
-    renewals: int
-    """Policies that followed the first; the next renewal is this and one more."""
-    renew: NotRequired[Renewing | None]
-    rolling: bool
-    """Whether the first step of the policy advises every period."""
-    renewal: NotRequired[RenewalDue | None]
-    drift: Drift
-    """Whether the returns still come as they came."""
-    created_ms: int
 
 
 class SessionEntry(TypedDict):
@@ -1372,6 +1396,19 @@ class Sweep(TypedDict):
     wealth: NotRequired[SweepRange | None]
 
 
+class TrainAssets(TypedDict):
+    """A training of a policy for several assets."""
+
+    problem: AssetsProblem
+    """The assets and the investor."""
+    design: NotRequired[DesignSpecification]
+    """Where the surrogates are trained; laws start resampled."""
+    surrogate: NotRequired[SurrogateSpecification]
+    """How the surrogates are made."""
+    seed: NotRequired[int]
+    """The same request and seed give the same policy, bit for bit."""
+
+
 class Warning(TypedDict):
     """Something in a sound request that may be a mistake."""
 
@@ -1423,7 +1460,7 @@ class WorstCase(TypedDict):
 
 
 class Action(Advice):
-    """The robust allocation for the coming period."""
+    """The robust allocation of one asset for the coming period."""
 
     session: str
     period: int
@@ -1510,6 +1547,16 @@ class AssetsAdvised(AssetsAdvice):
     """What in the question may be a mistake."""
 
 
+class Composed(TypedDict):
+    """Several assets before the coming period, by their names."""
+
+    composition: dict[str, float]
+    """Share of each asset in what is advised to be held; they sum to 1."""
+    holdings: dict[str, float]
+    """Share of wealth in each asset, before trading."""
+    one_step: NotRequired[OneStep | None]
+
+
 class Corrected(Uncertainty):
     """The session after a correction."""
 
@@ -1525,6 +1572,7 @@ class Corrected(Uncertainty):
     """Wealth now."""
     holding: float
     """Share of it in the risky asset."""
+    assets: NotRequired[Composed | None]
     drift: Drift
     """Whether the returns, as they stand, come as they came."""
 
@@ -1623,28 +1671,69 @@ class JobPage(TypedDict):
     """Give it as `after` for the next page; null on the last."""
 
 
-class Observation(Observed):
-    """One observed period."""
+class ObservedAssets(Composed):
+    """A period of several assets, by their names."""
 
-    reported: Report
-    """What was reported first."""
-    observed_ms: int
-    now: NotRequired[Now | None]
+    log_returns: NotRequired[dict[str, float]]
+    """Null where they are missing."""
+    advised_allocations: dict[str, float]
+    """Share of wealth in each asset that was advised."""
+    executed_allocations: dict[str, float]
+    """Share of wealth in each asset that was held."""
 
 
-class Renewal(Renewed):
-    """One renewal, as it was made."""
+class Renewed(Uncertainty):
+    """The session after a renewal."""
 
-    window: NotRequired[int | None]
-    """Returns that the law was made of, the last ones; null where those were all."""
-    renewed_ms: int
+    session: str
+    renewal: int
+    policy: str
+    period: int
+    """The coming period, the first that the policy advises."""
+    horizon: int
+    """The last period that it advises."""
+    terms: Terms
+    """Rate, cost and flows of its periods, where none other are reported."""
+    assets: NotRequired[Composed | None]
+
+
+class Session(TypedDict):
+    """A live investor."""
+
+    session: str
+    policy: str
+    """The one that advises the coming period."""
+    period: int
+    """The coming period, from 1; `horizon + 1` once completed."""
+    horizon: int
+    """The last period that the policy advises."""
+    state: SessionState
+    date: NotRequired[str | None]
+    """The last day of the last period that was reported with one."""
+    wealth: float
+    holding: float
+    """Share of wealth in the risky asset, before trading; of several assets in all of them."""
+    assets: NotRequired[Composed | None]
+    sample_size: int
+    corrections: int
+    """Corrections of what periods reported; the next one is this and one more."""
+    renewals: int
+    """Policies that followed the first; the next renewal is this and one more."""
+    renew: NotRequired[Renewing | None]
+    rolling: bool
+    """Whether the first step of the policy advises every period."""
+    renewal: NotRequired[RenewalDue | None]
+    drift: Drift
+    """Whether the returns still come as they came."""
+    created_ms: int
 
 
 class Specification(TypedDict):
-    """A whole training job: the problem, the design that samples its states, the surrogates, one seed."""
+    """A whole training job."""
 
     problem: ProblemSpecification
-    """What the investor is and may do."""
+    """What the investor is and may do; of several assets, with their fund in the place of one."""
+    fund: NotRequired[FundSpecification | None]
     design: NotRequired[DesignSpecification]
     """Where the surrogates are trained."""
     surrogate: NotRequired[SurrogateSpecification]
@@ -1680,6 +1769,10 @@ class StrategyReport(TypedDict):
     """Share of steps advised by solving the step anew."""
 
 
+TrainQuestion: TypeAlias = Specification | TrainAssets
+"""A training of a policy for one asset, or for several, which `problem.assets` names."""
+
+
 class WhatIfPoint(Advice):
     """The advice under one hypothesis."""
 
@@ -1706,6 +1799,40 @@ class AcceptedJob(Job):
 
 AdviseAnswer: TypeAlias = Advised | AssetsAdvised
 """The answer to a question about one asset or several."""
+
+
+class AssetsAction(Composed):
+    """The robust allocation of several assets for the coming period."""
+
+    session: str
+    period: int
+    allocation: dict[str, float]
+    """Share of wealth to hold in each asset; the rest is in the bank."""
+    total: float
+    """Share of wealth in all assets together."""
+    trade: dict[str, float]
+    """The allocation less the holdings: shares of wealth to buy, or where they are negative to sell."""
+    band: list[float]
+    """The totals that are best kept as they are; where trading costs nothing both ends are the total."""
+    contribution: float
+    """Money added at the end of the period, withdrawn where it is negative."""
+    certainty_equivalent: float
+    """Certainty equivalent, in terminal wealth, of going on with this composition: the promise that a later one never breaks."""
+    floor: float
+    """Terminal wealth of selling everything now and staying in the bank."""
+    radius: float
+    """Radius of the ball around the law of the fund, in log-return."""
+    sample_size: int
+    """Dates seen, those of the history among them."""
+    surrogate_sd: float
+    """Predicted standard deviation of the log certainty equivalent."""
+    in_design: bool
+    """Whether the state of the fund lies where the surrogates were trained."""
+    source: AdviceSource
+    """How the total was found."""
+    worst_case: NotRequired[WorstCase | None]
+    caution: list[Caution]
+    """What to know before the advice is followed."""
 
 
 class EvaluationReport(TypedDict):
@@ -1755,27 +1882,33 @@ class FrontierReport(TypedDict):
     """What the figures say, and what they cannot."""
 
 
-class History(TypedDict):
-    """Where a session started, and everything recorded of it."""
-
-    session: str
-    policy: str
-    """The first policy."""
-    terms: Terms
-    """Rate, cost and flows of its periods, where none other are reported."""
-    initial_wealth: float
-    initial_holding: float
-    """Share of it in the risky asset."""
-    history: list[float]
-    """Log-returns known at the start."""
-    observations: list[Observation]
-    corrections: list[Correction]
-    renewals: list[Renewal]
-    """The policies that followed the first."""
-
-
 JobReport: TypeAlias = EvaluationReport | BacktestReport | FrontierReport
 """The report of a job: of an evaluation, of a walk-forward or of a frontier."""
+
+
+class Observed(Uncertainty):
+    """The session after an observation."""
+
+    session: str
+    period: int
+    log_return: NotRequired[float | None]
+    """Null where it is missing."""
+    band: list[float]
+    """
+    The holdings that were best kept at the start of the period; where trading costs nothing both ends are the advised
+    allocation.
+    """
+    advised_allocation: float
+    executed_allocation: float
+    wealth: float
+    """Wealth at the end of the period, with what was added to it."""
+    holding: float
+    """Share of it in the risky asset, as the return left it."""
+    assets: NotRequired[ObservedAssets | None]
+    completed: bool
+    """Whether the horizon is reached."""
+    drift: Drift
+    """Whether the returns still come as they came."""
 
 
 class PolicyDetail(TypedDict):
@@ -1790,6 +1923,14 @@ class PolicyDetail(TypedDict):
     warnings: list[Warning]
     """What in the specification may be a mistake."""
     diagnostics: list[StepDiagnostics]
+
+
+class Renewal(Renewed):
+    """One renewal, as it was made."""
+
+    window: NotRequired[int | None]
+    """Returns that the law was made of, the last ones; null where those were all."""
+    renewed_ms: int
 
 
 class WhatIfAnswer1(WhatIfPoint):
@@ -1807,3 +1948,38 @@ class WhatIfAnswer2(TypedDict):
 
 WhatIfAnswer: TypeAlias = WhatIfAnswer1 | WhatIfAnswer2
 """One point, or the points of a sweep in its order."""
+
+
+ActionAnswer: TypeAlias = Action | AssetsAction
+"""The robust allocation for the coming period."""
+
+
+class Observation(Observed):
+    """One observed period."""
+
+    reported: Report
+    """What was reported first."""
+    observed_ms: int
+    now: NotRequired[Now | None]
+
+
+class History(TypedDict):
+    """Where a session started, and everything recorded of it."""
+
+    session: str
+    policy: str
+    """The first policy."""
+    terms: Terms
+    """Rate, cost and flows of its periods, where none other are reported."""
+    initial_wealth: float
+    initial_holding: float
+    """Share of it in the risky asset."""
+    assets: NotRequired[list[str] | None]
+    """Names of the assets, where there are several."""
+    composed: NotRequired[Composed | None]
+    history: KnownReturns
+    """Log-returns known at the start."""
+    observations: list[Observation]
+    corrections: list[Correction]
+    renewals: list[Renewal]
+    """The policies that followed the first."""

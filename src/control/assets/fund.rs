@@ -1,0 +1,193 @@
+//! A fund of several assets that one policy is lived by: its composition is chosen first, then the policy says what of wealth is
+//! in it.
+//!
+//! The composition theta is proposed by its rule from the returns seen. The log-return of the fund, `zeta = ln sum_i theta_i
+//! e^(z_i)`, is what the policy knows of the assets: the state's law is that of the zetas of all dates, its radius holds for all
+//! funds at once, and the advice is the policy's share times theta. A proposal takes the place of the composition held only where
+//! the policy values it as much (see [`guarded`]): then the policy's certainty equivalent at the fund held is a promise, whatever
+//! proposes. Checked by: `tests/funds.rs::the_promise_at_the_fund_held_is_kept_and_broken_without_the_guard`.
+//!
+//! Where trading costs, a proposal must also pay for the way there, by a rule that is no optimum: what the policy gains by it, an
+//! equal part of that each period left, must be more than what the trade costs beyond that of staying.
+
+use super::advice::{OneStep, named, worst_means};
+use super::advising::radius_factor;
+use super::composition::guarded;
+use super::{AssetsLaw, AssetsSolution, AssetsStep};
+use crate::control::error::FieldError;
+use crate::control::policy::advisor::Advisor;
+use crate::control::problem::actions::ActionInterval;
+use crate::control::problem::state::State;
+use crate::control::problem::utility::RelativeUtility;
+use crate::control::request::assets::AssetsProblem;
+use crate::control::request::fund::FundSpecification;
+use crate::control::request::radius_rule::RadiusRule;
+use crate::control::request::rules::LOG_RETURN;
+use crate::control::request::specification::{
+    DesignSpecification, InitialLaws, Interval, ProblemSpecification, Specification, SurrogateSpecification,
+};
+use crate::numerics::fund_bridges::fund_returns;
+use crate::numerics::levelling::inverse_volatility;
+
+/// Several assets as a session knows them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fund {
+    /// Log-returns that the law is of, date by date.
+    pub rows: Vec<Vec<f64>>,
+    /// Share of each asset in the fund; they sum to 1.
+    pub composition: Vec<f64>,
+    /// Share of wealth in each asset, before trading.
+    pub holdings: Vec<f64>,
+    /// What the composition was last proposed by, where that was a one-step problem.
+    pub solution: Option<AssetsSolution>,
+}
+
+impl AssetsProblem {
+    /// The training of a policy for a fund of these assets.
+    ///
+    /// # Errors
+    /// A field breaks a rule.
+    pub fn training(
+        &self,
+        design: DesignSpecification,
+        surrogate: SurrogateSpecification,
+        seed: u64,
+    ) -> Result<Specification, FieldError> {
+        self.check()?;
+        let plain = Specification { design, surrogate, ..Specification::of(self.of_fund(), seed) }.completed()?;
+        let radius_factor = radius_factor(self, &plain.problem, seed);
+        let support = self.support.map(|support| Interval { min: support.min, max: LOG_RETURN });
+        let radius = Some(scaled(plain.problem.radius_rule(), radius_factor));
+        let fund = FundSpecification {
+            assets: self.assets.clone(),
+            ground_norm: self.ground_norm,
+            composition: self.composition.clone(),
+            support: self.support,
+            radius_factor,
+            history: self.history.clone(),
+        };
+        let design = DesignSpecification { initial_laws: InitialLaws::Resampled, ..plain.design };
+        let problem = ProblemSpecification { radius, support, ..plain.problem };
+        Specification { problem, design, fund: Some(Box::new(fund)), ..plain }.completed()
+    }
+
+    /// What a policy was trained for, had `history` been seen; `None` where that is one asset.
+    pub fn of(specification: &Specification, history: Vec<Vec<f64>>) -> Option<Self> {
+        let Specification { problem, fund, .. } = specification;
+        let fund = fund.as_deref()?;
+        Some(AssetsProblem {
+            assets: fund.assets.clone(),
+            ground_norm: fund.ground_norm,
+            composition: fund.composition.clone(),
+            horizon: Some(problem.horizon),
+            rate_per_step: problem.rate_per_step,
+            periods_per_year: problem.periods_per_year,
+            initial_wealth: problem.initial_wealth,
+            action_interval: problem.action_interval,
+            trading_cost: problem.trading_cost,
+            contributions: problem.contributions.clone(),
+            utility: problem.utility,
+            radius: Some(scaled(problem.radius_rule(), fund.radius_factor.recip())),
+            support: fund.support,
+            history,
+        })
+    }
+}
+
+/// The rule of a radius so many times as large, of those that have a joint factor.
+fn scaled(rule: RadiusRule, factor: f64) -> RadiusRule {
+    match rule {
+        RadiusRule::Bridge { alpha, paths, scale } => RadiusRule::Bridge { alpha, paths, scale: scale * factor },
+        RadiusRule::Calibrated { alpha, paths, scale } => {
+            RadiusRule::Calibrated { alpha, paths, scale: scale * factor }
+        }
+        rule => rule,
+    }
+}
+
+impl Fund {
+    /// Who has seen `rows` and holds these shares of wealth, before a composition is chosen.
+    pub fn at(rows: Vec<Vec<f64>>, holdings: Vec<f64>) -> Self {
+        let composition = inverse_volatility(&rows);
+        Fund { rows, composition, holdings, solution: None }
+    }
+
+    /// Log-returns of the fund, date by date.
+    pub fn returns(&self) -> Vec<f64> {
+        fund_returns(&self.rows, &self.composition)
+    }
+
+    /// Log-return of what is held where the shares of wealth are `executed`, in a period of these log-returns.
+    pub fn log_return(&self, executed: &[f64], log_returns: &[f64]) -> f64 {
+        let total: f64 = executed.iter().sum();
+        let of = |shares: &[f64], whole: f64| {
+            shares.iter().zip(log_returns).map(|(share, z)| share / whole * z.exp()).sum::<f64>().ln()
+        };
+        if total > 0.0 { of(executed, total) } else { of(&self.composition, 1.0) }
+    }
+
+    /// Share of wealth that is traded on the way to `executed`.
+    pub fn traded(&self, executed: &[f64]) -> f64 {
+        self.holdings.iter().zip(executed).map(|(held, share)| f64::abs(share - held)).sum()
+    }
+
+    /// After a period through which `executed` was held, and which left the share `holding` in all assets.
+    pub fn passed(&mut self, executed: &[f64], log_returns: Option<&[f64]>, holding: f64) {
+        let grown = |(asset, share): (usize, &f64)| share * log_returns.map_or(1.0, |all| all[asset].exp());
+        let grown: Vec<f64> = executed.iter().enumerate().map(grown).collect();
+        let whole: f64 = grown.iter().sum();
+        self.holdings = grown.iter().map(|share| if whole > 0.0 { share / whole * holding } else { 0.0 }).collect();
+        self.rows.extend(log_returns.map(<[f64]>::to_vec));
+    }
+
+    /// The state of a fund of other shares.
+    fn state(&self, advisor: &Advisor, state: &State, composition: &[f64]) -> State {
+        let returns = fund_returns(&self.rows, composition);
+        let law = advisor.specification().problem.learning.law(&returns);
+        State { wealth: state.wealth, holding: state.holding, law }
+    }
+
+    /// Chooses the composition before the period after `step`, below the horizon, and gives the state of its fund. Cost: a
+    /// one-step problem where the rule has one, some policy values, and a law of n returns each.
+    pub fn compose(&mut self, advisor: &Advisor, fund: &FundSpecification, step: usize, state: &State) -> State {
+        let problem = &advisor.specification().problem;
+        let mut solution = None;
+        let proposed = fund.composition.composition(&self.rows, || {
+            let even = self.state(advisor, state, &inverse_volatility(&self.rows));
+            let law = AssetsLaw {
+                returns: &self.rows,
+                radius: advisor.radius(&even),
+                floor: fund.support.map_or(f64::NEG_INFINITY, |support| support.min),
+            };
+            let utility = RelativeUtility::new(problem.utility, state.wealth * (1.0 + problem.rate_per_step));
+            let [lowest, highest] = problem.action_interval;
+            let total = ActionInterval { lowest, highest };
+            let step = AssetsStep::new(law, fund.ground_norm.at(&self.rows), utility, problem.rate_per_step, total);
+            solution.insert(step.solve(self.solution.as_ref())).clone()
+        });
+        self.solution = solution;
+        let left = (problem.horizon - step) as f64;
+        let value = |composition: &[f64]| {
+            let state = self.state(advisor, state, composition);
+            let (total, gain) = advisor.surrogate(step, &state);
+            if problem.trading_cost <= 0.0 {
+                return gain;
+            }
+            let executed: Vec<f64> = composition.iter().map(|share| total * share).collect();
+            gain / left - problem.trading_cost * self.traded(&executed)
+        };
+        self.composition = guarded(self.composition.clone(), proposed, value);
+        self.state(advisor, state, &self.composition)
+    }
+
+    /// The one-step problem behind the composition, in wealth, by the names of the assets.
+    pub fn one_step(&self, names: &[String], floor: f64) -> Option<OneStep> {
+        let solution = self.solution.as_ref()?;
+        Some(OneStep {
+            allocation: named(names, &solution.allocation),
+            certainty_equivalent: floor * solution.value.exp(),
+            bound: floor * solution.bound.exp(),
+            worst_means: worst_means(names, &self.rows, solution),
+        })
+    }
+}

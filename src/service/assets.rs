@@ -1,0 +1,172 @@
+//! Several assets in a session: what is reported by their names, where they stand, and how that is told.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::report::{Report, by_name};
+use crate::control::assets::advice::{OneStep, named};
+use crate::control::assets::fund::Fund;
+use crate::control::error::FieldError;
+use crate::control::policy::advisor::Advisor;
+use crate::control::problem::state::State;
+use crate::control::request::rules;
+use crate::numerics::empirical::EmpiricalDistribution;
+
+/// What shares of wealth may sum to, beside rounding.
+const WHOLE: f64 = 1.0 + 1e-9;
+
+/// The assets of a session between two periods.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assets {
+    /// In the order of the columns.
+    pub names: Arc<[String]>,
+    pub fund: Fund,
+    /// The one-step problem behind the composition, as it was told.
+    pub one_step: Option<OneStep>,
+    /// The prices reported for the last period, if they were.
+    pub prices: Option<Vec<f64>>,
+}
+
+/// Several assets before the coming period, by their names.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Composed {
+    /// Share of each asset in what is advised to be held; they sum to 1.
+    pub composition: BTreeMap<String, f64>,
+    /// Share of wealth in each asset, before trading.
+    pub holdings: BTreeMap<String, f64>,
+    /// What is best for who looks one period ahead, where the composition is proposed by that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub one_step: Option<OneStep>,
+}
+
+/// The assets of a session when it is opened.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlannedAssets {
+    pub(super) names: Vec<String>,
+    pub(super) composed: Composed,
+}
+
+/// A period of several assets, by their names.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ObservedAssets {
+    /// Null where they are missing.
+    pub log_returns: Option<BTreeMap<String, f64>>,
+    /// Share of wealth in each asset that was advised.
+    pub advised_allocations: BTreeMap<String, f64>,
+    /// Share of wealth in each asset that was held.
+    pub executed_allocations: BTreeMap<String, f64>,
+    /// Before the coming period.
+    #[serde(flatten)]
+    pub composed: Composed,
+}
+
+impl Assets {
+    /// Who has seen `rows` and holds these shares of wealth, none unless given.
+    ///
+    /// # Errors
+    /// Holdings that are no shares of wealth in the assets.
+    pub(super) fn at(
+        names: &[String],
+        rows: Vec<Vec<f64>>,
+        holdings: Option<&BTreeMap<String, f64>>,
+    ) -> Result<Self, FieldError> {
+        let holdings = match holdings {
+            Some(holdings) => shares("holdings", holdings, names)?,
+            None => vec![0.0; names.len()],
+        };
+        Ok(Assets { names: names.into(), fund: Fund::at(rows, holdings), one_step: None, prices: None })
+    }
+
+    /// As it was told before the coming period.
+    ///
+    /// # Errors
+    /// What was told is of other assets.
+    pub(super) fn told(names: &[String], rows: Vec<Vec<f64>>, told: &Composed) -> Result<Self, FieldError> {
+        let mut assets = Assets::at(names, rows, Some(&told.holdings))?;
+        assets.take(told)?;
+        Ok(assets)
+    }
+
+    /// Takes the composition that was told.
+    ///
+    /// # Errors
+    /// It is of other assets.
+    pub(super) fn take(&mut self, told: &Composed) -> Result<(), FieldError> {
+        self.fund.composition = by_name("composition", &told.composition, &self.names)?;
+        self.one_step = told.one_step.clone();
+        Ok(())
+    }
+
+    /// As it is kept at the start of a session.
+    pub(super) fn planned(&self) -> PlannedAssets {
+        PlannedAssets { names: self.names.to_vec(), composed: self.composed() }
+    }
+
+    /// As it is told.
+    pub fn composed(&self) -> Composed {
+        Composed {
+            composition: named(&self.names, &self.fund.composition),
+            holdings: named(&self.names, &self.fund.holdings),
+            one_step: self.one_step.clone(),
+        }
+    }
+
+    /// Chooses the composition before the period after `step`, and gives the state of its fund. Cost: that of [`Fund::compose`].
+    pub(super) fn compose(&mut self, advisor: &Advisor, step: usize, state: &State) -> State {
+        let Some(of) = advisor.specification().fund.as_deref() else { return state.clone() };
+        let composed = self.fund.compose(advisor, of, step, state);
+        let bank = 1.0 + advisor.specification().problem.rate_per_step;
+        self.one_step = self.fund.one_step(&self.names, state.wealth * bank);
+        composed
+    }
+
+    /// Shares of wealth in the assets where so much is in all of them.
+    pub fn shares(&self, total: f64) -> Vec<f64> {
+        self.fund.composition.iter().map(|share| total * share).collect()
+    }
+
+    /// The shares of wealth that were held in a period, for which `advised` was advised of all.
+    ///
+    /// # Errors
+    /// What is reported is no share of wealth, or not of these assets.
+    pub(super) fn executed(&self, report: &Report, advised: f64) -> Result<Vec<f64>, FieldError> {
+        match &report.executed_allocations {
+            Some(executed) => shares("executed_allocations", executed, &self.names),
+            None => Ok(self.shares(advised)),
+        }
+    }
+
+    /// Log-returns of all assets, `None` where they are missing.
+    ///
+    /// # Errors
+    /// They are not given in exactly one way, or not of these assets, or one breaks a rule.
+    pub(super) fn log_returns(&self, report: &Report) -> Result<Option<Vec<f64>>, FieldError> {
+        report.log_returns(&self.names, self.prices.as_deref())
+    }
+
+    /// The mean log-return of each date, which no composition changes.
+    pub(super) fn means(rows: &[Vec<f64>]) -> EmpiricalDistribution {
+        EmpiricalDistribution::new(&rows.iter().map(|row| mean(row)).collect::<Vec<f64>>())
+    }
+}
+
+/// Of the log-returns of a date.
+pub(super) fn mean(row: &[f64]) -> f64 {
+    row.iter().sum::<f64>() / row.len().max(1) as f64
+}
+
+/// Shares of wealth in the assets.
+fn shares(field: &str, values: &BTreeMap<String, f64>, names: &[String]) -> Result<Vec<f64>, FieldError> {
+    let shares = by_name(field, values, names)?;
+    for (name, share) in names.iter().zip(&shares) {
+        rules::share(&format!("{field}.{name}"), *share)?;
+    }
+    let whole: f64 = shares.iter().sum();
+    if whole > WHOLE {
+        return Err(FieldError::new(field, format!("shares summing to {whole}"), "must sum to 1 at most"));
+    }
+    Ok(shares)
+}
