@@ -83,7 +83,12 @@ def test_a_session_of_several_assets(ballast: Ballast) -> None:
     training = ballast.train_assets(
         record, kind="log", rate_per_step=0.0, horizon=2, radius={"rule": "fixed", "radius": 1e-4}, design={"count": 20}
     )
-    session = training.policy().session(wealth=100.0)
+    policy = training.policy()
+    moved = policy.session(history=record[["bonds", "stocks"]], holdings={"stocks": 0.5, "bonds": 0.0})
+    assert moved.history()["history"] == record.values.tolist() and moved.assets_action()["holdings"]["stocks"] == 0.5
+    with pytest.raises(ValueError, match="must have those of the policy"):
+        policy.session(history=record.rename(columns={"bonds": "gold"}))
+    session = policy.session(wealth=100.0)
     advised = frames.allocation(session.assets_action())
     assert set(advised.index) == {"stocks", "bonds"} and 0.0 < advised.sum() <= 1.0
     held = advised * 0.5
@@ -282,7 +287,7 @@ def for_clients(item: dict[str, dict[str, list[str]]]) -> bool:
 def test_every_field_of_a_specification_is_an_argument() -> None:
     arguments = set(inspect.signature(Ballast.train).parameters) - {"self", "returns", "kind", "idempotency_key"}
     problem, whole = wire.ProblemSpecification.__annotations__, wire.Specification.__annotations__
-    assert arguments == (set(problem) - {"history"}) | (set(whole) - {"problem"})
+    assert arguments == (set(problem) - {"history"}) | (set(whole) - {"problem", "fund"})
 
 
 def test_a_training_opens_sessions_as_its_policy_does() -> None:

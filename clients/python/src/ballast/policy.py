@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from typing import cast
 from urllib.parse import quote
 
 from . import wire
 from .driving import Answering, awaiting_into, blocking, blocking_into
 from .errors import DamagedPolicy
-from .returns import Kind, Returns, log_returns
+from .returns import Kind, Returns, log_returns, log_returns_of_assets
 from .session import AsyncSession, Session
 from .transport import Transport, idempotent
 
@@ -41,6 +42,7 @@ class _Policy:
         kind: Kind = "log",
         wealth: float | None = None,
         holding: float | None = None,
+        holdings: Mapping[str, float] | None = None,
         renew: wire.Renewing | None = None,
         rolling: bool = False,
         idempotency_key: str | None = None,
@@ -48,7 +50,8 @@ class _Policy:
         """Opens a session of an investor.
 
         ``history`` is what the investor has seen, ``wealth`` what he has; by default both are the policy's own.
-        ``holding`` is the share of it in the risky asset, by default none. With ``rolling`` the first step of the
+        ``holding`` is the share of it in the risky asset, by default none; of several assets ``holdings`` says it of
+        each by its name, and ``history`` is a DataFrame with a column for each. With ``rolling`` the first step of the
         policy, whose learning must be decay, advises up to 5200 periods. The same ``idempotency_key`` and arguments
         again, even from another process, give the same session, at its first period; ``Session.refresh`` tells how far
         it is.
@@ -60,10 +63,22 @@ class _Policy:
             "renew": renew,
             "rolling": rolling,
         }
+        if holdings is not None:
+            request["holdings"] = dict(holdings)
         if history is not None:
-            request["history"] = log_returns(history, kind, "history")
+            request["history"] = await self._known(history, kind)
         headers = idempotent(idempotency_key)
         return cast(wire.Session, await self._transport.json("POST", "/sessions", body=request, headers=headers))
+
+    async def _known(self, history: Returns, kind: Kind) -> list[float] | list[list[float]]:
+        """Returns known at the start; of a DataFrame of several assets the columns in the order of the policy."""
+        if len(getattr(history, "columns", ())) < 2:
+            return log_returns(history, kind, "history")
+        fund = (await self._detail())["specification"].get("fund")
+        names = [] if fund is None else fund["assets"]
+        if sorted(names) != sorted(str(name) for name in history.columns):
+            raise ValueError(f"history has the columns {list(history.columns)}: must have those of the policy, {names}")
+        return log_returns_of_assets(history[names], kind)[1]
 
     async def _delete(self) -> None:
         """Deletes it. Raises :class:`InUse` while sessions live by it, and :class:`NotFound` where there is none."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TextIO, cast
 from urllib.parse import quote
@@ -127,6 +127,7 @@ class _Training(_Job):
         kind: Kind = "log",
         wealth: float | None = None,
         holding: float | None = None,
+        holdings: Mapping[str, float] | None = None,
         renew: wire.Renewing | None = None,
         rolling: bool = False,
         idempotency_key: str | None = None,
@@ -139,6 +140,7 @@ class _Training(_Job):
             kind=kind,
             wealth=wealth,
             holding=holding,
+            holdings=holdings,
             renew=renew,
             rolling=rolling,
             idempotency_key=idempotency_key,
