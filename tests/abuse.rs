@@ -122,7 +122,7 @@ async fn heads_and_depths_are_bounded() {
     assert_eq!(many.send().await.unwrap().status(), StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE);
     let long = app.client.get(format!("{}/readyz", app.url)).header("x-long", "1".repeat(100_000));
     assert_eq!(long.send().await.unwrap().status(), StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE);
-    for path in ["train", "evaluate", "backtest", "sessions", "observe", "what-if", "policies/import"] {
+    for path in ["train", "evaluate", "backtest", "sessions", "observe", "what-if", "returns", "policies/import"] {
         for deep in [format!("{}{}", "[".repeat(200_000), "]".repeat(200_000)), r#"{"a":"#.repeat(100_000)] {
             let request = app.client.post(format!("{}/{path}", app.url)).header("content-type", "application/json");
             let (status, problem) = read(request.body(deep).send().await.unwrap()).await;

@@ -169,6 +169,7 @@ fn file(folder: &Path, name: &str, text: &str) -> Result<(), BacktestError> {
 
 #[cfg(test)]
 mod tests {
+    use ballast::returns::Choices;
     use clap::Parser;
 
     use super::*;
@@ -191,13 +192,13 @@ mod tests {
     fn months(count: usize) -> Returns {
         let month = |index| format!("{:04}-{:02},{}\n", 2000 + index / 12, index % 12 + 1, risky_return(index));
         let text: String = (0..count).map(month).collect();
-        Returns::parse(&format!("date,return\n{text}"), Some(0.002), None).unwrap()
+        Returns::parse(&format!("date,return\n{text}"), &Choices::default(), Some(0.002), None).unwrap()
     }
 
     fn quarters(count: usize) -> Returns {
         let quarter = |index| format!("{:04}-{:02},{}\n", 2000 + index / 4, 3 * (index % 4) + 3, risky_return(index));
         let text: String = (0..count).map(quarter).collect();
-        Returns::parse(&format!("date,return\n{text}"), Some(0.006), None).unwrap()
+        Returns::parse(&format!("date,return\n{text}"), &Choices::default(), Some(0.006), None).unwrap()
     }
 
     #[test]

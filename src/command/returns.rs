@@ -1,8 +1,7 @@
 //! Returns of a risky asset and of the bank: those bundled, of the US stock market and Treasury bills, or a file's.
 //!
-//! A file has one period a row, oldest first, and columns that are found by their names ([`columns`]). How far apart its
-//! dates are says what a period is ([`Frequency`]). What breaks a rule is refused with its line, column and value: a file
-//! that is misread would give advice all the same.
+//! A file is read by the one reader of returns ([`ballast::returns`]); what it asks is answered by options. How far apart its
+//! dates are says what a period is ([`Frequency`]).
 
 use std::path::PathBuf;
 
@@ -10,23 +9,16 @@ use ballast::control::evaluation::account::Annual;
 use ballast::control::evaluation::rolling::Period;
 use ballast::control::request::dates;
 pub use ballast::control::request::frequency::Frequency;
+use ballast::returns::{Choices, Holds, Kind, Reading, Record, Series, Unit, decoded, read};
 use clap::Args;
-use csv::StringRecord;
-use jiff::civil::Date;
 
-use cell::Cell;
-use columns::{Columns, Kind, Line};
 pub use error::ReturnsError;
 
-mod cell;
-mod columns;
 mod error;
 #[cfg(test)]
 mod tests;
 
 const CSV: &str = include_str!("../../data/us_market_monthly.csv");
-/// A column of fractions that varies more than this in a period holds something else: per cent, or prices.
-const LARGEST_DEVIATION: f64 = 0.5;
 /// Of periods in a year: a day at the shortest.
 const PERIODS_PER_YEAR: std::ops::RangeInclusive<usize> = 1..=366;
 /// Of what the bank pays a period; as `problem.rate_per_step`.
@@ -35,7 +27,7 @@ const RATE: std::ops::RangeInclusive<f64> = -0.5..=0.5;
 /// Where the returns of a command come from.
 #[derive(Debug, Clone, Args)]
 pub struct ReturnsFile {
-    /// CSV file: a column of dates, and one of returns (fractions) or prices; oldest row first
+    /// File of dates beside returns or prices: CSV, or what a spreadsheet or a person writes
     file: PathBuf,
     /// What the bank pays a period, as a fraction; in place of a column such as risk_free_return
     #[arg(long)]
@@ -43,93 +35,112 @@ pub struct ReturnsFile {
     /// Periods that make a year; the dates say so unless given
     #[arg(long)]
     periods_per_year: Option<usize>,
+    #[command(flatten)]
+    choices: Choices,
 }
 
-/// One period: simple returns, as fractions.
+/// One period: returns as fractions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// Of the end of the period, in ISO 8601, as fine as the frequency: `2008-01` of a month.
     pub date: String,
     /// The same in years.
     pub time: f64,
+    pub log_return: f64,
     pub risky_return: f64,
     pub risk_free_return: f64,
 }
 
-/// Periods in the order of time, without a gap.
+/// Periods in the order of time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Returns {
     rows: Vec<Row>,
     pub frequency: Frequency,
     pub periods_per_year: usize,
-    /// What the returns were read from.
-    source: String,
+    /// What the column of the risky asset holds, and its name.
+    what: &'static str,
+    column: String,
     /// Where it is said what the bank pays.
     bank: String,
+    /// What was changed or passed over, in sentences.
+    remarks: Vec<String>,
 }
 
 impl Row {
     pub fn period(&self) -> Period {
-        Period { log_return: self.risky_return.ln_1p(), bank_return: self.risk_free_return }
+        Period { log_return: self.log_return, bank_return: self.risk_free_return }
     }
 }
 
 impl ReturnsFile {
     /// # Errors
-    /// The file cannot be read, or a line of it or an option breaks a rule.
+    /// The file cannot be read, a place in it or an option breaks a rule, or an option must say what the file does not.
     pub fn read(&self) -> Result<Returns, ReturnsError> {
-        let read = std::fs::read_to_string(&self.file);
-        let text = read.map_err(|source| ReturnsError::Read { path: self.file.clone(), source })?;
-        Returns::parse(&text, self.rate, self.periods_per_year)
+        let read = std::fs::read(&self.file);
+        let bytes = read.map_err(|source| ReturnsError::Read { path: self.file.clone(), source })?;
+        let text = decoded(&bytes).map_err(|said| ReturnsError::Refused { said })?;
+        Returns::parse(&text, &self.choices, self.rate, self.periods_per_year)
     }
 }
 
 impl Returns {
     /// The file embedded in the binary.
     pub fn bundled() -> Result<Self, ReturnsError> {
-        Self::parse(CSV, None, None)
+        Self::parse(CSV, &Choices::default(), None, None)
     }
 
-    /// Of the text of a file; `rate` and `periods_per_year` take the place of what it says.
+    /// Of the text of a file, with what is said of it; `rate` and `periods_per_year` take the place of what it says.
     ///
     /// # Errors
-    /// A line or an option breaks a rule.
-    pub fn parse(text: &str, rate: Option<f64>, periods_per_year: Option<usize>) -> Result<Self, ReturnsError> {
+    /// A place or an option breaks a rule, or an option must say what the text does not.
+    pub fn parse(
+        text: &str,
+        choices: &Choices,
+        rate: Option<f64>,
+        periods_per_year: Option<usize>,
+    ) -> Result<Self, ReturnsError> {
         check(rate, periods_per_year)?;
-        let mut reader = columns::reader(text.trim_start_matches('\u{feff}'));
-        let columns = Columns::of(reader.headers()?)?;
-        let bank = match (rate, &columns.bank) {
-            (Some(_), _) => "--rate".to_owned(),
-            (None, Some((_, name))) => format!("the last row of column {name}"),
-            (None, None) => return Err(ReturnsError::NoBank),
-        };
-        let records: Vec<StringRecord> = reader.records().collect::<Result<_, _>>()?;
-        let lines: Vec<Line> = records.iter().map(|record| columns.line(record)).collect::<Result<_, _>>()?;
-        let date = |line: &Line| dates::date(line.date.text).ok_or_else(|| line.date.refused(dates::FORM));
-        let dates: Vec<Date> = lines.iter().map(date).collect::<Result<_, _>>()?;
-        let risky_returns = columns.kind.returns(&lines)?;
-        if risky_returns.len() < 2 {
-            return Err(ReturnsError::Few { found: risky_returns.len() });
+        let reading = read(text, choices);
+        if let Reading::Read(Record { columns, .. }) | Reading::Asked { columns, .. } = &reading
+            && rate.is_none()
+            && !columns.is_empty()
+            && columns.iter().all(|column| column.holds != Holds::Rate)
+        {
+            return Err(ReturnsError::NoBank { remarks: String::new() });
         }
-        let written: Vec<&str> = lines.iter().map(|line| line.date.text).collect();
-        let frequency = Frequency::of(&dates, &written).map_err(|found| lines[found.index].date.refused(found.rule))?;
-        // The first price has no return.
-        let first = lines.len() - risky_returns.len();
-        let rows = dates[first..].iter().zip(&lines[first..]).zip(risky_returns);
-        let row = |((date, line), risky_return): ((&Date, &Line), f64)| {
-            let said = || line.bank.map_or(Ok(0.0), Cell::rate);
-            let risk_free_return = rate.map_or_else(said, Ok)?;
-            Ok(Row { date: frequency.shown(*date), time: frequency.time(*date), risky_return, risk_free_return })
-        };
-        let rows = rows.map(row).collect::<Result<Vec<Row>, ReturnsError>>()?;
-        let periods_per_year = periods_per_year.unwrap_or_else(|| frequency.periods_per_year(&dates));
-        let source = format!("{} column {}", columns.kind.source(), columns.name);
-        let returns = Returns { rows, frequency, periods_per_year, source, bank };
-        let deviation = returns.annual().volatility / (periods_per_year as f64).sqrt();
-        if columns.kind == Kind::Return && deviation > LARGEST_DEVIATION {
-            return Err(ReturnsError::Deviation { column: columns.name, deviation });
+        match reading {
+            Reading::Read(record) => Self::of(record, rate, periods_per_year),
+            Reading::Asked { questions, .. } => Err(ReturnsError::asked(&questions)),
+            Reading::Refused { sentence, .. } => Err(ReturnsError::Refused { said: sentence }),
         }
-        Ok(returns)
+    }
+
+    fn of(record: Record, rate: Option<f64>, periods_per_year: Option<usize>) -> Result<Self, ReturnsError> {
+        let Record { series, dates: days, frequency, rate: column, remarks, .. } = record;
+        let (Some(frequency), Some(days), Some(periods)) = (frequency, days, record.periods_per_year) else {
+            return Err(ReturnsError::NoFrequency);
+        };
+        let [series] = &series[..] else { return Err(ReturnsError::Several { found: series.len() }) };
+        let bank = match (rate, column) {
+            (Some(rate), _) => ("--rate".to_owned(), vec![rate; days.len()]),
+            (None, Some(column)) => (format!("the last row of column {}", column.column), column.rates),
+            (None, None) => return Err(ReturnsError::NoBank { remarks: format!("\n{}", remarks.join(" ")) }),
+        };
+        let rows = days.into_iter().zip(&series.log_returns).zip(&series.simple_returns).zip(bank.1);
+        let row = |(((date, log_return), risky_return), risk_free_return): (((String, &f64), &f64), f64)| Row {
+            time: dates::date(&date).map_or(0.0, |date| frequency.time(date)),
+            date,
+            log_return: *log_return,
+            risky_return: *risky_return,
+            risk_free_return,
+        };
+        let what = match series {
+            Series { kind: Kind::Simple, unit: Some(Unit::Fraction), .. } => "returns",
+            series => series.what(),
+        };
+        let (rows, periods_per_year) = (rows.map(row).collect(), periods_per_year.unwrap_or(periods));
+        let column = series.column.clone();
+        Ok(Returns { rows, frequency, periods_per_year, what, column, bank: bank.0, remarks })
     }
 
     pub fn rows(&self) -> &[Row] {
@@ -182,14 +193,16 @@ impl Returns {
         let Annual { mean, volatility, .. } = self.annual();
         let date = |row: Option<&Row>| row.map_or(String::new(), |row| row.date.clone());
         let noun = self.frequency.noun();
+        let remarks: String = self.remarks.iter().map(|remark| format!(" {remark}")).collect();
         format!(
-            "{} {} returns, {} to {}, {}.\nA year of {} {noun}{} has a mean of {:.1} % and a deviation of {:.1} %. \
-             The bank pays {:.3} % a {noun}, {:.1} % a year, by {}.",
+            "{} {} {}, {} to {}, as in column {}.\nA year of {} {noun}{} has a mean of {:.1} % and a deviation of {:.1} %. \
+             The bank pays {:.3} % a {noun}, {:.1} % a year, by {}.{remarks}",
             self.rows.len(),
             self.frequency.adjective(),
+            self.what,
             date(self.rows.first()),
             date(self.rows.last()),
-            self.source,
+            self.column,
             self.periods_per_year,
             if self.periods_per_year == 1 { "" } else { "s" },
             100.0 * mean,

@@ -53,13 +53,15 @@ pub fn access(method: &str, route: Option<&str>) -> Access {
         ("POST", "/train" | "/evaluate" | "/backtest" | "/frontier" | "/jobs/{id}/cancel" | "/policies/import")
         | ("DELETE", "/jobs/{id}" | "/policies/{id}") => Access::Role(KeyRole::Train),
         (_, "/health" | "/metrics" | "/audit") => Access::Role(KeyRole::Admin),
-        ("GET" | "HEAD", _) | ("POST", "/what-if" | "/advise") => Access::Role(KeyRole::Read),
+        ("GET" | "HEAD", _) | ("POST", "/what-if" | "/advise" | "/returns") => Access::Role(KeyRole::Read),
         _ => Access::Role(KeyRole::Admin),
     }
 }
 
 /// The one body that is large by nature.
 const LARGE_BODY: &str = "/policies/import";
+/// A body that holds a text, and how many bytes: the longest that is read, every second letter of it escaped.
+const TEXT_BODY: (&str, usize) = ("/returns", 12_000_000);
 
 /// What the gate knows.
 #[derive(Clone)]
@@ -97,7 +99,11 @@ pub async fn admit(State(gate): State<Gate>, mut request: Request, next: Next) -
         return problem.into_response();
     }
     let access = access(request.method().as_str(), route);
-    let limit = if route == Some(LARGE_BODY) { gate.large_body_bytes } else { gate.body_bytes };
+    let limit = match route {
+        Some(LARGE_BODY) => gate.large_body_bytes,
+        Some(route) if route == TEXT_BODY.0 => gate.large_body_bytes.min(TEXT_BODY.1),
+        _ => gate.body_bytes,
+    };
     let call = match access {
         Access::Open => None,
         access => match admitted(&gate.service, access, request.headers()) {

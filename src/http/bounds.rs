@@ -72,6 +72,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("Advise", "wealth", wealth.clone()),
         ("Advise", "holding", within((0.0, 1.0))),
         ("AdviseAssets", "wealth", wealth.clone()),
+        ("ReadReturns", "text", json!({ "maxLength": 8_000_000 })),
         ("FrontierRequest", "scales", listed(&SCALES, within((0.0, LARGEST_SCALE)))),
         ("FrontierRequest", "resamples", whole(&RESAMPLES)),
         ("FrontierRequest", "block", json!({ "minimum": 1 })),

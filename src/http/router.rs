@@ -22,7 +22,7 @@ use super::hosts::Hosts;
 use super::problem::{Problem, ProblemKind};
 use super::{
     access, advise, audit, backtests, bounds, dashboard, defaults, described, documentation, evaluations, events,
-    frontiers, jobs, operations, policies, sessions, telemetry, what_if, wire,
+    frontiers, jobs, operations, policies, returns, sessions, telemetry, what_if, wire,
 };
 use crate::service::Service;
 use crate::service::config::Config;
@@ -72,6 +72,7 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(sessions::action))
         .routes(routes!(what_if::what_if))
         .routes(routes!(advise::advise))
+        .routes(routes!(returns::read))
 }
 
 fn operators() -> OpenApiRouter<Arc<Service>> {

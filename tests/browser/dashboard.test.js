@@ -70,7 +70,7 @@ test("a refusal is told at the field it names", async () => {
   await page.getByLabel("Returns or prices").fill("0.01 -0.02 nine");
   await field.fill("4");
   await page.getByRole("button", { name: "Train", exact: true }).click();
-  await page.locator(".error").getByText("Line 1, column 3: \u201cnine\u201d is not a number.").waitFor();
+  await page.locator(".error").getByText('Line 1: column 3 is "nine": must be a number').waitFor();
   await page.getByRole("button", { name: "Show the place" }).click();
   const selected = await page
     .getByLabel("Returns or prices")
@@ -83,7 +83,7 @@ test("a training from a file, watched to its end", async () => {
     .getByLabel("Choose a CSV file")
     .setInputFiles({ name: "returns.csv", mimeType: "text/csv", buffer: Buffer.from(FILE) });
   await page
-    .getByText("12 simple returns in percent from market return, monthly, January 2020 to December 2020, oldest first.")
+    .getByText("12 monthly simple returns in percent, January 2020 to December 2020, as in column market return.")
     .waitFor();
   assert.equal(await page.getByLabel("They are").inputValue(), "simple");
   assert.equal(await page.getByLabel("In", { exact: true }).inputValue(), "percent");

@@ -1,9 +1,12 @@
 // Returns on the page: what is pasted, dropped or typed is read as what it is, told, asked about or refused.
 
 import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
 import { browser, call, service } from "./ballast.js";
 
+const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
 let ballast, chromium, page;
 
 before(async () => {
@@ -54,29 +57,37 @@ test("pasted percent are percent", async () => {
   );
 });
 
-test("dates of digits are not prices", async () => {
-  await chosen("market.csv", "date,market\n20200101,0.01\n20200201,-0.02\n20200301,0.03\n");
-  await note()
-    .getByText("3 simple returns as fractions from market, monthly, January 2020 to March 2020, oldest first.")
-    .waitFor();
-  close(await history(), [0.01, -0.02, 0.03].map(Math.log1p));
-});
-
-test("a file that is newest first is turned round by its dates, and says so", async () => {
+test("a file that is newest first is turned round, said and drawn", async () => {
   await chosen("prices.csv", "date,close\n2020-03-31,103\n2020-02-29,101\n2020-01-31,100\n");
-  await note().getByText("given newest first and turned round by their dates").waitFor();
+  await note().getByText("The rows came newest first and are turned round.").waitFor();
   close(await history(), [Math.log(101 / 100), Math.log(103 / 101)]);
+  await page.getByText("Returns read, 2020-02 to 2020-03").waitFor();
 });
 
-test("what the numbers do not say is asked, and nothing is trained before the answer", async () => {
-  await pasted("0.2 -0.15 0.3 -0.1");
+test("a file in UTF-16 is read", async () => {
+  await page.goto("about:blank");
+  await page.goto(`${ballast.url}/#/train`);
+  const buffer = Buffer.from("\ufeffdate\tr\r\n2020-01\t0.01\r\n2020-02\t-0.02\r\n", "utf16le");
+  await page.locator('input[type="file"]').setInputFiles({ name: "excel.txt", mimeType: "text/plain", buffer });
+  await note().getByText("2 monthly simple returns as fractions, January 2020 to February 2020").waitFor();
+});
+
+test("questions are answered by the keyboard alone, and nothing is trained before the answer", async () => {
+  await pasted("01/02/2020,0.2\n01/03/2020,-0.15\n01/04/2020,0.3\n01/05/2020,-0.1");
   await note().getByText("Are the returns fractions or percent?").waitFor();
   assert.deepEqual(await history(), []);
   await page.getByRole("button", { name: "Train", exact: true }).click();
-  await page.getByText(/^To be answered first: Are the returns fractions or percent/).waitFor();
+  await page.getByText(/^To be answered first: Which day is 01\/02\/2020/).waitFor();
   assert.deepEqual((await call(ballast.url, "/jobs")).jobs, []);
-  await page.getByRole("button", { name: /^Percent: 0\.2 is 0\.20/ }).click();
-  await note().getByText("4 simple returns in percent").waitFor();
+  await page.getByRole("radio", { name: /^1 February 2020/ }).focus();
+  await page.keyboard.press("Space");
+  await page.keyboard.press("Tab");
+  await page.keyboard.press("ArrowDown");
+  assert.ok(await page.getByRole("radio", { name: /^Percent: 0\.2 is 0\.20 %/ }).isChecked());
+  await page.keyboard.press("Tab");
+  await page.keyboard.press("Enter");
+  await note().getByText("4 monthly simple returns in percent, February 2020 to May 2020, as in column 2.").waitFor();
+  assert.equal(await page.evaluate(() => document.activeElement.id), "f-problem-history-note");
   close(
     await history(),
     [0.2, -0.15, 0.3, -0.1].map((value) => Math.log1p(value / 100)),
@@ -85,30 +96,38 @@ test("what the numbers do not say is asked, and nothing is trained before the an
 
 test("two columns of numbers are asked about, and another answer reads the file anew", async () => {
   await chosen("two.csv", "month,fund,index\n2020-01,1.5,100\n2020-02,-2.5,99\n2020-03,3,101\n");
-  await page.getByRole("button", { name: /^fund / }).click();
-  await note().getByText("3 simple returns in percent from fund").waitFor();
-  await page.getByLabel("Column").selectOption({ label: "index (100; 99; 101 \u2026)" });
-  await note().getByText("2 returns of 3 prices from index").waitFor();
+  await page.getByRole("radio", { name: /^fund / }).check();
+  await page.getByRole("button", { name: "Read it so" }).click();
+  await note().getByText("3 monthly simple returns in percent, January 2020 to March 2020, as in column fund.").waitFor();
+  await page.getByLabel("Column").selectOption("index");
+  await note().getByText("2 monthly returns of prices, February 2020 to March 2020, as in column index.").waitFor();
   close(await history(), [Math.log(99 / 100), Math.log(101 / 99)]);
 });
 
-test("a bad cell is named, and the numbers before it are no longer in force", async () => {
+test("a bad cell is named and shown, and the numbers before it are no longer in force", async () => {
   await pasted("1.5 -2 3");
   await note().getByText("3 simple returns in percent").waitFor();
   await chosen("bad.csv", "month,fund\n2020-01,1.5\n2020-02,NA\n2020-03,3\n");
-  await note().getByText("Line 3, column 2: \u201cNA\u201d is not a number.").waitFor();
+  await note().getByText('Line 3: fund is "NA": must be a number').waitFor();
   assert.deepEqual(await history(), []);
+  await page.getByRole("button", { name: "Show the place" }).click();
+  assert.equal(await area().evaluate(({ value, selectionStart, selectionEnd }) => value.slice(selectionStart, selectionEnd)), "NA");
+});
+
+test("what a file says of the bank is taken where that is wanted", async () => {
+  await chosen("rates.csv", "month,fund,RF\n2020-01,1.5,0.2\n2020-02,-2,0.21\n2020-03,3,0.22\n");
+  await page.getByRole("button", { name: /bank.s rate from RF: 0\.220.% a period/ }).click();
+  assert.equal(await page.getByLabel("Bank return per period").inputValue(), "0.0022");
+  assert.equal(await page.getByLabel("Periods a year").inputValue(), "12");
 });
 
 test("a deviation above 30 % a period is not taken without a word", async () => {
-  await pasted("0.5 -0.4 0.9 -0.3");
-  await page.getByRole("button", { name: /^Fractions/ }).click();
-  await note()
-    .getByText(/standard deviation of 54\.49.% a period\. Is that right\?/)
-    .waitFor();
+  await pasted("500 -60 90 -30");
+  await note().getByText("standard deviation of 258.26 % a period. Is that right?").waitFor();
   assert.deepEqual(await history(), []);
-  await page.getByRole("button", { name: "Yes, take them so" }).click();
-  await note().getByText("4 simple returns as fractions").waitFor();
+  await page.getByRole("radio", { name: /^Yes, take them so/ }).check();
+  await page.getByRole("button", { name: "Read it so" }).click();
+  await note().getByText("4 simple returns in percent").waitFor();
   assert.equal((await history()).length, 4);
 });
 
@@ -118,7 +137,7 @@ test("the example says what it takes", async () => {
   await page.getByRole("button", { name: /^Use the example/ }).click();
   await note()
     .getByText(
-      /^The latest 240 of 1109 simple returns as fractions from market_return, monthly, December 1998 to November 2018/,
+      /^The latest 240 of 1109 monthly simple returns as fractions, December 1998 to November 2018, as in column market_return\./,
     )
     .waitFor();
   assert.equal((await history()).length, 240);
@@ -128,5 +147,16 @@ test("what is typed is judged at a pause, and by the time it is sent", async () 
   await pasted("");
   await area().pressSequentially("1.5 -2 3 x");
   await page.getByRole("button", { name: "Train", exact: true }).click();
-  await page.locator(".error").getByText("Line 1, column 4: \u201cx\u201d is not a number.").waitFor();
+  await page.locator(".error").getByText('Line 1: column 4 is "x": must be a number').waitFor();
+});
+
+test("what is asked, read and refused breaks no rule of accessibility", async () => {
+  const axe = await readFile(AXE, "utf8");
+  for (const text of ["0.2 -0.15 0.3 -0.1", "month,fund,rf\n2020-01,1,0.1\n2020-02,-2,0.1\n2020-03,3,0.1", "1 x"]) {
+    await pasted(text);
+    await page.locator(".note.telling, .note.wrong").first().waitFor();
+    await page.evaluate(axe);
+    const { violations } = await page.evaluate(() => window.axe.run(document));
+    assert.deepEqual(violations.map(({ id, nodes }) => [id, nodes.map(({ html }) => html)]), []);
+  }
 });

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -129,6 +130,21 @@ def test_a_walk_forward_takes_dates_and_rates_from_pandas(ballast: Ballast) -> N
         ballast.backtest(prices, kind="price", rate=rate.shift(freq="D"), **choices)
     with pytest.raises(ValueError, match="dates has 12 entries: must have 13, one for each entry of returns"):
         ballast.backtest(prices, kind="price", rate=0.002, dates=quarters[1:], **choices)
+
+
+def test_a_text_a_file_and_a_table_are_read_alike(ballast: Ballast, tmp_path: Path) -> None:
+    table = pd.Series(SIMPLE, index=INDEX, name="fund")
+    text = "date,fund\n2008-01-01,0.02\n2008-02-01,-0.05\n2008-03-01,0\n"
+    for encoding in ("utf-8-sig", "utf-16"):
+        (tmp_path / encoding).write_text(text, encoding)
+    for source in (text, table, table.to_frame(), tmp_path / "utf-8-sig", tmp_path / "utf-16"):
+        reading: Any = ballast.read_returns(source)
+        assert reading["outcome"] == "read" and reading["frequency"] == "monthly", reading
+        assert reading["series"][0]["log_returns"] == pytest.approx(LOGS, abs=1e-15)
+    percent: Any = ballast.read_returns("0.2 -0.15 0.3", unit="percent")
+    assert percent["series"][0]["log_returns"][0] == pytest.approx(math.log(1.002), abs=1e-15)
+    asked: Any = ballast.read_returns("0.2 -0.15 0.3")
+    assert [question["asks"] for question in asked["questions"]] == ["unit"]
 
 
 def test_the_history_of_a_session_is_named(ballast: Ballast) -> None:

@@ -184,6 +184,7 @@ def test_a_session_goes_on_by_another_policy(ballast: Ballast, session: Session)
 def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, session: Session) -> None:
     """Compares what goes over the network with api/openapi.json: an operation the service gains is missed here."""
     ballast.advise(RETURNS, kind="log", rate_per_step=0.001)
+    ballast.read_returns("1.5 -2 3")
     training = train(ballast, seed=8)
     policy = training.policy()
     own = policy.session(history=RETURNS[:5])

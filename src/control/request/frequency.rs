@@ -42,24 +42,36 @@ use Frequency::{Daily, Monthly, Quarterly, Weekly, Yearly};
 const DISTANCES: [(Frequency, RangeInclusive<i32>); 5] =
     [(Daily, 1..=4), (Weekly, 5..=9), (Monthly, 26..=33), (Quarterly, 85..=97), (Yearly, 350..=380)];
 
+/// Days from each date to the next.
+fn gaps(dates: &[Date]) -> Vec<i32> {
+    dates.windows(2).map(|pair| pair[0].until(pair[1]).map_or(0, |span| span.get_days())).collect()
+}
+
 impl Frequency {
-    /// The one that the median distance of two or more dates tells; `written` is how each of them was given.
+    /// The one that the median distance of dates tells, where they increase.
+    pub fn typical(dates: &[Date]) -> Option<Self> {
+        let mut gaps = gaps(dates);
+        gaps.sort_unstable();
+        gaps.get(gaps.len().saturating_sub(1) / 2).and_then(|median| Self::by(*median))
+    }
+
+    fn by(gap: i32) -> Option<Self> {
+        DISTANCES.iter().find(|(_, days)| days.contains(&gap)).map(|(frequency, _)| *frequency)
+    }
+
+    /// The [`typical`](Self::typical) one; `written` is how each of them was given.
     ///
     /// # Errors
     /// A date that is not later than the one before, or is not the next one at that frequency.
     pub fn of(dates: &[Date], written: &[&str]) -> Result<Self, Misplaced> {
-        let days = |pair: &[Date]| pair[0].until(pair[1]).map_or(0, |span| span.get_days());
-        let gaps: Vec<i32> = dates.windows(2).map(days).collect();
+        let gaps = gaps(dates);
         let refused = |index: usize, rule: String| Err(Misplaced { index: index + 1, rule });
         if let Some(index) = gaps.iter().position(|gap| *gap <= 0) {
             let rule = "the row before: rows go from the oldest to the newest, one a date";
             return refused(index, format!("must be later than {}, {rule}", written[index]));
         }
-        let mut sorted = gaps.clone();
-        sorted.sort_unstable();
-        let by = |gap: i32| DISTANCES.iter().find(|(_, days)| days.contains(&gap)).map(|(frequency, _)| *frequency);
-        let Some(frequency) = sorted.get(gaps.len().saturating_sub(1) / 2).and_then(|median| by(*median)) else {
-            let index = gaps.iter().position(|gap| by(*gap).is_none()).unwrap_or_default();
+        let Some(frequency) = Self::typical(dates) else {
+            let index = gaps.iter().position(|gap| Self::by(*gap).is_none()).unwrap_or_default();
             let rule = "where rows must be daily, weekly, monthly, quarterly or yearly";
             let (gap, before) = (gaps[index], written[index]);
             return refused(index, format!("is {gap} days after {before}, the row before, {rule}"));

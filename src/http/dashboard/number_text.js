@@ -22,27 +22,19 @@ const bare = (text) =>
     .replace(/^[\u2212\u2013]/, "-")
     .replace(/\s*%$/, "");
 
-/** Whether `text` is a number by the decimal mark given, or by either. */
-export function isNumber(text, decimal) {
+/** Whether `text` is a number by the decimal mark given. */
+function isNumber(text, decimal) {
   const plain = bare(text);
-  if (plain === "-0") return false;
-  return decimal ? PATTERNS[decimal].test(plain) : PATTERNS.point.test(plain) || PATTERNS.comma.test(plain);
+  return plain !== "-0" && PATTERNS[decimal].test(plain);
 }
 
-/** Whether `text` is meant as a number, well formed or not: digits and marks alone. */
-export const looksNumeric = (text) =>
-  /\d/.test(text) && /^[+-]?[\d.,'\u2019\u00a0\u202f ]+(e[+-]?\d+)?$/i.test(bare(text));
-
 /** The number that `text` is; only where `isNumber` says that it is one. A percent sign does not divide it. */
-export function numberOf(text, decimal) {
+function numberOf(text, decimal) {
   const joined = bare(text).replace(APART[decimal], "");
   return Number(decimal === "comma" ? joined.replace(",", ".") : joined);
 }
 
-/** `text` with its comma as a decimal point. */
-export const commaDecimal = (text) => bare(text).replaceAll(".", "").replace(",", ".");
-
-export const hasPercent = (text) => /%\s*$/.test(text);
+const hasPercent = (text) => /%\s*$/.test(text);
 
 /**
  * A number typed by itself: null where nothing is, and the text as it is where it is no number or could be two, as 100,000

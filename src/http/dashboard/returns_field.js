@@ -1,72 +1,98 @@
-// The field that takes returns: typed, pasted or out of a file, all by the one reader. What was read stands below it in a
-// sentence, what cannot be told from the text is asked there, and until it is answered the form has no returns.
+// The field that takes returns: typed, pasted or out of a file, all read by the service. What was read stands below it in a
+// sentence and a chart, what cannot be told from the text is asked there, and until it is answered the form has no returns.
 
-import { text } from "./api.js";
+import { post, text } from "./api.js";
+import { lineChart } from "./chart.js";
 import { announce, h } from "./dom.js";
-import { count } from "./format.js";
-import { ASKED, read } from "./returns_reader.js";
+import { count, percent, percentTick } from "./format.js";
 
 const KINDS = { simple: "Simple returns", log: "Log-returns", price: "Prices" };
 const UNITS = { percent: "Percent (1.2)", fraction: "Fractions (0.012)" };
-const ORDERS = { oldest: "The oldest", newest: "The newest" };
+const ORDERS = { false: "The oldest", true: "The newest" };
 /** Numbers are not judged while they are being typed, for so long, in milliseconds. */
 const PAUSE = 300;
-/** The market column of the example, and twenty years of its months: what the demo trains on. */
-const EXAMPLE = { file: "/dashboard/us_market_monthly.csv", said: { column: 1, latest: 240 } };
-const HINT = "Oldest first, or with dates in any order. Separated by spaces, commas, semicolons, tabs or lines.";
+/** The service takes no longer history, and a chart shows no more. */
+const MOST = 20_000;
+/** Twenty years of months of the US stock market: what the demo trains on. */
+const EXAMPLE = { file: "/dashboard/us_market_monthly.csv", said: { latest: 240 } };
+const HINT = "With dates, or oldest first. Separated by spaces, commas, semicolons, tabs or lines.";
+/** What was said of these is asked anew once another column or kind is chosen. */
+const FOLLOWS = { columns: ["kind", "unit", "large_deviation", "decimal_comma"], kind: ["unit", "large_deviation"] };
 
 /**
  * `{element, show(logReturns), trouble()}`; `changed(logReturns)` at every change, with none of them while the text is not
- * one reading. `trouble()` reads what is still being typed, and says why there are no returns, or null. `name` is the
- * request's field; `blank` is what an empty field means, where it may be empty.
+ * one reading. `trouble()` waits for what is still being read, and says why there are no returns, or null. `name` is the
+ * request's field; `blank` is what an empty field means, where it may be empty; `bank(rate, periodsPerYear)` takes what a
+ * column says that the bank paid last.
  */
-export function returnsField({ name, label, blank = null, example = false, changed }) {
+export function returnsField({ name, label, blank = null, example = false, changed, bank = null }) {
   const id = `f-${name.replace(/[^a-z0-9]+/gi, "-")}`;
   const area = h("textarea", { id, name, rows: 6, spellcheck: "false", "aria-describedby": `${id}-note` });
-  const note = h("p", { class: "note", id: `${id}-note`, role: "status" });
+  area.dataset.described = `${id}-note`;
+  const note = h("p", { class: "note", id: `${id}-note`, role: "status", tabindex: -1 });
   const asked = h("div", { class: "asked" });
-  let [said, answer, pending] = [{}, { outcome: "nothing" }, 0];
-  const judge = () => {
-    clearTimeout(pending);
-    pending = 0;
-    answer = read(area.value, said);
-    tell();
+  let [said, answer, pending, reading, asking] = [{}, null, 0, Promise.resolve(), new AbortController()];
+  const tell = (outcome, sentence) => {
+    note.classList.toggle("wrong", outcome === "refused");
+    note.classList.toggle("telling", outcome === "read" || outcome === "asked");
+    note.textContent = sentence;
+    if (outcome === "refused") area.setAttribute("aria-invalid", "true");
+    else area.removeAttribute("aria-invalid");
+  };
+  const judge = async () => {
+    asking.abort();
+    asking = new AbortController();
+    const { signal } = asking;
+    answer = null;
+    if (area.value.trim() === "") {
+      asked.replaceChildren();
+      return tell("nothing", blank ? `${blank} ${HINT}` : HINT);
+    }
+    try {
+      answer = await post("/returns", { text: area.value, choices: said }, signal);
+    } catch (error) {
+      if (signal.aborted) return;
+      answer = { outcome: "refused", sentence: error.message };
+    }
+    tell(answer.outcome, words(answer));
+    asked.replaceChildren(...below(answer, { said, say, forget, area, bank }));
   };
   const take = () => {
-    judge();
-    changed(answer.returns ?? []);
+    clearTimeout(pending);
+    pending = 0;
+    changed([]);
+    reading = judge().then(() => answer?.outcome === "read" && changed(answer.series[0].log_returns));
+    return reading;
   };
   const say = (more) => {
+    for (const name of Object.keys(more)) for (const after of FOLLOWS[name] ?? []) delete said[after];
     said = { ...said, ...more };
-    take();
+    take().then(() => note.focus());
   };
-  const tell = () => {
-    note.classList.toggle("wrong", answer.outcome === "refused");
-    note.classList.toggle("telling", ["reading", "question"].includes(answer.outcome));
-    note.textContent = answer.sentence ?? answer.message ?? (blank ? `${blank} ${HINT}` : HINT);
-    asked.replaceChildren(...asking(answer, said, say, area));
+  const forget = () => {
+    said = {};
+    take().then(() => area.focus());
   };
   const open = (content, known = {}) => {
-    said = known;
+    said = { ...known };
     area.value = content;
     take();
   };
   area.addEventListener("input", (event) => {
-    if (!isTyping(event)) said = {};
     clearTimeout(pending);
     if (isTyping(event)) pending = setTimeout(take, PAUSE);
-    else take();
+    else open(area.value);
   });
-  const trouble = () => {
-    if (pending) take();
-    if (answer.outcome === "reading") return null;
-    if (answer.outcome === "nothing") return blank ? null : "Returns are needed: paste them, or choose a file.";
-    return answer.outcome === "question" ? `To be answered first: ${answer.message}` : answer.message;
+  const trouble = async () => {
+    await (pending ? take() : reading);
+    if (answer?.outcome === "read") return null;
+    if (answer === null) return blank ? null : "Returns are needed: paste them, or choose a file.";
+    return answer.outcome === "asked" ? `To be answered first: ${words(answer)}` : words(answer);
   };
   const show = (returns) => {
-    said = { kind: "log", unit: "fraction", confirmed: true };
+    said = { kind: "log", unit: "fraction", large_deviation: true };
     area.value = returns.join(" ");
-    judge();
+    reading = judge();
   };
   const element = h(
     "div",
@@ -74,12 +100,25 @@ export function returnsField({ name, label, blank = null, example = false, chang
     drop(id, open, example),
     h("div", { class: "field wide" }, h("label", { for: id }, label), area, note, asked),
   );
-  tell();
+  judge();
   return { element, show, trouble };
 }
 
+const words = ({ sentence, questions }) => {
+  const said = sentence ?? questions.map(({ question }) => question).join(" ");
+  return said.charAt(0).toUpperCase() + said.slice(1);
+};
+
 /** What is typed is mended word by word and keeps what was said of it; what is pasted is another text. */
 const isTyping = ({ inputType = "" }) => /^(insertText|insertLineBreak|deleteContent|deleteWord)/.test(inputType);
+
+/** The text of a file: UTF-16 where its first bytes say so. */
+async function content(file) {
+  const bytes = await file.arrayBuffer();
+  const [first, second] = new Uint8Array(bytes);
+  const wide = { "255 254": "utf-16le", "254 255": "utf-16be" }[`${first} ${second}`];
+  return new TextDecoder(wide ?? "utf-8").decode(bytes);
+}
 
 /** Where a file is chosen or dropped. */
 function drop(id, open, example) {
@@ -90,7 +129,7 @@ function drop(id, open, example) {
     accept: ".csv,.tsv,.txt,text/csv,text/plain",
     class: "unseen",
   });
-  const opened = async (chosen) => chosen && open(await chosen.text());
+  const opened = async (chosen) => chosen && open(await content(chosen));
   file.addEventListener("change", () => opened(file.files[0]));
   const chosen = h("label", { class: "button quiet", for: file.id }, "Choose a CSV file");
   const zone = h("div", { class: "drop" }, h("p", {}, file, chosen, " or drop one here, or paste below."));
@@ -114,70 +153,113 @@ function drop(id, open, example) {
   return zone;
 }
 
-/** What a person can say of the text: the answers to a question, the place of a fault, or another reading. */
-function asking(answer, said, say, area) {
+/** What a person can say of the text: the answers to questions, the place of a fault, or another reading. */
+function below(answer, { said, say, forget, area, bank }) {
+  const again = h("button", { type: "button", class: "link", onclick: forget }, "Forget what was said of it");
+  const isSaid = Object.keys(said).some((name) => name !== "latest");
   switch (answer.outcome) {
-    case "question":
-      return [h("div", { class: "actions", role: "group", "aria-label": answer.message }, answers(answer, say))];
+    case "asked":
+      return [questions(answer.questions, say), ...(isSaid ? [again] : [])];
     case "refused":
-      return [
-        shown(answer.place, area),
-        Object.values(said).some((value) => value !== undefined) ? again(say) : null,
-      ].filter(Boolean);
-    case "reading":
-      return [h("div", { class: "fields" }, otherwise(answer.settled, said, say))];
+      return [...(answer.place ? [shown(answer.place, area)] : []), ...(isSaid ? [again] : [])];
     default:
-      return [];
+      return [
+        h("div", { class: "fields" }, otherwise(answer, said, say)),
+        ...(bank && answer.rate ? [offered(answer, bank)] : []),
+        ...(answer.series[0].log_returns.length <= MOST ? [picture(answer)] : []),
+      ];
   }
 }
 
-const answers = ({ choices }, say) =>
-  choices.map(({ words, said }) => h("button", { type: "button", class: "quiet", onclick: () => say(said) }, words));
-
-function again(say) {
-  const forget = Object.fromEntries(ASKED.map((name) => [name, undefined]));
-  return h("button", { type: "button", class: "link", onclick: () => say(forget) }, "Forget what was said of it");
+/** Each question with its answers as radio buttons, and one button that takes them all. */
+function questions(asked, say) {
+  const group = ({ asks, question, options }) =>
+    h(
+      "fieldset",
+      {},
+      h("legend", {}, question),
+      options.map(({ label, sentence }, index) =>
+        h(
+          "label",
+          { class: "option" },
+          h("input", { type: "radio", name: `asked-${asks}`, value: index }),
+          h("span", {}, label, sentence ? h("span", { class: "note" }, ` ${sentence}`) : null),
+        ),
+      ),
+    );
+  const groups = asked.map(group);
+  const answered = () => {
+    const chosen = groups.map((group) => group.querySelector(":checked"));
+    const open = chosen.indexOf(null);
+    if (open >= 0) return groups[open].querySelector("input").focus();
+    say(Object.assign({}, ...chosen.map(({ value }, index) => asked[index].options[value].choices)));
+  };
+  const button = h("button", { type: "button", class: "quiet", onclick: answered }, "Read it so");
+  return h("div", {}, groups, h("p", { class: "actions" }, button));
 }
 
-function shown(place, area) {
-  if (!place) return null;
+function shown({ line, value }, area) {
   const go = () => {
+    const start = area.value.split("\n").slice(0, line - 1).join("\n").length + (line > 1 ? 1 : 0);
+    const at = Math.max(start, area.value.indexOf(value, start));
     area.focus();
-    area.setSelectionRange(place.start, place.start + place.text.length);
+    area.setSelectionRange(at, at + value.length);
   };
   return h("button", { type: "button", class: "link", onclick: go }, "Show the place");
 }
 
-/** Choices that read the same text otherwise. What was said after the one that changes is asked anew. */
-function otherwise({ kind, unit, columns, dated, all }, said, say) {
-  const change = (name) => (value) => {
-    const later = ASKED.slice(ASKED.indexOf(name) + 1).map((after) => [after, undefined]);
-    say({ ...Object.fromEntries(later), [name]: value });
-  };
-  const choice = (name, label, choices, value) =>
+/** Choices that read the same text otherwise. */
+function otherwise({ columns, series, newest_first, count: all }, said, say) {
+  const [{ column, kind, unit }] = series;
+  const values = columns.filter(({ name, holds }) => holds === "values" || name === column);
+  const choice = (name, label, choices, value, read = (value) => value) =>
     field(
       label,
       h(
         "select",
-        { id: `read-${name}`, onchange: ({ target }) => change(name)(target.value) },
-        options(choices, value),
+        { id: `read-${name}`, onchange: ({ target }) => say({ [name]: read(target.value) }) },
+        Object.entries(choices).map(([key, words]) => h("option", { value: key, selected: key === value }, words)),
       ),
     );
-  const places = columns && Object.fromEntries(columns.map(({ words, said: { column } }) => [column, words]));
-  const pick = ({ target }) => change("column")(Number(target.value));
-  const keep = ({ target }) => say({ latest: Number(target.value) > 0 ? Number(target.value) : undefined });
+  const names = Object.fromEntries(values.map(({ name }) => [name, name]));
+  const keep = ({ target }) => say({ latest: Number(target.value) > 0 ? Math.round(Number(target.value)) : undefined });
   const latest = h("input", { id: "read-latest", type: "number", min: 2, max: all, onchange: keep });
   latest.value = Math.min(all, said.latest ?? all);
   return [
-    places && field("Column", h("select", { id: "read-column", onchange: pick }, options(places, String(said.column)))),
+    values.length > 1 && choice("columns", "Column", names, column, (name) => [name]),
     choice("kind", "They are", KINDS, kind),
     unit && choice("unit", "In", UNITS, unit),
-    dated ? null : choice("order", "The first is", ORDERS, said.order ?? "oldest"),
+    newest_first !== undefined &&
+      choice("newest_first", "The first is", ORDERS, String(newest_first), (value) => value === "true"),
     field(`Latest returns used, of ${count(all)}`, latest),
   ];
 }
 
 const field = (label, control) => h("div", { class: "field" }, h("label", { for: control.id }, label), control);
 
-const options = (choices, chosen) =>
-  Object.entries(choices).map(([value, words]) => h("option", { value, selected: value === chosen }, words));
+/** What a column says of the bank, for the form to take. */
+function offered({ rate: { column, rates }, periods_per_year }, bank) {
+  const last = rates.at(-1);
+  const use = () => bank(last, periods_per_year);
+  const label = `Take the bank\u2019s rate from ${column}: ${percent(last, 3)} a period`;
+  return h("p", {}, h("button", { type: "button", class: "quiet", onclick: use }, label));
+}
+
+function picture({ series: [{ log_returns }], dates }) {
+  const values = log_returns.map(Math.expm1);
+  const at = (index) => (index < values.length ? (dates?.[index] ?? String(index + 1)) : "");
+  return lineChart({
+    title: `Returns read, ${at(0)} to ${at(values.length - 1)}`,
+    height: 130,
+    // Room for half of the last date.
+    x: {
+      values: values.map((_, index) => index),
+      domain: [0, 1.05 * (values.length - 1)],
+      label: dates ? "" : "Return",
+      format: at,
+      whole: true,
+    },
+    y: { format: (value) => percent(value, 2), tick: percentTick, also: [0] },
+    series: [{ name: "", kind: "line", bare: true, values }],
+  });
+}

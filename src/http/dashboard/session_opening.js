@@ -61,7 +61,7 @@ function opening(policies, asked) {
   );
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
-    const trouble = history.trouble();
+    const trouble = await history.trouble();
     if (trouble) return showProblem(form, message, { field: "history", message: trouble });
     const request = { policy: policy.control.value };
     if (known.length > 0) request.history = known;

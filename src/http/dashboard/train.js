@@ -68,6 +68,12 @@ export async function view(_, leaving) {
       put(request, "problem.history", returns);
       written();
     },
+    bank: (rate, periods) => {
+      put(request, "problem.rate_per_step", rate);
+      if (periods) put(request, "problem.periods_per_year", periods);
+      fields.show(request);
+      written();
+    },
   });
   const fields = mainFields((path, value) => {
     if (path === "problem.utility.kind") put(request, "problem.utility", { ...UTILITY[value] });
@@ -128,7 +134,7 @@ export async function view(_, leaving) {
   );
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
-    const trouble = source.trouble();
+    const trouble = await source.trouble();
     if (trouble) return showProblem(form, message, { field: "problem.history", message: trouble });
     send.disabled = true;
     try {

@@ -14,7 +14,7 @@ from typing_extensions import Self
 from . import wire
 from .driving import Answering, awaiting_into, blocking, blocking_into
 from .policy import AsyncPolicy, Policy
-from .returns import Kind, Returns, Table, dates_of, day, log_returns, log_returns_of_assets, per_period
+from .returns import Kind, Returns, Table, dates_of, day, log_returns, log_returns_of_assets, per_period, text_of
 from .session import AsyncSession, Session
 from .training import (
     AsyncEvaluation,
@@ -157,6 +157,16 @@ class _Ballast:
         of_assets = {"assets": names, "history": rows, "rate_per_step": rate_per_step, **_given(problem)}
         whole = {"problem": of_assets, "design": design, "surrogate": surrogate, "seed": seed}
         return await self._queued("/train", _given(whole), idempotency_key)
+
+    async def _read_returns(self, source: str | os.PathLike[str] | Table, /, **choices: Any) -> wire.Reading:
+        """What a text of returns or prices says: one record, or what must be asked, or where it is wrong.
+
+        ``source`` is a text, the ``Path`` of a file, or a Series or DataFrame of pandas. ``choices`` say what the text
+        does not, or answer what was asked: ``unit="percent"``, ``columns=["fund"]`` (several are several assets).
+        Look at ``reading["outcome"]``: ``"read"`` has a ``sentence`` to check it by, and ``series``.
+        """
+        body = {"text": text_of(source), "choices": choices}
+        return cast(wire.Reading, await self._transport.json("POST", "/returns", body=body))
 
     async def _submit(self, specification: wire.Specification, *, idempotency_key: str | None = None) -> wire.Job:
         """Queues the training of a whole specification, such as ``Policy.detail`` shows."""
@@ -343,6 +353,7 @@ class Ballast(_Ballast):
     session = blocking_into(_Ballast._session, Session)
     advise = Answering(wire.Advised).blocking(_Ballast._advise)
     advise_assets = Answering(wire.AssetsAdvised).blocking(_Ballast._advise_assets)
+    read_returns = blocking(_Ballast._read_returns)
     health = Answering(wire.Health).blocking(_Ballast._health)
     close = blocking(_Ballast._close)
     jobs = Answering(wire.Job).iterating(_Ballast._jobs)
@@ -399,6 +410,7 @@ class AsyncBallast(_Ballast):
     session = awaiting_into(_Ballast._session, AsyncSession)
     advise = _Ballast._advise
     advise_assets = _Ballast._advise_assets
+    read_returns = _Ballast._read_returns
     health = _Ballast._health
     close = _Ballast._close
     jobs = _Ballast._jobs

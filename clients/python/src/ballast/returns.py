@@ -6,6 +6,8 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
+from os import PathLike
+from pathlib import Path
 from statistics import pstdev
 from typing import Any, Literal, TypeAlias
 
@@ -78,6 +80,16 @@ def log_returns_of_assets(
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
     return names, [list(row) for row in zip(*each, strict=True)]
+
+
+def text_of(source: str | PathLike[str] | Table) -> str:
+    """A text as it is, that of a file (UTF-8, or UTF-16 where its first bytes say so), or a table of pandas as CSV."""
+    if hasattr(source, "to_csv"):
+        return str(source.to_csv())
+    if not isinstance(source, PathLike):
+        return str(source)
+    content = Path(source).read_bytes()
+    return content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
 
 
 def dates_of(returns: Returns) -> list[str] | None:

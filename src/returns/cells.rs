@@ -1,0 +1,249 @@
+//! Text as rows of cells. A cell knows where it stands, so that whatever is wrong with it can be pointed at. What a cell means is
+//! not decided here, but for one thing: whether a comma parts numbers or is in them.
+
+use std::borrow::Cow;
+
+use super::choices::Choices;
+use super::dates::could_be_date;
+use super::number::{Mark, is_number, looks_numeric, number};
+use super::outcome::{Place, Stop};
+
+/// Of a text: a century of days of dozens of assets.
+const MOST_BYTES: usize = 8_000_000;
+pub const MOST_LINES: usize = 200_000;
+const MOST_CELLS: usize = 1_000_000;
+/// Marks that part cells wherever they occur; a comma or a blank does so only where nothing else can be meant.
+const SEPARATORS: [char; 3] = ['\t', ';', '|'];
+const COMMA: char = ',';
+const BLANK: char = ' ';
+/// Lines by which the meaning of a comma is told: it is the same in all of them.
+const FIRST: usize = 200;
+/// Letters of a value that are shown.
+const SHOWN: usize = 60;
+pub const SPREADSHEET: &str = "This is a spreadsheet file. Save it as CSV, or copy the column and paste it.";
+pub const NO_TEXT: &str = "This is no text in UTF-8 or UTF-16. Save it as CSV in UTF-8.";
+
+/// What stands between two separators.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell<'a> {
+    pub text: Cow<'a, str>,
+    line: u32,
+    column: u32,
+}
+
+impl Cell<'_> {
+    /// The cell breaks a rule, under the name of its column where it has one.
+    pub fn refused(&self, name: &str, rule: &str) -> Stop {
+        let place = self.place();
+        Stop::Refused { sentence: format!("{}: {rule}", self.called(name)), place: Some(place) }
+    }
+
+    /// Where the cell stands and what it holds, in words.
+    pub fn called(&self, name: &str) -> String {
+        let Place { line, column, value } = self.place();
+        let name = if name.is_empty() { format!("column {column}") } else { name.to_owned() };
+        format!("line {line}: {name} is {value:?}")
+    }
+
+    fn place(&self) -> Place {
+        let value = match self.text.char_indices().nth(SHOWN) {
+            Some((end, _)) => format!("{}\u{2026}", &self.text[..end]),
+            None => self.text.to_string(),
+        };
+        Place { line: self.line as usize, column: self.column as usize, value }
+    }
+}
+
+/// A line without what ends it, counted from 1.
+#[derive(Clone, Copy)]
+struct Line<'a> {
+    text: &'a str,
+    number: u32,
+}
+
+/// Rows of cells, none of them blank throughout, and how many lines were remarks.
+pub struct Rows<'a> {
+    pub rows: Vec<Vec<Cell<'a>>>,
+    pub remarks: usize,
+}
+
+impl<'a> Rows<'a> {
+    /// # Errors
+    /// The text is none, too long, or a comma in it can be meant in two ways.
+    pub fn of(text: &'a str, said: &Choices) -> Result<Self, Stop> {
+        let text = text.trim_start_matches('\u{feff}');
+        check(text)?;
+        let number =
+            |(index, text): (usize, &'a str)| Line { text, number: u32::try_from(index + 1).unwrap_or(u32::MAX) };
+        let given: Vec<Line> =
+            text.split('\n').enumerate().map(number).filter(|line| !line.text.trim().is_empty()).collect();
+        let lines: Vec<Line> = given.iter().copied().filter(|line| !is_remark(line.text)).collect();
+        if lines.is_empty() {
+            return Err(Stop::refused("There are no numbers in the text."));
+        }
+        let separator = separator(&lines, said)?;
+        let mut rows = lines.iter().map(|line| cells(*line, separator)).collect::<Result<Vec<_>, Stop>>()?;
+        let filled = |row: &Vec<Cell>| row.iter().rposition(|cell| !cell.text.is_empty()).map_or(0, |last| last + 1);
+        rows.retain(|row| filled(row) > 0);
+        // Separators at the ends of lines make blank cells.
+        let width = rows.iter().map(filled).max().unwrap_or(0);
+        rows.iter_mut().for_each(|row| row.truncate(width));
+        if rows.is_empty() {
+            return Err(Stop::refused("There are no numbers in the text."));
+        }
+        Ok(Rows { rows, remarks: given.len() - lines.len() })
+    }
+}
+
+fn check(text: &str) -> Result<(), Stop> {
+    let bounds = [
+        (text.len(), MOST_BYTES, "bytes"),
+        (text.bytes().filter(|byte| *byte == b'\n').count(), MOST_LINES, "lines"),
+        (text.chars().filter(|letter| letter.is_whitespace() || ",;|".contains(*letter)).count(), MOST_CELLS, "cells"),
+    ];
+    if let Some((found, most, what)) = bounds.into_iter().find(|(found, most, _)| found > most) {
+        return Err(Stop::refused(format!("The text has {found} {what}: must have at most {most}.")));
+    }
+    if text.starts_with("PK\u{3}\u{4}") {
+        return Err(Stop::refused(SPREADSHEET));
+    }
+    if text.contains(['\0', '\u{fffd}']) { Err(Stop::refused(NO_TEXT)) } else { Ok(()) }
+}
+
+/// #N/A is what a spreadsheet leaves where a number is missing.
+fn is_remark(line: &str) -> bool {
+    let line = line.trim_start();
+    line.starts_with('#') && !line.get(..4).is_some_and(|start| start.eq_ignore_ascii_case("#N/A"))
+}
+
+fn separator(lines: &[Line], said: &Choices) -> Result<char, Stop> {
+    let outside = |wanted: char| {
+        lines.iter().any(|line| line.text.split('"').step_by(2).any(|unquoted| unquoted.contains(wanted)))
+    };
+    if let Some(plain) = SEPARATORS.into_iter().find(|separator| outside(*separator)) {
+        return Ok(plain);
+    }
+    if outside(COMMA) {
+        return match said.comma_parts {
+            Some(parts) => Ok(if parts { COMMA } else { BLANK }),
+            None => comma(lines),
+        };
+    }
+    // Without commas words are cells, unless a quoted cell or a date of several words holds the blanks.
+    let is_whole = |line: &Line| !line.text.trim().contains(char::is_whitespace) || could_be_date(line.text.trim());
+    let quoted = lines.iter().any(|line| line.text.contains('"'));
+    Ok(if quoted || lines.iter().all(is_whole) { COMMA } else { BLANK })
+}
+
+/// A comma parts cells, or it is a decimal or thousands mark within them; where the text allows both, a person must say.
+fn comma(lines: &[Line]) -> Result<char, Stop> {
+    let (parting, inside) = (strangers(lines, COMMA)?, strangers(lines, BLANK)?);
+    if parting < inside {
+        return Ok(COMMA);
+    }
+    let word = lines.iter().find_map(|line| words(*line).into_iter().find(|cell| cell.text.contains(COMMA)));
+    let Some(word) = word.filter(|word| looks_numeric(&word.text)) else { return Ok(COMMA) };
+    if inside < parting {
+        return Ok(BLANK);
+    }
+    let (word, parted) = (&word.text, word.text.replace(COMMA, " and "));
+    let parts = |parts| Choices { comma_parts: Some(parts), ..Choices::default() };
+    let options =
+        vec![(format!("One number: {word}"), parts(false)), (format!("Numbers of their own: {parted}"), parts(true))];
+    Err(Stop::asked("comma_parts", format!("Is {word} one number, or are {parted} numbers of their own?"), options))
+}
+
+/// How many cells would be neither numbers nor dates, were the lines parted so; headings are none of them.
+fn strangers(lines: &[Line], separator: char) -> Result<usize, Stop> {
+    let lines = &lines[..lines.len().min(FIRST)];
+    let rows = lines.iter().map(|line| cells(*line, separator)).collect::<Result<Vec<_>, Stop>>()?;
+    let is_known = |cell: &Cell| cell.text.is_empty() || is_number(&cell.text) || could_be_date(&cell.text);
+    let headed = rows.len() > 1 && !rows[0].iter().any(is_known);
+    Ok(rows[usize::from(headed)..].iter().flatten().filter(|cell| !is_known(cell)).count())
+}
+
+fn cells(line: Line, separator: char) -> Result<Vec<Cell>, Stop> {
+    if separator == BLANK { Ok(words(line)) } else { fields(line, separator) }
+}
+
+/// A comma at the end of a word ends it, quotes around it are taken off, and a percent sign belongs to the number before it.
+fn words(line: Line) -> Vec<Cell> {
+    let mut found: Vec<Cell> = Vec::new();
+    for word in line.text.split_whitespace() {
+        let word = word.strip_suffix(COMMA).unwrap_or(word);
+        let text = word.strip_prefix('"').and_then(|word| word.strip_suffix('"')).unwrap_or(word);
+        match found.last_mut() {
+            Some(last) if text == "%" => last.text.to_mut().push_str(" %"),
+            _ if text.is_empty() => {}
+            _ => found.push(cell(line, found.len(), text.into())),
+        }
+    }
+    found
+}
+
+fn cell<'a>(line: Line<'a>, before: usize, text: Cow<'a, str>) -> Cell<'a> {
+    Cell { text, line: line.number, column: u32::try_from(before + 1).unwrap_or(u32::MAX) }
+}
+
+/// Quotes hold a separator together and are taken off; a doubled one within them is one.
+fn fields(line: Line, separator: char) -> Result<Vec<Cell>, Stop> {
+    let mut found = Vec::new();
+    let mut rest = Some(line.text);
+    while let Some(text) = rest {
+        let start = text.trim_start_matches([' ', '\u{a0}']);
+        let quoted = match start.strip_prefix('"') {
+            Some(inside) => Some((
+                inside,
+                closing(inside).ok_or_else(|| {
+                    Stop::refused(format!("Line {} opens a quote and does not close it.", line.number))
+                })?,
+            )),
+            None => None,
+        };
+        let after = quoted.map_or(start, |(inside, end)| &inside[end + 1..]);
+        let (own, next) = after.split_once(separator).map_or((after, None), |(own, next)| (own, Some(next)));
+        let text: Cow<str> = match quoted {
+            Some((inside, end)) if inside[..end].contains("\"\"") => inside[..end].replace("\"\"", "\"").into(),
+            Some((inside, end)) => inside[..end].trim().into(),
+            None => own.trim().into(),
+        };
+        found.push(cell(line, found.len(), text));
+        rest = next;
+    }
+    Ok(found)
+}
+
+/// Where the quote ends that `text` stands in.
+fn closing(text: &str) -> Option<usize> {
+    let mut from = 0;
+    loop {
+        let at = from + text[from..].find('"')?;
+        if !text[at + 1..].starts_with('"') {
+            return Some(at);
+        }
+        from = at + 2;
+    }
+}
+
+/// Which decimal mark `cells` have: asked for where 1,234 may be both.
+pub fn mark<'a>(cells: impl Iterator<Item = &'a Cell<'a>>, said: &Choices) -> Result<Mark, Stop> {
+    if let Some(comma) = said.decimal_comma {
+        return Ok(if comma { Mark::Comma } else { Mark::Point });
+    }
+    let numeric: Vec<&Cell> = cells.filter(|cell| looks_numeric(&cell.text)).collect();
+    let Some(doubtful) = numeric.iter().find(|cell| cell.text.contains(COMMA)) else { return Ok(Mark::Point) };
+    let fits = |mark| numeric.iter().filter(|cell| number(&cell.text, mark).is_some()).count();
+    match fits(Mark::Point).cmp(&fits(Mark::Comma)) {
+        std::cmp::Ordering::Greater => Ok(Mark::Point),
+        std::cmp::Ordering::Less => Ok(Mark::Comma),
+        std::cmp::Ordering::Equal => {
+            let option = |word: &str, decimal_comma, mark| {
+                let value = number(&doubtful.text, mark).unwrap_or(f64::NAN);
+                let choices = Choices { decimal_comma: Some(decimal_comma), ..Choices::default() };
+                (format!("{word}: {} is {value}", doubtful.text), choices)
+            };
+            let options = vec![option("Yes", true, Mark::Comma), option("No", false, Mark::Point)];
+            Err(Stop::asked("decimal_comma", format!("Is the comma in {} a decimal mark?", doubtful.text), options))
+        }
+    }
+}

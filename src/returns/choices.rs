@@ -1,0 +1,97 @@
+//! What a person says of a text beforehand, or answers when asked.
+
+use clap::{Args, ValueEnum};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// What the numbers are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Gains over what was held: 0.012 of 100 that became 101.2.
+    Simple,
+    /// Logarithms of what 1 became.
+    Log,
+    /// Prices or levels, of which each pair gives a return.
+    Price,
+}
+
+/// What returns are counted in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum Unit {
+    /// 0.012 is 1.2 %.
+    Fraction,
+    /// 1.2 is 1.2 %.
+    Percent,
+}
+
+/// What is said of a text; what is left out follows from it, or is asked.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema, Args)]
+#[serde(deny_unknown_fields, default)]
+pub struct Choices {
+    /// A column of returns or prices, by its name or its number from 1; several of them are several assets
+    #[arg(long = "column", id = "column")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub columns: Vec<String>,
+    /// What the numbers are
+    #[arg(long)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kind: Option<Kind>,
+    /// What returns are counted in
+    #[arg(long)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<Unit>,
+    /// Whether 01/02/2020 is the first of February, and not the second of January
+    #[arg(long)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub day_first: Option<bool>,
+    /// Whether the first row is the newest, where no dates tell
+    #[arg(long)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub newest_first: Option<bool>,
+    /// Whether a comma is the decimal mark
+    #[arg(long)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub decimal_comma: Option<bool>,
+    /// Whether a comma parts numbers, and is not within them
+    #[arg(long)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub comma_parts: Option<bool>,
+    /// Whether numbers in several columns are one record, line by line
+    #[arg(long)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub one_record: Option<bool>,
+    /// Whether a record from which periods are missing is taken as it is
+    #[arg(long)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gaps: Option<bool>,
+    /// Whether a standard deviation above 30 % a period is right
+    #[arg(long)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub large_deviation: Option<bool>,
+    /// How many of the last returns count; all of them unless given
+    #[arg(skip)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub latest: Option<usize>,
+}
+
+impl Choices {
+    /// These, and `more`, which counts where both say something.
+    #[must_use]
+    pub fn with(&self, more: &Choices) -> Choices {
+        Choices {
+            columns: if more.columns.is_empty() { self.columns.clone() } else { more.columns.clone() },
+            kind: more.kind.or(self.kind),
+            unit: more.unit.or(self.unit),
+            day_first: more.day_first.or(self.day_first),
+            newest_first: more.newest_first.or(self.newest_first),
+            decimal_comma: more.decimal_comma.or(self.decimal_comma),
+            comma_parts: more.comma_parts.or(self.comma_parts),
+            one_record: more.one_record.or(self.one_record),
+            gaps: more.gaps.or(self.gaps),
+            large_deviation: more.large_deviation.or(self.large_deviation),
+            latest: more.latest.or(self.latest),
+        }
+    }
+}

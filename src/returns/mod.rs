@@ -1,0 +1,38 @@
+//! Text of returns, as people paste it and programs write it, read into returns: the one reader of the page, of the command
+//! line and of every client.
+//!
+//! Text does not say what its numbers are. What follows from them is taken and told in a sentence; what does not follow is
+//! asked; and a cell that cannot be meant is refused by its line, its column and its value. Nothing is passed over in silence:
+//! an investor who is misread gets wrong advice that looks right. Checked by: `tests/returns.rs`.
+
+mod cells;
+mod choices;
+mod dates;
+mod kind;
+mod number;
+mod outcome;
+mod reading;
+mod record;
+mod sheet;
+mod words;
+
+pub use choices::{Choices, Kind, Unit};
+pub use outcome::{Answer, Place, Question};
+pub use reading::{Reading, read};
+pub use record::{BankRate, Record, Series};
+pub use sheet::{ColumnFound, Holds};
+
+/// The text of a file: UTF-8, or UTF-16 where its first bytes say so.
+///
+/// # Errors
+/// What kind of file it is instead, as a sentence.
+pub fn decoded(bytes: &[u8]) -> Result<String, String> {
+    let units = |of: fn([u8; 2]) -> u16| bytes[2..].chunks_exact(2).map(|pair| of([pair[0], pair[1]])).collect();
+    let utf_16: Option<Vec<u16>> = match bytes {
+        [0xff, 0xfe, ..] => Some(units(u16::from_le_bytes)),
+        [0xfe, 0xff, ..] => Some(units(u16::from_be_bytes)),
+        _ => None,
+    };
+    let text = utf_16.map_or_else(|| String::from_utf8(bytes.to_vec()).ok(), |units| String::from_utf16(&units).ok());
+    text.ok_or_else(|| if bytes.starts_with(b"PK") { cells::SPREADSHEET } else { cells::NO_TEXT }.to_owned())
+}

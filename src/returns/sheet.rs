@@ -1,0 +1,294 @@
+//! What the columns of a text are: dates, returns or prices, what the bank pays, or neither.
+//!
+//! A heading counts by its letters and digits alone, in any case: `Adj Close`, `adj_close` and `ADJ CLOSE` are one.
+
+use std::collections::HashSet;
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::cells::{Cell, MOST_LINES, Rows};
+use super::choices::Choices;
+use super::dates::are_dates;
+use super::number::{is_number, looks_numeric};
+use super::outcome::Stop;
+
+/// Headings of columns that are dates even where their cells are not understood.
+const DATES: [&str; 14] = [
+    "date",
+    "dates",
+    "datetime",
+    "timestamp",
+    "time",
+    "day",
+    "week",
+    "month",
+    "quarter",
+    "year",
+    "periodending",
+    "datum",
+    "monat",
+    "jahr",
+];
+/// Headings of the risky asset, the best first: what counts dividends before what may not. Programs write these, and nothing
+/// is asked beside them.
+const VALUES: [&str; 13] = [
+    "return",
+    "returns",
+    "riskyreturn",
+    "marketreturn",
+    "simplereturn",
+    "totalreturn",
+    "ret",
+    "adjclose",
+    "adjustedclose",
+    "close",
+    "closelast",
+    "price",
+    "nav",
+];
+/// Headings of the bank.
+const BANKS: [&str; 6] = ["riskfreereturn", "riskfreerate", "riskfree", "bankreturn", "rf", "rate"];
+/// What stands where a number is missing: never the name of a column.
+const MISSING: [&str; 9] = ["n/a", "na", "#n/a", "#na", "nan", "null", "none", "-", "."];
+/// Columns that a question shows.
+const OFFERED: usize = 50;
+const MOST_COLUMNS: usize = 1000;
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Holds {
+    /// When the periods ended.
+    Dates,
+    /// Returns or prices.
+    Values,
+    /// What the bank pays.
+    Rate,
+    /// Words, the numbers of the rows, or dates beside the dates.
+    Other,
+}
+
+/// A column that was found.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct ColumnFound {
+    /// Its heading, or its number; empty where the text is one run of numbers.
+    pub name: String,
+    /// What it holds.
+    pub holds: Holds,
+}
+
+/// A column of a text.
+pub struct Column<'a> {
+    pub name: String,
+    pub holds: Holds,
+    pub cells: Vec<Cell<'a>>,
+}
+
+impl Column<'_> {
+    pub fn texts(&self) -> Vec<&str> {
+        self.cells.iter().map(|cell| cell.text.as_ref()).collect()
+    }
+
+    fn given(&self) -> Vec<&str> {
+        self.texts().into_iter().filter(|text| !text.is_empty()).collect()
+    }
+
+    fn is_mostly_numbers(&self) -> bool {
+        let given = self.given();
+        !given.is_empty()
+            && 2 * given.iter().filter(|text| looks_numeric(text) || is_number(text)).count() > given.len()
+    }
+
+    /// Words with digits, another in every row: dates in a form that is not known here, most likely.
+    fn is_labels(&self) -> bool {
+        let texts = self.texts();
+        let distinct: HashSet<&str> = texts.iter().copied().collect();
+        distinct.len() == texts.len() && texts.iter().all(|text| text.contains(|letter: char| letter.is_ascii_digit()))
+    }
+
+    /// Whether the column only counts: 0, 1, 2 and so on, as spreadsheets and programs number their rows.
+    fn counts(&self) -> bool {
+        let from = self.cells.first().and_then(|cell| cell.text.parse::<usize>().ok()).filter(|from| *from <= 1);
+        from.is_some_and(|from| self.cells.iter().zip(from..).all(|(cell, row)| cell.text == row.to_string()))
+    }
+}
+
+/// A text as columns of one length.
+pub struct Sheet<'a> {
+    pub columns: Vec<Column<'a>>,
+    pub remarks: usize,
+}
+
+pub fn plain(name: &str) -> String {
+    name.to_lowercase().chars().filter(|letter| letter.is_alphanumeric()).collect()
+}
+
+impl<'a> Sheet<'a> {
+    /// # Errors
+    /// Lines of different lengths, no numbers, or it is not clear whether they are columns.
+    pub fn of(text: &'a str, said: &Choices) -> Result<Self, Stop> {
+        let Rows { mut rows, remarks } = Rows::of(text, said)?;
+        let heading = is_heading(&rows).then(|| rows.remove(0));
+        let widths: HashSet<usize> = rows.iter().map(Vec::len).collect();
+        let is_narrow = widths.len() == 1 && widths.contains(&1);
+        let is_plain =
+            heading.is_none() && rows.iter().flatten().all(|cell| cell.text.is_empty() || is_number(&cell.text));
+        let is_run = heading.is_none() && rows.len() == 1;
+        if is_narrow || is_run || (is_plain && (widths.len() > 1 || said.one_record == Some(true))) {
+            return run(rows, heading).map(|column| Sheet { columns: vec![column], remarks });
+        }
+        let columns = columns(rows, heading)?;
+        let is_open =
+            is_plain && said.one_record.is_none() && columns.iter().all(|column| column.holds == Holds::Values);
+        if is_open { Err(layout(&columns)) } else { Ok(Sheet { columns, remarks }) }
+    }
+
+    pub fn found(&self) -> Vec<ColumnFound> {
+        let found = |column: &Column| ColumnFound { name: column.name.clone(), holds: column.holds };
+        self.columns.iter().map(found).collect()
+    }
+
+    pub fn column(&self, holds: Holds) -> Option<&Column<'a>> {
+        self.columns.iter().find(|column| column.holds == holds)
+    }
+
+    /// The columns that are read: those said, the only one there is, or the one whose heading is the best.
+    pub fn chosen(&self, said: &Choices) -> Result<Vec<&Column<'a>>, Stop> {
+        if !said.columns.is_empty() {
+            return said.columns.iter().map(|name| self.named(name)).collect();
+        }
+        let values: Vec<&Column> = self.columns.iter().filter(|column| column.holds == Holds::Values).collect();
+        let best = |wanted: &&str| values.iter().copied().find(|column| plain(&column.name) == **wanted);
+        match values[..] {
+            [] => Err(self.without_numbers()),
+            [only] => Ok(vec![only]),
+            _ => match VALUES.iter().find_map(|wanted| best(&wanted)) {
+                Some(best) => Ok(vec![best]),
+                None => Err(ask(&values)),
+            },
+        }
+    }
+
+    fn named(&self, name: &str) -> Result<&Column<'a>, Stop> {
+        let number = || self.columns.get(name.parse::<usize>().ok()?.checked_sub(1)?);
+        let found = self.columns.iter().find(|column| column.name == name);
+        let found = found.or_else(|| self.columns.iter().find(|column| plain(&column.name) == plain(name)));
+        let names =
+            || self.columns.iter().map(|column| column.name.as_str()).take(OFFERED).collect::<Vec<_>>().join(", ");
+        found.or_else(number).ok_or_else(|| Stop::refused(format!("There is no column {name}: there are {}.", names())))
+    }
+
+    fn without_numbers(&self) -> Stop {
+        let others = self.columns.iter().filter(|column| column.holds != Holds::Dates);
+        let cell = others.flat_map(|column| column.cells.iter().map(|cell| (cell, column.name.as_str())));
+        match cell.clone().find(|(cell, _)| !cell.text.is_empty()) {
+            Some((cell, name)) => cell.refused(name, "must be a number in one column at least"),
+            None => Stop::refused("There are dates, and no returns beside them."),
+        }
+    }
+}
+
+/// The first row names the columns where it holds words alone, or nothing above a column of dates.
+fn is_heading(rows: &[Vec<Cell>]) -> bool {
+    let [first, rest @ ..] = rows else { return false };
+    let is_word = |cell: &Cell| {
+        let is_missing = MISSING.contains(&cell.text.to_lowercase().as_str());
+        !is_number(&cell.text) && !is_missing && !are_dates(&[cell.text.as_ref()], true)
+    };
+    let below =
+        |index: usize| rest.iter().filter_map(|row| row.get(index)).map(|cell| cell.text.as_ref()).collect::<Vec<_>>();
+    let is_above_dates = |(index, cell): (usize, &Cell)| cell.text.is_empty() && are_dates(&below(index), false);
+    !rest.is_empty() && (first.iter().all(is_word) || first.iter().enumerate().any(is_above_dates))
+}
+
+/// Numbers one after the other, line by line.
+fn run<'a>(rows: Vec<Vec<Cell<'a>>>, heading: Option<Vec<Cell>>) -> Result<Column<'a>, Stop> {
+    let name = heading.and_then(|heading| heading.first().map(|cell| cell.text.to_string())).unwrap_or_default();
+    let cells: Vec<Cell> = rows.into_iter().flatten().filter(|cell| !cell.text.is_empty()).collect();
+    if cells.len() > MOST_LINES {
+        return Err(Stop::refused(format!("The text has {} numbers: must have at most {MOST_LINES}.", cells.len())));
+    }
+    let column = Column { name, holds: Holds::Values, cells };
+    if are_dates(&column.texts(), true) {
+        let Some(first) = column.cells.first() else { return Err(Stop::refused("There are no numbers in the text.")) };
+        return Err(first.refused(&column.name, "must have a return beside it, being a date"));
+    }
+    Ok(column)
+}
+
+fn columns<'a>(rows: Vec<Vec<Cell<'a>>>, heading: Option<Vec<Cell>>) -> Result<Vec<Column<'a>>, Stop> {
+    let width = heading.as_ref().or(rows.first()).map_or(0, Vec::len);
+    if let Some(odd) = rows.iter().find(|row| row.len() != width) {
+        let rule = format!(
+            "ends a line of {} cells, where there must be {width} as in the first: a number with a comma in it must stand in \
+             quotes, or cells be parted by semicolons",
+            odd.len()
+        );
+        return Err(odd[odd.len() - 1].refused("", &rule));
+    }
+    if width > MOST_COLUMNS {
+        return Err(Stop::refused(format!("The text has {width} columns: must have at most {MOST_COLUMNS}.")));
+    }
+    let mut columns: Vec<Column> = Vec::with_capacity(width);
+    for index in 0..width {
+        let own = heading.as_ref().map(|heading| heading[index].text.to_string());
+        let is_taken = |name: &String| name.is_empty() || columns.iter().any(|other| other.name == *name);
+        let name = own.filter(|name| !is_taken(name)).unwrap_or_else(|| format!("column {}", index + 1));
+        columns.push(Column { name, holds: Holds::Other, cells: Vec::new() });
+    }
+    for row in rows {
+        columns.iter_mut().zip(row).for_each(|(column, cell)| column.cells.push(cell));
+    }
+    judge(&mut columns);
+    Ok(columns)
+}
+
+/// Says of each column what it holds.
+fn judge(columns: &mut [Column]) {
+    let is_date = |column: &Column| {
+        let given = column.given();
+        !given.is_empty() && are_dates(&given, false)
+    };
+    let is_dates: Vec<bool> = columns.iter().map(is_date).collect();
+    // What looks like dates in no known form is set aside where nothing else is dates.
+    let named = |column: &Column| {
+        DATES.contains(&plain(&column.name).as_str()) || (!column.is_mostly_numbers() && column.is_labels())
+    };
+    let dates = is_dates.iter().position(|is| *is).or_else(|| columns.iter().position(&named));
+    let is_numbers = |(column, is_dates): (&Column, &bool)| !is_dates && !named(column) && column.is_mostly_numbers();
+    let mut values: Vec<bool> = columns.iter().zip(&is_dates).map(is_numbers).collect();
+    let many = |values: &[bool]| values.iter().filter(|is| **is).count() > 1;
+    if many(&values) && values[0] && columns[0].counts() {
+        values[0] = false;
+    }
+    for (index, column) in columns.iter_mut().enumerate() {
+        if values[index] {
+            let is_bank = BANKS.contains(&plain(&column.name).as_str()) && many(&values);
+            values[index] = !is_bank;
+            column.holds = if is_bank { Holds::Rate } else { Holds::Values };
+        }
+    }
+    if let Some(dates) = dates {
+        columns[dates].holds = Holds::Dates;
+    }
+}
+
+fn ask(values: &[&Column]) -> Stop {
+    let option = |column: &&Column| {
+        let first: Vec<&str> = column.cells.iter().take(3).map(|cell| cell.text.as_ref()).collect();
+        let label = format!("{} ({} \u{2026})", column.name, first.join("; "));
+        (label, Choices { columns: vec![column.name.clone()], ..Choices::default() })
+    };
+    let options = values.iter().take(OFFERED).map(option).collect();
+    Stop::asked("columns", "Which column holds the returns or prices?", options)
+}
+
+fn layout(columns: &[Column]) -> Stop {
+    let count: usize = columns.iter().map(|column| column.cells.len()).sum();
+    let option = |label: String, one_record| (label, Choices { one_record: Some(one_record), ..Choices::default() });
+    let options =
+        vec![option("One record, read line by line".into(), true), option(format!("{} columns", columns.len()), false)];
+    let question = format!("Are these {count} numbers of one record, or columns of different things?");
+    Stop::asked("one_record", question, options)
+}
