@@ -37,7 +37,9 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "advice.js": SCRIPT,
         "api.js": SCRIPT,
         "chart.js": SCRIPT,
+        "comparators.js": SCRIPT,
         "correction.js": SCRIPT,
+        "course.js": SCRIPT,
         "dom.js": SCRIPT,
         "evaluation.js": SCRIPT,
         "evaluation_asking.js": SCRIPT,
@@ -55,7 +57,10 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "main.js": SCRIPT,
         "number_text.js": SCRIPT,
         "observe.js": SCRIPT,
+        "observed.js": SCRIPT,
         "pages.js": SCRIPT,
+        "periods.js": SCRIPT,
+        "picture.js": SCRIPT,
         "policies.js": SCRIPT,
         "policy.js": SCRIPT,
         "problem_words.js": SCRIPT,
@@ -72,6 +77,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "surface_worker.js": SCRIPT,
         "train.js": SCRIPT,
         "what_if.js": SCRIPT,
+        "worst_market.js": SCRIPT,
     };
     let example: (_, _, &[u8]) =
         ("us_market_monthly.csv", "text/csv; charset=utf-8", include_bytes!("../../data/us_market_monthly.csv"));

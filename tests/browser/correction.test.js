@@ -36,7 +36,7 @@ const form = () => page.locator("form", { has: page.getByRole("button", { name: 
 test("the last period comes first, and the fields are those of their own form", async () => {
   await page.goto(`${ballast.url}/#/sessions/${session}`);
   await page.getByText("Put a period right").click();
-  assert.deepEqual(await form().getByLabel("Period").locator("option").allInnerTexts(), ["2, to 2008-02-28", "1, to 2008-01-28"]);
+  assert.deepEqual(await form().getByLabel("Period").locator("option").allInnerTexts(), ["February 2008", "January 2008"]);
   await form().getByText("Return, %").click();
   assert.equal(await page.evaluate(() => document.activeElement.form.textContent.includes("Put it right")), true);
 });
@@ -53,11 +53,11 @@ test("a return most likely mistyped is asked about, and a right one stands besid
   await page.waitForFunction(() => !document.querySelector(".observe button[disabled]"));
   assert.match(questions.join(), /standard deviations from the record[^]*Is it meant\?/);
   await form().getByLabel("Return, %").fill("-2");
-  await form().getByText("It went differently").click();
-  await form().getByLabel("Share held, %").fill("50");
+  await form().getByText("I held another share").click();
+  assert.equal(await form().getByLabel("Share held, %").inputValue(), "50");
   await form().getByRole("button", { name: "Put it right" }).click();
-  await page.getByText(/Period 2 was put right on .*: the index was revised/).waitFor();
-  const row = plain(await page.getByRole("row", { name: /^2 / }).innerText());
+  await page.getByText(/February 2008 was put right on .*: the index was revised/).waitFor();
+  const row = plain(await page.getByRole("row", { name: /^February 2008/ }).innerText());
   assert.match(row, /-2\.00 %\s+-3\.00 %/);
   const { corrections, wealth } = await call(ballast.url, `/sessions/${session}`);
   assert.equal(corrections, 1);
@@ -67,7 +67,34 @@ test("a return most likely mistyped is asked about, and a right one stands besid
 test("a period of which no return is known is reported as missing", async () => {
   await page.getByLabel("Given as").first().selectOption("missing");
   await page.getByText("No return; wealth").waitFor();
-  await page.getByRole("button", { name: "Report period 3" }).click();
-  await page.getByRole("heading", { name: "Period 4 of 4" }).waitFor();
-  assert.match(plain(await page.getByRole("row", { name: /^3 / }).innerText()), /missing/);
+  assert.equal(await page.getByLabel("Last day").first().inputValue(), "2008-03-28");
+  await page.getByRole("button", { name: "Report March 2008" }).click();
+  await page.getByRole("heading", { name: "April 2008, period 4 of 4" }).waitFor();
+  assert.match(plain(await page.getByRole("row", { name: /^March 2008/ }).innerText()), /missing/);
+});
+
+test("what was put right is undone, and what was there before stands again", async () => {
+  await page.getByRole("button", { name: "Undo", exact: true }).click();
+  await page.getByText(/: Correction 1 was undone/).waitFor();
+  const { observations, corrections } = await call(ballast.url, `/sessions/${session}/history`);
+  assert.ok(Math.abs(observations[1].now.log_return - Math.log(0.97)) < 1e-12);
+  assert.equal(observations[1].now.executed_allocation, 0.5);
+  assert.equal(corrections.length, 2);
+});
+
+test("the last report is taken back, and what it was stays on record", async () => {
+  const { session } = await call(ballast.url, "/sessions", { policy: (await call(ballast.url, "/policies")).policies[0].policy });
+  await call(ballast.url, "/observe", { session, period: 1, simple_return: 0.05, date: "2008-01-31" });
+  await page.goto(`${ballast.url}/#/sessions/${session}`);
+  page.removeAllListeners("dialog");
+  page.on("dialog", (dialog) => dialog.accept());
+  await page.getByRole("button", { name: "take it back" }).click();
+  await page.getByText("The report was taken back").waitFor();
+  const { observations } = await call(ballast.url, `/sessions/${session}/history`);
+  assert.deepEqual([observations[0].now.log_return ?? null, observations[0].now.reported.date], [null, "2008-01-31"]);
+  assert.ok(Math.abs(observations[0].log_return - Math.log(1.05)) < 1e-12);
+  await page.getByRole("button", { name: "Undo", exact: true }).click();
+  await page.getByText(/: Correction 1 was undone/).waitFor();
+  const now = (await call(ballast.url, `/sessions/${session}/history`)).observations[0].now;
+  assert.ok(Math.abs(now.log_return - Math.log(1.05)) < 1e-12);
 });

@@ -132,15 +132,15 @@ test("a session is opened, observed, and the same after a reload", async () => {
   session = page.url().split("/").pop();
   await page.getByText("returns seen", { exact: false }).first().waitFor();
   await page.getByLabel(/Return in period 1/).fill("1.2");
-  await page.getByText(/Log-return 0.01193; wealth 100.00/).waitFor();
+  await page.getByText(/Wealth 100\.00 \u2192 /).waitFor();
   await page.getByRole("button", { name: "Report period 1" }).click();
   await page.getByRole("heading", { name: "Period 2 of 4" }).waitFor();
   const { observations } = await call(ballast.url, `/sessions/${session}/history`);
   assert.equal(observations.length, 1);
   assert.ok(Math.abs(observations[0].log_return - Math.log1p(0.012)) < 1e-15);
   const shown = async () => {
-    await page.getByRole("slider", { name: "Returns seen and the worst law" }).waitFor();
-    await page.getByRole("slider", { name: "Worth for certain by radius" }).waitFor();
+    await page.getByRole("slider", { name: "Returns seen and the worst market" }).waitFor();
+    await page.getByRole("slider", { name: "Worth as much as a sure, by caution" }).waitFor();
     return page.locator("main").innerText();
   };
   const before = await shown();
@@ -158,7 +158,7 @@ test("a report whose answer is lost is sent again and counts once", async () => 
     { times: 1 },
   );
   await page.getByLabel(/Return in period 2/).fill("\u22122.5");
-  await page.getByText("It went differently").click();
+  await page.getByText("I held another share").click();
   await page.getByLabel("Share held, %").fill("50");
   await page.getByRole("button", { name: "Report period 2" }).click();
   await page.getByText("Sending it again is safe").waitFor();
@@ -215,7 +215,7 @@ test("a long training is cancelled", async () => {
 test("what if is asked of a session", async (t) => {
   const { paths } = await call(ballast.url, "/openapi.json");
   await go(`#/sessions/${session}`);
-  const curve = page.getByRole("slider", { name: /by radius/ });
+  const curve = page.getByRole("slider", { name: /by caution/ });
   if (!("/what-if" in paths)) {
     assert.equal(await curve.count(), 0);
     return t.skip("this service has no /what-if");

@@ -53,9 +53,9 @@ test("a session says what is added at the end of the period, reckons with it, an
   const { session } = await call(ballast.url, "/sessions", { policy, holding: 0.2 });
   await page.goto(`${ballast.url}/#/sessions/${session}`);
   await page.getByText("At the end of the period 5.00 is added.").first().waitFor();
-  assert.match(await main(), /Band, low end/);
+  assert.match(await main(), /Best kept, low end/);
   await page.getByLabel("Return in period 1").fill("2");
-  const foretold = /wealth 100\.00 \u2192 ([\d.]+) at/.exec(await main())[1];
+  const foretold = /Wealth 100\.00 \u2192 ([\d.]+) at/.exec(await main())[1];
   await page.getByRole("button", { name: "Report period 1" }).click();
   await page.getByRole("heading", { name: "Period 2 of 3" }).waitFor();
   const { wealth } = await call(ballast.url, `/sessions/${session}`);
@@ -94,7 +94,7 @@ test("a policy that forgets is asked for by the form, and sessions by it renew t
     assert.deepEqual({ renew, rolling }, told);
   }
   assert.equal(await page.getByRole("heading", { name: "Period 1 of 2" }).count(), 0);
-  await page.locator("#check").filter({ hasNotText: "Being checked" }).waitFor();
+  await page.getByRole("slider", { name: "Returns seen and the worst market" }).waitFor();
   const words = await main();
   assert.match(words, /0 periods observed\n/);
   assert.doesNotMatch(words, /undefined|at the horizon/);

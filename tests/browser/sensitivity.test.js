@@ -1,11 +1,11 @@
-// What the session's page says of how near the advice is to changing: words from an answer, and on the page by a button.
+// What the session's page says of how near the advice is to changing: words from an answer, and on the page by themselves.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { browser, call, service, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
 
-const { sentences } = await dashboardModule("sensitivity.js");
+const { sentences, headline } = await dashboardModule("sensitivity.js");
 const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
 const said = (answer) => plain(sentences(answer).join(" "));
 
@@ -47,7 +47,14 @@ test("who is in the bank is told what it would take, and what never would", () =
   assert.match(banked(37), /^No return of the record by itself makes a difference/);
 });
 
-test("the page asks when the button is pressed, and says it", async () => {
+test("how near is said first, by what an unusual period would do", () => {
+  const moved = (low, high) => plain(headline({ allocation: 0.43, sensitivity: { next_return: { low: at(-0.07, low), high: at(0.06, high) } } }, "month"));
+  assert.equal(moved(0, 0.612), "It is near to changing: an unusual month would move it by 43 points.");
+  assert.equal(moved(0.4, 0.48), "It moves a little: an unusual month would move it by up to 5.0 points.");
+  assert.equal(moved(0.425, 0.44), "It is steady: hardly any month would move it by more than 2 points.");
+});
+
+test("the page asks by itself, and says it", async () => {
   const [ballast, chromium] = await Promise.all([service(), browser()]);
   try {
     const page = await chromium.newPage();
@@ -57,11 +64,11 @@ test("the page asks when the button is pressed, and says it", async () => {
     const policy = await trained(ballast.url, { problem, design: { count: 50 } });
     const { session } = await call(ballast.url, "/sessions", { policy });
     await page.goto(`${ballast.url}/#/sessions/${session}`);
-    await page.getByRole("button", { name: "Ask how near" }).click();
     await page.getByText(/The record has paid/).waitFor();
     const told = sentences(await call(ballast.url, `/action?session=${session}&sensitivity=true`));
     const shown = plain(await page.locator("main").innerText());
-    for (const words of told) assert.ok(shown.includes(plain(words)), words);
+    const first = headline(await call(ballast.url, `/action?session=${session}&sensitivity=true`));
+    for (const words of [first, ...told]) assert.ok(shown.includes(plain(words)), words);
   } finally {
     await chromium.close();
     await ballast.stop();

@@ -1,9 +1,8 @@
-// The one advice of a session's page. It is read off the policy and stands at once; the step solved anew checks it, and
-// takes its place where the two differ by more than the page says.
+// The one advice of a session's page, in money and in percent. The step solved anew is a check of it, told behind a fold.
 
-import { announce, h, section } from "./dom.js";
+import { h, section } from "./dom.js";
 import { endWords } from "./flows.js";
-import { allocation, percent, significant, wealth } from "./format.js";
+import { allocation, figures, percent, points, significant, wealth } from "./format.js";
 
 /** The advice is told to a tenth of a percent, so this far the policy and the step solved anew say the same. */
 const TOLERANCE = 0.001;
@@ -15,75 +14,88 @@ export const SOURCES = {
   resolved_other_radius: "solved anew for another radius",
   resolved_outside_design: "solved anew, because this state lies outside the policy\u2019s design",
   unsolved:
-    "because the step has no finite solution here, or wealth does not last for what is withdrawn: all stays in the bank, which no law can hurt",
+    "because the step has no finite solution here, or wealth does not last for what is withdrawn: all stays in the bank, which no market can hurt",
 };
 
 /** Whether two allocations are the same advice. */
 export const agrees = (one, other) => Math.abs(one - other) <= TOLERANCE;
 
 /**
- * The advice of `action`, above `rest`; `horizon` is null where there is none. `checked(anew)` takes what `/action` says of the same state with the step solved
- * anew, and gives the advice that stands; `unchecked(words)` says that it could not be.
+ * The advice of `action` with what follows it, `rest`. `place` is `{heading, end, price, cost, wealth}`: what the period is called,
+ * when it is all for, the last price reported or null, and the session's terms. `{element, quant, checked(anew), unchecked(words)}`:
+ * `checked` takes what `/action` says of the same state with the step solved anew, `unchecked` why it could not be.
  */
-export function adviceView(action, horizon, rest) {
-  const amount = h("strong", {}, allocation(action.allocation));
-  const order = h("p", { class: "sentence" }, trade(action));
-  const then = horizon === null ? "a horizon of the policy from now" : "at the horizon";
-  const sentence = h("p", { class: "sentence" }, why(action, then));
-  const end = action.contribution === 0 ? "" : h("p", { class: "sentence" }, endWords(action.contribution));
-  const read = action.source === "policy_surrogate";
-  const note = h(
-    "p",
-    { class: "note", id: "check" },
-    read ? `${exactly(action)}. Being checked\u2026` : `${exactly(action)}.`,
-  );
-  const big = h("p", { class: "big" }, h("span", {}, "Hold "), amount, h("span", {}, " in the risky asset"));
+export function adviceView(action, place, rest) {
+  const note = h("p", { class: "note", id: "check" }, `${exactly(action)}. The step is being solved anew, as a check\u2026`);
   const element = section(
-    `Period ${action.period}${horizon === null ? "" : ` of ${horizon}`}`,
-    h("div", { class: "advice", id: "advice", tabindex: -1 }, big, order, sentence, end, note),
+    place.heading,
+    h(
+      "div",
+      { class: "advice", id: "advice", tabindex: -1 },
+      h("p", { class: "big" }, h("span", {}, "Hold "), h("strong", {}, allocation(action.allocation)), h("span", {}, " in stocks")),
+      h("p", { class: "sentence order" }, order(action, place)),
+      action.caution.map(({ sentence }) => h("p", { class: "note wrong caution" }, sentence)),
+      h("p", { class: "sentence" }, why(action, place.end)),
+      action.contribution === 0 ? "" : h("p", { class: "sentence" }, endWords(action.contribution)),
+    ),
     rest,
   );
   const checked = (anew) => {
-    if (!read) return action;
-    if (agrees(anew.allocation, action.allocation)) {
-      note.textContent = `${exactly(action)}. Checked: the step solved anew is within ${percent(TOLERANCE).replace("%", "points")} of it.`;
-      return action;
-    }
-    amount.textContent = allocation(anew.allocation);
-    order.textContent = trade(anew);
-    sentence.replaceChildren(...why(anew, then));
-    const apart = percent(Math.abs(anew.allocation - action.allocation)).replace("%", "points");
-    const found = anew.source === "unsolved" ? exactly(anew) : "Solved anew";
-    note.textContent = `${found}: what was read off the policy, ${allocation(action.allocation)}, is ${apart} away from it.`;
-    announce(`The advice was solved anew: hold ${amount.textContent}.`);
-    return { ...anew, replaced: true };
+    const apart = points(Math.abs(anew.allocation - action.allocation));
+    const found = anew.source === "unsolved" ? exactly(anew) : `The step solved anew holds ${percent(anew.allocation)}`;
+    note.textContent = agrees(anew.allocation, action.allocation)
+      ? `${exactly(action)}. Checked: the step solved anew is within ${points(TOLERANCE)} of it.`
+      : `${exactly(action)}. ${found}, ${apart} away from it.`;
   };
   const unchecked = (words) => (note.textContent = `${exactly(action)}. It could not be checked: ${words}`);
-  return { element, checked, unchecked };
+  return { element, quant: [note, h("p", { class: "note" }, quantWords(action))], checked, unchecked };
 }
 
-const exactly = ({ allocation, source }) => `Allocation ${significant(allocation, 4)}, ${SOURCES[source]}`;
+const exactly = ({ allocation, source }) => `Allocation ${percent(allocation, 2)}, ${SOURCES[source]}`;
 
-/** What to do about the share held now. Less than the advice is told to is nothing. */
-function trade({ holding, band: [low, high], trade: change }) {
+/** What the advice comes to in money and, where a price is known, in shares; what is traded pays its cost. */
+export function inMoney({ allocation: advised, holding, trade }, { wealth: whole, cost, price }) {
+  const all = whole * (1 - cost * Math.abs(trade));
+  const [held, now] = [advised * all, holding * whole];
+  const parts = { all, held, now, bank: all - held, trade: held - now, cost: whole - all };
+  return price === null ? parts : { ...parts, shares: held / price, traded: (held - now) / price };
+}
+
+/** What to do about what is held now. Less than the advice is told to is nothing. */
+function order(action, place) {
+  const { all, held, now, trade, bank, cost, shares, traded } = inMoney(action, place);
+  const [low, high] = action.band;
+  const still = Math.abs(action.trade) < TOLERANCE / 2;
+  const stocks = `${wealth(held)} of ${wealth(all)} in stocks, ${wealth(bank)} in the bank`;
+  const sized = traded === undefined ? "" : ` (about ${number(Math.abs(traded))} shares at ${wealth(place.price)})`;
+  const paid = cost > 0 && !still ? `, which costs ${wealth(cost)}` : "";
+  const act = still
+    ? [h("b", {}, "Nothing to trade"), `: ${wealth(now)} is held now.`]
+    : [h("b", {}, `${trade > 0 ? "Buy" : "Sell"} ${wealth(Math.abs(trade))}`), `${sized}${paid}: ${wealth(now)} is held now, ${allocation(action.holding)}.`];
   const kept = low < high ? ` Anything from ${allocation(low)} to ${allocation(high)} is best kept as it is.` : "";
-  const now = `${allocation(holding)} is held now: `;
-  if (Math.abs(change) < TOLERANCE / 2) return `${now}nothing to trade.${kept}`;
-  return `${now}${change > 0 ? "buy" : "sell"} ${percent(Math.abs(change))} of wealth.${kept}`;
+  return [`${stocks}${shares === undefined || shares === 0 ? "" : `, ${number(shares)} shares`}. `, ...act, kept];
 }
 
-function why({ allocation, certainty_equivalent, floor }, then) {
+/** So many shares. */
+const number = (shares) => (shares >= 100 ? wealth(Math.round(shares)).replace(/\.00$/, "") : figures(shares, 3));
+
+function why({ allocation, certainty_equivalent, floor }, end) {
   if (allocation === 0)
-    return [
-      "Against the worst law the returns seen cannot rule out, nothing beats the bank, which reaches ",
-      h("b", {}, wealth(floor)),
-      ".",
-    ];
+    return ["In the worst market your record still allows nothing beats the bank, which reaches ", h("b", {}, wealth(floor)), ` ${end}.`];
   return [
-    "Against the worst law the returns seen cannot rule out, this is worth ",
+    "Even in the worst market your record still allows, this is worth as much as a sure ",
     h("b", {}, wealth(certainty_equivalent)),
-    ` for certain ${then}, where the bank alone reaches `,
+    ` ${end}; all in the bank comes to `,
     h("b", {}, wealth(floor)),
     ".",
   ];
+}
+
+/** The figures behind the advice, in the words of the paper. */
+function quantWords({ radius, sample_size, effective_size, certainty_equivalent, floor, surrogate_sd }) {
+  const weighed = effective_size < sample_size - 0.5 ? `, worth ${significant(effective_size, 3)} of equal weight` : "";
+  return [
+    `Radius of the uncertainty set ${figures(radius, 3)}, around ${sample_size} returns${weighed}.`,
+    `Certainty equivalent ${wealth(certainty_equivalent)}, floor ${wealth(floor)}; predicted standard deviation of its log ${significant(1e4 * surrogate_sd, 2)} bp.`,
+  ].join(" ");
 }

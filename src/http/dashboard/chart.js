@@ -1,6 +1,7 @@
 // Charts of a few hundred points, as SVG: drawn at the width they have, read by pointer, by keyboard and as a table.
 
 import { disclosure, h, s, table } from "./dom.js";
+import { pictureButtons } from "./picture.js";
 
 /** Round numbers that span `[low, high]` with about `wanted` steps. */
 export function ticks(low, high, wanted) {
@@ -27,8 +28,12 @@ export function extent(values, also = []) {
   if (finite.length === 0) return [0, 1];
   const [low, high] = [Math.min(...finite), Math.max(...finite)];
   const room = high > low ? 0.05 * (high - low) : 0.05 * Math.abs(high) || 0.5;
+  if (high === low) return [also.includes(low) ? low : low - room, high + room];
   return [also.includes(low) ? low : low - room, also.includes(high) ? high : high + room];
 }
+
+/** No drawing is narrower, in pixels. */
+const LEAST_WIDTH = 180;
 
 /** An element whose drawing follows its width: `draw(width)` gives the SVG's children. */
 export function plot(height, draw) {
@@ -41,7 +46,7 @@ export function plot(height, draw) {
     );
     holder.replaceChildren(picture);
   };
-  holder.redraw = () => holder.clientWidth > 0 && drawn(holder.clientWidth);
+  holder.redraw = () => holder.clientWidth > 0 && drawn(Math.max(LEAST_WIDTH, holder.clientWidth));
   new ResizeObserver(holder.redraw).observe(holder);
   return holder;
 }
@@ -85,6 +90,9 @@ export function walkable(holder, { label, count, start, at, read }) {
   go(start);
 }
 
+/** Half the width of a letter of a label, in pixels. */
+const LETTER_HALF = 3.4;
+
 /** Horizontal rules with their values, and the labels below. */
 export function axes({ x, y, xTicks, yTicks, xFormat, yFormat, left, right, bottom }) {
   return [
@@ -96,13 +104,11 @@ export function axes({ x, y, xTicks, yTicks, xFormat, yFormat, left, right, bott
         yFormat(tick, yTicks[1] - yTicks[0]),
       ),
     ]),
-    xTicks.map((tick) =>
-      s(
-        "text",
-        { class: "tick", x: x(tick), y: bottom + 18, "text-anchor": "middle" },
-        xFormat(tick, xTicks[1] - xTicks[0]),
-      ),
-    ),
+    xTicks.map((tick) => {
+      const words = xFormat(tick, xTicks[1] - xTicks[0]);
+      const beyond = x(tick) + LETTER_HALF * words.length > right;
+      return s("text", { class: "tick", x: beyond ? right : x(tick), y: bottom + 18, "text-anchor": beyond ? "end" : "middle" }, words);
+    }),
   ];
 }
 
@@ -121,7 +127,7 @@ const block = (index) =>
 
 /** Title, what is read off, the plot, and the same as a table. */
 export function figure({ title, legend, holder, rows, note }) {
-  return h(
+  const element = h(
     "figure",
     { class: "chart" },
     h("figcaption", {}, h("span", { class: "title" }, title), legend),
@@ -129,15 +135,19 @@ export function figure({ title, legend, holder, rows, note }) {
     note ? h("p", { class: "note" }, note) : null,
     rows ? disclosure("As a table", rows) : null,
   );
+  const saving = pictureButtons(element);
+  element.append(saving);
+  return element;
 }
 
 /**
  * Lines over common positions.
- * x: `{values, domain, label, format, tick, whole, between}`, `between` where x names the unit before it; y: `{format, tick, also}`;
- * series: `[{name, values, kind: "line" | "bars" | "levels", bare}]`, null where there is nothing. Bars and levels span
- * the unit before their x; a bare line has no dots. What is read at first is `start`, or the last value of the first series; `gutter` lines up charts that stand above each other.
+ * x: `{values, domain, label, here, format, tick, whole, between}`, `between` where x names the unit before it and `here` what stands beside a value read, where that is not label and format; y: `{format, tick, also}`;
+ * series: `[{name, values, kind: "line" | "bars" | "levels", bare, colour}]`, null where there is nothing. Bars and levels span
+ * the unit before their x; a bare line has no dots; `colour` is the series' place unless said. What is read at first is `start`, or the last value of the first series; `gutter` lines up charts that stand above each other.
  */
-export function lineChart({ title, x, y, series, height = 190, note, start: first, gutter = 0 }) {
+export function lineChart({ title, x, y, series: given, height = 190, note, start: first, gutter = 0 }) {
+  const series = given.map((one, index) => ({ colour: index, ...one }));
   const shown = x.values
     .map((_, index) => index)
     .filter((index) => series.some(({ values }) => Number.isFinite(values[index])));
@@ -147,8 +157,8 @@ export function lineChart({ title, x, y, series, height = 190, note, start: firs
     "span",
     { class: "legend" },
     here,
-    series.map(({ name, kind }, index) =>
-      h("span", {}, name ? [kind === "bars" ? block(index) : swatch(index), `${name} `] : null, outputs[index]),
+    series.map(({ name, kind, colour }, index) =>
+      h("span", {}, name ? [kind === "bars" ? block(colour) : swatch(colour), `${name} `] : null, outputs[index]),
     ),
   );
   const yDomain = extent(
@@ -190,7 +200,7 @@ export function lineChart({ title, x, y, series, height = 190, note, start: firs
         yFormat: y.tick,
       }),
       cursor,
-      series.map((one, index) => drawn(one, index, x.values, frame)),
+      series.map((one) => drawn(one, x.values, frame)),
     ];
   });
   const mark = () => {
@@ -201,7 +211,7 @@ export function lineChart({ title, x, y, series, height = 190, note, start: firs
   const read = (at) => {
     position = at;
     const index = shown[at];
-    here.textContent = `${x.label} ${x.format(x.values[index])}`;
+    here.textContent = x.here ? x.here(x.values[index]) : `${x.label} ${x.format(x.values[index])}`;
     const words = series.map(({ values }, k) => (outputs[k].textContent = y.format(values[index])));
     mark();
     return `${here.textContent}: ${series.map(({ name }, k) => `${name} ${words[k]}`).join(", ")}`;
@@ -221,32 +231,44 @@ export function lineChart({ title, x, y, series, height = 190, note, start: firs
   return figure({ title, legend, holder, note, rows: () => table(title, columns, shown) });
 }
 
-function drawn({ values, kind, bare }, index, positions, { x, y, bottom }) {
+/** Bars narrower than this, in pixels, are drawn as one shape. */
+const NARROWEST = 5;
+
+function drawn({ values, kind, bare, colour }, positions, { x, y, bottom }) {
   const points = values.map((value, k) => [x(positions[k]), y(value), value]);
+  const seen = points.filter(([, , value]) => Number.isFinite(value));
+  const wide = x(1) - x(0);
+  if (kind === "bars" && wide < NARROWEST) return s("path", { class: `bar s${colour}`, d: steps(seen, wide, bottom) });
   if (kind === "bars") {
-    const wide = x(1) - x(0);
-    return points
-      .filter(([, , value]) => Number.isFinite(value))
-      .map(([right, top]) =>
-        s("rect", {
-          class: `bar s${index}`,
-          x: right - wide + 1,
-          width: Math.max(1, wide - 2),
-          y: Math.min(top, bottom - 1),
-          height: Math.max(1, bottom - top),
-        }),
-      );
+    const zero = Math.min(bottom, Math.max(10, y(0)));
+    return seen.map(([right, top]) =>
+      s("rect", {
+        class: `bar s${colour}`,
+        x: right - wide + 1,
+        width: Math.max(1, wide - 2),
+        y: Math.min(top, zero, bottom - 1),
+        height: Math.max(1, Math.abs(zero - top)),
+      }),
+    );
   }
-  const dots = points.filter(([, , value]) => Number.isFinite(value));
+  if (kind === "levels" && wide < NARROWEST) return s("path", { class: `line s${colour}`, d: steps(seen, wide) });
   if (kind === "levels")
-    return dots.map(([right, py]) =>
-      s("line", { class: `level s${index}`, x1: right - x(1) + x(0) + 1, x2: right - 1, y1: py, y2: py }),
+    return seen.map(([right, py]) =>
+      s("line", { class: `level s${colour}`, x1: right - wide + 1, x2: right - 1, y1: py, y2: py }),
     );
   const path = points.map(([px, py, value], k) => {
     if (!Number.isFinite(value)) return "";
     return `${k > 0 && Number.isFinite(points[k - 1][2]) ? "L" : "M"}${px.toFixed(1)} ${py.toFixed(1)}`;
   });
   const ends =
-    !bare && dots.length <= 40 ? dots.map(([cx, cy]) => s("circle", { class: `dot s${index}`, cx, cy, r: 2.5 })) : null;
-  return [s("path", { class: `line s${index}`, d: path.join("") }), ends];
+    !bare && seen.length <= 40 ? seen.map(([cx, cy]) => s("circle", { class: `dot s${colour}`, cx, cy, r: 2.5 })) : null;
+  return [s("path", { class: `line s${colour}`, d: path.join("") }), ends];
+}
+
+/** A staircase over positions that end a unit each, closed along `bottom` where that is given. */
+function steps(seen, wide, bottom) {
+  if (seen.length === 0) return "";
+  const stairs = seen.map(([right, top]) => `V${top.toFixed(1)}H${right.toFixed(1)}`).join("");
+  const [left, top] = [(seen[0][0] - wide).toFixed(1), seen[0][1].toFixed(1)];
+  return bottom === undefined ? `M${left} ${top}${stairs}` : `M${left} ${bottom}${stairs}V${bottom}Z`;
 }

@@ -6,13 +6,14 @@ import { input, select } from "./form.js";
 import { reportFields, sendReports } from "./report_fields.js";
 
 /** The form for a session with observed periods. */
-export function correctionForm({ id, session, history, policy, refresh }) {
+export function correctionForm({ id, session, history, policy, calendar, refresh }) {
   const within = "correction-";
-  const periods = history.observations.map((row) => {
-    const { date } = standing(row);
-    return [row.period, date ? `${row.period}, to ${date}` : row.period];
-  });
-  const period = select({ within, name: "period", label: "Period", choices: periods.reverse() });
+  const periods = history.observations.map(({ period }) => [period, calendar.name(period)]);
+  const fill = (chosen) => {
+    const row = history.observations[chosen - 1];
+    fields.fill(standing(row), (row.now ?? row).log_return);
+  };
+  const period = select({ within, name: "period", label: "Period", choices: periods.reverse(), changed: (value) => fill(Number(value)) });
   const { rate_per_step, contributions } = policy.specification.problem;
   const fields = reportFields({
     within,
@@ -21,6 +22,7 @@ export function correctionForm({ id, session, history, policy, refresh }) {
     contribution: Array.isArray(contributions) ? null : contributions,
   });
   fields.advised(null);
+  fill(history.observations.length);
   const reason = input({
     within,
     name: "reason",
@@ -34,7 +36,7 @@ export function correctionForm({ id, session, history, policy, refresh }) {
   const form = h(
     "form",
     { class: "observe", novalidate: true },
-    h("p", { class: "note" }, "All of the period is said anew: what is left blank is what it is by default, whatever was reported first."),
+    h("p", { class: "note" }, "The fields hold what stands now. What was reported before stays on record beside it."),
     h("div", { class: "fields" }, period.element, reason.element),
     fields.element,
     message,

@@ -7,7 +7,7 @@ const added = ({ contributions }, period) =>
   Array.isArray(contributions) ? contributions[period - 1] : contributions;
 
 /** The terms of a period of a session, and the first period by them. */
-const termsOf = ({ terms, renewals }, period) =>
+export const termsOf = ({ terms, renewals }, period) =>
   renewals.findLast((renewal) => renewal.period <= period) ?? { terms, period: 1 };
 
 /** True where nothing is ever added or withdrawn. */
@@ -17,7 +17,7 @@ const none = ({ contributions }) => [contributions].flat().every((amount) => amo
 export const standing = (observation) => observation?.now?.reported ?? observation?.reported ?? {};
 
 /** What was added at the end of a period as it is reported, and what would be of one that is not. */
-function addedIn(history, period) {
+export function addedIn(history, period) {
   const { terms, period: first } = termsOf(history, period);
   return standing(history.observations[period - 1]).flow ?? added(terms, period - first + 1);
 }

@@ -40,6 +40,21 @@ export function significant(value, digits = 3) {
     .replaceAll("-", MINUS);
 }
 
+/** `digits` significant digits, zeros among them: in a column every number has as many. */
+export function figures(value, digits = 3) {
+  if (value === 0 || !Number.isFinite(value ?? Number.NaN)) return significant(value, digits);
+  const exponent = Math.floor(Math.log10(Math.abs(Number(value.toPrecision(digits)))));
+  return exponent >= -4 && exponent < digits ? grouped(value, digits - 1 - exponent) : significant(value, digits);
+}
+
+/** A difference of shares or returns, in points of a hundred. */
+export function points(fraction, digits = 1) {
+  return `${grouped(100 * fraction, digits)} points`;
+}
+
+/** How often something of a probability happens: one in so many. */
+export const oneIn = (probability) => count(Math.max(1, Math.round(1 / probability)));
+
 /** A number on an axis, with the digits that its `step` asks for. */
 export function tick(value, step) {
   const size = Math.max(Math.abs(value), Math.abs(step) || Math.abs(value));
@@ -67,7 +82,7 @@ function decimals(step) {
 
 /** A difference of log certainty equivalents, in basis points (1e-4). */
 export function basisPoints(value) {
-  return value === null || value === undefined ? "\u2013" : `${significant(1e4 * value, 2)}${NARROW}bp`;
+  return value === null || value === undefined ? "\u2013" : `${figures(1e4 * value, 2)}${NARROW}bp`;
 }
 
 /** A whole number. */
@@ -88,9 +103,9 @@ export function duration(seconds) {
   return `${grouped(seconds / 3600, 1)}${NARROW}h`;
 }
 
-/** A moment, in milliseconds since 1970, in the reader's own time. */
+/** A moment, in milliseconds since 1970, in the reader's own time, which it names. */
 export function moment(milliseconds) {
-  const options = { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" };
+  const options = { day: "numeric", month: "short", year: "numeric", hour: "2-digit", minute: "2-digit", timeZoneName: "short" };
   return new Date(milliseconds).toLocaleString("en-GB", options);
 }
 

@@ -50,8 +50,8 @@ export function lawChart({ transport }) {
     "span",
     { class: "legend" },
     here,
-    h("span", {}, seen.key, "Returns seen ", seen.value),
-    h("span", {}, worst.key, "Worst law ", worst.value),
+    h("span", {}, seen.key, "Seen ", seen.value),
+    h("span", {}, worst.key, "Worst market ", worst.value),
     h("span", {}, moved.key, "of it moved here ", moved.value),
   );
   let x = scale(domain, [0, 1]),
@@ -111,18 +111,18 @@ export function lawChart({ transport }) {
       (mass) => percent(mass),
     );
     mark();
-    return `${here.textContent}: seen ${seen.value.textContent}, worst law ${worst.value.textContent}, of it moved here ${moved.value.textContent}`;
+    return `${here.textContent}: seen ${seen.value.textContent}, worst market ${worst.value.textContent}, of it moved here ${moved.value.textContent}`;
   };
   const start = bins.reduce((best, bin, at) => (bin.moved > bins[best].moved ? at : best), 0);
   walkable(holder, {
-    label: "Returns seen and the worst law",
+    label: "Returns seen and the worst market",
     count: BINS,
     start,
     read,
     at: (pixel) => Math.floor((BINS * (x.inverse(pixel) - domain[0])) / (domain[1] - domain[0])),
   });
   return figure({
-    title: "Share of probability by return of the coming period",
+    title: "How often each return comes: as seen above the line, in the worst market below it",
     legend,
     holder,
     rows: () => movesTable(transport),
@@ -141,13 +141,13 @@ function roomy(place) {
 
 function movesTable(transport) {
   const moves = transport.filter(({ atom, moved_to }) => atom !== moved_to);
-  if (moves.length === 0) return h("p", {}, "No mass is moved.");
+  if (moves.length === 0) return h("p", {}, "Nothing is moved.");
   return table(
-    "Mass the worst law moves",
+    "Returns that the worst market moves",
     [
       { name: "Return seen", cell: ({ atom }) => simple(atom) },
       { name: "Moved to", numeric: true, cell: ({ moved_to }) => simple(moved_to) },
-      { name: "Probability", numeric: true, cell: ({ mass }) => percent(mass, 2) },
+      { name: "How often", numeric: true, cell: ({ mass }) => percent(mass, 2) },
     ],
     moves.sort((a, b) => b.mass - a.mass),
   );

@@ -6,16 +6,17 @@ import { clear, input, select, showProblem } from "./form.js";
 import { allocation, percent, wealth } from "./format.js";
 import { fraction, typed } from "./number_text.js";
 
-const KINDS = { simple_return: "Simple return", log_return: "Log-return", missing: "None is known" };
+const KINDS = { simple_return: "Gain or loss", log_return: "Log-return", missing: "None is known" };
 
-/** The fields for a period, with the policy's rate and contribution as what they are where nothing is said. */
-export function reportFields({ within, label, rate, contribution, changed }) {
+/** The fields for a period, with the policy's rate and contribution as what they are where nothing is said, and its last day
+ * as it most likely is. */
+export function reportFields({ within, label, rate, contribution, date: likely = null, changed }) {
   const edited = () => changed?.();
   const given = input({
     within,
     name: "return",
     label,
-    note: "Of the risky asset: \u22122.5 is a loss of 2.5 %",
+    note: "Of the stocks: \u22122.5 is a loss of 2.5 %",
     unit: "percent",
     changed: edited,
   });
@@ -40,16 +41,25 @@ export function reportFields({ within, label, rate, contribution, changed }) {
     changed: edited,
   });
   const reached = input({ within, name: "wealth", label: "Wealth reached", note: "Blank: what all the rest gives.", changed: edited });
-  const date = input({ within, name: "date", label: "Last day", note: "Such as 2008-09-30.", inputmode: "text" });
+  const date = input({ within, name: "date", label: "Last day", note: "Such as 2008-09-30. May be blank.", inputmode: "text", value: likely ?? "" });
   const more = h(
     "details",
     {},
-    h("summary", {}, "It went differently"),
-    h("div", { class: "fields" }, [date, held, paid, flow, reached].map((field) => field.element)),
+    h("summary", {}, "I held another share, or money came or went"),
+    h("div", { class: "fields" }, [held, paid, flow, reached].map((field) => field.element)),
   );
   const isMissing = () => kind.control.value === "missing";
   return {
-    element: h("div", {}, h("div", { class: "fields" }, given.element, kind.element), more),
+    element: h("div", {}, h("div", { class: "fields" }, given.element, date.element, kind.element), more),
+    /** What was reported, into the fields. */
+    fill(report, logReturn) {
+      const texts = new Map([[held, report.executed_allocation], [paid, report.rate]].map(([field, share]) => [field, inPercent(share)]));
+      for (const [field, value] of [[flow, report.flow], [reached, report.wealth], [date, report.date]]) texts.set(field, value ?? "");
+      kind.control.value = logReturn === null ? "missing" : "simple_return";
+      given.control.disabled = isMissing();
+      texts.set(given, logReturn === null ? "" : inPercent(report.simple_return ?? Math.expm1(logReturn)));
+      for (const [field, text] of texts) field.control.value = text;
+    },
     /** The growth of the asset, what is held, what the bank pays, what is added and what is reached where it is said; null
      * where something cannot be read. */
     read(advised) {
@@ -88,6 +98,9 @@ export function reportFields({ within, label, rate, contribution, changed }) {
     },
   };
 }
+
+/** A share as it is typed in percent. */
+const inPercent = (share) => (share === null || share === undefined ? "" : String(Number((100 * share).toPrecision(12))));
 
 /**
  * Sends what `compose` makes of the form to `path`, once at a time, and then has the session shown anew by `refresh`. What is

@@ -1,32 +1,47 @@
-// How near the advice is to changing, in sentences; it takes some hundred robust steps, so it is asked for by a button.
+// How near the advice is to changing, in sentences; it takes some hundred robust steps, so it comes after the rest.
 
 import { get } from "./api.js";
 import { h, section } from "./dom.js";
-import { allocation, count, counted, percent } from "./format.js";
+import { allocation, count, counted, percent, points } from "./format.js";
 
 /** Frameworks of policies that learn from returns; by the others no return changes the advice. */
 const LEARN = ["adaptive", "plug_in", "parametric_adaptive"];
 
-/** The button, and in its place what `/action` says. */
-export function sensitivity({ id, policy, leaving }) {
-  if (!LEARN.includes(policy.specification.problem.framework)) return "";
-  const holder = h("div", { "aria-live": "polite" });
+/** Of longer records the service does not tell it: no one return of so many makes a difference. */
+const LONGEST = 360;
+
+/** `{element, ask()}`: the section, and what fills it from `/action`. */
+export function nearness({ id, session, policy, leaving, unit }) {
+  const learns = LEARN.includes(policy.specification.problem.framework);
+  if (!learns || session.sample_size > LONGEST) return { element: "", ask: async () => {} };
+  const holder = h("div", { "aria-live": "polite" }, h("p", { class: "note" }, "Asking for the advice of some hundred other records\u2026"));
   const ask = async () => {
-    holder.replaceChildren(h("p", { class: "note" }, "Asking for the advice of some hundred other records\u2026"));
-    const action = await get(`/action?session=${id}&sensitivity=true`, leaving);
-    holder.replaceChildren(...sentences(action).map((words) => h("p", { class: "sentence" }, words)));
+    try {
+      const action = await get(`/action?session=${id}&sensitivity=true`, leaving);
+      const words = sentences(action, unit).map((words) => h("p", { class: "sentence" }, words));
+      holder.replaceChildren(h("p", { class: "sentence lead" }, headline(action, unit)), ...words);
+    } catch (error) {
+      if (!leaving.aborted) holder.replaceChildren(h("p", { class: "error" }, error.message));
+    }
   };
-  const failed = (error) => leaving.aborted || holder.replaceChildren(h("p", { class: "error" }, error.message));
-  const note = "What one return fewer, one more, or another mean would change.";
-  const button = h("button", { class: "quiet", onclick: () => ask().catch(failed) }, "Ask how near");
-  holder.append(h("p", { class: "note" }, note), button);
-  return section("How near it is to changing", holder);
+  return { element: section("How near it is to changing", holder), ask };
+}
+
+/** An advice that an ordinary coming return moves by less than this stays; by more than the second it is near to changing. */
+const [STEADY, NEAR] = [0.02, 0.1];
+
+/** How near, in one sentence. */
+export function headline({ allocation: told, sensitivity: { next_return } }, unit = "period") {
+  const move = Math.max(...[next_return.low, next_return.high].map((end) => Math.abs(end.allocation - told)));
+  if (move < STEADY) return `It is steady: hardly any ${unit} would move it by more than ${points(STEADY, 0)}.`;
+  const by = points(move, move < 0.1 ? 1 : 0);
+  return move < NEAR ? `It moves a little: an unusual ${unit} would move it by up to ${by}.` : `It is near to changing: an unusual ${unit} would move it by ${by}.`;
 }
 
 /** What an answer with its sensitivity says. */
-export function sentences(action) {
+export function sentences(action, unit = "period") {
   const { without_one, next_return, premium } = action.sensitivity;
-  return [...lacking(action, without_one), ...coming(next_return), ...paying(premium)];
+  return [...lacking(action, without_one), ...coming(next_return), ...paying(premium, unit)];
 }
 
 const simple = ({ simple_return }) => percent(simple_return);
@@ -47,11 +62,11 @@ function coming({ to_bank, to_highest, low, high }) {
   ].filter(Boolean);
 }
 
-function paying({ present, needed, periods_more }) {
-  const paid = `The record has paid ${percent(present, 2)} a period beyond the bank`;
+function paying({ present, needed, periods_more }, unit) {
+  const paid = `The record has paid ${percent(present, 2)} a ${unit} beyond the bank`;
   if (needed === null) return [`${paid}; no other mean near it would part the bank from holding something.`];
   const leaves = `${paid}; the advice leaves the bank at ${percent(needed, 2)}.`;
   if (periods_more === 0) return [leaves];
-  if (periods_more === null) return [leaves, `No number of periods like those seen, up to ${count(10000)}, would do.`];
-  return [leaves, `About ${counted(periods_more, "more period")} like those seen would do as well.`];
+  if (periods_more === null) return [leaves, `No number of ${unit}s like those seen, up to ${count(10000)}, would do.`];
+  return [leaves, `About ${counted(periods_more, `more ${unit}`)} like those seen would do as well.`];
 }

@@ -1,29 +1,19 @@
-// One session: what to hold now and why, the return to report, and how it went.
+// One session, as a client may be shown it: what to hold now and why, the return to report, how it went, and what it rests on.
 
 import { adviceView } from "./advice.js";
 import { get, offers, remove } from "./api.js";
-import { lineChart } from "./chart.js";
-import { correctionForm } from "./correction.js";
-import { announce, disclosure, facts, h, section, table } from "./dom.js";
+import { holdings, wealthCourse, worstFallFact } from "./course.js";
+import { announce, facts, h, section } from "./dom.js";
 import { banked, netAdded, standing } from "./flows.js";
-import {
-  allocation,
-  count,
-  counted,
-  moment,
-  percent,
-  percentTick,
-  short,
-  significant,
-  tick,
-  wealth,
-} from "./format.js";
+import { allocation, count, counted, percent, points, short, wealth } from "./format.js";
 import { asking } from "./frontier.js";
-import { lawChart } from "./law_chart.js";
 import { observeForm } from "./observe.js";
-import { sensitivity } from "./sensitivity.js";
-import { utility } from "./specification.js";
+import { lastReport, observed, righting } from "./observed.js";
+import { calendar } from "./periods.js";
+import { nearness } from "./sensitivity.js";
+import { isParametric, moments, utility } from "./specification.js";
 import { conservatism } from "./what_if.js";
+import { worstMarket } from "./worst_market.js";
 
 export async function view(id, leaving) {
   const session = await get(`/sessions/${id}`, leaving);
@@ -35,17 +25,26 @@ export async function view(id, leaving) {
   ]);
   const holder = h("div", {});
   const shown = { id, policy, canAsk, canTry, leaving };
+  const known = (session, history) => ({
+    ...shown,
+    session,
+    history,
+    refresh,
+    calendar: calendar(history, policy.specification.problem.periods_per_year),
+    cautionScale: cautionScale(policy.specification.problem),
+  });
   const refresh = async (news) => {
-    const [now, past] = await Promise.all([get(`/sessions/${id}`, leaving), get(`/sessions/${id}/history`, leaving)]);
-    await fill(holder, { ...shown, session: now, history: past, refresh });
+    const now = known(...(await Promise.all([get(`/sessions/${id}`, leaving), get(`/sessions/${id}/history`, leaving)])));
+    await fill(holder, now);
+    const { session, calendar } = now;
     announce(
-      now.state === "completed"
-        ? `The session is completed with wealth ${wealth(now.wealth)}.`
-        : `${news ?? `Period ${now.period - 1} is recorded.`} Wealth ${wealth(now.wealth)}.`,
+      session.state === "completed"
+        ? `The session is completed with wealth ${wealth(session.wealth)}.`
+        : `${news ?? `${calendar.name(session.period - 1)} is recorded.`} Wealth ${wealth(session.wealth)}.`,
     );
     holder.querySelector("#advice")?.focus();
   };
-  await fill(holder, { ...shown, session, history, refresh });
+  await fill(holder, known(session, history));
   const trail = h(
     "p",
     { class: "trail" },
@@ -54,62 +53,85 @@ export async function view(id, leaving) {
     h("a", { href: `#/policies/${session.policy}` }, `Policy ${short(session.policy)}`),
     `, ${utility(policy.specification.problem.utility)}`,
   );
-  return { title: `Session ${short(id)}`, trail, actions: deletion(id), body: holder };
+  return { title: `Session ${short(id)}`, trail, body: [holder, deletion(id)] };
 }
 
-async function fill(holder, shown) {
-  const { id, session, leaving } = shown;
+/** What one unit of the radius takes from the average return: of a normal law it counts in standard deviations. */
+const cautionScale = (problem) => (isParametric(problem.framework) ? moments(problem.history).deviation : 1);
+
+async function fill(holder, told) {
+  const { id, session, history, calendar, policy, leaving } = told;
+  const shown = { ...told, right: null };
+  shown.right = history.observations.length > 0 ? righting(shown) : null;
   if (session.state !== "active") {
-    const ended = [h("div", {}, completed(shown)), h("div", {}, course(shown, null))];
-    return holder.replaceChildren(figures(shown, null), h("div", { class: "columns" }, ended), observed(shown));
+    const ended = [h("div", {}, completed(shown), lastReport(shown)), wealthCourse(shown)];
+    return holder.replaceChildren(h("div", { class: "columns" }, ended), figures(shown, null), held(shown, null), observed(shown));
   }
   const action = await get(`/action?session=${id}`, leaving);
   const report = observeForm(action, shown);
-  const advice = adviceView(action, session.rolling ? null : session.horizon, report.element);
-  const numbers = h("div", {}, figures(shown, action));
-  const sofar = h("div", {}, course(shown, action));
-  const settled = (stands) => {
-    if (!stands.replaced) return;
-    report.advise(stands.allocation);
-    numbers.replaceChildren(figures(shown, stands));
-    sofar.replaceChildren(course(shown, stands));
-  };
+  const advice = adviceView(action, place(shown, action), [report, lastReport(shown)]);
+  const near = nearness({ id, session, policy, leaving, unit: calendar.unit });
+  const caution = shown.canAsk ? conservatism(shown, action) : null;
   holder.replaceChildren(
-    numbers,
     changed(shown),
     due(shown),
-    h("div", { class: "columns" }, h("div", {}, advice.element), sofar),
-    sensitivity(shown),
-    worstCase(shown, advice, settled),
-    shown.canAsk ? conservatism(shown, action) : "",
-    caution(shown),
+    h("div", { class: "columns" }, advice.element, wealthCourse(shown)),
+    figures(shown, action),
+    near.element,
+    worstMarket(shown, advice, calendar.unit, () => near.ask().then(() => caution?.ask())),
+    caution?.element ?? "",
+    held(shown, action),
     observed(shown),
+    frontier(shown),
   );
 }
 
-function figures({ session, history }, action) {
+/** What the advice is about: its period, when it is all for, and in what money. */
+function place({ session, history, policy, calendar }, { period }) {
+  const { trading_cost, horizon } = policy.specification.problem;
+  const name = calendar.name(period);
+  const which = session.rolling ? "" : ` of ${session.horizon}`;
+  const last = standing(history.observations.at(-1));
+  return {
+    heading: name === `Period ${period}` ? `${name}${which}` : `${name}, period ${period}${which}`,
+    end: session.rolling ? `${counted(horizon, calendar.unit)} from now` : `at the end of ${calendar.inText(session.horizon)}`,
+    price: last.price ?? null,
+    cost: trading_cost,
+    wealth: session.wealth,
+  };
+}
+
+function figures(shown, action) {
+  const { session, history, calendar } = shown;
   const put = netAdded(history);
   const change = (session.wealth - put) / history.initial_wealth - 1;
   const apart = put === 0 ? "" : `, ${put > 0 ? "beside" : "after"} ${wealth(Math.abs(put))} ${put > 0 ? "added" : "withdrawn"}`;
-  return facts([
-    ["Wealth", wealth(session.wealth), `${change >= 0 ? "+" : ""}${percent(change)} since the start${apart}`],
-    ["Held", allocation(session.holding), "of wealth, before trading"],
-    action && ["Certainty equivalent", wealth(action.certainty_equivalent), session.rolling ? "for certain a horizon of the policy from now" : "for certain at the horizon"],
-    action && ["Floor", wealth(action.floor), "all sold now, and in the bank until then"],
-    action && ["Radius", significant(action.radius, 3), "of the set of laws guarded against"],
-    [
-      "Returns seen",
-      count(session.sample_size),
-      `${counted(session.period - 1, "period")} observed${session.rolling ? "" : ` of ${session.horizon}`}`,
-    ],
-  ]);
+  const end = session.rolling ? "a horizon of the policy from now" : `at the end of ${calendar.inText(session.horizon)}`;
+  const caution = action && points(action.radius * shown.cautionScale, 2);
+  return h(
+    "div",
+    { class: "figures" },
+    facts([
+      ["Wealth", wealth(session.wealth), `${change >= 0 ? "+" : ""}${percent(change)} since the start${apart}`],
+      ["Held in stocks", allocation(session.holding), "of wealth, before trading"],
+      action && ["Worth as much as a sure", wealth(action.certainty_equivalent), end],
+      action && ["All in the bank", wealth(action.floor), `${end}, all sold now`],
+      history.observations.length > 0 && worstFallFact(shown),
+      action && ["Caution", caution, `the average return may really be so much lower a ${calendar.unit}`],
+      [
+        "Returns seen",
+        count(session.sample_size),
+        `${counted(session.period - 1, "period")} observed${session.rolling ? "" : ` of ${session.horizon}`}`,
+      ],
+    ]),
+  );
 }
 
 /** That the returns no longer come as they came, where they do not. */
 function changed({ session: { drift } }) {
   if (drift.level === "none") return "";
   const how = drift.level === "alarm" ? "no longer come as they came" : "may no longer come as they came";
-  const words = `The returns ${how}: a bet against it has made ${count(Math.floor(drift.highest))} out of 1, which it does for one session in ${count(Math.floor(drift.highest))} at most where nothing changes. The advice rests on all returns seen; a policy trained on newer ones may serve better.`;
+  const words = `The returns ${how}: where nothing changes, so clear a sign is seen in one session of ${count(Math.floor(drift.highest))} at most. The advice rests on all returns seen; a policy trained on newer ones may serve better.`;
   return h("p", { class: "note wrong" }, words);
 }
 
@@ -140,170 +162,24 @@ function due({ session: { renewal } }) {
   return h("p", { class: renewal.state === "failed" ? "note wrong" : "note" }, ...states[renewal.state]);
 }
 
-/** Wealth, allocation and radius through time. */
-function course({ session, history, policy }, action) {
-  const { trading_cost } = policy.specification.problem;
-  const { observations, initial_wealth } = history;
-  const horizon = session.rolling ? Math.max(12, observations.length + 1) : session.horizon;
-  const periods = Array.from({ length: horizon + 1 }, (_, k) => k);
-  const after = (period, read) => (observations[period - 1] ? read(observations[period - 1]) : null);
-  const stands = (period, name) => after(period, (row) => (row.now ?? row)[name]);
-  const x = { values: periods, domain: [0, horizon], label: "After period", format: String, whole: true };
-  const lived = periods.map((k) => (k === 0 ? initial_wealth : stands(k, "wealth")));
-  const bank = banked(history, horizon);
-  const held = periods.map((k) => stands(k, "executed_allocation"));
-  const told = (now, then) =>
-    periods.map((k) => (action && k === action.period ? now(action) : after(k, then)));
-  const advised = told(
-    ({ allocation }) => allocation,
-    (row) => row.advised_allocation,
-  );
-  const ends = ["low", "high"].map((name, end) => ({
-    name: `Band, ${name} end`,
-    kind: "levels",
-    values: told(
-      ({ band }) => band[end],
-      ({ band }) => band[end],
-    ),
-  }));
-  const radii = periods.map((k) =>
-    k === session.period - 1 && action ? action.radius : stands(k, "radius"),
-  );
-  const gutter = 64;
-  return section(
-    "So far",
-    lineChart({
-      title: "Wealth",
-      gutter,
-      height: 200,
-      x,
-      y: { format: wealth, tick },
-      series: [
-        { name: "Session", kind: "line", values: lived },
-        { name: "All in the bank", kind: "line", bare: true, values: bank },
-      ],
-    }),
-    lineChart({
-      title: "Allocation",
-      gutter,
-      height: 150,
-      x: { ...x, label: "Period", between: true },
-      y: { format: allocation, tick: percentTick, also: [0] },
-      series: [
-        { name: "Held", kind: "bars", values: held },
-        ...(trading_cost > 0 ? ends : [{ name: "Advised", kind: "levels", values: advised }]),
-      ],
-    }),
-    lineChart({
-      title: "Radius of the set of laws",
-      gutter,
-      height: 130,
-      x,
-      y: { format: (value) => significant(value, 3), tick },
-      series: [{ name: "", kind: "line", values: radii }],
-    }),
-  );
-}
+const held = (shown, action) => section("What it held", h("div", { class: "duo" }, ...holdings(shown, action)));
 
-/** The law behind the current advice, and the check of it; both take a robust step, so they come after the rest stands. */
-function worstCase({ id, leaving }, advice, settled) {
-  const holder = h("div", { class: "later" }, h("p", { class: "note" }, "Solving the step for its worst law\u2026"));
-  const told = async () => {
-    const anew = await get(`/action?session=${id}&explain=worst_case`, leaving);
-    settled(advice.checked(anew));
-    const { worst_case } = anew;
-    const sentence = h("p", { class: "sentence" }, worstWords(anew));
-    if (worst_case.transport.length === 0) return [sentence];
-    const told = `A radius wider by 0.001 would cost ${significant(10 * worst_case.radius_cost, 2)} basis points of the certainty equivalent. Multiplier of the ball ${significant(worst_case.multiplier, 3)} (utility lost per unit of radius); duality gap ${significant(1e4 * Math.abs(worst_case.duality_gap), 2)} bp.`;
-    return [sentence, lawChart(worst_case), h("p", { class: "note" }, told)];
-  };
-  told().then(
-    (nodes) => holder.replaceChildren(...nodes),
-    (error) => {
-      if (leaving.aborted) return;
-      advice.unchecked(error.message);
-      holder.replaceChildren(h("p", { class: "error" }, error.message));
-    },
-  );
-  return section("Against what this is robust", holder);
-}
-
-/** What the worst law does to the advice that stands above it; its worth stands there too, and only there. */
-function worstWords({ worst_case: { transport, sentence }, radius, sample_size }) {
-  if (transport.length === 0) return sentence.replace(/^A(gains)?t an allocation of \S+ %,/, "Against this advice,");
-  const moves = transport.filter(({ atom, moved_to }) => atom !== moved_to);
-  const among = `within distance ${significant(radius, 3)} of the ${counted(sample_size, "return")} seen`;
-  if (moves.length === 0) return `No law ${among} does worse to this advice than the returns themselves.`;
-  const share = moves.reduce((sum, { mass }) => sum + mass, 0);
-  const lowest = Math.min(...moves.map(({ moved_to }) => moved_to));
-  return `Against this advice, the worst law ${among} moves ${percent(share)} of the probability, down to a return of ${percent(Math.expm1(lowest))} in one period.`;
-}
-
-/** What more or less of it would lose, where the policy has a ball. */
-function caution({ session, policy, history, canTry }) {
+/** What more or less caution would lose, where the policy has a ball. */
+function frontier({ session, policy, history, canTry }) {
   const { problem } = policy.specification;
   if (!canTry || problem.radius?.rule === "chi_square") return "";
   const seen = history.observations.map((row) => (row.now ?? row).log_return).filter((value) => value !== null);
-  return section(
+  const element = section(
     "How much caution",
     h(
       "p",
       { class: "note" },
-      "What other multiples of the radius would lose on some hundreds of records drawn like this one, a period at a time: without a trading cost, without forgetting, and without money that comes and goes.",
+      "What other amounts of caution would lose on some hundreds of records drawn like this one, a period at a time: without a trading cost, without forgetting, and without money that comes and goes.",
     ),
     h("p", {}, asking(problem, [...history.history, ...seen], session.wealth)),
   );
-}
-
-function observed(shown) {
-  const { history } = shown;
-  if (history.observations.length === 0) return "";
-  const rows = [...history.observations].reverse();
-  const dated = rows.some((row) => standing(row).date);
-  /** What stands, and beside it what was told where that was something else. */
-  const now = (name, words) => (row) => {
-    const [stands, told] = [(row.now ?? row)[name], row[name]].map((value) => (value === null ? "missing" : words(value)));
-    return stands === told ? stands : h("span", {}, stands, " ", h("s", { class: "note", title: "As it was told then" }, told));
-  };
-  return section(
-    "Observed",
-    table(
-      "Observed periods, newest first",
-      [
-        { name: "Period", cell: ({ period }) => count(period) },
-        ...(dated ? [{ name: "Last day", cell: (row) => standing(row).date ?? "" }] : []),
-        { name: "Return", numeric: true, cell: now("log_return", (value) => percent(Math.expm1(value), 2)) },
-        { name: "Log-return", numeric: true, cell: now("log_return", (value) => significant(value, 4)) },
-        { name: "Advised", numeric: true, cell: now("advised_allocation", allocation) },
-        { name: "Held", numeric: true, cell: now("executed_allocation", allocation) },
-        { name: "Wealth", numeric: true, cell: now("wealth", wealth) },
-        { name: "Radius", numeric: true, cell: now("radius", (value) => significant(value, 3)) },
-        { name: "Reported", numeric: true, cell: ({ observed_ms }) => moment(observed_ms) },
-      ],
-      rows,
-    ),
-    corrections(history),
-    renewals(history),
-    disclosure("Put a period right", () => correctionForm(shown)),
-  );
-}
-
-/** What was put right, newest first. */
-function corrections({ corrections }) {
-  if (corrections.length === 0) return "";
-  const words = ({ period, reason, corrected_ms }) => `Period ${period} was put right on ${moment(corrected_ms)}: ${reason}`;
-  return h("ul", { class: "corrections" }, [...corrections].reverse().map((made) => h("li", {}, words(made))));
-}
-
-/** The policies that followed the first, newest first. */
-function renewals({ renewals }) {
-  if (renewals.length === 0) return "";
-  const words = ({ period, policy, renewed_ms }) => [
-    `From period ${period} on by `,
-    h("a", { href: `#/policies/${policy}` }, `policy ${short(policy)}`),
-    `, since ${moment(renewed_ms)}`,
-  ];
-  return h("ul", { class: "renewals" }, [...renewals].reverse().map((made) => h("li", {}, ...words(made))));
+  element.classList.add("asked-for");
+  return element;
 }
 
 function deletion(id) {
@@ -315,5 +191,5 @@ function deletion(id) {
       (error) => announce(error.message),
     );
   });
-  return button;
+  return h("p", { class: "end" }, button);
 }

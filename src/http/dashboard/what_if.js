@@ -1,42 +1,42 @@
 // What the session's advice would be, were it guarded more or less.
 
-import { agrees } from "./advice.js";
 import { post } from "./api.js";
 import { lineChart } from "./chart.js";
 import { h, section } from "./dom.js";
-import { allocation, percentTick, significant, tick, wealth } from "./format.js";
+import { allocation, percentTick, points, significant, tick, wealth } from "./format.js";
 
 /** From trusting the returns seen to twice the caution; every point is a robust step solved. */
 const SWEEP = { from: 0, to: 2, points: 21 };
 
-/** Allocation and certainty equivalent against the scale of the radius; asked for after the rest of the page stands. */
-export function conservatism({ id, leaving }, action) {
-  const holder = h("div", {}, h("p", { class: "note" }, "Solving the step for other radii\u2026"));
-  post("/what-if", { session: id, sweep: { radius_scale: SWEEP } }, leaving).then(
-    ({ points }) => holder.replaceChildren(...charts(points, action)),
-    (error) => leaving.aborted || holder.replaceChildren(h("p", { class: "error" }, error.message)),
-  );
-  return section("More or less guarded", holder);
+/** `{element, ask()}`: what is held and what it is worth, against how much caution. */
+export function conservatism({ id, leaving, calendar, cautionScale }, action) {
+  const holder = h("div", {}, h("p", { class: "note" }, "Solving the step for other amounts of caution\u2026"));
+  const ask = () =>
+    post("/what-if", { session: id, sweep: { radius_scale: SWEEP } }, leaving).then(
+      ({ points }) => holder.replaceChildren(...charts(points, action, cautionScale, calendar.unit)),
+      (error) => leaving.aborted || holder.replaceChildren(h("p", { class: "error" }, error.message)),
+    );
+  return { element: section("With more or less caution", holder), ask };
 }
 
-function charts(points, { radius, allocation: advised }) {
+function charts(solved, { radius, allocation: advised }, cautionScale, unit) {
   const times = (value) => `\u00d7 ${significant(value, 2)}`;
-  const x = { values: points.map(({ radius_scale }) => radius_scale), label: "Radius", format: times, tick };
-  const own = points.findIndex(({ radius_scale }) => Math.abs(radius_scale - 1) < 1e-9);
-  // One advice on the page: the step solved anew at its own radius is told by its check.
-  const held = (point, index) => (index === own && agrees(point.allocation, advised) ? advised : point.allocation);
-  const line = (name, read, bare) => ({ name, kind: "line", bare, values: points.map(read) });
+  const x = { values: solved.map(({ radius_scale }) => radius_scale), label: "Caution", format: times, tick };
+  const own = solved.findIndex(({ radius_scale }) => Math.abs(radius_scale - 1) < 1e-9);
+  // One advice on the page: at its own caution it is the one that stands above.
+  const held = (point, index) => (index === own ? advised : point.allocation);
+  const line = (name, read, more) => ({ name, kind: "line", values: solved.map(read), ...more });
   return [
     h(
       "p",
       { class: "note" },
-      `The coming period solved again with its radius of ${significant(radius, 3)} multiplied. At 0 the returns seen are the whole truth; later periods keep their own radius.`,
+      `At \u00d7 1, the caution of this session, the average return may really be ${points(radius * cautionScale, 2)} a ${unit} lower than it was seen; at \u00d7 0 the record is the whole truth. Later periods keep their own caution.`,
     ),
     h(
       "div",
       { class: "duo" },
       lineChart({
-        title: "Allocation by radius",
+        title: "Share in stocks by caution",
         height: 170,
         start: own,
         x,
@@ -44,12 +44,12 @@ function charts(points, { radius, allocation: advised }) {
         series: [line("", held)],
       }),
       lineChart({
-        title: "Worth for certain by radius",
+        title: "Worth as much as a sure, by caution",
         height: 170,
         start: own,
         x,
         y: { format: wealth, tick },
-        series: [line("", (point) => point.certainty_equivalent), line("Bank", ({ floor }) => floor, true)],
+        series: [line("", (point) => point.certainty_equivalent), line("All in the bank", ({ floor }) => floor, { bare: true, colour: 2 })],
       }),
     ),
   ];

@@ -1,0 +1,50 @@
+// The same start, lived otherwise: what shares held through the same returns, rates and flows would have come to.
+
+import { standing, termsOf, addedIn } from "./flows.js";
+
+/** What the periods observed brought, each as it stands: the growth of the asset, the bank's rate, the money added. */
+const lived = (history) =>
+  history.observations.map((row, index) => ({
+    growth: Math.exp((row.now ?? row).log_return ?? 0),
+    rate: standing(row).rate ?? termsOf(history, index + 1).terms.rate_per_step,
+    cost: termsOf(history, index + 1).terms.trading_cost,
+    added: addedIn(history, index + 1),
+  }));
+
+/** Wealth at the start and after each observed period of who brings the risky asset to `share` of it in each. */
+export function mixed(history, share) {
+  let [wealth, holding] = [history.initial_wealth, history.initial_holding];
+  return [
+    wealth,
+    ...lived(history).map(({ growth, rate, cost, added }) => {
+      const invested = wealth * (1 - cost * Math.abs(share - holding));
+      const grown = (1 - share) * (1 + rate) + share * growth;
+      const before = invested * grown;
+      wealth = before + added;
+      // What is added comes to the bank.
+      holding = wealth > 0 ? (invested * share * growth) / wealth : share;
+      return wealth;
+    }),
+  ];
+}
+
+/** Wealth at the start and after each observed period of the session itself, as it stands. */
+export const wealths = (history) => [history.initial_wealth, ...history.observations.map((row) => (row.now ?? row).wealth)];
+
+/** How far wealth lies below its highest so far, 0 or less, with money that comes and goes taken out. */
+export function falls(history, wealth = wealths(history)) {
+  let [level, highest] = [1, 1];
+  return wealth.map((value, index) => {
+    if (index === 0) return 0;
+    level *= (value - addedIn(history, index)) / wealth[index - 1];
+    highest = Math.max(highest, level);
+    return level / highest - 1;
+  });
+}
+
+/** The worst of them: `{depth, from, to}`, the periods after which it began and was deepest; null where there was none. */
+export function worstFall(falls) {
+  const to = falls.reduce((worst, value, index) => (value < falls[worst] ? index : worst), 0);
+  if (falls[to] >= 0) return null;
+  return { depth: falls[to], from: falls.slice(0, to).findLastIndex((value) => value >= 0), to };
+}

@@ -1,0 +1,118 @@
+// How a session went: wealth beside what the same start would have come to otherwise, the worst fall, what was held.
+
+import { lineChart } from "./chart.js";
+import { falls, mixed, wealths, worstFall } from "./comparators.js";
+import { h, section } from "./dom.js";
+import { banked } from "./flows.js";
+import { allocation, percent, percentTick, tick, wealth } from "./format.js";
+
+/** What the session is measured by, each held through the same returns; 60/40 as people call it. */
+export const BESIDE = [
+  { name: "All in the bank", share: 0, colour: 2 },
+  { name: "60/40", share: 0.6, colour: 3 },
+  { name: "All in stocks", share: 1, colour: 1 },
+];
+/** Charts above each other start at one line. */
+const GUTTER = 64;
+
+/** Positions of the periods from the start to the horizon, with their names. */
+function periodsOf({ session, history, calendar }) {
+  const lived = history.observations.length;
+  const horizon = session.rolling ? Math.max(12, lived + 1) : Math.max(session.horizon, lived);
+  const values = Array.from({ length: horizon + 1 }, (_, k) => k);
+  const x = { values, domain: [0, horizon], label: "Period", format: calendar.after, here: calendar.after, tick: calendar.brief, whole: true };
+  return { horizon, values, x };
+}
+
+/** Wealth and falls: what a client is shown. */
+export function wealthCourse(shown) {
+  const { history } = shown;
+  const { horizon, values, x } = periodsOf(shown);
+  const own = wealths(history);
+  const bank = banked(history, horizon);
+  const along = (of) => values.map((k) => of[k] ?? null);
+  const series = [
+    { name: "This session", kind: "line", values: along(own) },
+    ...BESIDE.map(({ name, share, colour }) => ({ name, colour, kind: "line", bare: true, values: along(share === 0 ? bank : mixed(history, share)) })),
+  ];
+  const deep = falls(history);
+  const stocks = falls(history, mixed(history, 1));
+  const charts = [lineChart({ title: "Wealth", gutter: GUTTER, height: 230, x, y: { format: wealth, tick }, series })];
+  if (own.length > 1) {
+    charts.push(
+      lineChart({
+        title: "Below the highest so far",
+        gutter: GUTTER,
+        height: 120,
+        x,
+        y: { format: percent, tick: percentTick, also: [0] },
+        series: [
+          { name: "This session", kind: "line", values: along(deep) },
+          { name: "All in stocks", kind: "line", bare: true, values: along(stocks) },
+        ],
+      }),
+    );
+  }
+  return section("So far", own.length > 1 ? h("p", { class: "sentence" }, comparison(shown, own)) : "", ...charts);
+}
+
+/** The session's wealth beside the others', a sentence. */
+function comparison({ history }, own) {
+  const worth = (share) => wealth(mixed(history, share).at(-1));
+  return `It stands at ${wealth(own.at(-1))}. The same start would have come to ${worth(0)} all in the bank, ${worth(0.6)} at 60/40 and ${worth(1)} all in stocks.`;
+}
+
+/** The worst fall as a fact: `[name, value, note]`. */
+export function worstFallFact({ history, calendar }) {
+  const worst = worstFall(falls(history));
+  if (worst === null) return ["Worst fall so far", "None", "never below its highest"];
+  const from = worst.from === 0 ? "from the start" : `from ${calendar.inText(worst.from)}`;
+  return ["Worst fall so far", percent(worst.depth), `${from} to ${calendar.inText(worst.to)}`];
+}
+
+/** What was held, and the caution, through time. */
+export function holdings(shown, action) {
+  const { history, policy, calendar, session } = shown;
+  const { values, x } = periodsOf(shown);
+  const { observations } = history;
+  const row = (period) => observations[period - 1] ?? null;
+  const stands = (period, name) => (row(period) ? (row(period).now ?? row(period))[name] : null);
+  const told = (now, then) => values.map((k) => (action && k === action.period ? now(action) : row(k) && then(row(k))));
+  const ends = ["low", "high"].map((name, end) => ({
+    name: `Best kept, ${name} end`,
+    kind: "levels",
+    colour: 1 + end,
+    values: told(
+      ({ band }) => band[end],
+      ({ band }) => band[end],
+    ),
+  }));
+  const advised = {
+    name: "Advised",
+    kind: "levels",
+    values: told(
+      ({ allocation }) => allocation,
+      (then) => then.advised_allocation,
+    ),
+  };
+  const costly = policy.specification.problem.trading_cost > 0;
+  const chart = lineChart({
+    title: "Share held in stocks",
+    gutter: GUTTER,
+    height: 150,
+    x: { ...x, here: calendar.name, format: calendar.name, between: true },
+    y: { format: allocation, tick: percentTick, also: [0] },
+    series: [{ name: "Held", kind: "bars", values: values.map((k) => stands(k, "executed_allocation")) }, ...(costly ? ends : [advised])],
+  });
+  const radii = values.map((k) => (k === session.period - 1 && action ? action.radius : stands(k, "radius")));
+  const perPoint = shown.cautionScale;
+  const caution = lineChart({
+    title: `Caution: the average return may be lower by so much a ${calendar.unit}`,
+    gutter: GUTTER,
+    height: 130,
+    x,
+    y: { format: (value) => percent(value, 2), tick: percentTick },
+    series: [{ name: "", kind: "line", values: radii.map((radius) => (radius === null ? null : radius * perPoint)) }],
+  });
+  return [chart, caution];
+}

@@ -1,0 +1,165 @@
+// The periods of a session that passed: as a table, as a file, put right, and what was put right before.
+
+import { post } from "./api.js";
+import { falls, mixed, wealths } from "./comparators.js";
+import { correctionForm } from "./correction.js";
+import { BESIDE } from "./course.js";
+import { announce, disclosure, h, section, table } from "./dom.js";
+import { standing } from "./flows.js";
+import { allocation, count, figures, moment, percent, short, wealth } from "./format.js";
+import { day } from "./periods.js";
+import { save } from "./picture.js";
+
+/** Periods shown at first; who wants all asks. */
+const NEWEST = 24;
+
+export function observed(shown) {
+  const { history, calendar } = shown;
+  const rows = [...history.observations].reverse();
+  if (rows.length === 0) return "";
+  /** What stands, and beside it what was told where that was something else. */
+  const now = (name, words) => (row) => {
+    const [stands, told] = [(row.now ?? row)[name], row[name]].map((value) => (value === null ? "missing" : words(value)));
+    return stands === told ? stands : h("span", {}, stands, " ", h("s", { class: "note", title: "As it was told then" }, told));
+  };
+  const period = { name: "Period", cell: (row) => calendar.name(row.period).replace(/^Period /, "") };
+  const number = (name, cell) => ({ name, numeric: true, cell });
+  const told = (some) =>
+    table(
+      "Observed periods, newest first",
+      [
+        period,
+        ...(calendar.dated ? [{ name: "Last day", cell: (row) => (standing(row).date ? day(standing(row).date) : "") }] : []),
+        number("Return", now("log_return", (value) => percent(Math.expm1(value), 2))),
+        number("Advised", now("advised_allocation", allocation)),
+        number("Held", now("executed_allocation", allocation)),
+        number("Wealth", now("wealth", wealth)),
+        number("Reported", ({ observed_ms }) => moment(observed_ms)),
+      ],
+      some,
+    );
+  const holder = h("div", {}, told(rows.slice(0, NEWEST)));
+  const all = h("button", { class: "quiet", onclick: () => (holder.replaceChildren(told(rows)), all.remove()) }, `Show all ${count(rows.length)}`);
+  const quant = () =>
+    table(
+      "Observed periods in the words of the paper",
+      [
+        period,
+        number("Log-return", now("log_return", (value) => figures(value, 4))),
+        number("Radius", now("radius", (value) => figures(value, 3))),
+        number("Returns seen", ({ sample_size }) => count(sample_size)),
+      ],
+      rows,
+    );
+  const file = `session-${short(shown.id)}.csv`;
+  return section(
+    "Periods so far",
+    holder,
+    h(
+      "p",
+      { class: "foot" },
+      rows.length > NEWEST ? all : null,
+      h("button", { class: "quiet", onclick: () => save(csv(shown), file, "text/csv") }, "Save as CSV"),
+    ),
+    corrections(shown),
+    renewals(shown),
+    shown.right,
+    disclosure("For the quant", quant),
+  );
+}
+
+/** The periods as a file: numbers plain, shares and returns in percent. */
+export function csv({ history, calendar }) {
+  const own = wealths(history);
+  const beside = BESIDE.map(({ name, share }) => [name, mixed(history, share)]);
+  const deep = falls(history);
+  const cell = (value) => (/[",\n]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value);
+  const hundred = (value) => (value === null ? "" : String(Number((100 * value).toPrecision(12))));
+  const plain = (value) => String(Number(value.toPrecision(12)));
+  const head = ["Period", "Name", "Last day", "Return, %", "Advised, %", "Held, %", "Wealth", ...beside.map(([name]) => name), "Below the highest, %"];
+  const start = ["0", "Start", "", "", "", "", plain(own[0]), ...beside.map(() => plain(own[0])), "0"];
+  const lines = history.observations.map((row, index) => {
+    const stands = row.now ?? row;
+    const back = stands.log_return === null ? null : Math.expm1(stands.log_return);
+    const shares = [back, stands.advised_allocation, stands.executed_allocation].map(hundred);
+    const others = beside.map(([, wealths]) => plain(wealths[index + 1]));
+    const name = calendar.name(row.period);
+    return [String(row.period), name, standing(row).date ?? "", ...shares, plain(stands.wealth), ...others, hundred(deep[index + 1])];
+  });
+  return `${[head, start, ...lines].map((line) => line.map(cell).join(",")).join("\r\n")}\r\n`;
+}
+
+const REPORT = ["log_return", "simple_return", "price", "previous_price", "missing", "date", "rate", "flow", "executed_allocation", "wealth"];
+const reportOf = (said) => Object.fromEntries(REPORT.filter((name) => (said[name] ?? false) !== false).map((name) => [name, said[name]]));
+
+/** Sends a correction that was said before, or that takes a return away. */
+async function correct({ id, session, refresh }, period, report, reason, news) {
+  const request = { correction: session.corrections + 1, period, reason, confirm: true, ...report };
+  await post(`/sessions/${id}/corrections`, request).then(
+    () => refresh(news),
+    (error) => announce(error.message),
+  );
+}
+
+/** The last report, with what to do where it was wrong. */
+export function lastReport(shown) {
+  const { history, calendar } = shown;
+  const row = history.observations.at(-1);
+  if (!row) return "";
+  const { log_return, executed_allocation } = row.now ?? row;
+  const name = calendar.inText(row.period);
+  const { date } = standing(row);
+  const undo = () => {
+    const words = `Take back the return of ${name}?\n\nThe period stays, without a return, until you put one in. What was reported stays on record.`;
+    if (!confirm(words)) return;
+    const report = { missing: true, executed_allocation, ...(date ? { date } : {}) };
+    correct(shown, row.period, report, "The report was taken back", `The return of ${name} is taken back.`);
+  };
+  const mend = () => {
+    shown.right.open = true;
+    shown.right.querySelector("form")?.scrollIntoView({ block: "center" });
+    requestAnimationFrame(() => shown.right.querySelector("form input")?.focus());
+  };
+  const said = log_return === null ? "no return is known" : percent(Math.expm1(log_return), 2);
+  return h(
+    "p",
+    { class: "note last" },
+    `Last report, ${name}: ${said}. `,
+    h("button", { class: "link", onclick: mend }, "Put it right"),
+    log_return === null ? "" : [" or ", h("button", { class: "link", onclick: undo }, "take it back")],
+  );
+}
+
+/** The form for a period put right, in a fold. */
+export const righting = (shown) => disclosure("Put a period right", () => correctionForm(shown));
+
+/** What was put right, newest first; the newest can be undone. */
+function corrections(shown) {
+  const { history, calendar } = shown;
+  if (history.corrections.length === 0) return "";
+  const words = ({ period, reason, corrected_ms }) =>
+    `${calendar.name(period)} was put right on ${moment(corrected_ms)}: ${reason}`;
+  const undo = (made) => {
+    const earlier = history.corrections.filter(({ period, correction }) => period === made.period && correction < made.correction).at(-1);
+    const said = earlier ?? history.observations[made.period - 1].reported;
+    const news = `${calendar.name(made.period)} is as it was before.`;
+    return correct(shown, made.period, reportOf(said), `Correction ${made.correction} was undone`, news);
+  };
+  const made = [...history.corrections].reverse();
+  return h(
+    "ul",
+    { class: "corrections" },
+    made.map((one, index) => h("li", {}, words(one), index === 0 ? [" ", h("button", { class: "link", onclick: () => undo(one) }, "Undo")] : null)),
+  );
+}
+
+/** The policies that followed the first, newest first. */
+function renewals({ history: { renewals }, calendar }) {
+  if (renewals.length === 0) return "";
+  const words = ({ period, policy, renewed_ms }) => [
+    `From ${calendar.inText(period)} on by `,
+    h("a", { href: `#/policies/${policy}` }, `policy ${short(policy)}`),
+    `, since ${moment(renewed_ms)}`,
+  ];
+  return h("ul", { class: "renewals" }, [...renewals].reverse().map((made) => h("li", {}, ...words(made))));
+}

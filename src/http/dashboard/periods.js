@@ -1,0 +1,89 @@
+// What the periods of a session are called: by their dates where those are reported, by their number where not.
+
+import { standing } from "./flows.js";
+
+const DAY = 86_400_000;
+/** Days between two last days, at least and at most, by the unit they tell; and that unit's months or days. */
+const UNITS = [
+  { unit: "day", least: 1, most: 4 },
+  { unit: "week", least: 6, most: 8, days: 7 },
+  { unit: "month", least: 26, most: 33, months: 1 },
+  { unit: "quarter", least: 86, most: 95, months: 3 },
+  { unit: "year", least: 360, most: 371, months: 12 },
+];
+/** The unit by the periods in a year. */
+const A_YEAR = { 1: "year", 4: "quarter", 12: "month", 52: "week" };
+/** Trading days in a year are this many or more. */
+const DAILY = 200;
+
+/** A month, say, where that many periods make a year; "period" where that is not said. */
+export const unitOf = (periods_per_year) =>
+  periods_per_year >= DAILY ? "day" : (A_YEAR[Math.round(periods_per_year)] ?? "period");
+
+/** Midnight, UTC, of the day "2008-09-30". */
+const parsed = (date) => Date.parse(`${date}T00:00:00Z`);
+const written = (time) => new Date(time).toISOString().slice(0, 10);
+const told = (time, options) => new Date(time).toLocaleDateString("en-GB", { timeZone: "UTC", ...options });
+
+/** A day, as 30 Sep 2008. */
+export const day = (date) => told(parsed(date), { day: "numeric", month: "short", year: "numeric" });
+
+/** So many months later: the last day of a month stays that. */
+function later(time, months) {
+  const from = new Date(time);
+  const last = (year, month) => new Date(Date.UTC(year, month + 1, 0)).getUTCDate();
+  const isLast = from.getUTCDate() === last(from.getUTCFullYear(), from.getUTCMonth());
+  const [year, month] = [from.getUTCFullYear(), from.getUTCMonth() + months];
+  return Date.UTC(year, month, isLast ? last(year, month) : Math.min(from.getUTCDate(), last(year, month)));
+}
+
+/** The unit that the dates keep to, or null. */
+function rhythm(dated) {
+  const gaps = dated.slice(1).map(({ time, period }, index) => (time - dated[index].time) / DAY / (period - dated[index].period));
+  if (gaps.length === 0) return null;
+  const middle = gaps.sort((a, b) => a - b)[gaps.length >> 1];
+  return UNITS.find(({ least, most }) => middle >= least && middle <= most) ?? null;
+}
+
+/**
+ * The calendar of a session: `unit` is what a period is called, `name(k)` period k from 1, `brief(k)` the same on an axis,
+ * `after(k)` its end, `next` the last day that the coming period most likely has, or null. `dated` says whether there are dates.
+ */
+export function calendar(history, periods_per_year) {
+  const dated = history.observations
+    .map((row) => ({ period: row.period, date: standing(row).date }))
+    .filter(({ date }) => date)
+    .map(({ period, date }) => ({ period, time: parsed(date) }));
+  const said = periods_per_year ? UNITS.find(({ unit }) => unit === unitOf(periods_per_year)) : null;
+  const kept = rhythm(dated) ?? (dated.length > 0 ? said : null);
+  const unit = (kept ?? said)?.unit ?? "period";
+  const moved = (time, steps) => {
+    if (steps === 0) return time;
+    if (kept?.months) return later(time, steps * kept.months);
+    return kept?.days ? time + steps * kept.days * DAY : null;
+  };
+  /** The last day of a period: as reported, or as the nearest dated one tells. */
+  const end = (period) => {
+    const nearest = dated.reduce((best, one) => (best && Math.abs(best.period - period) <= Math.abs(one.period - period) ? best : one), null);
+    return nearest && moved(nearest.time, period - nearest.period);
+  };
+  // Two last days in one month have no names of their own.
+  const months = dated.map(({ time }) => written(time).slice(0, 7));
+  const byMonth = kept?.months === 1 && new Set(months).size === months.length;
+  const name = (period) => {
+    const time = end(period);
+    if (time === null) return `Period ${period}`;
+    if (byMonth) return told(time, { month: "long", year: "numeric" });
+    return `${unit === "day" || unit === "period" ? "" : `${unit[0].toUpperCase()}${unit.slice(1)} to `}${day(written(time))}`;
+  };
+  const brief = (period) => {
+    const time = period < 1 ? null : end(period);
+    if (time === null) return period === 0 && dated.length > 0 ? "Start" : String(period);
+    return told(time, byMonth ? { month: "short", year: "2-digit" } : { day: "numeric", month: "short", year: "2-digit" });
+  };
+  const inText = (period) => name(period).replace(/^[PWQY](?=eriod|eek|uarter|ear)/, (letter) => letter.toLowerCase());
+  const after = (period) => (period === 0 ? "At the start" : `After ${inText(period)}`);
+  const last = dated.at(-1);
+  const coming = last?.period === history.observations.length ? moved(last.time, 1) : null;
+  return { unit, name, inText, brief, after, dated: dated.length > 0, next: coming && written(coming) };
+}

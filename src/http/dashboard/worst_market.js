@@ -1,0 +1,71 @@
+// The worst market that the record still allows: what it assumes, in words, and the law itself.
+
+import { get } from "./api.js";
+import { disclosure, h, section } from "./dom.js";
+import { figures, oneIn, percent, significant } from "./format.js";
+import { lawChart } from "./law_chart.js";
+
+/** A move to within this of the deepest one is as deep, in log-return. */
+const NEAR = 0.01;
+/** Below this share of it, a market does not differ. */
+const LITTLE = 5e-4;
+
+/** What the market assumes beyond the returns seen, a sentence. `unit` is what a period is called. */
+export function assumed({ transport }, unit) {
+  const moves = transport.filter(({ atom, moved_to, mass }) => atom !== moved_to && mass > 0);
+  const share = (some) => some.reduce((sum, { mass }) => sum + mass, 0);
+  if (share(moves) < LITTLE) return `It assumes that every ${unit} comes as those seen did: no market allowed does worse to this advice.`;
+  const lowest = Math.min(...moves.map(({ moved_to }) => moved_to));
+  const deep = moves.filter(({ moved_to }) => moved_to <= lowest + NEAR);
+  const rest = share(moves) - share(deep);
+  const size = (log) => percent(Math.abs(Math.expm1(log)), Math.abs(Math.expm1(log)) < 0.095 ? 1 : 0);
+  const often = (mass) => (mass > 0.6 ? `most ${unit}s` : `one ${unit} in ${oneIn(mass)}`);
+  const verb = (mass, word) => (mass > 0.6 ? word : `${word}s`);
+  const more = rest >= LITTLE ? `, and that ${often(rest)} ${verb(rest, "bring")} less than the like did` : "";
+  const mass = share(deep);
+  return lowest <= 0
+    ? `It assumes that ${often(mass)} ${verb(mass, "lose")} ${size(lowest)}${more}.`
+    : `It assumes that ${often(mass)} ${verb(mass, "gain")} ${size(lowest)} only, where those seen gained more${more}.`;
+}
+
+/** The section; the robust step takes a while, so it comes after the rest of the page stands. `then()` when it has. */
+export function worstMarket({ id, leaving }, advice, unit, then) {
+  const paper = h("div", { class: "words quant" }, advice.quant);
+  const holder = h("div", { class: "later" }, h("p", { class: "note" }, "Looking for the worst market\u2026"));
+  const told = async () => {
+    const anew = await get(`/action?session=${id}&explain=worst_case`, leaving);
+    advice.checked(anew);
+    const { worst_case } = anew;
+    paper.append(paperWords(anew));
+    if (worst_case.transport.length === 0) return [h("p", { class: "sentence" }, normalWords(anew))];
+    return [h("p", { class: "sentence" }, assumed(worst_case, unit)), lawChart(worst_case)];
+  };
+  told().then(
+    (nodes) => {
+      holder.replaceChildren(...nodes);
+      then();
+    },
+    (error) => {
+      if (leaving.aborted) return;
+      advice.unchecked(error.message);
+      holder.replaceChildren(h("p", { class: "error" }, error.message));
+      then();
+    },
+  );
+  return section("The worst market your record still allows", holder, disclosure("For the quant", () => paper));
+}
+
+/** Of a market of normal returns. */
+function normalWords({ worst_case: { normal, sentence } }) {
+  if (!normal) return sentence;
+  return sentence.replace(/^A(gains)?t an allocation of \S+ %,/, "Against this advice,").replace(/-(?=[\d.]+ ?%)/g, "\u2212");
+}
+
+function paperWords({ worst_case, radius, sample_size }) {
+  const { transport, radius_cost, multiplier, duality_gap } = worst_case;
+  const moves = transport.filter(({ atom, moved_to }) => atom !== moved_to);
+  const moved = moves.reduce((sum, { mass }) => sum + mass, 0);
+  const law = transport.length === 0 ? "" : `The worst law within Wasserstein distance ${figures(radius, 3)} of the ${sample_size} returns seen moves ${percent(moved)} of the probability. `;
+  const words = `${law}A radius wider by 0.001 would cost ${significant(10 * radius_cost, 2)} basis points of the certainty equivalent. Multiplier of the ball ${significant(multiplier, 3)} (utility lost per unit of radius); duality gap ${significant(1e4 * Math.abs(duality_gap), 2)} bp.`;
+  return h("p", { class: "note" }, words);
+}
