@@ -61,10 +61,10 @@ test("a refusal is told at the field it names", async () => {
   await page.getByRole("button", { name: "Train", exact: true }).click();
   await page.getByText(/^Bank return per period is blank; it must be a number/).waitFor();
   await page.getByLabel("Bank return per period").fill("0,2 %");
-  await page.getByLabel("Decisions").fill("0");
+  await page.getByLabel("Periods ahead").fill("0");
   await page.getByRole("button", { name: "Train", exact: true }).click();
-  const field = page.getByLabel("Decisions");
-  await page.getByText("Decisions is 0; it must be from 1 to 520.").waitFor();
+  const field = page.getByLabel("Periods ahead");
+  await page.getByText("Periods ahead is 0; it must be from 1 to 520.").waitFor();
   assert.equal(await field.getAttribute("aria-invalid"), "true");
   assert.ok(await field.evaluate((element) => element === document.activeElement), "focus goes to the field");
   await page.getByLabel("Returns or prices").fill("0.01 -0.02 nine");
@@ -87,9 +87,10 @@ test("a training from a file, watched to its end", async () => {
     .waitFor();
   assert.equal(await page.getByLabel("They are").inputValue(), "simple");
   assert.equal(await page.getByLabel("In", { exact: true }).inputValue(), "percent");
-  await page.getByLabel("Utility").selectOption("exponential");
+  await page.getByLabel("Investor").selectOption("own");
+  await page.getByLabel("Utility", { exact: true }).selectOption("exponential");
   await page.getByLabel("Relative risk aversion").fill("1");
-  await page.getByLabel("Radius scale").fill("0.2");
+  await page.getByLabel("Caution, times").fill("0.2");
   await page.getByLabel("Design points").fill("400");
   await page.getByText("Every field, as JSON").click();
   const request = JSON.parse(await page.getByLabel("Training request as JSON").inputValue());
@@ -110,14 +111,17 @@ test("a training from a file, watched to its end", async () => {
 });
 
 test("a policy is told in words, drawn, and read by keyboard", async () => {
-  await page.getByText("4 decisions with exponential utility").waitFor();
-  const map = page.getByRole("application", { name: /Allocation/ });
+  await page.getByText("It looks 4 periods ahead for an investor with exponential utility").waitFor();
+  const map = page.getByRole("application", { name: /Share held in stocks/ });
   await map.focus();
   const read = page.locator("figure output").first();
   const before = await read.textContent();
   await page.keyboard.press("ArrowUp");
   assert.notEqual(await read.textContent(), before);
-  assert.match(before, /Wealth .* mean log-return .* allocation \d+/);
+  assert.match(before, /Wealth .* average return .*: hold \d+/);
+  assert.equal(await page.getByRole("table", { name: "Diagnostics of every step" }).count(), 0);
+  await page.getByText(/^Every step was solved to (less than )?[\d.]+.% of what it is worth/).waitFor();
+  await page.getByText("For the quant").click();
   await page.getByRole("table", { name: "Diagnostics of every step" }).waitFor();
 });
 
@@ -207,7 +211,7 @@ test("a long training is cancelled", async () => {
     design: { count: 3000 },
   });
   await go("#/jobs");
-  await page.getByText(/^Step 59, solving/).waitFor();
+  await page.getByText(/^Period 60, solving/).waitFor();
   await page.getByRole("button", { name: /^Cancel/ }).click();
   await page.locator(".state.cancelled").waitFor();
 });
@@ -257,9 +261,9 @@ test("an evaluation is asked for and reported", async (t) => {
     assert.equal(await entry.count(), 0);
     return t.skip("this service has no /evaluate");
   }
-  await page.getByLabel("Paths per history").fill("200");
+  await page.getByLabel("Futures per record").fill("200");
   await page.getByRole("button", { name: "Evaluate" }).click();
-  await page.getByRole("table", { name: "Outcomes of every strategy" }).waitFor();
+  await page.getByRole("table", { name: "How wealth ended, by what it is worth" }).waitFor();
   evaluation = page.url().split("/").pop();
 });
 

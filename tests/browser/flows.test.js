@@ -25,7 +25,7 @@ const main = async () => plain(await page.locator("main").innerText());
 test("a policy is trained with what is added and withdrawn as the form says", async () => {
   await page.goto(`${ballast.url}/#/train`);
   await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
-  await page.getByLabel("Decisions").fill("3");
+  await page.getByLabel("Periods ahead").fill("3");
   await page.getByLabel("Bank return per period").fill("0.2 %");
   await page.getByLabel("Trading cost").fill("1 %");
   await page.getByLabel("Added each period").fill("12 500; -20; 3,5");
@@ -67,7 +67,7 @@ test("a session says what is added at the end of the period, reckons with it, an
 test("a policy that forgets is asked for by the form, and sessions by it renew themselves or roll", async () => {
   await page.goto(`${ballast.url}/#/train`);
   await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
-  await page.getByLabel("Decisions").fill("2");
+  await page.getByLabel("Periods ahead").fill("2");
   await page.getByLabel("Bank return per period").fill("0.2 %");
   await page.getByLabel("Half-life of returns").fill("1");
   const sent = page.waitForRequest((request) => request.url().endsWith("/train"));

@@ -5,7 +5,7 @@ import { readFile } from "node:fs/promises";
 import { test } from "node:test";
 import { dashboardModule } from "./modules.js";
 
-const { tick } = await dashboardModule("format.js");
+const { figures, minus, tick } = await dashboardModule("format.js");
 const { typed } = await dashboardModule("number_text.js");
 const { SOURCES } = await dashboardModule("advice.js");
 const { problemWords } = await dashboardModule("problem_words.js");
@@ -33,9 +33,18 @@ test("a refusal names the field, the value and the rule in the unit of the field
     [{ value: "100,000", rule: 'invalid type: string "100,000", expected f64' }, "Initial wealth", null, "Initial wealth is \u201c100,000\u201d; it must be a number, with nothing between its thousands."],
     [{ value: null, rule: "invalid type: null, expected f64" }, "Initial wealth", null, "Initial wealth is blank; it must be a number, with nothing between its thousands."],
     [{ value: 1.5, rule: "invalid type: floating point `1.5`, expected u64" }, "Seed", null, "Seed is 1.5; it must be a whole number, zero or more."],
+    [{ value: 1, rule: "must lie in [0.001, 0.999]" }, "Confidence, %", "confidence", "Confidence is 0 %; it must be from 0.1 % to 99.9 %."],
+    [{ value: 0.6, rule: "must lie in [-0.5, 0.5]" }, "Bank return per month, %", "percent", "Bank return per month is 60 %; it must be from -50 % to 50 %."],
+    [{ value: 7, rule: "must lie in [-5, 5]" }, "Returns or prices, number 4,", null, "Returns or prices, number 4, is 7; it must be from -5 to 5."],
+    [{ value: "x", rule: "unknown variant `x`, expected one of `log`, `power`" }, "Kind", null, "Kind is \u201cx\u201d; it must be one of log, power."],
     [{ value: -1, rule: "must be a number in [-0.9932620530009145, 147.4131591025766]" }, "Return in period 2, %", "percent", "Return in period 2 is -100 %; it must be from -99.32 % to 14,741.31 %."],
   ];
   for (const [problem, label, unit, words] of cases) assert.equal(plain(problemWords(problem, label, unit)), words);
+});
+
+test("numbers of a column have the digits of each other, and a sentence has minus signs", () => {
+  assert.deepEqual([0.0048, 0.00475, 1.5, 12.34, 0].map((value) => figures(value, 3)), ["0.00480", "0.00475", "1.50", "12.3", "0"]);
+  assert.equal(minus("from -18.9 % on 2008-09-30, well-known (-2)"), "from \u221218.9 % on 2008-09-30, well-known (\u22122)");
 });
 
 test("every source of an advice has words", async () => {

@@ -1,5 +1,6 @@
 // The service's own interface, as /docs describes it.
 
+import { minus } from "./format.js";
 import { held, shown } from "./key.js";
 
 /** A stream that broke off is opened again after so long, in milliseconds. */
@@ -8,7 +9,7 @@ const RECONNECT = 1000;
 /** A refusal or a failure, as a problem document (RFC 9457). */
 export class Problem extends Error {
   constructor(document) {
-    super(document.detail || document.title);
+    super(minus(document.detail || document.title));
     const { type, title, status, field, value, rule } = document;
     Object.assign(this, { type, title, status, field, value, rule });
   }
@@ -55,9 +56,9 @@ export async function offers(path) {
 
 /**
  * Follows a job: `changed(job)` at once and at every change, until it ends or `signal` aborts. A stream that breaks off
- * is opened again, and told which event was seen last. By `fetch`, for an `EventSource` cannot show a key.
+ * is opened again, and told which event was seen last; `unheard(error)` hears of that, and of null once it goes on. By `fetch`, for an `EventSource` cannot show a key.
  */
-export async function follow(job, changed, signal) {
+export async function follow(job, changed, signal, unheard = () => {}) {
   let seen = {};
   while (!signal.aborted) {
     try {
@@ -66,11 +67,13 @@ export async function follow(job, changed, signal) {
       for await (const event of events(stream.body)) {
         seen = { "last-event-id": event.id };
         const now = JSON.parse(event.data);
+        unheard(null);
         changed(now);
         if (isOver(now)) return;
       }
     } catch (error) {
       if (signal.aborted || (error instanceof Problem && !error.passing)) return;
+      unheard(error);
     }
     await new Promise((resolve) => setTimeout(resolve, RECONNECT));
   }

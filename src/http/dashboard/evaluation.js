@@ -1,12 +1,23 @@
-// The report of one evaluation, as docs/evaluation.md describes it.
+// The report of one evaluation: what was compared and what came of it in sentences and in wealth, the rest for the quant.
 
 import { download, get } from "./api.js";
 import { lineChart } from "./chart.js";
-import { facts, h, section, table } from "./dom.js";
-import { count, counted, duration, percent, percentTick, short, significant, tick, wealth } from "./format.js";
+import { disclosure, h, section, table } from "./dom.js";
+import { count, counted, duration, figures, minus, percent, percentTick, short, significant, tick, wealth } from "./format.js";
+import { histogram } from "./histogram.js";
 import { intervalChart } from "./interval_chart.js";
 import { until } from "./jobs.js";
-import { FRAMEWORKS, worth } from "./specification.js";
+import { unitOf } from "./periods.js";
+import { FRAMEWORKS, investorWords, PAPER, worth } from "./specification.js";
+import { binned, chanceBelow, pieces, worstAverage } from "./spread.js";
+
+/** One colour a kind of policy, in every chart; constant mixes have one of their own. */
+const COLOURS = { adaptive: 0, static: 1, plug_in: 3, known_law: 4, parametric_adaptive: 5, parametric_static: 6 };
+const MIX = 2;
+/** Histograms shown at once. */
+const SHOWN = 4;
+const BINS = 36;
+const TAIL = 0.05;
 
 export async function view(id, leaving) {
   const job = await get(`/jobs/${id}`, leaving);
@@ -14,160 +25,232 @@ export async function view(id, leaving) {
   const title = `Evaluation ${short(id)}`;
   if (job.state !== "succeeded") return { title, trail, body: until(job, leaving) };
   const report = await get(job.report, leaving);
-  const names = report.strategies.map(named);
+  const ended = outcomes(report);
   const export_ = h(
     "a",
     { class: "button quiet", href: job.report, download: `evaluation-${short(id)}.json`, onclick: download },
     "Export",
   );
-  return {
-    title,
-    trail,
-    actions: export_,
-    body: [summary(report), outcomes(report, names), spreads(report, names), courses(report), coverage(report)],
-  };
+  const body = [compared(report), results(report, ended), spreads(report, ended), courses(report), quant(report, ended)];
+  return { title, trail, actions: export_, body };
 }
 
-const named = ({ framework, constant_mix }) =>
-  framework ? FRAMEWORKS[framework] : constant_mix === 0 ? "All in the bank" : `${percent(constant_mix, 0)} at risk`;
+export const named = ({ framework, constant_mix }) => {
+  if (framework) return FRAMEWORKS[framework];
+  if (constant_mix === 0 || constant_mix === 1) return constant_mix === 0 ? "All in the bank" : "All in stocks";
+  return `${percent(constant_mix, 0)} in stocks`;
+};
+
+const colourOf = ({ framework }) => (framework ? COLOURS[framework] : MIX);
+
+/** What was put in over the periods, with the start. */
+function putIn({ initial_wealth, contributions, horizon }) {
+  const all = Array.isArray(contributions) ? contributions.reduce((sum, amount) => sum + amount, 0) : contributions * horizon;
+  return initial_wealth + all;
+}
+
+/** Every strategy with its name, its colour and what its wealth ended like, what it is worth the most first. */
+export function outcomes({ strategies, histogram_edges, request }) {
+  const { utility } = request.problem;
+  const stake = putIn(request.problem);
+  return strategies
+    .map((strategy) => {
+      const spread = pieces(strategy, histogram_edges, utility);
+      const quantile = (name) => worth(utility, strategy.utility[name].value);
+      return {
+        ...strategy,
+        name: named(strategy),
+        colour: colourOf(strategy),
+        spread,
+        loss: chanceBelow(spread, stake),
+        tail: worstAverage(spread, TAIL),
+        fifth: quantile("quantile_20"),
+        tenth: quantile("quantile_90"),
+        least: quantile("min"),
+        most: quantile("max"),
+      };
+    })
+    .sort((one, other) => other.certainty_equivalent.value - one.certainty_equivalent.value);
+}
 
 /** An estimate with its interval. */
 const interval = ({ value, low, high }, format) => `${format(value)} (${format(low)} to ${format(high)})`;
 
-function summary({ request, histories, level = request.level, costs }) {
+/** What was compared, on what, for whom. */
+function compared({ request, histories, strategies }) {
+  const { problem } = request;
+  const unit = unitOf(problem.periods_per_year);
   const drawn = request.histories.kind === "drawn";
-  const radii = histories.map(({ radius }) => radius).filter(Number.isFinite);
+  const records = drawn ? `, after each of ${counted(histories.length, "record")} drawn from the market` : `, after a record of ${counted(problem.history.length, "return")}`;
+  const followed = strategies.filter(({ policy }) => policy && Object.values(request.policies).includes(policy));
+  const links = followed.map(({ policy, framework }, index) => [index > 0 ? ", " : "", `\u201c${FRAMEWORKS[framework]}\u201d is `, h("a", { href: `#/policies/${policy}` }, `policy ${short(policy)}`)]);
   return h(
     "div",
-    {},
+    { class: "words" },
     h(
-      "div",
-      { class: "words" },
-      h(
-        "p",
-        {},
-        `Every strategy went through the same ${counted(request.paths * histories.length, "path")} of ${counted(request.problem.horizon, "period")}${drawn ? `, from ${counted(histories.length, "history").replace("historys", "histories")} drawn from the law` : ", all from the given history"}. Ranges bound each figure at ${percent(level, 0)}.`,
-      ),
+      "p",
+      {},
+      `${count(strategies.length)} ways to hold stocks, through the same ${counted(request.paths * histories.length, "future")} of ${counted(problem.horizon, unit)}${records}, for ${investorWords(problem.utility)} who starts with ${wealth(problem.initial_wealth)}.`,
     ),
-    facts([
-      ["Paths", count(request.paths), drawn ? "per history" : "from one history"],
-      ["Histories", count(histories.length), drawn ? "drawn" : "given"],
-      radii.length > 0 && [
-        "First radius",
-        significant(radii.reduce((sum, radius) => sum + radius, 0) / radii.length, 3),
-        "mean over histories",
-      ],
-      ["Training", duration(costs.training_seconds)],
-      ["Simulation", duration(costs.simulation_seconds)],
-    ]),
+    h(
+      "p",
+      {},
+      `Futures are drawn from ${drawnFrom(problem.law)}; the bank pays ${percent(problem.rate_per_step, 2)} a ${unit}${problem.trading_cost > 0 ? `, and trading costs ${percent(problem.trading_cost, 2)}` : ""}. `,
+      links.length > 0 ? [...links, "; the other policies were trained for this."] : "The policies were trained for this.",
+    ),
   );
 }
 
-/** Quantiles and extremes of utility are those of wealth, utility being increasing; its mean and variance are not. */
-function outcomes({ strategies, reference, request, sentences }, names) {
-  const rows = strategies.map((strategy, index) => ({ ...strategy, name: names[index] }));
-  const estimate = (name, read, format) => ({
-    name,
-    numeric: true,
-    cell: (row) => (read(row) ? interval(read(row), format) : "\u2013"),
-  });
-  const plain = (name, read, digits) => ({ name, numeric: true, cell: (row) => significant(read(row).value, digits) });
-  const inWealth = (name, read) => ({
-    name,
-    numeric: true,
-    cell: ({ utility }) => wealth(worth(request.problem.utility, read(utility).value)),
-  });
-  const referred = names[strategies.findIndex(({ strategy }) => strategy === reference)];
+const LAWS = { bootstrap: "the record itself, smoothed", gaussian_mixture: "a mixture of bell curves", student_t: "a Student law, of heavier tails than a bell curve" };
+const drawnFrom = (law) => LAWS[law?.kind] ?? "the market it was asked for";
+
+/** A name within a sentence. */
+const called = ({ framework, name }) => (framework ? `\u201c${name}\u201d` : name);
+
+/** What the figures say. */
+export function conclusions({ reference }, ended) {
+  const [best] = ended;
+  const bank = ended.find(({ constant_mix }) => constant_mix === 0);
+  const stocks = ended.find(({ constant_mix }) => constant_mix === 1);
+  const sure = ({ certainty_equivalent: { value } }) => `as much as a sure ${wealth(value)}`;
+  const main = ended.find(({ strategy }) => strategy === reference);
+  const said = [
+    `${called(best)} is worth the most to this investor: ${sure(best)}${bank && bank !== best ? `, where all in the bank comes to ${wealth(bank.certainty_equivalent.value)}` : ""}.`,
+  ];
+  const place = ended.indexOf(main) + 1;
+  if (main && main !== best) {
+    const { low, high } = best.difference?.certainty_equivalent ?? { low: -1, high: 1 };
+    const far = low > 0 || high < 0 ? "" : ", by so little that these futures cannot tell the two apart";
+    said.push(`${called(main)} comes ${ordinal(place)} of ${ended.length}, worth ${sure(main)}${far}.`);
+  }
+  if (main) {
+    const beside = stocks && stocks !== main ? ` All in stocks does so in ${percent(stocks.loss, 0)}, with ${wealth(stocks.tail)}.` : "";
+    said.push(`${called(main)} ends with less than was put in in ${percent(main.loss, 0)} of the futures; the worst 5\u202f% of them end with ${wealth(main.tail)} on average.${beside}`);
+  }
+  return main?.own_mix ? [...said, changing(main)] : said;
+}
+
+const ordinal = (place) => `${place}${{ 1: "st", 2: "nd", 3: "rd" }[place % 100 > 10 && place % 100 < 14 ? 0 : place % 10] ?? "th"}`;
+
+/** Whether changing the share held earned anything. */
+function changing(strategy) {
+  const { allocation, beyond } = strategy.own_mix;
+  const size = `${tick(Math.abs(beyond.value), 0.01)} (${tick(beyond.low, 0.01)} to ${tick(beyond.high, 0.01)})`;
+  const verdict = beyond.low > 0 || beyond.high < 0 ? "" : ": these futures do not show that it did anything";
+  return `${called(strategy)} holds ${percent(allocation)} on average; that it changes the share ${beyond.value < 0 ? "cost" : "earned"} ${size} beside holding that all along${verdict}.`;
+}
+
+function results(report, ended) {
+  const money = (name, read) => ({ name, numeric: true, cell: (row) => wealth(read(row)) });
   return section(
-    "What each was worth",
+    "What each is worth",
+    h("div", { class: "words" }, conclusions(report, ended).map((sentence) => h("p", {}, sentence))),
     intervalChart({
-      title: "Certainty equivalent of terminal wealth",
-      rows: rows.map(({ name, certainty_equivalent }) => ({ name, ...certainty_equivalent })),
+      title: "Worth as much as a sure",
+      rows: ended.map(({ name, colour, certainty_equivalent }) => ({ name, colour, ...certainty_equivalent })),
       format: wealth,
       tick,
     }),
     table(
-      "Outcomes of every strategy",
+      "How wealth ended, by what it is worth",
       [
         { name: "Strategy", cell: ({ name }) => name },
-        estimate("Certainty equivalent", ({ certainty_equivalent }) => certainty_equivalent, wealth),
-        estimate(
-          `Less ${referred.toLowerCase()}`,
-          ({ difference }) => difference?.certainty_equivalent,
-          (value) => tick(value, 0.01),
-        ),
-        estimate(
-          "Beyond its own mix",
-          ({ own_mix }) => own_mix?.beyond,
-          (value) => tick(value, 0.01),
-        ),
-        estimate("Mean wealth", (row) => row.wealth.mean, wealth),
-        inWealth("20 % below", ({ quantile_20 }) => quantile_20),
-        inWealth("90 % below", ({ quantile_90 }) => quantile_90),
-        inWealth("Least", ({ min }) => min),
-        inWealth("Most", ({ max }) => max),
-        plain("Mean utility", ({ utility }) => utility.mean, 7),
-        plain("Variance", ({ utility }) => utility.variance, 3),
+        money("Worth as much as a sure", ({ certainty_equivalent }) => certainty_equivalent.value),
+        money("Average", (row) => row.wealth.mean.value),
+        { name: "Chance of loss", numeric: true, cell: ({ loss }) => percent(loss) },
+        money("Worst 5\u202f%, average", ({ tail }) => tail),
+        money("One in five below", ({ fifth }) => fifth),
+        money("One in ten above", ({ tenth }) => tenth),
+        money("Least", ({ least }) => least),
+        money("Most", ({ most }) => most),
       ],
-      rows,
+      ended,
     ),
-    h("div", { class: "words" }, ...sentences.map((sentence) => h("p", {}, sentence))),
+    h("p", { class: "note" }, `A loss is to end with less than the ${wealth(putIn(report.request.problem))} put in. Chances of loss and the worst 5\u202f% are read off a histogram; ranges in the chart hold with ${percent(report.request.level, 0)} confidence.`),
   );
 }
 
-/** One histogram a strategy, on common bins: even in utility, labelled by the wealth that has it. */
-function spreads({ strategies, histogram_edges, request }, names) {
-  const bins = histogram_edges.length - 1;
-  if (histogram_edges[0] === histogram_edges[bins]) return "";
-  const edge = (place) => wealth(worth(request.problem.utility, histogram_edges[Math.round(place)]));
-  const x = {
-    values: Array.from({ length: bins }, (_, k) => k + 1),
-    domain: [0, bins],
-    label: "Wealth",
-    whole: true,
-    format: (place) => `${edge(place - 1)} to ${edge(place)}`,
-    tick: edge,
-  };
-  const charts = strategies.map(({ histogram }, index) => {
-    const total = histogram.reduce((sum, value) => sum + value, 0);
-    return lineChart({
-      title: names[index],
-      height: 120,
-      start: histogram.indexOf(Math.max(...histogram)),
-      x,
-      y: { format: percent, tick: percentTick, also: [0] },
-      series: [{ name: "", kind: "bars", values: histogram.map((value) => value / total) }],
-    });
-  });
-  return section("How terminal wealth spreads", h("div", { class: "trio" }, charts));
+/** Those drawn at first: the reference, what is worth the most, all in stocks, and the next kinds of policy. */
+function foremost(ended, reference) {
+  const wanted = [ended.find(({ strategy }) => strategy === reference), ended[0], ended.find(({ constant_mix }) => constant_mix === 1)];
+  const rest = [...ended].sort((one, other) => Number(Boolean(other.framework)) - Number(Boolean(one.framework)));
+  return [...new Set([...wanted, ...rest].filter(Boolean))].slice(0, SHOWN);
 }
 
-/** Allocation and radius through time, where a framework decides. */
-function courses({ strategies }) {
+/** A histogram a strategy, all on one scale of wealth; who ends alike on every path is a mark in all of them. */
+function spreads({ request, reference }, ended) {
+  const spread = ended.filter(({ spread }) => spread.length > 1);
+  if (spread.length === 0) return "";
+  const domain = [Math.min(...spread.map(({ spread }) => spread[0].from)), Math.max(...spread.map(({ spread }) => spread.at(-1).to))];
+  const shares = new Map(spread.map((one) => [one, binned(one.spread, domain, BINS)]));
+  const shown = foremost(spread, reference);
+  const rest = spread.filter((one) => !shown.includes(one));
+  const top = Math.max(...shown.flatMap((one) => shares.get(one)));
+  const bank = ended.find(({ constant_mix }) => constant_mix === 0);
+  const marks = bank ? [{ name: bank.name, at: bank.certainty_equivalent.value }] : [];
+  const drawn = (some, highest) =>
+    h("div", { class: "duo" }, some.map((one) => histogram({ title: one.name, shares: shares.get(one), domain, top: highest, colour: one.colour, marks })));
+  const dashed = bank ? ` The dashed line is all in the bank, ${wealth(bank.certainty_equivalent.value)}.` : "";
+  const others = () => drawn(rest, Math.max(top, ...rest.flatMap((one) => shares.get(one))));
+  return section(
+    "How wealth spreads at the end",
+    h("p", { class: "note" }, `How often wealth ends where, after ${counted(request.problem.horizon, unitOf(request.problem.periods_per_year))}: one scale for all.${dashed}`),
+    drawn(shown, top),
+    rest.length > 0 ? disclosure(`The other ${count(rest.length)}`, others) : "",
+  );
+}
+
+/** What was held through time, where a policy decides. */
+function courses({ strategies, request }) {
   const deciding = strategies.filter(({ periods }) => periods);
   if (deciding.length === 0) return "";
-  const values = deciding[0].periods.map(({ period }) => period);
-  const x = { values, label: "Period", format: String, whole: true };
-  const line = (strategy, read) => ({ name: named(strategy), kind: "line", values: strategy.periods.map(read) });
-  const guarding = deciding.filter(({ periods }) => periods[0].radius);
-  const radius =
-    guarding.length > 0 &&
-    lineChart({
-      title: "Mean radius",
-      x,
-      y: { format: (value) => significant(value, 3), tick },
-      series: guarding.map((strategy) => line(strategy, ({ radius }) => radius.mean)),
-    });
+  const unit = unitOf(request.problem.periods_per_year);
+  const series = deciding.map((one) => ({ name: named(one), colour: colourOf(one), kind: "line", values: one.periods.map(({ allocation }) => allocation.mean) }));
+  const x = { values: deciding[0].periods.map(({ period }) => period), label: unit[0].toUpperCase() + unit.slice(1), format: String, whole: true };
   return section(
     "What each held",
-    lineChart({
-      title: "Mean allocation",
-      x,
-      y: { format: percent, tick: percentTick, also: [0] },
-      series: deciding.map((strategy) => line(strategy, ({ allocation }) => allocation.mean)),
-    }),
-    radius || null,
+    lineChart({ title: "Average share in stocks", x, y: { format: percent, tick: percentTick, also: [0] }, series }),
   );
+}
+
+/** Utility, differences, radii and coverage, and what it took. */
+function quant(report, ended) {
+  const { request, reference, sentences, costs, histories } = report;
+  const referred = ended.find(({ strategy }) => strategy === reference)?.name.toLowerCase() ?? "the reference";
+  const estimate = (name, read, format) => ({ name, numeric: true, cell: (row) => (read(row) ? interval(read(row), format) : "\u2013") });
+  const build = () =>
+    h(
+      "div",
+      {},
+      h("p", { class: "note" }, sentences.map((sentence) => minus(sentence)).join(" ")),
+      h("p", { class: "note" }, `${counted(request.paths, "path")} a history of ${count(histories.length)}; training took ${duration(costs.training_seconds)}, simulation ${duration(costs.simulation_seconds)}.`),
+      table(
+        "Certainty equivalents and utility",
+        [
+          { name: "Strategy", cell: ({ framework, name }) => (framework ? PAPER[framework] : name) },
+          estimate("Certainty equivalent", ({ certainty_equivalent }) => certainty_equivalent, wealth),
+          estimate(`More than ${referred}`, ({ difference }) => difference?.certainty_equivalent, (value) => tick(value, 0.01)),
+          estimate("Beyond its own mix", ({ own_mix }) => own_mix?.beyond, (value) => tick(value, 0.01)),
+          { name: "Mean utility", numeric: true, cell: ({ utility }) => figures(utility.mean.value, 7) },
+          { name: "Variance", numeric: true, cell: ({ utility }) => significant(utility.variance.value, 3) },
+        ],
+        ended,
+      ),
+      radii(report),
+      coverage(report),
+    );
+  return section("For the quant", disclosure("Utility, radii and coverage", build));
+}
+
+function radii({ strategies }) {
+  const guarding = strategies.filter(({ periods }) => periods?.[0].radius);
+  if (guarding.length === 0) return "";
+  return lineChart({
+    title: "Mean radius",
+    x: { values: guarding[0].periods.map(({ period }) => period), label: "Period", format: String, whole: true },
+    y: { format: (value) => figures(value, 3), tick },
+    series: guarding.map((one) => ({ name: named(one), colour: colourOf(one), kind: "line", values: one.periods.map(({ radius }) => radius?.mean ?? null) })),
+  });
 }
 
 function coverage({ strategies }) {
@@ -177,12 +260,10 @@ function coverage({ strategies }) {
     strategy.coverage.by_sample_size.map((row) => ({ ...row, strategy, target: strategy.coverage.target })),
   );
   const left = covered.map(
-    (strategy) =>
-      `${named(strategy)}: the law left the ball at some period on ${interval(strategy.coverage.ever_left, percent)} of the paths.`,
+    (strategy) => `${named(strategy)}: the law left the ball at some period on ${interval(strategy.coverage.ever_left, percent)} of the paths.`,
   );
-  return section(
-    "How often the ball held the true law",
-    left.map((sentence) => h("p", {}, sentence)),
+  return [
+    ...left.map((sentence) => h("p", { class: "note" }, sentence)),
     table(
       "Coverage by sample size",
       [
@@ -193,5 +274,5 @@ function coverage({ strategies }) {
       ],
       rows,
     ),
-  );
+  ];
 }

@@ -21,21 +21,21 @@ function asking(policies, asked) {
   const policy = select({
     name: "policy",
     label: "Policy",
-    note: "Its problem, design and seed are used for every framework.",
+    note: "Its investor, record and precision are those of all that is compared.",
     choices,
   });
   if (asked in choices) policy.control.value = asked;
-  const paths = input({ name: "paths", label: "Paths per history", note: "100 to 100,000.", value: "1000" });
+  const paths = input({ name: "paths", label: "Futures per record", note: "100 to 100,000.", value: "1000" });
   const histories = select({
     name: "histories.kind",
-    label: "Histories",
-    note: "Drawn ones say how much the result depends on the history.",
-    choices: { given: "The policy\u2019s own", drawn: "Drawn from the law" },
+    label: "Records",
+    note: "Drawn ones say how much the result depends on the record.",
+    choices: { given: "The policy\u2019s own", drawn: "Drawn from the market" },
   });
-  const count = input({ name: "histories.count", label: "How many histories", note: "2 to 1,000.", value: "50" });
+  const count = input({ name: "histories.count", label: "How many records", note: "2 to 1,000.", value: "50" });
   const frameworks = h(
     "div",
-    { class: "field checks", role: "group", "aria-label": "Frameworks" },
+    { class: "field checks", role: "group", "aria-label": "Kinds of policy" },
     Object.entries(FRAMEWORKS).map(([value, words]) =>
       h("label", {}, h("input", { type: "checkbox", name: "frameworks", value, checked: true }), words),
     ),
@@ -57,7 +57,7 @@ function asking(policies, asked) {
       h(
         "span",
         { class: "note" },
-        "Frameworks other than the policy\u2019s are trained first; all-bank and constant mixes take part by themselves.",
+        "Other kinds than the policy\u2019s are trained first; all in the bank and constant mixes take part by themselves.",
       ),
     ),
   );

@@ -21,7 +21,7 @@ function field(name, label, note, control, within = "") {
   return { name, element, control };
 }
 
-/** A text field; `changed(text)` at every edit. `within` tells its id from that of the same field in another form. `unit` is "percent" where it counts so and the request does not. */
+/** A text field; `changed(text)` at every edit. `within` tells its id from that of the same field in another form. `unit` is "percent" where it counts so and the request does not, "confidence" where it is what the request's share leaves of 100 %. */
 export function input({ name, label, note, changed, within, value = "", unit = null, ...attributes }) {
   const control = h("input", {
     type: "text",
@@ -74,14 +74,18 @@ export function showProblem(form, message, problem, otherwise) {
   }
   if (control === null) {
     message.hidden = false;
-    message.textContent = problem.message;
-    otherwise?.closest("details")?.setAttribute("open", "");
-    (otherwise ?? message).focus();
+    message.textContent = problem.rule && problem.field ? problemWords(problem, inWords(problem.field)) : problem.message;
+    // A refusal that names no field is not mended in one.
+    const place = problem.field ? otherwise : null;
+    place?.closest("details")?.setAttribute("open", "");
+    (place ?? message).focus();
     return;
   }
-  control.closest("details")?.setAttribute("open", "");
-  const own = problem.rule && problem.field === control.name && control.labels.length > 0;
-  const words = own ? problemWords(problem, control.labels[0].textContent, control.dataset.unit) : problem.message;
+  for (let fold = control.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;
+  const part = /^\[(\d+)\]$/.exec((problem.field ?? "").slice(control.name.length));
+  const own = problem.rule && (problem.field === control.name || part) && control.labels.length > 0;
+  const label = own && `${control.labels[0].textContent}${part ? `, number ${Number(part[1]) + 1},` : ""}`;
+  const words = own ? problemWords(problem, label, control.dataset.unit) : problem.message;
   const error = h("p", { class: "error", role: "alert", id: `${control.id}-error` }, words);
   control.setAttribute("aria-invalid", "true");
   control.dataset.described = control.getAttribute("aria-describedby") ?? "";
@@ -89,6 +93,12 @@ export function showProblem(form, message, problem, otherwise) {
   control.closest(".field").append(error);
   control.focus();
   control.addEventListener("input", () => clear(form), { once: true });
+}
+
+/** The last part of a field's path, as a label would have it: `design.sampling_law.degrees_of_freedom` is Degrees of freedom. */
+function inWords(path) {
+  const last = path.replace(/\[\d+\]/g, "").split(".").at(-1).replaceAll("_", " ");
+  return last[0].toUpperCase() + last.slice(1);
 }
 
 /** Takes errors away. */

@@ -10,6 +10,9 @@ function grouped(value, digits) {
     .replace("-", MINUS);
 }
 
+/** A sentence of the service with minus signs where it has hyphens before numbers. */
+export const minus = (sentence) => sentence.replace(/(^|[\s([\u201c])-(?=[\d.])/g, `$1${MINUS}`);
+
 /** A share or a return, given as a fraction. */
 export function percent(fraction, digits = 1) {
   return Number.isFinite(fraction) ? `${grouped(100 * fraction, digits)}${NARROW}%` : "\u2013";

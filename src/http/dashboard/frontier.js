@@ -2,7 +2,7 @@
 
 import { download, get, post } from "./api.js";
 import { announce, h, section, table } from "./dom.js";
-import { percent, short, tick } from "./format.js";
+import { minus, percent, short, tick } from "./format.js";
 import { intervalChart } from "./interval_chart.js";
 import { until } from "./jobs.js";
 
@@ -17,7 +17,7 @@ export async function view(id, leaving) {
   const words = h(
     "div",
     { class: "words" },
-    report.sentences.map((sentence) => h("p", {}, sentence)),
+    report.sentences.map((sentence) => h("p", {}, minus(sentence))),
   );
   return { title, trail, actions, body: [words, ...report.resampled.map((resampled) => drawn(report, resampled))] };
 }
@@ -25,30 +25,31 @@ export async function view(id, leaving) {
 const TITLES = {
   smoothed: () => "Records drawn from the returns seen, smoothed",
   block: ({ length }) => `Records of blocks of ${length} periods in a row`,
-  without_premium: () => "Records of a law without the premium",
+  without_premium: () => "Records of a market that pays no more than the bank",
 };
 
-const points = (value) => tick(value, 0.1);
-const scaled = (scale) => ({ 0: "No radius", 1: "The radius" })[scale] ?? `${scale} times it`;
+/** What is lost comes in basis points, and is told in percent. */
+const inPercent = (value) => tick(value / 100, 0.001);
+const scaled = (scale) => ({ 0: "No caution", 1: "This caution" })[scale] ?? `${scale} times it`;
 
 /** One law: what each scale loses, and how much that varies. */
 function drawn({ own, per_year }, { bootstrap, best, points: scales }) {
   const total = (shares) => shares.reduce((sum, share) => sum + share, 0);
-  const lost = `Lost ${per_year ? "a year" : "a period"}, basis points`;
+  const lost = `Lost ${per_year ? "a year" : "a period"}, %`;
   const rows = scales.map((point, index) => ({ ...point, name: scaled(point.scale), own: total(own[index]) }));
   const number = (name, cell) => ({ name, numeric: true, cell });
   return section(
     TITLES[bootstrap.kind](bootstrap),
-    h("p", { class: "note" }, `Who knows this law holds ${percent(total(best))}.`),
-    intervalChart({ title: lost, noun: "Radius", rows: rows.map(({ name, lost }) => ({ name, ...lost })), format: points, tick }),
+    h("p", { class: "note" }, `Who knows this market holds ${percent(total(best))}.`),
+    intervalChart({ title: lost, noun: "Caution", rows: rows.map(({ name, lost }) => ({ name, ...lost })), format: inPercent, tick: (value, step) => tick(value / 100, step / 100) }),
     table(
-      `${lost}, at each multiple of the radius`,
+      `${lost}, at each multiple of the caution`,
       [
-        { name: "Radius", cell: ({ name }) => name },
-        number("Lost on average", ({ lost }) => points(lost.value)),
-        number("Varies from record to record by", ({ deviation }) => points(deviation.value)),
-        number("Beyond the best", ({ beyond_least }) => (beyond_least ? points(beyond_least.value) : "\u2013")),
-        number("Beyond its own mix", ({ beyond_own_mix }) => points(beyond_own_mix.value)),
+        { name: "Caution", cell: ({ name }) => name },
+        number("Lost on average", ({ lost }) => inPercent(lost.value)),
+        number("Varies from record to record by", ({ deviation }) => inPercent(deviation.value)),
+        number("Beyond the best", ({ beyond_least }) => (beyond_least ? inPercent(beyond_least.value) : "\u2013")),
+        number("Beyond its own mix", ({ beyond_own_mix }) => inPercent(beyond_own_mix.value)),
         number("Held on average", ({ total }) => percent(total)),
         number("Held on this record", ({ own }) => percent(own)),
       ],

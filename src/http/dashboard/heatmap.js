@@ -10,9 +10,9 @@ const COLOURS = 11;
 
 /**
  * `x`, `y`: `{name, values, format, tick}`, values ascending; `field[row][column]` over y and x;
- * `range`: the field's own range, for the colours; `dots`: positions of design points; `start`: the cell first read.
+ * `range`: the field's own range, for the colours; `dots`: positions of design points; `own`: that of the record itself, or null; what is read first is the record itself, or the middle.
  */
-export function heatmap({ title, x, y, field, range, format, dots, note, name }) {
+export function heatmap({ title, x, y, field, range, format, dots, own = null, note, name }) {
   const [columns, rows] = [x.values.length, y.values.length];
   const output = h("output", { class: "here", "aria-live": "polite" });
   const legend = h(
@@ -28,7 +28,7 @@ export function heatmap({ title, x, y, field, range, format, dots, note, name })
             { class: "swatch", width: 10, height: 10, "aria-hidden": "true" },
             s("circle", { class: "sample", cx: 5, cy: 5, r: 2.5 }),
           ),
-          "design points",
+          "situations solved",
         )
       : null,
   );
@@ -36,7 +36,9 @@ export function heatmap({ title, x, y, field, range, format, dots, note, name })
   const [dx, dy] = [half(x.values), half(y.values)];
   const colour = (value) =>
     `c${Math.round((COLOURS - 1) * Math.max(0, Math.min(1, (value - range[0]) / (range[1] - range[0] || 1))))}`;
-  let [column, row] = [columns >> 1, rows >> 1],
+  const near = (axis, d, value) => Math.round((value - axis.values[0]) / (2 * d));
+  const first = own && inside(own, x.values, y.values) ? [near(x, dx, own[0]), near(y, dy, own[1])] : [columns >> 1, rows >> 1];
+  let [column, row] = first,
     place,
     cursor;
   const holder = plot(HEIGHT, (width) => {
@@ -78,6 +80,7 @@ export function heatmap({ title, x, y, field, range, format, dots, note, name })
       s("text", { class: "axis", x: 0, y: 11 }, y.name),
       ramp(right + 14, range, format),
       cursor,
+      own && inside(own, x.values, y.values) ? cross(across(own[0]), up(own[1])) : null,
     ];
   });
   const mark = () => {
@@ -106,15 +109,19 @@ export function heatmap({ title, x, y, field, range, format, dots, note, name })
   });
   holder.addEventListener("pointermove", (event) => {
     const box = holder.getBoundingClientRect();
-    const nearest = (axis, value, d) => Math.round((value - axis.values[0]) / (2 * d));
-    go(
-      nearest(x, place.across.inverse(event.clientX - box.left), dx),
-      nearest(y, place.up.inverse(event.clientY - box.top), dy),
-    );
+    go(near(x, dx, place.across.inverse(event.clientX - box.left)), near(y, dy, place.up.inverse(event.clientY - box.top)));
   });
   read();
   return figure({ title, legend, holder, note, rows: () => fieldTable({ title, x, y, field, format }) });
 }
+
+const inside = ([px, py], xs, ys) => px >= xs[0] && px <= xs.at(-1) && py >= ys[0] && py <= ys.at(-1);
+
+/** A cross that stands out on every colour. */
+const cross = (x, y) => {
+  const d = `M${x - 7} ${y}H${x + 7}M${x} ${y - 7}V${y + 7}`;
+  return [s("path", { class: "own under", d }), s("path", { class: "own", d })];
+};
 
 /** One path a colour: a thousand elements would take a frame to make. */
 function paths(field, colour, corner, wide, high) {

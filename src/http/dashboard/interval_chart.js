@@ -5,7 +5,7 @@ import { s, table } from "./dom.js";
 
 const LINE = 26;
 
-/** `rows`: `{name, value, low, high}`; `noun` says what has the names. */
+/** `rows`: `{name, value, low, high, colour}`; `noun` says what has the names. */
 export function intervalChart({ title, noun = "Strategy", rows, format, tick }) {
   const height = LINE * rows.length + 34;
   const bottom = LINE * rows.length + 4;
@@ -23,12 +23,12 @@ export function intervalChart({ title, noun = "Strategy", rows, format, tick }) 
           tick(place, places[1] - places[0]),
         ),
       ]),
-      rows.map(({ name, value, low, high }, index) => {
+      rows.map(({ name, value, low, high, colour = 0 }, index) => {
         const y = LINE * (index + 0.5) + 2;
         return [
           s("text", { class: "tick name", x: 0, y, dy: "0.32em" }, name),
-          s("line", { class: "range", x1: x(low), x2: Math.max(x(high), x(low) + 1), y1: y, y2: y }),
-          s("circle", { class: "dot s0", cx: x(value), cy: y, r: 4.5 }),
+          s("line", { class: `range s${colour}`, x1: x(low), x2: Math.max(x(high), x(low) + 1), y1: y, y2: y }),
+          s("circle", { class: `dot s${colour}`, cx: x(value), cy: y, r: 4.5 }),
         ];
       }),
     ];

@@ -2,7 +2,7 @@
 
 import { download, follow, get, isOver, post, Problem } from "./api.js";
 import { announce, h } from "./dom.js";
-import { count, duration, moment, short } from "./format.js";
+import { count, counted, duration, moment, short } from "./format.js";
 import { foot, Pages } from "./pages.js";
 
 /** Browsers keep six connections to one address: following two jobs leaves room for everything else. */
@@ -30,15 +30,32 @@ export function until(job, leaving) {
   return jobList([job], leaving, again).element;
 }
 
+/** What is said where the service does not answer: what stands below may long be otherwise. */
+function silence() {
+  const element = h("p", { class: "note wrong", role: "alert", hidden: true });
+  let since = null;
+  /** `error` is null where it answered. */
+  const hear = (error) => {
+    if (error?.name === "AbortError") return;
+    if (error === null) since = null;
+    else since ??= Date.now();
+    element.hidden = since === null;
+    if (since !== null) element.textContent = `${error.message} What stands here is what it said last, on ${moment(since)}.`;
+  };
+  return { element, hear };
+}
+
 /** `{element, add(entries)}`: jobs that stay up to date until `leaving`; `changed(job)` hears of every change. */
 export function jobList(entries, leaving, changed = () => {}) {
-  const element = h("ol", { class: "cards" });
+  const list = h("ol", { class: "cards" });
+  const silent = silence();
+  const element = h("div", {}, silent.element, list);
   const cards = [];
-  const wake = watch(cards, leaving);
+  const wake = watch(cards, leaving, silent.hear);
   const add = (more) => {
     const added = more.map((job) => card(job, changed));
     cards.push(...added);
-    element.append(...added.map((card) => card.element));
+    list.append(...added.map((card) => card.element));
     wake();
   };
   add(entries);
@@ -53,14 +70,14 @@ function welcome() {
     h(
       "p",
       { class: "lead" },
-      "Ballast tells an investor how much to hold in a risky asset when nobody knows the law of its returns. Nothing has been trained here yet.",
+      "Ballast tells an investor how much to hold in stocks when nobody knows what the market will do. Nothing has been trained here yet.",
     ),
     h(
       "ol",
       { class: "steps" },
       step(
         "Train a policy",
-        "Give it the returns seen so far. It prepares for the worst law those returns cannot rule out, in seconds to minutes.",
+        "Give it the returns seen so far. It prepares for the worst market your record still allows, in seconds to minutes.",
       ),
       step("Open a session", "A session is one investor: his wealth, and the returns he has lived through."),
       step(
@@ -127,17 +144,26 @@ function summary({ state, progress, error, kind }) {
   if (state === "cancelled") return `Stopped after ${progress.steps_done} of ${progress.steps_total} steps.`;
   if (state === "succeeded")
     return kind === "train"
-      ? `${progress.steps_total} steps solved, last to first.`
-      : `${progress.steps_total} steps done.`;
-  const left = progress.seconds_left === null ? "" : `, ${duration(progress.seconds_left)} left`;
+      ? `${counted(progress.steps_total, "period")} solved, the last first.`
+      : `${counted(progress.steps_total, "step")} done.`;
+  const left = timeLeft(kind, progress);
   if (kind === "backtest") return `Trains policies and lives by them${left}`;
   if (kind === "frontier") return `${count(progress.points_done ?? 0)} records are advised${left}`;
-  const at =
-    progress.step === null || progress.phase === null ? "Starting" : `Step ${progress.step}, ${progress.phase}`;
+  const idle = progress.steps_done > 0 ? "Between two periods" : "Starting";
+  const at = progress.step === null || progress.phase === null ? idle : `Period ${progress.step + 1}, ${progress.phase}`;
   const points = progress.points_total
-    ? `: ${count(progress.points_done)} of ${count(progress.points_total)} points`
+    ? `: ${count(progress.points_done)} of ${counted(progress.points_total, "situation")}`
     : "";
   return `${at}${points}${left}`;
+}
+
+/** Steps that must be done before they tell how long the others take: the first is another thing than those after it. */
+const TELLING = 2;
+
+/** What is left of a job, where that can be known: an evaluation simulates when all is trained, and says so only then. */
+function timeLeft(kind, { seconds_left, steps_done, phase }) {
+  if (seconds_left === null || steps_done < TELLING || (kind === "evaluate" && phase !== "simulating")) return "";
+  return `, about ${duration(seconds_left)} left`;
 }
 
 function bar({ job, state, progress }) {
@@ -150,7 +176,7 @@ function bar({ job, state, progress }) {
   );
 }
 
-const stepsDone = ({ steps_done, steps_total }) => `${steps_done} of ${steps_total} steps`;
+const stepsDone = ({ steps_done, steps_total }) => `${steps_done} of ${counted(steps_total, "step")}`;
 
 /** Steps done, and nine tenths of the one being solved by its points: the rest is fitting. */
 function done({ steps_done, steps_total, points_done, points_total, phase }) {
@@ -189,7 +215,7 @@ function links(card) {
 }
 
 /** Follows the first running jobs and asks for the others now and then; the function given looks for new ones. */
-function watch(cards, leaving) {
+function watch(cards, leaving, hear) {
   const followed = new Set();
   let awake = false;
   const turn = async () => {
@@ -199,10 +225,11 @@ function watch(cards, leaving) {
       const live = [...followed].filter((one) => !isOver(one.job)).length;
       if (live >= FOLLOWED || followed.has(card)) continue;
       followed.add(card);
-      follow(card.job.job, card.update, leaving);
+      follow(card.job.job, card.update, leaving, hear);
     }
     const others = pending.filter((card) => !followed.has(card));
-    await Promise.all(others.map((card) => get(`/jobs/${card.job.job}`, leaving).then(card.update, () => {})));
+    const asked = (card) => get(`/jobs/${card.job.job}`, leaving).then((job) => (card.update(job), hear(null)), hear);
+    await Promise.all(others.map(asked));
     awake = pending.length > 0 && !leaving.aborted;
     if (awake) setTimeout(turn, POLL);
   };

@@ -1,13 +1,13 @@
 // The frame: which view stands at which address, and what happens on the way from one to the next.
 
-import { offers, Problem } from "./api.js";
+import { get, offers, Problem } from "./api.js";
 import { announce, h } from "./dom.js";
 import * as evaluation from "./evaluation.js";
 import * as evaluationAsking from "./evaluation_asking.js";
 import * as evaluations from "./evaluations.js";
 import * as frontier from "./frontier.js";
 import * as jobs from "./jobs.js";
-import { keyForm } from "./key.js";
+import { held, keyForm } from "./key.js";
 import * as policies from "./policies.js";
 import * as policy from "./policy.js";
 import * as session from "./session.js";
@@ -18,7 +18,7 @@ import * as train from "./train.js";
 /** Address, view, and the entry of the navigation it belongs to. A view is `async (id, leaving) => {title, body}`. */
 const ROUTES = [
   [/^#\/jobs$/, jobs.view, "jobs"],
-  [/^#\/train$/, train.view, "jobs"],
+  [/^#\/train(?:\?(.*))?$/, train.view, "jobs"],
   [/^#\/policies$/, policies.view, "policies"],
   [/^#\/policies\/([^/]+)$/, policy.view, "policies"],
   [/^#\/sessions$/, sessions.view, "sessions"],
@@ -40,15 +40,15 @@ async function show() {
   leaving.abort();
   leaving = new AbortController();
   const { signal } = leaving;
-  const hash = location.hash || "#/jobs";
-  const [route, match] = ROUTES.map((route) => [route, route[0].exec(hash)]).find(([, match]) => match) ?? [];
   main.setAttribute("aria-busy", "true");
-  let page;
+  let [page, route, match] = [];
   try {
+    const hash = ["", "#/"].includes(location.hash) ? await home(signal) : location.hash;
+    [route, match] = ROUTES.map((route) => [route, route[0].exec(hash)]).find(([, match]) => match) ?? [];
     page = route ? await route[1](match[1] && decodeURIComponent(match[1]), signal) : missing(hash);
   } catch (error) {
     if (signal.aborted) return;
-    page = failed(error);
+    page = failed(error, route?.[2]);
   }
   if (signal.aborted) return;
   for (const link of document.querySelectorAll(".bar [data-view]")) {
@@ -69,25 +69,36 @@ async function show() {
   first = false;
 }
 
+/** Where a visit starts: at the sessions, or where there is none at what to do first. */
+async function home(signal) {
+  const { sessions } = await get("/sessions?limit=1", signal);
+  return sessions.length > 0 ? "#/sessions" : "#/jobs";
+}
+
 /** Where a key is typed in, or given up. */
 function key() {
   const note = "A service that asks for keys shows nothing without one. This tab alone keeps it, until it is closed.";
-  const home = () => location.assign("#/jobs");
-  return { title: "Key", body: [h("p", {}, note), keyForm(home)] };
+  return { title: "Key", body: [h("p", {}, note), keyForm(() => location.assign("#/"))] };
 }
+
+const capital = (sentence) => `${sentence[0].toUpperCase()}${sentence.slice(1)}`;
 
 function missing(hash) {
   return {
     title: "There is nothing here",
-    body: h("p", {}, `No view stands at ${hash}. `, h("a", { href: "#/jobs" }, "See the jobs"), "."),
+    body: h("p", {}, `No view stands at ${hash}. `, h("a", { href: "#/" }, "Start anew"), "."),
   };
 }
 
-function failed(error) {
+function failed(error, view) {
   if (!(error instanceof Problem)) console.error(error);
   if (error.status === 401)
-    return { title: "A key is needed", body: [h("p", { role: "alert" }, error.message), keyForm(show)] };
+    return { title: "A key is needed", body: [h("p", { role: "alert", class: held() ? "error" : null }, capital(error.message)), keyForm(show)] };
   const again = h("button", { onclick: show }, "Try again");
+  if (error.status === 404 && view) {
+    const list = h("a", { href: `#/${view}` }, `See the ${view}`);
+    return { title: "It is not here", body: [h("p", { role: "alert" }, `${error.message} It may have been deleted. `, list, ".")] };
+  }
   return { title: error.title ?? "This view failed", body: [h("p", { role: "alert" }, error.message), again] };
 }
 

@@ -4,7 +4,7 @@ import { get, post } from "./api.js";
 import { announce, h, table } from "./dom.js";
 import { count, moment, percent, short, significant } from "./format.js";
 import { foot, Pages } from "./pages.js";
-import { FRAMEWORKS, hasBall, isParametric, radiusRule, utility } from "./specification.js";
+import { caution, FRAMEWORKS, utility } from "./specification.js";
 
 /** Fewer than of other things at a time: each is asked for by itself. */
 const PAGE = 50;
@@ -56,13 +56,10 @@ function listed(rows) {
     "Policies, newest first",
     [
       { name: "Policy", cell: ({ policy }) => h("a", { href: `#/policies/${policy}` }, h("code", {}, short(policy))) },
-      { name: "Framework", cell: of(({ framework }) => FRAMEWORKS[framework]) },
-      { name: "Utility", cell: of((problem) => utility(problem.utility)) },
-      {
-        name: "Radius",
-        cell: of((problem) => (hasBall(problem) || isParametric(problem.framework) ? radiusRule(problem.radius) : "0")),
-      },
-      { name: "Decisions", numeric: true, cell: of(({ horizon }) => count(horizon)) },
+      { name: "Kind", cell: of(({ framework }) => FRAMEWORKS[framework]) },
+      { name: "Investor", cell: of((problem) => utility(problem.utility)) },
+      { name: "Caution", cell: of((problem) => caution(problem)) },
+      { name: "Periods ahead", numeric: true, cell: of(({ horizon }) => count(horizon)) },
       { name: "Bank rate", numeric: true, cell: of(({ rate_per_step }) => percent(rate_per_step, 2)) },
       { name: "Returns", numeric: true, cell: of(({ history }) => count(history.length)) },
       { name: "Size", numeric: true, cell: ({ bytes }) => `${significant(bytes / 1e6, 2)} MB` },

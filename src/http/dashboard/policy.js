@@ -1,10 +1,11 @@
-// One policy: what it was asked, what it does, how well it was solved.
+// One policy: what it was asked, what it does, and for the quant how well it was solved.
 
 import { download, get, offers, remove } from "./api.js";
 import { lineChart } from "./chart.js";
 import { announce, disclosure, h, section, table } from "./dom.js";
-import { basisPoints, count, moment, percent, percentTick, short, significant } from "./format.js";
-import { FRAMEWORKS, inWords, warningList } from "./specification.js";
+import { basisPoints, count, figures, moment, percent, percentTick, short } from "./format.js";
+import { unitOf } from "./periods.js";
+import { FRAMEWORKS, inPaperWords, inWords, warningList } from "./specification.js";
 import { surfaceView } from "./surface_view.js";
 
 /** Documents larger than this, in bytes, are fetched for the surface when asked only. */
@@ -23,11 +24,12 @@ export async function view(id, leaving) {
       "div",
       { class: "words" },
       inWords(specification, annualised).map((sentence) => h("p", {}, sentence)),
+      h("p", {}, often(specification.problem, diagnostics)),
       warningList(warnings),
     ),
-    disclosure("The whole specification", () => h("pre", { tabindex: 0 }, JSON.stringify(specification, null, 1))),
+    again(id),
     surface(policy, leaving),
-    steps(diagnostics),
+    solved(specification, diagnostics),
   ];
   const evaluate = (await offers("/evaluate"))
     ? h("a", { class: "button quiet", href: `#/evaluations/new?policy=${id}` }, "Evaluate")
@@ -73,6 +75,29 @@ function deletion(id) {
   return button;
 }
 
+/** How often it holds nothing, by the situations it was solved in; a sentence. */
+function often({ horizon, periods_per_year }, diagnostics) {
+  const unit = unitOf(periods_per_year);
+  const share = (step) => percent(diagnostics[step].all_bank_share, 0);
+  const [first, last] = [share(0), share(horizon - 1)];
+  if (diagnostics[0].design_count === 1) {
+    const now = diagnostics[0].all_bank_share === 0 ? "It holds stocks in the first" : "It holds nothing in the first";
+    return horizon === 1 ? `${now} ${unit}.` : `${now} ${unit}, and nothing in ${last} of the situations it was trained for in the last.`;
+  }
+  return `It holds nothing in ${first} of the situations it was trained for in the first ${unit}${horizon === 1 ? "" : `, and in ${last} in the last`}.`;
+}
+
+/** The ways to another policy like it. */
+function again(id) {
+  return h(
+    "p",
+    { class: "again" },
+    h("a", { href: `#/train?from=${id}` }, "Clone with one thing changed"),
+    " \u00b7 ",
+    h("a", { href: `#/train?newer=${id}` }, "Retrain on newer returns"),
+  );
+}
+
 function surface({ policy: id, specification, diagnostics }, leaving) {
   const functions = specification.problem.trading_cost > 0 ? FUNCTIONS.costly : FUNCTIONS.free;
   const size = diagnostics.reduce(
@@ -80,10 +105,31 @@ function surface({ policy: id, specification, diagnostics }, leaving) {
     0,
   );
   const holder = h("div", {});
-  const load = () => holder.replaceChildren(surfaceView({ id, horizon: specification.problem.horizon, leaving }));
+  const load = () => holder.replaceChildren(surfaceView({ id, problem: specification.problem, leaving }));
   if (size <= READY_BYTES) load();
   else holder.append(h("button", { onclick: load }, `Read the policy (about ${count(size / 1e6)} MB) and draw it`));
   return section("What it holds", holder);
+}
+
+/** One line for a manager, and the rest for the quant. */
+function solved(specification, diagnostics) {
+  const widest = Math.max(...diagnostics.map(({ duality_gap }) => duality_gap));
+  const rough = Math.max(0, ...diagnostics.map(({ value }) => value?.leave_one_out_error ?? 0));
+  const within = (value) => (value < 5e-7 ? "less than 0.0001\u202f%" : percent(value, 4));
+  const words = `Every step was solved to ${within(widest)} of what it is worth, and is read between the situations solved to ${within(rough)}.`;
+  return section(
+    "How well it was solved",
+    h("p", { class: "sentence" }, words),
+    disclosure("For the quant", () =>
+      h(
+        "div",
+        {},
+        inPaperWords(specification).map((sentence) => h("p", { class: "sentence" }, sentence)),
+        steps(diagnostics),
+        disclosure("The whole specification", () => h("pre", { tabindex: 0 }, JSON.stringify(specification, null, 1))),
+      ),
+    ),
+  );
 }
 
 function steps(diagnostics) {
@@ -99,7 +145,7 @@ function steps(diagnostics) {
   const names = [...new Set(diagnostics.flatMap(({ policy }) => policy?.features ?? []))];
   const length = (side, name) => (step) => {
     const index = step[side]?.features.indexOf(name) ?? -1;
-    return index < 0 ? "\u2013" : significant(step[side].lengthscales[index], 2);
+    return index < 0 ? "\u2013" : figures(step[side].lengthscales[index], 2);
   };
   const period = { name: "Period", cell: ({ step }) => count(step + 1) };
   const figure = (name, cell) => ({ name, cell, numeric: true });
@@ -110,9 +156,9 @@ function steps(diagnostics) {
     figure("Uncertified", ({ uncertified_share }) => percent(uncertified_share)),
     figure("Duality gap", ({ duality_gap }) => basisPoints(duality_gap)),
     figure("Value, left out", ({ value }) => basisPoints(value?.leave_one_out_error)),
-    figure("Policy, left out", ({ policy }) => significant(policy?.leave_one_out_error, 2)),
-    figure("Value noise", ({ value }) => significant(value?.noise_variance, 2)),
-    figure("Policy noise", ({ policy }) => significant(policy?.noise_variance, 2)),
+    figure("Policy, left out", ({ policy }) => percent(policy?.leave_one_out_error, 2)),
+    figure("Value noise", ({ value }) => figures(value?.noise_variance, 2)),
+    figure("Policy noise", ({ policy }) => figures(policy?.noise_variance, 2)),
   ];
   const lengthscales = (side) =>
     disclosure(
@@ -126,8 +172,7 @@ function steps(diagnostics) {
           ),
         ][0],
     );
-  return section(
-    "How well it was solved",
+  return [
     h(
       "div",
       { class: "trio" },
@@ -143,5 +188,5 @@ function steps(diagnostics) {
     table("Diagnostics of every step", quality, diagnostics),
     lengthscales("value"),
     lengthscales("policy"),
-  );
+  ];
 }

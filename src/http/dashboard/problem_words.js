@@ -7,35 +7,43 @@ const WANTED = [
   [/expected (i32|i64)/, "a whole number"],
   [/expected (f32|f64)/, "a number, with nothing between its thousands"],
 ];
+/** What else the parser says before what it wants. */
+const PARSER = /^(?:invalid (?:type|value|length)|unknown (?:variant|field)|missing field)[^]*?, expected /;
 const BOUNDS = /(?:lie|be a number|be a whole number)? ?in ([[(])(-?[\d.e+-]+), (-?[\d.e+-]+)([\])])/;
 
-/** One sentence for a problem with a `rule`; `unit` is "percent" where the field counts so and the request does not. */
+/** One sentence for a problem with a `rule`; `unit` is that of the field where it is not the request's: "percent", or "confidence",
+ * which is what a share leaves of 100 %. */
 export function problemWords({ value, rule }, label, unit) {
-  const name = label.replace(/, %$/, "");
+  const name = label.replace(/, %(?=$|,)/, "");
   return `${name} ${given(value, unit)}; it ${ruled(rule, unit)}.`;
 }
 
 function given(value, unit) {
   if (value === null || value === undefined || value === "") return "is blank";
+  if (typeof value === "object") return "is not as it must be";
   return typeof value === "number" ? `is ${number(value, unit)}` : `is \u201c${value}\u201d`;
 }
 
 function ruled(rule, unit) {
   const wanted = WANTED.find(([pattern]) => pattern.test(rule));
   if (wanted) return `must be ${wanted[1]}`;
+  if (PARSER.test(rule)) return `must be ${rule.replace(PARSER, "").replaceAll("`", "")}`;
   const whole = rule.includes("whole number") ? "a whole number " : "";
   return rule.replace(BOUNDS, (_, opening, low, high, closing) => {
-    if (opening === "[" && closing === "]")
-      return `be ${whole}from ${number(low, unit, Math.ceil)} to ${number(high, unit, Math.floor)}`;
-    const [above, below] = [opening === "[" ? "at least" : "above", closing === "]" ? "at most" : "below"];
-    return `be ${whole}${above} ${number(low, unit)} and ${below} ${number(high, unit)}`;
+    const turned = unit === "confidence";
+    const [ends, marks] = turned ? [[high, low], [closing, opening]] : [[low, high], [opening, closing]];
+    const closed = marks.map((mark) => mark === "[" || mark === "]");
+    if (closed[0] && closed[1]) return `be ${whole}from ${number(ends[0], unit, Math.ceil)} to ${number(ends[1], unit, Math.floor)}`;
+    const [above, below] = [closed[0] ? "at least" : "above", closed[1] ? "at most" : "below"];
+    return `be ${whole}${above} ${number(ends[0], unit)} and ${below} ${number(ends[1], unit)}`;
   });
 }
 
 /** A number in the field's unit; bounds in percent are rounded inward, so that what is told is taken. */
 function number(value, unit, round = Math.round) {
-  const size = Number(value);
-  const shown = unit === "percent" ? round(1e4 * size) / 100 : size;
+  const size = unit === "confidence" ? 1 - Number(value) : Number(value);
+  // Inward, but not by what a double is off.
+  const shown = unit ? round(Number((1e4 * size).toPrecision(12))) / 100 : size;
   const text = shown.toLocaleString("en-GB", { maximumFractionDigits: 6, useGrouping: "min2" }).replace("-", MINUS);
-  return unit === "percent" ? `${text}\u202f%` : text;
+  return unit ? `${text}\u202f%` : text;
 }

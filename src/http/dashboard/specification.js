@@ -2,30 +2,54 @@
 
 import { h } from "./dom.js";
 import * as flows from "./flows.js";
-import { count, counted, percent, significant, wealth } from "./format.js";
+import { count, counted, minus, percent, significant, wealth } from "./format.js";
+import { unitOf } from "./periods.js";
 
+/** The kinds of policy in a manager's words; `PAPER` has the paper's. */
 export const FRAMEWORKS = {
+  adaptive: "Cautious, learns",
+  static: "Cautious, fixed",
+  known_law: "Knows the market",
+  plug_in: "Trusts the record",
+  parametric_static: "Cautious, fixed, bell curve",
+  parametric_adaptive: "Cautious, learns, bell curve",
+};
+export const PAPER = {
   adaptive: "Adaptive robust",
   static: "Static robust",
   known_law: "Known law",
   plug_in: "Plug-in",
-  parametric_static: "Parametric static",
-  parametric_adaptive: "Parametric adaptive",
+  parametric_static: "Parametric static robust",
+  parametric_adaptive: "Parametric adaptive robust",
 };
 
 const MEANINGS = {
-  adaptive: "It guards against the worst law near the returns seen, and learns from every new one.",
-  static: "It guards against the worst law near the history, and does not learn.",
-  known_law: "It takes the law as known and guards against nothing.",
+  adaptive: "It guards against the worst market that the returns seen still allow, and learns from every new one.",
+  static: "It guards against the worst market that the history still allows, and does not learn.",
+  known_law: "It takes the market as known and guards against nothing.",
   plug_in: "It takes the returns seen for the whole truth, and learns.",
-  parametric_static: "It takes returns as normal, guards against every mean and variance near the history's, and does not learn.",
+  parametric_static:
+    "It takes returns as a bell curve, guards against every average and spread near the history\u2019s, and does not learn.",
   parametric_adaptive:
-    "It takes returns as normal, guards against every mean and variance near those of the returns seen, and learns.",
+    "It takes returns as a bell curve, guards against every average and spread near those of the returns seen, and learns.",
 };
+
+/** Investors by their relative risk aversion, of power utility. */
+export const INVESTORS = { cautious: 6, balanced: 3, bold: 1.5 };
+
+/** The preset that a utility is, if it is one. */
+export const presetOf = ({ kind, risk_aversion }) =>
+  kind === "power" ? Object.keys(INVESTORS).find((name) => INVESTORS[name] === risk_aversion) : undefined;
+
+/** Whom a policy is for, after "for". */
+export const investorWords = (asked) =>
+  presetOf(asked) ? `a ${presetOf(asked)} investor (risk aversion ${significant(asked.risk_aversion)})` : `an investor with ${utility(asked)}`;
 
 /** Utility in a few words. */
 export function utility({ kind, risk_aversion }) {
   if (kind === "log") return "log utility";
+  const preset = presetOf({ kind, risk_aversion });
+  if (preset) return `${preset}, risk aversion ${significant(risk_aversion)}`;
   return `${kind} utility, risk aversion ${significant(risk_aversion)}${kind === "exponential" ? " per unit of wealth" : ""}`;
 }
 
@@ -77,22 +101,41 @@ export const isParametric = (framework) => framework.startsWith("parametric");
 
 /** What may be a mistake in a request. */
 export function warningList(warnings) {
-  return warnings.map(({ message }) => h("p", { class: "note wrong" }, message));
+  return warnings.map(({ message }) => h("p", { class: "note wrong" }, minus(message)));
 }
 
-/** The whole specification, a sentence a choice; `annualised` is what the service says by the year, where it does. */
-export function inWords({ problem, design, surrogate, seed }, annualised) {
+/** How cautious a policy is, in a few words. */
+export function caution(problem) {
+  const { radius, framework } = problem;
+  if (!hasBall(problem) && !isParametric(framework)) return "none";
+  const { alpha, scale = 1 } = radius;
+  const confidence = alpha === undefined ? radiusRule(radius) : `${percent(1 - alpha, 0)} confidence`;
+  return scale === 1 ? confidence : `${confidence}, \u00d7 ${significant(scale)}`;
+}
+
+/** What was asked for, a sentence a choice; `annualised` is what the service says by the year, where it does. */
+export function inWords({ problem }, annualised) {
   const { mean, deviation } = moments(problem.history);
   const limit = problem.action_interval[1];
-  const ball = hasBall(problem) ? ` The radius of the ball is ${radiusRule(problem.radius)}.` : "";
+  const unit = unitOf(problem.periods_per_year);
+  const guarded = caution(problem) === "none" ? "" : ` Its caution: ${caution(problem)}.`;
   const { learning } = problem;
   const forgets =
-    learning.kind === "decay" ? ` Returns weigh less the older they are: half after ${significant(learning.half_life)} of the periods.` : "";
+    learning.kind === "decay" ? ` Returns count less the older they are: half after ${counted(learning.half_life, unit)}.` : "";
+  const all = limit === 1 ? "all" : `up to ${percent(limit, 0)}`;
+  return [
+    `${MEANINGS[problem.framework]}${guarded}${forgets}`,
+    `It looks ${counted(problem.horizon, unit)} ahead for ${investorWords(problem.utility)}; the bank pays ${percent(problem.rate_per_step, 2)} a ${unit}${annualised ? ` (${percent(annualised.rate, 2)} a year)` : ""}, and ${all} of wealth may be in stocks. It starts with ${wealth(problem.initial_wealth)}. ${trading(problem)} ${flows.inWords(problem)}`.trim(),
+    `The record holds ${counted(problem.history.length, "return")}: mean ${percent(mean, 2)}, standard deviation ${percent(deviation, 2)} a ${unit}.${annualised ? ` By the year stocks returned ${percent(annualised.mean_return)} on average, with a standard deviation of ${percent(annualised.deviation)}.` : ""}`,
+  ];
+}
+
+/** How it was asked for and solved, in the words of the paper. */
+export function inPaperWords({ problem, design, surrogate, seed }) {
+  const ball = hasBall(problem) ? `the radius of the ball is ${radiusRule(problem.radius)}` : isParametric(problem.framework) ? `the uncertainty set is ${radiusRule(problem.radius)}` : "there is no uncertainty set";
   const laws = design.initial_laws === "resampled" ? "starting from resampled histories" : "starting from this history";
   return [
-    `${MEANINGS[problem.framework]}${ball}${forgets}`,
-    `${counted(problem.horizon, "decision")} with ${utility(problem.utility)}; the bank pays ${percent(problem.rate_per_step, 2)} a period${annualised ? ` (${percent(annualised.rate, 2)} a year)` : ""}, and up to ${percent(limit, 0)} of wealth may be at risk. It starts with ${wealth(problem.initial_wealth)}. ${trading(problem)} ${flows.inWords(problem)}`.trim(),
-    `The history holds ${counted(problem.history.length, "log-return")}: mean ${percent(mean, 2)}, standard deviation ${percent(deviation, 2)} a period.${annualised ? ` By the year the asset returned ${percent(annualised.mean_return)} on average, with a standard deviation of ${percent(annualised.deviation)}.` : ""}`,
+    `${PAPER[problem.framework]}: ${ball}. The utility is ${problem.utility.kind}; mean and standard deviation above are of log-returns.`,
     `Each step was solved at ${counted(design.count, "state")} simulated under ${law(design.sampling_law)}, ${laws}; surrogates of the ${surrogate.target === "value" ? "value" : "gain over the floor"} on ${surrogate.features === "raw_moments" ? "raw" : "standardised"} features. Seed ${count(seed)}.`,
   ];
 }

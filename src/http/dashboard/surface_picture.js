@@ -5,7 +5,7 @@ import { stepSurface } from "./surface.js";
 const [COLUMNS, ROWS, ALONG] = [41, 29, 61];
 /** More dots than this would hide the field. */
 const DOTS = 300;
-const AXES = ["wealth", "mean", "radius", "deviation"];
+const AXES = ["wealth", "mean", "deviation", "radius"];
 
 /**
  * The picture of `step`: `across` is the axis wanted beside the mean, `radius` a share of the way from the least radius of
@@ -21,7 +21,8 @@ export function picture(policy, shape, surfaces, { step, across, radius }) {
   const axes = AXES.filter((axis) => axis in found.ranges);
   if (axes.length === 1) return along(found, axes[0]);
   const choices = axes.filter((axis) => axis !== "mean");
-  return over(found, choices, choices.includes(across) ? across : choices[0], radius);
+  const itself = { wealth: policy.specification.problem.initial_wealth, mean: shape.mean, deviation: shape.deviation };
+  return over(found, choices, choices.includes(across) ? across : choices[0], radius, itself);
 }
 
 function along(found, axis) {
@@ -29,7 +30,7 @@ function along(found, axis) {
   return { kind: "line", axis, values, allocations: values.map((value) => found.at({ [axis]: value })) };
 }
 
-function over(found, choices, across, share) {
+function over(found, choices, across, share, itself) {
   const range = across === "radius" ? undefined : found.ranges.radius;
   const radius = range ? range[0] * (range[1] / range[0]) ** share : found.middle.radius;
   const [xs, ys] = [spread(found.ranges[across], COLUMNS), spread(found.ranges.mean, ROWS)];
@@ -43,6 +44,7 @@ function over(found, choices, across, share) {
     ys,
     cells: ys.map((_, row) => columns.map((column) => column[row])),
     dots: thinned(found.dots(across), found.dots("mean")),
+    own: across in itself ? [itself[across], itself.mean] : null,
     radius: range ? radius : null,
     rest: ["wealth", "deviation", "radius"]
       .filter((axis) => axis !== across && axis in found.ranges)

@@ -2,9 +2,10 @@
 
 import { lineChart } from "./chart.js";
 import { h } from "./dom.js";
-import { basisPoints, percent, percentTick, significant, tick, wealth } from "./format.js";
+import { percent, percentTick, tick, wealth } from "./format.js";
 import { heatmap } from "./heatmap.js";
 import { shown } from "./key.js";
+import { unitOf } from "./periods.js";
 
 const WORKER = "/dashboard/surface_worker.js";
 /** Radii to choose from the least of the design to the largest. */
@@ -12,8 +13,8 @@ const RADII = 20;
 
 const AXES = {
   wealth: { label: "Wealth", format: wealth, tick },
-  mean: { label: "Mean log-return", format: (value) => percent(value, 2), tick: percentTick },
-  radius: { label: "Radius", format: (value) => significant(value, 3), tick },
+  mean: { label: "Average return", format: (value) => percent(value, 2), tick: percentTick },
+  radius: { label: "Caution", format: (value) => percent(value, 2), tick: percentTick },
   deviation: { label: "Standard deviation", format: (value) => percent(value, 2), tick: percentTick },
 };
 
@@ -32,13 +33,13 @@ function workerAddress() {
 }
 
 /** The surface of policy `id`, computed in a worker that lives until `leaving`. */
-export function surfaceView({ id, horizon, leaving }) {
+export function surfaceView({ id, problem, leaving }) {
   const status = h("p", { role: "status" }, "Reading the policy\u2026");
   const holder = h("div", {}, status);
   const worker = new Worker(workerAddress(), { type: "module" });
   leaving.addEventListener("abort", () => worker.terminate());
   const fail = (words) => holder.replaceChildren(h("p", { class: "error", role: "alert" }, words));
-  const { element, show, next } = explorer(horizon, (wish) => worker.postMessage(wish));
+  const { element, show, next } = explorer(problem, (wish) => worker.postMessage(wish));
   worker.addEventListener("error", () => fail("The surface could not be computed."));
   worker.addEventListener("message", ({ data }) => {
     if (data.failed) return fail(data.failed);
@@ -51,23 +52,24 @@ export function surfaceView({ id, horizon, leaving }) {
 }
 
 /** The controls and the drawing. One wish is out at a time; the latest of those made meanwhile follows it. */
-function explorer(horizon, ask) {
-  const step = h("input", { type: "range", id: "surface-step", min: 0, max: horizon - 1, value: horizon - 1, step: 1 });
+function explorer({ horizon, periods_per_year }, ask) {
+  const unit = unitOf(periods_per_year);
+  const step = h("input", { type: "range", id: "surface-step", min: 0, max: horizon - 1, value: Math.min(1, horizon - 1), step: 1 });
   const across = h("select", { id: "surface-across" });
   const radius = h("input", { type: "range", id: "surface-radius", min: 0, max: RADII, value: RADII / 2, step: 1 });
   const outputs = { step: h("output", { for: step.id }), radius: h("output", { for: radius.id }) };
   const field = (label, control, output) =>
     h("p", { class: "field" }, h("label", { for: control.id }, label), control, output);
   const fields = {
-    step: field("Period", step, outputs.step),
+    step: field(unit[0].toUpperCase() + unit.slice(1), step, outputs.step),
     across: field("Across", across, null),
-    radius: field("Radius", radius, outputs.radius),
+    radius: field("Caution", radius, outputs.radius),
   };
   const drawing = h("div", {});
   let [out, stale] = [false, false];
   const next = () => {
     outputs.step.textContent = `${Number(step.value) + 1} of ${horizon}`;
-    step.setAttribute("aria-valuetext", `period ${outputs.step.textContent}`);
+    step.setAttribute("aria-valuetext", `${unit} ${outputs.step.textContent}`);
     stale = out;
     if (out) return;
     out = true;
@@ -102,38 +104,40 @@ function single({ band: [low, high], floor_gain }) {
   return h(
     "p",
     { class: "single" },
-    "At this step every session of this policy knows one and the same law: hold ",
+    "Here every session of this policy knows the same record: hold ",
     h("strong", {}, held),
-    ", worth ",
-    h("strong", {}, basisPoints(floor_gain)),
-    " more than the bank to who starts in the bank.",
+    " in stocks, worth ",
+    h("strong", {}, percent(Math.expm1(floor_gain), 4)),
+    " more than the bank even in the worst market, to who starts in the bank.",
   );
 }
 
 function alongOne({ axis, values, allocations }) {
   const { label, format, tick } = AXES[axis];
   return lineChart({
-    title: "Allocation",
+    title: "Share held in stocks",
     x: { values, label, format, tick },
     y: { format: percent, tick: percentTick, also: [0] },
-    series: [{ name: "Allocation", kind: "line", values: allocations }],
+    series: [{ name: "Hold", kind: "line", values: allocations }],
   });
 }
 
-function overTwo({ across, xs, ys, cells, dots, rest }) {
+function overTwo({ across, xs, ys, cells, dots, own, rest }) {
   const axis = (name, values) => ({ name: AXES[name].label, values, format: AXES[name].format, tick: AXES[name].tick });
   const fixed = rest.map(([name, value]) => `${AXES[name].label.toLowerCase()} ${AXES[name].format(value)}`);
   const stretched = across === "deviation" ? " and standard deviation" : "";
-  const note = `Each cell is the history, moved to that mean${stretched}${fixed.length > 0 ? `; ${fixed.join(", ")}` : ""}. Where no design point lies, Ballast solves the step anew instead of reading this surface.`;
+  const marked = own ? " The cross is the history itself." : "";
+  const note = `Each cell is the history, moved to that average${stretched}${fixed.length > 0 ? `; ${fixed.join(", ")}` : ""}.${marked} Beyond the situations solved, Ballast solves the step anew. Returns here are log-returns.`;
   return heatmap({
-    title: "Allocation",
-    name: "allocation",
+    title: "Share held in stocks",
+    name: "hold",
     x: axis(across, xs),
     y: axis("mean", ys),
     field: cells,
     range: rounded(cells.flat()),
     format: (value) => percent(value, 0),
     dots,
+    own,
     note,
   });
 }

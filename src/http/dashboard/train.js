@@ -1,29 +1,12 @@
 // A training request, from a form, a file of returns or JSON; the three show the same request.
 
-import { post } from "./api.js";
+import { get, post } from "./api.js";
 import { announce, h } from "./dom.js";
-import { fieldset, input, select, showProblem } from "./form.js";
-import { typed } from "./number_text.js";
+import { showProblem } from "./form.js";
+import { short } from "./format.js";
 import { returnsField } from "./returns_field.js";
-import { isParametric, warningList } from "./specification.js";
-
-const UTILITIES = { exponential: "Exponential", power: "Power", log: "Log" };
-/** Each kind with a usual risk aversion, in multiples of one over the initial wealth where that is meant. */
-const UTILITY = {
-  exponential: { kind: "exponential", risk_aversion_relative: 3 },
-  power: { kind: "power", risk_aversion: 3 },
-  log: { kind: "log" },
-};
-const FRAMEWORKS = {
-  adaptive: "Adaptive robust",
-  static: "Static robust",
-  plug_in: "Plug-in",
-  parametric_adaptive: "Parametric adaptive",
-  parametric_static: "Parametric static",
-};
-
-/** Fields that are parts of one, and may be given in percent. */
-const SHARES = ["problem.rate_per_step", "problem.trading_cost", "problem.radius.alpha"];
+import { warningList } from "./specification.js";
+import { put, radiusFor, trainFields, UTILITY } from "./train_fields.js";
 
 /** What the form starts from; what is null is to be filled in, or may be left out. */
 const initial = () => ({
@@ -43,20 +26,20 @@ const initial = () => ({
   seed: 1,
 });
 
-/** What weighs less with age, if anything does. */
-const HALF_LIFE = "problem.learning.half_life";
+/** What changes which fields there are, or what they are called. */
+const REDRAWN = ["problem.framework", "problem.periods_per_year"];
 
-const at = (object, path) => path.split(".").reduce((value, key) => value?.[key], object);
-
-function put(object, path, value) {
-  const keys = path.split(".");
-  const last = keys.pop();
-  const parent = keys.reduce((value, key) => (value[key] ??= {}), object);
-  parent[last] = value;
+/** The request that another policy was trained by. */
+async function like(policy, leaving) {
+  const { specification } = await get(`/policies/${policy}`, leaving);
+  return structuredClone(specification);
 }
 
-export async function view(_, leaving) {
-  let request = initial();
+/** `query`: `from=POLICY` fills the form with what that policy was trained by, `newer=POLICY` likewise to be given newer returns. */
+export async function view(query, leaving) {
+  const asked = new URLSearchParams(query ?? "");
+  const origin = asked.get("from") ?? asked.get("newer");
+  let request = origin ? await like(origin, leaving) : initial();
   const message = h("p", { class: "error", role: "alert", hidden: true });
   const json = h("textarea", { id: "json", rows: 18, spellcheck: "false", "aria-describedby": "json-note json-error" });
   const jsonError = h("p", { id: "json-error", class: "error", hidden: true });
@@ -75,16 +58,10 @@ export async function view(_, leaving) {
       written();
     },
   });
-  const fields = mainFields((path, value) => {
-    if (path === "problem.utility.kind") put(request, "problem.utility", { ...UTILITY[value] });
-    else put(request, path, value);
-    if (path === "problem.framework") {
-      const { alpha = 0.1 } = request.problem.radius ?? {};
-      request.problem.radius = isParametric(value)
-        ? { rule: "chi_square", alpha }
-        : { rule: "bridge", alpha, scale: 1 };
-    }
-    if (path === "problem.utility.kind" || path === "problem.framework") fields.show(request);
+  const fields = trainFields((path, value) => {
+    put(request, path, value);
+    if (path === "problem.framework") request.problem.radius = radiusFor(value, request.problem.radius);
+    if (REDRAWN.includes(path) || path.startsWith("problem.utility")) fields.show(request);
     written();
   });
   const written = () => {
@@ -149,9 +126,20 @@ export async function view(_, leaving) {
     send.disabled = false;
   });
   fields.show(request);
+  if (origin) source.show(request.problem.history);
   written();
-  const trail = h("p", { class: "trail" }, h("a", { href: "#/jobs" }, "Jobs"));
-  return { title: "Train a policy", trail, body: form };
+  const back = (href, words) => h("p", { class: "trail" }, h("a", { href }, words));
+  const trail = origin ? back(`#/policies/${origin}`, `Policy ${short(origin)}`) : back("#/jobs", "Jobs");
+  const newer = asked.has("newer");
+  return { title: newer ? "Train on newer returns" : "Train a policy", trail, body: [origin ? told(newer) : "", form] };
+}
+
+/** What a form that is filled from a policy asks for. */
+function told(newer) {
+  const words = newer
+    ? "Everything is as that policy was trained, its returns too: put newer ones in their place, and train."
+    : "Everything is as that policy was trained: change one thing, train, and compare the two.";
+  return h("p", { class: "lead" }, words);
 }
 
 /** What stands in the place of the form once a training is queued whose request may be a mistake. */
@@ -171,84 +159,4 @@ function compact(request) {
     /\[\s*([-\d.e+,\s]*?)\s*\]/g,
     (_, inside) => `[${inside.replace(/\s+/g, " ")}]`,
   );
-}
-
-/** One number, or several that semicolons keep apart. */
-function amounts(text) {
-  const each = text.split(";").map((part) => typed(part)).filter((part) => part !== null);
-  return each.length > 1 ? each : (each[0] ?? 0);
-}
-
-function mainFields(changed) {
-  const number = (path, label, note, options = {}) =>
-    input({
-      name: path,
-      label,
-      note,
-      changed: (text) => changed(path, typed(text, { shares: SHARES.includes(path) })),
-      ...options,
-    });
-  const parts = [
-    select({
-      name: "problem.framework",
-      label: "Framework",
-      note: "Adaptive guards and learns, static only guards, plug-in only learns; the parametric ones take returns as normal.",
-      choices: FRAMEWORKS,
-      changed: (value) => changed("problem.framework", value),
-    }),
-    number("problem.horizon", "Decisions", "Periods to live through, 1 to 520."),
-    number(
-      "problem.rate_per_step",
-      "Bank return per period",
-      "Of one period of the returns: 3 % a year are 0.247 % a month, or 0.00247.",
-    ),
-    number("problem.periods_per_year", "Periods a year", "May be blank. 12 of months; rates are then told a year, too."),
-    number("problem.initial_wealth", "Initial wealth", "In any unit."),
-    number("problem.trading_cost", "Trading cost", "Of what is traded: 0.002 or 0.2 %; 0 is free."),
-    input({
-      name: "problem.contributions",
-      label: "Added each period",
-      note: "At its end; negative is withdrawn. One number, or one for each period, apart by semicolons.",
-      changed: (text) => changed("problem.contributions", amounts(text)),
-    }),
-    input({
-      name: HALF_LIFE,
-      label: "Half-life of returns",
-      note: "In periods: one so old weighs half. Blank: all weigh the same.",
-      changed: (text) => {
-        const half_life = typed(text);
-        changed("problem.learning", half_life === null ? { kind: "equal" } : { kind: "decay", half_life });
-      },
-    }),
-    select({
-      name: "problem.utility.kind",
-      label: "Utility",
-      choices: UTILITIES,
-      changed: (value) => changed("problem.utility.kind", value),
-    }),
-    number("problem.utility.risk_aversion", "Risk aversion", "Exponential: per unit of wealth. Power: above 1."),
-    number(
-      "problem.utility.risk_aversion_relative",
-      "Relative risk aversion",
-      "Over the initial wealth: of one who starts with 100, 3 is 0.03 per unit of wealth.",
-    ),
-    number("problem.radius.alpha", "Miscoverage alpha", "Smaller guards against more: 0.1 takes the 90 % quantile."),
-    number("problem.radius.scale", "Radius scale", "Multiplies the radius; 0 trusts the returns seen."),
-    number("design.count", "Design points", "States solved per step: more is finer and slower, 10 to 10,000."),
-    number("seed", "Seed", "The same request and seed give the same policy."),
-  ];
-  const show = (request) => {
-    for (const part of parts) {
-      const found = at(request, part.name);
-      const value = found === undefined && part.name === HALF_LIFE ? "" : found;
-      if (part.control !== document.activeElement) part.control.value = [value ?? ""].flat().join("; ");
-      part.element.hidden = value === undefined;
-    }
-  };
-  const elements = [
-    fieldset("The investor", [...parts.slice(1, 7), ...parts.slice(8, 11)]),
-    fieldset("What he guards against", [parts[0], parts[7], parts[11], parts[12]]),
-    fieldset("Precision", parts.slice(13)),
-  ];
-  return { elements, show };
 }

@@ -1,0 +1,146 @@
+// The fields of a training: the investor and his caution in a manager's words and in percent, the paper's behind a fold.
+
+import { h } from "./dom.js";
+import { fieldset, input, select } from "./form.js";
+import { fraction, typed } from "./number_text.js";
+import { unitOf } from "./periods.js";
+import { FRAMEWORKS, INVESTORS, isParametric, presetOf } from "./specification.js";
+
+/** Each kind of utility with a usual risk aversion, in multiples of one over the initial wealth where that is meant. */
+export const UTILITY = {
+  exponential: { kind: "exponential", risk_aversion_relative: 3 },
+  power: { kind: "power", risk_aversion: 3 },
+  log: { kind: "log" },
+};
+const UTILITIES = { exponential: "Exponential", power: "Power", log: "Log" };
+/** What is offered; the law that is known has to be given as JSON. */
+const OFFERED = Object.fromEntries(Object.entries(FRAMEWORKS).filter(([framework]) => framework !== "known_law"));
+/** What weighs less with age, if anything does. */
+const HALF_LIFE = "problem.learning.half_life";
+/** The choice of an investor that no preset is. */
+const OWN = "own";
+
+export const at = (object, path) => path.split(".").reduce((value, key) => value?.[key], object);
+
+export function put(object, path, value) {
+  const keys = path.split(".");
+  const last = keys.pop();
+  const parent = keys.reduce((value, key) => (value[key] ??= {}), object);
+  parent[last] = value;
+}
+
+/** One number, or several that semicolons keep apart. */
+function amounts(text) {
+  const each = text.split(";").map((part) => typed(part)).filter((part) => part !== null);
+  return each.length > 1 ? each : (each[0] ?? 0);
+}
+
+const short = (value) => String(Number(value.toPrecision(12)));
+/** How a field shows what the request holds, and reads it: as it is, in percent, or as what is left of 100 %. */
+const READING = {
+  plain: { read: typed, show: (value) => value },
+  percent: { read: (text) => fraction(text) ?? typed(text), show: (value) => (typeof value === "number" ? short(100 * value) : value) },
+  confidence: {
+    read: (text) => {
+      const given = fraction(text);
+      return given === null ? typed(text) : Number((1 - given).toPrecision(12));
+    },
+    show: (value) => (typeof value === "number" ? short(100 * (1 - value)) : value),
+  },
+};
+
+const capital = (word) => word[0].toUpperCase() + word.slice(1);
+
+/** `{elements, show(request)}`; `changed(path, value)` at every edit. */
+export function trainFields(changed) {
+  const readings = {};
+  const field = (path, label, note, unit = "plain") => {
+    readings[path] = READING[unit];
+    const edited = (text) => changed(path, READING[unit].read(text));
+    return input({ name: path, label, note, changed: edited, unit: unit === "plain" ? null : unit });
+  };
+  const presets = Object.keys(INVESTORS).map((name) => [name, capital(name)]);
+  const investor = select({
+    name: "investor",
+    label: "Investor",
+    note: `How much a loss hurts: risk aversion ${Object.values(INVESTORS).join(", ").replace(/, (?=[^,]*$)/, " and ")}.`,
+    choices: [...presets, [OWN, "Set for the quant"]],
+    changed: (name) => {
+      if (name === OWN) quant.open = true;
+      else changed("problem.utility", { kind: "power", risk_aversion: INVESTORS[name] });
+    },
+  });
+  const horizon = field("problem.horizon", "Periods ahead", "Until the money is needed, 1 to 520.");
+  const rate = field("problem.rate_per_step", "Bank return per period, %", "3 % a year are 0.247 % a month.", "percent");
+  const yearly = field("problem.periods_per_year", "Periods a year", "May be blank. 12 of months; rates are then told a year, too.");
+  const start = field("problem.initial_wealth", "Wealth at the start", "In any currency.");
+  const cost = field("problem.trading_cost", "Trading cost, %", "Of what is traded; 0 is free.", "percent");
+  const flow = input({
+    name: "problem.contributions",
+    label: "Added each period",
+    note: "At its end; negative is withdrawn. One number, or one for each period, apart by semicolons.",
+    changed: (text) => changed("problem.contributions", amounts(text)),
+  });
+  const framework = select({
+    name: "problem.framework",
+    label: "Kind of policy",
+    note: "A cautious one guards against markets worse than the record; one that learns takes every new return into account.",
+    choices: OFFERED,
+    changed: (value) => changed("problem.framework", value),
+  });
+  const confidence = field("problem.radius.alpha", "Confidence, %", "More guards against more: usual is 90 %.", "confidence");
+  const caution = field("problem.radius.scale", "Caution, times", "1 is what the confidence asks for; 0 trusts the record.");
+  const halfLife = input({
+    name: HALF_LIFE,
+    label: "Half-life of returns",
+    note: "In periods: one so old counts half. Blank: all count the same.",
+    changed: (text) => {
+      const half_life = typed(text);
+      changed("problem.learning", half_life === null ? { kind: "equal" } : { kind: "decay", half_life });
+    },
+  });
+  const kind = select({ name: "problem.utility.kind", label: "Utility", choices: UTILITIES, changed: (value) => changed("problem.utility", { ...UTILITY[value] }) });
+  const paper = [
+    kind,
+    field("problem.utility.risk_aversion", "Risk aversion", "Exponential: per unit of wealth. Power: above 1."),
+    field(
+      "problem.utility.risk_aversion_relative",
+      "Relative risk aversion",
+      "Over the initial wealth: of one who starts with 100, 3 is 0.03 per unit of wealth.",
+    ),
+    field("design.count", "Design points", "States solved per step: more is finer and slower, 10 to 10,000."),
+    field("seed", "Seed", "The same request and seed give the same policy."),
+  ];
+  const quant = h("details", {}, h("summary", {}, "For the quant"), fieldset("Utility and precision", paper));
+  const parts = [horizon, rate, yearly, start, cost, flow, framework, confidence, caution, halfLife, ...paper];
+  const show = (request) => {
+    for (const part of parts) {
+      const found = at(request, part.name);
+      const value = found === undefined && part.name === HALF_LIFE ? "" : found;
+      const shown = [value ?? ""].flat().map(readings[part.name]?.show ?? ((each) => each));
+      if (part.control !== document.activeElement) part.control.value = shown.join("; ");
+      part.element.hidden = value === undefined;
+    }
+    const given = request.problem?.framework;
+    if (given in FRAMEWORKS && !(given in OFFERED) && framework.control.value !== given) {
+      framework.control.append(h("option", { value: given }, FRAMEWORKS[given]));
+      framework.control.value = given;
+    }
+    investor.control.value = presetOf(request.problem?.utility ?? {}) ?? OWN;
+    const unit = unitOf(request.problem?.periods_per_year);
+    horizon.element.querySelector("label").textContent = `${capital(unit)}s ahead`;
+    rate.element.querySelector("label").textContent = `Bank return per ${unit}, %`;
+  };
+  const elements = [
+    fieldset("The investor", [investor, horizon, rate, yearly, start, cost, flow]),
+    fieldset("What he guards against", [framework, confidence, caution, halfLife]),
+    quant,
+  ];
+  return { elements, show };
+}
+
+/** The rule of caution that goes with a kind of policy. */
+export function radiusFor(framework, radius) {
+  const { alpha = 0.1 } = radius ?? {};
+  return isParametric(framework) ? { rule: "chi_square", alpha } : { rule: "bridge", alpha, scale: 1 };
+}

@@ -1,0 +1,125 @@
+// The page of an evaluation: sentences first, wealth, one colour a strategy, histograms on one scale.
+
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { browser, call, service, trained } from "./ballast.js";
+import { dashboardModule } from "./modules.js";
+
+const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
+const HISTORY = Array.from({ length: 24 }, (_, k) => 0.01 + 0.05 * Math.sin(1.7 * k));
+
+let ballast, chromium, page, policy, report, evaluation;
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  page.setDefaultTimeout(20_000);
+  const problem = { horizon: 3, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY };
+  const design = { count: 40 };
+  policy = await trained(ballast.url, { problem, design });
+  const { specification } = await call(ballast.url, `/policies/${policy}`);
+  const { framework, ...asked } = specification.problem;
+  const request = { ...specification, problem: asked, policies: { [framework]: policy }, frameworks: ["adaptive", "static", "plug_in"], paths: 400 };
+  evaluation = (await call(ballast.url, "/evaluate", request)).job;
+  for (;;) {
+    const now = await call(ballast.url, `/jobs/${evaluation}`);
+    if (now.finished_ms !== null) break;
+    await new Promise((resolve) => setTimeout(resolve, 100));
+  }
+  report = await call(ballast.url, `/jobs/${evaluation}/report`);
+  await page.goto(`${ballast.url}/#/evaluations/${evaluation}`);
+  await page.getByRole("table", { name: "How wealth ended, by what it is worth" }).waitFor();
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
+
+test("chances and the worst of a spread are those of its outcomes", async () => {
+  const { binned, chanceBelow, pieces, worstAverage } = await dashboardModule("spread.js");
+  // Log utility: a thousand outcomes, even over wealth from 50 to 150, in bins even in utility.
+  const outcomes = Array.from({ length: 100_000 }, (_, k) => 50 + (k + 0.5) / 1000);
+  const [low, high] = [Math.log(50), Math.log(150)];
+  const edges = Array.from({ length: 41 }, (_, k) => low + ((high - low) * k) / 40);
+  const counts = Array(40).fill(0);
+  for (const wealth of outcomes) counts[Math.floor((40 * (Math.log(wealth) - low)) / (high - low))]++;
+  const utility = { min: { value: low }, max: { value: high }, mean: { value: 4.5 } };
+  const spread = pieces({ histogram: counts, utility }, edges, { kind: "log" });
+  const near = (found, wanted, by) => assert.ok(Math.abs(found - wanted) < by, `${found} is not ${wanted}`);
+  near(chanceBelow(spread, 100), 0.5, 1e-3);
+  near(chanceBelow(spread, 60), 0.1, 1e-3);
+  near(worstAverage(spread, 0.05), 52.5, 0.01);
+  const shares = binned(spread, [50, 150], 20);
+  near(shares.reduce((sum, share) => sum + share), 1, 1e-12);
+  for (const share of shares) near(share, 0.05, 1e-3);
+  const sure = pieces({ histogram: counts, utility: { ...utility, min: { value: low }, max: { value: low }, mean: { value: low } } }, edges, { kind: "log" });
+  assert.deepEqual([chanceBelow(sure, 50.1), chanceBelow(sure, 49.9)], [1, 0]);
+  near(worstAverage(sure, 0.05), 50, 1e-9);
+});
+
+test("what was compared, on which policy and for whom, comes first, and then what came of it", async () => {
+  const words = plain(await page.locator("main").innerText());
+  const [first] = words.split("What each is worth");
+  assert.match(first, /14 ways to hold stocks, through the same 400 futures of 3 months, after a record of 24 returns, for a balanced investor \(risk aversion 3\) who starts with 100\.00\./);
+  assert.match(first, /the bank pays 0\.20 % a month\. .Cautious, learns. is policy [0-9a-f]{10}; the other policies were trained for this\./);
+  await page.locator(`a[href="#/policies/${policy}"]`).waitFor();
+  const best = report.strategies.reduce((best, one) => (one.certainty_equivalent.value > best.certainty_equivalent.value ? one : best));
+  assert.ok(words.includes(`is worth the most to this investor: as much as a sure ${best.certainty_equivalent.value.toFixed(2)}`), words);
+  assert.match(words, /ends with less than was put in in \d+ % of the futures; the worst 5 % of them end with [\d.]+ on average\./);
+  assert.doesNotMatch(words, /utility|Variance|Less adaptive|undefined|NaN/);
+});
+
+test("the table is in wealth and sorted by what each is worth", async () => {
+  const rows = await page.getByRole("table", { name: "How wealth ended, by what it is worth" }).locator("tbody tr").allInnerTexts();
+  assert.equal(rows.length, report.strategies.length);
+  const cells = rows.map((row) => plain(row).split("\t"));
+  const worths = cells.map((row) => Number(row[1]));
+  assert.deepEqual(worths, [...worths].sort((a, b) => b - a));
+  const bank = cells.find(([name]) => name === "All in the bank");
+  const sure = (100 * 1.002 ** 3).toFixed(2);
+  assert.deepEqual(bank, ["All in the bank", sure, sure, "0.0 %", sure, sure, sure, sure, sure]);
+});
+
+test("at most four histograms stand, on one scale of wealth and of height", async () => {
+  const charts = page.locator("section", { hasText: "How wealth spreads at the end" }).locator("figure");
+  assert.equal(await charts.count(), 4);
+  const labels = await charts.evaluateAll((figures) => figures.map((figure) => [...figure.querySelectorAll("text.tick")].map(({ textContent }) => textContent).join()));
+  assert.equal(new Set(labels).size, 1, labels.join(" | "));
+  const varying = report.strategies.filter(({ utility }) => utility.max.value > utility.min.value);
+  assert.ok(varying.length >= 10 && varying.length < report.strategies.length);
+  await page.getByText(`The other ${varying.length - 4}`).click();
+  assert.equal(await charts.count(), varying.length);
+});
+
+test("a strategy has one colour in every chart", async () => {
+  const stroke = (locator) => locator.evaluate((element) => getComputedStyle(element).stroke);
+  const fill = (locator) => locator.evaluate((element) => getComputedStyle(element).fill);
+  const seen = { adaptive: [], plug_in: [] };
+  for (const [kind, name, colour] of [["adaptive", "Cautious, learns", "s0"], ["plug_in", "Trusts the record", "s3"]]) {
+    seen[kind].push(await stroke(page.locator(`figure:has-text("Average share in stocks") path.line.${colour}`).first()));
+    seen[kind].push(await stroke(page.locator(`figure:has-text("Worth as much as a sure") line.range.${colour}`).first()));
+    seen[kind].push(await fill(page.getByRole("slider", { name, exact: true }).locator("rect.bar").first()));
+    assert.equal(new Set(seen[kind]).size, 1, seen[kind].join());
+  }
+  assert.notEqual(seen.adaptive[0], seen.plug_in[0]);
+});
+
+test("axe finds nothing, in light, in dark and at 320 pixels, folds open", async () => {
+  const axe = await readFile(AXE, "utf8");
+  await page.getByText("Utility, radii and coverage").click();
+  await page.getByRole("table", { name: "Certainty equivalents and utility" }).waitFor();
+  for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
+    await page.emulateMedia({ colorScheme });
+    await page.setViewportSize({ width, height: 900 });
+    await page.evaluate(axe);
+    const { violations, passes } = await page.evaluate(() => axe.run(document));
+    assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join("\n")}`), []);
+    assert.ok(passes.length > 10);
+    assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0);
+  }
+});

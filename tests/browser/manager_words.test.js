@@ -1,0 +1,148 @@
+// The page in a manager's words and in percent; the paper's words stand behind folds.
+
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { browser, call, service, trained } from "./ballast.js";
+
+const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
+const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
+/** What stops a reader who is no mathematician. */
+const PAPER = /certainty equivalent|miscoverage|\balpha\b|surrogate|duality|lengthscale|design point|\bWasserstein|worst law|robust|multiplier|log-utility|\bradius\b/i;
+
+let ballast, chromium, page, policy;
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  page.setDefaultTimeout(20_000);
+  const problem = { horizon: 3, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY, radius: { rule: "bridge", alpha: 0.2, scale: 0.1 } };
+  policy = await trained(ballast.url, { problem, design: { count: 40 } });
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
+const go = async (hash) => {
+  await page.goto("about:blank");
+  await page.goto(`${ballast.url}/${hash}`);
+  await page.locator("main:not([aria-busy]) h1").waitFor();
+  await page.waitForLoadState("networkidle");
+};
+
+test("no page says the paper's words outside a fold", async () => {
+  const { session } = await call(ballast.url, "/sessions", { policy });
+  for (const hash of ["#/jobs", "#/train", "#/policies", `#/policies/${policy}`, "#/sessions", "#/sessions/new", `#/sessions/${session}`, "#/evaluations/new"]) {
+    await go(hash);
+    const words = await page.locator("main").innerText();
+    assert.doesNotMatch(words, PAPER, hash);
+    assert.doesNotMatch(words, /\d-\d\.|[ (]-\d/, `${hash} has a hyphen for a minus`);
+    assert.ok(words.length > 40);
+  }
+});
+
+test("a policy says whom it is for and how cautious it is, and the paper's words are behind its fold", async () => {
+  await go(`#/policies/${policy}`);
+  const words = plain(await page.locator("main").innerText());
+  assert.match(words, /It looks 3 months ahead for a balanced investor \(risk aversion 3\); the bank pays 0\.20 % a month \(2\.43 % a year\), and all of wealth may be in stocks\./);
+  assert.match(words, /Its caution: 80 % confidence, × 0\.1\./);
+  await page.locator("summary", { hasText: "For the quant" }).click();
+  await page.getByText("Adaptive robust: the radius of the ball is 0.1 times the 80\u202f% quantile of the bridge statistic").waitFor();
+});
+
+test("the form takes percent and presets, and sends what the service counts in", async () => {
+  await go("#/train");
+  await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
+  await page.getByLabel("Periods a year").fill("12");
+  await page.getByLabel("Months ahead").fill("2");
+  await page.getByLabel("Bank return per month, %").fill("0.25");
+  await page.getByLabel("Trading cost, %").fill("0,2 %");
+  await page.getByLabel("Confidence, %").fill("95");
+  await page.getByLabel("Investor").selectOption({ label: "Cautious" });
+  const sent = page.waitForRequest((request) => request.url().endsWith("/train"));
+  await page.getByRole("button", { name: "Train", exact: true }).click();
+  const { problem } = (await sent).postDataJSON();
+  assert.deepEqual([problem.rate_per_step, problem.trading_cost, problem.radius.alpha, problem.horizon], [0.0025, 0.002, 0.05, 2]);
+  assert.deepEqual(problem.utility, { kind: "power", risk_aversion: 6 });
+});
+
+test("a refusal is the page's own sentence, in the unit of its field and beside it", async () => {
+  await go("#/train");
+  await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
+  const bank = page.getByLabel("Bank return per period");
+  const train = page.getByRole("button", { name: "Train", exact: true });
+  const refused = async (words) => {
+    await train.click();
+    await page.locator(".field .error").getByText(words).waitFor();
+  };
+  await bank.fill("60");
+  await refused("Bank return per period is 60\u202f%; it must be from \u221250\u202f% to 50\u202f%.");
+  await bank.fill("a lot");
+  await refused(/^Bank return per period is \u201ca lot\u201d; it must be a number/);
+  await bank.fill("0.2");
+  await page.getByLabel("Confidence").fill("100");
+  await refused("Confidence is 100\u202f%; it must be from 0.1\u202f% to 99.9\u202f%.");
+  await page.getByLabel("Confidence").fill("90");
+  await page.locator("summary", { hasText: "For the quant" }).click();
+  await page.getByLabel("Seed").fill("1.5");
+  await page.locator("summary", { hasText: "For the quant" }).click();
+  await refused("Seed is 1.5; it must be a whole number, zero or more.");
+  const words = await page.locator("form").innerText();
+  assert.doesNotMatch(words, /f64|usize|u64|expected/);
+});
+
+test("a key that may not train is told so without an editor springing open", async () => {
+  await go("#/train");
+  await page.route("**/train", (route) =>
+    route.fulfill({ status: 403, contentType: "application/problem+json", body: JSON.stringify({ type: "/problems/forbidden", title: "Not allowed", status: 403, detail: "the call needs the role train" }) }),
+  );
+  await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
+  await page.getByRole("button", { name: "Train", exact: true }).click();
+  await page.getByText("the call needs the role train").waitFor();
+  assert.equal(await page.getByLabel("Training request as JSON").isVisible(), false);
+  await page.unrouteAll();
+});
+
+test("a session that is not there leads back to the list", async () => {
+  await go("#/sessions/session_of_nobody");
+  await page.getByRole("link", { name: "See the sessions" }).click();
+  await page.getByRole("heading", { level: 1, name: "Sessions" }).waitFor();
+});
+
+test("a service that stopped answering is said to have, and heard again", async () => {
+  await call(ballast.url, "/train", { problem: { horizon: 60, rate_per_step: 0.002, history: HISTORY }, design: { count: 3000 } });
+  await page.route("**/jobs/**", (route) => route.abort());
+  await page.goto("about:blank");
+  await page.goto(`${ballast.url}/#/jobs`);
+  await page.getByText(/The service did not answer\..*What stands here is what it said last, on \d/).waitFor();
+  await page.unrouteAll();
+  await page.getByText("The service did not answer.", { exact: false }).waitFor({ state: "hidden" });
+  const { jobs } = await call(ballast.url, "/jobs");
+  await Promise.all(jobs.map(({ job }) => fetch(`${ballast.url}/jobs/${job}/cancel`, { method: "POST" })));
+});
+
+test("a visit starts at the sessions", async () => {
+  await go("");
+  assert.equal(await page.locator("h1").innerText(), "Sessions");
+});
+
+test("axe finds nothing on the form and on the policy, in light, in dark and at 320 pixels", async () => {
+  const axe = await readFile(AXE, "utf8");
+  for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
+    await page.emulateMedia({ colorScheme });
+    await page.setViewportSize({ width, height: 900 });
+    for (const hash of ["#/train", `#/train?newer=${policy}`, `#/policies/${policy}`]) {
+      await go(hash);
+      for (const fold of await page.locator("summary", { hasText: "For the quant" }).all()) await fold.click();
+      await page.evaluate(axe);
+      const { violations, passes } = await page.evaluate(() => axe.run(document));
+      assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join("\n")}`), [], `${hash} ${colorScheme} ${width}`);
+      assert.ok(passes.length > 10);
+      assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0, `${hash} at ${width}`);
+    }
+  }
+});
