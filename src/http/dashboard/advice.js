@@ -2,7 +2,7 @@
 
 import { h, section } from "./dom.js";
 import { endWords } from "./flows.js";
-import { allocation, figures, percent, points, significant, wealth } from "./format.js";
+import { allocation, figures, minus, percent, points, significant, wealth } from "./format.js";
 
 /** The advice is told to a tenth of a percent, so this far the policy and the step solved anew say the same. */
 const TOLERANCE = 0.001;
@@ -34,7 +34,7 @@ export function adviceView(action, place, rest) {
       { class: "advice", id: "advice", tabindex: -1 },
       h("p", { class: "big" }, h("span", {}, "Hold "), h("strong", {}, allocation(action.allocation)), h("span", {}, " in stocks")),
       h("p", { class: "sentence order" }, order(action, place)),
-      action.caution.map(({ sentence }) => h("p", { class: "note wrong caution" }, sentence)),
+      action.caution.map(({ sentence }) => h("p", { class: "note wrong caution" }, minus(sentence))),
       h("p", { class: "sentence" }, why(action, place.end)),
       action.contribution === 0 ? "" : h("p", { class: "sentence" }, endWords(action.contribution)),
     ),

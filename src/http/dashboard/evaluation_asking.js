@@ -24,6 +24,7 @@ function asking(policies, asked) {
     note: "Its investor, record and precision are those of all that is compared.",
     choices,
   });
+  policy.element.classList.add("broad");
   if (asked in choices) policy.control.value = asked;
   const paths = input({ name: "paths", label: "Futures per record", note: "100 to 100,000.", value: "1000" });
   const histories = select({

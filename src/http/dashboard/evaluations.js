@@ -9,7 +9,7 @@ export async function view(_, leaving) {
   const entries = await pages.next();
   const actions = h("a", { class: "button", href: "#/evaluations/new" }, "Compare out of sample");
   const lead =
-    "No evaluation yet. One sends every framework, and simple constant mixes, through the same simulated returns, and says what each of them ended with.";
+    "No evaluation yet. One sends every kind of policy, and simple constant mixes, through the same futures, and says what each of them ended with.";
   if (entries.length === 0) return { title: "Evaluations", actions, body: h("p", { class: "lead" }, lead) };
   const jobs = jobList(entries, leaving);
   return {

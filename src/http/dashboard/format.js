@@ -50,6 +50,9 @@ export function figures(value, digits = 3) {
   return exponent >= -4 && exponent < digits ? grouped(value, digits - 1 - exponent) : significant(value, digits);
 }
 
+/** A small share, to so many significant digits. */
+export const percentFigures = (fraction, digits) => `${figures(100 * fraction, digits)}${NARROW}%`;
+
 /** A difference of shares or returns, in points of a hundred. */
 export function points(fraction, digits = 1) {
   return `${grouped(100 * fraction, digits)} points`;
@@ -75,7 +78,7 @@ const power = (value) => Math.floor(Math.log10(value) + 1e-9);
 
 /** A share on an axis. */
 export function percentTick(fraction, step) {
-  return percent(fraction, Math.min(4, decimals(100 * step)));
+  return percent(fraction, Math.min(FINEST, decimals(100 * step)));
 }
 
 /** Decimals that tell multiples of `step` apart. */

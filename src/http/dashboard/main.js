@@ -2,6 +2,7 @@
 
 import { get, offers, Problem } from "./api.js";
 import { announce, h } from "./dom.js";
+import * as compare from "./compare.js";
 import * as evaluation from "./evaluation.js";
 import * as evaluationAsking from "./evaluation_asking.js";
 import * as evaluations from "./evaluations.js";
@@ -27,6 +28,7 @@ const ROUTES = [
   [/^#\/evaluations$/, evaluations.view, "evaluations"],
   [/^#\/evaluations\/new(?:\?(.*))?$/, evaluationAsking.view, "evaluations"],
   [/^#\/evaluations\/([^/]+)$/, evaluation.view, "evaluations"],
+  [/^#\/compare(?:\?(.*))?$/, compare.view, "compare"],
   [/^#\/frontiers\/([^/]+)$/, frontier.view, "jobs"],
   [/^#\/key$/, key, "key"],
 ];

@@ -4,6 +4,7 @@ import { get, post } from "./api.js";
 import { announce, h, table } from "./dom.js";
 import { count, moment, percent, short, significant } from "./format.js";
 import { foot, Pages } from "./pages.js";
+import { ticking } from "./ticking.js";
 import { caution, FRAMEWORKS, utility } from "./specification.js";
 
 /** Fewer than of other things at a time: each is asked for by itself. */
@@ -26,12 +27,13 @@ export async function view(_, leaving) {
     h("a", { class: "button", href: "#/train" }, "Train a policy"),
   );
   if (rows.length === 0) return { title: "Policies", actions, body: empty() };
-  const holder = h("div", {}, listed(rows));
+  const ticks = ticking("policies");
+  const holder = h("div", {}, listed(rows, ticks));
   const add = async (older) => {
     rows.push(...(await detailed(older)));
-    holder.replaceChildren(listed(rows));
+    holder.replaceChildren(listed(rows, ticks));
   };
-  return { title: "Policies", actions, body: [holder, foot(pages, ["policy", "policies"], rows.length, add)] };
+  return { title: "Policies", actions, body: [ticks.link, holder, foot(pages, ["policy", "policies"], rows.length, add)] };
 }
 
 function empty() {
@@ -47,7 +49,7 @@ function empty() {
   );
 }
 
-function listed(rows) {
+function listed(rows, ticks) {
   const of =
     (read) =>
     ({ detail }) =>
@@ -55,7 +57,13 @@ function listed(rows) {
   return table(
     "Policies, newest first",
     [
-      { name: "Policy", cell: ({ policy }) => h("a", { href: `#/policies/${policy}` }, h("code", {}, short(policy))) },
+      {
+        name: "Policy",
+        cell: ({ policy }) => [
+          ticks.box(policy, `policy ${short(policy)}`),
+          h("a", { href: `#/policies/${policy}` }, h("code", {}, short(policy))),
+        ],
+      },
       { name: "Kind", cell: of(({ framework }) => FRAMEWORKS[framework]) },
       { name: "Investor", cell: of((problem) => utility(problem.utility)) },
       { name: "Caution", cell: of((problem) => caution(problem)) },

@@ -18,6 +18,7 @@ export async function view(query, leaving) {
 
 function opening(policies, asked) {
   const policy = select({ name: "policy", label: "Policy", choices: policyChoices(policies) });
+  policy.element.classList.add("broad");
   if (policies.some(({ policy }) => policy === asked)) policy.control.value = asked;
   const stake = input({ name: "wealth", label: "Wealth", note: "Blank: the policy\u2019s initial wealth." });
   const holding = input({
@@ -30,7 +31,7 @@ function opening(policies, asked) {
     name: "rolling",
     label: "How it goes on",
     choices: { ends: "To the horizon of the policy", renews: "Renewed by itself", rolls: "Rolling" },
-    note: "Renewed, it goes on by policies trained on what was seen by then. Rolling needs a policy whose weights decay.",
+    note: "Renewed, it goes on by policies trained on what was seen by then. Rolling needs a policy to which older returns count less.",
     changed: (choice) => [every, window].forEach(({ element }) => (element.hidden = choice !== "renews")),
   });
   const every = input({ name: "renew.every", label: "Periods by each policy", value: "12" });

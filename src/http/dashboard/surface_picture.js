@@ -25,6 +25,13 @@ export function picture(policy, shape, surfaces, { step, across, radius }) {
   return over(found, choices, choices.includes(across) ? across : choices[0], radius, itself);
 }
 
+/** What is held after `step` periods at each of `means`, everything else at the middle of the design. */
+export function curve(policy, shape, { step, means }) {
+  const found = stepSurface(policy, shape, step);
+  if (found === null) return means.map(() => policy.steps[step].solution.band[0]);
+  return means.map((mean) => found.at({ mean }));
+}
+
 function along(found, axis) {
   const values = spread(found.ranges[axis], ALONG);
   return { kind: "line", axis, values, allocations: values.map((value) => found.at({ [axis]: value })) };

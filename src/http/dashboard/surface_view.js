@@ -2,7 +2,7 @@
 
 import { lineChart } from "./chart.js";
 import { h } from "./dom.js";
-import { percent, percentTick, tick, wealth } from "./format.js";
+import { percent, percentFigures, percentTick, tick, wealth } from "./format.js";
 import { heatmap } from "./heatmap.js";
 import { shown } from "./key.js";
 import { unitOf } from "./periods.js";
@@ -14,7 +14,7 @@ const RADII = 20;
 const AXES = {
   wealth: { label: "Wealth", format: wealth, tick },
   mean: { label: "Average return", format: (value) => percent(value, 2), tick: percentTick },
-  radius: { label: "Caution", format: (value) => percent(value, 2), tick: percentTick },
+  radius: { label: "Caution", format: (value) => percentFigures(value, 4), tick: percentTick },
   deviation: { label: "Standard deviation", format: (value) => percent(value, 2), tick: percentTick },
 };
 
@@ -49,6 +49,22 @@ export function surfaceView({ id, problem, leaving }) {
   });
   worker.postMessage({ address: `/policies/${id}/export`, headers: shown() });
   return holder;
+}
+
+/** What policy `id` holds after `step` periods at each of `means`, everything else at the middle of its design. */
+export function surfaceCurve(id, { step, means }, leaving) {
+  const worker = new Worker(workerAddress(), { type: "module" });
+  leaving.addEventListener("abort", () => worker.terminate());
+  return new Promise((resolve, reject) => {
+    const end = (settle, value) => (worker.terminate(), settle(value));
+    worker.addEventListener("error", () => end(reject, new Error("The policy could not be read.")));
+    worker.addEventListener("message", ({ data }) => {
+      if (data.failed) end(reject, new Error(data.failed));
+      else if (data.ready) worker.postMessage({ step, means });
+      else end(resolve, data.curve);
+    });
+    worker.postMessage({ address: `/policies/${id}/export`, headers: shown() });
+  });
 }
 
 /** The controls and the drawing. One wish is out at a time; the latest of those made meanwhile follows it. */

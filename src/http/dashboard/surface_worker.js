@@ -1,10 +1,10 @@
 // A policy's document read, and its surface computed, off the thread that the page lives on.
 //
 // First message: `{address, headers}`, answered by `{ready}`. Each one after it is a wish for a picture, answered by
-// `{picture}`. A failure of either is `{failed}`, in words.
+// `{picture}`, or with `means` for what is held at them, answered by `{curve}`. A failure of either is `{failed}`, in words.
 
 import { Shape, retention } from "./laws.js";
-import { picture } from "./surface_picture.js";
+import { curve, picture } from "./surface_picture.js";
 
 let policy;
 let shape;
@@ -24,7 +24,9 @@ async function load({ address, headers }) {
 
 addEventListener("message", async ({ data }) => {
   try {
-    postMessage(data.address ? await load(data) : { picture: picture(policy, shape, surfaces, data) });
+    if (data.address) postMessage(await load(data));
+    else if (data.means) postMessage({ curve: curve(policy, shape, data) });
+    else postMessage({ picture: picture(policy, shape, surfaces, data) });
   } catch (error) {
     postMessage({ failed: error.message });
   }

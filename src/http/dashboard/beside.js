@@ -1,0 +1,25 @@
+// A table of two things side by side, with what differs.
+
+import { h, table } from "./dom.js";
+import { short } from "./format.js";
+
+/** What two things are called in a table and in charts: A is the first. */
+export const LETTERS = ["A", "B"];
+
+/**
+ * `rows`: `{name, cells: [of A, of B], apart}`; `apart` is the difference in words, where it is more than that they differ.
+ * `kind` is where the two are.
+ */
+export function beside(caption, kind, noun, ids, rows) {
+  const link = (index) => [`${LETTERS[index]}: `, h("a", { href: `#/${kind}/${ids[index]}` }, `${noun} ${short(ids[index])}`)];
+  const differs = ({ cells: [one, other], apart }) => (one === other ? "" : (apart ?? "differs"));
+  return table(
+    caption,
+    [
+      { name: "What", cell: ({ name }) => name },
+      ...[0, 1].map((index) => ({ name: h("span", {}, link(index)), cell: ({ cells }) => (differs({ cells }) ? h("b", {}, cells[index]) : cells[index]) })),
+      { name: "B less A", cell: differs },
+    ],
+    rows,
+  );
+}

@@ -1,0 +1,84 @@
+// Two policies: what they were asked, and what they hold at the same average return.
+
+import { get } from "./api.js";
+import { beside, LETTERS } from "./beside.js";
+import { lineChart } from "./chart.js";
+import { h, section } from "./dom.js";
+import { inWords as flowsInWords } from "./flows.js";
+import { count, counted, percent, percentTick, points, significant, wealth } from "./format.js";
+import { unitOf } from "./periods.js";
+import { caution, FRAMEWORKS, moments, utility } from "./specification.js";
+import { surfaceCurve } from "./surface_view.js";
+
+/** Places at which the two are read. */
+const ALONG = 61;
+/** Standard deviations of a mean, to either side of it, over which the two are shown. */
+const ASIDE = 2.5;
+
+export async function policiesBeside(ids, leaving) {
+  const both = await Promise.all(ids.map((id) => get(`/policies/${id}`, leaving)));
+  const asked = both.map(({ specification }) => specification);
+  const table = beside("Two policies side by side", "policies", "Policy", ids, rows(asked));
+  return [h("p", { class: "lead" }, sentence(rows(asked))), table, curves(ids, both, leaving)];
+}
+
+/** What differs, in a sentence. */
+function sentence(all) {
+  const apart = all.filter(({ cells: [one, other] }) => one !== other).map(({ name }) => name.toLowerCase());
+  if (apart.length === 0) return "The two were asked the same; only their seeds or their precision may differ.";
+  return `They differ in ${apart.length === 1 ? apart[0] : `${apart.slice(0, -1).join(", ")} and ${apart.at(-1)}`}; everything else is the same.`;
+}
+
+function rows(asked) {
+  const problems = asked.map(({ problem }) => problem);
+  const row = (name, read, apart) => {
+    const cells = asked.map((one) => read(one.problem, one));
+    return { name, cells, apart };
+  };
+  const [one, other] = problems;
+  const less = (read, words) => words(read(other) - read(one));
+  const signed = (value, words) => `${value > 0 ? "+" : ""}${words(value)}`;
+  const records = problems.map(({ history }) => moments(history));
+  const same = one.history.length === other.history.length && one.history.every((value, index) => value === other.history[index]);
+  const record = ({ history }) => {
+    const { mean, deviation } = moments(history);
+    return `${counted(history.length, "return")}: mean ${percent(mean, 2)}, deviation ${percent(deviation, 2)}`;
+  };
+  return [
+    row("Kind", ({ framework }) => FRAMEWORKS[framework]),
+    row("Investor", (problem) => utility(problem.utility)),
+    row("Caution", (problem) => caution(problem)),
+    row("Periods ahead", ({ horizon, periods_per_year }) => counted(horizon, unitOf(periods_per_year)), less(({ horizon }) => horizon, (value) => signed(value, count))),
+    row("Bank", ({ rate_per_step }) => percent(rate_per_step, 3), less(({ rate_per_step }) => rate_per_step, (value) => signed(value, (size) => points(size, 3)))),
+    row("Trading cost", ({ trading_cost }) => percent(trading_cost, 2), less(({ trading_cost }) => trading_cost, (value) => signed(value, (size) => points(size, 2)))),
+    row("Wealth at the start", ({ initial_wealth }) => wealth(initial_wealth), less(({ initial_wealth }) => initial_wealth, (value) => signed(value, wealth))),
+    row("Money added", (problem) => flowsInWords(problem) || "None"),
+    row("Most in stocks", ({ action_interval }) => percent(action_interval[1], 0)),
+    row("Older returns", ({ learning }) => (learning.kind === "decay" ? `half after ${significant(learning.half_life)}` : "count like newer ones")),
+    { name: "Record", cells: [record(one), same ? record(one) : `${record(other)}${record(other) === record(one) ? " (other returns)" : ""}`], apart: `mean ${signed(records[1].mean - records[0].mean, (value) => points(value, 2))}` },
+    row("Precision", (_, { design, seed }) => `${counted(design.count, "situation")}, seed ${count(seed)}`),
+  ];
+}
+
+/** What each holds near the start against the average return of the record. */
+function curves(ids, both, leaving) {
+  const holder = h("div", {}, h("p", { class: "note" }, "Reading the two policies\u2026"));
+  const known = both.map(({ specification: { problem } }) => ({ ...moments(problem.history), n: problem.history.length }));
+  const wide = known.map(({ mean, deviation, n }) => [mean - (ASIDE * deviation) / Math.sqrt(n), mean + (ASIDE * deviation) / Math.sqrt(n)]);
+  const [low, high] = [Math.min(...wide.map(([from]) => from)), Math.max(...wide.map(([, to]) => to))];
+  const means = Array.from({ length: ALONG }, (_, k) => low + ((high - low) * k) / (ALONG - 1));
+  Promise.all(ids.map((id, index) => surfaceCurve(id, { step: Math.min(1, both[index].horizon - 1), means }, leaving))).then(
+    (held) => {
+      const series = held.map((values, index) => ({ name: LETTERS[index], kind: "line", bare: true, values }));
+      const start = means.findIndex((mean) => mean >= known[0].mean);
+      const x = { values: means, label: "Average return", format: (value) => percent(value, 2), tick: percentTick };
+      holder.replaceChildren(lineChart({ title: "Share in stocks by average return", height: 240, start, x, y: { format: percent, tick: percentTick, also: [0] }, series }));
+    },
+    (error) => leaving.aborted || holder.replaceChildren(h("p", { class: "error" }, error.message)),
+  );
+  return section(
+    "What they hold",
+    h("p", { class: "note" }, "After the first period, each with its own record moved to that average (of log-returns), at the middle of the caution, the wealth and the deviation it was trained for."),
+    holder,
+  );
+}

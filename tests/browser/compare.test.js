@@ -1,0 +1,108 @@
+// Two policies or two sessions side by side, reached by ticking two rows of their list.
+
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { browser, call, service, trained } from "./ballast.js";
+
+const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
+const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
+
+let ballast, chromium, page, careful, bold, one, other;
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  page.setDefaultTimeout(20_000);
+  const problem = { horizon: 4, rate_per_step: 0.002, history: HISTORY, radius: { rule: "bridge", alpha: 0.1, scale: 0.3 } };
+  const design = { count: 40 };
+  careful = await trained(ballast.url, { problem, design });
+  bold = await trained(ballast.url, { problem: { ...problem, radius: { ...problem.radius, scale: 0.05 }, trading_cost: 0.003 }, design });
+  [one, other] = await Promise.all([careful, bold].map(async (policy) => (await call(ballast.url, "/sessions", { policy })).session));
+  for (const [session, held, wealth] of [[one, 0, [0.02]], [other, 1, [0.02, -0.1]]]) {
+    for (const [index, simple_return] of wealth.entries())
+      await call(ballast.url, "/observe", { session, period: index + 1, simple_return, executed_allocation: held, flow: index === 1 ? 50 : 0, date: `2008-0${index + 1}-28` });
+  }
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
+const rows = async () => {
+  const texts = await page.locator("tbody tr").allInnerTexts();
+  return Object.fromEntries(texts.map((text) => plain(text).split("\t").map((cell) => cell.trim())).map(([name, ...cells]) => [name, cells]));
+};
+const go = async (hash) => {
+  await page.goto("about:blank");
+  await page.goto(`${ballast.url}/${hash}`);
+  await page.locator("main:not([aria-busy]) h1").waitFor();
+};
+const tick = async (kind, ids) => {
+  await go(`#/${kind}`);
+  for (const id of ids) await page.getByRole("row", { name: id.replace(/^[a-z]+_/, "").slice(0, 10) }).first().getByRole("checkbox").check();
+  await page.getByRole("link", { name: "Compare the two" }).click();
+};
+
+test("two sessions ticked are told side by side", async () => {
+  await tick("sessions", [one, other]);
+  await page.getByRole("heading", { level: 1, name: "Two sessions" }).waitFor();
+  const told = await rows();
+  assert.deepEqual(told["100 has become"].slice(0, 2), ["100.20", (100 * (1 - 0.003) * 1.02 * 0.9).toFixed(2)]);
+  assert.deepEqual(told["Money added, less taken"], ["0.00", "50.00", "+50.00"]);
+  assert.deepEqual(told["Worst fall"], ["0.0 %", "-10.0 %", "-10.0 points"]);
+  assert.deepEqual(told["Last period"].slice(0, 2), ["Period 1", "February 2008"]);
+  const actions = await Promise.all([one, other].map((session) => call(ballast.url, `/action?session=${session}`)));
+  for (const [index, { allocation }] of actions.entries()) assert.ok(Math.abs(Number.parseFloat(told["To hold in stocks"][index]) - 100 * allocation) <= 0.05);
+  const chart = page.getByRole("slider", { name: "What 100 has become" });
+  await chart.press("Home");
+  assert.match(plain(await chart.getAttribute("aria-valuetext")), /At the start: A 100\.00, B 100\.00/);
+});
+
+test("a third tick takes the place of the first", async () => {
+  const third = (await call(ballast.url, "/sessions", { policy: careful })).session;
+  await tick("sessions", [one, other, third]);
+  await page.getByRole("heading", { level: 1, name: "Two sessions" }).waitFor();
+  assert.ok(page.url().endsWith(`#/compare?sessions=${other},${third}`), page.url());
+});
+
+test("two policies ticked are told by what differs, and by what they hold", async () => {
+  await tick("policies", [careful, bold]);
+  await page.getByText("They differ in caution and trading cost; everything else is the same.").waitFor();
+  const told = await rows();
+  assert.deepEqual(told.Caution, ["90 % confidence, × 0.3", "90 % confidence, × 0.05", "differs"]);
+  assert.deepEqual(told["Trading cost"], ["0.00 %", "0.30 %", "+0.30 points"]);
+  assert.deepEqual(told.Record[2], "");
+  const chart = page.getByRole("slider", { name: "Share in stocks by average return" });
+  await chart.press("Home");
+  const at = async () => plain(await chart.getAttribute("aria-valuetext"));
+  const low = /A ([\d.]+) %, B ([\d.]+) %/.exec(await at()).slice(1).map(Number);
+  await chart.press("End");
+  const high = /A ([\d.]+) %, B ([\d.]+) %/.exec(await at()).slice(1).map(Number);
+  assert.ok(high[1] > low[1] && high[0] >= low[0] && high[1] > high[0], `${low} to ${high}`);
+});
+
+test("an address that names no two says how to come by them", async () => {
+  await go("#/compare?sessions=only");
+  await page.getByText("Tick two rows of the policies or of the sessions.").waitFor();
+});
+
+test("axe finds nothing on the pages of two and on the lists, in light, in dark and at 320 pixels", async () => {
+  const axe = await readFile(AXE, "utf8");
+  for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
+    await page.emulateMedia({ colorScheme });
+    await page.setViewportSize({ width, height: 900 });
+    for (const hash of ["#/sessions", "#/policies", `#/compare?policies=${careful},${bold}`, `#/compare?sessions=${one},${other}`]) {
+      await go(hash);
+      await page.waitForLoadState("networkidle");
+      await page.evaluate(axe);
+      const { violations, passes } = await page.evaluate(() => axe.run(document));
+      assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join("\n")}`), [], `${hash} ${colorScheme} ${width}`);
+      assert.ok(passes.length > 10);
+      assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0, `${hash} at ${width}`);
+    }
+  }
+});
