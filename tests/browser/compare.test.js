@@ -54,7 +54,7 @@ test("two sessions ticked are told side by side", async () => {
   assert.deepEqual(told["100 has become"].slice(0, 2), ["100.20", (100 * (1 - 0.003) * 1.02 * 0.9).toFixed(2)]);
   assert.deepEqual(told["Money added, less taken"], ["0.00", "50.00", "+50.00"]);
   assert.deepEqual(told["Worst fall"], ["0.0 %", "-10.0 %", "-10.0 points"]);
-  assert.deepEqual(told["Last period"].slice(0, 2), ["Period 1", "February 2008"]);
+  assert.deepEqual(told["Last period"].slice(0, 2), ["28 Jan 2008", "February 2008"]);
   const actions = await Promise.all([one, other].map((session) => call(ballast.url, `/action?session=${session}`)));
   for (const [index, { allocation }] of actions.entries()) assert.ok(Math.abs(Number.parseFloat(told["To hold in stocks"][index]) - 100 * allocation) <= 0.05);
   const chart = page.getByRole("slider", { name: "What 100 has become" });

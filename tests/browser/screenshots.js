@@ -26,6 +26,7 @@ try {
     problem: {
       horizon: HORIZON,
       rate_per_step: Number(bank.toFixed(4)),
+      periods_per_year: 12,
       utility: { kind: "power", risk_aversion: 3 },
       history: returns.slice(start - MONTHS, start).map(Math.log1p),
     },
@@ -41,7 +42,9 @@ try {
   }
   const { session } = await call(url, "/sessions", { policy });
   for (let period = 1; period <= LIVED; period++) {
-    await call(url, "/observe", { session, period, simple_return: returns[start + period - 1] });
+    // The last day of a month is the one before the first of the next.
+    const date = new Date(Date.UTC(2008, period, 0)).toISOString().slice(0, 10);
+    await call(url, "/observe", { session, period, simple_return: returns[start + period - 1], date });
   }
   await shot(`#/sessions/${session}`, "light", "slider", "docs/images/session.png", 1080);
   await shot(`#/policies/${policy}`, "dark", "application", "docs/images/policy.png", 1035);

@@ -21,8 +21,8 @@ export const SOURCES = {
 export const agrees = (one, other) => Math.abs(one - other) <= TOLERANCE;
 
 /**
- * The advice of `action` with what follows it, `rest`. `place` is `{heading, end, price, cost, wealth}`: what the period is called,
- * when it is all for, the last price reported or null, and the session's terms. `{element, quant, checked(anew), unchecked(words)}`:
+ * The advice of `action` with what follows it, `rest`. `place` is `{heading, end, cautious, price, cost, wealth}`: what the period is called,
+ * when it is all for, whether it guards against worse than the record, the last price reported or null, and the session's terms. `{element, quant, checked(anew), unchecked(words)}`:
  * `checked` takes what `/action` says of the same state with the step solved anew, `unchecked` why it could not be.
  */
 export function adviceView(action, place, rest) {
@@ -35,7 +35,7 @@ export function adviceView(action, place, rest) {
       h("p", { class: "big" }, h("span", {}, "Hold "), h("strong", {}, allocation(action.allocation)), h("span", {}, " in stocks")),
       h("p", { class: "sentence order" }, order(action, place)),
       action.caution.map(({ sentence }) => h("p", { class: "note wrong caution" }, minus(sentence))),
-      h("p", { class: "sentence" }, why(action, place.end)),
+      h("p", { class: "sentence" }, why(action, place)),
       action.contribution === 0 ? "" : h("p", { class: "sentence" }, endWords(action.contribution)),
     ),
     rest,
@@ -79,11 +79,12 @@ function order(action, place) {
 /** So many shares. */
 const number = (shares) => (shares >= 100 ? wealth(Math.round(shares)).replace(/\.00$/, "") : figures(shares, 3));
 
-function why({ allocation, certainty_equivalent, floor }, end) {
-  if (allocation === 0)
-    return ["In the worst market your record still allows nothing beats the bank, which reaches ", h("b", {}, wealth(floor)), ` ${end}.`];
+function why({ allocation, certainty_equivalent, floor }, { end, cautious }) {
+  const worst = "n the worst market your record still allows";
+  const [even, market] = cautious ? [`Even i${worst}`, `I${worst}`] : Array(2).fill("If the market is what this policy takes it for");
+  if (allocation === 0) return [`${market}, nothing beats the bank, which reaches `, h("b", {}, wealth(floor)), ` ${end}.`];
   return [
-    "Even in the worst market your record still allows, this is worth as much as a sure ",
+    `${even}, this is worth as much as a sure `,
     h("b", {}, wealth(certainty_equivalent)),
     ` ${end}; all in the bank comes to `,
     h("b", {}, wealth(floor)),

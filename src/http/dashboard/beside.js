@@ -13,7 +13,7 @@ export const LETTERS = ["A", "B"];
 export function beside(caption, kind, noun, ids, rows) {
   const link = (index) => [`${LETTERS[index]}: `, h("a", { href: `#/${kind}/${ids[index]}` }, `${noun} ${short(ids[index])}`)];
   const differs = ({ cells: [one, other], apart }) => (one === other ? "" : (apart ?? "differs"));
-  return table(
+  const both = table(
     caption,
     [
       { name: "What", cell: ({ name }) => name },
@@ -22,4 +22,6 @@ export function beside(caption, kind, noun, ids, rows) {
     ],
     rows,
   );
+  both.classList.add("beside");
+  return both;
 }

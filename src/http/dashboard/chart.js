@@ -38,6 +38,8 @@ const LEAST_WIDTH = 180;
 /** An element whose drawing follows its width: `draw(width)` gives the SVG's children. */
 export function plot(height, draw) {
   const holder = h("div", { class: "plot" });
+  // Its room is kept before it is drawn, so that nothing below it moves.
+  holder.style.minHeight = `${height}px`;
   const drawn = (width) => {
     const picture = s(
       "svg",

@@ -5,6 +5,7 @@ import { get } from "./api.js";
 import { beside, LETTERS } from "./beside.js";
 import { lineChart } from "./chart.js";
 import { falls, wealths, worstFall } from "./comparators.js";
+import { LEAST_FALL, LEAST_SHARE } from "./course.js";
 import { h, section } from "./dom.js";
 import { addedIn, netAdded } from "./flows.js";
 import { allocation, count, percent, percentTick, points, short, tick, wealth } from "./format.js";
@@ -98,7 +99,7 @@ function courses(both) {
   return section(
     "How they went",
     lineChart({ title: "What 100 has become", gutter: 64, height: 220, x, y: { format: wealth, tick }, series: series(({ grown }) => grown) }),
-    lineChart({ title: "Below the highest so far", gutter: 64, height: 130, x, y: { format: percent, tick: percentTick, also: [0] }, series: series(({ history }) => falls(history)) }),
-    lineChart({ title: "Share held in stocks", gutter: 64, height: 150, x: { ...x, here: name, between: true }, y: { format: allocation, tick: percentTick, also: [0] }, series: series(held, { kind: "levels" }) }),
+    lineChart({ title: "Below the highest so far", gutter: 64, height: 130, x, y: { format: percent, tick: percentTick, also: [0, -LEAST_FALL] }, series: series(({ history }) => falls(history)) }),
+    lineChart({ title: "Share held in stocks", gutter: 64, height: 150, x: { ...x, here: name, between: true }, y: { format: allocation, tick: percentTick, also: [0, LEAST_SHARE] }, series: series(held, { kind: "levels" }) }),
   );
 }

@@ -5,6 +5,7 @@ import { falls, mixed, wealths, worstFall } from "./comparators.js";
 import { h, section } from "./dom.js";
 import { banked } from "./flows.js";
 import { allocation, percent, percentTick, tick, wealth } from "./format.js";
+import { isCautious } from "./specification.js";
 
 /** What the session is measured by, each held through the same returns; 60/40 as people call it. */
 export const BESIDE = [
@@ -14,6 +15,9 @@ export const BESIDE = [
 ];
 /** Charts above each other start at one line. */
 const GUTTER = 64;
+
+/** Less than this makes no chart of its own height. */
+export const [LEAST_FALL, LEAST_SHARE] = [0.01, 0.1];
 
 /** Positions of the periods from the start to the horizon, with their names. */
 function periodsOf({ session, history, calendar }) {
@@ -45,7 +49,7 @@ export function wealthCourse(shown) {
         gutter: GUTTER,
         height: 120,
         x,
-        y: { format: percent, tick: percentTick, also: [0] },
+        y: { format: percent, tick: percentTick, also: [0, -LEAST_FALL] },
         series: [
           { name: "This session", kind: "line", values: along(deep) },
           { name: "All in stocks", kind: "line", bare: true, values: along(stocks) },
@@ -101,9 +105,10 @@ export function holdings(shown, action) {
     gutter: GUTTER,
     height: 150,
     x: { ...x, here: calendar.name, format: calendar.name, between: true },
-    y: { format: allocation, tick: percentTick, also: [0] },
+    y: { format: allocation, tick: percentTick, also: [0, LEAST_SHARE] },
     series: [{ name: "Held", kind: "bars", values: values.map((k) => stands(k, "executed_allocation")) }, ...(costly ? ends : [advised])],
   });
+  if (!isCautious(policy.specification.problem)) return [chart];
   const radii = values.map((k) => (k === session.period - 1 && action ? action.radius : stands(k, "radius")));
   const perPoint = shown.cautionScale;
   const caution = lineChart({

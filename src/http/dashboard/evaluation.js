@@ -239,7 +239,9 @@ function quant(report, ended) {
       radii(report),
       coverage(report),
     );
-  return section("For the quant", disclosure("Utility, radii and coverage", build));
+  const element = section("For the quant", disclosure("Utility, radii and coverage", build));
+  element.classList.add("asked-for");
+  return element;
 }
 
 function radii({ strategies }) {

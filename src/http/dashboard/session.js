@@ -11,7 +11,7 @@ import { observeForm } from "./observe.js";
 import { lastReport, observed, righting } from "./observed.js";
 import { calendar } from "./periods.js";
 import { nearness } from "./sensitivity.js";
-import { isParametric, moments, utility } from "./specification.js";
+import { hasBall, isCautious, isParametric, moments, utility } from "./specification.js";
 import { conservatism } from "./what_if.js";
 import { worstMarket } from "./worst_market.js";
 
@@ -71,14 +71,15 @@ async function fill(holder, told) {
   const report = observeForm(action, shown);
   const advice = adviceView(action, place(shown, action), [report, lastReport(shown)]);
   const near = nearness({ id, session, policy, leaving, unit: calendar.unit });
-  const caution = shown.canAsk ? conservatism(shown, action) : null;
+  const cautious = isCautious(policy.specification.problem);
+  const caution = shown.canAsk && cautious ? conservatism(shown, action) : null;
   holder.replaceChildren(
     changed(shown),
     due(shown),
     h("div", { class: "columns" }, advice.element, wealthCourse(shown)),
     figures(shown, action),
     near.element,
-    worstMarket(shown, advice, calendar.unit, () => near.ask().then(() => caution?.ask())),
+    worstMarket({ ...shown, cautious }, advice, () => near.ask().then(() => caution?.ask())),
     caution?.element ?? "",
     held(shown, action),
     observed(shown),
@@ -95,6 +96,7 @@ function place({ session, history, policy, calendar }, { period }) {
   return {
     heading: name === `Period ${period}` ? `${name}${which}` : `${name}, period ${period}${which}`,
     end: session.rolling ? `${counted(horizon, calendar.unit)} from now` : `at the end of ${calendar.inText(session.horizon)}`,
+    cautious: isCautious(policy.specification.problem),
     price: last.price ?? null,
     cost: trading_cost,
     wealth: session.wealth,
@@ -117,7 +119,7 @@ function figures(shown, action) {
       action && ["Worth as much as a sure", wealth(action.certainty_equivalent), end],
       action && ["All in the bank", wealth(action.floor), `${end}, all sold now`],
       history.observations.length > 0 && worstFallFact(shown),
-      action && ["Caution", caution, `the average return may really be so much lower a ${calendar.unit}`],
+      action && isCautious(shown.policy.specification.problem) && ["Caution", caution, `the average return may really be so much lower a ${calendar.unit}`],
       [
         "Returns seen",
         count(session.sample_size),
@@ -167,7 +169,7 @@ const held = (shown, action) => section("What it held", h("div", { class: "duo" 
 /** What more or less caution would lose, where the policy has a ball. */
 function frontier({ session, policy, history, canTry }) {
   const { problem } = policy.specification;
-  if (!canTry || problem.radius?.rule === "chi_square") return "";
+  if (!canTry || !hasBall(problem)) return "";
   const seen = history.observations.map((row) => (row.now ?? row).log_return).filter((value) => value !== null);
   const element = section(
     "How much caution",

@@ -18,13 +18,12 @@ export async function view(query, leaving) {
 
 function opening(policies, asked) {
   const policy = select({ name: "policy", label: "Policy", choices: policyChoices(policies) });
-  policy.element.classList.add("broad");
   if (policies.some(({ policy }) => policy === asked)) policy.control.value = asked;
   const stake = input({ name: "wealth", label: "Wealth", note: "Blank: the policy\u2019s initial wealth." });
   const holding = input({
     name: "holding",
     label: "Share of it held already, %",
-    note: "In the risky asset. Blank: nothing.",
+    note: "In stocks. Blank: nothing.",
     unit: "percent",
   });
   const going = select({
@@ -34,6 +33,7 @@ function opening(policies, asked) {
     note: "Renewed, it goes on by policies trained on what was seen by then. Rolling needs a policy to which older returns count less.",
     changed: (choice) => [every, window].forEach(({ element }) => (element.hidden = choice !== "renews")),
   });
+  for (const { element } of [policy, going]) element.classList.add("broad");
   const every = input({ name: "renew.every", label: "Periods by each policy", value: "12" });
   const window = input({ name: "renew.window", label: "Returns it is trained on", note: "The last ones. Blank: all." });
   every.element.hidden = window.element.hidden = true;

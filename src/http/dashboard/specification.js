@@ -99,6 +99,9 @@ export const hasBall = ({ framework }) => framework === "adaptive" || framework 
 /** True where the uncertainty set is a confidence region of a normal law. */
 export const isParametric = (framework) => framework.startsWith("parametric");
 
+/** True where a policy guards against markets worse than the record. */
+export const isCautious = (problem) => hasBall(problem) || isParametric(problem.framework);
+
 /** What may be a mistake in a request. */
 export function warningList(warnings) {
   return warnings.map(({ message }) => h("p", { class: "note wrong" }, minus(message)));
@@ -106,8 +109,8 @@ export function warningList(warnings) {
 
 /** How cautious a policy is, in a few words. */
 export function caution(problem) {
-  const { radius, framework } = problem;
-  if (!hasBall(problem) && !isParametric(framework)) return "none";
+  const { radius } = problem;
+  if (!isCautious(problem)) return "none";
   const { alpha, scale = 1 } = radius;
   const confidence = alpha === undefined ? radiusRule(radius) : `${percent(1 - alpha, 0)} confidence`;
   return scale === 1 ? confidence : `${confidence}, \u00d7 ${significant(scale)}`;

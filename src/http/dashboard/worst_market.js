@@ -2,7 +2,7 @@
 
 import { get } from "./api.js";
 import { disclosure, h, section } from "./dom.js";
-import { figures, oneIn, percent, significant } from "./format.js";
+import { figures, minus, oneIn, percent, significant } from "./format.js";
 import { lawChart } from "./law_chart.js";
 
 /** A move to within this of the deepest one is as deep, in log-return. */
@@ -10,11 +10,11 @@ const NEAR = 0.01;
 /** Below this share of it, a market does not differ. */
 const LITTLE = 5e-4;
 
-/** What the market assumes beyond the returns seen, a sentence. `unit` is what a period is called. */
-export function assumed({ transport }, unit) {
+/** What the market assumes beyond the returns seen, a sentence. `unit` is what a period is called, `cautious` whether it might. */
+export function assumed({ transport }, unit, cautious = true) {
   const moves = transport.filter(({ atom, moved_to, mass }) => atom !== moved_to && mass > 0);
   const share = (some) => some.reduce((sum, { mass }) => sum + mass, 0);
-  if (share(moves) < LITTLE) return `It assumes that every ${unit} comes as those seen did: no market allowed does worse to this advice.`;
+  if (share(moves) < LITTLE) return `It assumes that every ${unit} comes as those seen did${cautious ? ": no market allowed does worse to this advice" : ""}.`;
   const lowest = Math.min(...moves.map(({ moved_to }) => moved_to));
   const deep = moves.filter(({ moved_to }) => moved_to <= lowest + NEAR);
   const rest = share(moves) - share(deep);
@@ -29,19 +29,20 @@ export function assumed({ transport }, unit) {
 }
 
 /** The section; the robust step takes a while, so it comes after the rest of the page stands. `then()` when it has. */
-export function worstMarket({ id, leaving }, advice, unit, then) {
+export function worstMarket({ id, cautious, calendar: { unit }, leaving }, advice, then) {
   const paper = h("div", { class: "words quant" }, advice.quant);
-  const holder = h("div", { class: "later" }, h("p", { class: "note" }, "Looking for the worst market\u2026"));
+  const holder = h("div", { class: "later" }, h("p", { class: "note" }, "Solving the step anew\u2026"));
   const told = async () => {
     const anew = await get(`/action?session=${id}&explain=worst_case`, leaving);
     advice.checked(anew);
     const { worst_case } = anew;
     paper.append(paperWords(anew));
-    if (worst_case.transport.length === 0) return [h("p", { class: "sentence" }, normalWords(anew))];
-    return [h("p", { class: "sentence" }, assumed(worst_case, unit)), lawChart(worst_case)];
+    if (worst_case.transport.length === 0) return [h("p", { class: "sentence" }, assumedNormal(worst_case, unit))];
+    return [h("p", { class: "sentence" }, assumed(worst_case, unit, cautious)), lawChart(worst_case)];
   };
   told().then(
     (nodes) => {
+      holder.classList.remove("later");
       holder.replaceChildren(...nodes);
       then();
     },
@@ -52,13 +53,14 @@ export function worstMarket({ id, leaving }, advice, unit, then) {
       then();
     },
   );
-  return section("The worst market your record still allows", holder, disclosure("For the quant", () => paper));
+  return section(cautious ? "The worst market your record still allows" : "The market it counts on", holder, disclosure("For the quant", () => paper));
 }
 
-/** Of a market of normal returns. */
-function normalWords({ worst_case: { normal, sentence } }) {
-  if (!normal) return sentence;
-  return sentence.replace(/^A(gains)?t an allocation of \S+ %,/, "Against this advice,").replace(/-(?=[\d.]+ ?%)/g, "\u2212");
+/** Of a market whose returns are a bell curve: its average and its spread beside those seen. */
+export function assumedNormal({ normal, sentence }, unit) {
+  if (!normal) return minus(sentence);
+  const [average, spread, seenAverage, seenSpread] = [normal.mean, Math.sqrt(normal.variance), normal.estimated_mean, Math.sqrt(normal.estimated_variance)].map((value) => percent(value, 2));
+  return `It assumes that stocks return ${average} a ${unit} on average, give or take ${spread}, where ${seenAverage} and ${seenSpread} were seen (as log-returns).`;
 }
 
 function paperWords({ worst_case, radius, sample_size }) {
