@@ -125,6 +125,15 @@ SimpleReturn: TypeAlias = float
 AlphaItem: TypeAlias = float
 
 
+class BankRate(TypedDict):
+    """What the bank paid in each period, as fractions."""
+
+    column: str
+    """The name of the column."""
+    rates: list[float]
+    """In the order of the returns."""
+
+
 class Bootstrap1(TypedDict):
     """Independent draws of the returns seen, spread by a kernel."""
 
@@ -318,6 +327,10 @@ class HistoryReport(TypedDict):
     """Mean terminal utility of each strategy, in their order."""
 
 
+Holds: TypeAlias = Literal["dates", "values", "rate", "other"]
+"""What a column holds."""
+
+
 LengthscaleItem: TypeAlias = float
 
 
@@ -380,6 +393,10 @@ JobKind: TypeAlias = Literal["train", "evaluate", "backtest", "frontier"]
 
 
 JobState: TypeAlias = Literal["queued", "running", "succeeded", "failed", "cancelled"]
+
+
+Kind: TypeAlias = Literal["simple", "log", "price"]
+"""What the numbers are."""
 
 
 KnownReturns: TypeAlias = list[float] | list[list[float]]
@@ -498,6 +515,17 @@ class OwnMix(TypedDict):
 
 Phase: TypeAlias = Literal["solving", "fitting", "simulating"]
 """What a job is doing."""
+
+
+class Place(TypedDict):
+    """Where in the text something is wrong."""
+
+    line: int
+    """From 1."""
+    column: int
+    """From 1: of the fields of the line."""
+    value: str
+    """What stands there, shortened where it is long."""
 
 
 class PolicyEntry(TypedDict):
@@ -647,6 +675,15 @@ class RadiusSpread(TypedDict):
 
 Rates: TypeAlias = float | list[float]
 """What the bank pays in each period."""
+
+
+class Reading3(TypedDict):
+    """It is none."""
+
+    sentence: str
+    """What is wrong, and where."""
+    place: NotRequired[Place | None]
+    outcome: Literal["refused"]
 
 
 class Renew(TypedDict):
@@ -846,6 +883,10 @@ class Uncertainty(TypedDict):
     """Simulation standard error of the quantile."""
     radius: float
     """As in an advice."""
+
+
+Unit: TypeAlias = Literal["fraction", "percent"]
+"""What returns are counted in."""
 
 
 class UtilityReport(TypedDict):
@@ -1116,6 +1157,40 @@ class Caution(TypedDict):
     """For people."""
 
 
+class Choices(TypedDict):
+    """What is said of a text; what is left out follows from it, or is asked."""
+
+    columns: NotRequired[list[str]]
+    """A column of returns or prices, by its name or its number from 1; several of them are several assets"""
+    kind: NotRequired[Kind | None]
+    unit: NotRequired[Unit | None]
+    day_first: NotRequired[bool | None]
+    """Whether 01/02/2020 is the first of February, and not the second of January"""
+    newest_first: NotRequired[bool | None]
+    """Whether the first row is the newest, where no dates tell"""
+    decimal_comma: NotRequired[bool | None]
+    """Whether a comma is the decimal mark"""
+    comma_parts: NotRequired[bool | None]
+    """Whether a comma parts numbers, and is not within them"""
+    one_record: NotRequired[bool | None]
+    """Whether numbers in several columns are one record, line by line"""
+    gaps: NotRequired[bool | None]
+    """Whether a record from which periods are missing is taken as it is"""
+    large_deviation: NotRequired[bool | None]
+    """Whether a standard deviation above 30 % a period is right"""
+    latest: NotRequired[int | None]
+    """How many of the last returns count; all of them unless given"""
+
+
+class ColumnFound(TypedDict):
+    """A column that was found."""
+
+    name: str
+    """Its heading, or its number; empty where the text is one run of numbers."""
+    holds: Holds
+    """What it holds."""
+
+
 class CoverageAtSize(TypedDict):
     """How often the ball held the true law at one sample size."""
 
@@ -1306,6 +1381,15 @@ class ProblemSpecification(TypedDict):
     """The log-returns observed before the start, at least two of them distinct."""
 
 
+class ReadReturns(TypedDict):
+    """A text, and what is said of it."""
+
+    text: str
+    """As it was pasted, or stands in a file: at most 8 MB."""
+    choices: NotRequired[Choices]
+    """Nothing at first, then the answers to what is asked."""
+
+
 class RenewalDue(TypedDict):
     """Where a renewal is that is due."""
 
@@ -1328,6 +1412,26 @@ class Sensitivity(TypedDict):
     """With one more return."""
     premium: Premium
     """With another mean, and with more returns like those seen."""
+
+
+class Series(TypedDict):
+    """Returns of one asset."""
+
+    column: str
+    """The name of its column; empty where the text is one run of numbers."""
+    kind: Kind
+    """What the column holds."""
+    unit: NotRequired[Unit | None]
+    log_returns: list[float]
+    """Returns as the service takes them."""
+    mean: float
+    """Mean of the simple returns of a period."""
+    deviation: float
+    """Their standard deviation."""
+    mean_per_year: NotRequired[float | None]
+    """Mean times the periods of a year."""
+    deviation_per_year: NotRequired[float | None]
+    """Deviation times the square root of the periods of a year."""
 
 
 class SessionEntry(TypedDict):
@@ -1512,6 +1616,17 @@ class Advised(Advice):
     """What in the question may be a mistake."""
 
 
+class Answer(TypedDict):
+    """One answer to a question."""
+
+    label: str
+    """In words."""
+    choices: Choices
+    """What to add to `choices`."""
+    sentence: NotRequired[str | None]
+    """What would be read, where that is one thing."""
+
+
 class AssetsAdvice(TypedDict):
     """What to hold of several assets through the coming period."""
 
@@ -1680,6 +1795,51 @@ class ObservedAssets(Composed):
     """Share of wealth in each asset that was advised."""
     executed_allocations: dict[str, float]
     """Share of wealth in each asset that was held."""
+
+
+class Question(TypedDict):
+    """What cannot be told from the text."""
+
+    asks: str
+    """The choice that is asked for, as `choices` names it."""
+    question: str
+    """In words."""
+    options: list[Answer]
+    """Each of them settles it."""
+
+
+class Reading2(TypedDict):
+    """It may be several."""
+
+    questions: list[Question]
+    """What would settle it."""
+    columns: list[ColumnFound]
+    """The columns, where they are known."""
+    outcome: Literal["asked"]
+
+
+class Record(TypedDict):
+    """Returns of one asset or several, oldest first."""
+
+    sentence: str
+    """What was read, for a person to check."""
+    columns: list[ColumnFound]
+    """All that the text has."""
+    series: list[Series]
+    """Those that were read, all of one length."""
+    count: int
+    """Returns there are, of which `latest` may have taken fewer."""
+    dates: NotRequired[list[str] | None]
+    """When each period ended, in ISO 8601, as fine as the frequency; absent where no dates were understood."""
+    frequency: NotRequired[str | None]
+    """`daily`, `weekly`, `monthly`, `quarterly` or `yearly`, where the dates say so."""
+    periods_per_year: NotRequired[int | None]
+    """How many periods make a year, where the dates say so."""
+    newest_first: NotRequired[bool | None]
+    """Where there are no dates that tell: whether the first row was taken for the newest."""
+    rate: NotRequired[BankRate | None]
+    remarks: list[str]
+    """What was changed or passed over, in sentences; the last of `sentence`."""
 
 
 class Renewed(Uncertainty):
@@ -1923,6 +2083,16 @@ class PolicyDetail(TypedDict):
     warnings: list[Warning]
     """What in the specification may be a mistake."""
     diagnostics: list[StepDiagnostics]
+
+
+class Reading1(Record):
+    """It is this record."""
+
+    outcome: Literal["read"]
+
+
+Reading: TypeAlias = Reading1 | Reading2 | Reading3
+"""What is made of a text."""
 
 
 class Renewal(Renewed):
