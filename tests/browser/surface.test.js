@@ -38,7 +38,7 @@ after(async () => {
   await ballast?.stop();
 });
 
-const map = () => page.getByRole("application", { name: /Allocation/ });
+const map = () => page.getByRole("application", { name: /Share held in stocks/ });
 
 /** Opens the policy and moves the sliders as a person does; the long tasks since the page stood, in milliseconds. */
 async function walk() {
@@ -46,7 +46,7 @@ async function walk() {
   await page.goto(`${ballast.url}/#/policies/${policy}`);
   await map().waitFor();
   const told = page.locator("output[for=surface-step]");
-  for (const key of ["ArrowLeft", "ArrowRight"]) {
+  for (const key of ["ArrowRight", "ArrowLeft"]) {
     const before = await told.textContent();
     await page.getByLabel("Period").press(key);
     await page.waitForFunction(
@@ -56,7 +56,7 @@ async function walk() {
     await map().waitFor();
   }
   for (let k = 0; k < 5; k++)
-    await page.getByLabel("Radius", { exact: true }).press(k % 2 ? "ArrowLeft" : "ArrowRight");
+    await page.getByLabel("Caution", { exact: true }).press(k % 2 ? "ArrowLeft" : "ArrowRight");
   await page.waitForTimeout(300);
   return page.evaluate(() => [...longTasks]);
 }
@@ -77,7 +77,7 @@ test("no task is long while the surface is drawn and its sliders move", async (t
 });
 
 test("the radius that is told is the one that is drawn", async () => {
-  const radius = page.getByLabel("Radius", { exact: true });
+  const radius = page.getByLabel("Caution", { exact: true });
   const told = page.locator("output[for=surface-radius]");
   await radius.press("Home");
   await page.waitForFunction(() => document.querySelector("#surface-radius").value === "0");
@@ -88,5 +88,5 @@ test("the radius that is told is the one that is drawn", async () => {
     (text) => document.querySelector("output[for=surface-radius]").textContent !== text,
     least,
   );
-  await page.locator("figure .note", { hasText: `radius ${await told.textContent()}` }).waitFor();
+  await page.locator("figure .note", { hasText: `caution ${await told.textContent()}` }).waitFor();
 });
