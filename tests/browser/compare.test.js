@@ -90,6 +90,13 @@ test("an address that names no two says how to come by them", async () => {
   await page.getByText("Tick two rows of the policies or of the sessions.").waitFor();
 });
 
+test("on a phone both stand beside each other", async () => {
+  await page.setViewportSize({ width: 390, height: 844 });
+  await go(`#/compare?sessions=${one},${other}`);
+  const [wide, room] = await page.locator(".table.beside").evaluate((table) => [table.scrollWidth, table.clientWidth]);
+  assert.ok(wide <= room, `${wide} of ${room}`);
+});
+
 test("axe finds nothing on the pages of two and on the lists, in light, in dark and at 320 pixels", async () => {
   const axe = await readFile(AXE, "utf8");
   for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
