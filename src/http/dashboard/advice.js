@@ -18,7 +18,7 @@ export const SOURCES = {
 };
 
 /** Whether two allocations are the same advice. */
-export const agrees = (one, other) => Math.abs(one - other) <= TOLERANCE;
+const agrees = (one, other) => Math.abs(one - other) <= TOLERANCE;
 
 /**
  * The advice of `action` with what follows it, `rest`. `place` is `{heading, end, cautious, price, cost, wealth}`: what the period is called,

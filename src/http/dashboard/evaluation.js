@@ -35,7 +35,7 @@ export async function view(id, leaving) {
   return { title, trail, actions: export_, body };
 }
 
-export const named = ({ framework, constant_mix }) => {
+const named = ({ framework, constant_mix }) => {
   if (framework) return FRAMEWORKS[framework];
   if (constant_mix === 0 || constant_mix === 1) return constant_mix === 0 ? "All in the bank" : "All in stocks";
   return `${percent(constant_mix, 0)} in stocks`;
@@ -50,7 +50,7 @@ function putIn({ initial_wealth, contributions, horizon }) {
 }
 
 /** Every strategy with its name, its colour and what its wealth ended like, what it is worth the most first. */
-export function outcomes({ strategies, histogram_edges, request }) {
+function outcomes({ strategies, histogram_edges, request }) {
   const { utility } = request.problem;
   const stake = putIn(request.problem);
   return strategies
@@ -108,7 +108,7 @@ const drawnFrom = (law) => LAWS[law?.kind] ?? "the market it was asked for";
 const called = ({ framework, name }) => (framework ? `\u201c${name}\u201d` : name);
 
 /** What the figures say. */
-export function conclusions({ reference }, ended) {
+function conclusions({ reference }, ended) {
   const [best] = ended;
   const bank = ended.find(({ constant_mix }) => constant_mix === 0);
   const stocks = ended.find(({ constant_mix }) => constant_mix === 1);

@@ -83,7 +83,7 @@ function legend(figure, width) {
   return [keys, keys.length > 0 ? line + 1 : 0];
 }
 
-export const svgText = (figure) => new XMLSerializer().serializeToString(standing(figure));
+const svgText = (figure) => new XMLSerializer().serializeToString(standing(figure));
 
 /** The drawing on a canvas: shape by shape, for this page may load no picture that it made itself. */
 async function png(figure) {

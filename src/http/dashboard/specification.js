@@ -65,7 +65,7 @@ export function worth({ kind, risk_aversion: aversion }, value) {
 }
 
 /** The rule of the radius in a few words. */
-export function radiusRule(radius) {
+function radiusRule(radius) {
   switch (radius.rule) {
     case "bridge":
     case "calibrated": {

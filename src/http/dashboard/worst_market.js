@@ -57,7 +57,7 @@ export function worstMarket({ id, cautious, calendar: { unit }, leaving }, advic
 }
 
 /** Of a market whose returns are a bell curve: its average and its spread beside those seen. */
-export function assumedNormal({ normal, sentence }, unit) {
+function assumedNormal({ normal, sentence }, unit) {
   if (!normal) return minus(sentence);
   const [average, spread, seenAverage, seenSpread] = [normal.mean, Math.sqrt(normal.variance), normal.estimated_mean, Math.sqrt(normal.estimated_variance)].map((value) => percent(value, 2));
   return `It assumes that stocks return ${average} a ${unit} on average, give or take ${spread}, where ${seenAverage} and ${seenSpread} were seen (as log-returns).`;
