@@ -144,7 +144,7 @@ fn resolved<'a>(description: &'a Value, schema: &'a Value) -> &'a Value {
     }
 }
 
-/// Every field below a schema, as `outer.inner` and `list[].inner`, with its schema.
+/// Every field below a schema, as `outer.inner` and `list[].inner`, with its schema; of a whole that is a list, as `inner`.
 fn fields(description: &Value, schema: &Value, path: &str, found: &mut Vec<(String, Value)>) {
     let schema = resolved(description, schema);
     for (name, property) in schema["properties"].as_object().into_iter().flatten() {
@@ -158,7 +158,8 @@ fn fields(description: &Value, schema: &Value, path: &str, found: &mut Vec<(Stri
         }
     }
     if schema["items"].is_object() {
-        fields(description, &schema["items"], &format!("{path}[]"), found);
+        let of_each = if path.is_empty() { String::new() } else { format!("{path}[]") };
+        fields(description, &schema["items"], &of_each, found);
     }
 }
 

@@ -32,6 +32,16 @@ fn every_scenario_runs_and_its_figures_hang_together() {
 }
 
 #[test]
+fn lists_report_what_calls_report() {
+    let report = loadtest(&["observe", "--batch", "5"]);
+    let figures = report["figures"].as_array().expect("figures");
+    let found = figures.iter().find(|figure| figure["what"] == "observe: 4 clients, 12 sessions, lists of 5");
+    let observe = found.unwrap_or_else(|| panic!("no lists in {figures:?}"));
+    assert_eq!(observe["bounds"].as_array().map(Vec::len), Some(1), "the wait for a list has no bound: {observe}");
+    assert!(observe["rate"].as_f64().expect("a rate") > 0.0 && observe["processor_us"].as_f64().expect("time") > 0.0);
+}
+
+#[test]
 fn a_bound_is_met_or_not_by_the_figure_beside_it() {
     let report = loadtest(&["observe"]);
     let figures = report["figures"].as_array().expect("figures");

@@ -49,6 +49,9 @@ pub struct LoadTest {
     /// Sessions that are asked
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     sessions: u32,
+    /// Observations of `observe` in one call, each of another session
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    batch: u16,
     /// How often `observe` is run, each time with new sessions
     #[arg(long, default_value_t = 3)]
     rounds: u32,

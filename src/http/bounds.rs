@@ -17,6 +17,7 @@ use crate::control::request::rules::{
 };
 use crate::service::plan::MOST_RENEWALS;
 use crate::service::report::{LONGEST_REASON, MOST_CORRECTIONS, PRICE};
+use crate::service::reports::REPORTS;
 use crate::service::what_if::POINTS;
 
 /// Adds to every schema what its fields may hold.
@@ -30,6 +31,11 @@ pub fn tell(description: &mut OpenApi) {
     }
     if let Some(sweep) = components.schemas.get_mut("Sweep") {
         merged(sweep, &json!({ "minProperties": 1, "maxProperties": 1 }));
+    }
+    if let Some(RefOr::T(Schema::OneOf(reports))) = components.schemas.get_mut("Reports") {
+        let lists = reports.items.iter_mut().filter(|item| matches!(item, RefOr::T(Schema::Array(_))));
+        let length = json!({ "minItems": REPORTS.start(), "maxItems": REPORTS.end() });
+        lists.for_each(|list| merged(list, &length));
     }
 }
 
@@ -331,5 +337,6 @@ mod tests {
             assert!(told.count() > 0, "{field}: {rule} is not told by {name}");
         }
         assert_eq!(description["components"]["schemas"]["Sweep"]["maxProperties"], 1);
+        assert_eq!(description["components"]["schemas"]["Reports"]["oneOf"][1]["maxItems"], 1000);
     }
 }

@@ -60,7 +60,9 @@ impl<S: Send + Sync> FromRequest<S> for JsonBytes {
                 ),
             }
         })?;
-        turn.map_or(Ok(()), |AfterBody(turn)| turn.begin()).map_err(ServiceError::from)?;
+        if let Some(AfterBody(turn)) = turn {
+            turn.begin().await.map_err(ServiceError::from)?;
+        }
         Ok(JsonBytes(bytes))
     }
 }

@@ -28,6 +28,7 @@ mod page;
 mod patient;
 mod policies;
 pub mod problem;
+mod reports;
 mod returns;
 mod router;
 mod schema;

@@ -204,6 +204,11 @@ impl Problem {
     fn slug(&self) -> &str {
         self.kind.trim_start_matches("/problems/")
     }
+
+    /// Counts it as met, once, where it is answered.
+    pub fn count(&self) {
+        metrics::counter!(PROBLEMS, "problem" => self.slug().to_owned()).increment(1);
+    }
 }
 
 /// Shows every kind of problem as never met, so that the first one is seen as an increase.
@@ -217,7 +222,7 @@ impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let wait = self.retry_after.map(|wait| wait.as_secs_f64().ceil().max(1.0) as u64);
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        metrics::counter!(PROBLEMS, "problem" => self.slug().to_owned()).increment(1);
+        self.count();
         let mut response = (status, Json(self)).into_response();
         let headers = response.headers_mut();
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));

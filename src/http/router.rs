@@ -22,7 +22,7 @@ use super::hosts::Hosts;
 use super::problem::{Problem, ProblemKind};
 use super::{
     access, advise, audit, backtests, bounds, dashboard, defaults, described, documentation, evaluations, events,
-    frontiers, jobs, operations, policies, returns, sessions, telemetry, what_if, wire,
+    frontiers, jobs, operations, policies, reports, returns, sessions, telemetry, what_if, wire,
 };
 use crate::service::Service;
 use crate::service::config::Config;
@@ -66,7 +66,7 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(sessions::open, sessions::list))
         .routes(routes!(sessions::get, sessions::delete))
         .routes(routes!(sessions::history))
-        .routes(routes!(sessions::observe))
+        .routes(routes!(reports::observe))
         .routes(routes!(sessions::correct))
         .routes(routes!(sessions::renew))
         .routes(routes!(sessions::action))

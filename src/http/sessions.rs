@@ -21,11 +21,11 @@ use crate::control::policy::advisor::AdviceMode;
 use crate::service::Service;
 use crate::service::action::Question;
 use crate::service::allowance::Class;
-use crate::service::answer::{Corrected, Observed};
+use crate::service::answer::Corrected;
 use crate::service::history::History;
-use crate::service::metrics::{ACTION_SECONDS, OBSERVE_SECONDS};
+use crate::service::metrics::ACTION_SECONDS;
 use crate::service::plan::{Renew, Renewed};
-use crate::service::report::{Correct, Observe};
+use crate::service::report::Correct;
 use crate::service::sessions::Start;
 use crate::service::what_if::Explain;
 
@@ -143,7 +143,7 @@ pub async fn renew(
 }
 
 /// An answer as it is stored.
-fn as_recorded(json: String) -> Response {
+pub fn as_recorded(json: String) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], json).into_response()
 }
 
@@ -159,28 +159,6 @@ pub async fn delete(
 ) -> Result<StatusCode, Problem> {
     service.sessions.delete(&caller, &id).await?;
     Ok(StatusCode::NO_CONTENT)
-}
-
-/// Report the return of a period: exactly once, durable before it is answered.
-#[utoipa::path(post, path = "/observe", tag = "sessions",
-    request_body(content = Observe, example = json!({
-        "session": "session_0123456789abcdef0123456789abcdef", "period": 1, "simple_return": 0.012, "executed_allocation": 0.3
-    })),
-    responses(
-        (status = 200, description = "Recorded; the same period and content again give the same answer.", body = Observed),
-        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "Other content, a gap, past the horizon, or an unusual return that nobody confirms.", body = Problem, content_type = "application/problem+json"),
-        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
-pub async fn observe(
-    State(service): State<Arc<Service>>,
-    By(caller, _): By<Live>,
-    JsonBody(report): JsonBody<Observe>,
-) -> Result<Response, Problem> {
-    let started = Instant::now();
-    let report = Observe { reported_by: caller.key().clone(), ..report };
-    let observed = service.sessions.observe(&caller.tenant, &report, &caller.turn).await?;
-    metrics::histogram!(OBSERVE_SECONDS).record(started.elapsed().as_secs_f64());
-    Ok(as_recorded(observed))
 }
 
 /// Query of `/action`.

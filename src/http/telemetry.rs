@@ -96,6 +96,13 @@ pub fn exposition(jobs: JobCounts, sessions: u64, waiting: [(&'static str, usize
     RECORDER.get().and_then(Option::as_ref).map(PrometheusHandle::render).unwrap_or_default() + &names::of_keys(keys)
 }
 
+/// Counts an answer that turns a tenant away.
+pub fn count_refusal(status: u16, tenant: &str) {
+    if matches!(status, 401 | 403 | 429) {
+        metrics::counter!(names::REFUSALS, "tenant" => tenant.to_owned(), "status" => status.to_string()).increment(1);
+    }
+}
+
 /// A request under way, to be recorded when it is answered.
 pub struct Recording {
     started: Instant,
@@ -134,10 +141,7 @@ impl Recording {
             .increment(1);
         let asker = response.extensions().get::<Asker>();
         let tenant = asker.and_then(|asker| asker.tenant.as_ref()).map_or("", |tenant| tenant.as_str());
-        if matches!(status, 401 | 403 | 429) {
-            metrics::counter!(names::REFUSALS, "tenant" => tenant.to_owned(), "status" => status.to_string())
-                .increment(1);
-        }
+        count_refusal(status, tenant);
         spans::answered(&span, status, asker.map(|_| tenant));
         let key = asker.map_or("", |asker| &asker.key);
         if !key.is_empty() || may_log() {

@@ -71,7 +71,7 @@ impl Sessions {
             (state, record) = (same, Some(seen));
         }
         drop(held);
-        turn.begin()?;
+        turn.begin().await?;
         let solving = self.resolving.run(tenant, move || {
             let (advice, worst_case) = match explain {
                 true => {

@@ -151,18 +151,25 @@ impl Allowance {
     }
 }
 
-/// What one call must take before it does heavy work: one call off the heavy rate and the places, each once, whoever asks
-/// first. The places are given up when it is dropped.
+/// What one call, or one element of a list, must take before it does heavy work: one call off the heavy rate and the
+/// places, each once, whoever asks first. The places are given up when it is dropped.
 #[derive(Debug)]
 pub struct HeavyTurn {
     allowance: Arc<Allowance>,
+    /// Waited for first: elements of one list do not take each other's places.
+    lane: Option<Arc<Semaphore>>,
     counted: OnceLock<()>,
     places: OnceLock<Places>,
 }
 
 impl HeavyTurn {
     pub fn new(allowance: Arc<Allowance>) -> Self {
-        HeavyTurn { allowance, counted: OnceLock::new(), places: OnceLock::new() }
+        HeavyTurn { allowance, lane: None, counted: OnceLock::new(), places: OnceLock::new() }
+    }
+
+    /// Of an element of a list, of whose elements as many do heavy work at a time as `lane` has places.
+    pub fn in_lane(allowance: Arc<Allowance>, lane: Arc<Semaphore>) -> Self {
+        HeavyTurn { lane: Some(lane), ..HeavyTurn::new(allowance) }
     }
 
     /// Takes the call off the heavy rate, before its body is read.
@@ -181,10 +188,15 @@ impl HeavyTurn {
     ///
     /// # Errors
     /// [`Refused::TooOften`], or [`Refused::NoPlace`] where all places are taken.
-    pub fn begin(&self) -> Result<(), Refused> {
+    pub async fn begin(&self) -> Result<(), Refused> {
         self.count()?;
         if self.places.get().is_none() {
-            let places = self.allowance.places().ok_or(Refused::NoPlace)?;
+            let first = match &self.lane {
+                Some(lane) => lane.clone().acquire_owned().await.ok(),
+                None => None,
+            };
+            let mut places = self.allowance.places().ok_or(Refused::NoPlace)?;
+            places.extend(first);
             self.places.get_or_init(|| places);
         }
         Ok(())
@@ -255,19 +267,35 @@ mod tests {
         assert_eq!(given, 1000);
     }
 
-    #[test]
-    fn a_heavy_call_is_counted_once_and_gives_its_place_up_when_it_ends() {
+    #[tokio::test]
+    async fn a_heavy_call_is_counted_once_and_gives_its_place_up_when_it_ends() {
         let limits = Limits::new([0, 1, 0], 1);
         let allowance = Arc::new(Allowance::new(&limits));
         let turn = HeavyTurn::new(allowance.clone());
         turn.count().unwrap();
-        turn.begin().unwrap();
-        turn.begin().unwrap();
-        assert!(matches!(HeavyTurn::new(allowance).begin(), Err(Refused::TooOften(Class::Heavy, _))));
+        turn.begin().await.unwrap();
+        turn.begin().await.unwrap();
+        assert!(matches!(HeavyTurn::new(allowance).begin().await, Err(Refused::TooOften(Class::Heavy, _))));
         let other = HeavyTurn::new(Arc::new(Allowance::new(&limits)));
-        assert!(matches!(other.begin(), Err(Refused::NoPlace)));
+        assert!(matches!(other.begin().await, Err(Refused::NoPlace)));
         drop(turn);
-        other.begin().unwrap();
+        other.begin().await.unwrap();
+    }
+
+    /// Two places, of which one is the tenant's: the second element waits for the first and is not refused.
+    #[tokio::test]
+    async fn elements_of_a_list_wait_for_each_other_and_count_one_by_one() {
+        let allowance = Arc::new(Allowance::new(&Limits::new([0, 2, 0], 2)));
+        let lane = Arc::new(Semaphore::new(1));
+        let element = || HeavyTurn::in_lane(allowance.clone(), lane.clone());
+        let (first, second) = (element(), element());
+        first.begin().await.unwrap();
+        let waiting = tokio::spawn(async move { second.begin().await });
+        tokio::task::yield_now().await;
+        assert!(!waiting.is_finished());
+        drop(first);
+        waiting.await.unwrap().unwrap();
+        assert!(matches!(element().begin().await, Err(Refused::TooOften(Class::Heavy, _))));
     }
 
     #[test]

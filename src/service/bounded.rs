@@ -77,6 +77,11 @@ impl Bounded {
         working.instrument(spans::of_work(self.name)).await.map_err(ServiceError::internal)
     }
 
+    /// Pieces that may be under way at a time, those of guests aside.
+    pub(super) fn places(&self) -> usize {
+        self.lock().size.common
+    }
+
     /// Requests that wait for a place.
     pub(super) fn waiting(&self) -> usize {
         let turns = self.lock();

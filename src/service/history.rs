@@ -126,7 +126,7 @@ impl Sessions {
             }
         }
         if !corrections.is_empty() {
-            turn.begin()?;
+            turn.begin().await?;
             let periods = Periods::of(&facts)?;
             let first = periods.first_corrected();
             let now = self.told_now(tenant, &periods, first).await?;

@@ -126,7 +126,7 @@ impl Live {
             None => match self.predicted(step, means).await? {
                 Ok(advice) => advice,
                 Err(outside) => {
-                    means.turn.begin()?;
+                    means.turn.begin().await?;
                     let (advisor, state) = (means.advisor.clone(), self.standing.state.clone());
                     let tenant = &self.row.tenant;
                     means.resolving.run(tenant, move || advisor.advise_outside(step, &state, &outside)).await?

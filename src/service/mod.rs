@@ -35,6 +35,7 @@ mod recording;
 mod renewal;
 pub mod renewer;
 pub mod report;
+pub mod reports;
 pub mod returns;
 mod secret;
 pub mod sessions;

@@ -181,6 +181,25 @@ def test_a_session_goes_on_by_another_policy(ballast: Ballast, session: Session)
     assert kept.observe(log_return=0.02).period == 2
 
 
+def test_many_sessions_report_at_once(ballast: Ballast, session: Session) -> None:
+    other = ballast.policy(session.policy).session()
+    reports: list[wire.Observe] = [
+        {"session": session.id, "period": 1, "log_return": 0.01},
+        {"session": other.id, "period": 2, "log_return": 0.01},
+        {"session": "nobody", "period": 1, "log_return": 0.01},
+    ]
+    answers = ballast.observe(reports)
+    assert [answer["status"] for answer in answers] == [200, 409, 404]
+    assert ballast.observe(iter(reports)) == answers
+    first, second = answers[0].get("answer"), answers[1].get("problem")
+    assert first is not None and session.refresh().wealth == first["wealth"] and session.period == 2
+    assert second is not None and second["type"] == "/problems/report-gap"
+    with pytest.raises(package.InvalidField) as refusal:
+        ballast.observe([reports[0], reports[0]])
+    assert refusal.value.field == "[1].session"
+    assert ballast.observe([]) == []
+
+
 def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, session: Session) -> None:
     """Compares what goes over the network with api/openapi.json: an operation the service gains is missed here."""
     ballast.advise(RETURNS, kind="log", rate_per_step=0.001)

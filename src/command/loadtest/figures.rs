@@ -21,7 +21,7 @@ struct Figure {
     p50_ms: Option<f64>,
     p99_ms: Option<f64>,
     max_ms: Option<f64>,
-    /// Of the service's processors, a request.
+    /// Of the service's processors, for one of the things asked for.
     processor_us: Option<f64>,
     bounds: Vec<Bound>,
 }

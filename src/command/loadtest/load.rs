@@ -12,12 +12,18 @@ use super::server::Server;
 #[derive(Debug, Default)]
 pub struct Load {
     milliseconds: Vec<f64>,
+    /// What was asked for: as many things as requests, unless a request asks for several.
+    asked: usize,
     seconds: f64,
     /// Processor time of the service, where it is known.
     processor_seconds: Option<f64>,
 }
 
 impl Load {
+    fn of(milliseconds: Vec<f64>, seconds: f64) -> Load {
+        Load { asked: milliseconds.len(), milliseconds, seconds, processor_seconds: None }
+    }
+
     /// What `driving` gives, with the processor time that the service takes for it.
     pub async fn on(
         server: &Server,
@@ -29,18 +35,23 @@ impl Load {
         Ok(Load { processor_seconds, ..load })
     }
 
-    /// Microseconds of the service's processors for one request.
+    /// The same, where its requests asked for so many things together.
+    pub fn asking(self, asked: usize) -> Self {
+        Load { asked, ..self }
+    }
+
+    /// Microseconds of the service's processors for one of the things asked for.
     pub fn processor_us(&self) -> Option<f64> {
-        self.processor_seconds.map(|seconds| 1e6 * seconds / self.requests() as f64)
+        self.processor_seconds.map(|seconds| 1e6 * seconds / self.asked as f64)
     }
 
-    pub fn requests(&self) -> usize {
-        self.milliseconds.len()
+    pub fn asked(&self) -> usize {
+        self.asked
     }
 
-    /// Requests answered a second.
+    /// Things answered a second.
     pub fn rate(&self) -> f64 {
-        self.requests() as f64 / self.seconds
+        self.asked as f64 / self.seconds
     }
 
     /// The quantiles at `shares` and the largest, in milliseconds.
@@ -53,6 +64,7 @@ impl Load {
 
     pub fn add(&mut self, other: Load) {
         self.milliseconds.extend(other.milliseconds);
+        self.asked += other.asked;
         self.seconds += other.seconds;
         self.processor_seconds = match self.processor_seconds {
             Some(seconds) => other.processor_seconds.map(|other| seconds + other),
@@ -73,7 +85,7 @@ pub async fn saturate<R: Iterator<Item = Vec<u8>>>(
     let started = Instant::now();
     let clients = connections.iter_mut().zip(0..).map(|(connection, client)| one_by_one(connection, requests(client)));
     let milliseconds = try_join_all(clients).await?.concat();
-    Ok(Load { milliseconds, seconds: started.elapsed().as_secs_f64(), processor_seconds: None })
+    Ok(Load::of(milliseconds, started.elapsed().as_secs_f64()))
 }
 
 async fn one_by_one(
@@ -118,7 +130,7 @@ pub async fn paced(
     });
     let answered: Result<Vec<_>, ConnectionError> = join_all(clients).await.into_iter().collect();
     let seconds = started.elapsed().as_secs_f64();
-    Ok(Load { milliseconds: answered?.concat(), seconds, processor_seconds: None })
+    Ok(Load::of(answered?.concat(), seconds))
 }
 
 /// The bodies of the answers to `requests`, in their order, from `clients` connections.

@@ -65,10 +65,20 @@ impl World {
         opened.iter().map(|body| text(&serde_json::from_slice(body)?, "session")).collect()
     }
 
-    /// The report of a session's `period`; `index` is the session's place among those of the scenario.
-    pub fn observation(&self, session: &str, index: usize, period: usize) -> Vec<u8> {
+    /// A session's `period`; `index` is the session's place among those of the scenario.
+    fn report(&self, session: &str, index: usize, period: usize) -> String {
         let log_return = self.returns[(index + 61 * period) % RETURNS];
-        post("/observe", &format!(r#"{{"session":"{session}","period":{period},"log_return":{log_return}}}"#))
+        format!(r#"{{"session":"{session}","period":{period},"log_return":{log_return}}}"#)
+    }
+
+    /// The call that reports `period` of these sessions: one of them as it is, several as a list.
+    pub fn observation(&self, sessions: &[(usize, &String)], period: usize) -> Vec<u8> {
+        let reports: Vec<String> =
+            sessions.iter().map(|&(index, session)| self.report(session, index, period)).collect();
+        match reports.as_slice() {
+            [report] => post("/observe", report),
+            reports => post("/observe", &format!("[{}]", reports.join(","))),
+        }
     }
 
     /// Writes `count` sessions straight into the store of a service that is down, many to a commit.

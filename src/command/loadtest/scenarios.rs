@@ -52,7 +52,7 @@ pub async fn run(arguments: &LoadTest, server: &mut Server, report: &mut Report)
     {
         let sessions = test.world.open(server, test.clients, arguments.sessions).await?;
         // The first step is solved at one state; from the second on a step answers from its surrogates.
-        test.observed(server, &sessions, 1..=1).await?;
+        test.observed(server, &sessions, 1..=1, 1).await?;
         test.actions(server, report, &sessions).await?;
     }
     if arguments.runs(Scenario::Sessions100k) {
@@ -69,38 +69,46 @@ struct Test<'a> {
 }
 
 impl Test<'_> {
-    /// Every session through `periods`; each client has sessions of its own.
+    /// Every session through `periods`; each client has sessions of its own, of which it reports `batch` in a call.
     async fn observed(
         &self,
         server: &Server,
         sessions: &[String],
         periods: std::ops::RangeInclusive<usize>,
+        batch: usize,
     ) -> Result<Load, Box<dyn Error>> {
-        let own = |client: usize| sessions.iter().enumerate().skip(client).step_by(self.clients);
-        let report = |period: usize, (index, session): (usize, &String)| self.world.observation(session, index, period);
-        let requests =
-            |client: usize| periods.clone().flat_map(move |period| own(client).map(move |one| report(period, one)));
-        Ok(Load::on(server, saturate(&server.addresses, self.clients, requests)).await?)
+        let clients = self.clients.min(sessions.len().div_ceil(batch));
+        let own: Vec<Vec<(usize, &String)>> =
+            (0..clients).map(|client| sessions.iter().enumerate().skip(client).step_by(clients).collect()).collect();
+        let (own, world) = (&own, &self.world);
+        let requests = |client: usize| {
+            let calls = move |period| own[client].chunks(batch).map(move |some| world.observation(some, period));
+            periods.clone().flat_map(calls)
+        };
+        let load = Load::on(server, saturate(&server.addresses, clients, requests)).await?;
+        Ok(load.asking(sessions.len() * periods.clone().count()))
     }
 
     async fn observe(&self, server: &Server, report: &mut Report) -> Result<(), Box<dyn Error>> {
-        let (count, horizon) = (self.arguments.sessions, self.world.horizon);
+        let (count, horizon, batch) = (self.arguments.sessions, self.world.horizon, self.arguments.batch.into());
         let (mut load, mut growth) = (Load::default(), Growth::default());
         for _ in 0..self.arguments.rounds {
             growth.start(server).await?;
             let sessions = self.world.open(server, self.clients, count).await?;
             growth.opened(server).await?;
             tell(&format!("{} observations from {} clients", sessions.len() * horizon, self.clients));
-            load.add(self.observed(server, &sessions, 1..=horizon).await?);
+            load.add(self.observed(server, &sessions, 1..=horizon, batch).await?);
             growth.observed(server).await?;
             let coming = periods(server, self.clients, &sessions).await?;
             if let Some(period) = coming.iter().find(|&&period| period != horizon as u64 + 1) {
                 return Err(format!("a session is at period {period} after {horizon} observations").into());
             }
         }
-        let must = Must { rate: Some(OBSERVES_PER_SECOND), p99_ms: Some(OBSERVE_P99_MS) };
-        report.load(format!("observe: {} clients, {count} sessions", self.clients), &load, must);
-        growth.tell(load.requests() / horizon, load.requests(), report);
+        // The wait for a list is no wait for an observation.
+        let must = Must { rate: Some(OBSERVES_PER_SECOND), p99_ms: (batch == 1).then_some(OBSERVE_P99_MS) };
+        let lists = if batch == 1 { String::new() } else { format!(", lists of {batch}") };
+        report.load(format!("observe: {} clients, {count} sessions{lists}", self.clients), &load, must);
+        growth.tell(load.asked() / horizon, load.asked(), report);
         Ok(())
     }
 
@@ -115,7 +123,7 @@ impl Test<'_> {
             report.load("action-idle: first and later asks", &load, must);
         }
         if self.arguments.runs(Scenario::ActionWhileTraining) {
-            self.observed(server, sessions, 2..=2).await?;
+            self.observed(server, sessions, 2..=2, 1).await?;
             tell("the same while 1,000 design points are trained");
             let job = long_training(server).await?;
             let load = self.now_and_then(server, sessions).await?;
@@ -184,10 +192,10 @@ impl Test<'_> {
         let start = Bound::below(seconds, START_SECONDS, "s");
         report.bounded(format!("sessions-100k: {seconds:.2} s from start to ready"), start);
         tell(&format!("{count} sessions observe and are advised"));
-        let observed = self.observed(server, &sessions, 1..=1).await?;
+        let observed = self.observed(server, &sessions, 1..=1, 1).await?;
         let must = Must { rate: None, p99_ms: Some(OBSERVE_P99_MS) };
         report.load("sessions-100k: each observes, read from the store", &observed, must);
-        let observed = self.observed(server, &sessions, 2..=2).await?;
+        let observed = self.observed(server, &sessions, 2..=2, 1).await?;
         let must = Must { rate: Some(OBSERVES_PER_SECOND), p99_ms: Some(OBSERVE_P99_MS) };
         report.load("sessions-100k: each observes again", &observed, must);
         let load = self.now_and_then(server, &sessions).await?;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 from types import TracebackType
@@ -26,7 +27,7 @@ from .training import (
     Training,
     WalkForward,
 )
-from .transport import Awaiting, Transport, Waiting, idempotent
+from .transport import RETRIED_STATUS, Awaiting, Transport, Waiting, growing_pause, idempotent
 
 
 class _Ballast:
@@ -273,6 +274,29 @@ class _Ballast:
         """A session that was opened before, at the period it has come to."""
         return cast(wire.Session, await self._transport.json("GET", f"/sessions/{quote(session, safe='')}"))
 
+    async def _observe(self, reports: Iterable[wire.Observe]) -> list[wire.ElementAnswered]:
+        """Reports a period of each of many sessions at once, and answers what became of each, in their order.
+
+        A report is what :meth:`Session.observe <ballast.Session.observe>` sends: ``session``, ``period`` and how the
+        period went. Each is recorded, answered and refused by itself: ``status`` is 200 beside an ``answer``, and
+        another beside a ``problem``, where ``Session.observe`` would raise. A thousand go in one request. What is
+        refused for the moment is sent again by itself, as a lost request is; the same reports again are answered as
+        they were. Objects of these sessions learn of it by ``refresh``.
+        """
+        reports = list(reports)
+        answered: dict[int, wire.ElementAnswered] = {}
+        for start in range(0, len(reports), _REPORTS):
+            waiting = list(range(start, min(start + _REPORTS, len(reports))))
+            for attempt in itertools.count():
+                sent = [reports[index] for index in waiting]
+                answers: list[wire.ElementAnswered] = await self._transport.json("POST", "/observe", body=sent)
+                answered.update(zip(waiting, answers, strict=True))
+                waiting = [index for index in waiting if answered[index]["status"] in RETRIED_STATUS]
+                if not waiting or attempt == self._transport.retries:
+                    break
+                await self._transport.pause(max(_SECOND, growing_pause(attempt)))
+        return [answered[index] for index in range(len(reports))]
+
     def _jobs(self) -> AsyncIterator[wire.Job]:
         """All jobs, newest first."""
         return self._listed("/jobs", "jobs")
@@ -354,6 +378,7 @@ class Ballast(_Ballast):
     advise = Answering(wire.Advised).blocking(_Ballast._advise)
     advise_assets = Answering(wire.AssetsAdvised).blocking(_Ballast._advise_assets)
     read_returns = blocking(_Ballast._read_returns)
+    observe = blocking(_Ballast._observe)
     health = Answering(wire.Health).blocking(_Ballast._health)
     close = blocking(_Ballast._close)
     jobs = Answering(wire.Job).iterating(_Ballast._jobs)
@@ -411,6 +436,7 @@ class AsyncBallast(_Ballast):
     advise = _Ballast._advise
     advise_assets = _Ballast._advise_assets
     read_returns = _Ballast._read_returns
+    observe = _Ballast._observe
     health = _Ballast._health
     close = _Ballast._close
     jobs = _Ballast._jobs
@@ -433,6 +459,10 @@ class AsyncBallast(_Ballast):
 
 #: Entries asked for at a time.
 _PAGE = 200
+#: Reports sent at a time.
+_REPORTS = 1000
+#: The pause before elements of a list that were refused for the moment are sent again: rates are by the second.
+_SECOND = 1.0
 
 
 def _amounts(contributions: float | Sequence[float] | None) -> float | list[float] | None:

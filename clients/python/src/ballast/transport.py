@@ -15,10 +15,10 @@ import random
 import time
 import uuid
 from abc import ABC, abstractmethod
-from collections.abc import AsyncIterator, Iterator, Mapping
+from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from email.utils import parsedate_to_datetime
-from typing import Any
+from typing import Any, TypeAlias
 
 import httpx
 
@@ -30,6 +30,9 @@ FIRST_PAUSE = 0.2
 LONGEST_PAUSE = 30.0
 #: The service sends a sign of life every 15 s on a stream of events.
 STREAM_SILENCE = 60.0
+
+#: What a request holds: JSON to be written, or bytes as they are.
+Body: TypeAlias = Mapping[str, Any] | Sequence[Any] | bytes
 
 #: Refusals for the moment.
 RETRIED_STATUS = (429, 503)
@@ -71,7 +74,7 @@ class Transport(ABC):
         method: str,
         path: str,
         *,
-        body: Mapping[str, Any] | bytes | None = None,
+        body: Body | None = None,
         params: Mapping[str, str | int | None] | None = None,
         headers: Mapping[str, str] | None = None,
     ) -> httpx.Response:
@@ -79,7 +82,7 @@ class Transport(ABC):
 
         Raises :class:`ProblemError` where the service refuses and :class:`Unreachable` where no answer comes.
         """
-        content = encoded(body) if isinstance(body, Mapping) else body
+        content = body if body is None or isinstance(body, bytes) else encoded(body)
         media = {} if body is None else {"content-type": "application/json"}
         given = {name: value for name, value in (params or {}).items() if value is not None}
         request = self.http.build_request(
@@ -111,7 +114,7 @@ class Transport(ABC):
         method: str,
         path: str,
         *,
-        body: Mapping[str, Any] | bytes | None = None,
+        body: Body | None = None,
         params: Mapping[str, str | int | None] | None = None,
         headers: Mapping[str, str] | None = None,
     ) -> Any:
@@ -183,7 +186,7 @@ async def _in_turn(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:
         yield chunk
 
 
-def encoded(body: Mapping[str, Any]) -> bytes:
+def encoded(body: Mapping[str, Any] | Sequence[Any]) -> bytes:
     """JSON. NumPy's scalars are numbers; NaN and infinities are not JSON: ``ValueError`` names the first of them."""
 
     def plain(value: Any) -> Any:

@@ -743,6 +743,10 @@ class Report(TypedDict):
     """Wealth reached, with what was added, where it differs from what all of the above gives."""
 
 
+Reports: TypeAlias = Observe | list[Observe]
+"""One report, or a list of reports of as many sessions."""
+
+
 class Resampled(TypedDict):
     """The frontier on records drawn from one law."""
 
@@ -1711,6 +1715,17 @@ class Coverage(TypedDict):
     """Share of paths on which some period's ball did not hold it."""
 
 
+class ElementAnswered(TypedDict):
+    """The answer to one element of a list."""
+
+    session: str
+    period: int
+    status: int
+    """What a call with this report alone would be answered with."""
+    answer: NotRequired[Observed | None]
+    problem: NotRequired[Problem | None]
+
+
 class EvaluationRequest(TypedDict):
     """A comparison of strategies on common simulated returns."""
 
@@ -1886,6 +1901,10 @@ class Session(TypedDict):
     drift: Drift
     """Whether the returns still come as they came."""
     created_ms: int
+
+
+ReportsAnswered: TypeAlias = Observed | list[ElementAnswered]
+"""The answer to one report, or to each of a list in its order."""
 
 
 class Specification(TypedDict):

@@ -1,0 +1,155 @@
+//! What periods gave: one report, or a list of many sessions' reports.
+
+use std::fmt;
+use std::sync::Arc;
+
+use axum::extract::State;
+use axum::response::Response;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Error, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::json;
+use utoipa::ToSchema;
+
+use super::access::{By, Live};
+use super::extract::JsonBody;
+use super::problem::Problem;
+use super::sessions::as_recorded;
+use super::telemetry;
+use crate::service::Service;
+use crate::service::answer::Observed;
+use crate::service::report::Observe;
+use crate::service::reports::{self, REPORTS, Reported};
+
+/// One report, or a list of reports of as many sessions.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum Reports {
+    One(Box<Observe>),
+    Many(Vec<Observe>),
+}
+
+impl<'de> Deserialize<'de> for Reports {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(OneOrMany)
+    }
+}
+
+/// Reads which of the two it is off the first byte, so that what is wrong in it is named as it stands there.
+struct OneOrMany;
+
+impl<'de> Visitor<'de> for OneOrMany {
+    type Value = Reports;
+
+    fn expecting(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str("a report, or a list of reports")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Reports, A::Error> {
+        Observe::deserialize(MapAccessDeserializer::new(map)).map(Box::new).map(Reports::One)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut elements: A) -> Result<Reports, A::Error> {
+        let mut reports = Vec::new();
+        while let Some(report) = elements.next_element()? {
+            if reports.len() == *REPORTS.end() {
+                return Err(A::Error::custom(reports::too_many()));
+            }
+            reports.push(report);
+        }
+        Ok(Reports::Many(reports))
+    }
+}
+
+/// The answer to one report, or to each of a list in its order.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "answers travel as they are stored: this describes them")]
+pub enum ReportsAnswered {
+    One(Box<Observed>),
+    Many(Vec<ElementAnswered>),
+}
+
+/// The answer to one element of a list.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct ElementAnswered {
+    pub session: String,
+    pub period: usize,
+    /// What a call with this report alone would be answered with.
+    #[schema(example = 200)]
+    pub status: u16,
+    /// Where the status is 200.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub answer: Option<Observed>,
+    /// Where it is another.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub problem: Option<Problem>,
+}
+
+/// Report the return of a period, or of one period of each of up to 1000 sessions: each exactly once, durable before it is
+/// answered.
+#[utoipa::path(post, path = "/observe", tag = "sessions",
+    request_body(content = Reports, example = json!({
+        "session": "session_0123456789abcdef0123456789abcdef", "period": 1, "simple_return": 0.012, "executed_allocation": 0.3
+    })),
+    responses(
+        (status = 200, description = "Recorded; the same period and content again give the same answer. Of a list, the answer to each element with a status of its own.", body = ReportsAnswered),
+        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "Other content, a gap, past the horizon, or an unusual return that nobody confirms.", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule, or a list names a session twice.", body = Problem, content_type = "application/problem+json")))]
+pub async fn observe(
+    State(service): State<Arc<Service>>,
+    By(caller, _): By<Live>,
+    JsonBody(reports): JsonBody<Reports>,
+) -> Result<Response, Problem> {
+    match reports {
+        Reports::One(report) => Ok(as_recorded(service.sessions.report(&caller, *report, &caller.turn).await?)),
+        Reports::Many(reports) => {
+            let reported = service.sessions.report_all(&caller, reports).await?;
+            let elements: Vec<String> =
+                reported.into_iter().map(|element| answered(element, caller.tenant.as_str())).collect();
+            Ok(as_recorded(format!("[{}]", elements.join(","))))
+        }
+    }
+}
+
+/// One element's answer, written around the answer as it is stored.
+fn answered(Reported { session, period, outcome }: Reported, tenant: &str) -> String {
+    let session = json!(session);
+    match outcome.map_err(Problem::from) {
+        Ok(answer) => format!(r#"{{"session":{session},"period":{period},"status":200,"answer":{answer}}}"#),
+        Err(problem) => {
+            problem.count();
+            telemetry::count_refusal(problem.status, tenant);
+            let (status, problem) = (problem.status, json!(problem));
+            format!(r#"{{"session":{session},"period":{period},"status":{status},"problem":{problem}}}"#)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::http::decode;
+
+    fn refused(body: &str) -> (String, String) {
+        let problem = decode::json::<Reports>(body.as_bytes()).unwrap_err();
+        (problem.field.unwrap().into(), problem.rule.unwrap().into())
+    }
+
+    #[test]
+    fn what_is_wrong_in_a_list_is_named_with_its_place() {
+        let good = r#"{"session": "a", "period": 1, "log_return": 0.1}"#;
+        assert!(matches!(decode::json::<Reports>(good.as_bytes()), Ok(Reports::One(_))));
+        let list = format!("[{good}, {}]", good.replace("1,", "1.0,"));
+        assert!(matches!(decode::json(list.as_bytes()), Ok(Reports::Many(reports)) if reports.len() == 2));
+        assert_eq!(refused(r#"{"session": "a", "period": "x"}"#).0, "period");
+        assert_eq!(refused(&format!(r#"[{good}, {{"session": "a", "period": "x"}}]"#)).0, "[1].period");
+        assert_eq!(refused(&format!(r#"[{good}, {{"session": "a", "perod": 1}}]"#)).0, "[1].perod");
+        assert_eq!(refused(&format!(r#"[{good}, {{"session": "a"}}]"#)), ("[1].period".into(), "must be given".into()));
+        let (field, rule) = refused("7");
+        assert!(field == "body" && rule.contains("a report, or a list of reports"), "{field}: {rule}");
+        let long = format!("[{}]", vec![good; REPORTS.end() + 1].join(","));
+        assert_eq!(refused(&long), ("body".into(), "must hold 1 to 1000 reports".into()));
+    }
+}

@@ -1,0 +1,95 @@
+//! Reports of many sessions at once: each element of a list is what a call of its own would be.
+//!
+//! There is no transaction over a list, and none is needed: each element is recorded exactly once, so the same list sent
+//! again is answered as it was, and goes on where an earlier one was cut off. What a list saves is the call around each
+//! report, and it brings its reports to the store together, which writes them together.
+
+use std::collections::HashSet;
+use std::ops::RangeInclusive;
+use std::sync::Arc;
+use std::time::Instant;
+
+use futures_util::{StreamExt, stream};
+use tokio::sync::Semaphore;
+
+use super::allowance::{Class, HeavyTurn, Refused};
+use super::error::ServiceError;
+use super::keys::Caller;
+use super::metrics::OBSERVE_SECONDS;
+use super::report::Observe;
+use super::sessions::Sessions;
+use crate::control::error::FieldError;
+
+/// Reports of one list.
+pub const REPORTS: RangeInclusive<usize> = 1..=1000;
+/// Elements of one list under way at a time: two commits of the store, so that one is made ready while the other is
+/// written.
+const AT_A_TIME: usize = 128;
+
+/// What became of one element of a list.
+#[derive(Debug)]
+pub struct Reported {
+    pub session: String,
+    pub period: usize,
+    /// The answer in JSON as it was recorded.
+    pub outcome: Result<String, ServiceError>,
+}
+
+impl Sessions {
+    /// Records one report as [`Sessions::observe`] does.
+    ///
+    /// # Errors
+    /// As there.
+    pub async fn report(&self, caller: &Caller, report: Observe, turn: &HeavyTurn) -> Result<String, ServiceError> {
+        let started = Instant::now();
+        let report = Observe { reported_by: caller.key().clone(), ..report };
+        let answer = self.observe(&caller.tenant, &report, turn).await?;
+        metrics::histogram!(OBSERVE_SECONDS).record(started.elapsed().as_secs_f64());
+        Ok(answer)
+    }
+
+    /// Records a list of reports, each as a call of its own would be: what became of each, in their order. The call itself
+    /// was taken off the allowance for the first element; every other one is taken off it here.
+    ///
+    /// # Errors
+    /// The list is empty or too long, or names a session twice; nothing is recorded then.
+    pub async fn report_all(&self, caller: &Caller, reports: Vec<Observe>) -> Result<Vec<Reported>, ServiceError> {
+        check(&reports)?;
+        let lane = Arc::new(Semaphore::new(self.resolving.places()));
+        let elements = reports.into_iter().enumerate().map(|(index, report)| {
+            let turn = HeavyTurn::in_lane(caller.allowance.clone(), lane.clone());
+            async move {
+                let (session, period) = (report.session.clone(), report.period);
+                let counted = if index == 0 { Ok(()) } else { caller.allowance.take(Class::Live) };
+                let outcome = match counted {
+                    Ok(()) => self.report(caller, report, &turn).await,
+                    Err(refused) => Err(Refused::TooOften(Class::Live, refused).into()),
+                };
+                (index, Reported { session, period, outcome })
+            }
+        });
+        let mut reported: Vec<_> = stream::iter(elements).buffer_unordered(AT_A_TIME).collect().await;
+        reported.sort_unstable_by_key(|(index, _)| *index);
+        Ok(reported.into_iter().map(|(_, reported)| reported).collect())
+    }
+}
+
+/// Two periods of one session would race, and which of them is refused would be chance.
+fn check(reports: &[Observe]) -> Result<(), FieldError> {
+    if !REPORTS.contains(&reports.len()) {
+        return Err(FieldError::new("body", format!("{} reports", reports.len()), too_many()));
+    }
+    let mut named = HashSet::with_capacity(reports.len());
+    match reports.iter().position(|report| !named.insert(report.session.as_str())) {
+        None => Ok(()),
+        Some(index) => {
+            let rule = "must be another session: one list holds one period of each";
+            Err(FieldError::new(format!("[{index}].session"), &reports[index].session, rule))
+        }
+    }
+}
+
+/// The rule of a list's length.
+pub fn too_many() -> String {
+    format!("must hold {} to {} reports", REPORTS.start(), REPORTS.end())
+}
