@@ -258,6 +258,9 @@ fn faulty_sessions() -> Vec<(&'static str, &'static str)> {
         (r#""renew": {"every": 1, "horizon": 2}"#, "renew.horizon"),
         (r#""rolling": true"#, "rolling"),
         (r#""rolling": "yes""#, "rolling"),
+        (r#""name": 7"#, "name"),
+        (r#""notes": "a\u0000b""#, "notes"),
+        (r#""tags": ["a", "a"]"#, "tags[1]"),
         (r#""colour": 1"#, "colour"),
     ]
 }

@@ -173,6 +173,9 @@ fn naming(job: &str, evaluation: &str, policy: &str, session: &str) -> Vec<(Meth
     let problem = json!({ "horizon": 1, "rate_per_step": 0.002, "history": [0.01, -0.02, 0.03] });
     calls.push(body("/evaluate", json!({ "problem": problem, "policies": { "adaptive": policy } })));
     for path in [format!("/jobs/{job}"), format!("/sessions/{session}"), format!("/policies/{policy}")] {
+        if !path.starts_with("/jobs") {
+            calls.push((Method::PATCH, path.clone(), Some(json!({ "name": "mine" }))));
+        }
         calls.push((Method::DELETE, path, None));
     }
     calls

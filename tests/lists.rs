@@ -35,7 +35,7 @@ async fn a_list_of_large_jobs_is_quick_small_and_in_nobodys_way() {
         "WITH RECURSIVE numbers (n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM numbers WHERE n < 1000)
          INSERT INTO jobs (job, tenant, kind, state, steps_total, created_ms, worker, lease_until_ms)
          SELECT 'large_' || n, 'default', 'train', 'running', 1, 1, 'nobody', 9000000000000000 FROM numbers",
-        "INSERT INTO job_requests (job, json) SELECT job, printf('%.*c', 418000, 'x') FROM jobs WHERE job LIKE 'large_%'",
+        "INSERT INTO job_requests (job, json, labels_json) SELECT job, printf('%.*c', 418000, 'x'), '' FROM jobs WHERE job LIKE 'large_%'",
     ] {
         execute(app.folder(), statement).await;
     }

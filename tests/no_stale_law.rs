@@ -161,6 +161,7 @@ fn routes(session: &str, policy: &str) -> Vec<(Method, String, Option<Value>)> {
             }
             let body = match path.as_str() {
                 "/sessions" => json!({ "policy": policy }),
+                "/sessions/{id}" => json!({ "name": "not theirs" }),
                 "/observe" => json!({ "session": session, "period": 1, "log_return": 0.5 }),
                 "/sessions/{id}/corrections" => {
                     json!({ "correction": 1, "period": 1, "log_return": 0.5, "reason": "not theirs" })
@@ -171,7 +172,7 @@ fn routes(session: &str, policy: &str) -> Vec<(Method, String, Option<Value>)> {
             let query = if path == "/action" { format!("?session={session}") } else { String::new() };
             let path = path.replace("{id}", session) + &query;
             let method: Method = method.to_uppercase().parse().unwrap();
-            routes.push((method.clone(), path, (method == Method::POST).then_some(body)));
+            routes.push((method.clone(), path, [Method::POST, Method::PATCH].contains(&method).then_some(body)));
         }
     }
     assert!(routes.len() >= 9, "{routes:?}");

@@ -52,7 +52,7 @@ fn every_operation_lists_what_its_shape_can_answer() {
             }
         }
     }
-    assert_eq!(with_body, 12);
+    assert_eq!(with_body, 14);
 }
 
 #[test]

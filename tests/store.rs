@@ -8,7 +8,8 @@ use std::time::Duration;
 use ballast::control::policy::content_hash;
 use ballast::store::{
     Append, AuditFilter, AuditRow, CreateJob, CreateSession, DeletePolicy, EntryKind, EntryRow, JobCounts, JobKind,
-    JobOutcome, JobRow, JobState, NewJob, NewKey, RequestKey, Rotate, SessionRow, Store, StoreError, Successor, Tenant,
+    JobOutcome, JobRow, JobState, NewJob, NewKey, Relabel, RequestKey, Rotate, SessionRow, Store, StoreError,
+    Successor, Tenant,
 };
 use futures_util::future::join_all;
 use support::place::Place;
@@ -56,6 +57,7 @@ fn new_job(job: &str, key: Option<&str>) -> NewJob {
         request_json: r#"{"seed":1}"#.into(),
         request_hash: "hash".into(),
         idempotency_key: key.map(str::to_owned),
+        labels: Relabel::default(),
         steps_total: 10,
         created_ms: 1000,
     }
@@ -88,7 +90,7 @@ async fn with_session(store: &Store, session: &str, history: &[f64]) {
         due: None,
         created_ms: 5,
     };
-    assert_eq!(store.create_session(new, None).await.unwrap(), CreateSession::Created);
+    assert_eq!(store.create_session(new, Relabel::default(), None).await.unwrap(), CreateSession::Created);
 }
 
 fn observation(session: &str, period: usize, content: &str) -> EntryRow {
@@ -143,11 +145,13 @@ async fn an_idempotency_key_opens_one_session(place: &Place) {
     let second = place.second(&store).await;
     let key = |request: &str| Some(RequestKey { key: "key".into(), request_hash: request.into() });
     let new = |session: &str| session_of("default", session);
-    assert_eq!(store.create_session(new("s0"), key("a")).await.unwrap(), CreateSession::NoPolicy);
+    assert_eq!(store.create_session(new("s0"), Relabel::default(), key("a")).await.unwrap(), CreateSession::NoPolicy);
     store.insert_policy(&Tenant::default(), &content_hash(POLICY), POLICY, 1).await.unwrap();
     let opened = join_all((1..=8).map(|n| {
         let store = if n % 2 == 0 { store.clone() } else { second.clone() };
-        tokio::spawn(async move { store.create_session(new(&format!("s{n}")), key("a")).await.unwrap() })
+        tokio::spawn(
+            async move { store.create_session(new(&format!("s{n}")), Relabel::default(), key("a")).await.unwrap() },
+        )
     }));
     let opened: Vec<_> = opened.await.into_iter().map(Result::unwrap).collect();
     let listed = store.sessions(&Tenant::default(), 10, None).await.unwrap();
@@ -158,19 +162,25 @@ async fn an_idempotency_key_opens_one_session(place: &Place) {
 
     store.append(observation(&one.session, 1, "c")).await.unwrap();
     let store = place.reopen(store).await;
-    assert_eq!(store.create_session(new("s9"), key("a")).await.unwrap(), repeated, "as it started");
-    assert_eq!(store.create_session(new("s9"), key("b")).await.unwrap(), CreateSession::KeyConflict);
+    assert_eq!(store.create_session(new("s9"), Relabel::default(), key("a")).await.unwrap(), repeated, "as it started");
+    assert_eq!(
+        store.create_session(new("s9"), Relabel::default(), key("b")).await.unwrap(),
+        CreateSession::KeyConflict
+    );
     let job = store.create_job(new_job("j", Some("key"))).await.unwrap();
     assert_eq!(job, CreateJob::KeyConflict, "a session has the key");
     store.create_job(new_job("j", Some("job"))).await.unwrap();
     let of_the_job = Some(RequestKey { key: "job".into(), request_hash: "a".into() });
-    assert_eq!(store.create_session(new("s9"), of_the_job).await.unwrap(), CreateSession::KeyConflict);
+    assert_eq!(
+        store.create_session(new("s9"), Relabel::default(), of_the_job).await.unwrap(),
+        CreateSession::KeyConflict
+    );
     store.insert_policy(&tenant("south"), &content_hash(POLICY), POLICY, 1).await.unwrap();
-    let southern = store.create_session(session_of("south", "south"), key("b")).await.unwrap();
+    let southern = store.create_session(session_of("south", "south"), Relabel::default(), key("b")).await.unwrap();
     assert_eq!(southern, CreateSession::Created, "keys are a tenant's own");
 
     assert!(store.delete_session(&Tenant::default(), &one.session).await.unwrap());
-    let anew = store.create_session(new("s9"), key("b")).await.unwrap();
+    let anew = store.create_session(new("s9"), Relabel::default(), key("b")).await.unwrap();
     assert_eq!(anew, CreateSession::Created, "the key went with its session");
 }
 
@@ -373,10 +383,10 @@ async fn a_session_needs_its_policy_and_a_free_name(place: &Place) {
         due: None,
         created_ms: 1,
     };
-    assert_eq!(store.create_session(new.clone(), None).await.unwrap(), CreateSession::NoPolicy);
+    assert_eq!(store.create_session(new.clone(), Relabel::default(), None).await.unwrap(), CreateSession::NoPolicy);
     with_session(&store, "s", &[0.1, 0.2]).await;
     let again = SessionRow { policy: content_hash(POLICY), ..new };
-    assert_eq!(store.create_session(again, None).await.unwrap(), CreateSession::Exists);
+    assert_eq!(store.create_session(again, Relabel::default(), None).await.unwrap(), CreateSession::Exists);
     assert_eq!(store.session(&Tenant::default(), "s").await.unwrap().unwrap().initial_wealth, 100.0);
     assert_eq!(store.session(&Tenant::default(), "nobody").await.unwrap(), None);
     assert!(!store.delete_session(&Tenant::default(), "nobody").await.unwrap());
@@ -611,7 +621,8 @@ async fn two_replicas_meet(place: &Place) {
             created_ms: 1,
         };
         let tenant = Tenant::default();
-        match tokio::join!(store.create_session(new, None), second.delete_policy(&tenant, &policy)) {
+        match tokio::join!(store.create_session(new, Relabel::default(), None), second.delete_policy(&tenant, &policy))
+        {
             (Ok(CreateSession::Created), Ok(DeletePolicy::InUse { sessions: 1 })) => {
                 assert!(second.delete_session(&Tenant::default(), &session).await.unwrap());
             }
@@ -774,7 +785,10 @@ async fn tenants_see_only_their_own(place: &Place) {
     let (north, south) = (tenant("north"), tenant("south"));
     let policy = content_hash(POLICY);
     assert!(store.insert_policy(&north, &policy, POLICY, 1).await.unwrap());
-    assert_eq!(store.create_session(session_of("south", "s1"), None).await.unwrap(), CreateSession::NoPolicy);
+    assert_eq!(
+        store.create_session(session_of("south", "s1"), Relabel::default(), None).await.unwrap(),
+        CreateSession::NoPolicy
+    );
     assert_eq!(store.policy(&south, &policy).await.unwrap(), None);
     assert_eq!(store.delete_policy(&south, &policy).await.unwrap(), DeletePolicy::Absent);
     assert!(store.insert_policy(&south, &policy, POLICY, 2).await.unwrap());
@@ -783,7 +797,10 @@ async fn tenants_see_only_their_own(place: &Place) {
         assert_eq!((row.created_ms, row.json.as_slice()), (created_ms, POLICY));
         assert_eq!(store.policies(owner, 10, None).await.unwrap()[0].created_ms, created_ms);
     }
-    assert_eq!(store.create_session(session_of("south", "s1"), None).await.unwrap(), CreateSession::Created);
+    assert_eq!(
+        store.create_session(session_of("south", "s1"), Relabel::default(), None).await.unwrap(),
+        CreateSession::Created
+    );
     assert_eq!(store.sessions(&north, 10, None).await.unwrap(), []);
     assert_eq!(store.sessions(&south, 10, None).await.unwrap().len(), 1);
     assert!(!store.delete_session(&north, "s1").await.unwrap());
@@ -857,7 +874,7 @@ async fn a_session_moved_to_another_tenant_is_damaged(place: &Place) {
         let store = place.open().await;
         let session = format!("{from}_{to}");
         store.insert_policy(&tenant(from), &content_hash(POLICY), POLICY, 1).await.unwrap();
-        store.create_session(session_of(from, &session), None).await.unwrap();
+        store.create_session(session_of(from, &session), Relabel::default(), None).await.unwrap();
         assert_eq!(store.session(&tenant(from), &session).await.unwrap().unwrap().tenant, tenant(from));
         store.close().await;
         place.tamper(&format!("UPDATE sessions SET tenant = '{to}' WHERE session = '{session}'")).await;

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use ballast::control::policy::content_hash;
 use ballast::store::{
     Append, CreateJob, CreateSession, DeleteJob, DeletePolicy, EntryKind, EntryRow, JobKind, JobOutcome, JobRow,
-    JobState, NewJob, OverQuota, Quota, Quotas, SessionRow, Store, StoreError, Tenant, Usage,
+    JobState, NewJob, OverQuota, Quota, Quotas, Relabel, SessionRow, Store, StoreError, Tenant, Usage,
 };
 use proptest::prelude::*;
 use support::place::Place;
@@ -330,6 +330,7 @@ async fn create_job(store: &Store, model: &mut Model, tenant: u8, job: u8, key: 
         request_json: "{}".into(),
         request_hash: hash.to_string(),
         idempotency_key: key.map(|key| key.to_string()),
+        labels: Relabel::default(),
         steps_total: 3,
         created_ms: model.now,
     };
@@ -434,11 +435,11 @@ async fn live(store: &Store, model: &mut Model, operation: &Operation) {
                 (true, true) => CreateSession::Exists,
                 (true, false) if kept >= limit => {
                     let expected = OverQuota { quota: Quota::Sessions, kept, wanted: 1, limit };
-                    return assert_eq!(over(store.create_session(new, None).await), expected);
+                    return assert_eq!(over(store.create_session(new, Relabel::default(), None).await), expected);
                 }
                 (true, false) => CreateSession::Created,
             };
-            assert_eq!(store.create_session(new, None).await.unwrap(), expected);
+            assert_eq!(store.create_session(new, Relabel::default(), None).await.unwrap(), expected);
             if expected == CreateSession::Created {
                 model.sessions.push((session, policy, Vec::new()));
             }

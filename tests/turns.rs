@@ -4,7 +4,7 @@ mod support;
 
 use std::time::Instant;
 
-use ballast::store::{CreateJob, JobKind, JobOutcome, NewJob, Store, Tenant};
+use ballast::store::{CreateJob, JobKind, JobOutcome, NewJob, Relabel, Store, Tenant};
 use proptest::prelude::*;
 use sqlx::AssertSqlSafe;
 use sqlx::Connection;
@@ -46,6 +46,7 @@ async fn queue(store: &Store, job: String, owner: usize) {
         request_json: "{}".into(),
         request_hash: "hash".into(),
         idempotency_key: None,
+        labels: Relabel::default(),
         steps_total: 1,
         created_ms: 0,
     };
@@ -125,7 +126,7 @@ fn many(numbers: &str) -> [String; 3] {
             "INSERT INTO jobs (job, tenant, kind, state, steps_total, created_ms)
              {numbers} SELECT {name}, 'tenant_1', 'train', 'queued', 1, 0 FROM numbers"
         ),
-        format!("INSERT INTO job_requests (job, json) {numbers} SELECT {name}, '{{}}' FROM numbers"),
+        format!("INSERT INTO job_requests (job, json, labels_json) {numbers} SELECT {name}, '{{}}', '' FROM numbers"),
         "INSERT INTO turns (tenant, turn) VALUES ('tenant_1', 0)".to_owned(),
     ]
 }

@@ -49,9 +49,10 @@ pub fn access(method: &str, route: Option<&str>) -> Access {
             Access::Open
         }
         ("POST", "/sessions" | "/observe" | "/sessions/{id}/corrections" | "/sessions/{id}/renewals")
-        | ("DELETE", "/sessions/{id}") => Access::Role(KeyRole::Operate),
+        | ("DELETE" | "PATCH", "/sessions/{id}") => Access::Role(KeyRole::Operate),
         ("POST", "/train" | "/evaluate" | "/backtest" | "/frontier" | "/jobs/{id}/cancel" | "/policies/import")
-        | ("DELETE", "/jobs/{id}" | "/policies/{id}") => Access::Role(KeyRole::Train),
+        | ("DELETE", "/jobs/{id}" | "/policies/{id}")
+        | ("PATCH", "/policies/{id}") => Access::Role(KeyRole::Train),
         (_, "/health" | "/metrics" | "/audit") => Access::Role(KeyRole::Admin),
         ("GET" | "HEAD", _) | ("POST", "/what-if" | "/advise" | "/returns") => Access::Role(KeyRole::Read),
         _ => Access::Role(KeyRole::Admin),

@@ -19,6 +19,7 @@ use crate::service::plan::MOST_RENEWALS;
 use crate::service::report::{LONGEST_REASON, MOST_CORRECTIONS, PRICE};
 use crate::service::reports::REPORTS;
 use crate::service::what_if::POINTS;
+use crate::store::{LONGEST_NAME, LONGEST_NOTES, LONGEST_TAG, MOST_TAGS};
 
 /// Adds to every schema what its fields may hold.
 pub fn tell(description: &mut OpenApi) {
@@ -101,6 +102,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         .chain(investors)
         .chain(of_assets())
         .chain(of_sessions())
+        .chain(of_labels())
         .chain(walked())
         .chain(reported())
         .collect()
@@ -156,6 +158,16 @@ fn of_sessions() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
         ("Renewing", "window", whole(&HISTORY_LENGTH)),
     ];
     rules.into_iter()
+}
+
+/// Of what things are called.
+fn of_labels() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
+    ["Train", "OpenSession", "Relabel"].into_iter().flat_map(|schema| {
+        let tag = json!({ "minLength": 1, "maxLength": LONGEST_TAG });
+        let tags = json!({ "maxItems": MOST_TAGS, "uniqueItems": true, "items": tag });
+        let [name, notes] = [LONGEST_NAME, LONGEST_NOTES].map(|most| json!({ "maxLength": most }));
+        [(schema, "name", name), (schema, "notes", notes), (schema, "tags", tags)]
+    })
 }
 
 /// Of a walk-forward.

@@ -9,6 +9,7 @@ use serde_json::{Map, Value, json};
 use utoipa::openapi::OpenApi;
 
 use super::bounds::{merged, with_field};
+use super::jobs::Train;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::backtest::BacktestRequest;
 use crate::control::request::evaluation::EvaluationRequest;
@@ -29,10 +30,11 @@ pub fn tell(description: &mut OpenApi) {
     }
 }
 
-fn told() -> [(&'static str, Map<String, Value>); 10] {
+fn told() -> [(&'static str, Map<String, Value>); 11] {
     let least = json!({ "history": [], "rate_per_step": 0.0 });
     [
         ("Specification", of::<Specification>(json!({ "problem": least }))),
+        ("Train", of::<Train>(json!({ "problem": least }))),
         ("ProblemSpecification", of::<ProblemSpecification>(least.clone())),
         ("AssetsProblem", of::<AssetsProblem>(json!({ "assets": [], "history": [], "rate_per_step": 0.0 }))),
         ("DesignSpecification", of::<DesignSpecification>(json!({}))),

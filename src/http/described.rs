@@ -19,7 +19,13 @@ const INFALLIBLE: [&str; 4] = ["/livez", "/openapi.json", "/docs", "/"];
 pub fn with_every_problem(description: &mut OpenApi) {
     for (path, item) in &mut description.paths.paths {
         let is_infallible = INFALLIBLE.contains(&path.as_str());
-        for (method, operation) in [("GET", &mut item.get), ("POST", &mut item.post), ("DELETE", &mut item.delete)] {
+        let operations = [
+            ("GET", &mut item.get),
+            ("POST", &mut item.post),
+            ("PATCH", &mut item.patch),
+            ("DELETE", &mut item.delete),
+        ];
+        for (method, operation) in operations {
             let Some(operation) = operation else { continue };
             if is_infallible {
                 describe(operation, &ADDRESSED);
@@ -78,7 +84,7 @@ fn by_deed(method: &str, path: &str) -> &'static [ProblemKind] {
         ("POST", "/train" | "/evaluate" | "/backtest" | "/frontier") => {
             &[Kind::StorageFull, Kind::QuotaExceeded, Kind::QueueFull]
         }
-        ("POST", "/sessions" | "/policies/import") => &[Kind::StorageFull, Kind::QuotaExceeded],
+        ("POST", "/sessions" | "/policies/import") | ("PATCH", _) => &[Kind::StorageFull, Kind::QuotaExceeded],
         _ => &[Kind::StorageFull],
     }
 }

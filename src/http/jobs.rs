@@ -6,7 +6,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use utoipa::{IntoResponses, ToSchema};
 
 use super::access::{By, Heavy, Live, Read};
@@ -18,12 +18,40 @@ use super::problem::{Problem, ProblemKind};
 use super::wire;
 use crate::control::error::FieldError;
 use crate::control::request::assets::AssetsProblem;
+use crate::control::request::fund::FundSpecification;
 use crate::control::request::specification::{
-    DesignSpecification, Specification, SurrogateSpecification, default_seed,
+    DesignSpecification, ProblemSpecification, Specification, SurrogateSpecification, default_seed,
 };
 use crate::service::Service;
 use crate::service::error::ServiceError;
 use crate::service::jobs::Accepted;
+use crate::store::Relabel;
+
+/// A training: its specification, and what its policy is to be called, which is no part of that.
+#[derive(Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Train {
+    /// What the investor is and may do.
+    problem: ProblemSpecification,
+    /// The assets of the fund that a completed specification is of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    fund: Option<Box<FundSpecification>>,
+    /// Where the surrogates are trained.
+    #[serde(default)]
+    design: DesignSpecification,
+    /// How the surrogates are made.
+    #[serde(default)]
+    surrogate: SurrogateSpecification,
+    /// The same specification and seed give the same policy, bit for bit.
+    #[serde(default = "default_seed")]
+    seed: u64,
+    /// What the policy is to be called, in at most 100 letters.
+    name: Option<String>,
+    /// At most 2,000 letters.
+    notes: Option<String>,
+    /// At most 20, each another, of 1 to 50 letters.
+    tags: Option<Vec<String>>,
+}
 
 /// Queue a training.
 #[utoipa::path(post, path = "/train", tag = "jobs",
@@ -47,11 +75,11 @@ pub async fn train(
     JsonBytes(bytes): JsonBytes,
 ) -> Result<Response, Problem> {
     let key = idempotency_key(&headers)?;
-    let specification = match said(&bytes) {
-        Some(SaidOfProblem { assets: Some(_), .. }) => trained(decode::json(&bytes)?).await?,
-        _ => decode::json(&bytes)?,
+    let (specification, labels) = match said(&bytes) {
+        Some(SaidOfProblem { assets: Some(_), .. }) => decode::json::<TrainAssets>(&bytes)?.specified().await?,
+        _ => decode::json::<Train>(&bytes)?.specified(),
     };
-    Ok(accepted(service.jobs.train(&caller, specification, key).await?))
+    Ok(accepted(service.jobs.train(&caller, specification, labels, key).await?))
 }
 
 /// A training of a policy for one asset, or for several, which `problem.assets` names.
@@ -59,7 +87,7 @@ pub async fn train(
 #[serde(untagged)]
 #[expect(dead_code, reason = "a body is read as the one that it is: this describes both")]
 pub enum TrainQuestion {
-    Asset(Box<Specification>),
+    Asset(Box<Train>),
     Assets(TrainAssets),
 }
 
@@ -68,24 +96,39 @@ pub enum TrainQuestion {
 #[serde(deny_unknown_fields)]
 pub struct TrainAssets {
     /// The assets and the investor.
-    pub problem: AssetsProblem,
+    problem: AssetsProblem,
     /// Where the surrogates are trained; laws start resampled.
     #[serde(default)]
-    pub design: DesignSpecification,
+    design: DesignSpecification,
     /// How the surrogates are made.
     #[serde(default)]
-    pub surrogate: SurrogateSpecification,
+    surrogate: SurrogateSpecification,
     /// The same request and seed give the same policy, bit for bit.
     #[serde(default = "default_seed")]
-    pub seed: u64,
+    seed: u64,
+    /// What the policy is to be called, in at most 100 letters.
+    name: Option<String>,
+    /// At most 2,000 letters.
+    notes: Option<String>,
+    /// At most 20, each another, of 1 to 50 letters.
+    tags: Option<Vec<String>>,
 }
 
-/// The radius for all funds at once is simulated.
-async fn trained(asked: TrainAssets) -> Result<Specification, Problem> {
-    let TrainAssets { problem, design, surrogate, seed } = asked;
-    let trained = tokio::task::spawn_blocking(move || problem.training(design, surrogate, seed));
-    let trained = trained.await.map_err(ServiceError::internal)?;
-    Ok(trained.map_err(ServiceError::from)?)
+impl Train {
+    fn specified(self) -> (Specification, Relabel) {
+        let Train { problem, fund, design, surrogate, seed, name, notes, tags } = self;
+        (Specification { problem, fund, design, surrogate, seed }, Relabel { name, notes, tags })
+    }
+}
+
+impl TrainAssets {
+    /// The radius for all funds at once is simulated.
+    async fn specified(self) -> Result<(Specification, Relabel), Problem> {
+        let TrainAssets { problem, design, surrogate, seed, name, notes, tags } = self;
+        let trained = tokio::task::spawn_blocking(move || problem.training(design, surrogate, seed));
+        let trained = trained.await.map_err(ServiceError::internal)?.map_err(ServiceError::from)?;
+        Ok((trained, Relabel { name, notes, tags }))
+    }
 }
 
 /// What a call that queues a job answers; told here for all of them.

@@ -22,6 +22,7 @@ mod fault;
 mod frontiers;
 mod hosts;
 mod jobs;
+mod labels;
 mod listener;
 mod operations;
 mod page;

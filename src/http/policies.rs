@@ -50,6 +50,7 @@ pub async fn get(
     let specification = advisor.specification().clone();
     Ok(Json(wire::PolicyDetail {
         policy: row.policy,
+        labels: service.names.of(&caller.tenant, &id).await?,
         created_ms: row.created_ms,
         framework: specification.problem.framework,
         horizon: specification.problem.horizon,

@@ -28,6 +28,7 @@ use crate::service::plan::{Renew, Renewed};
 use crate::service::report::Correct;
 use crate::service::sessions::Start;
 use crate::service::what_if::Explain;
+use crate::store::{Labels, Relabel};
 
 /// Open a session.
 #[utoipa::path(post, path = "/sessions", tag = "sessions",
@@ -47,10 +48,12 @@ pub async fn open(
     headers: HeaderMap,
     JsonBody(request): JsonBody<wire::OpenSession>,
 ) -> Result<Response, Problem> {
-    let wire::OpenSession { policy, history, wealth, holding, holdings, renew, rolling } = request;
-    let start = Start { policy, history, wealth, holding, holdings, renew, rolling };
+    let wire::OpenSession { policy, history, wealth, holding, holdings, renew, rolling, name, notes, tags } = request;
+    let labels = Relabel { name, notes, tags };
+    let called = Labels::default().after(&labels);
+    let start = Start { policy, history, wealth, holding, holdings, renew, rolling, labels };
     let live = service.sessions.open(&caller, start, idempotency_key(&headers)?).await?;
-    let session = wire::Session::from(live);
+    let session = wire::Session { labels: called, ..live.into() };
     let location = [(header::LOCATION, format!("/sessions/{}", session.session))];
     Ok((StatusCode::CREATED, location, Json(session)).into_response())
 }
@@ -85,7 +88,8 @@ pub async fn get(
 ) -> Result<Json<wire::Session>, Problem> {
     let live = service.sessions.get(&caller.tenant, &id).await?;
     let renewal = service.sessions.renewal(&live).await?;
-    Ok(Json(wire::Session { renewal, ..live.into() }))
+    let labels = service.names.of(&caller.tenant, &id).await?;
+    Ok(Json(wire::Session { renewal, labels, ..live.into() }))
 }
 
 /// Where a session started and everything recorded of it: what was reported, what was told then, what would be told now.

@@ -132,6 +132,7 @@ impl Recording {
         let verb = match method {
             Method::GET => "GET",
             Method::POST => "POST",
+            Method::PATCH => "PATCH",
             Method::DELETE => "DELETE",
             Method::HEAD => "HEAD",
             _ => "other",

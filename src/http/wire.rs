@@ -22,7 +22,7 @@ use crate::service::known::KnownReturns;
 use crate::service::live::Live;
 use crate::service::plan::Renewing;
 use crate::service::renewer::RenewalDue;
-use crate::store::{JobKind, JobState, PolicySummary, SessionSummary};
+use crate::store::{JobKind, JobState, Labels, PolicySummary, SessionSummary};
 
 /// A job.
 #[derive(Debug, Serialize, ToSchema)]
@@ -126,11 +126,13 @@ pub struct PolicyEntry {
     pub created_ms: i64,
     /// Length of the exported document.
     pub bytes: u64,
+    #[serde(flatten)]
+    pub labels: Labels,
 }
 
 impl From<PolicySummary> for PolicyEntry {
     fn from(row: PolicySummary) -> Self {
-        PolicyEntry { policy: row.policy, created_ms: row.created_ms, bytes: row.bytes }
+        PolicyEntry { policy: row.policy, created_ms: row.created_ms, bytes: row.bytes, labels: row.labels }
     }
 }
 
@@ -146,6 +148,8 @@ pub struct PolicyPage {
 #[derive(Debug, Serialize, ToSchema)]
 pub struct PolicyDetail {
     pub policy: String,
+    #[serde(flatten)]
+    pub labels: Labels,
     pub created_ms: i64,
     pub framework: Framework,
     pub horizon: usize,
@@ -183,6 +187,12 @@ pub struct OpenSession {
     /// Live every period by the first step of a policy whose learning is decay, for up to 5200 periods. Default: false.
     #[serde(default)]
     pub rolling: bool,
+    /// What the session is called, in at most 100 letters.
+    pub name: Option<String>,
+    /// At most 2,000 letters.
+    pub notes: Option<String>,
+    /// At most 20, each another, of 1 to 50 letters.
+    pub tags: Option<Vec<String>>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
@@ -197,6 +207,8 @@ pub enum SessionState {
 #[derive(Debug, Serialize, ToSchema)]
 pub struct Session {
     pub session: String,
+    #[serde(flatten)]
+    pub labels: Labels,
     /// The one that advises the coming period.
     pub policy: String,
     /// The coming period, from 1; `horizon + 1` once completed.
@@ -246,6 +258,7 @@ impl From<Live> for Session {
             corrections: live.corrections,
             drift: live.standing.bet.told(),
             session: live.row.session.clone(),
+            labels: Labels::default(),
             policy: live.current.policy.clone(),
             horizon: live.horizon(),
             renewals: live.renewals,
@@ -261,6 +274,8 @@ impl From<Live> for Session {
 #[derive(Debug, Serialize, ToSchema)]
 pub struct SessionEntry {
     pub session: String,
+    #[serde(flatten)]
+    pub labels: Labels,
     /// The one that advises the coming period.
     pub policy: String,
     pub period: usize,
@@ -277,6 +292,7 @@ impl From<SessionSummary> for SessionEntry {
             period: row.observations + 1,
             state: session_state(row.observations, row.horizon),
             session: row.session,
+            labels: row.labels,
             policy: row.policy,
             horizon: row.horizon,
             initial_wealth: row.initial_wealth,

@@ -20,7 +20,7 @@ use crate::control::request::evaluation::EvaluationRequest;
 use crate::control::request::frontier::FrontierRequest;
 use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
-use crate::store::{Actor, CreateJob, DeleteJob, JobKind, JobRow, NewJob, Store, Tenant};
+use crate::store::{Actor, CreateJob, DeleteJob, JobKind, JobRow, NewJob, Relabel, Store, Tenant};
 
 /// A job as stored, and how far it is where it runs in this process.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,6 +34,23 @@ pub struct Job {
 pub struct Accepted {
     pub job: Job,
     pub warnings: Vec<Warning>,
+}
+
+/// A request to queue.
+struct Request<'a, C> {
+    kind: JobKind,
+    sent: &'a [u8],
+    /// The same with every default filled in.
+    completed: &'a C,
+    steps_total: usize,
+    labels: Relabel,
+}
+
+impl<'a, C> Request<'a, C> {
+    /// Of a job that makes no policy.
+    fn of(kind: JobKind, sent: &'a [u8], completed: &'a C, steps_total: usize) -> Self {
+        Request { kind, sent, completed, steps_total, labels: Relabel::default() }
+    }
 }
 
 /// The jobs of the store.
@@ -56,7 +73,8 @@ impl Jobs {
         self.board.clone()
     }
 
-    /// Queues a training. The same key and specification again give the same job.
+    /// Queues a training, whose policy is called as `labels` say. The same key and specification again give the same job,
+    /// whatever its policy is to be called.
     ///
     /// # Errors
     /// A field that breaks its rule, or asks for more memory than there is; a key used with another request.
@@ -64,11 +82,13 @@ impl Jobs {
         &self,
         caller: &Caller,
         specification: Specification,
+        labels: Relabel,
         key: Option<String>,
     ) -> Result<Accepted, ServiceError> {
+        labels.check()?;
         let sent = serde_json::to_vec(&specification).map_err(ServiceError::internal)?;
-        let (tenant, by) = (&caller.tenant, caller.actor());
-        let (job, completed) = self.queue_training(tenant, by, specification, &sent, key).await?;
+        let by = (&caller.tenant, caller.actor());
+        let (job, completed) = self.queue_training(by, specification, labels, &sent, key).await?;
         Ok(Accepted { job, warnings: completed.problem.warnings() })
     }
 
@@ -84,14 +104,15 @@ impl Jobs {
         key: String,
     ) -> Result<Job, ServiceError> {
         let sent = key.clone();
-        Ok(self.queue_training(tenant, by, specification, sent.as_bytes(), Some(key)).await?.0)
+        let queued = self.queue_training((tenant, by), specification, Relabel::default(), sent.as_bytes(), Some(key));
+        Ok(queued.await?.0)
     }
 
     async fn queue_training(
         &self,
-        tenant: &Tenant,
-        by: Actor,
+        of: (&Tenant, Actor),
         specification: Specification,
+        labels: Relabel,
         sent: &[u8],
         key: Option<String>,
     ) -> Result<(Job, Specification), ServiceError> {
@@ -99,7 +120,8 @@ impl Jobs {
         self.memory.admits(&estimate::training(&completed, self.threads))?;
         self.memory.keeps(&estimate::advising(&completed))?;
         let steps = completed.problem.horizon;
-        Ok((self.queue((tenant, by), JobKind::Train, sent, &completed, steps, key).await?, completed))
+        let request = Request { kind: JobKind::Train, sent, completed: &completed, steps_total: steps, labels };
+        Ok((self.queue(of, request, key).await?, completed))
     }
 
     /// Queues an evaluation, whose policies the caller has looked at. The same key and request again give the same job.
@@ -116,7 +138,8 @@ impl Jobs {
         let completed = request.completed()?;
         self.memory.admits(&estimate::evaluation(&completed, self.threads))?;
         let (of, steps) = ((&caller.tenant, caller.actor()), completed.step_count());
-        let job = self.queue(of, JobKind::Evaluate, &sent, &completed, steps, key).await?;
+        let request = Request::of(JobKind::Evaluate, &sent, &completed, steps);
+        let job = self.queue(of, request, key).await?;
         Ok(Accepted { job, warnings: completed.problem.warnings() })
     }
 
@@ -134,7 +157,8 @@ impl Jobs {
         let backtest = Backtest::new(request)?;
         self.memory.admits(&estimate::backtest(&backtest, self.threads))?;
         let (of, steps) = ((&caller.tenant, caller.actor()), backtest.trainings());
-        let job = self.queue(of, JobKind::Backtest, &sent, &backtest.request, steps, key).await?;
+        let request = Request::of(JobKind::Backtest, &sent, &backtest.request, steps);
+        let job = self.queue(of, request, key).await?;
         Ok(Accepted { job, warnings: backtest.warnings() })
     }
 
@@ -152,7 +176,8 @@ impl Jobs {
         let question = request.question()?;
         self.memory.admits(&estimate::frontier(&question, self.threads))?;
         let of = (&caller.tenant, caller.actor());
-        let job = self.queue(of, JobKind::Frontier, &sent, &question.request, 1, key).await?;
+        let request = Request::of(JobKind::Frontier, &sent, &question.request, 1);
+        let job = self.queue(of, request, key).await?;
         Ok(Accepted { job, warnings: question.fund.problem.warnings() })
     }
 
@@ -160,10 +185,7 @@ impl Jobs {
     async fn queue(
         &self,
         (tenant, by): (&Tenant, Actor),
-        kind: JobKind,
-        sent: &[u8],
-        completed: &impl Serialize,
-        steps_total: usize,
+        Request { kind, sent, completed, steps_total, labels }: Request<'_, impl Serialize>,
         key: Option<String>,
     ) -> Result<Job, ServiceError> {
         key.as_deref().map_or(Ok(()), idempotency::check)?;
@@ -175,6 +197,7 @@ impl Jobs {
             request_hash: content_hash(sent),
             idempotency_key: key.clone(),
             steps_total,
+            labels,
             created_ms: self.clock.now_milliseconds(),
         };
         match self.store.by(by).create_job(new).await? {

@@ -22,6 +22,7 @@ mod identity;
 pub mod jobs;
 pub mod keys;
 pub mod known;
+pub mod labels;
 pub mod live;
 pub mod memory;
 pub mod metrics;
@@ -56,6 +57,7 @@ use config::{Config, Role, StoreLocation};
 use error::ServiceError;
 use jobs::{Accepted, Jobs};
 use keys::{Caller, Keys};
+use labels::Names;
 use memory::Memory;
 use policies::Policies;
 use renewer::Renewer;
@@ -72,6 +74,7 @@ pub struct Service {
     pub audit: Audit,
     pub jobs: Jobs,
     pub keys: Arc<Keys>,
+    pub names: Names,
     pub policies: Arc<Policies>,
     pub sessions: Sessions,
     pub shutdown: Shutdown,
@@ -119,7 +122,8 @@ impl Service {
         let start =
             || Trainer::start(config, store.clone(), clock.clone(), jobs.board(), memory.clone(), shutdown.clone());
         let trainer = config.role.runs_jobs().then(start).transpose()?;
-        Ok(Arc::new(Service { audit, jobs, keys, policies, sessions, shutdown, memory, store, clock, trainer }))
+        let names = Names::new(store.clone());
+        Ok(Arc::new(Service { audit, jobs, keys, names, policies, sessions, shutdown, memory, store, clock, trainer }))
     }
 
     /// Queues an evaluation. The same key and request again give the same job.

@@ -38,7 +38,7 @@ use crate::control::policy::content_hash;
 use crate::control::problem::state::State;
 use crate::control::request::assets::check_rows;
 use crate::control::request::specification::Specification;
-use crate::store::{CreateSession, RequestKey, SessionFacts, SessionRow, SessionSummary, Store, Tenant};
+use crate::store::{CreateSession, Relabel, RequestKey, SessionFacts, SessionRow, SessionSummary, Store, Tenant};
 
 /// Entries replayed in a few milliseconds.
 const PROMPT_ENTRIES: usize = 520;
@@ -56,6 +56,7 @@ pub struct Start {
     pub holdings: Option<BTreeMap<String, f64>>,
     pub renew: Option<Renewing>,
     pub rolling: bool,
+    pub labels: Relabel,
 }
 
 impl Start {
@@ -141,7 +142,8 @@ impl Sessions {
     pub async fn open(&self, caller: &Caller, start: Start, key: Option<String>) -> Result<Live, ServiceError> {
         let tenant = &caller.tenant;
         let key = key.map(|key| start.under(key)).transpose()?;
-        let Start { policy, renew, rolling, .. } = start.clone();
+        start.labels.check()?;
+        let Start { policy, renew, rolling, labels, .. } = start.clone();
         let advisor = self.policies.advisor(tenant, &policy).await?;
         let (state, assets, history) = start.begins(&advisor)?;
         // The policy's own wealth pays, whatever is held.
@@ -163,7 +165,7 @@ impl Sessions {
             created_ms: self.clock.now_milliseconds(),
         };
         let opening = self.store.by(caller.actor());
-        let opening = opening.create_session(row.clone(), key.clone());
+        let opening = opening.create_session(row.clone(), labels, key.clone());
         let row = match opening.instrument(spans::of_write("open a session")).await? {
             CreateSession::Created => row,
             // Of the same start: the state is the one above.

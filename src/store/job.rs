@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 use super::codec::from_sql;
 use super::error::Failure;
 use super::job_state::JobState;
+use super::labels::Relabel;
 use super::query::Row;
 use super::tenant::Tenant;
 
@@ -48,6 +49,8 @@ pub struct NewJob {
     pub request_hash: String,
     pub idempotency_key: Option<String>,
     pub steps_total: usize,
+    /// What the policy of a training is to be called.
+    pub labels: Relabel,
     pub created_ms: i64,
 }
 

@@ -7,6 +7,7 @@ use super::codec::to_sql;
 use super::error::Failure;
 use super::job::{CreateJob, JobCounts, JobRow, NewJob, OldestJobs};
 use super::job_state::{JobEvent, JobState};
+use super::labels::Relabel;
 use super::query::{Connection, Row, query};
 use super::quotas::{self, Quotas, ROW_BYTES, Usage};
 use super::tenant::Tenant;
@@ -132,9 +133,11 @@ async fn create(
         .bind(new.created_ms)
         .bind(new.tenant.as_str());
     connection.execute(insert).await?;
-    let bytes = Usage::of_bytes(ROW_BYTES + quotas::length(new.request_json.as_bytes()));
-    let request = query("INSERT INTO job_requests (job, json) VALUES ($1, $2)");
-    connection.execute(request.bind(new.job.as_str()).bind(new.request_json)).await?;
+    let parts = [new.request_json, labels_json(&new.labels)?];
+    let bytes = Usage::of_bytes(ROW_BYTES + parts.iter().map(|part| quotas::length(part.as_bytes())).sum::<i64>());
+    let [request_json, labels] = parts;
+    let request = query("INSERT INTO job_requests (job, json, labels_json) VALUES ($1, $2, $3)");
+    connection.execute(request.bind(new.job.as_str()).bind(request_json).bind(labels)).await?;
     if let Some(key) = new.idempotency_key {
         let take = query(
             "INSERT INTO idempotency_keys (tenant, idempotency_key, request_hash, job) VALUES ($1, $2, $3, $4)
@@ -213,11 +216,31 @@ pub(super) async fn end(
          WHERE job = $3",
     );
     connection.execute(end.bind(state.as_str()).bind(now_ms).bind(job)).await?;
-    let request =
-        query("DELETE FROM job_requests WHERE job = $1 RETURNING CAST(octet_length(json) AS BIGINT) AS bytes")
-            .bind(job);
+    let request = query(
+        "DELETE FROM job_requests WHERE job = $1
+             RETURNING CAST(octet_length(json) + octet_length(labels_json) AS BIGINT) AS bytes",
+    )
+    .bind(job);
     let bytes = sum(&connection.rows(request).await?)?;
     quotas::change(connection, &row.tenant, Usage::of_bytes(-bytes)).await.map(drop)
+}
+
+/// Labels to give, as a column; empty where there are none.
+fn labels_json(labels: &Relabel) -> Result<String, Failure> {
+    if labels.is_empty() {
+        return Ok(String::new());
+    }
+    serde_json::to_string(labels).map_err(|error| Failure::Corrupt(format!("labels that cannot be written ({error})")))
+}
+
+/// What the policy of a job is to be called.
+pub(super) async fn labels_of(connection: &mut Connection<'_>, job: &str) -> Result<Relabel, Failure> {
+    let find = query("SELECT labels_json FROM job_requests WHERE job = $1").bind(job);
+    let found: String = connection.row(find).await?.map_or(Ok(String::new()), |row| row.get("labels_json"))?;
+    if found.is_empty() {
+        return Ok(Relabel::default());
+    }
+    serde_json::from_str(&found).map_err(|error| Failure::Corrupt(format!("the labels of job {job} ({error})")))
 }
 
 /// The sum of the column `bytes`.

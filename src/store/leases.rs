@@ -14,7 +14,8 @@ use super::codec::{Seal, from_sql, to_sql};
 use super::error::Failure;
 use super::job::{ClaimedJob, JobOutcome, JobRow};
 use super::job_state::{JobEvent, JobState};
-use super::jobs::{end, find};
+use super::jobs::{end, find, labels_of};
+use super::labels::{self, Labelled};
 use super::query::{Connection, Query, Row, query};
 use super::quotas::{self, Quotas, Usage};
 use super::{Store, StoreError, policies, turns};
@@ -222,6 +223,12 @@ async fn finish(
     let update = match outcome {
         JobOutcome::Succeeded { policy_id, policy_json } => {
             policies::insert(connection, &row.tenant, &policy_id, policy_json, now_ms, Quotas::NONE).await?;
+            let labels = labels_of(connection, &job).await?;
+            if !labels.is_empty() {
+                labels::hold(connection, &row.tenant, Labelled::Policy, &policy_id).await?;
+                let (_, grown) = labels::put(connection, &row.tenant, &policy_id, &labels).await?;
+                quotas::change(connection, &row.tenant, grown).await?;
+            }
             query("UPDATE jobs SET policy = $1, steps_done = steps_total WHERE job = $2").bind(policy_id).bind(job)
         }
         JobOutcome::Reported { report_json } => {

@@ -6,6 +6,7 @@ use futures_util::FutureExt;
 use super::audit::{self, Actor, Deed};
 use super::codec::to_sql;
 use super::error::Failure;
+use super::labels::{self, Labels};
 use super::query::{Connection, Row, query};
 use super::quotas::{self, Quotas, ROW_BYTES, Usage};
 use super::tenant::Tenant;
@@ -29,6 +30,7 @@ pub struct PolicySummary {
     pub created_ms: i64,
     /// Length of its portable form.
     pub bytes: u64,
+    pub labels: Labels,
 }
 
 /// What became of a request to delete a policy.
@@ -99,9 +101,10 @@ impl Store {
     ) -> Result<Vec<PolicySummary>, StoreError> {
         let page = query(
             "SELECT policy_owners.sequence, policies.policy, policy_owners.created_ms,
-                    CAST(length(json) AS BIGINT) AS bytes
+                    CAST(length(json) AS BIGINT) AS bytes, labels.name, labels.notes, labels.tags
              FROM policy_owners JOIN policies ON policies.policy = policy_owners.policy
-             WHERE tenant = $1 AND policy_owners.sequence < $2 ORDER BY policy_owners.sequence DESC LIMIT $3",
+             LEFT JOIN labels ON labels.tenant = policy_owners.tenant AND labels.object = policies.policy
+             WHERE policy_owners.tenant = $1 AND policy_owners.sequence < $2 ORDER BY policy_owners.sequence DESC LIMIT $3",
         );
         let page = page.bind(tenant.as_str()).bind(after.unwrap_or(i64::MAX)).bind(to_sql(limit));
         self.list("listing policies", page, |rows| rows.iter().map(PolicySummary::from_row).collect()).await
@@ -193,6 +196,7 @@ async fn delete(
     );
     connection.execute(unowned.bind(id.as_str())).await?;
     let bytes = Usage::of_bytes(ROW_BYTES + row.get::<i64>("bytes")?);
+    let bytes = bytes.and(labels::remove(connection, &tenant, &id).await?);
     quotas::change(connection, &tenant, bytes.given_back()).await?;
     audit::record(connection, &actor, &tenant, Deed::DeletePolicy, &id, "deleted").await?;
     Ok(DeletePolicy::Deleted)
@@ -205,6 +209,7 @@ impl PolicySummary {
             policy: row.get("policy")?,
             created_ms: row.get("created_ms")?,
             bytes: row.get::<i64>("bytes")?.unsigned_abs(),
+            labels: Labels::from_row(row)?,
         })
     }
 }

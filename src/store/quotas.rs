@@ -4,7 +4,7 @@
 //! statement: whoever waits for the row waits for a commit and no more. Queued jobs are counted where they stand, up to
 //! the quota.
 //!
-//! Bytes are those of requests, reports, policies and histories, and [`ROW_BYTES`] for each job, policy and session. A
+//! Bytes are those of requests, reports, policies, histories and labels, and [`ROW_BYTES`] for each job, policy and session. A
 //! session takes the room of all its observations when it is opened: no return that an investor reports is ever refused
 //! for a quota, nor is what a worker finished. Checkpoints are not counted; they go with the end of their job.
 //!
@@ -58,6 +58,11 @@ impl Usage {
     pub(super) fn of_session(history_bytes: i64, room: i64) -> Self {
         let entries = room.saturating_mul(ENTRY_BYTES);
         Usage { sessions: 1, bytes: ROW_BYTES.saturating_add(history_bytes).saturating_add(entries) }
+    }
+
+    /// Of both together.
+    pub(super) fn and(self, other: Usage) -> Self {
+        Usage { sessions: self.sessions + other.sessions, bytes: self.bytes.saturating_add(other.bytes) }
     }
 
     pub(super) fn given_back(self) -> Self {

@@ -8,6 +8,7 @@ use super::entries::EntryRow;
 use super::error::Failure;
 use super::head::Head;
 use super::idempotency::{self, RequestKey, Used};
+use super::labels::{self, Labels, Relabel};
 use super::query::{Connection, Row, query};
 use super::quotas::{self, Quotas, Usage};
 use super::seen::Seen;
@@ -71,16 +72,22 @@ pub struct SessionSummary {
     pub created_ms: i64,
     /// Number of periods observed.
     pub observations: usize,
+    pub labels: Labels,
 }
 
 impl Store {
-    /// Opens a session and records its idempotency key, both or neither.
+    /// Opens a session, calls it what it is to be called and records its idempotency key, all or nothing.
     ///
     /// # Errors
     /// [`StoreError::OverQuota`] where the tenant has as many sessions, or keeps as many bytes, as it may.
-    pub async fn create_session(&self, new: SessionRow, key: Option<RequestKey>) -> Result<CreateSession, StoreError> {
-        let (quotas, actor) = (self.quotas, self.actor.clone());
-        self.write("creating a session", move |connection| create(connection, new, key, quotas, actor).boxed()).await
+    pub async fn create_session(
+        &self,
+        new: SessionRow,
+        labels: Relabel,
+        key: Option<RequestKey>,
+    ) -> Result<CreateSession, StoreError> {
+        let by = (self.quotas, self.actor.clone());
+        self.write("creating a session", move |connection| create(connection, new, labels, key, by).boxed()).await
     }
 
     /// A session of a tenant.
@@ -114,14 +121,15 @@ impl Store {
         after: Option<i64>,
     ) -> Result<Vec<SessionSummary>, StoreError> {
         let page = query(
-            "SELECT sequence, session, initial_wealth, created_ms,
+            "SELECT sequence, session, initial_wealth, created_ms, name, notes, tags,
                     coalesce((SELECT policy FROM renewals WHERE renewals.session = sessions.session
                               ORDER BY number DESC LIMIT 1), policy) AS policy,
                     coalesce((SELECT horizon FROM renewals WHERE renewals.session = sessions.session
                               ORDER BY number DESC LIMIT 1), horizon) AS horizon,
                     coalesce((SELECT number FROM entries WHERE entries.session = sessions.session AND kind = 'observation'
                               ORDER BY entry DESC LIMIT 1), 0) AS observations
-             FROM sessions WHERE tenant = $1 AND sequence < $2 ORDER BY sequence DESC LIMIT $3",
+             FROM sessions LEFT JOIN labels ON labels.tenant = sessions.tenant AND labels.object = sessions.session
+             WHERE sessions.tenant = $1 AND sequence < $2 ORDER BY sequence DESC LIMIT $3",
         );
         let page = page.bind(tenant.as_str()).bind(after.unwrap_or(i64::MAX)).bind(to_sql(limit));
         self.list("listing sessions", page, |rows| rows.iter().map(SessionSummary::from_row).collect()).await
@@ -144,9 +152,9 @@ impl Store {
 async fn create(
     mut connection: Connection<'_>,
     row: SessionRow,
+    labels: Relabel,
     key: Option<RequestKey>,
-    quotas: Quotas,
-    actor: Actor,
+    (quotas, actor): (Quotas, Actor),
 ) -> Result<CreateSession, Failure> {
     let connection = &mut connection;
     if let Some(key) = &key
@@ -166,7 +174,10 @@ async fn create(
         return earlier.ok_or_else(|| Failure::Corrupt(format!("the idempotency key {}", key.key)));
     }
     let history_bytes = quotas::length(&encode_reals(&row.initial_history));
-    let usage = Usage::of_session(history_bytes, to_sql(row.horizon));
+    let mut usage = Usage::of_session(history_bytes, to_sql(row.horizon));
+    if !labels.is_empty() {
+        usage = usage.and(labels::put(connection, &row.tenant, &row.session, &labels).await?.1);
+    }
     quotas::take(connection, &row.tenant, usage, quotas).await?;
     let outcome = format!("opened under policy {}", row.policy);
     audit::record(connection, &actor, &row.tenant, Deed::OpenSession, &row.session, &outcome).await?;
@@ -236,6 +247,7 @@ async fn delete(
     let deleted = connection.row(delete.bind(session.as_str()).bind(tenant.as_str())).await?;
     let Some(row) = deleted else { return Ok(false) };
     let usage = Usage::of_session(row.get("history_bytes")?, row.get("room")?);
+    let usage = usage.and(labels::remove(connection, &tenant, &session).await?);
     quotas::change(connection, &tenant, usage.given_back()).await?;
     let outcome = format!("deleted, with {entries} entries");
     audit::record(connection, &actor, &tenant, Deed::DeleteSession, &session, &outcome).await?;
@@ -297,6 +309,7 @@ impl SessionSummary {
             horizon: from_sql(row.get("horizon")?)?,
             created_ms: row.get("created_ms")?,
             observations: from_sql(row.get("observations")?)?,
+            labels: Labels::from_row(row)?,
         })
     }
 }

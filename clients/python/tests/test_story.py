@@ -181,6 +181,20 @@ def test_a_session_goes_on_by_another_policy(ballast: Ballast, session: Session)
     assert kept.observe(log_return=0.02).period == 2
 
 
+def test_things_are_called(ballast: Ballast) -> None:
+    policy = train(ballast, seed=9, name="World", tags=["equity"]).policy()
+    detail = policy.detail()
+    assert (detail["name"], detail["notes"], detail["tags"]) == ("World", "", ["equity"])
+    assert policy.label(notes="monthly", tags=[]) == {"name": "World", "notes": "monthly", "tags": []}
+    session = policy.session(name="Ada", tags=["x"])
+    assert session.label(name="") == {"name": "", "notes": "", "tags": ["x"]}
+    assert next(ballast.sessions())["tags"] == ["x"]
+    assert next(ballast.policies())["notes"] == "monthly"
+    with pytest.raises(package.InvalidField) as refusal:
+        session.label(tags=["a", "a"])
+    assert refusal.value.field == "tags[1]"
+
+
 def test_many_sessions_report_at_once(ballast: Ballast, session: Session) -> None:
     other = ballast.policy(session.policy).session()
     reports: list[wire.Observe] = [
@@ -212,6 +226,8 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     own.observe(log_return=0.01).correct(1, "revised", log_return=0.02)
     own.renew(policy.id)
     own.refresh().history()
+    own.label(name="Ada")
+    policy.label(name="World")
     assert own.id in [entry["session"] for entry in ballast.sessions()]
     own.delete()
     assert policy.id in [entry["policy"] for entry in ballast.policies()]
@@ -307,7 +323,8 @@ def for_clients(item: dict[str, dict[str, list[str]]]) -> bool:
 def test_every_field_of_a_specification_is_an_argument() -> None:
     arguments = set(inspect.signature(Ballast.train).parameters) - {"self", "returns", "kind", "idempotency_key"}
     problem, whole = wire.ProblemSpecification.__annotations__, wire.Specification.__annotations__
-    assert arguments == (set(problem) - {"history"}) | (set(whole) - {"problem", "fund"})
+    of_whole = set(whole) - {"problem", "fund"}
+    assert arguments == (set(problem) - {"history"}) | of_whole | set(wire.Relabel.__annotations__)
 
 
 def test_a_training_opens_sessions_as_its_policy_does() -> None:

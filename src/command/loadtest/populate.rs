@@ -10,7 +10,7 @@ use ballast::control::request::specification::{InitialLaws, Specification};
 use ballast::control::training::Training;
 use ballast::service::error::ServiceError;
 use ballast::service::plan::Plan;
-use ballast::store::{CreateSession, SessionRow, Store, Tenant};
+use ballast::store::{CreateSession, Relabel, SessionRow, Store, Tenant};
 use futures_util::{StreamExt, stream};
 use serde_json::Value;
 
@@ -92,7 +92,7 @@ impl World {
             let (store, new) = (store.clone(), self.session(index));
             async move {
                 let new = new?;
-                let outcome = store.create_session(new.clone(), None).await?;
+                let outcome = store.create_session(new.clone(), Relabel::default(), None).await?;
                 Ok::<_, Box<dyn Error>>((outcome, new.session))
             }
         });

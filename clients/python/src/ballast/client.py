@@ -14,6 +14,7 @@ from typing_extensions import Self
 
 from . import wire
 from .driving import Answering, awaiting_into, blocking, blocking_into
+from .labels import relabelled
 from .policy import AsyncPolicy, Policy
 from .returns import Kind, Returns, Table, dates_of, day, log_returns, log_returns_of_assets, per_period, text_of
 from .session import AsyncSession, Session
@@ -56,6 +57,9 @@ class _Ballast:
         design: wire.DesignSpecification | None = None,
         surrogate: wire.SurrogateSpecification | None = None,
         seed: int | None = None,
+        name: str | None = None,
+        notes: str | None = None,
+        tags: Sequence[str] | None = None,
         idempotency_key: str | None = None,
     ) -> wire.Job:
         """Queues a training on the returns seen so far, and does not wait for it.
@@ -63,8 +67,9 @@ class _Ballast:
         ``returns`` is a list, an array, a Series or a DataFrame of one column, and ``kind`` says of what:
         ``"simple"`` or ``"log"`` returns or ``"price"``, oldest first. ``rate_per_step`` is what the bank pays per
         period of the returns, as a fraction: 0.00247 a month for 3 % a year. What is left out the service chooses,
-        and ``Policy.detail`` tells. The same ``idempotency_key`` and arguments again, even from another process, give
-        the same job. Raises ``ValueError`` where ``returns`` cannot be meant (a number that is missing, dates of an
+        and ``Policy.detail`` tells. ``name``, ``notes`` and ``tags`` are what the policy is to be called, and no part
+        of what it is. The same ``idempotency_key`` and arguments again, even from another process, give the same job.
+        Raises ``ValueError`` where ``returns`` cannot be meant (a number that is missing, dates of an
         index that do not increase, percents), before anything is sent.
         """
         problem = {
@@ -84,7 +89,8 @@ class _Ballast:
             "law": law,
         }
         whole = {"problem": _given(problem), "design": design, "surrogate": surrogate, "seed": seed}
-        return await self._submit(cast(wire.Specification, _given(whole)), idempotency_key=idempotency_key)
+        specification = cast(wire.Specification, _given(whole))
+        return await self._submit(specification, name=name, notes=notes, tags=tags, idempotency_key=idempotency_key)
 
     async def _advise(
         self,
@@ -145,6 +151,9 @@ class _Ballast:
         design: wire.DesignSpecification | None = None,
         surrogate: wire.SurrogateSpecification | None = None,
         seed: int | None = None,
+        name: str | None = None,
+        notes: str | None = None,
+        tags: Sequence[str] | None = None,
         idempotency_key: str | None = None,
         **problem: Any,
     ) -> wire.Job:
@@ -152,12 +161,12 @@ class _Ballast:
 
         ``returns``, ``kind``, ``assets`` and ``rate_per_step`` are as in ``advise_assets``, and so is every other field
         of the problem that is given by name; also ``horizon``, ``trading_cost``, ``contributions`` and ``composition``.
-        ``design``, ``surrogate``, ``seed`` and ``idempotency_key`` are as in ``train``.
+        What else is given is as in ``train``.
         """
         names, rows = log_returns_of_assets(returns, kind, assets)
         of_assets = {"assets": names, "history": rows, "rate_per_step": rate_per_step, **_given(problem)}
         whole = {"problem": of_assets, "design": design, "surrogate": surrogate, "seed": seed}
-        return await self._queued("/train", _given(whole), idempotency_key)
+        return await self._queued("/train", {**_given(whole), **relabelled(name, notes, tags)}, idempotency_key)
 
     async def _read_returns(self, source: str | os.PathLike[str] | Table, /, **choices: Any) -> wire.Reading:
         """What a text of returns or prices says: one record, or what must be asked, or where it is wrong.
@@ -169,9 +178,19 @@ class _Ballast:
         body = {"text": text_of(source), "choices": choices}
         return cast(wire.Reading, await self._transport.json("POST", "/returns", body=body))
 
-    async def _submit(self, specification: wire.Specification, *, idempotency_key: str | None = None) -> wire.Job:
-        """Queues the training of a whole specification, such as ``Policy.detail`` shows."""
-        return await self._queued("/train", specification, idempotency_key)
+    async def _submit(
+        self,
+        specification: wire.Specification,
+        *,
+        name: str | None = None,
+        notes: str | None = None,
+        tags: Sequence[str] | None = None,
+        idempotency_key: str | None = None,
+    ) -> wire.Job:
+        """Queues the training of a whole specification, such as ``Policy.detail`` shows. Its policy is to be called as
+        in ``train``."""
+        request = {**specification, **relabelled(name, notes, tags)}
+        return await self._queued("/train", request, idempotency_key)
 
     async def _job(self, job: str) -> wire.Job:
         """A training, an evaluation, a walk-forward or a frontier that was queued before."""
@@ -243,6 +262,9 @@ class _Ballast:
         resamples: int | None = None,
         block: int | None = None,
         seed: int | None = None,
+        name: str | None = None,
+        notes: str | None = None,
+        tags: Sequence[str] | None = None,
         idempotency_key: str | None = None,
         **problem: Any,
     ) -> wire.Job:

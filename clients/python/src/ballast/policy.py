@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import cast
 from urllib.parse import quote
 
 from . import wire
 from .driving import Answering, awaiting_into, blocking, blocking_into
 from .errors import DamagedPolicy
+from .labels import Labelled
 from .returns import Kind, Returns, log_returns, log_returns_of_assets
 from .session import AsyncSession, Session
 from .transport import Transport, idempotent
 
 
-class _Policy:
+class _Policy(Labelled):
     """A policy of the service, by its name."""
 
     def __init__(self, transport: Transport, policy: str) -> None:
@@ -45,6 +46,9 @@ class _Policy:
         holdings: Mapping[str, float] | None = None,
         renew: wire.Renewing | None = None,
         rolling: bool = False,
+        name: str | None = None,
+        notes: str | None = None,
+        tags: Sequence[str] | None = None,
         idempotency_key: str | None = None,
     ) -> wire.Session:
         """Opens a session of an investor.
@@ -52,7 +56,8 @@ class _Policy:
         ``history`` is what the investor has seen, ``wealth`` what he has; by default both are the policy's own.
         ``holding`` is the share of it in the risky asset, by default none; of several assets ``holdings`` says it of
         each by its name, and ``history`` is a DataFrame with a column for each. With ``rolling`` the first step of the
-        policy, whose learning must be decay, advises up to 5200 periods. The same ``idempotency_key`` and arguments
+        policy, whose learning must be decay, advises up to 5200 periods. ``name``, ``notes`` and ``tags`` are what the
+        session is to be called. The same ``idempotency_key`` and arguments
         again, even from another process, give the same session, at its first period; ``Session.refresh`` tells how far
         it is.
         """
@@ -62,6 +67,9 @@ class _Policy:
             "holding": holding,
             "renew": renew,
             "rolling": rolling,
+            "name": name,
+            "notes": notes,
+            "tags": None if tags is None else list(tags),
         }
         if holdings is not None:
             request["holdings"] = dict(holdings)
@@ -94,6 +102,7 @@ class Policy(_Policy):
     detail = Answering(wire.PolicyDetail).blocking(_Policy._detail)
     export = blocking(_Policy._export)
     session = blocking_into(_Policy._session, Session)
+    label = Answering(wire.Labels).blocking(_Policy._label)
     delete = blocking(_Policy._delete)
 
 
@@ -103,4 +112,5 @@ class AsyncPolicy(_Policy):
     detail = _Policy._detail
     export = _Policy._export
     session = awaiting_into(_Policy._session, AsyncSession)
+    label = _Policy._label
     delete = _Policy._delete

@@ -12,6 +12,7 @@ from typing_extensions import Self, Unpack
 from . import frames, replay, wire
 from .driving import Answering, blocking
 from .errors import JobEnded
+from .labels import Labelled
 from .returns import Kind, Returns
 from .transport import Transport, growing_pause
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 _LOOK = 0.5
 
 
-class _Session:
+class _Session(Labelled):
     """A session of the service, and the period it has come to.
 
     ``observe`` numbers its reports, which makes them exactly-once: a report whose answer was lost is sent again under
@@ -270,6 +271,7 @@ class Session(_Session):
     correct = Answering(wire.Corrected).blocking(_Session._correct)
     renew = Answering(wire.Renewed).blocking(_Session._renew)
     what_if = blocking(_Session._what_if)
+    label = Answering(wire.Labels).blocking(_Session._label)
     history = Answering(wire.History).blocking(_Session._history)
     frame = blocking(_Session._frame)
     refresh = blocking(_Session._refresh)
@@ -286,6 +288,7 @@ class AsyncSession(_Session):
     correct = _Session._correct
     renew = _Session._renew
     what_if = _Session._what_if
+    label = _Session._label
     history = _Session._history
     frame = _Session._frame
     refresh = _Session._refresh

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TextIO, cast
 from urllib.parse import quote
@@ -130,6 +130,9 @@ class _Training(_Job):
         holdings: Mapping[str, float] | None = None,
         renew: wire.Renewing | None = None,
         rolling: bool = False,
+        name: str | None = None,
+        notes: str | None = None,
+        tags: Sequence[str] | None = None,
         idempotency_key: str | None = None,
         watch: Watch | None = None,
     ) -> wire.Session:
@@ -143,6 +146,9 @@ class _Training(_Job):
             holdings=holdings,
             renew=renew,
             rolling=rolling,
+            name=name,
+            notes=notes,
+            tags=tags,
             idempotency_key=idempotency_key,
         )
 

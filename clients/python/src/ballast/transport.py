@@ -1,9 +1,9 @@
 """Requests over one pool of connections, repeated where that is safe: what is repeated is written once, and two
 transports differ in how they wait.
 
-Every call of this client can be repeated without harm, for one of four reasons: it reads; it deletes; its content names
-it (an imported policy); or the service knows the request again (the idempotency key of a job or a session, the period
-of an observation).
+Every call of this client can be repeated without harm, for one of four reasons: it reads; it deletes; its content says
+what is to be (an imported policy, labels); or the service knows the request again (the idempotency key of a job or a
+session, the period of an observation).
 """
 
 from __future__ import annotations

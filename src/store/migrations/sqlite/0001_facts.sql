@@ -31,8 +31,10 @@ CREATE INDEX jobs_by_end ON jobs (finished_ms) WHERE finished_ms IS NOT NULL;
 -- What may hold megabytes stands apart from the jobs: neither a list nor a renewed lease reads or rewrites it.
 -- A request goes when its job ends.
 CREATE TABLE job_requests (
-    job  TEXT PRIMARY KEY REFERENCES jobs (job) ON DELETE CASCADE,
-    json TEXT NOT NULL
+    job         TEXT PRIMARY KEY REFERENCES jobs (job) ON DELETE CASCADE,
+    json        TEXT NOT NULL,
+    -- What the policy of a training is to be called.
+    labels_json TEXT NOT NULL
 ) STRICT;
 
 CREATE TABLE job_reports (
@@ -118,6 +120,20 @@ CREATE TABLE idempotency_keys (
 
 CREATE INDEX idempotency_keys_by_job ON idempotency_keys (job);
 CREATE INDEX idempotency_keys_by_session ON idempotency_keys (session);
+
+-- What a tenant calls its policies and sessions. They describe and find things, and no seal covers them.
+CREATE TABLE labels (
+    tenant TEXT NOT NULL,
+    -- A policy or a session.
+    object TEXT NOT NULL,
+    name   TEXT NOT NULL,
+    notes  TEXT NOT NULL,
+    -- Each between line breaks.
+    tags   TEXT NOT NULL,
+    -- Name and tags in lower case, to be found by.
+    folded TEXT NOT NULL,
+    PRIMARY KEY (tenant, object)
+) STRICT, WITHOUT ROWID;
 
 -- What happened in a session, in the order it was recorded.
 CREATE TABLE entries (

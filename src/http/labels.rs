@@ -1,0 +1,44 @@
+//! What policies and sessions are called.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+
+use super::access::{By, Live};
+use super::extract::{Id, JsonBody};
+use super::problem::Problem;
+use crate::service::Service;
+use crate::store::{Labelled, Labels, Relabel};
+
+/// Change what a policy is called: what is absent stays, what is null or empty is cleared.
+#[utoipa::path(patch, path = "/policies/{id}", tag = "policies", params(("id" = String, Path, description = "The policy.")),
+    request_body(content = Relabel, example = json!({ "name": "World, monthly", "tags": ["equity"] })),
+    responses(
+        (status = 200, description = "As it is called now.", body = Labels),
+        (status = 404, description = "There is no such policy.", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn of_policy(
+    State(service): State<Arc<Service>>,
+    By(caller, _): By<Live>,
+    Id(id): Id,
+    JsonBody(change): JsonBody<Relabel>,
+) -> Result<Json<Labels>, Problem> {
+    Ok(Json(service.names.change(&caller, Labelled::Policy, &id, change).await?))
+}
+
+/// Change what a session is called: what is absent stays, what is null or empty is cleared.
+#[utoipa::path(patch, path = "/sessions/{id}", tag = "sessions", params(("id" = String, Path, description = "The session.")),
+    request_body(content = Relabel, example = json!({ "name": "Ada", "notes": "Reports by post.", "tags": ["monthly"] })),
+    responses(
+        (status = 200, description = "As it is called now.", body = Labels),
+        (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
+        (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn of_session(
+    State(service): State<Arc<Service>>,
+    By(caller, _): By<Live>,
+    Id(id): Id,
+    JsonBody(change): JsonBody<Relabel>,
+) -> Result<Json<Labels>, Problem> {
+    Ok(Json(service.names.change(&caller, Labelled::Session, &id, change).await?))
+}

@@ -1,0 +1,44 @@
+//! What policies and sessions are called, and how that is changed.
+
+use super::error::ServiceError;
+use super::keys::Caller;
+use crate::store::{Labelled, Labels, Relabel, Store, Tenant};
+
+/// The labels of the store.
+pub struct Names {
+    store: Store,
+}
+
+impl Names {
+    pub(super) fn new(store: Store) -> Self {
+        Names { store }
+    }
+
+    /// What a policy or a session is called.
+    ///
+    /// # Errors
+    /// The store does not answer.
+    pub async fn of(&self, tenant: &Tenant, object: &str) -> Result<Labels, ServiceError> {
+        Ok(self.store.labels(tenant, object).await?)
+    }
+
+    /// Changes what a policy or a session is called; as it is called now.
+    ///
+    /// # Errors
+    /// A field breaks a rule; there is no such thing; the tenant keeps as many bytes as it may.
+    pub async fn change(
+        &self,
+        caller: &Caller,
+        kind: Labelled,
+        object: &str,
+        change: Relabel,
+    ) -> Result<Labels, ServiceError> {
+        change.check()?;
+        let what = match kind {
+            Labelled::Policy => "policy",
+            Labelled::Session => "session",
+        };
+        let changed = self.store.by(caller.actor()).relabel(&caller.tenant, kind, object, change).await?;
+        changed.ok_or_else(|| ServiceError::unknown(what, object))
+    }
+}

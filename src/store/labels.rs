@@ -1,0 +1,288 @@
+//! What a tenant calls its policies and sessions: a name, notes and tags.
+//!
+//! They describe and find things, and nothing is computed from them: no seal covers them, and a policy's name by its content
+//! and a session's advice are the same whatever they are called. Both kinds of thing have their labels in one table, each
+//! row written in the transaction of what it is of, and gone with it.
+
+use std::collections::HashSet;
+
+use futures_util::FutureExt;
+use serde::{Deserialize, Deserializer, Serialize};
+use utoipa::ToSchema;
+
+use super::audit::{self, Deed};
+use super::error::Failure;
+use super::query::{Connection, Row, query};
+use super::quotas::{self, Usage};
+use super::tenant::Tenant;
+use super::{Store, StoreError};
+use crate::control::error::FieldError;
+
+/// Letters of a name, of notes and of a tag.
+pub const LONGEST_NAME: usize = 100;
+pub const LONGEST_NOTES: usize = 2_000;
+pub const LONGEST_TAG: usize = 50;
+/// Tags of one thing.
+pub const MOST_TAGS: usize = 20;
+
+/// What a policy or a session is called; each part is empty where nothing was said.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct Labels {
+    /// Not necessarily of this one alone.
+    pub name: String,
+    pub notes: String,
+    pub tags: Vec<String>,
+}
+
+/// A change of labels: what is absent stays, what is null or empty is cleared.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Relabel {
+    /// At most 100 letters, without control characters.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// At most 2,000 letters, without control characters but line breaks.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    pub notes: Option<String>,
+    /// At most 20, each another, of 1 to 50 letters without control characters.
+    #[serde(default, deserialize_with = "given", skip_serializing_if = "Option::is_none")]
+    pub tags: Option<Vec<String>>,
+}
+
+/// A field that is there, be it null.
+pub fn given<'de, D: Deserializer<'de>, T: Deserialize<'de> + Default>(deserializer: D) -> Result<Option<T>, D::Error> {
+    Option::<T>::deserialize(deserializer).map(|value| Some(value.unwrap_or_default()))
+}
+
+/// What has labels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Labelled {
+    Policy,
+    Session,
+}
+
+impl Relabel {
+    /// # Errors
+    /// The first field that breaks its rule.
+    pub fn check(&self) -> Result<(), FieldError> {
+        if let Some(name) = &self.name {
+            text("name", name, 0..=LONGEST_NAME, char::is_control)?;
+        }
+        if let Some(notes) = &self.notes {
+            text("notes", notes, 0..=LONGEST_NOTES, |letter| letter.is_control() && letter != '\n')?;
+        }
+        let tags = self.tags.as_deref().unwrap_or_default();
+        if tags.len() > MOST_TAGS {
+            let rule = format!("must hold at most {MOST_TAGS} tags");
+            return Err(FieldError::new("tags", format!("{} tags", tags.len()), rule));
+        }
+        let mut seen = HashSet::new();
+        for (index, tag) in tags.iter().enumerate() {
+            let field = format!("tags[{index}]");
+            text(&field, tag, 1..=LONGEST_TAG, char::is_control)?;
+            if !seen.insert(tag) {
+                return Err(FieldError::new(field, tag, "must be another than those before it"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether it changes nothing, whatever the labels are.
+    pub fn is_empty(&self) -> bool {
+        *self == Relabel::default()
+    }
+}
+
+fn text(
+    field: &str,
+    value: &str,
+    lengths: std::ops::RangeInclusive<usize>,
+    is_refused: fn(char) -> bool,
+) -> Result<(), FieldError> {
+    let letters = value.chars().count();
+    if lengths.contains(&letters) && !value.contains(is_refused) {
+        return Ok(());
+    }
+    let rule = format!("must have {} to {} letters, without control characters", lengths.start(), lengths.end());
+    let shown = if lengths.contains(&letters) { format!("{value:?}") } else { format!("{letters} letters") };
+    Err(FieldError::new(field, shown, rule))
+}
+
+impl Labels {
+    /// As they are after a change.
+    pub fn after(self, change: &Relabel) -> Labels {
+        let Relabel { name, notes, tags } = change.clone();
+        Labels { name: name.unwrap_or(self.name), notes: notes.unwrap_or(self.notes), tags: tags.unwrap_or(self.tags) }
+    }
+
+    /// Of a row with the columns `name`, `notes` and `tags`, of a join that may have found none.
+    pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
+        let text = |column: &str| row.get::<Option<String>>(column).map(Option::unwrap_or_default);
+        let tags = text("tags")?.split('\n').filter(|tag| !tag.is_empty()).map(str::to_owned).collect();
+        Ok(Labels { name: text("name")?, notes: text("notes")?, tags })
+    }
+
+    /// Tags as a column has them: each between line breaks, which no tag holds, so that a whole tag is found as a part.
+    fn tags_column(&self) -> String {
+        if self.tags.is_empty() { String::new() } else { format!("\n{}\n", self.tags.join("\n")) }
+    }
+
+    fn bytes(&self) -> i64 {
+        let texts = [&self.name, &self.notes, &self.tags_column(), &self.folded()];
+        texts.iter().map(|text| quotas::length(text.as_bytes())).sum()
+    }
+
+    /// What they are found by, in lower case.
+    fn folded(&self) -> String {
+        format!("{}{}", self.name, self.tags_column()).to_lowercase()
+    }
+}
+
+impl Store {
+    /// What a policy or a session of a tenant is called; nothing where there is none.
+    pub async fn labels(&self, tenant: &Tenant, object: &str) -> Result<Labels, StoreError> {
+        let find = query(FIND).bind(tenant.as_str()).bind(object);
+        self.list("reading labels", find, |rows| rows.first().map_or(Ok(Labels::default()), Labels::from_row)).await
+    }
+
+    /// Changes what a policy or a session of a tenant is called; as it is called now. `None` where there is none.
+    ///
+    /// # Errors
+    /// [`StoreError::OverQuota`] where the tenant keeps as many bytes as it may.
+    pub async fn relabel(
+        &self,
+        tenant: &Tenant,
+        kind: Labelled,
+        object: &str,
+        change: Relabel,
+    ) -> Result<Option<Labels>, StoreError> {
+        let (tenant, object, actor, quotas) = (tenant.clone(), object.to_owned(), self.actor.clone(), self.quotas);
+        self.write("changing labels", move |mut connection| {
+            async move {
+                let connection = &mut connection;
+                if !hold(connection, &tenant, kind, &object).await? {
+                    return Ok(None);
+                }
+                if change.is_empty() {
+                    return Ok(Some(stored(connection, &tenant, &object).await?));
+                }
+                let deed = match kind {
+                    Labelled::Policy => Deed::LabelPolicy,
+                    Labelled::Session => Deed::LabelSession,
+                };
+                let (labels, grown) = put(connection, &tenant, &object, &change).await?;
+                quotas::take(connection, &tenant, grown, quotas).await?;
+                audit::record(connection, &actor, &tenant, deed, &object, &told(&change)).await?;
+                Ok(Some(labels))
+            }
+            .boxed()
+        })
+        .await
+    }
+}
+
+async fn stored(connection: &mut Connection<'_>, tenant: &Tenant, object: &str) -> Result<Labels, Failure> {
+    let row = connection.row(query(FIND).bind(tenant.as_str()).bind(object)).await?;
+    row.as_ref().map_or(Ok(Labels::default()), Labels::from_row)
+}
+
+const FIND: &str = "SELECT name, notes, tags FROM labels WHERE tenant = $1 AND object = $2";
+
+/// Which labels were changed, for the audit.
+fn told(change: &Relabel) -> String {
+    let given = [("name", change.name.is_some()), ("notes", change.notes.is_some()), ("tags", change.tags.is_some())];
+    let named: Vec<&str> = given.iter().filter(|(_, given)| *given).map(|(name, _)| *name).collect();
+    format!("set {}", named.join(", "))
+}
+
+/// Keeps a thing from being deleted or called otherwise until this transaction ends; whether the tenant has it.
+pub(super) async fn hold(
+    connection: &mut Connection<'_>,
+    tenant: &Tenant,
+    kind: Labelled,
+    object: &str,
+) -> Result<bool, Failure> {
+    let find = query(match kind {
+        Labelled::Policy => "SELECT sequence FROM policy_owners WHERE tenant = $1 AND policy = $2",
+        Labelled::Session => "SELECT sequence FROM sessions WHERE tenant = $1 AND session = $2",
+    });
+    let find = find.bind(tenant.as_str()).bind(object).for_update_but_references();
+    Ok(connection.row(find).await?.is_some())
+}
+
+/// Changes the labels of a thing that is held by this transaction; as they are now, and what they take more.
+pub(super) async fn put(
+    connection: &mut Connection<'_>,
+    tenant: &Tenant,
+    object: &str,
+    change: &Relabel,
+) -> Result<(Labels, Usage), Failure> {
+    let before = stored(connection, tenant, object).await?;
+    let grown = -before.bytes();
+    let labels = before.after(change);
+    let write = query(
+        "INSERT INTO labels (tenant, object, name, notes, tags, folded) VALUES ($1, $2, $3, $4, $5, $6)
+         ON CONFLICT (tenant, object) DO UPDATE SET name = excluded.name, notes = excluded.notes,
+                                                    tags = excluded.tags, folded = excluded.folded",
+    );
+    let write = write
+        .bind(tenant.as_str())
+        .bind(object)
+        .bind(labels.name.as_str())
+        .bind(labels.notes.as_str())
+        .bind(labels.tags_column())
+        .bind(labels.folded());
+    connection.execute(write).await?;
+    let grown = grown + labels.bytes();
+    Ok((labels, Usage::of_bytes(grown)))
+}
+
+/// Deletes the labels of what is deleted; what they took.
+pub(super) async fn remove(connection: &mut Connection<'_>, tenant: &Tenant, object: &str) -> Result<Usage, Failure> {
+    let labels = stored(connection, tenant, object).await?;
+    let delete = query("DELETE FROM labels WHERE tenant = $1 AND object = $2");
+    connection.execute(delete.bind(tenant.as_str()).bind(object)).await?;
+    Ok(Usage::of_bytes(labels.bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(json: &str) -> String {
+        let change: Relabel = serde_json::from_str(json).unwrap();
+        change.check().unwrap_err().field
+    }
+
+    #[test]
+    fn every_rule_refuses_what_is_beyond_it_alone() {
+        let (name, notes, tag) = ("é".repeat(LONGEST_NAME), "x\n".repeat(LONGEST_NOTES / 2), "t".repeat(LONGEST_TAG));
+        let tags: Vec<String> = (1..MOST_TAGS).map(|tag| tag.to_string()).chain([tag.clone()]).collect();
+        let most = Relabel { name: Some(name.clone()), notes: Some(notes.clone()), tags: Some(tags.clone()) };
+        assert_eq!(most.check(), Ok(()));
+        let field = |change: Relabel| change.check().unwrap_err().field;
+        assert_eq!(field(Relabel { name: Some(name + "x"), ..most.clone() }), "name");
+        assert_eq!(field(Relabel { notes: Some(notes + "x"), ..most.clone() }), "notes");
+        let with = |tag: &str| Relabel { tags: Some([&tags[..], &[tag.into()]].concat()), ..most.clone() };
+        assert_eq!(field(with("x")), "tags");
+        for (json, field) in [
+            (r#"{"name": "a\nb"}"#, "name"),
+            (r#"{"notes": "a\u0007b"}"#, "notes"),
+            (r#"{"tags": ["a", ""]}"#, "tags[1]"),
+            (r#"{"tags": ["a", "b\tc"]}"#, "tags[1]"),
+            (r#"{"tags": ["a", "b", "a"]}"#, "tags[2]"),
+        ] {
+            assert_eq!(refused(json), field, "{json}");
+        }
+        assert_eq!(refused(&format!(r#"{{"tags": ["{tag}x"]}}"#)), "tags[0]");
+    }
+
+    #[test]
+    fn what_is_absent_stays_and_what_is_null_is_cleared() {
+        let labels = Labels { name: "a".into(), notes: "b".into(), tags: vec!["c".into()] };
+        let after = |json: &str| labels.clone().after(&serde_json::from_str(json).unwrap());
+        assert_eq!(after("{}"), labels);
+        assert_eq!(after(r#"{"name": null, "tags": []}"#), Labels { notes: "b".into(), ..Labels::default() });
+        assert_eq!(after(r#"{"notes": "", "name": "d"}"#).name, "d");
+    }
+}
