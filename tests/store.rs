@@ -8,8 +8,8 @@ use std::time::Duration;
 use ballast::control::policy::content_hash;
 use ballast::store::{
     Append, AuditFilter, AuditRow, CreateJob, CreateSession, DeletePolicy, EntryKind, EntryRow, JobCounts, JobKind,
-    JobOutcome, JobRow, JobState, NewJob, NewKey, Relabel, RequestKey, Rotate, SessionRow, Store, StoreError,
-    Successor, Tenant,
+    JobOutcome, JobRow, JobState, NewJob, NewKey, Relabel, RequestKey, Rotate, SessionQuery, SessionRow, Store,
+    StoreError, Successor, Tenant,
 };
 use futures_util::future::join_all;
 use support::place::Place;
@@ -48,6 +48,11 @@ on_both_engines!(
     a_head_follows_the_rows,
     a_name_nobody_can_have_finds_nothing,
 );
+
+/// So many sessions, the newest first.
+fn newest(limit: usize) -> SessionQuery {
+    SessionQuery { limit, descending: true, ..SessionQuery::default() }
+}
 
 fn new_job(job: &str, key: Option<&str>) -> NewJob {
     NewJob {
@@ -154,7 +159,7 @@ async fn an_idempotency_key_opens_one_session(place: &Place) {
         )
     }));
     let opened: Vec<_> = opened.await.into_iter().map(Result::unwrap).collect();
-    let listed = store.sessions(&Tenant::default(), 10, None).await.unwrap();
+    let listed = store.sessions(&Tenant::default(), &newest(10)).await.unwrap().sessions;
     let [one] = &listed[..] else { panic!("{listed:?}") };
     assert_eq!(opened.iter().filter(|outcome| **outcome == CreateSession::Created).count(), 1, "{opened:?}");
     let repeated = CreateSession::Repeated(new(&one.session));
@@ -408,7 +413,7 @@ async fn a_restart_keeps_sessions_bit_for_bit(place: &Place) {
     assert_eq!(read, [1, 2, 3].map(|period| observation("s", period, "c")));
     assert_eq!(store.entry("s", EntryKind::Observation, 2).await.unwrap().as_ref(), Some(&read[1]));
     assert_eq!(store.entry("s", EntryKind::Correction, 2).await.unwrap(), None);
-    assert_eq!(store.sessions(&Tenant::default(), 10, None).await.unwrap()[0].observations, 3);
+    assert_eq!(store.sessions(&Tenant::default(), &newest(10)).await.unwrap().sessions[0].observations, 3);
 }
 
 async fn what_was_seen_is_current_until_somebody_writes(place: &Place) {
@@ -473,7 +478,7 @@ async fn every_entry_is_stored_once_and_in_order(place: &Place) {
     // The second of its kind, and not the second entry.
     let second = store.entry("s", EntryKind::Observation, 2).await.unwrap().unwrap();
     assert_eq!((second.entry, second.number), (3, 2));
-    assert_eq!(store.sessions(&Tenant::default(), 10, None).await.unwrap()[0].observations, 2);
+    assert_eq!(store.sessions(&Tenant::default(), &newest(10)).await.unwrap().sessions[0].observations, 2);
     let told = |row: AuditRow| (row.deed, row.outcome);
     let filter = AuditFilter { object: Some("s".into()), ..AuditFilter::default() };
     let audit = store.deeds(&filter, 10, None).await.unwrap().into_iter().map(told);
@@ -516,7 +521,7 @@ async fn many_sessions_commit_in_groups(place: &Place) {
         assert!(appends.into_iter().all(|append| append.unwrap().unwrap() == Append::Appended));
     }
     let store = place.reopen(store).await;
-    let listed = store.sessions(&Tenant::default(), 100, None).await.unwrap();
+    let listed = store.sessions(&Tenant::default(), &newest(100)).await.unwrap().sessions;
     assert_eq!(listed.len(), 50);
     assert!(listed.iter().all(|session| session.observations == 4));
 }
@@ -562,7 +567,7 @@ async fn reads_run_on_any_thread(place: &Place) {
         store.policies(&Tenant::default(), 1, None).await?;
         store.jobs(&Tenant::default(), 1, None).await?;
         store.entries("s").await?;
-        store.sessions(&Tenant::default(), 1, None).await?;
+        store.sessions(&Tenant::default(), &newest(1)).await?;
         store.session(&Tenant::default(), "s").await
     });
     assert_eq!(read.await.unwrap().unwrap().unwrap().session, "s");
@@ -801,8 +806,8 @@ async fn tenants_see_only_their_own(place: &Place) {
         store.create_session(session_of("south", "s1"), Relabel::default(), None).await.unwrap(),
         CreateSession::Created
     );
-    assert_eq!(store.sessions(&north, 10, None).await.unwrap(), []);
-    assert_eq!(store.sessions(&south, 10, None).await.unwrap().len(), 1);
+    assert_eq!(store.sessions(&north, &newest(10)).await.unwrap().sessions, []);
+    assert_eq!(store.sessions(&south, &newest(10)).await.unwrap().sessions.len(), 1);
     assert!(!store.delete_session(&north, "s1").await.unwrap());
     // The sessions of one tenant keep its policy, not that of another; the bytes go with the last owner.
     assert_eq!(store.delete_policy(&north, &policy).await.unwrap(), DeletePolicy::Deleted);

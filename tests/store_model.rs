@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use ballast::control::policy::content_hash;
 use ballast::store::{
     Append, CreateJob, CreateSession, DeleteJob, DeletePolicy, EntryKind, EntryRow, JobKind, JobOutcome, JobRow,
-    JobState, NewJob, OverQuota, Quota, Quotas, Relabel, SessionRow, Store, StoreError, Tenant, Usage,
+    JobState, NewJob, OverQuota, Quota, Quotas, Relabel, SessionQuery, SessionRow, Store, StoreError, Tenant, Usage,
 };
 use proptest::prelude::*;
 use support::place::Place;
@@ -490,7 +490,8 @@ async fn compare(store: &Store, model: &Model) {
     let policies: Vec<_> = policies.into_iter().rev().map(|row| row.policy).collect();
     let owned = model.policies.iter().filter(|policy| policy.0 == 0);
     assert_eq!(policies, owned.map(|policy| policy_name(policy.1)).collect::<Vec<_>>());
-    let sessions = store.sessions(&Tenant::default(), 1000, None).await.unwrap();
+    let newest = SessionQuery { limit: 1000, descending: true, ..SessionQuery::default() };
+    let sessions = store.sessions(&Tenant::default(), &newest).await.unwrap().sessions;
     assert_eq!(sessions.len(), model.sessions.len());
     for (row, (session, policy, contents)) in sessions.iter().rev().zip(&model.sessions) {
         assert_eq!((&row.session, &row.policy), (&session_name(*session), &policy_name(*policy)));

@@ -25,6 +25,7 @@ mod jobs;
 mod labels;
 mod listener;
 mod operations;
+mod overview;
 mod page;
 mod patient;
 mod policies;

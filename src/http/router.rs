@@ -22,7 +22,7 @@ use super::hosts::Hosts;
 use super::problem::{Problem, ProblemKind};
 use super::{
     access, advise, audit, backtests, bounds, dashboard, defaults, described, documentation, evaluations, events,
-    frontiers, jobs, labels, operations, policies, reports, returns, sessions, telemetry, what_if, wire,
+    frontiers, jobs, labels, operations, overview, policies, reports, returns, sessions, telemetry, what_if, wire,
 };
 use crate::service::Service;
 use crate::service::config::Config;
@@ -63,7 +63,7 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(policies::get, policies::delete, labels::of_policy))
         .routes(routes!(policies::export))
         .routes(routes!(policies::import))
-        .routes(routes!(sessions::open, sessions::list))
+        .routes(routes!(sessions::open, overview::list))
         .routes(routes!(sessions::get, sessions::delete, labels::of_session))
         .routes(routes!(sessions::history))
         .routes(routes!(reports::observe))

@@ -12,9 +12,8 @@ use utoipa::ToSchema;
 
 use super::access::{self, Asked, By, Live, Read};
 use super::action::ActionAnswer;
-use super::extract::{Id, JsonBody, Parameters};
+use super::extract::{Id, JsonBody};
 use super::jobs::idempotency_key;
-use super::page::{self, Page};
 use super::problem::Problem;
 use super::wire;
 use crate::control::policy::advisor::AdviceMode;
@@ -56,24 +55,6 @@ pub async fn open(
     let session = wire::Session { labels: called, ..live.into() };
     let location = [(header::LOCATION, format!("/sessions/{}", session.session))];
     Ok((StatusCode::CREATED, location, Json(session)).into_response())
-}
-
-/// List sessions, newest first.
-#[utoipa::path(get, path = "/sessions", tag = "sessions",
-    params(("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
-           ("after" = Option<i64>, Query, description = "The `next` of the page before.")),
-    responses(
-        (status = 200, description = "A page of sessions.", body = wire::SessionPage),
-        (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
-pub async fn list(
-    State(service): State<Arc<Service>>,
-    By(caller, _): By<Read>,
-    Parameters(page): Parameters<Page>,
-) -> Result<Json<wire::SessionPage>, Problem> {
-    let (limit, after) = page.bounds()?;
-    let rows = service.sessions.list(&caller.tenant, limit, after).await?;
-    let next = page::next(rows.len(), limit, rows.last().map(|row| row.sequence));
-    Ok(Json(wire::SessionPage { sessions: rows.into_iter().map(Into::into).collect(), next }))
 }
 
 /// A session: coming period, wealth, state.

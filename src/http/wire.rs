@@ -22,7 +22,7 @@ use crate::service::known::KnownReturns;
 use crate::service::live::Live;
 use crate::service::plan::Renewing;
 use crate::service::renewer::RenewalDue;
-use crate::store::{JobKind, JobState, Labels, PolicySummary, SessionSummary};
+use crate::store::{JobKind, JobState, Labels, PolicySummary};
 
 /// A job.
 #[derive(Debug, Serialize, ToSchema)]
@@ -241,7 +241,7 @@ pub struct Session {
     pub created_ms: i64,
 }
 
-fn session_state(observed: usize, horizon: usize) -> SessionState {
+pub fn session_state(observed: usize, horizon: usize) -> SessionState {
     if observed >= horizon { SessionState::Completed } else { SessionState::Active }
 }
 
@@ -268,43 +268,4 @@ impl From<Live> for Session {
             created_ms: live.row.created_ms,
         }
     }
-}
-
-/// A session in a list.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct SessionEntry {
-    pub session: String,
-    #[serde(flatten)]
-    pub labels: Labels,
-    /// The one that advises the coming period.
-    pub policy: String,
-    pub period: usize,
-    /// The last period that the policy advises.
-    pub horizon: usize,
-    pub state: SessionState,
-    pub initial_wealth: f64,
-    pub created_ms: i64,
-}
-
-impl From<SessionSummary> for SessionEntry {
-    fn from(row: SessionSummary) -> Self {
-        SessionEntry {
-            period: row.observations + 1,
-            state: session_state(row.observations, row.horizon),
-            session: row.session,
-            labels: row.labels,
-            policy: row.policy,
-            horizon: row.horizon,
-            initial_wealth: row.initial_wealth,
-            created_ms: row.created_ms,
-        }
-    }
-}
-
-/// A page of sessions, newest first.
-#[derive(Debug, Serialize, ToSchema)]
-pub struct SessionPage {
-    pub sessions: Vec<SessionEntry>,
-    /// Give it as `after` for the next page; null on the last.
-    pub next: Option<i64>,
 }

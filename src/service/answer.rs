@@ -1,5 +1,6 @@
 //! What is answered to a report and to a correction; kept with them, to be given again.
 
+use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -28,6 +29,11 @@ pub struct Observed {
     /// Of several assets, by their names: what is told beside is of their fund.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub assets: Option<ObservedAssets>,
+    /// Change of wealth by the period, what was added or reached otherwise included.
+    pub wealth_change: f64,
+    /// The last day that was reported, of this period or of one before.
+    #[schema(value_type = Option<String>, format = Date)]
+    pub date: Option<Date>,
     /// Whether the horizon is reached.
     pub completed: bool,
     /// Whether the returns still come as they came.
@@ -54,8 +60,23 @@ pub struct Corrected {
     /// Of several assets, before the coming period.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub assets: Option<Composed>,
+    /// Change of wealth by the last period observed, as it stands now.
+    pub wealth_change: f64,
+    /// The last day that is reported now.
+    #[schema(value_type = Option<String>, format = Date)]
+    pub date: Option<Date>,
     /// Whether the returns, as they stand, come as they came.
     pub drift: Drift,
     #[serde(flatten)]
     pub uncertainty: Uncertainty,
+}
+
+/// Where a session stands, as far as every answer that moves it says so.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+pub struct Stands {
+    pub wealth: f64,
+    pub holding: f64,
+    pub wealth_change: f64,
+    pub date: Option<Date>,
+    pub drift: Drift,
 }

@@ -180,6 +180,8 @@ impl Live {
                 executed_allocations: named(&assets.names, &executed),
                 composed: assets.composed(),
             }),
+            wealth_change: standing.state.wealth - self.standing.state.wealth,
+            date: standing.date,
             completed: observe.period == self.horizon(),
             drift: standing.bet.told(),
             uncertainty,

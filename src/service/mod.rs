@@ -26,6 +26,7 @@ pub mod labels;
 pub mod live;
 pub mod memory;
 pub mod metrics;
+pub mod overview;
 pub mod periods;
 pub mod plan;
 pub mod policies;

@@ -76,6 +76,8 @@ pub struct PutRight {
     pub standing: Standing,
     /// Of the period put right; `None` where it is missing.
     pub log_return: Option<f64>,
+    /// By the last period, as it stands now.
+    pub wealth_change: f64,
 }
 
 /// What is read of the answer to an observation.
@@ -225,10 +227,11 @@ impl Periods {
         }
         let before = passage.standing;
         self.correct(correction)?;
-        let (mut corrected, mut passage) = (None, self.passage()?);
+        let (mut corrected, mut wealth_before, mut passage) = (None, f64::NAN, self.passage()?);
         for (period, stood) in (1..).zip(stood) {
             let passed = passage.next().map_err(|(period, error)| in_period(period, correction, error))?;
             let Some(Step { before, seen, log_return, .. }) = passed else { break };
+            wealth_before = before.state.wealth;
             if period == correction.period {
                 corrected = log_return;
             }
@@ -244,7 +247,8 @@ impl Periods {
             }
         }
         let standing = passage.last()?;
-        Ok(PutRight { before, standing, log_return: corrected })
+        let wealth_change = standing.state.wealth - wealth_before;
+        Ok(PutRight { before, standing, log_return: corrected, wealth_change })
     }
 
     /// Where the session stands after all of them.

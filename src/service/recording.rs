@@ -98,7 +98,8 @@ impl Sessions {
             current.follows(correct.period, advisor.specification().problem.framework)?;
             let putting = correct.clone();
             let put_right = move || periods.put_right(&putting);
-            let PutRight { before, standing, log_return } = self.advising.run(tenant, put_right).await??;
+            let PutRight { before, standing, log_return, wealth_change } =
+                self.advising.run(tenant, put_right).await??;
             let step = current.step(observed);
             let (standing, uncertainty) = measured(&self.advising, &advisor, tenant, step, standing).await?;
             let radius = Some(uncertainty.radius);
@@ -111,6 +112,8 @@ impl Sessions {
                 wealth: standing.state.wealth,
                 holding: standing.state.holding,
                 assets: standing.assets.as_ref().map(|assets| assets.composed()),
+                wealth_change,
+                date: standing.date,
                 drift: standing.bet.told(),
                 uncertainty,
             };

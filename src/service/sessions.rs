@@ -38,7 +38,7 @@ use crate::control::policy::content_hash;
 use crate::control::problem::state::State;
 use crate::control::request::assets::check_rows;
 use crate::control::request::specification::Specification;
-use crate::store::{CreateSession, Relabel, RequestKey, SessionFacts, SessionRow, SessionSummary, Store, Tenant};
+use crate::store::{CreateSession, Relabel, RequestKey, SessionFacts, SessionRow, Store, Tenant};
 
 /// Entries replayed in a few milliseconds.
 const PROMPT_ENTRIES: usize = 520;
@@ -227,19 +227,6 @@ impl Sessions {
     /// Requests that wait for their turn to be advised, and to have a step solved.
     pub fn waiting(&self) -> [(&'static str, usize); 2] {
         [&self.advising, &self.resolving].map(|turns| (turns.name, turns.waiting()))
-    }
-
-    /// At most `limit` sessions, newest first, after the session with sequence `after`.
-    ///
-    /// # Errors
-    /// The store does not answer.
-    pub async fn list(
-        &self,
-        tenant: &Tenant,
-        limit: usize,
-        after: Option<i64>,
-    ) -> Result<Vec<SessionSummary>, ServiceError> {
-        Ok(self.store.sessions(tenant, limit, after).await?)
     }
 
     /// # Errors

@@ -33,8 +33,8 @@ const TOTALS: &str = "
         UNION ALL SELECT tenant, 0, octet_length(json) FROM job_reports JOIN jobs ON jobs.job = job_reports.job
         UNION ALL SELECT tenant, 0, $1 + octet_length(json)
             FROM policy_owners JOIN policies ON policies.policy = policy_owners.policy
-        UNION ALL SELECT tenant, 0, octet_length(name) + octet_length(notes) + octet_length(tags) + octet_length(folded)
-            FROM labels
+        UNION ALL SELECT tenant, 0, octet_length(name) + octet_length(notes) + octet_length(tags)
+            + octet_length(folded_name) + octet_length(folded_tags) FROM labels
         UNION ALL SELECT tenant, 1, $1 + octet_length(initial_history) + room * $2 FROM sessions
     ), sums (tenant, sessions, bytes) AS (SELECT tenant, sum(sessions), sum(bytes) FROM parts GROUP BY tenant)
     SELECT coalesce(usage.tenant, sums.tenant) AS tenant, usage.sessions, CAST(sums.sessions AS BIGINT) AS counted,

@@ -128,13 +128,9 @@ impl Labels {
     }
 
     fn bytes(&self) -> i64 {
-        let texts = [&self.name, &self.notes, &self.tags_column(), &self.folded()];
+        let tags = self.tags_column();
+        let texts = [&self.name, &self.notes, &tags, &self.name.to_lowercase(), &tags.to_lowercase()];
         texts.iter().map(|text| quotas::length(text.as_bytes())).sum()
-    }
-
-    /// What they are found by, in lower case.
-    fn folded(&self) -> String {
-        format!("{}{}", self.name, self.tags_column()).to_lowercase()
     }
 }
 
@@ -221,9 +217,11 @@ pub(super) async fn put(
     let grown = -before.bytes();
     let labels = before.after(change);
     let write = query(
-        "INSERT INTO labels (tenant, object, name, notes, tags, folded) VALUES ($1, $2, $3, $4, $5, $6)
+        "INSERT INTO labels (tenant, object, name, notes, tags, folded_name, folded_tags)
+         VALUES ($1, $2, $3, $4, $5, $6, $7)
          ON CONFLICT (tenant, object) DO UPDATE SET name = excluded.name, notes = excluded.notes,
-                                                    tags = excluded.tags, folded = excluded.folded",
+                                                    tags = excluded.tags, folded_name = excluded.folded_name,
+                                                    folded_tags = excluded.folded_tags",
     );
     let write = write
         .bind(tenant.as_str())
@@ -231,7 +229,8 @@ pub(super) async fn put(
         .bind(labels.name.as_str())
         .bind(labels.notes.as_str())
         .bind(labels.tags_column())
-        .bind(labels.folded());
+        .bind(labels.name.to_lowercase())
+        .bind(labels.tags_column().to_lowercase());
     connection.execute(write).await?;
     let grown = grown + labels.bytes();
     Ok((labels, Usage::of_bytes(grown)))

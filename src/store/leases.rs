@@ -19,6 +19,7 @@ use super::labels::{self, Labelled};
 use super::query::{Connection, Query, Row, query};
 use super::quotas::{self, Quotas, Usage};
 use super::{Store, StoreError, policies, turns};
+use crate::control::policy::periods_per_year;
 
 /// Workers that may die under a job between two checkpoints.
 const MOST_DEATHS: i64 = 3;
@@ -73,11 +74,16 @@ impl Store {
         outcome: JobOutcome,
         now_ms: i64,
     ) -> Result<bool, StoreError> {
+        let mut year = None;
         if let JobOutcome::Succeeded { policy_id, policy_json } = &outcome {
             policies::verify(policy_id, policy_json).map_err(|failure| failure.during("finishing a job"))?;
+            year = periods_per_year(policy_json);
         }
         let job = job.to_owned();
-        self.write("finishing a job", move |connection| finish(connection, job, attempt, outcome, now_ms).boxed()).await
+        self.write("finishing a job", move |connection| {
+            finish(connection, job, attempt, (outcome, year), now_ms).boxed()
+        })
+        .await
     }
 
     /// Puts the job back in the queue with its checkpoints; one that was asked to stop is cancelled. False when fenced.
@@ -209,7 +215,7 @@ async fn finish(
     mut connection: Connection<'_>,
     job: String,
     attempt: i64,
-    outcome: JobOutcome,
+    (outcome, year): (JobOutcome, Option<f64>),
     now_ms: i64,
 ) -> Result<bool, Failure> {
     let connection = &mut connection;
@@ -222,7 +228,7 @@ async fn finish(
     let Ok(next) = row.state.next(event) else { return Ok(false) };
     let update = match outcome {
         JobOutcome::Succeeded { policy_id, policy_json } => {
-            policies::insert(connection, &row.tenant, &policy_id, policy_json, now_ms, Quotas::NONE).await?;
+            policies::insert(connection, &row.tenant, &policy_id, (policy_json, year), now_ms, Quotas::NONE).await?;
             let labels = labels_of(connection, &job).await?;
             if !labels.is_empty() {
                 labels::hold(connection, &row.tenant, Labelled::Policy, &policy_id).await?;

@@ -38,6 +38,7 @@ mod keys;
 mod labels;
 mod leases;
 mod migrations;
+mod overview;
 mod policies;
 mod postgres;
 mod query;
@@ -69,13 +70,14 @@ pub use job::{ClaimedJob, CreateJob, JobCounts, JobKind, JobOutcome, JobRow, New
 pub use job_state::{IllegalTransition, JobEvent, JobState};
 pub use keys::{KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, Successor};
 pub use labels::{LONGEST_NAME, LONGEST_NOTES, LONGEST_TAG, Labelled, Labels, MOST_TAGS, Relabel, given};
+pub use overview::{SessionIs, SessionKey, SessionList, SessionOrder, SessionPlace, SessionQuery, SessionSummary};
 pub use policies::{DeletePolicy, PolicyRow, PolicySummary};
 pub use postgres::{PostgresUrl, UrlError};
 pub use quotas::{Quotas, Usage};
 pub use renewals::Onto;
 pub use retention::{DeleteJob, Room};
 pub use seen::Seen;
-pub use sessions::{CreateSession, SessionFacts, SessionRow, SessionSummary};
+pub use sessions::{CreateSession, SessionFacts, SessionRow};
 pub use tenant::Tenant;
 
 /// The durable facts of one folder or one database. Clones share the connections.

@@ -11,7 +11,7 @@ use super::query::{Connection, Row, query};
 use super::quotas::{self, Quotas, ROW_BYTES, Usage};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
-use crate::control::policy::content_hash;
+use crate::control::policy::{content_hash, periods_per_year};
 
 /// A policy as stored, its bytes verified against its name.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,11 +59,12 @@ impl Store {
     ) -> Result<bool, StoreError> {
         let doing = "inserting a policy";
         verify(id, json).map_err(|failure| failure.during(doing))?;
-        let (tenant, id, json) = (tenant.clone(), id.to_owned(), json.to_vec());
+        // Before the write, which others wait for.
+        let (tenant, id, year, json) = (tenant.clone(), id.to_owned(), periods_per_year(json), json.to_vec());
         let (quotas, actor) = (self.quotas, self.actor.clone());
         self.write(doing, move |mut connection| {
             async move {
-                let is_new = insert(&mut connection, &tenant, &id, json, created_ms, quotas).await?;
+                let is_new = insert(&mut connection, &tenant, &id, (json, year), created_ms, quotas).await?;
                 if is_new {
                     audit::record(&mut connection, &actor, &tenant, Deed::ImportPolicy, &id, "stored").await?;
                 }
@@ -124,16 +125,17 @@ pub(super) async fn insert(
     connection: &mut Connection<'_>,
     tenant: &Tenant,
     id: &str,
-    json: Vec<u8>,
+    (json, periods_per_year): (Vec<u8>, Option<f64>),
     created_ms: i64,
     quotas: Quotas,
 ) -> Result<bool, Failure> {
     let bytes = Usage::of_bytes(ROW_BYTES + quotas::length(&json));
     let insert = |json: Vec<u8>| {
-        query("INSERT INTO policies (policy, created_ms, json) VALUES ($1, $2, $3) ON CONFLICT (policy) DO NOTHING")
-            .bind(id)
-            .bind(created_ms)
-            .bind(json)
+        let insert = query(
+            "INSERT INTO policies (policy, created_ms, periods_per_year, json) VALUES ($1, $2, $3, $4)
+             ON CONFLICT (policy) DO NOTHING",
+        );
+        insert.bind(id).bind(created_ms).bind(periods_per_year).bind(json)
     };
     connection.execute(insert(json.clone())).await?;
     let kept = query("SELECT sequence FROM policies WHERE policy = $1").bind(id);

@@ -3,6 +3,8 @@
 //! Both engines speak the SQL that is written here, with `$1`; where they differ, it is said once, in this file:
 //! PostgreSQL locks the rows a decision rests on, where SQLite's one writer meets nobody.
 
+use std::borrow::Cow;
+
 use sqlx::postgres::{PgArguments, PgConnection, PgRow};
 use sqlx::query::Query as Statement;
 use sqlx::sqlite::{SqliteArguments, SqliteConnection, SqliteRow};
@@ -23,7 +25,7 @@ pub(super) enum Purpose {
 
 /// A statement and the values of `$1`, `$2` and so on.
 pub(super) struct Query {
-    sql: &'static str,
+    sql: Cow<'static, str>,
     lock: &'static str,
     values: Vec<Value>,
 }
@@ -34,11 +36,13 @@ pub(super) enum Value {
     /// An integer, or NULL.
     Optional(Option<i64>),
     Real(f64),
+    /// A real number, or NULL.
+    OptionalReal(Option<f64>),
     Bytes(Vec<u8>),
 }
 
-pub(super) fn query(sql: &'static str) -> Query {
-    Query { sql, lock: "", values: Vec::new() }
+pub(super) fn query(sql: impl Into<Cow<'static, str>>) -> Query {
+    Query { sql: sql.into(), lock: "", values: Vec::new() }
 }
 
 impl Query {
@@ -68,13 +72,17 @@ impl Query {
     }
 
     fn sqlite(self) -> Statement<'static, Sqlite, SqliteArguments> {
-        bound(sqlx::query(self.sql), self.values)
+        let statement = match self.sql {
+            Cow::Borrowed(sql) => sqlx::query(sql),
+            Cow::Owned(sql) => sqlx::query(AssertSqlSafe(sql)),
+        };
+        bound(statement, self.values)
     }
 
     fn postgres(self) -> Statement<'static, Postgres, PgArguments> {
-        let statement = match self.lock {
-            "" => sqlx::query(self.sql),
-            lock => sqlx::query(AssertSqlSafe(format!("{}{lock}", self.sql))),
+        let statement = match (self.sql, self.lock) {
+            (Cow::Borrowed(sql), "") => sqlx::query(sql),
+            (sql, lock) => sqlx::query(AssertSqlSafe(format!("{sql}{lock}"))),
         };
         bound(statement, self.values.into_iter().map(Value::without_nul).collect())
     }
@@ -89,6 +97,7 @@ where
     i64: Encode<'static, DB> + Type<DB>,
     Option<i64>: Encode<'static, DB> + Type<DB>,
     f64: Encode<'static, DB> + Type<DB>,
+    Option<f64>: Encode<'static, DB> + Type<DB>,
     Vec<u8>: Encode<'static, DB> + Type<DB>,
 {
     values.into_iter().fold(statement, |statement, value| match value {
@@ -96,6 +105,7 @@ where
         Value::Integer(integer) => statement.bind(integer),
         Value::Optional(integer) => statement.bind(integer),
         Value::Real(real) => statement.bind(real),
+        Value::OptionalReal(real) => statement.bind(real),
         Value::Bytes(bytes) => statement.bind(bytes),
     })
 }
@@ -137,6 +147,12 @@ impl From<Option<i64>> for Value {
 impl From<f64> for Value {
     fn from(real: f64) -> Self {
         Value::Real(real)
+    }
+}
+
+impl From<Option<f64>> for Value {
+    fn from(real: Option<f64>) -> Self {
+        Value::OptionalReal(real)
     }
 }
 

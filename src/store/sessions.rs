@@ -8,7 +8,7 @@ use super::entries::EntryRow;
 use super::error::Failure;
 use super::head::Head;
 use super::idempotency::{self, RequestKey, Used};
-use super::labels::{self, Labels, Relabel};
+use super::labels::{self, Relabel};
 use super::query::{Connection, Row, query};
 use super::quotas::{self, Quotas, Usage};
 use super::seen::Seen;
@@ -58,23 +58,6 @@ pub struct SessionFacts {
     pub seen: Seen,
 }
 
-/// A session without its history.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SessionSummary {
-    /// Order of creation; the cursor of [`Store::sessions`].
-    pub sequence: i64,
-    pub session: String,
-    /// The one that advises the coming period.
-    pub policy: String,
-    pub initial_wealth: f64,
-    /// The last period that the policy advises.
-    pub horizon: usize,
-    pub created_ms: i64,
-    /// Number of periods observed.
-    pub observations: usize,
-    pub labels: Labels,
-}
-
 impl Store {
     /// Opens a session, calls it what it is to be called and records its idempotency key, all or nothing.
     ///
@@ -111,28 +94,6 @@ impl Store {
         let Some(entries) = self.entries(session).await? else { return Ok(None) };
         let head = entries.last().map_or_else(|| row.head(), EntryRow::head);
         Ok(Some(SessionFacts { row, entries, seen: Seen { head, change } }))
-    }
-
-    /// At most `limit` sessions of a tenant, newest first; `after` is the `sequence` of the last row of the page before.
-    pub async fn sessions(
-        &self,
-        tenant: &Tenant,
-        limit: usize,
-        after: Option<i64>,
-    ) -> Result<Vec<SessionSummary>, StoreError> {
-        let page = query(
-            "SELECT sequence, session, initial_wealth, created_ms, name, notes, tags,
-                    coalesce((SELECT policy FROM renewals WHERE renewals.session = sessions.session
-                              ORDER BY number DESC LIMIT 1), policy) AS policy,
-                    coalesce((SELECT horizon FROM renewals WHERE renewals.session = sessions.session
-                              ORDER BY number DESC LIMIT 1), horizon) AS horizon,
-                    coalesce((SELECT number FROM entries WHERE entries.session = sessions.session AND kind = 'observation'
-                              ORDER BY entry DESC LIMIT 1), 0) AS observations
-             FROM sessions LEFT JOIN labels ON labels.tenant = sessions.tenant AND labels.object = sessions.session
-             WHERE sessions.tenant = $1 AND sequence < $2 ORDER BY sequence DESC LIMIT $3",
-        );
-        let page = page.bind(tenant.as_str()).bind(after.unwrap_or(i64::MAX)).bind(to_sql(limit));
-        self.list("listing sessions", page, |rows| rows.iter().map(SessionSummary::from_row).collect()).await
     }
 
     /// Deletes a session of a tenant and its entries. False where there was none.
@@ -296,20 +257,5 @@ impl SessionRow {
         };
         read.seal().verify(&row.get::<Vec<u8>>("seal")?, what)?;
         Ok(read)
-    }
-}
-
-impl SessionSummary {
-    fn from_row(row: &Row) -> Result<Self, Failure> {
-        Ok(SessionSummary {
-            sequence: row.get("sequence")?,
-            session: row.get("session")?,
-            policy: row.get("policy")?,
-            initial_wealth: row.get("initial_wealth")?,
-            horizon: from_sql(row.get("horizon")?)?,
-            created_ms: row.get("created_ms")?,
-            observations: from_sql(row.get("observations")?)?,
-            labels: Labels::from_row(row)?,
-        })
     }
 }

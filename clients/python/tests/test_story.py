@@ -195,6 +195,23 @@ def test_things_are_called(ballast: Ballast) -> None:
     assert refusal.value.field == "tags[1]"
 
 
+def test_sessions_are_found_and_in_order(ballast: Ballast, session: Session) -> None:
+    opened = [ballast.policy(session.policy).session(name=f"Ordered {n}", wealth=100.0 + n, tags=["o"]) for n in (2, 1)]
+    opened[0].observe(log_return=0.01, date="2020-01-31")
+    richest = list(ballast.sessions(search="ORDERED", sort="-wealth"))
+    assert [entry["name"] for entry in richest] == ["Ordered 2", "Ordered 1"]
+    assert [entry["session"] for entry in ballast.sessions(tag="o", sort="name", state="active")] == [
+        opened[1].id,
+        opened[0].id,
+    ]
+    assert richest[0]["wealth"] == opened[0].wealth and richest[0]["wealth_change"] == opened[0].wealth - 102.0
+    pd = pytest.importorskip("pandas")
+    frame = package.frames.sessions(richest)
+    assert list(frame.index) == [opened[0].id, opened[1].id]
+    assert frame["date"].iloc[0] == pd.Timestamp("2020-01-31") and pd.isna(frame["last_report"].iloc[1])
+    assert package.frames.sessions([]).empty
+
+
 def test_many_sessions_report_at_once(ballast: Ballast, session: Session) -> None:
     other = ballast.policy(session.policy).session()
     reports: list[wire.Observe] = [

@@ -15,6 +15,23 @@ use crate::control::request::specification::Specification;
 use crate::control::solved_step::{FORMAT, StepDiagnostics, StepSolution};
 use crate::control::surrogate::stored::{SingleSolution, Solution, StepSurrogates};
 
+/// The periods that a year has by the specification in a policy's bytes, where it says; none of bytes that are no policy.
+pub fn periods_per_year(json: &[u8]) -> Option<f64> {
+    #[derive(Deserialize)]
+    struct Document {
+        specification: Specified,
+    }
+    #[derive(Deserialize)]
+    struct Specified {
+        problem: Problem,
+    }
+    #[derive(Deserialize)]
+    struct Problem {
+        periods_per_year: Option<f64>,
+    }
+    serde_json::from_slice::<Document>(json).ok().and_then(|document| document.specification.problem.periods_per_year)
+}
+
 /// The completed specification and the solution of every step, in ascending order of step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -11,4 +11,4 @@ pub mod walk;
 pub mod what_if;
 pub mod worst_case;
 
-pub use document::{Policy, content_hash};
+pub use document::{Policy, content_hash, periods_per_year};

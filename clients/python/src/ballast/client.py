@@ -6,7 +6,7 @@ import itertools
 import os
 from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 from types import TracebackType
-from typing import Any, cast
+from typing import Any, Literal, TypeAlias, cast
 from urllib.parse import quote
 
 import httpx
@@ -29,6 +29,11 @@ from .training import (
     WalkForward,
 )
 from .transport import RETRIED_STATUS, Awaiting, Transport, Waiting, growing_pause, idempotent
+
+#: What a list of sessions is in the order of; with ``-`` before it descending.
+SessionSort: TypeAlias = Literal[
+    "created", "-created", "name", "-name", "wealth", "-wealth", "last_report", "-last_report"
+]
 
 
 class _Ballast:
@@ -327,9 +332,20 @@ class _Ballast:
         """All policies, newest first."""
         return self._listed("/policies", "policies")
 
-    def _sessions(self) -> AsyncIterator[wire.SessionEntry]:
-        """All sessions, newest first."""
-        return self._listed("/sessions", "sessions")
+    def _sessions(
+        self,
+        *,
+        search: str | None = None,
+        tag: str | None = None,
+        state: Literal["active", "completed", "due"] | None = None,
+        sort: SessionSort | None = None,
+    ) -> AsyncIterator[wire.SessionEntry]:
+        """All sessions, or those that match, each with what it is called and where it stands; newest first unless told.
+
+        ``search`` is a part of a name, of a tag, of the session's or its policy's identifier or of the policy's name,
+        whatever the case; ``tag`` is one that they have. :func:`ballast.frames.sessions` makes a table of them.
+        """
+        return self._listed("/sessions", "sessions", search=search, tag=tag, state=state, sort=sort)
 
     def _audit(self, *, tenant: str | None = None, object: str | None = None) -> AsyncIterator[wire.AuditEntry]:
         """Who did what, newest first, of all tenants and things unless told; for keys with the role ``admin``."""
@@ -349,7 +365,7 @@ class _Ballast:
         )
 
     async def _listed(self, path: str, name: str, **wanted: str | None) -> AsyncIterator[Any]:
-        after: int | None = None
+        after: int | str | None = None
         while True:
             page = await self._transport.json("GET", path, params={"after": after, "limit": _PAGE, **wanted})
             for entry in page[name]:

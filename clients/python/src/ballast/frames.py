@@ -8,7 +8,7 @@ missing, the call raises ``ImportError`` and says what to install.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
 
@@ -89,6 +89,39 @@ def worst_means(advised: wire.AssetsAdvised) -> pd.DataFrame:
     Raises ``ImportError`` without pandas.
     """
     return require_pandas().DataFrame.from_dict(advised["worst_means"], orient="index", columns=["seen", "worst"])
+
+
+def sessions(entries: Iterable[wire.SessionEntry]) -> pd.DataFrame:
+    """What ``Ballast.sessions`` lists, a row for each session in the order of the list, with its identifier as index.
+
+    The columns are the fields of an entry but ``notes``: ``wealth`` and ``wealth_change`` are currencies, ``holding`` a
+    share of wealth, ``date`` the last day reported. ``created`` and ``last_report`` are times in UTC. What is not there
+    is NaN or ``NaT``. Raises ``ImportError`` without pandas.
+    """
+    pd = require_pandas()
+    frame = pd.DataFrame(list(entries), columns=["session", *_LISTED, "date", "created_ms", "last_report_ms"])
+    frame = frame.set_index("session")
+    times = {name: pd.to_datetime(frame.pop(f"{name}_ms"), unit="ms", utc=True) for name in ("created", "last_report")}
+    numbers = {name: frame[name].astype(float) for name in ("wealth_change", "periods_per_year")}
+    return frame.assign(date=pd.to_datetime(frame["date"]), **times, **numbers)
+
+
+_LISTED = (
+    "name",
+    "tags",
+    "policy",
+    "policy_name",
+    "periods_per_year",
+    "period",
+    "horizon",
+    "state",
+    "due",
+    "drift",
+    "initial_wealth",
+    "wealth",
+    "wealth_change",
+    "holding",
+)
 
 
 def walk_forward(report: wire.BacktestReport) -> pd.DataFrame:

@@ -1,5 +1,9 @@
 -- A seal is the SHA-256 of the row's fields, checked by every read.
 
+-- What SQLite calls so, of paths as '$.field' alone.
+CREATE FUNCTION json_extract(document TEXT, path TEXT) RETURNS TEXT LANGUAGE SQL IMMUTABLE
+    RETURN CAST(document AS json) ->> substr(path, 3);
+
 CREATE TABLE jobs (
     sequence         BIGINT GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
     job              TEXT NOT NULL UNIQUE,
@@ -68,6 +72,8 @@ CREATE TABLE policies (
     sequence   BIGINT GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
     policy     TEXT NOT NULL UNIQUE,
     created_ms BIGINT NOT NULL,
+    -- As its specification says; before its bytes, which a list passes over.
+    periods_per_year DOUBLE PRECISION,
     json       BYTEA NOT NULL
 );
 
@@ -129,8 +135,9 @@ CREATE TABLE labels (
     notes  TEXT NOT NULL,
     -- Each between line breaks.
     tags   TEXT NOT NULL,
-    -- Name and tags in lower case, to be found by.
-    folded TEXT NOT NULL,
+    -- The same in lower case, to be found and put in order by.
+    folded_name TEXT NOT NULL,
+    folded_tags TEXT NOT NULL,
     PRIMARY KEY (tenant, object)
 );
 

@@ -69,6 +69,8 @@ CREATE TABLE policies (
     sequence   INTEGER PRIMARY KEY AUTOINCREMENT,
     policy     TEXT NOT NULL UNIQUE,
     created_ms INTEGER NOT NULL,
+    -- As its specification says; before its bytes, which a list passes over.
+    periods_per_year ANY,
     json       BLOB NOT NULL
 ) STRICT;
 
@@ -130,8 +132,9 @@ CREATE TABLE labels (
     notes  TEXT NOT NULL,
     -- Each between line breaks.
     tags   TEXT NOT NULL,
-    -- Name and tags in lower case, to be found by.
-    folded TEXT NOT NULL,
+    -- The same in lower case, to be found and put in order by.
+    folded_name TEXT NOT NULL,
+    folded_tags TEXT NOT NULL,
     PRIMARY KEY (tenant, object)
 ) STRICT, WITHOUT ROWID;
 

@@ -1,0 +1,244 @@
+//! The list of sessions: searched, put in order, page by page.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use jiff::civil::Date;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::access::{By, Read};
+use super::extract::Parameters;
+use super::page::Page;
+use super::problem::{Problem, ProblemKind};
+use super::wire::{SessionState, session_state};
+use crate::control::error::FieldError;
+use crate::service::Service;
+use crate::service::drift::DriftLevel;
+use crate::service::overview::Listed;
+use crate::store::{Labels, SessionIs, SessionKey, SessionOrder, SessionPlace, SessionQuery};
+
+/// Letters of what is searched for: more than any name has.
+const LONGEST_SEARCH: usize = 100;
+
+/// Query parameters of the list, as text.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Asked {
+    search: Option<String>,
+    tag: Option<String>,
+    state: Option<Is>,
+    sort: Option<String>,
+    limit: Option<String>,
+    after: Option<String>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+enum Is {
+    Active,
+    Completed,
+    Due,
+}
+
+/// A session in a list.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct SessionEntry {
+    pub session: String,
+    #[serde(flatten)]
+    pub labels: Labels,
+    /// The one that advises the coming period.
+    pub policy: String,
+    /// What that is called; empty where it is called nothing.
+    pub policy_name: String,
+    /// Of that policy, where it says.
+    pub periods_per_year: Option<f64>,
+    /// The coming period, from 1; `horizon + 1` once completed.
+    pub period: usize,
+    /// The last period that the policy advises.
+    pub horizon: usize,
+    pub state: SessionState,
+    pub initial_wealth: f64,
+    pub wealth: f64,
+    /// Share of wealth in the risky asset, before trading.
+    pub holding: f64,
+    /// Change of wealth by the last period; null before the first.
+    pub wealth_change: Option<f64>,
+    /// The last day that was reported.
+    #[schema(value_type = Option<String>, format = Date)]
+    pub date: Option<Date>,
+    /// When it last reported a period, or put one right.
+    pub last_report_ms: Option<i64>,
+    /// Whether its next policy is to be trained.
+    pub due: bool,
+    /// Whether the returns still come as they came.
+    pub drift: DriftLevel,
+    pub created_ms: i64,
+}
+
+impl From<Listed> for SessionEntry {
+    fn from(Listed { row, stands }: Listed) -> Self {
+        SessionEntry {
+            period: row.observations + 1,
+            state: session_state(row.observations, row.horizon),
+            wealth: stands.map_or(row.initial_wealth, |stands| stands.wealth),
+            holding: stands.map_or(row.initial_holding, |stands| stands.holding),
+            wealth_change: stands.map(|stands| stands.wealth_change),
+            date: stands.and_then(|stands| stands.date),
+            drift: stands.map_or(DriftLevel::None, |stands| stands.drift.level),
+            last_report_ms: row.last.map(|(_, reported_ms)| reported_ms),
+            session: row.session,
+            labels: row.labels,
+            policy: row.policy,
+            policy_name: row.policy_name,
+            periods_per_year: row.periods_per_year,
+            horizon: row.horizon,
+            initial_wealth: row.initial_wealth,
+            due: row.is_due,
+            created_ms: row.created_ms,
+        }
+    }
+}
+
+/// A page of sessions.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct SessionPage {
+    pub sessions: Vec<SessionEntry>,
+    /// Sessions that match, on all pages together.
+    pub total: usize,
+    /// Give it as `after` for the next page; null on the last.
+    pub next: Option<String>,
+}
+
+/// List sessions: all, or those that match, in some order, newest first unless told.
+#[utoipa::path(get, path = "/sessions", tag = "sessions",
+    params(("search" = Option<String>, Query, max_length = 100, description = "Part of a name, of a tag, of the session's or its policy's identifier or of the policy's name, whatever the case."),
+           ("tag" = Option<String>, Query, max_length = 50, description = "One that they have."),
+           ("state" = inline(Option<Is>), Query, description = "`due`: to be renewed by itself."),
+           ("sort" = Option<String>, Query, description = "`created`, `name`, `wealth` or `last_report`, with `-` before it for descending; default `-created`."),
+           ("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
+           ("after" = Option<String>, Query, description = "The `next` of the page before, of the same `sort`.")),
+    responses(
+        (status = 200, description = "A page of sessions.", body = SessionPage),
+        (status = 400, description = "A parameter breaks a rule.", body = Problem, content_type = "application/problem+json")))]
+pub async fn list(
+    State(service): State<Arc<Service>>,
+    By(caller, _): By<Read>,
+    Parameters(asked): Parameters<Asked>,
+) -> Result<Json<SessionPage>, Problem> {
+    let asked = asked.read()?;
+    let found = service.sessions.list(&caller.tenant, &asked).await?;
+    let last = found.sessions.last().filter(|_| found.sessions.len() == asked.limit);
+    let next = last.map(|last| cursor(&asked, &last.row.place));
+    let sessions = found.sessions.into_iter().map(SessionEntry::from).collect();
+    Ok(Json(SessionPage { sessions, total: found.total, next }))
+}
+
+fn refused(field: &str, value: &str, rule: impl Into<String>) -> Problem {
+    Problem::of_field(ProblemKind::InvalidQuery, FieldError::new(field, value, rule))
+}
+
+impl Asked {
+    fn read(self) -> Result<SessionQuery, Problem> {
+        let (limit, _) = Page::new(self.limit, None).bounds()?;
+        if let Some(search) = self.search.as_ref().filter(|search| search.chars().count() > LONGEST_SEARCH) {
+            return Err(refused("search", search, format!("must have at most {LONGEST_SEARCH} letters")));
+        }
+        let sort = self.sort.as_deref().unwrap_or("-created");
+        let (word, descending) = sort.strip_prefix('-').map_or((sort, false), |word| (word, true));
+        let order = match word {
+            "created" => SessionOrder::Created,
+            "name" => SessionOrder::Name,
+            "wealth" => SessionOrder::Wealth,
+            "last_report" => SessionOrder::LastReport,
+            _ => {
+                let rule = "must be created, name, wealth or last_report, with - before it for descending";
+                return Err(refused("sort", sort, rule));
+            }
+        };
+        let is = self.state.map(|state| match state {
+            Is::Active => SessionIs::Active,
+            Is::Completed => SessionIs::Completed,
+            Is::Due => SessionIs::Due,
+        });
+        let search = self.search.filter(|search| !search.is_empty());
+        let asked = SessionQuery { search, tag: self.tag, is, order, descending, limit, after: None };
+        let after = self.after.map(|text| {
+            let rule = "must be the `next` of the page before, of the same sort";
+            place(&asked, &text).ok_or_else(|| refused("after", &text, rule))
+        });
+        Ok(SessionQuery { after: after.transpose()?, ..asked })
+    }
+}
+
+/// The order of a list, as its cursors begin.
+fn mark(asked: &SessionQuery) -> String {
+    let order = match asked.order {
+        SessionOrder::Created => 'c',
+        SessionOrder::Name => 'n',
+        SessionOrder::Wealth => 'w',
+        SessionOrder::LastReport => 'r',
+    };
+    format!("{order}{}", if asked.descending { 'd' } else { 'a' })
+}
+
+/// The place of a page's last row: what it is put in order by, as it was then, and which of those with the same it is.
+fn cursor(asked: &SessionQuery, SessionPlace { key, sequence }: &SessionPlace) -> String {
+    let key = match key {
+        SessionKey::Created => String::new(),
+        SessionKey::Name(name) => name.bytes().map(|byte| format!("{byte:02x}")).collect(),
+        SessionKey::Wealth(wealth) => format!("{:016x}", wealth.to_bits()),
+        SessionKey::LastReport(reported_ms) => reported_ms.to_string(),
+    };
+    format!("{}.{sequence}.{key}", mark(asked))
+}
+
+fn place(asked: &SessionQuery, text: &str) -> Option<SessionPlace> {
+    let (marked, rest) = text.split_once('.')?;
+    let (sequence, key) = rest.split_once('.')?;
+    let key = match asked.order {
+        _ if marked != mark(asked) => return None,
+        SessionOrder::Created => key.is_empty().then_some(SessionKey::Created)?,
+        SessionOrder::Name => SessionKey::Name(text_of(key)?),
+        SessionOrder::Wealth => {
+            let wealth = u64::from_str_radix(key, 16).ok().map(f64::from_bits);
+            SessionKey::Wealth(wealth.filter(|wealth| wealth.is_finite())?)
+        }
+        SessionOrder::LastReport => SessionKey::LastReport(key.parse().ok()?),
+    };
+    Some(SessionPlace { key, sequence: sequence.parse().ok()? })
+}
+
+/// Text from the hexadecimal digits of its bytes.
+fn text_of(digits: &str) -> Option<String> {
+    let pairs = digits.as_bytes().chunks(2);
+    let bytes = pairs.map(|pair| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok());
+    String::from_utf8(bytes.collect::<Option<_>>()?).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cursor_is_read_as_it_was_written_and_under_its_own_order_alone() {
+        for (order, key) in [
+            (SessionOrder::Created, SessionKey::Created),
+            (SessionOrder::Name, SessionKey::Name("été, \"x\"\u{1F600}".into())),
+            (SessionOrder::Name, SessionKey::Name(String::new())),
+            (SessionOrder::Wealth, SessionKey::Wealth(0.1 + 0.2)),
+            (SessionOrder::LastReport, SessionKey::LastReport(-7)),
+        ] {
+            let asked = SessionQuery { order, descending: true, ..SessionQuery::default() };
+            let found = SessionPlace { key, sequence: 41 };
+            let written = cursor(&asked, &found);
+            assert_eq!(place(&asked, &written), Some(found), "{written}");
+            assert_eq!(place(&SessionQuery { descending: false, ..asked.clone() }, &written), None);
+        }
+        let asked = SessionQuery { order: SessionOrder::Wealth, ..SessionQuery::default() };
+        for text in ["", "wa", "wa.1", "wa.x.3ff0000000000000", "wa.1.7ff0000000000000", "wa.1.zz", "17"] {
+            assert_eq!(place(&asked, text), None, "{text}");
+        }
+    }
+}

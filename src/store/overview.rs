@@ -1,0 +1,279 @@
+//! Sessions as an overview shows them: found, put in order and listed page by page.
+//!
+//! What a row tells of where its session stands is what its last entry answered, joined to it: nothing is kept twice, so
+//! that a row is never out of step with the entries, and an observation writes no more than its entry. Only what is listed
+//! is read; what pages are put in order by is read of every session that matches.
+
+use std::fmt;
+
+use super::codec::{from_sql, to_sql};
+use super::error::Failure;
+use super::labels::Labels;
+use super::query::{Query, Row, Value, query};
+use super::tenant::Tenant;
+use super::{Store, StoreError};
+
+/// What a list is in the order of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SessionOrder {
+    /// As they were opened.
+    #[default]
+    Created,
+    /// By their names, whatever the case.
+    Name,
+    /// By what they have now.
+    Wealth,
+    /// By when they last reported; first those that never did.
+    LastReport,
+}
+
+/// Which sessions are listed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SessionIs {
+    Active,
+    /// At its horizon.
+    Completed,
+    /// To be renewed by itself.
+    Due,
+}
+
+/// What is asked of a list of sessions; all of them, as they were opened, where nothing is given.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SessionQuery {
+    /// Part of a name, of a tag, of a session's or a policy's identifier or of the policy's name, whatever the case.
+    pub search: Option<String>,
+    /// A whole tag.
+    pub tag: Option<String>,
+    pub is: Option<SessionIs>,
+    pub order: SessionOrder,
+    pub descending: bool,
+    pub limit: usize,
+    /// The last row of the page before.
+    pub after: Option<SessionPlace>,
+}
+
+/// The place of a row in the order of its list.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionPlace {
+    pub key: SessionKey,
+    /// Of rows whose keys are the same.
+    pub sequence: i64,
+}
+
+/// What a row is put in order by.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SessionKey {
+    Created,
+    Name(String),
+    Wealth(f64),
+    LastReport(i64),
+}
+
+/// A session without its history.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionSummary {
+    pub session: String,
+    pub labels: Labels,
+    /// The one that advises the coming period.
+    pub policy: String,
+    pub policy_name: String,
+    /// Of that policy, where it says.
+    pub periods_per_year: Option<f64>,
+    pub initial_wealth: f64,
+    /// Share of it in the risky asset.
+    pub initial_holding: f64,
+    /// The last period that the policy advises.
+    pub horizon: usize,
+    pub created_ms: i64,
+    /// Number of periods observed.
+    pub observations: usize,
+    /// Whether it is to be renewed by itself.
+    pub is_due: bool,
+    /// The last observation or correction: what was answered to it, and when.
+    pub last: Option<(String, i64)>,
+    pub place: SessionPlace,
+}
+
+/// A page of sessions, and how many match in all.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionList {
+    pub sessions: Vec<SessionSummary>,
+    pub total: usize,
+}
+
+/// The tables of a list: a session, its labels, the policy that advises it, and the last entry that moved it.
+const TABLES: &str = "FROM sessions
+    LEFT JOIN labels ON labels.tenant = sessions.tenant AND labels.object = sessions.session
+    LEFT JOIN renewals ON renewals.session = sessions.session
+         AND renewals.number = (SELECT max(number) FROM renewals AS made WHERE made.session = sessions.session)
+    LEFT JOIN policies ON policies.policy = coalesce(renewals.policy, sessions.policy)
+    LEFT JOIN labels AS called ON called.tenant = sessions.tenant
+         AND called.object = coalesce(renewals.policy, sessions.policy)
+    LEFT JOIN entries AS last ON last.session = sessions.session
+         AND last.entry = (SELECT entry FROM entries AS made WHERE made.session = sessions.session
+                           AND kind <> 'renewal' ORDER BY entry DESC LIMIT 1)";
+const HORIZON: &str = "coalesce(renewals.horizon, sessions.horizon)";
+const OBSERVATIONS: &str = "coalesce((SELECT number FROM entries AS made WHERE made.session = sessions.session
+    AND kind = 'observation' ORDER BY entry DESC LIMIT 1), 0)";
+const WEALTH: &str = "coalesce(CAST(json_extract(last.answer_json, '$.wealth') AS DOUBLE PRECISION),
+    sessions.initial_wealth)";
+
+impl Store {
+    /// Sessions of a tenant.
+    pub async fn sessions(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<SessionList, StoreError> {
+        let doing = "listing sessions";
+        let (page, count) = (asked.page(tenant), asked.count(tenant));
+        let decode = |rows: &[Row]| rows.iter().map(|row| SessionSummary::from_row(row, asked.order)).collect();
+        let counted = |rows: &[Row]| rows.first().map_or(Ok(0), |row| row.get::<i64>("total"));
+        let (sessions, total) =
+            futures_util::try_join!(self.list(doing, page, decode), self.list(doing, count, counted))?;
+        Ok(SessionList { sessions, total: usize::try_from(total).unwrap_or_default() })
+    }
+}
+
+/// A statement under way: its text and its values.
+struct Statement {
+    sql: String,
+    values: Vec<Value>,
+}
+
+impl Statement {
+    fn new(sql: String, tenant: &Tenant) -> Self {
+        let mut statement = Statement { sql, values: Vec::new() };
+        statement.and(" WHERE sessions.tenant = ?", [tenant.as_str().into()]);
+        statement
+    }
+
+    /// Adds a part whose `?` stand for the values, in their order.
+    fn and<const N: usize>(&mut self, part: &str, values: [Value; N]) {
+        let mut values = values.into_iter();
+        for (index, piece) in part.split('?').enumerate() {
+            if index > 0 {
+                self.values.extend(values.next());
+                self.write(format_args!("${}", self.values.len()));
+            }
+            self.sql.push_str(piece);
+        }
+    }
+
+    fn write(&mut self, text: fmt::Arguments<'_>) {
+        self.sql += &text.to_string();
+    }
+
+    fn query(self) -> Query {
+        self.values.into_iter().fold(query(self.sql), Query::bind)
+    }
+}
+
+impl SessionQuery {
+    fn page(&self, tenant: &Tenant) -> Query {
+        let key = self.order.key();
+        let columns = format!(
+            "SELECT sessions.sequence, sessions.session, sessions.initial_wealth, sessions.initial_holding,
+                    sessions.created_ms, labels.name, labels.notes, labels.tags,
+                    coalesce(renewals.policy, sessions.policy) AS policy, called.name AS policy_name,
+                    policies.periods_per_year, {HORIZON} AS horizon, {OBSERVATIONS} AS observations, sessions.due,
+                    last.answer_json, last.created_ms AS reported_ms, {key} AS sort_key {TABLES}"
+        );
+        let mut statement = Statement::new(columns, tenant);
+        self.only_matching(&mut statement);
+        let (order, beyond) = if self.descending { ("DESC", '<') } else { ("ASC", '>') };
+        if let Some(SessionPlace { key: value, sequence }) = &self.after {
+            let value = match value {
+                SessionKey::Created => (*sequence).into(),
+                SessionKey::Name(name) => name.as_str().into(),
+                SessionKey::Wealth(wealth) => (*wealth).into(),
+                SessionKey::LastReport(reported_ms) => (*reported_ms).into(),
+            };
+            let part = format!(" AND ({key}, sessions.sequence) {beyond} (?, ?)");
+            statement.and(&part, [value, (*sequence).into()]);
+        }
+        let by_key = if self.order == SessionOrder::Created { String::new() } else { format!("sort_key {order}, ") };
+        let end = format!(" ORDER BY {by_key}sessions.sequence {order} LIMIT ?");
+        statement.and(&end, [to_sql(self.limit).into()]);
+        statement.query()
+    }
+
+    fn count(&self, tenant: &Tenant) -> Query {
+        let is_narrowed = self.search.is_some() || self.tag.is_some() || self.is.is_some();
+        let tables = if is_narrowed { TABLES } else { "FROM sessions" };
+        let mut statement = Statement::new(format!("SELECT count(*) AS total {tables}"), tenant);
+        self.only_matching(&mut statement);
+        statement.query()
+    }
+
+    fn only_matching(&self, statement: &mut Statement) {
+        if let Some(search) = &self.search {
+            let part = format!("%{}%", escaped(&search.to_lowercase()));
+            let like = |column: &str| format!(r"{column} LIKE ? ESCAPE '\'");
+            let columns = [
+                "labels.folded_name",
+                "labels.folded_tags",
+                "sessions.session",
+                "called.folded_name",
+                "coalesce(renewals.policy, sessions.policy)",
+            ];
+            let any = columns.map(like).join(" OR ");
+            statement.and(&format!(" AND ({any})"), columns.map(|_| part.as_str().into()));
+        }
+        if let Some(tag) = &self.tag {
+            // What has the tag is another text without it.
+            statement.and(" AND replace(labels.tags, ?, '') <> labels.tags", [format!("\n{tag}\n").into()]);
+        }
+        match self.is {
+            None => {}
+            Some(SessionIs::Active) => statement.and(&format!(" AND {OBSERVATIONS} < {HORIZON}"), []),
+            Some(SessionIs::Completed) => statement.and(&format!(" AND {OBSERVATIONS} >= {HORIZON}"), []),
+            Some(SessionIs::Due) => statement.and(&format!(" AND sessions.due <= {OBSERVATIONS}"), []),
+        }
+    }
+}
+
+/// Text as a pattern that means itself.
+fn escaped(text: &str) -> String {
+    text.replace('\\', r"\\").replace('%', r"\%").replace('_', r"\_")
+}
+
+impl SessionOrder {
+    fn key(self) -> &'static str {
+        match self {
+            SessionOrder::Created => "sessions.sequence",
+            SessionOrder::Name => "coalesce(labels.folded_name, '')",
+            SessionOrder::Wealth => WEALTH,
+            SessionOrder::LastReport => "coalesce(last.created_ms, 0)",
+        }
+    }
+
+    fn place(self, row: &Row) -> Result<SessionPlace, Failure> {
+        let key = match self {
+            SessionOrder::Created => SessionKey::Created,
+            SessionOrder::Name => SessionKey::Name(row.get("sort_key")?),
+            SessionOrder::Wealth => SessionKey::Wealth(row.get("sort_key")?),
+            SessionOrder::LastReport => SessionKey::LastReport(row.get("sort_key")?),
+        };
+        Ok(SessionPlace { key, sequence: row.get("sequence")? })
+    }
+}
+
+impl SessionSummary {
+    fn from_row(row: &Row, order: SessionOrder) -> Result<Self, Failure> {
+        let observations = from_sql(row.get("observations")?)?;
+        let due = row.get::<Option<i64>>("due")?.map(from_sql).transpose()?;
+        let (answer, reported_ms): (Option<String>, Option<i64>) = (row.get("answer_json")?, row.get("reported_ms")?);
+        Ok(SessionSummary {
+            session: row.get("session")?,
+            labels: Labels::from_row(row)?,
+            policy: row.get("policy")?,
+            policy_name: row.get::<Option<String>>("policy_name")?.unwrap_or_default(),
+            periods_per_year: row.get("periods_per_year")?,
+            initial_wealth: row.get("initial_wealth")?,
+            initial_holding: row.get("initial_holding")?,
+            horizon: from_sql(row.get("horizon")?)?,
+            created_ms: row.get("created_ms")?,
+            observations,
+            is_due: due.is_some_and(|due| due <= observations),
+            last: answer.zip(reported_ms),
+            place: order.place(row)?,
+        })
+    }
+}
