@@ -103,8 +103,8 @@ fn name(rest: &mut &str) -> Option<i16> {
     let count = rest.bytes().take_while(u8::is_ascii_alphabetic).count();
     let (word, after) = rest.split_at(count);
     *rest = after.strip_prefix('.').unwrap_or(after);
-    let starts = |name: &&str| name.get(..count).is_some_and(|start| start.eq_ignore_ascii_case(word));
-    let found = if word.eq_ignore_ascii_case("sept") { Some(8) } else { MONTHS.iter().position(|name| starts(&name)) };
+    let starts = |name: &str| name.get(..count).is_some_and(|start| start.eq_ignore_ascii_case(word));
+    let found = if word.eq_ignore_ascii_case("sept") { Some(8) } else { MONTHS.iter().position(|name| starts(name)) };
     found.filter(|_| count >= 3).and_then(|index| i16::try_from(index + 1).ok())
 }
 

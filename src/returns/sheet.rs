@@ -159,11 +159,11 @@ impl<'a> Sheet<'a> {
             return said.columns.iter().map(|name| self.named(name)).collect();
         }
         let values: Vec<&Column> = self.columns.iter().filter(|column| column.holds == Holds::Values).collect();
-        let best = |wanted: &&str| values.iter().copied().find(|column| plain(&column.name) == **wanted);
+        let best = |wanted: &str| values.iter().copied().find(|column| plain(&column.name) == wanted);
         match values[..] {
             [] => Err(self.without_numbers()),
             [only] => Ok(vec![only]),
-            _ => match VALUES.iter().find_map(|wanted| best(&wanted)) {
+            _ => match VALUES.iter().find_map(|wanted| best(wanted)) {
                 Some(best) => Ok(vec![best]),
                 None => Err(ask(&values)),
             },

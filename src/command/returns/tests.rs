@@ -61,7 +61,7 @@ fn what_the_file_does_not_say_is_asked_with_the_options_that_say_it() {
     );
     let said = Choices { day_first: Some(true), unit: Some(Unit::Percent), ..column };
     assert_eq!(parse(&said).unwrap().rows[0].risky_return, 0.003);
-    let several = Choices { columns: vec!["fund".into(), "index".into()], ..said };
+    let several = Choices { columns: vec!["fund".into(), "index".into()], kind: Some(Kind::Simple), ..said };
     assert_eq!(parse(&several).unwrap_err().to_string(), "--column is 2 columns: must be one");
 }
 

@@ -403,6 +403,15 @@ KnownReturns: TypeAlias = list[float] | list[list[float]]
 """Log-returns known at the start of a session, oldest first."""
 
 
+class Labels(TypedDict):
+    """What a policy or a session is called; each part is empty where nothing was said."""
+
+    name: str
+    """Not necessarily of this one alone."""
+    notes: str
+    tags: list[str]
+
+
 class Learning1(TypedDict):
     """As much as any other."""
 
@@ -504,6 +513,9 @@ class Observe(TypedDict):
     """Wealth reached, with what was added, where it differs from what all of the above gives."""
 
 
+Tag: TypeAlias = str
+
+
 class OwnMix(TypedDict):
     """The constant mix of a strategy's own average allocation, which nobody could have chosen beforehand, on the same returns."""
 
@@ -528,7 +540,7 @@ class Place(TypedDict):
     """What stands there, shortened where it is long."""
 
 
-class PolicyEntry(TypedDict):
+class PolicyEntry(Labels):
     """A policy in a list."""
 
     policy: str
@@ -684,6 +696,17 @@ class Reading3(TypedDict):
     """What is wrong, and where."""
     place: NotRequired[Place | None]
     outcome: Literal["refused"]
+
+
+class Relabel(TypedDict):
+    """A change of labels: what is absent stays, what is null or empty is cleared."""
+
+    name: NotRequired[str | None]
+    """At most 100 letters, without control characters."""
+    notes: NotRequired[str | None]
+    """At most 2,000 letters, without control characters but line breaks."""
+    tags: NotRequired[list[Tag] | None]
+    """At most 20, each another, of 1 to 50 letters without control characters."""
 
 
 class Renew(TypedDict):
@@ -1339,6 +1362,12 @@ class OpenSession(TypedDict):
     renew: NotRequired[Renewing | None]
     rolling: NotRequired[bool]
     """Live every period by the first step of a policy whose learning is decay, for up to 5200 periods. Default: false."""
+    name: NotRequired[str | None]
+    """What the session is called, in at most 100 letters."""
+    notes: NotRequired[str | None]
+    """At most 2,000 letters."""
+    tags: NotRequired[list[Tag] | None]
+    """At most 20, each another, of 1 to 50 letters."""
 
 
 class PeriodReport(TypedDict):
@@ -1438,25 +1467,45 @@ class Series(TypedDict):
     """Deviation times the square root of the periods of a year."""
 
 
-class SessionEntry(TypedDict):
+class SessionEntry(Labels):
     """A session in a list."""
 
     session: str
     policy: str
     """The one that advises the coming period."""
+    policy_name: str
+    """What that is called; empty where it is called nothing."""
+    periods_per_year: NotRequired[float | None]
+    """Of that policy, where it says."""
     period: int
+    """The coming period, from 1; `horizon + 1` once completed."""
     horizon: int
     """The last period that the policy advises."""
     state: SessionState
     initial_wealth: float
+    wealth: float
+    holding: float
+    """Share of wealth in the risky asset, before trading."""
+    wealth_change: NotRequired[float | None]
+    """Change of wealth by the last period; null before the first."""
+    date: NotRequired[str | None]
+    """The last day that was reported."""
+    last_report_ms: NotRequired[int | None]
+    """When it last reported a period, or put one right."""
+    due: bool
+    """Whether its next policy is to be trained."""
+    drift: DriftLevel
+    """Whether the returns still come as they came."""
     created_ms: int
 
 
 class SessionPage(TypedDict):
-    """A page of sessions, newest first."""
+    """A page of sessions."""
 
     sessions: list[SessionEntry]
-    next: NotRequired[int | None]
+    total: int
+    """Sessions that match, on all pages together."""
+    next: NotRequired[str | None]
     """Give it as `after` for the next page; null on the last."""
 
 
@@ -1504,6 +1553,26 @@ class Sweep(TypedDict):
     wealth: NotRequired[SweepRange | None]
 
 
+class Train(TypedDict):
+    """A training: its specification, and what its policy is to be called, which is no part of that."""
+
+    problem: ProblemSpecification
+    """What the investor is and may do."""
+    fund: NotRequired[FundSpecification | None]
+    design: NotRequired[DesignSpecification]
+    """Where the surrogates are trained."""
+    surrogate: NotRequired[SurrogateSpecification]
+    """How the surrogates are made."""
+    seed: NotRequired[int]
+    """The same specification and seed give the same policy, bit for bit."""
+    name: NotRequired[str | None]
+    """What the policy is to be called, in at most 100 letters."""
+    notes: NotRequired[str | None]
+    """At most 2,000 letters."""
+    tags: NotRequired[list[Tag] | None]
+    """At most 20, each another, of 1 to 50 letters."""
+
+
 class TrainAssets(TypedDict):
     """A training of a policy for several assets."""
 
@@ -1515,6 +1584,16 @@ class TrainAssets(TypedDict):
     """How the surrogates are made."""
     seed: NotRequired[int]
     """The same request and seed give the same policy, bit for bit."""
+    name: NotRequired[str | None]
+    """What the policy is to be called, in at most 100 letters."""
+    notes: NotRequired[str | None]
+    """At most 2,000 letters."""
+    tags: NotRequired[list[str] | None]
+    """At most 20, each another, of 1 to 50 letters."""
+
+
+TrainQuestion: TypeAlias = Train | TrainAssets
+"""A training of a policy for one asset, or for several, which `problem.assets` names."""
 
 
 class Warning(TypedDict):
@@ -1692,6 +1771,10 @@ class Corrected(Uncertainty):
     holding: float
     """Share of it in the risky asset."""
     assets: NotRequired[Composed | None]
+    wealth_change: float
+    """Change of wealth by the last period observed, as it stands now."""
+    date: NotRequired[str | None]
+    """The last day that is reported now."""
     drift: Drift
     """Whether the returns, as they stand, come as they came."""
 
@@ -1713,17 +1796,6 @@ class Coverage(TypedDict):
     """Ascending; one entry where the ball is frozen."""
     ever_left: Estimate
     """Share of paths on which some period's ball did not hold it."""
-
-
-class ElementAnswered(TypedDict):
-    """The answer to one element of a list."""
-
-    session: str
-    period: int
-    status: int
-    """What a call with this report alone would be answered with."""
-    answer: NotRequired[Observed | None]
-    problem: NotRequired[Problem | None]
 
 
 class EvaluationRequest(TypedDict):
@@ -1872,7 +1944,7 @@ class Renewed(Uncertainty):
     assets: NotRequired[Composed | None]
 
 
-class Session(TypedDict):
+class Session(Labels):
     """A live investor."""
 
     session: str
@@ -1901,10 +1973,6 @@ class Session(TypedDict):
     drift: Drift
     """Whether the returns still come as they came."""
     created_ms: int
-
-
-ReportsAnswered: TypeAlias = Observed | list[ElementAnswered]
-"""The answer to one report, or to each of a list in its order."""
 
 
 class Specification(TypedDict):
@@ -1946,10 +2014,6 @@ class StrategyReport(TypedDict):
     coverage: NotRequired[Coverage | None]
     resolved_share: NotRequired[float | None]
     """Share of steps advised by solving the step anew."""
-
-
-TrainQuestion: TypeAlias = Specification | TrainAssets
-"""A training of a policy for one asset, or for several, which `problem.assets` names."""
 
 
 class WhatIfPoint(Advice):
@@ -2084,13 +2148,17 @@ class Observed(Uncertainty):
     holding: float
     """Share of it in the risky asset, as the return left it."""
     assets: NotRequired[ObservedAssets | None]
+    wealth_change: float
+    """Change of wealth by the period, what was added or reached otherwise included."""
+    date: NotRequired[str | None]
+    """The last day that was reported, of this period or of one before."""
     completed: bool
     """Whether the horizon is reached."""
     drift: Drift
     """Whether the returns still come as they came."""
 
 
-class PolicyDetail(TypedDict):
+class PolicyDetail(Labels):
     """A policy, and how well each of its steps was solved."""
 
     policy: str
@@ -2143,6 +2211,17 @@ ActionAnswer: TypeAlias = Action | AssetsAction
 """The robust allocation for the coming period."""
 
 
+class ElementAnswered(TypedDict):
+    """The answer to one element of a list."""
+
+    session: str
+    period: int
+    status: int
+    """What a call with this report alone would be answered with."""
+    answer: NotRequired[Observed | None]
+    problem: NotRequired[Problem | None]
+
+
 class Observation(Observed):
     """One observed period."""
 
@@ -2150,6 +2229,10 @@ class Observation(Observed):
     """What was reported first."""
     observed_ms: int
     now: NotRequired[Now | None]
+
+
+ReportsAnswered: TypeAlias = Observed | list[ElementAnswered]
+"""The answer to one report, or to each of a list in its order."""
 
 
 class History(TypedDict):
