@@ -282,11 +282,31 @@ async fn what_is_wrong_of_several_assets_is_named() {
         (with("composition", json!({ "given": [0.5, 0.5] })), "problem.composition.given"),
         (with("composition", json!({ "given": [0.5, 0.6, 0.1] })), "problem.composition.given"),
         (with("assets", json!(["a", "a", "b"])), "problem.assets[1]"),
+        (with("composition", json!("best")), "problem.composition"),
+        (with("ground_norm", json!("two")), "problem.ground_norm"),
+        (with("trading_cost", json!(0.2)), "problem.trading_cost"),
         (with("horizon", json!(0)), "problem.horizon"),
         (with("framework", json!("static_robust")), "problem.framework"),
     ] {
         let (status, problem) = app.post("/train", &request).await;
         assert_eq!((status.as_u16(), &problem["field"]), (422, &json!(field)), "{request}: {problem}");
+    }
+    // A completed specification with its fund is a request as well.
+    let policy = app.get(&format!("/policies/{}", app.policy)).await.1;
+    let wrong = |place: &str, value: Value| {
+        let mut specification = policy["specification"].clone();
+        *specification["fund"].pointer_mut(place).unwrap() = value;
+        specification
+    };
+    for (request, field) in [
+        (wrong("/radius_factor", json!(0.5)), "fund.radius_factor"),
+        (wrong("/assets", json!(["stocks", "bonds"])), "fund.history[0]"),
+        (wrong("/composition", json!({ "given": [1.0] })), "fund.composition.given"),
+        (wrong("/ground_norm", json!("two")), "fund.ground_norm"),
+        (wrong("/history/0/0", json!(0.5)), "problem.history[0]"),
+    ] {
+        let (status, problem) = app.post("/train", &request).await;
+        assert_eq!((status.as_u16(), &problem["field"]), (422, &json!(field)), "{problem}");
     }
     // A session of one asset takes nothing of several.
     app.train(&support::specification(2)).await;

@@ -88,7 +88,7 @@ pub async fn train(
 #[expect(dead_code, reason = "a body is read as the one that it is: this describes both")]
 pub enum TrainQuestion {
     Asset(Box<Train>),
-    Assets(TrainAssets),
+    Assets(Box<TrainAssets>),
 }
 
 /// A training of a policy for several assets.

@@ -59,6 +59,15 @@ pub struct Start {
     pub labels: Relabel,
 }
 
+/// Where a session begins.
+struct Beginning {
+    state: State,
+    /// Where there are several.
+    assets: Option<Box<Assets>>,
+    /// Log-returns known, date after date.
+    history: Vec<f64>,
+}
+
 impl Start {
     /// The request for it under a key. Its hash is that of no job's request, which has other fields.
     fn under(&self, key: String) -> Result<RequestKey, ServiceError> {
@@ -67,8 +76,8 @@ impl Start {
         Ok(RequestKey { key, request_hash: content_hash(&sent) })
     }
 
-    /// The first state by the policy of `advisor`, several assets, and the log-returns known, date after date.
-    fn begins(self, advisor: &Advisor) -> Result<(State, Option<Box<Assets>>, Vec<f64>), FieldError> {
+    /// Where it begins by the policy of `advisor`.
+    fn begins(self, advisor: &Advisor) -> Result<Beginning, FieldError> {
         let Start { history, wealth, holding, holdings, .. } = self;
         let Specification { problem, fund, .. } = advisor.specification();
         let Some(fund) = fund else {
@@ -81,7 +90,8 @@ impl Start {
             }
             let history = history.map(KnownReturns::values);
             let state = advisor.initial_state(history.as_deref(), wealth)?.with_holding(holding.unwrap_or(0.0))?;
-            return Ok((state, None, history.unwrap_or_else(|| problem.history.clone())));
+            let history = history.unwrap_or_else(|| problem.history.clone());
+            return Ok(Beginning { state, assets: None, history });
         };
         if let Some(holding) = holding {
             let rule = "must be absent: the policy is of several assets, and holdings says it of each";
@@ -100,7 +110,7 @@ impl Start {
         let assets = Assets::at(&fund.assets, rows, holdings.as_ref())?;
         let holding = assets.fund.holdings.iter().sum::<f64>().min(1.0);
         let state = advisor.initial_state(Some(&assets.fund.returns()), wealth)?.with_holding(holding)?;
-        Ok((state, Some(assets.into()), history))
+        Ok(Beginning { state, assets: Some(assets.into()), history })
     }
 }
 
@@ -145,11 +155,11 @@ impl Sessions {
         start.labels.check()?;
         let Start { policy, renew, rolling, labels, .. } = start.clone();
         let advisor = self.policies.advisor(tenant, &policy).await?;
-        let (state, assets, history) = start.begins(&advisor)?;
+        let beginning = start.begins(&advisor)?;
         // The policy's own wealth pays, whatever is held.
-        advisor.check_withdrawals(&state)?;
-        let plan = Plan::new(&advisor, state.law.sample_size(), renew, rolling)?;
-        let (state, assets) = self.composed(tenant, &advisor, state, assets).await?;
+        advisor.check_withdrawals(&beginning.state)?;
+        let plan = Plan::new(&advisor, beginning.state.law.sample_size(), renew, rolling)?;
+        let Beginning { state, assets, history } = self.composed(tenant, &advisor, beginning).await?;
         let plan = Plan { assets: assets.as_ref().map(|assets| assets.planned()), ..plan };
         self.policies.starts_from(&advisor, state.law.sample_size(), plan.terms.horizon)?;
         let row = SessionRow {
@@ -193,17 +203,16 @@ impl Sessions {
         })
     }
 
-    /// The composition of several assets before the first period, and the state of their fund.
+    /// With the composition of several assets before the first period, and the state of their fund.
     async fn composed(
         &self,
         tenant: &Tenant,
         advisor: &Arc<Advisor>,
-        state: State,
-        assets: Option<Box<Assets>>,
-    ) -> Result<(State, Option<Box<Assets>>), ServiceError> {
-        let Some(mut assets) = assets else { return Ok((state, None)) };
+        beginning: Beginning,
+    ) -> Result<Beginning, ServiceError> {
+        let Beginning { state, assets: Some(mut assets), history } = beginning else { return Ok(beginning) };
         let advisor = advisor.clone();
-        let compose = move || (assets.compose(&advisor, 0, &state), Some(assets));
+        let compose = move || Beginning { state: assets.compose(&advisor, 0, &state), assets: Some(assets), history };
         self.advising.run(tenant, compose).await
     }
 

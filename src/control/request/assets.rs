@@ -221,7 +221,7 @@ pub(super) fn check_fund(fund: &FundSpecification, problem: &ProblemSpecificatio
     rules::within("fund.radius_factor", fund.radius_factor, 1.0, LARGEST_FACTOR)?;
     let returns = fund_returns(&fund.history, &inverse_volatility(&fund.history));
     let differs = |(index, (given, of_fund)): (usize, (&f64, f64))| {
-        ((given - of_fund).abs() > ROUNDING).then(|| (index, *given, of_fund))
+        ((given - of_fund).abs() > ROUNDING).then_some((index, *given, of_fund))
     };
     if returns.len() != problem.history.len() {
         let rule = format!("must hold {} log-returns, one for each date of fund.history", returns.len());
