@@ -35,6 +35,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "inter.woff2": "font/woff2",
         "inter-LICENSE.txt": TEXT,
         "advice.js": SCRIPT,
+        "advised.js": SCRIPT,
         "api.js": SCRIPT,
         "beside.js": SCRIPT,
         "chart.js": SCRIPT,
@@ -60,6 +61,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "law_chart.js": SCRIPT,
         "laws.js": SCRIPT,
         "main.js": SCRIPT,
+        "naming.js": SCRIPT,
         "number_text.js": SCRIPT,
         "observe.js": SCRIPT,
         "observed.js": SCRIPT,
@@ -84,6 +86,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "ticking.js": SCRIPT,
         "train.js": SCRIPT,
         "train_fields.js": SCRIPT,
+        "welcome.js": SCRIPT,
         "what_if.js": SCRIPT,
         "worst_market.js": SCRIPT,
     };

@@ -71,11 +71,15 @@ async function unrolled() {
 }
 
 test("every session can be reached", async () => {
-  await go("#/sessions");
+  await go("#/");
   assert.equal(await page.locator(`a[href="#/sessions/${oldest}"]`).count(), 0);
-  await page.getByText("The newest 100 sessions. There are older ones.").waitFor();
-  assert.equal(await unrolled(), 2);
-  await page.getByText("211 sessions, and no more.", { exact: true }).waitFor();
+  for (const shown of [50, 100, 150, 200]) {
+    await page.getByText(`${shown} of 211`, { exact: true }).waitFor();
+    await page.getByRole("button", { name: "Show more" }).click();
+  }
+  await page.getByText("211 of 211", { exact: true }).waitFor();
+  assert.equal(await page.getByRole("button", { name: "Show more" }).isVisible(), false);
+  assert.equal(await page.locator("tbody tr").count(), SESSIONS);
   await page.locator(`a[href="#/sessions/${oldest}"]`).click();
   await page.getByRole("heading", { level: 1, name: /^Session / }).waitFor();
 });

@@ -24,7 +24,8 @@ function filled(element, attributes, children) {
   return element;
 }
 
-/** A table: `columns` are `{name, cell(row), numeric}`. The first column heads its row. */
+/** A table: `columns` are `{name, cell(row), numeric, sorted}`, the last "ascending" or "descending" where rows are in its order. The
+ * first column heads its row. */
 export function table(caption, columns, rows) {
   const cell = (row, column, index) =>
     h(
@@ -45,7 +46,7 @@ export function table(caption, columns, rows) {
         h(
           "tr",
           {},
-          columns.map((column) => h("th", { scope: "col", class: column.numeric ? "number" : null }, column.name)),
+          columns.map(({ name, numeric, sorted }) => h("th", { scope: "col", class: numeric ? "number" : null, "aria-sort": sorted }, name)),
         ),
       ),
       h(

@@ -1,6 +1,6 @@
 // The frame: which view stands at which address, and what happens on the way from one to the next.
 
-import { get, offers, Problem } from "./api.js";
+import { offers, Problem } from "./api.js";
 import { announce, h } from "./dom.js";
 import * as compare from "./compare.js";
 import * as evaluation from "./evaluation.js";
@@ -22,7 +22,7 @@ const ROUTES = [
   [/^#\/train(?:\?(.*))?$/, train.view, "jobs"],
   [/^#\/policies$/, policies.view, "policies"],
   [/^#\/policies\/([^/]+)$/, policy.view, "policies"],
-  [/^#\/sessions$/, sessions.view, "sessions"],
+  [/^#\/(?:sessions)?(?:\?.*)?$/, sessions.view, "sessions"],
   [/^#\/sessions\/new(?:\?(.*))?$/, sessionOpening.view, "sessions"],
   [/^#\/sessions\/([^/]+)$/, session.view, "sessions"],
   [/^#\/evaluations$/, evaluations.view, "evaluations"],
@@ -45,7 +45,7 @@ async function show() {
   main.setAttribute("aria-busy", "true");
   let [page, route, match] = [];
   try {
-    const hash = ["", "#/"].includes(location.hash) ? await home(signal) : location.hash;
+    const hash = location.hash || "#/";
     [route, match] = ROUTES.map((route) => [route, route[0].exec(hash)]).find(([, match]) => match) ?? [];
     page = route ? await route[1](match[1] && decodeURIComponent(match[1]), signal) : missing(hash);
   } catch (error) {
@@ -69,12 +69,6 @@ async function show() {
     scrollTo(0, 0);
   }
   first = false;
-}
-
-/** Where a visit starts: at the sessions, or where there is none at what to do first. */
-async function home(signal) {
-  const { sessions } = await get("/sessions?limit=1", signal);
-  return sessions.length > 0 ? "#/sessions" : "#/jobs";
 }
 
 /** Where a key is typed in, or given up. */

@@ -1,43 +1,183 @@
-// Sessions: the investors who live by a policy.
+// Sessions, one investor a row: where each stands, when he reported last, what to do for him now, and what needs care.
 
+import { advised } from "./advised.js";
+import { get } from "./api.js";
 import { h, table } from "./dom.js";
-import { count, moment, short, wealth } from "./format.js";
-import { foot, Pages } from "./pages.js";
+import { input, select } from "./form.js";
+import { allocation, count, counted, moment, percent, wealth } from "./format.js";
+import { called, headed } from "./naming.js";
+import { day, daysLate, isoDay, nextDay } from "./periods.js";
 import { ticking } from "./ticking.js";
+import { welcome } from "./welcome.js";
+
+/** Rows shown at a time: the advice of each is asked for by itself. */
+const PAGE = 50;
+/** Nothing is asked for while a word is being typed, for so long, in milliseconds. */
+const PAUSE = 250;
+const STATES = { "": "All", active: "Active", completed: "Completed", due: "Due for renewal" };
+const NEWEST = "-created";
+/** What is asked for, as it stands in the address, and what it is where nothing is said. */
+const CHOICES = { search: "", tag: "", state: "", sort: NEWEST };
 
 export async function view(_, leaving) {
-  const pages = new Pages("/sessions", "sessions", leaving);
-  const entries = await pages.next();
-  const actions = h("a", { class: "button", href: "#/sessions/new" }, "Open a session");
-  const lead =
-    "No session yet. A session is one investor who lives by a policy: report each return as it comes, and read what to hold next.";
-  if (entries.length === 0) return { title: "Sessions", actions, body: h("p", { class: "lead" }, lead) };
-  const ticks = ticking("sessions");
-  const holder = h("div", {}, listed(entries, ticks));
-  const add = (older) => {
-    entries.push(...older);
-    holder.replaceChildren(listed(entries, ticks));
-  };
-  return { title: "Sessions", actions, body: [ticks.link, holder, foot(pages, ["session", "sessions"], entries.length, add)] };
+  const said = new URLSearchParams(location.hash.split("?")[1] ?? "");
+  const chosen = Object.fromEntries(Object.entries(CHOICES).map(([name, blank]) => [name, said.get(name) ?? blank]));
+  if (!(chosen.state in STATES)) chosen.state = "";
+  const actions = h("div", { class: "actions" }, h("a", { class: "button", href: "#/sessions/new" }, "Open a session"));
+  const first = await read(chosen, null, leaving);
+  const title = "Sessions";
+  if (first.total === 0 && !filtered(chosen)) {
+    const { policies } = await get("/policies?limit=1", leaving);
+    return { title, actions: policies.length > 0 ? actions : null, body: policies.length > 0 ? lead() : welcome() };
+  }
+  return { title, actions, body: overview(chosen, first, leaving) };
 }
 
-function listed(entries, ticks) {
-  return table(
-    "Sessions, newest first",
-    [
-      {
-        name: "Session",
-        cell: ({ session }) => [
-          ticks.box(session, `session ${short(session)}`),
-          h("a", { href: `#/sessions/${session}` }, h("code", {}, short(session))),
-        ],
-      },
-      { name: "State", cell: ({ state }) => h("span", { class: `state ${state}` }, state) },
-      { name: "Observed", numeric: true, cell: ({ period, horizon }) => `${count(period - 1)} of ${count(horizon)}` },
-      { name: "Initial wealth", numeric: true, cell: ({ initial_wealth }) => wealth(initial_wealth) },
-      { name: "Policy", cell: ({ policy }) => h("a", { href: `#/policies/${policy}` }, h("code", {}, short(policy))) },
-      { name: "Opened", cell: ({ created_ms }) => moment(created_ms) },
-    ],
-    entries,
+const lead = () =>
+  h(
+    "p",
+    { class: "lead" },
+    "No session yet. A session is one investor who lives by a policy: report each return as it comes, and read what to hold next.",
   );
+
+const filtered = ({ search, tag, state }) => Boolean(search || tag || state);
+
+/** What of `chosen` is other than where nothing is said. */
+const differing = (chosen) => Object.entries(chosen).filter(([name, value]) => value !== CHOICES[name]);
+
+function read(chosen, after, signal) {
+  const query = new URLSearchParams([["limit", PAGE], ...differing(chosen), ...(after === null ? [] : [["after", after]])]);
+  return get(`/sessions?${query}`, signal);
+}
+
+function overview(chosen, first, leaving) {
+  const advice = advised(leaving);
+  const ticks = ticking("sessions");
+  const tags = h("datalist", { id: "tags" });
+  const known = new Set();
+  const holder = h("div", {});
+  const line = h("p", { class: "note", role: "status" });
+  const more = h("button", { class: "quiet" }, "Show more");
+  let [entries, page, asking] = [[], first, new AbortController()];
+  leaving.addEventListener("abort", () => asking.abort());
+  const sort = (column) => {
+    const kept = holder.contains(document.activeElement);
+    const down = column !== "name";
+    const [one, other] = down ? [`-${column}`, column] : [column, `-${column}`];
+    ask({ sort: chosen.sort === one ? other : one }).then(() => kept && holder.querySelector("[aria-sort] button")?.focus());
+  };
+  const add = (now) => {
+    page = now;
+    entries.push(...page.sessions);
+    for (const tag of page.sessions.flatMap(({ tags }) => tags)) known.add(tag);
+    tags.replaceChildren(...[...known].sort().map((value) => h("option", { value })));
+    holder.replaceChildren(entries.length > 0 ? listed(entries, { ticks, advice, sorted: chosen.sort, sort }) : h("p", {}, "No session matches."));
+    more.hidden = entries.length >= page.total || page.next === null;
+    line.textContent = `${count(entries.length)} of ${count(page.total)}`;
+  };
+  const failed = (error) => {
+    if (error.name !== "AbortError") line.textContent = error.message;
+  };
+  /** Starts anew with what was changed. */
+  const ask = async (changed) => {
+    Object.assign(chosen, changed);
+    asking.abort();
+    asking = new AbortController();
+    const { signal } = asking;
+    const query = new URLSearchParams(differing(chosen)).toString();
+    history.replaceState(null, "", query ? `#/sessions?${query}` : "#/");
+    try {
+      const now = await read(chosen, null, signal);
+      advice.forget();
+      entries = [];
+      add(now);
+    } catch (error) {
+      failed(error);
+    }
+  };
+  more.addEventListener("click", async () => {
+    more.disabled = true;
+    const { signal } = asking;
+    await read(chosen, page.next, signal).then((now) => signal.aborted || add(now), failed);
+    more.disabled = false;
+  });
+  add(first);
+  return [filters(chosen, ask, tags), ticks.link, holder, h("div", { class: "foot" }, line, more)];
+}
+
+/** The search and the filters; `ask(changed)` at every change. */
+function filters(chosen, ask, tags) {
+  let typing = 0;
+  const soon = (changed) => {
+    clearTimeout(typing);
+    typing = setTimeout(() => ask(changed), PAUSE);
+  };
+  const text = { inputmode: "text" };
+  const search = input({ ...text, name: "search", label: "Search", value: chosen.search, type: "search", placeholder: "Name, tag or policy", maxlength: 100, changed: (text) => soon({ search: text.trim() }) });
+  const tag = input({ ...text, name: "tag", label: "Tag", value: chosen.tag, placeholder: "All", list: "tags", changed: (text) => soon({ tag: text.trim() }) });
+  const state = select({ name: "state", label: "State", choices: STATES, changed: (value) => ask({ state: value }) });
+  state.control.value = chosen.state;
+  const fields = h("div", { class: "fields" }, search.element, tag.element, tags, state.element);
+  return h("form", { role: "search", class: "filters", onsubmit: (event) => event.preventDefault() }, fields);
+}
+
+function listed(entries, { ticks, advice, sorted, sort }) {
+  const today = isoDay(new Date());
+  const by = (words, column) => {
+    const [up, down] = [sorted === column, sorted === `-${column}`];
+    const mark = up ? "\u2191" : down ? "\u2193" : "";
+    const button = h("button", { class: "link sorting", onclick: () => sort(column) }, words, h("span", { "aria-hidden": "true" }, ` ${mark}`));
+    return { name: button, sorted: up ? "ascending" : down ? "descending" : null };
+  };
+  return table("Sessions", [
+    {
+      ...by("Session", "name"),
+      cell: ({ session, name, tags }) =>
+        h(
+          "div",
+          { class: "ticked" },
+          ticks.box(session, `session ${called(session, name)}`),
+          h("div", {}, headed(`#/sessions/${session}`, session, name), tagList(tags)),
+        ),
+    },
+    { ...by("Wealth", "wealth"), numeric: true, cell: ({ wealth: now }) => wealth(now) },
+    { name: "Held now", numeric: true, cell: ({ holding }) => allocation(holding) },
+    { name: "Last period", numeric: true, cell: change },
+    { ...by("Last report", "last_report"), cell: (entry) => lastReport(entry, today) },
+    { name: "To hold", numeric: true, cell: (entry) => advice.of(entry).hold },
+    { name: "To trade", numeric: true, cell: (entry) => advice.of(entry).trade },
+    { name: "State", cell: standing },
+    { ...by("Opened", "created"), cell: ({ created_ms, policy, policy_name }) => [moment(created_ms).split(",")[0], h("span", { class: "under" }, "by ", h("a", { href: `#/policies/${policy}` }, called(policy, policy_name)))] },
+  ], entries);
+}
+
+const tagList = (tags) => (tags.length > 0 ? h("span", { class: "under tags" }, tags.map((tag) => h("span", { class: "tag" }, tag))) : null);
+
+/** What the last period made of wealth, what was added with it. */
+function change({ wealth: now, wealth_change }) {
+  if (wealth_change === null || wealth_change === undefined) return "\u2013";
+  const plus = wealth_change > 0 ? "+" : "";
+  return [`${plus}${percent(wealth_change / (now - wealth_change))}`, h("span", { class: "under" }, `${plus}${wealth(wealth_change)}`)];
+}
+
+/** The last day reported, and when the next report is due or how late it is. */
+function lastReport({ date, last_report_ms, periods_per_year, state }, today) {
+  if (!last_report_ms) return "None yet";
+  const under = (words, wrong) => h("span", { class: wrong ? "under wrong" : "under" }, words);
+  if (!date) return [moment(last_report_ms).split(",")[0], under("without a day")];
+  const next = state === "completed" ? null : nextDay(date, periods_per_year);
+  if (next === null) return day(date);
+  const late = daysLate(next, today);
+  return [day(date), late > 0 ? under(`overdue by ${counted(late, "day")}`, true) : under(`next ${day(next)}`)];
+}
+
+/** Its state, how far it is, and what needs care. */
+function standing({ state, period, horizon, due, drift }) {
+  const drifting = { warning: "Returns may have changed", alarm: "Returns have changed" }[drift];
+  return [
+    h("span", { class: `state ${state}` }, state),
+    h("span", { class: "under" }, `${count(period - 1)} of ${count(horizon)}`),
+    due ? h("span", { class: "under wrong" }, "Due for renewal") : null,
+    drifting ? h("span", { class: "under wrong" }, drifting) : null,
+  ];
 }

@@ -1,0 +1,80 @@
+// The advice for many sessions: asked for a few at a time, and filled in as it comes.
+
+import { inMoney } from "./advice.js";
+import { get } from "./api.js";
+import { h } from "./dom.js";
+import { allocation, wealth } from "./format.js";
+
+/** Browsers keep six connections to one address: so many leave room for what is clicked meanwhile. */
+const AT_ONCE = 4;
+/** A trade of a smaller share of wealth is none, as the advice is told to a tenth of a percent. */
+const LITTLE = 0.0005;
+
+/** `{of(entry), forget()}`: `of` gives the elements `{hold, trade}` of a session's row, asked for once; what still waits is
+ * not asked for after `forget()`, until its row is shown again. */
+export function advised(leaving) {
+  const cells = new Map();
+  const costs = new Map();
+  let [waiting, busy] = [[], 0];
+  const costOf = (policy) => {
+    if (!costs.has(policy)) costs.set(policy, get(`/policies/${policy}`, leaving).then(({ specification }) => specification.problem.trading_cost));
+    return costs.get(policy);
+  };
+  const fill = async ({ entry, hold, trade }) => {
+    const [action, cost] = await Promise.all([get(`/action?session=${entry.session}`, leaving), costOf(entry.policy)]);
+    hold.replaceChildren(...held(action));
+    trade.replaceChildren(...traded(action, entry.wealth, cost));
+  };
+  const turn = async () => {
+    const row = waiting.shift();
+    if (!row || leaving.aborted) return;
+    busy += 1;
+    await fill(row).catch((error) => {
+      row.hold.replaceChildren(none(error.message));
+      row.trade.replaceChildren("\u2013");
+    });
+    busy -= 1;
+    turn();
+  };
+  const of = (entry) => {
+    if (!cells.has(entry.session)) {
+      const row = { entry, hold: h("span", {}, "\u2026"), trade: h("span", {}, "\u2026") };
+      cells.set(entry.session, row);
+      if (entry.state === "completed") for (const cell of [row.hold, row.trade]) cell.replaceChildren("\u2013");
+      else {
+        waiting.push(row);
+        if (busy < AT_ONCE) turn();
+      }
+    }
+    return cells.get(entry.session);
+  };
+  const forget = () => {
+    for (const { entry } of waiting) cells.delete(entry.session);
+    waiting = [];
+  };
+  return { of, forget };
+}
+
+/** No advice, and why. */
+const none = (reason) => h("span", {}, "\u2013 ", h("span", { class: "under" }, reason));
+
+const isOfSeveral = (action) => typeof action.allocation === "object";
+
+function held(action) {
+  if (!isOfSeveral(action)) return [allocation(action.allocation)];
+  const names = Object.keys(action.allocation).filter((name) => action.allocation[name] >= LITTLE);
+  return [allocation(action.total), h("span", { class: "under" }, `in ${names.length} of ${Object.keys(action.allocation).length} assets`)];
+}
+
+/** What to buy and to sell, in money; what is traded pays its cost. */
+function traded(action, whole, cost) {
+  const words = (verb, size) => `${verb} ${wealth(Math.abs(size))}`;
+  if (!isOfSeveral(action)) {
+    if (Math.abs(action.trade) < LITTLE) return ["Nothing"];
+    const { trade } = inMoney(action, { wealth: whole, cost, price: null });
+    return [words(trade > 0 ? "Buy" : "Sell", trade)];
+  }
+  const sum = (sign) => whole * Object.values(action.trade).reduce((all, share) => all + Math.max(0, sign * share), 0);
+  const parts = [["Buy", sum(1)], ["Sell", sum(-1)]].filter(([, size]) => size >= LITTLE * whole);
+  return parts.length === 0 ? ["Nothing"] : parts.map(([verb, size]) => h("span", { class: "line-of-two" }, words(verb, size)));
+}

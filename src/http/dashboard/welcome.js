@@ -1,0 +1,30 @@
+// What is said where nothing is yet.
+
+import { h } from "./dom.js";
+
+export function welcome() {
+  const step = (title, ...text) => h("li", {}, h("h2", {}, title), h("p", {}, text));
+  return h(
+    "div",
+    { class: "welcome" },
+    h(
+      "p",
+      { class: "lead" },
+      "Ballast tells an investor how much to hold in stocks when nobody knows what the market will do. Nothing has been trained here yet.",
+    ),
+    h(
+      "ol",
+      { class: "steps" },
+      step(
+        "Train a policy",
+        "Give it the returns seen so far. It prepares for the worst market your record still allows, in seconds to minutes.",
+      ),
+      step("Open a session", "A session is one investor: his wealth, and the returns he has lived through."),
+      step(
+        "Observe and act",
+        "Report each period\u2019s return as it comes. The advice for the next one follows from all of them.",
+      ),
+    ),
+    h("p", {}, h("a", { class: "button", href: "#/train" }, "Train the first policy")),
+  );
+}

@@ -1,0 +1,151 @@
+// Every client in one table: where each stands, what to do for him now, found by name, tag and state, in any order.
+
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { browser, call, service, trained } from "./ballast.js";
+import { dashboardModule } from "./modules.js";
+
+const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
+const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
+const NAMES = ["Ada", "Grace", "Emmy"];
+const DAY = 86_400_000;
+
+let ballast, chromium, page, sessions, policy;
+
+const isoDay = (time) => new Date(time).toISOString().slice(0, 10);
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await chromium.newPage({ viewport: { width: 1280, height: 900 }, timezoneId: "UTC" });
+  page.setDefaultTimeout(20_000);
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
+const go = async (hash) => {
+  await page.goto("about:blank");
+  await page.goto(`${ballast.url}/${hash}`);
+  await page.locator("main:not([aria-busy]) h1").waitFor();
+  await page.waitForLoadState("networkidle");
+};
+const names = () => page.locator("tbody th a").allInnerTexts();
+const cells = async (name) => (await page.getByRole("row", { name }).locator("td").allInnerTexts()).map(plain);
+const shown = (line) => page.locator(".foot").getByText(line, { exact: true }).waitFor();
+
+test("where nothing is, a visit is welcomed; where only a policy is, a session is asked for", async () => {
+  await go("");
+  await page.getByRole("link", { name: "Train the first policy" }).waitFor();
+  policy = await trained(ballast.url, {
+    problem: { horizon: 2, rate_per_step: 0.002, periods_per_year: 52, history: HISTORY, trading_cost: 0.01, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } },
+    design: { count: 40 },
+    name: "World, weekly",
+  });
+  await go("");
+  await page.getByText("No session yet.", { exact: false }).waitFor();
+  await page.getByRole("link", { name: "Open a session" }).click();
+  await page.getByRole("heading", { level: 1, name: "Open a session" }).waitFor();
+});
+
+test("a row tells wealth, holding, the last period, how late the report is, the advice and the trade", async () => {
+  sessions = [];
+  for (const [index, name] of NAMES.entries())
+    sessions.push((await call(ballast.url, "/sessions", { policy, wealth: 1000 * (index + 1), name, tags: index === 1 ? ["pension"] : [] })).session);
+  const now = Date.now();
+  await call(ballast.url, "/observe", { session: sessions[0], period: 1, simple_return: 0.1, executed_allocation: 1, date: isoDay(now - 17 * DAY) });
+  await call(ballast.url, "/observe", { session: sessions[1], period: 1, simple_return: -0.1, executed_allocation: 0, date: isoDay(now - DAY) });
+  await go("");
+  const session = await call(ballast.url, `/sessions/${sessions[0]}`);
+  const action = await call(ballast.url, `/action?session=${sessions[0]}`);
+  const [wealth, held, change, report, hold, trade, state, opened] = await cells("Ada");
+  // All is bought at a hundredth, and gains a tenth.
+  assert.equal(wealth, "1089.00");
+  assert.equal(held, "100 %");
+  assert.match(change, /\+8\.9 %\s+\+89\.00/);
+  assert.match(report, /overdue by 10 days/);
+  assert.ok(Math.abs(Number.parseFloat(hold) - 100 * action.allocation) <= 0.05, `${hold} for ${action.allocation}`);
+  const whole = session.wealth * (1 - 0.01 * Math.abs(action.trade));
+  const size = action.allocation * whole - session.wealth * action.holding;
+  const told = Math.abs(action.trade) < 0.0005 ? "Nothing" : `${size > 0 ? "Buy" : "Sell"} ${Math.abs(size).toFixed(2)}`;
+  assert.equal(trade, told);
+  assert.match(state, /active\s+1 of 2/);
+  assert.match(opened, /by World, weekly/);
+  assert.match((await cells("Grace"))[3], /next \d/);
+  assert.equal((await cells("Emmy"))[3], "None yet");
+  assert.equal((await cells("Emmy"))[2], "\u2013");
+});
+
+test("a report is due a period after the last, by the calendar of the policy", async () => {
+  const { daysLate, nextDay } = await dashboardModule("periods.js");
+  assert.deepEqual([nextDay("2024-01-31", 12), nextDay("2024-03-31", 4), nextDay("2024-02-23", 52), nextDay("2024-03-01", 252)], ["2024-02-29", "2024-06-30", "2024-03-01", "2024-03-04"]);
+  assert.deepEqual([nextDay("2024-01-31", null), daysLate("2024-02-29", "2024-03-02"), daysLate("2024-02-29", "2024-02-28")], [null, 2, 0]);
+});
+
+test("headers put the rows in order, and say so", async () => {
+  await go("");
+  assert.deepEqual(await names(), ["Emmy", "Grace", "Ada"]);
+  const press = (name) => page.getByRole("button", { name }).click();
+  const order = (name) => page.getByRole("columnheader", { name }).getAttribute("aria-sort");
+  await press("Wealth");
+  await page.waitForFunction(() => document.querySelector("tbody th a").textContent === "Emmy" && document.querySelector("[aria-sort]").textContent.startsWith("Wealth"));
+  assert.equal(await order("Wealth"), "descending");
+  await press("Wealth");
+  await page.waitForFunction(() => document.querySelector("tbody th a").textContent === "Ada");
+  assert.equal(await order("Wealth"), "ascending");
+  await press("Session");
+  await page.waitForFunction(() => document.querySelector("[aria-sort]").textContent.startsWith("Session"));
+  assert.deepEqual(await names(), ["Ada", "Emmy", "Grace"]);
+  assert.match(page.url(), /sort=name/);
+  // The address brings the same rows back.
+  await go(new URL(page.url()).hash);
+  assert.deepEqual(await names(), ["Ada", "Emmy", "Grace"]);
+});
+
+test("search, tag and state leave those that match", async () => {
+  await go("");
+  await shown("3 of 3");
+  await page.getByLabel("Search").fill("gra");
+  await shown("1 of 1");
+  assert.deepEqual(await names(), ["Grace"]);
+  await page.getByLabel("Search").fill("100 % & nobody");
+  await page.getByText("No session matches.").waitFor();
+  await go(new URL(page.url()).hash);
+  await page.getByText("No session matches.").waitFor();
+  assert.equal(await page.getByLabel("Search").inputValue(), "100 % & nobody");
+  await page.getByLabel("Search").fill("");
+  await shown("3 of 3");
+  await page.getByLabel("Tag").fill("pension");
+  await shown("1 of 1");
+  await page.getByLabel("Tag").fill("");
+  await shown("3 of 3");
+  await page.getByLabel("State").selectOption("completed");
+  await shown("0 of 0");
+});
+
+test("an advice that is refused is a dash with its reason, and the others stand", async () => {
+  const refused = { type: "/problems/overloaded", title: "The service cannot answer now", status: 503, detail: "too busy for Grace" };
+  await page.route(`**/action?session=${sessions[1]}`, (route) => route.fulfill({ status: 503, contentType: "application/problem+json", body: JSON.stringify(refused) }));
+  await go("");
+  assert.match((await cells("Grace"))[4], /^\u2013\s+too busy for Grace$/);
+  assert.match((await cells("Emmy"))[4], /^[\d.]+ %$/);
+  await page.unrouteAll();
+});
+
+test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scrolls sideways", async () => {
+  const axe = await readFile(AXE, "utf8");
+  for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
+    await page.emulateMedia({ colorScheme });
+    await page.setViewportSize({ width, height: 900 });
+    await go("");
+    await page.evaluate(axe);
+    const { violations, passes } = await page.evaluate(() => axe.run(document));
+    assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join("\n")}`), []);
+    assert.ok(passes.length > 10);
+    assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0);
+  }
+});
