@@ -43,6 +43,7 @@ const parsed = async (answer) => (await answer).json();
 
 export const get = (path, signal) => parsed(send("GET", path, undefined, signal));
 export const post = (path, body, signal) => parsed(send("POST", path, body, signal));
+export const patch = (path, body) => parsed(send("PATCH", path, body));
 export const remove = (path) => send("DELETE", path);
 export const text = async (path) => (await send("GET", path)).text();
 

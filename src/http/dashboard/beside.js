@@ -1,17 +1,17 @@
 // A table of two things side by side, with what differs.
 
 import { h, table } from "./dom.js";
-import { short } from "./format.js";
+import { titled } from "./naming.js";
 
 /** What two things are called in a table and in charts: A is the first. */
 export const LETTERS = ["A", "B"];
 
 /**
  * `rows`: `{name, cells: [of A, of B], apart}`; `apart` is the difference in words, where it is more than that they differ.
- * `kind` is where the two are.
+ * `kind` is where the two are, `names` what they are called, empty where nothing.
  */
-export function beside(caption, kind, noun, ids, rows) {
-  const link = (index) => [`${LETTERS[index]}: `, h("a", { href: `#/${kind}/${ids[index]}` }, `${noun} ${short(ids[index])}`)];
+export function beside(caption, kind, noun, ids, names, rows) {
+  const link = (index) => [`${LETTERS[index]}: `, h("a", { href: `#/${kind}/${ids[index]}` }, titled(noun, ids[index], names[index]))];
   const differs = ({ cells: [one, other], apart }) => (one === other ? "" : (apart ?? "differs"));
   const both = table(
     caption,

@@ -18,7 +18,7 @@ const ASIDE = 2.5;
 export async function policiesBeside(ids, leaving) {
   const both = await Promise.all(ids.map((id) => get(`/policies/${id}`, leaving)));
   const asked = both.map(({ specification }) => specification);
-  const table = beside("Two policies side by side", "policies", "Policy", ids, rows(asked));
+  const table = beside("Two policies side by side", "policies", "Policy", ids, both.map(({ name }) => name), rows(asked));
   return [h("p", { class: "lead" }, sentence(rows(asked))), table, curves(ids, both, leaving)];
 }
 

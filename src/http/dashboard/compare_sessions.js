@@ -8,13 +8,14 @@ import { falls, wealths, worstFall } from "./comparators.js";
 import { LEAST_FALL, LEAST_SHARE } from "./course.js";
 import { h, section } from "./dom.js";
 import { addedIn, netAdded } from "./flows.js";
-import { allocation, count, percent, percentTick, points, short, tick, wealth } from "./format.js";
+import { allocation, count, percent, percentTick, points, tick, wealth } from "./format.js";
+import { called } from "./naming.js";
 import { calendar } from "./periods.js";
 import { caution, utility } from "./specification.js";
 
 export async function sessionsBeside(ids, leaving) {
   const both = await Promise.all(ids.map((id) => read(id, leaving)));
-  const table = beside("Two sessions side by side", "sessions", "Session", ids, rows(both));
+  const table = beside("Two sessions side by side", "sessions", "Session", ids, both.map(({ session }) => session.name), rows(both));
   return [h("p", { class: "lead" }, sentence(both)), table, courses(both)];
 }
 
@@ -26,7 +27,7 @@ async function read(id, leaving) {
     session.state === "active" ? get(`/action?session=${id}`, leaving) : null,
   ]);
   const { problem } = policy.specification;
-  return { session, history, problem, action, calendar: calendar(history, problem.periods_per_year), grown: grown(history) };
+  return { session, history, policy, problem, action, calendar: calendar(history, problem.periods_per_year), grown: grown(history) };
 }
 
 /** What 100 at the start has become after each period, without what was added or taken. */
@@ -73,7 +74,7 @@ function rows(both) {
     row("Worst fall", (one) => ({ size: deepest(one), words: percent(deepest(one)) }), signed(points)),
     row("Last period", last),
     row("Returns seen", ({ session }) => ({ size: session.sample_size, words: count(session.sample_size) }), signed(count)),
-    row("Policy", ({ session }) => short(session.policy)),
+    row("Policy", ({ policy }) => called(policy.policy, policy.name)),
     row("Investor", ({ problem }) => utility(problem.utility)),
     row("Caution", ({ problem }) => caution(problem)),
   ];

@@ -7,6 +7,7 @@ import { count, counted, duration, figures, minus, percent, percentTick, short, 
 import { histogram } from "./histogram.js";
 import { intervalChart } from "./interval_chart.js";
 import { until } from "./jobs.js";
+import { policyLink } from "./naming.js";
 import { unitOf } from "./periods.js";
 import { FRAMEWORKS, investorWords, PAPER, worth } from "./specification.js";
 import { binned, chanceBelow, pieces, worstAverage } from "./spread.js";
@@ -83,7 +84,7 @@ function compared({ request, histories, strategies }) {
   const drawn = request.histories.kind === "drawn";
   const records = drawn ? `, after each of ${counted(histories.length, "record")} drawn from the market` : `, after a record of ${counted(problem.history.length, "return")}`;
   const followed = strategies.filter(({ policy }) => policy && Object.values(request.policies).includes(policy));
-  const links = followed.map(({ policy, framework }, index) => [index > 0 ? ", " : "", `\u201c${FRAMEWORKS[framework]}\u201d is `, h("a", { href: `#/policies/${policy}` }, `policy ${short(policy)}`)]);
+  const links = followed.map(({ policy, framework }, index) => [index > 0 ? ", " : "", `\u201c${FRAMEWORKS[framework]}\u201d is `, policyLink(policy)]);
   return h(
     "div",
     { class: "words" },

@@ -35,6 +35,14 @@ export function input({ name, label, note, changed, within, value = "", unit = n
   return field(name, label, note, control, within);
 }
 
+/** A field of several lines. */
+export function area({ name, label, note, changed, within, value = "", rows = 2 }) {
+  const control = h("textarea", { rows, class: "prose" });
+  control.value = value;
+  if (changed) control.addEventListener("input", () => changed(control.value));
+  return field(name, label, note, control, within);
+}
+
 /** A choice; `choices` maps values to words, or lists both where their order is not that of the values. */
 export function select({ name, label, note, choices, changed, within }) {
   const control = h(

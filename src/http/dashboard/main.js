@@ -59,7 +59,7 @@ async function show() {
   }
   const heading = h("h1", { tabindex: -1 }, page.title);
   main.replaceChildren(
-    h("header", { class: "page" }, h("div", {}, page.trail ?? null, heading), page.actions ?? null),
+    h("header", { class: "page" }, h("div", {}, page.trail ?? null, heading, page.under ?? null), page.actions ?? null),
     ...[page.body].flat(),
   );
   main.removeAttribute("aria-busy");

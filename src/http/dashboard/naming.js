@@ -1,13 +1,91 @@
 // What things are called: by the name that somebody gave, else by the part of the identifier that tells it from others.
 
-import { h } from "./dom.js";
+import { get, patch } from "./api.js";
+import { announce, h } from "./dom.js";
+import { area, input, showProblem } from "./form.js";
 import { short } from "./format.js";
 
 /** What a thing is called in a sentence. */
 export const called = (id, name) => name || short(id);
 
+/** The same with what kind of thing it is, where only its identifier tells. */
+export const titled = (noun, id, name) => name || `${noun} ${short(id)}`;
+
 /** What heads the row of a thing: its name with the identifier behind it, or the identifier alone. */
 export function headed(href, id, name) {
   const code = h("code", {}, short(id));
   return name ? [h("a", { href }, name), h("span", { class: "under" }, code)] : h("a", { href }, code);
+}
+
+/** A link to a policy of which the identifier alone is known: where `asked`, its name takes the place of that once it is read. */
+export function policyLink(id, asked = true) {
+  const link = h("a", { href: `#/policies/${id}` }, `policy ${short(id)}`);
+  const name = ({ name }) => name && link.replaceChildren(name);
+  if (asked) get(`/policies/${id}`).then(name, () => {});
+  return link;
+}
+
+export const tagList = (tags) => (tags.length > 0 ? h("span", { class: "tags" }, tags.map((tag) => h("span", { class: "tag" }, tag))) : null);
+
+const CLEARED = { name: "", notes: "", tags: [] };
+
+/** `{parts, read(), show(labels)}`: the fields of what a thing is called. `read()` gives those that are not blank, or with `{all: true}` all
+ * of them. `changed()` at every edit. */
+export function labelFields({ within, changed } = {}) {
+  const text = { within, inputmode: "text", changed };
+  const name = input({ ...text, name: "name", label: "Name", note: "What it is called. May be blank." });
+  const tags = input({ ...text, name: "tags", label: "Tags", note: "To find it by, apart by commas. May be blank." });
+  const notes = area({ within, changed, name: "notes", label: "Notes", note: "May be blank." });
+  const read = ({ all = false } = {}) => {
+    const said = {
+      name: name.control.value.trim(),
+      notes: notes.control.value.trim(),
+      tags: tags.control.value.split(",").map((tag) => tag.trim()).filter(Boolean),
+    };
+    return Object.fromEntries(Object.entries(said).filter(([, value]) => all || value.length > 0));
+  };
+  const show = (labels) => {
+    const given = { ...CLEARED, ...labels };
+    for (const [field, value] of [[name, given.name], [notes, given.notes], [tags, [given.tags].flat().join(", ")]])
+      if (field.control !== document.activeElement) field.control.value = value ?? "";
+  };
+  return { name, tags, notes, parts: [name, tags, notes], read, show };
+}
+
+/** What stands below the heading of a thing at `path`: what it is called, to be changed in place. */
+export function labelled(noun, path, id, labels) {
+  const element = h("div", { class: "labels" });
+  const rest = () => {
+    const edit = h("button", { class: "link", onclick: change }, labels.name ? "Edit" : "Give it a name");
+    const line = h("p", { class: "note" }, labels.name ? [`${noun} `, h("code", {}, short(id)), " "] : null, tagList(labels.tags), " ", edit);
+    element.replaceChildren(line, labels.notes ? h("p", { class: "note prose" }, labels.notes) : "");
+    return edit;
+  };
+  const change = () => {
+    const fields = labelFields({ within: "label-" });
+    fields.show(labels);
+    const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
+    const save = h("button", { type: "submit" }, "Save");
+    const leave = h("button", { type: "button", class: "quiet", onclick: () => rest().focus() }, "Leave as it was");
+    const form = h("form", { novalidate: true, "aria-label": `What this ${noun.toLowerCase()} is called` }, h("div", { class: "fields" }, fields.parts.map((part) => part.element)), message, h("p", { class: "send" }, save, leave));
+    form.addEventListener("submit", async (event) => {
+      event.preventDefault();
+      save.disabled = true;
+      try {
+        labels = await patch(path, fields.read({ all: true }));
+        const title = titled(noun, id, labels.name);
+        document.querySelector("h1").textContent = title;
+        document.title = `${title} \u00b7 Ballast`;
+        rest().focus();
+        announce(`It is called ${title}.`);
+      } catch (error) {
+        showProblem(form, message, error);
+      }
+      save.disabled = false;
+    });
+    element.replaceChildren(form);
+    fields.name.control.focus();
+  };
+  rest();
+  return element;
 }

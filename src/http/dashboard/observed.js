@@ -7,6 +7,7 @@ import { BESIDE } from "./course.js";
 import { announce, disclosure, h, section, table } from "./dom.js";
 import { standing } from "./flows.js";
 import { allocation, count, figures, moment, percent, short, wealth } from "./format.js";
+import { policyLink } from "./naming.js";
 import { day } from "./periods.js";
 import { save } from "./picture.js";
 
@@ -156,10 +157,10 @@ function corrections(shown) {
 /** The policies that followed the first, newest first. */
 function renewals({ history: { renewals }, calendar }) {
   if (renewals.length === 0) return "";
-  const words = ({ period, policy, renewed_ms }) => [
+  const words = ({ period, policy, renewed_ms }, index) => [
     `From ${calendar.inText(period)} on by `,
-    h("a", { href: `#/policies/${policy}` }, `policy ${short(policy)}`),
+    policyLink(policy, index < NEWEST),
     `, since ${moment(renewed_ms)}`,
   ];
-  return h("ul", { class: "renewals" }, [...renewals].reverse().map((made) => h("li", {}, ...words(made))));
+  return h("ul", { class: "renewals" }, [...renewals].reverse().map((made, index) => h("li", {}, ...words(made, index))));
 }

@@ -2,7 +2,8 @@
 
 import { get, post } from "./api.js";
 import { announce, h, table } from "./dom.js";
-import { count, moment, percent, short, significant } from "./format.js";
+import { count, moment, percent, significant } from "./format.js";
+import { called, headed, tagList } from "./naming.js";
 import { foot, Pages } from "./pages.js";
 import { ticking } from "./ticking.js";
 import { caution, FRAMEWORKS, utility } from "./specification.js";
@@ -59,10 +60,13 @@ function listed(rows, ticks) {
     [
       {
         name: "Policy",
-        cell: ({ policy }) => [
-          ticks.box(policy, `policy ${short(policy)}`),
-          h("a", { href: `#/policies/${policy}` }, h("code", {}, short(policy))),
-        ],
+        cell: ({ policy, name, tags }) =>
+          h(
+            "div",
+            { class: "ticked" },
+            ticks.box(policy, `policy ${called(policy, name)}`),
+            h("div", {}, headed(`#/policies/${policy}`, policy, name), tagList(tags)),
+          ),
       },
       { name: "Kind", cell: of(({ framework }) => FRAMEWORKS[framework]) },
       { name: "Investor", cell: of((problem) => utility(problem.utility)) },

@@ -4,6 +4,7 @@ import { download, get, offers, remove } from "./api.js";
 import { lineChart } from "./chart.js";
 import { announce, disclosure, h, section, table } from "./dom.js";
 import { basisPoints, count, figures, moment, percent, percentTick, short } from "./format.js";
+import { labelled, titled } from "./naming.js";
 import { unitOf } from "./periods.js";
 import { FRAMEWORKS, inPaperWords, inWords, warningList } from "./specification.js";
 import { surfaceView } from "./surface_view.js";
@@ -57,7 +58,7 @@ export async function view(id, leaving) {
     h("a", { href: "#/policies" }, "Policies"),
     ` \u203a ${FRAMEWORKS[policy.framework]}, stored ${moment(policy.created_ms)}`,
   );
-  return { title: `Policy ${short(id)}`, trail, actions, body };
+  return { title: titled("Policy", id, policy.name), trail, under: labelled("Policy", `/policies/${id}`, id, policy), actions, body };
 }
 
 function deletion(id) {

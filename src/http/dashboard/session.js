@@ -5,8 +5,9 @@ import { get, offers, remove } from "./api.js";
 import { holdings, wealthCourse, worstFallFact } from "./course.js";
 import { announce, facts, h, section } from "./dom.js";
 import { banked, netAdded, standing } from "./flows.js";
-import { allocation, count, counted, percent, points, short, wealth } from "./format.js";
+import { allocation, count, counted, percent, points, wealth } from "./format.js";
 import { asking } from "./frontier.js";
+import { labelled, titled } from "./naming.js";
 import { observeForm } from "./observe.js";
 import { lastReport, observed, righting } from "./observed.js";
 import { calendar } from "./periods.js";
@@ -50,10 +51,10 @@ export async function view(id, leaving) {
     { class: "trail" },
     h("a", { href: "#/sessions" }, "Sessions"),
     " \u203a ",
-    h("a", { href: `#/policies/${session.policy}` }, `Policy ${short(session.policy)}`),
+    h("a", { href: `#/policies/${session.policy}` }, titled("Policy", session.policy, policy.name)),
     `, ${utility(policy.specification.problem.utility)}`,
   );
-  return { title: `Session ${short(id)}`, trail, body: [holder, deletion(id)] };
+  return { title: titled("Session", id, session.name), trail, under: labelled("Session", `/sessions/${id}`, id, session), body: [holder, deletion(id)] };
 }
 
 /** What one unit of the radius takes from the average return: of a normal law it counts in standard deviations. */

@@ -4,6 +4,7 @@ import { post } from "./api.js";
 import { h } from "./dom.js";
 import { fieldset, input, select, showProblem } from "./form.js";
 import { moment, short } from "./format.js";
+import { labelFields } from "./naming.js";
 import { fraction, typed } from "./number_text.js";
 import { all } from "./pages.js";
 import { returnsField } from "./returns_field.js";
@@ -17,6 +18,7 @@ export async function view(query, leaving) {
 }
 
 function opening(policies, asked) {
+  const labels = labelFields();
   const policy = select({ name: "policy", label: "Policy", choices: policyChoices(policies) });
   if (policies.some(({ policy }) => policy === asked)) policy.control.value = asked;
   const stake = input({ name: "wealth", label: "Wealth", note: "Blank: the policy\u2019s initial wealth." });
@@ -50,13 +52,15 @@ function opening(policies, asked) {
     h("summary", {}, "Other returns are known than the policy\u2019s history"),
     history.element,
   );
+  const more = h("details", {}, h("summary", {}, "Tags and notes"), h("div", { class: "fields" }, labels.tags.element, labels.notes.element));
   const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
   const form = h(
     "form",
     { novalidate: true },
-    fieldset("Whose session", [policy, stake, holding]),
+    fieldset("Whose session", [labels.name, policy, stake, holding]),
     fieldset("How long", [going, every, window]),
     other,
+    more,
     message,
     h("p", { class: "send" }, h("button", { type: "submit" }, "Open")),
   );
@@ -64,7 +68,7 @@ function opening(policies, asked) {
     event.preventDefault();
     const trouble = await history.trouble();
     if (trouble) return showProblem(form, message, { field: "history", message: trouble });
-    const request = { policy: policy.control.value };
+    const request = { policy: policy.control.value, ...labels.read() };
     if (known.length > 0) request.history = known;
     const wealth = typed(stake.control.value);
     if (wealth !== null) request.wealth = wealth;
@@ -86,5 +90,5 @@ function opening(policies, asked) {
 /** Policies to choose from, by what tells them apart. */
 export const policyChoices = (policies) =>
   Object.fromEntries(
-    policies.map(({ policy, created_ms }) => [policy, `${short(policy)}, stored ${moment(created_ms)}`]),
+    policies.map(({ policy, name, created_ms }) => [policy, `${name ? `${name} (${short(policy)})` : short(policy)}, stored ${moment(created_ms)}`]),
   );

@@ -5,7 +5,7 @@ import { get } from "./api.js";
 import { h, table } from "./dom.js";
 import { input, select } from "./form.js";
 import { allocation, count, counted, moment, percent, wealth } from "./format.js";
-import { called, headed } from "./naming.js";
+import { called, headed, tagList } from "./naming.js";
 import { day, daysLate, isoDay, nextDay } from "./periods.js";
 import { ticking } from "./ticking.js";
 import { welcome } from "./welcome.js";
@@ -150,8 +150,6 @@ function listed(entries, { ticks, advice, sorted, sort }) {
     { ...by("Opened", "created"), cell: ({ created_ms, policy, policy_name }) => [moment(created_ms).split(",")[0], h("span", { class: "under" }, "by ", h("a", { href: `#/policies/${policy}` }, called(policy, policy_name)))] },
   ], entries);
 }
-
-const tagList = (tags) => (tags.length > 0 ? h("span", { class: "under tags" }, tags.map((tag) => h("span", { class: "tag" }, tag))) : null);
 
 /** What the last period made of wealth, what was added with it. */
 function change({ wealth: now, wealth_change }) {

@@ -2,8 +2,8 @@
 
 import { get, post } from "./api.js";
 import { announce, h } from "./dom.js";
-import { showProblem } from "./form.js";
-import { short } from "./format.js";
+import { fieldset, showProblem } from "./form.js";
+import { labelFields, policyLink } from "./naming.js";
 import { returnsField } from "./returns_field.js";
 import { warningList } from "./specification.js";
 import { put, radiusFor, trainFields, UTILITY } from "./train_fields.js";
@@ -64,6 +64,13 @@ export async function view(query, leaving) {
     if (REDRAWN.includes(path) || path.startsWith("problem.utility")) fields.show(request);
     written();
   });
+  const labels = labelFields({
+    changed: () => {
+      const { name, notes, tags } = labels.read();
+      Object.assign(request, { name, notes, tags });
+      written();
+    },
+  });
   const written = () => {
     json.value = compact(request);
     jsonError.hidden = true;
@@ -73,6 +80,7 @@ export async function view(query, leaving) {
       request = JSON.parse(json.value);
       jsonError.hidden = true;
       fields.show(request);
+      labels.show(request);
       source.show([request.problem?.history ?? []].flat());
     } catch (error) {
       jsonError.textContent = error.message;
@@ -100,6 +108,7 @@ export async function view(query, leaving) {
     { novalidate: true },
     h("fieldset", {}, h("legend", {}, "The returns seen so far"), source.element),
     fields.elements,
+    fieldset("What it is called", labels.parts),
     advanced,
     message,
     h(
@@ -128,8 +137,7 @@ export async function view(query, leaving) {
   fields.show(request);
   if (origin) source.show(request.problem.history);
   written();
-  const back = (href, words) => h("p", { class: "trail" }, h("a", { href }, words));
-  const trail = origin ? back(`#/policies/${origin}`, `Policy ${short(origin)}`) : back("#/jobs", "Jobs");
+  const trail = h("p", { class: "trail" }, origin ? ["Like ", policyLink(origin)] : h("a", { href: "#/jobs" }, "Jobs"));
   const newer = asked.has("newer");
   return { title: newer ? "Train on newer returns" : "Train a policy", trail, body: [origin ? told(newer) : "", form] };
 }

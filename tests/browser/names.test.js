@@ -1,0 +1,124 @@
+// What policies and sessions are called: given where they are made, changed where they stand, and said wherever they are meant.
+
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { browser, call, service, trained } from "./ballast.js";
+
+const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
+const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
+
+let ballast, chromium, page, policy, session;
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  page.setDefaultTimeout(20_000);
+  policy = await trained(ballast.url, { problem: { horizon: 3, rate_per_step: 0.002, history: HISTORY }, design: { count: 20 } });
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+const go = async (hash) => {
+  await page.goto("about:blank");
+  await page.goto(`${ballast.url}/${hash}`);
+  await page.locator("main:not([aria-busy]) h1").waitFor();
+  await page.waitForLoadState("networkidle");
+};
+const heading = (name) => page.getByRole("heading", { level: 1, name, exact: true }).waitFor();
+const short = (id) => id.replace(/^[a-z]+_/, "").slice(0, 10);
+
+test("a training is named, and so is what it gives", async () => {
+  await go("#/train");
+  await page.getByLabel("Returns or prices").fill(HISTORY.map((value) => 100 * value).join("\n"));
+  await page.getByLabel("Bank return per period, %").fill("0.2");
+  await page.getByLabel("Periods ahead").fill("1");
+  await page.getByLabel("Name", { exact: true }).fill("World & bills");
+  await page.getByLabel("Tags").fill("equity, monthly,");
+  const sent = page.waitForRequest((request) => request.url().endsWith("/train"));
+  await page.getByRole("button", { name: "Train", exact: true }).click();
+  const { name, tags, notes } = (await sent).postDataJSON();
+  assert.deepEqual([name, tags, notes], ["World & bills", ["equity", "monthly"], undefined]);
+});
+
+test("a policy is named in place, and a session by it is opened under a name", async () => {
+  await go(`#/policies/${policy}`);
+  await heading(`Policy ${short(policy)}`);
+  await page.getByRole("button", { name: "Give it a name" }).click();
+  await page.getByLabel("Name", { exact: true }).fill("x".repeat(101));
+  await page.getByRole("button", { name: "Save", exact: true }).click();
+  await page.locator(".field .error").waitFor();
+  await page.getByLabel("Name", { exact: true }).fill("Careful");
+  await page.getByLabel("Notes").fill("Since March.\nAsk before May.");
+  await page.getByRole("button", { name: "Save", exact: true }).click();
+  await heading("Careful");
+  assert.match(await page.title(), /^Careful/);
+  assert.equal(await page.evaluate(() => document.activeElement.textContent), "Edit");
+  const now = await call(ballast.url, `/policies/${policy}`);
+  assert.deepEqual([now.name, now.notes, now.tags], ["Careful", "Since March.\nAsk before May.", []]);
+  await page.getByRole("link", { name: "Open a session" }).click();
+  await heading("Open a session");
+  assert.match(await page.getByLabel("Policy", { exact: true }).locator("option:checked").innerText(), new RegExp(`^Careful \\(${short(policy)}\\)`));
+  await page.getByLabel("Name", { exact: true }).fill("Ada");
+  await page.getByText("Tags and notes").click();
+  await page.getByLabel("Tags").fill("pension");
+  await page.getByRole("button", { name: "Open", exact: true }).click();
+  await heading("Ada");
+  session = page.url().split("/").pop();
+  const opened = await call(ballast.url, `/sessions/${session}`);
+  assert.deepEqual([opened.name, opened.notes, opened.tags], ["Ada", "", ["pension"]]);
+});
+
+test("the name is said in the trail, the lists and beside another, with the identifier behind it", async () => {
+  await go(`#/sessions/${session}`);
+  assert.match(await page.locator(".trail").innerText(), /^Sessions \u203a Careful,/);
+  assert.match(await page.locator(".labels").innerText(), new RegExp(`Session ${short(session)}\\s+pension\\s+Edit`));
+  for (const [hash, name, id] of [["#/", "Ada", session], ["#/policies", "Careful", policy]]) {
+    await go(hash);
+    const row = page.getByRole("row", { name });
+    assert.equal(await row.getByRole("link", { name, exact: true }).count(), 1);
+    assert.ok((await row.innerText()).includes(short(id)));
+  }
+  const other = (await call(ballast.url, "/sessions", { policy })).session;
+  await go(`#/compare?sessions=${session},${other}`);
+  await page.getByRole("link", { name: "Ada", exact: true }).waitFor();
+  await page.getByRole("link", { name: `Session ${short(other)}`, exact: true }).waitFor();
+  assert.match(await page.getByRole("row", { name: /^Policy/ }).innerText(), /Careful\s+Careful/);
+  await go(`#/train?from=${policy}`);
+  await page.locator(".trail").getByRole("link", { name: "Careful" }).waitFor();
+});
+
+test("a name is taken away, and what was typed is left", async () => {
+  await go(`#/sessions/${session}`);
+  await page.getByRole("button", { name: "Edit" }).click();
+  await page.getByLabel("Name", { exact: true }).fill("Nobody");
+  await page.getByRole("button", { name: "Leave as it was" }).click();
+  await page.getByRole("button", { name: "Edit" }).click();
+  assert.equal(await page.getByLabel("Name", { exact: true }).inputValue(), "Ada");
+  await page.getByLabel("Name", { exact: true }).fill("");
+  await page.getByRole("button", { name: "Save", exact: true }).click();
+  await heading(`Session ${short(session)}`);
+  const { name, tags } = await call(ballast.url, `/sessions/${session}`);
+  assert.deepEqual([name, tags], ["", ["pension"]]);
+});
+
+test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scrolls sideways", async () => {
+  const axe = await readFile(AXE, "utf8");
+  for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
+    await page.emulateMedia({ colorScheme });
+    await page.setViewportSize({ width, height: 900 });
+    for (const hash of [`#/sessions/${session}`, `#/policies/${policy}`, "#/sessions/new", "#/train"]) {
+      await go(hash);
+      if (hash.includes("_") || hash.includes("policies")) await page.locator(".labels button").click();
+      await page.evaluate(axe);
+      const { violations, passes } = await page.evaluate(() => axe.run(document));
+      assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join("\n")}`), [], `${hash} ${colorScheme} ${width}`);
+      assert.ok(passes.length > 10);
+      assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0, `${hash} at ${width}`);
+    }
+  }
+});
