@@ -72,6 +72,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "policy.js": SCRIPT,
         "problem_words.js": SCRIPT,
         "report_fields.js": SCRIPT,
+        "reporting.js": SCRIPT,
         "returns_field.js": SCRIPT,
         "sensitivity.js": SCRIPT,
         "session.js": SCRIPT,

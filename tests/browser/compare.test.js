@@ -62,11 +62,22 @@ test("two sessions ticked are told side by side", async () => {
   assert.match(plain(await chart.getAttribute("aria-valuetext")), /At the start: A 100\.00, B 100\.00/);
 });
 
-test("a third tick takes the place of the first", async () => {
+test("of policies a third tick takes the place of the first, of sessions as many are ticked as are reported for", async () => {
   const third = (await call(ballast.url, "/sessions", { policy: careful })).session;
-  await tick("sessions", [one, other, third]);
+  const box = (id) => page.getByRole("row", { name: id.replace(/^[a-z]+_/, "").slice(0, 10) }).first().getByRole("checkbox");
+  await go("#/sessions");
+  for (const id of [one, other, third]) await box(id).check();
+  assert.equal(await page.getByRole("link", { name: "Compare the two" }).isVisible(), false);
+  await page.getByRole("link", { name: "Report for the 3" }).waitFor();
+  await box(one).uncheck();
+  await page.getByRole("link", { name: "Compare the two" }).click();
   await page.getByRole("heading", { level: 1, name: "Two sessions" }).waitFor();
   assert.ok(page.url().endsWith(`#/compare?sessions=${other},${third}`), page.url());
+  const problem = { horizon: 1, rate_per_step: 0.001, history: HISTORY };
+  const last = await trained(ballast.url, { problem, design: { count: 20 } });
+  await tick("policies", [careful, bold, last]);
+  await page.getByRole("heading", { level: 1, name: "Two policies" }).waitFor();
+  assert.ok(page.url().endsWith(`#/compare?policies=${bold},${last}`), page.url());
 });
 
 test("two policies ticked are told by what differs, and by what they hold", async () => {

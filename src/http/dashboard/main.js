@@ -11,6 +11,7 @@ import * as jobs from "./jobs.js";
 import { held, keyForm } from "./key.js";
 import * as policies from "./policies.js";
 import * as policy from "./policy.js";
+import * as reporting from "./reporting.js";
 import * as session from "./session.js";
 import * as sessionOpening from "./session_opening.js";
 import * as sessions from "./sessions.js";
@@ -23,6 +24,7 @@ const ROUTES = [
   [/^#\/policies$/, policies.view, "policies"],
   [/^#\/policies\/([^/]+)$/, policy.view, "policies"],
   [/^#\/(?:sessions)?(?:\?.*)?$/, sessions.view, "sessions"],
+  [/^#\/report(?:\?(.*))?$/, reporting.view, "sessions"],
   [/^#\/sessions\/new(?:\?(.*))?$/, sessionOpening.view, "sessions"],
   [/^#\/sessions\/([^/]+)$/, session.view, "sessions"],
   [/^#\/evaluations$/, evaluations.view, "evaluations"],

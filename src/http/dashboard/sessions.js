@@ -23,7 +23,8 @@ export async function view(_, leaving) {
   const said = new URLSearchParams(location.hash.split("?")[1] ?? "");
   const chosen = Object.fromEntries(Object.entries(CHOICES).map(([name, blank]) => [name, said.get(name) ?? blank]));
   if (!(chosen.state in STATES)) chosen.state = "";
-  const actions = h("div", { class: "actions" }, h("a", { class: "button", href: "#/sessions/new" }, "Open a session"));
+  const several = h("a", { class: "button quiet", href: "#/report" }, "Report for several");
+  const actions = h("div", { class: "actions" }, several, h("a", { class: "button", href: "#/sessions/new" }, "Open a session"));
   const first = await read(chosen, null, leaving);
   const title = "Sessions";
   if (first.total === 0 && !filtered(chosen)) {
@@ -52,7 +53,7 @@ function read(chosen, after, signal) {
 
 function overview(chosen, first, leaving) {
   const advice = advised(leaving);
-  const ticks = ticking("sessions");
+  const ticks = ticking("sessions", { at: "#/report", words: (ticked) => `Report for the ${count(ticked)}` });
   const tags = h("datalist", { id: "tags" });
   const known = new Set();
   const holder = h("div", {});
