@@ -79,7 +79,8 @@ function order(action, place) {
 /** So many shares. */
 const number = (shares) => (shares >= 100 ? wealth(Math.round(shares)).replace(/\.00$/, "") : figures(shares, 3));
 
-function why({ allocation, certainty_equivalent, floor }, { end, cautious }) {
+/** What the advice is worth even then, as the parts of a sentence. */
+export function why({ allocation, certainty_equivalent, floor }, { end, cautious }) {
   const worst = "n the worst market your record still allows";
   const [even, market] = cautious ? [`Even i${worst}`, `I${worst}`] : Array(2).fill("If the market is what this policy takes it for");
   if (allocation === 0) return [`${market}, nothing beats the bank, which reaches `, h("b", {}, wealth(floor)), ` ${end}.`];

@@ -120,7 +120,7 @@ const swatch = (index) =>
     { class: "swatch", width: 22, height: 8, "aria-hidden": "true" },
     s("line", { class: `line s${index}`, x1: 1, x2: 21, y1: 4, y2: 4 }),
   );
-const block = (index) =>
+export const block = (index) =>
   s(
     "svg",
     { class: "swatch", width: 12, height: 12, "aria-hidden": "true" },

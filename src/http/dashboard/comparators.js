@@ -2,6 +2,9 @@
 
 import { standing, termsOf, addedIn } from "./flows.js";
 
+/** What is held beside the bank, in words. */
+export const risky = ({ assets }) => (assets ? "the assets" : "stocks");
+
 /** What the periods observed brought, each as it stands: the growth of the asset, the bank's rate, the money added. */
 const lived = (history) =>
   history.observations.map((row, index) => ({

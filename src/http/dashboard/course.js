@@ -1,17 +1,17 @@
 // How a session went: wealth beside what the same start would have come to otherwise, the worst fall, what was held.
 
 import { lineChart } from "./chart.js";
-import { falls, mixed, wealths, worstFall } from "./comparators.js";
+import { falls, mixed, risky, wealths, worstFall } from "./comparators.js";
 import { h, section } from "./dom.js";
 import { banked } from "./flows.js";
 import { allocation, percent, percentTick, tick, wealth } from "./format.js";
 import { isCautious } from "./specification.js";
 
 /** What the session is measured by, each held through the same returns; 60/40 as people call it. */
-export const BESIDE = [
+export const besides = (history) => [
   { name: "All in the bank", share: 0, colour: 2 },
   { name: "60/40", share: 0.6, colour: 3 },
-  { name: "All in stocks", share: 1, colour: 1 },
+  { name: `All in ${risky(history)}`, share: 1, colour: 1 },
 ];
 /** Charts above each other start at one line. */
 const GUTTER = 64;
@@ -37,7 +37,7 @@ export function wealthCourse(shown) {
   const along = (of) => values.map((k) => of[k] ?? null);
   const series = [
     { name: "This session", kind: "line", values: along(own) },
-    ...BESIDE.map(({ name, share, colour }) => ({ name, colour, kind: "line", bare: true, values: along(share === 0 ? bank : mixed(history, share)) })),
+    ...besides(history).map(({ name, share, colour }) => ({ name, colour, kind: "line", bare: true, values: along(share === 0 ? bank : mixed(history, share)) })),
   ];
   const deep = falls(history);
   const stocks = falls(history, mixed(history, 1));
@@ -52,7 +52,7 @@ export function wealthCourse(shown) {
         y: { format: percent, tick: percentTick, also: [0, -LEAST_FALL] },
         series: [
           { name: "This session", kind: "line", values: along(deep) },
-          { name: "All in stocks", kind: "line", bare: true, values: along(stocks) },
+          { name: `All in ${risky(history)}`, kind: "line", bare: true, values: along(stocks) },
         ],
       }),
     );
@@ -63,7 +63,7 @@ export function wealthCourse(shown) {
 /** The session's wealth beside the others', a sentence. */
 function comparison({ history }, own) {
   const worth = (share) => wealth(mixed(history, share).at(-1));
-  return `It stands at ${wealth(own.at(-1))}. The same start would have come to ${worth(0)} all in the bank, ${worth(0.6)} at 60/40 and ${worth(1)} all in stocks.`;
+  return `It stands at ${wealth(own.at(-1))}. The same start would have come to ${worth(0)} all in the bank, ${worth(0.6)} at 60/40 and ${worth(1)} all in ${risky(history)}.`;
 }
 
 /** The worst fall as a fact: `[name, value, note]`. */

@@ -3,7 +3,7 @@
 import { post } from "./api.js";
 import { falls, mixed, wealths } from "./comparators.js";
 import { correctionForm } from "./correction.js";
-import { BESIDE } from "./course.js";
+import { besides } from "./course.js";
 import { announce, disclosure, h, section, table } from "./dom.js";
 import { standing } from "./flows.js";
 import { allocation, count, figures, moment, percent, short, wealth } from "./format.js";
@@ -32,6 +32,7 @@ export function observed(shown) {
         period,
         ...(calendar.dated ? [{ name: "Last day", cell: (row) => (standing(row).date ? day(standing(row).date) : "") }] : []),
         number("Return", now("log_return", (value) => percent(Math.expm1(value), 2))),
+        ...(history.assets ?? []).map((name) => number(name, ({ assets, now }) => percent(Math.expm1((now?.assets ?? assets).log_returns?.[name] ?? Number.NaN), 2))),
         number("Advised", now("advised_allocation", allocation)),
         number("Held", now("executed_allocation", allocation)),
         number("Wealth", now("wealth", wealth)),
@@ -72,7 +73,7 @@ export function observed(shown) {
 /** The periods as a file: numbers plain, shares and returns in percent. */
 export function csv({ history, calendar }) {
   const own = wealths(history);
-  const beside = BESIDE.map(({ name, share }) => [name, mixed(history, share)]);
+  const beside = besides(history).map(({ name, share }) => [name, mixed(history, share)]);
   const deep = falls(history);
   const cell = (value) => (/[",\n]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value);
   const hundred = (value) => (value === null ? "" : String(Number((100 * value).toPrecision(12))));

@@ -100,7 +100,7 @@ export function reportFields({ within, label, rate, contribution, date: likely =
 }
 
 /** A share as it is typed in percent. */
-const inPercent = (share) => (share === null || share === undefined ? "" : String(Number((100 * share).toPrecision(12))));
+export const inPercent = (share) => (share === null || share === undefined ? "" : String(Number((100 * share).toPrecision(12))));
 
 /**
  * Sends what `compose` makes of the form to `path`, once at a time, and then has the session shown anew by `refresh`. What is

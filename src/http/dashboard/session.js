@@ -2,6 +2,7 @@
 
 import { adviceView } from "./advice.js";
 import { get, offers, remove } from "./api.js";
+import { risky } from "./comparators.js";
 import { holdings, wealthCourse, worstFallFact } from "./course.js";
 import { announce, facts, h, section } from "./dom.js";
 import { banked, netAdded, standing } from "./flows.js";
@@ -12,6 +13,7 @@ import { observeForm } from "./observe.js";
 import { lastReport, observed, righting } from "./observed.js";
 import { calendar } from "./periods.js";
 import { nearness } from "./sensitivity.js";
+import { severalAdvice, severalForm, severalHeld, severalWorst } from "./several.js";
 import { hasBall, isCautious, isParametric, moments, utility } from "./specification.js";
 import { conservatism } from "./what_if.js";
 import { worstMarket } from "./worst_market.js";
@@ -63,12 +65,13 @@ const cautionScale = (problem) => (isParametric(problem.framework) ? moments(pro
 async function fill(holder, told) {
   const { id, session, history, calendar, policy, leaving } = told;
   const shown = { ...told, right: null };
-  shown.right = history.observations.length > 0 ? righting(shown) : null;
+  shown.right = history.observations.length > 0 && !history.assets ? righting(shown) : null;
   if (session.state !== "active") {
-    const ended = [h("div", {}, completed(shown), lastReport(shown)), wealthCourse(shown)];
-    return holder.replaceChildren(h("div", { class: "columns" }, ended), figures(shown, null), held(shown, null), observed(shown));
+    const ended = [h("div", {}, completed(shown), history.assets ? "" : lastReport(shown)), wealthCourse(shown)];
+    return holder.replaceChildren(h("div", { class: "columns" }, ended), figures(shown, null), history.assets ? severalHeld(shown) : held(shown, null), observed(shown));
   }
   const action = await get(`/action?session=${id}`, leaving);
+  if (history.assets) return fillSeveral(holder, shown, action);
   const report = observeForm(action, shown);
   const advice = adviceView(action, place(shown, action), [report, lastReport(shown)]);
   const near = nearness({ id, session, policy, leaving, unit: calendar.unit });
@@ -85,6 +88,21 @@ async function fill(holder, told) {
     held(shown, action),
     observed(shown),
     frontier(shown),
+  );
+}
+
+/** The same of several assets, of which neither a period put right nor another caution is told. */
+function fillSeveral(holder, shown, action) {
+  const { history, calendar } = shown;
+  const advice = severalAdvice(action, place(shown, action), history.assets, severalForm(action, shown));
+  holder.replaceChildren(
+    changed(shown),
+    due(shown),
+    h("div", { class: "columns" }, advice, wealthCourse(shown)),
+    figures(shown, action),
+    severalWorst(action, history.assets, calendar),
+    severalHeld(shown),
+    observed(shown),
   );
 }
 
@@ -116,7 +134,7 @@ function figures(shown, action) {
     { class: "figures" },
     facts([
       ["Wealth", wealth(session.wealth), `${change >= 0 ? "+" : ""}${percent(change)} since the start${apart}`],
-      ["Held in stocks", allocation(session.holding), "of wealth, before trading"],
+      [`Held in ${risky(shown.history)}`, allocation(session.holding), "of wealth, before trading"],
       action && ["Worth as much as a sure", wealth(action.certainty_equivalent), end],
       action && ["All in the bank", wealth(action.floor), `${end}, all sold now`],
       history.observations.length > 0 && worstFallFact(shown),

@@ -1,0 +1,157 @@
+// A session of several assets: what to hold of each, the report of all of them, and what the worst market makes of each.
+
+import { SOURCES, why } from "./advice.js";
+import { disclosure, h, section, table } from "./dom.js";
+import { endWords } from "./flows.js";
+import { input } from "./form.js";
+import { allocation, figures, minus, percent, points, wealth } from "./format.js";
+import { fraction, typed } from "./number_text.js";
+import { sendReports } from "./report_fields.js";
+import { stackedChart } from "./stacked.js";
+
+/** A trade of a smaller share of wealth is none. */
+const LITTLE = 0.0005;
+
+const sum = (numbers) => numbers.reduce((all, number) => all + number, 0);
+
+/** What an advice by name comes to in money, asset by asset; all that is bought and sold pays its cost. */
+export function inMoneyByName(action, assets, { wealth: whole, cost }) {
+  const all = whole * (1 - cost * sum(assets.map((name) => Math.abs(action.trade[name]))));
+  const rows = assets.map((name) => {
+    const [held, now] = [action.allocation[name] * all, action.holdings[name] * whole];
+    const still = Math.abs(action.trade[name]) < LITTLE;
+    return { name, share: action.allocation[name], held, holding: action.holdings[name], now, trade: still ? 0 : held - now };
+  });
+  const [held, now] = [sum(rows.map((row) => row.held)), sum(rows.map((row) => row.now))];
+  const total = { name: "All of them", share: action.total, held, holding: now / whole, now, trade: null };
+  const bank = { name: "Bank", share: 1 - action.total, held: all - held, holding: 1 - now / whole, now: whole - now, trade: null };
+  return { rows, total, bank, cost: whole - all };
+}
+
+/** The advice, with what follows it, `rest`. */
+export function severalAdvice(action, place, assets, rest) {
+  const { rows, total, bank, cost } = inMoneyByName(action, assets, place);
+  const money = (share, size) => [allocation(share), h("span", { class: "under" }, wealth(size))];
+  const number = (name, cell) => ({ name, numeric: true, cell });
+  const traded = (size) => (size === null ? "" : size === 0 ? "Nothing" : `${size > 0 ? "Buy" : "Sell"} ${wealth(Math.abs(size))}`);
+  const orders = table("What to hold of each asset", [
+    { name: "Asset", cell: ({ name }) => name },
+    number("To hold", ({ share, held }) => money(share, held)),
+    number("Held now", ({ holding, now }) => money(holding, now)),
+    number("To trade", ({ trade }) => traded(trade)),
+  ], [...rows, total, bank]);
+  orders.classList.add("by-asset");
+  return section(
+    place.heading,
+    h(
+      "div",
+      { class: "advice", id: "advice", tabindex: -1 },
+      h("p", { class: "big" }, h("span", {}, "Hold "), h("strong", {}, allocation(action.total)), h("span", {}, ` in ${assets.length} assets`)),
+      orders,
+      cost > 0 && rows.some(({ trade }) => trade !== 0) ? h("p", { class: "sentence" }, `Trading costs ${wealth(cost)}.`) : "",
+      action.caution.map(({ sentence }) => h("p", { class: "note wrong caution" }, minus(sentence))),
+      h("p", { class: "sentence" }, why({ ...action, allocation: action.total }, place)),
+      action.contribution === 0 ? "" : h("p", { class: "sentence" }, endWords(action.contribution)),
+    ),
+    rest,
+  );
+}
+
+/** The fields of a period's report: a return of each asset, and on demand what else was held, paid, added and reached. */
+function severalFields(action, assets, { rate, date, changed }) {
+  const part = (list, label, note) =>
+    assets.map((name, index) => input({ within: `asset-${index}-`, name: `${list}.${name}`, label: label(name), note: note(name), unit: "percent", changed }));
+  const returns = part("simple_returns", (name) => `Return of ${name}, %`, () => null);
+  const held = part("executed_allocations", (name) => `${name} held, %`, (name) => `Blank: the ${allocation(action.allocation[name])} advised.`);
+  const day = input({ name: "date", label: "Last day", note: "Such as 2008-09-30. May be blank.", inputmode: "text", value: date ?? "" });
+  const paid = input({ name: "rate", label: "The bank paid, %", note: `Blank: ${percent(rate, 3)}, the policy\u2019s.`, unit: "percent", changed });
+  const flow = input({ name: "flow", label: "Money added at the end", note: `Blank: ${wealth(action.contribution)}, the policy\u2019s. \u2212100 is 100 taken.`, changed });
+  const reached = input({ name: "wealth", label: "Wealth reached", note: "Blank: what all the rest gives.", changed });
+  const elements = (fields) => h("div", { class: "fields" }, fields.map(({ element }) => element));
+  const more = h("details", {}, h("summary", {}, "I held other shares, or money came or went"), elements([...held, paid, flow, reached]));
+  const text = ({ control }) => control.value.trim();
+  const byName = (fields, blank) => Object.fromEntries(assets.map((name, index) => [name, text(fields[index]) === "" ? blank(name) : (fraction(text(fields[index])) ?? text(fields[index]))]));
+  const executed = () => byName(held, (name) => action.allocation[name]);
+  return {
+    element: h("div", {}, elements([...returns, day]), more),
+    trouble() {
+      const wrong = returns.find((field) => fraction(text(field)) === null);
+      if (!wrong) return null;
+      return { field: wrong.name, message: text(wrong) === "" ? "The return is blank." : `\u201c${text(wrong)}\u201d is not a number of percent.` };
+    },
+    report() {
+      const report = { simple_returns: byName(returns, () => null) };
+      if (held.some((field) => text(field) !== "")) report.executed_allocations = executed();
+      for (const [field, read] of [[paid, fraction], [flow, typed], [reached, typed], [day, (said) => said]]) if (text(field) !== "") report[field.name] = read(text(field)) ?? text(field);
+      return report;
+    },
+    /** What the period brought, or null where something cannot be read. */
+    read() {
+      const blank = (field, otherwise, read) => (text(field) === "" ? otherwise : read(text(field)));
+      const told = { back: byName(returns, () => null), held: executed(), rate: blank(paid, rate, fraction), added: blank(flow, action.contribution, typed), ended: blank(reached, Number.NaN, typed) };
+      const numbers = [...Object.values(told.back), ...Object.values(told.held), told.rate, told.added, told.ended];
+      return numbers.every((number) => typeof number === "number") ? told : null;
+    },
+  };
+}
+
+/** The form for the coming period; what is held where nothing else is said is the advice. */
+export function severalForm(action, { id, session, history: { assets }, policy, calendar, refresh }) {
+  const { rate_per_step, trading_cost } = policy.specification.problem;
+  const preview = h("output", { class: "note" });
+  const foretell = () => {
+    const told = fields.read();
+    if (told === null) return (preview.textContent = "");
+    const whole = sum(Object.values(told.held));
+    if (whole > 1 + 1e-9) return (preview.textContent = `This will be refused: ${percent(whole)} in all cannot be held.`);
+    const cost = trading_cost * sum(assets.map((name) => Math.abs(told.held[name] - action.holdings[name])));
+    const grown = (1 - whole) * (1 + told.rate) + sum(assets.map((name) => told.held[name] * (1 + told.back[name])));
+    const reached = Number.isNaN(told.ended) ? session.wealth * (1 - cost) * grown + told.added : told.ended;
+    preview.textContent = `Wealth ${wealth(session.wealth)} \u2192 ${wealth(reached)} at ${allocation(whole)} held. ${endWords(told.added)}`;
+  };
+  const fields = severalFields(action, assets, { rate: rate_per_step, date: calendar.next, changed: () => foretell() });
+  const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
+  const button = h("button", { type: "submit" }, `Report ${calendar.inText(action.period)}`);
+  const form = h("form", { class: "observe", novalidate: true }, fields.element, preview, message, h("p", { class: "send" }, button));
+  const compose = () => ({ session: id, period: action.period, ...fields.report() });
+  sendReports(form, { button, message, fields, path: "/observe", compose, once: "a period counts once.", session, refresh });
+  return form;
+}
+
+/** What the worst market of the coming period makes of each asset, behind the shares of what is held. */
+export function severalWorst(action, assets, { unit }) {
+  const means = action.one_step?.worst_means;
+  const quant = disclosure("For the quant", () =>
+    h("p", { class: "note" }, `${SOURCES[action.source][0].toUpperCase()}${SOURCES[action.source].slice(1)}. Radius of the fund\u2019s uncertainty set ${figures(action.radius, 3)}, around ${action.sample_size} returns.${action.one_step ? ` The one-step problem is worth at least ${wealth(action.one_step.certainty_equivalent)}, and no allocation more than ${wealth(action.one_step.bound)}.` : ""}`),
+  );
+  if (!means) return section("How it was found", quant);
+  const row = (name) => {
+    const [seen, worst] = [means[name].seen, means[name].worst].map(Math.expm1);
+    return { name, seen, worst, less: seen - worst };
+  };
+  const rows = assets.map(row);
+  const most = rows.reduce((one, other) => (other.less > one.less ? other : one));
+  const words =
+    most.less < 5e-6
+      ? `It assumes that every asset returns on average what it did, as no market allowed does worse to this advice.`
+      : `It takes most from ${most.name}: ${percent(most.worst, 2)} a ${unit} on average, where ${percent(most.seen, 2)} was seen.`;
+  const number = (name, cell) => ({ name, numeric: true, cell });
+  return section(
+    "The worst market your record still allows",
+    h("p", { class: "sentence" }, words),
+    table(`Average return of each asset a ${unit}`, [
+      { name: "Asset", cell: ({ name }) => name },
+      number(`Seen, a ${unit}`, ({ seen }) => percent(seen, 2)),
+      number("In the worst market", ({ worst }) => percent(worst, 2)),
+      number("Lower by", ({ less }) => points(less, 3)),
+    ], rows),
+    quant,
+  );
+}
+
+/** What was held of each, period by period. */
+export function severalHeld({ history, calendar }) {
+  const shares = history.observations.map((row) => ((row.now ?? row).assets ?? row.assets).executed_allocations ?? row.assets.executed_allocations);
+  if (shares.length === 0) return "";
+  return section("What it held", stackedChart({ title: "Share of wealth in each asset", assets: history.assets, shares, x: { name: calendar.name, tick: calendar.brief } }));
+}

@@ -1,0 +1,55 @@
+// What was held of each of several assets through time, one above the other; what is left to the whole is in the bank.
+
+import { axes, block, figure, plot, scale, walkable } from "./chart.js";
+import { h, s, table } from "./dom.js";
+import { allocation, percentTick } from "./format.js";
+
+const [HEIGHT, FOOT, TOP] = [190, 30, 10];
+/** So many assets have a colour of their own; the others are told together. */
+const COLOURS = 6;
+const QUARTERS = [0, 0.25, 0.5, 0.75, 1];
+
+/** `shares`: for each period, from the first, the share of wealth in each of `assets` by its name. `x`: `{name(period), tick(period)}`. */
+export function stackedChart({ title, assets, shares, x }) {
+  const own = assets.length > COLOURS ? assets.slice(0, COLOURS - 1) : assets;
+  const others = assets.slice(own.length);
+  const layers = own.map((name) => ({ name, of: (held) => held[name] }));
+  if (others.length > 0) layers.push({ name: "Others", of: (held) => others.reduce((sum, name) => sum + held[name], 0) });
+  const told = [...layers, { name: "Bank", of: (held) => 1 - assets.reduce((sum, name) => sum + held[name], 0) }];
+  const here = h("span", { class: "here" });
+  const outputs = told.map(() => h("b", {}));
+  const legend = h("span", { class: "legend" }, here, told.map(({ name }, index) => h("span", {}, index < layers.length ? block(index) : null, `${name} `, outputs[index])));
+  let [across, cursor, position] = [scale([0, 1], [0, 1]), null, shares.length - 1];
+  const mark = () => {
+    for (const end of ["x1", "x2"]) cursor?.setAttribute(end, across(position + 0.5));
+  };
+  const holder = plot(HEIGHT, (width) => {
+    const [left, right, bottom] = [64, width - 4, HEIGHT - FOOT];
+    across = scale([0, shares.length], [left, width - 14]);
+    const y = scale([0, 1], [bottom, TOP]);
+    const every = Math.ceil(shares.length / Math.max(1, Math.floor(width / 80)));
+    const xTicks = shares.map((_, index) => index + 1).filter((period) => (period - 1) % every === 0);
+    const wide = across(1) - across(0);
+    const bars = shares.map((held, index) => {
+      let below = 0;
+      return layers.map(({ of }, layer) => {
+        const [from, to] = [below, below + of(held)];
+        below = to;
+        return s("rect", { class: `bar s${layer}`, x: across(index) + 1, width: Math.max(0.5, wide - 2), y: y(to), height: Math.max(0, y(from) - y(to)) });
+      });
+    });
+    cursor = s("line", { class: "cursor", y1: 6, y2: bottom });
+    mark();
+    return [axes({ x: (period) => across(period - 0.5), y, xTicks, yTicks: QUARTERS, xFormat: x.tick, yFormat: percentTick, left, right, bottom }), bars, cursor];
+  });
+  const read = (at) => {
+    position = at;
+    here.textContent = x.name(at + 1);
+    const words = told.map(({ of }, index) => (outputs[index].textContent = allocation(of(shares[at]))));
+    mark();
+    return `${here.textContent}: ${told.map(({ name }, index) => `${name} ${words[index]}`).join(", ")}`;
+  };
+  walkable(holder, { label: title, count: shares.length, start: shares.length - 1, at: (pixel) => Math.floor(across.inverse(pixel)), read });
+  const columns = [{ name: "Period", cell: (index) => x.name(index + 1) }, ...[...assets.map((name) => ({ name, of: (held) => held[name] })), told.at(-1)].map(({ name, of }) => ({ name, numeric: true, cell: (index) => allocation(of(shares[index])) }))];
+  return figure({ title, legend, holder, rows: () => table(title, columns, shares.map((_, index) => index)) });
+}

@@ -1,0 +1,146 @@
+// A session of several assets: what to hold of each, a return reported for each, and what the worst market makes of each.
+
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { browser, call, service, trained } from "./ballast.js";
+
+const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
+const ASSETS = ["World", "Bonds A/B", "Gold"];
+const HISTORY = [
+  [0.0131, 0.003, 0.018], [-0.0442, 0.009, -0.046], [0.021, -0.004, 0.028], [0.033, 0.002, 0.015], [-0.012, 0.001, 0.005],
+  [0.008, 0.005, -0.006], [0.045, -0.002, 0.03], [-0.027, 0.006, -0.008], [0.016, 0.003, 0.006], [0.002, 0.001, 0.003],
+];
+const COST = 0.001;
+
+let ballast, chromium, page, session;
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  page.setDefaultTimeout(20_000);
+  const policy = await trained(ballast.url, {
+    problem: { assets: ASSETS, horizon: 4, rate_per_step: 0.001, periods_per_year: 12, history: HISTORY, trading_cost: COST, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } },
+    design: { count: 20 },
+  });
+  ({ session } = await call(ballast.url, "/sessions", { policy, wealth: 250_000, name: "Trust" }));
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
+const go = async () => {
+  await page.goto("about:blank");
+  await page.goto(`${ballast.url}/#/sessions/${session}`);
+  await page.locator("main:not([aria-busy]) h1").waitFor();
+  await page.waitForLoadState("networkidle");
+};
+const rows = async (name) => {
+  const texts = await page.getByRole("table", { name }).locator("tbody tr").allInnerTexts();
+  return Object.fromEntries(texts.map((text) => plain(text).replaceAll(",", "").split(/\t|\n/).map((cell) => cell.trim()).filter(Boolean)).map(([name, ...cells]) => [name, cells]));
+};
+const near = (told, value, within) => assert.ok(Math.abs(Number.parseFloat(told) - value) <= within, `${told} for ${value}`);
+
+test("the advice is told by asset, in percent and in money, and comes to the whole", async () => {
+  await go();
+  const action = await call(ballast.url, `/action?session=${session}`);
+  const told = await rows("What to hold of each asset");
+  // From the bank alone all that is held is bought.
+  const all = 250_000 * (1 - COST * action.total);
+  for (const name of ASSETS) {
+    const [share, money, now, nowMoney, trade] = told[name];
+    near(share, 100 * action.allocation[name], 0.05);
+    near(money, action.allocation[name] * all, 0.51);
+    assert.deepEqual([now, nowMoney], ["0 %", "0.00"]);
+    if (action.allocation[name] > 0.0005) near(trade.replace("Buy ", ""), action.allocation[name] * all, 0.51);
+    else assert.equal(trade, "Nothing");
+  }
+  near(told["All of them"][0], 100 * action.total, 0.05);
+  near(Number(told["All of them"][1]) + Number(told.Bank[1]), all, 1.1);
+  const words = plain(await page.locator("#advice").innerText()).replaceAll(",", "");
+  near(/Trading costs ([\d.]+)\./.exec(words)[1], 250_000 - all, 0.01);
+  const promise = /worth as much as a sure ([\d.]+?)\.? at the end/.exec(words);
+  near(promise[1], action.certainty_equivalent, 0.51);
+  assert.doesNotMatch(plain(await page.locator("main").innerText()), /undefined|NaN|in stocks|certainty equivalent/);
+});
+
+test("the worst market is told of each asset by its average return", async () => {
+  const { one_step } = await call(ballast.url, `/action?session=${session}`);
+  const told = await rows("Average return of each asset a month");
+  for (const name of ASSETS) {
+    near(told[name][0], 100 * Math.expm1(one_step.worst_means[name].seen), 0.006);
+    near(told[name][1], 100 * Math.expm1(one_step.worst_means[name].worst), 0.006);
+  }
+  const lowered = (name) => one_step.worst_means[name].seen - one_step.worst_means[name].worst;
+  const most = ASSETS.reduce((one, other) => (lowered(other) > lowered(one) ? other : one));
+  await page.getByText(`It takes most from ${most}:`, { exact: false }).waitFor();
+});
+
+test("a return is reported for each asset, and other shares where they were held", async () => {
+  await go();
+  const report = () => page.getByRole("button", { name: /^Report/ }).click();
+  await page.getByLabel("Return of World, %").fill("1.5");
+  await page.getByLabel("Return of Bonds A/B, %").fill("0,2");
+  await report();
+  await page.locator(".field .error").getByText("The return is blank.").waitFor();
+  await page.getByLabel("Return of Gold, %").fill("-1");
+  await page.getByLabel("Last day").fill("2026-10-31");
+  const foretold = /\u2192 ([\d,.]+?) at/.exec(await page.locator(".observe output").innerText())[1].replaceAll(",", "");
+  await report();
+  await page.getByRole("heading", { name: "November 2026, period 2 of 4" }).waitFor();
+  const [first] = (await call(ballast.url, `/sessions/${session}/history`)).observations;
+  assert.deepEqual(first.reported.simple_returns, { World: 0.015, "Bonds A/B": 0.002, Gold: -0.01 });
+  assert.equal("executed_allocations" in first.reported, false);
+  near(foretold, first.wealth, 0.51);
+  await page.getByText("I held other shares").click();
+  await page.getByLabel("World held, %").fill("40");
+  await page.getByLabel("Bonds A/B held, %").fill("10");
+  await page.getByLabel("Gold held, %").fill("60");
+  for (const name of ASSETS) await page.getByLabel(`Return of ${name}, %`).fill("1");
+  await page.getByText("This will be refused: 110.0\u202f% in all cannot be held.").waitFor();
+  await page.getByLabel("Gold held, %").fill("20");
+  await report();
+  await page.getByRole("heading", { name: "December 2026, period 3 of 4" }).waitFor();
+  const second = (await call(ballast.url, `/sessions/${session}/history`)).observations[1];
+  assert.deepEqual(second.reported.executed_allocations, { World: 0.4, "Bonds A/B": 0.1, Gold: 0.2 });
+});
+
+test("what was held stands one above the other, read by keyboard and as a table", async () => {
+  await go();
+  const chart = page.getByRole("slider", { name: "Share of wealth in each asset" });
+  await chart.press("End");
+  assert.equal(plain(await chart.getAttribute("aria-valuetext")), "November 2026: World 40.0 %, Bonds A/B 10.0 %, Gold 20.0 %, Bank 30.0 %");
+  // Seven tenths of the height between nothing and all are filled.
+  const heights = await chart.locator("rect.bar").evaluateAll((bars) => bars.slice(-3).map((bar) => Number(bar.getAttribute("height"))));
+  near(heights.reduce((sum, height) => sum + height, 0), 0.7 * 150, 0.01);
+  const told = await rows("Observed periods, newest first");
+  assert.ok(told["November 2026"].filter((cell) => cell === "1.00 %").length >= 3, `${told["November 2026"]}`);
+});
+
+test("a session of several that has ended says so, and what it held", async () => {
+  for (const period of [3, 4]) await call(ballast.url, "/observe", { session, period, simple_returns: { World: 0.01, "Bonds A/B": 0, Gold: 0.01 } });
+  await go();
+  await page.getByRole("heading", { name: "Completed" }).waitFor();
+  await page.getByRole("slider", { name: "Share of wealth in each asset" }).waitFor();
+});
+
+test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scrolls sideways", async () => {
+  const { policy } = await call(ballast.url, `/sessions/${session}`);
+  ({ session } = await call(ballast.url, "/sessions", { policy }));
+  await call(ballast.url, "/observe", { session, period: 1, simple_returns: { World: 0.01, "Bonds A/B": 0, Gold: 0.01 } });
+  const axe = await readFile(AXE, "utf8");
+  for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
+    await page.emulateMedia({ colorScheme });
+    await page.setViewportSize({ width, height: 900 });
+    await go();
+    await page.evaluate(axe);
+    const { violations, passes } = await page.evaluate(() => axe.run(document));
+    assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join("\n")}`), []);
+    assert.ok(passes.length > 10);
+    assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0);
+  }
+});
