@@ -121,6 +121,20 @@ test("what was held stands one above the other, read by keyboard and as a table"
   assert.ok(told["November 2026"].filter((cell) => cell === "1.00 %").length >= 3, `${told["November 2026"]}`);
 });
 
+test("it stands beside another session by what it holds in all", async () => {
+  const { policy } = await call(ballast.url, `/sessions/${session}`);
+  const other = (await call(ballast.url, "/sessions", { policy })).session;
+  await page.goto(`${ballast.url}/#/compare?sessions=${session},${other}`);
+  await page.getByRole("heading", { level: 1, name: "Two sessions" }).waitFor();
+  const told = await rows("Two sessions side by side");
+  const actions = await Promise.all([session, other].map((id) => call(ballast.url, `/action?session=${id}`)));
+  for (const [index, { total }] of actions.entries()) near(told["To hold in the assets"][index], 100 * total, 0.05);
+  assert.match(told["To trade"][1], /^buy [\d.]+$/);
+  assert.doesNotMatch(plain(await page.locator("main").innerText()), /NaN|undefined|in stocks/);
+  await page.goto(`${ballast.url}/#/policies/${policy}`);
+  await page.getByText("It is for World, Bonds A/B and Gold;", { exact: false }).waitFor();
+});
+
 test("a session of several that has ended says so, and what it held", async () => {
   for (const period of [3, 4]) await call(ballast.url, "/observe", { session, period, simple_returns: { World: 0.01, "Bonds A/B": 0, Gold: 0.01 } });
   await go();

@@ -4,6 +4,7 @@ import { inMoney } from "./advice.js";
 import { get } from "./api.js";
 import { h } from "./dom.js";
 import { allocation, wealth } from "./format.js";
+import { inMoneyByName } from "./several.js";
 
 /** Browsers keep six connections to one address: so many leave room for what is clicked meanwhile. */
 const AT_ONCE = 4;
@@ -63,18 +64,20 @@ const isOfSeveral = (action) => typeof action.allocation === "object";
 function held(action) {
   if (!isOfSeveral(action)) return [allocation(action.allocation)];
   const names = Object.keys(action.allocation).filter((name) => action.allocation[name] >= LITTLE);
-  return [allocation(action.total), h("span", { class: "under" }, `in ${names.length} of ${Object.keys(action.allocation).length} assets`)];
+  return [allocation(heldInAll(action)), h("span", { class: "under" }, `in ${names.length} of ${Object.keys(action.allocation).length} assets`)];
 }
 
-/** What to buy and to sell, in money; what is traded pays its cost. */
-function traded(action, whole, cost) {
-  const words = (verb, size) => `${verb} ${wealth(Math.abs(size))}`;
-  if (!isOfSeveral(action)) {
-    if (Math.abs(action.trade) < LITTLE) return ["Nothing"];
-    const { trade } = inMoney(action, { wealth: whole, cost, price: null });
-    return [words(trade > 0 ? "Buy" : "Sell", trade)];
-  }
-  const sum = (sign) => whole * Object.values(action.trade).reduce((all, share) => all + Math.max(0, sign * share), 0);
-  const parts = [["Buy", sum(1)], ["Sell", sum(-1)]].filter(([, size]) => size >= LITTLE * whole);
-  return parts.length === 0 ? ["Nothing"] : parts.map(([verb, size]) => h("span", { class: "line-of-two" }, words(verb, size)));
+/** The share of wealth to hold, in one asset or in all of several together. */
+export const heldInAll = (action) => (isOfSeveral(action) ? action.total : action.allocation);
+
+/** What to buy and to sell, in money, as one or two words of order; what is traded pays its cost. */
+export function orders(action, whole, cost) {
+  const trades = isOfSeveral(action)
+    ? inMoneyByName(action, Object.keys(action.allocation), { wealth: whole, cost }).rows.map(({ trade }) => trade)
+    : [Math.abs(action.trade) < LITTLE ? 0 : inMoney(action, { wealth: whole, cost, price: null }).trade];
+  const sum = (sign) => trades.reduce((all, trade) => all + Math.max(0, sign * trade), 0);
+  const parts = [["Buy", sum(1)], ["Sell", sum(-1)]].filter(([, size]) => size > 0);
+  return parts.length === 0 ? ["Nothing"] : parts.map(([verb, size]) => `${verb} ${wealth(size)}`);
 }
+
+const traded = (action, whole, cost) => orders(action, whole, cost).map((words) => h("span", { class: "line-of-two" }, words));

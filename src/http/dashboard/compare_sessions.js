@@ -1,10 +1,10 @@
 // Two sessions: what each is advised now, and how they went.
 
-import { inMoney } from "./advice.js";
+import { heldInAll, orders } from "./advised.js";
 import { get } from "./api.js";
 import { beside, LETTERS } from "./beside.js";
 import { lineChart } from "./chart.js";
-import { falls, wealths, worstFall } from "./comparators.js";
+import { falls, risky, wealths, worstFall } from "./comparators.js";
 import { LEAST_FALL, LEAST_SHARE } from "./course.js";
 import { h, section } from "./dom.js";
 import { addedIn, netAdded } from "./flows.js";
@@ -38,11 +38,14 @@ function grown(history) {
   return levels;
 }
 
+/** What the two hold beside the bank, in words. */
+const besideBank = (both) => risky(both.find(({ history }) => history.assets)?.history ?? both[0].history);
+
 function sentence([one, other]) {
   const [first, second] = [one.grown.at(-1), other.grown.at(-1)];
   const after = ({ session }) => `${count(session.period - 1)} period${session.period === 2 ? "" : "s"}`;
   const held = [one, other].every(({ action }) => action)
-    ? ` A is to hold ${allocation(one.action.allocation)} in stocks now, B ${allocation(other.action.allocation)}.`
+    ? ` A is to hold ${allocation(heldInAll(one.action))} in ${besideBank([one, other])} now, B ${allocation(heldInAll(other.action))}.`
     : "";
   return `100 in A has become ${wealth(first)} in ${after(one)}, and in B ${wealth(second)} in ${after(other)}.${held}`;
 }
@@ -55,16 +58,12 @@ function rows(both) {
   const signed = (words) => (value) => `${value > 0 ? "+" : ""}${words(value)}`;
   const money = (size) => ({ size, words: wealth(size) });
   const share = (size) => ({ size, words: allocation(size) });
-  const traded = ({ action, session, problem }) => inMoney(action, { wealth: session.wealth, cost: problem.trading_cost, price: null });
-  const trade = (one) => {
-    const { trade } = traded(one);
-    return Math.abs(one.action.trade) < 0.0005 ? "nothing" : `${trade > 0 ? "buy" : "sell"} ${wealth(Math.abs(trade))}`;
-  };
+  const trade = ({ action, session, problem }) => orders(action, session.wealth, problem.trading_cost).join(", ").toLowerCase();
   const deepest = ({ history }) => worstFall(falls(history))?.depth ?? 0;
   const active = (read) => (one) => (one.action ? read(one) : null);
   const last = ({ calendar, session }) => (session.period === 1 ? "none yet" : calendar.name(session.period - 1));
   return [
-    row("To hold in stocks", active(({ action }) => share(action.allocation)), signed(points)),
+    row(`To hold in ${besideBank(both)}`, active(({ action }) => share(heldInAll(action))), signed(points)),
     row("To trade", active(trade)),
     row("Worth as much as a sure", active(({ action }) => money(action.certainty_equivalent)), signed(wealth)),
     row("All in the bank", active(({ action }) => money(action.floor)), signed(wealth)),
@@ -101,6 +100,6 @@ function courses(both) {
     "How they went",
     lineChart({ title: "What 100 has become", gutter: 64, height: 220, x, y: { format: wealth, tick }, series: series(({ grown }) => grown) }),
     lineChart({ title: "Below the highest so far", gutter: 64, height: 130, x, y: { format: percent, tick: percentTick, also: [0, -LEAST_FALL] }, series: series(({ history }) => falls(history)) }),
-    lineChart({ title: "Share held in stocks", gutter: 64, height: 150, x: { ...x, here: name, between: true }, y: { format: allocation, tick: percentTick, also: [0, LEAST_SHARE] }, series: series(held, { kind: "levels" }) }),
+    lineChart({ title: `Share held in ${besideBank(both)}`, gutter: 64, height: 150, x: { ...x, here: name, between: true }, y: { format: allocation, tick: percentTick, also: [0, LEAST_SHARE] }, series: series(held, { kind: "levels" }) }),
   );
 }

@@ -24,6 +24,7 @@ export async function view(id, leaving) {
     h(
       "div",
       { class: "words" },
+      ofSeveral(specification),
       inWords(specification, annualised).map((sentence) => h("p", {}, sentence)),
       h("p", {}, often(specification.problem, diagnostics)),
       warningList(warnings),
@@ -74,6 +75,12 @@ function deletion(id) {
     }
   });
   return button;
+}
+
+/** That it is for several assets, where it is. */
+function ofSeveral({ fund }) {
+  if (!fund) return null;
+  return h("p", {}, `It is for ${fund.assets.slice(0, -1).join(", ")} and ${fund.assets.at(-1)}; what is said of stocks below is of all of them together.`);
 }
 
 /** How often it holds nothing, by the situations it was solved in; a sentence. */
