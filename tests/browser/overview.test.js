@@ -136,6 +136,23 @@ test("an advice that is refused is a dash with its reason, and the others stand"
   await page.unrouteAll();
 });
 
+test("what needs care is told where it is so", async () => {
+  await page.route("**/sessions?*", async (route) => {
+    const response = await route.fetch();
+    const answer = await response.json();
+    for (const row of answer.sessions) Object.assign(row, { Ada: { drift: "alarm" }, Grace: { drift: "warning" }, Emmy: { due: true } }[row.name]);
+    await route.fulfill({ response, json: answer });
+  });
+  await go("");
+  const told = await Promise.all(NAMES.map(async (name) => (await cells(name))[6]));
+  assert.match(told[0], /Returns have changed$/);
+  assert.match(told[1], /Returns may have changed$/);
+  assert.match(told[2], /Due for renewal$/);
+  await page.unrouteAll();
+  await go("");
+  for (const name of NAMES) assert.doesNotMatch((await cells(name))[6], /changed|Due/);
+});
+
 test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scrolls sideways", async () => {
   const axe = await readFile(AXE, "utf8");
   for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {

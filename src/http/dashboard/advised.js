@@ -38,23 +38,27 @@ export function advised(leaving) {
     turn();
   };
   const of = (entry) => {
-    if (!cells.has(entry.session)) {
+    const key = state(entry);
+    if (!cells.has(key)) {
       const row = { entry, hold: h("span", {}, "\u2026"), trade: h("span", {}, "\u2026") };
-      cells.set(entry.session, row);
+      cells.set(key, row);
       if (entry.state === "completed") for (const cell of [row.hold, row.trade]) cell.replaceChildren("\u2013");
       else {
         waiting.push(row);
         if (busy < AT_ONCE) turn();
       }
     }
-    return cells.get(entry.session);
+    return cells.get(key);
   };
   const forget = () => {
-    for (const { entry } of waiting) cells.delete(entry.session);
+    for (const { entry } of waiting) cells.delete(state(entry));
     waiting = [];
   };
   return { of, forget };
 }
+
+/** What the advice of a row rests on: another report or another policy asks anew. */
+const state = ({ session, policy, last_report_ms }) => [session, policy, last_report_ms].join();
 
 /** No advice, and why. */
 const none = (reason) => h("span", {}, "\u2013 ", h("span", { class: "under" }, reason));
