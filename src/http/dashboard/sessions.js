@@ -5,6 +5,7 @@ import { get } from "./api.js";
 import { h, table } from "./dom.js";
 import { input, select } from "./form.js";
 import { allocation, count, counted, moment, percent, wealth } from "./format.js";
+import { jobList } from "./jobs.js";
 import { called, headed, tagList } from "./naming.js";
 import { day, daysLate, isoDay, nextDay } from "./periods.js";
 import { ticking } from "./ticking.js";
@@ -28,8 +29,9 @@ export async function view(_, leaving) {
   const first = await read(chosen, null, leaving);
   const title = "Sessions";
   if (first.total === 0 && !filtered(chosen)) {
-    const { policies } = await get("/policies?limit=1", leaving);
-    return { title, actions: policies.length > 0 ? actions : null, body: policies.length > 0 ? lead() : welcome() };
+    const [{ policies }, { jobs }] = await Promise.all(["/policies?limit=1", "/jobs?limit=1"].map((path) => get(path, leaving)));
+    if (policies.length > 0) return { title, actions, body: lead() };
+    return { title, body: jobs.length > 0 ? [lead(), jobList(jobs, leaving).element] : welcome() };
   }
   return { title, actions, body: overview(chosen, first, leaving) };
 }
