@@ -23,9 +23,9 @@ use crate::control::request::specification::{
     DesignSpecification, ProblemSpecification, Specification, SurrogateSpecification, default_seed,
 };
 use crate::service::Service;
-use crate::service::error::ServiceError;
 use crate::service::jobs::Accepted;
-use crate::store::Relabel;
+use crate::service::sessions::Sessions;
+use crate::store::{Relabel, Tenant};
 
 /// A training: its specification, and what its policy is to be called, which is no part of that.
 #[derive(Debug, Serialize, Deserialize, ToSchema)]
@@ -76,7 +76,10 @@ pub async fn train(
 ) -> Result<Response, Problem> {
     let key = idempotency_key(&headers)?;
     let (specification, labels) = match said(&bytes) {
-        Some(SaidOfProblem { assets: Some(_), .. }) => decode::json::<TrainAssets>(&bytes)?.specified().await?,
+        Some(SaidOfProblem { assets: Some(_), .. }) => {
+            let asked = decode::json::<TrainAssets>(&bytes)?;
+            asked.specified(&service.sessions, &caller.tenant).await?
+        }
         _ => decode::json::<Train>(&bytes)?.specified(),
     };
     Ok(accepted(service.jobs.train(&caller, specification, labels, key).await?))
@@ -122,11 +125,9 @@ impl Train {
 }
 
 impl TrainAssets {
-    /// The radius for all funds at once is simulated.
-    async fn specified(self) -> Result<(Specification, Relabel), Problem> {
+    async fn specified(self, sessions: &Sessions, tenant: &Tenant) -> Result<(Specification, Relabel), Problem> {
         let TrainAssets { problem, design, surrogate, seed, name, notes, tags } = self;
-        let trained = tokio::task::spawn_blocking(move || problem.training(design, surrogate, seed));
-        let trained = trained.await.map_err(ServiceError::internal)?.map_err(ServiceError::from)?;
+        let trained = sessions.training(tenant, problem, (design, surrogate, seed)).await?;
         Ok((trained, Relabel { name, notes, tags }))
     }
 }

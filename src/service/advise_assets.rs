@@ -9,7 +9,9 @@ use crate::control::assets::advice::AssetsAdvice;
 use crate::control::request::annualised::Annualised;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::rules;
-use crate::control::request::specification::default_seed;
+use crate::control::request::specification::{
+    DesignSpecification, Specification, SurrogateSpecification, default_seed,
+};
 use crate::control::request::warnings::Warning;
 use crate::store::Tenant;
 
@@ -39,6 +41,20 @@ pub struct AssetsAdvised {
 }
 
 impl Sessions {
+    /// The training of a policy for several assets, of whose funds the joint radius is found.
+    ///
+    /// # Errors
+    /// A field breaks a rule; no turn to solve.
+    pub async fn training(
+        &self,
+        tenant: &Tenant,
+        problem: AssetsProblem,
+        (design, surrogate, seed): (DesignSpecification, SurrogateSpecification, u64),
+    ) -> Result<Specification, ServiceError> {
+        let training = move || problem.training(design, surrogate, seed);
+        Ok(self.resolving.run(tenant, training).await??)
+    }
+
     /// # Errors
     /// A field breaks a rule; the radius asks for more memory than can be kept; no turn to solve.
     pub async fn advise_assets(&self, tenant: &Tenant, question: AdviseAssets) -> Result<AssetsAdvised, ServiceError> {

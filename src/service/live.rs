@@ -25,6 +25,12 @@ pub(super) struct Means<'a> {
     pub turn: &'a HeavyTurn,
 }
 
+impl Means<'_> {
+    fn turns(&self) -> [&Bounded; 2] {
+        [self.advising, self.resolving]
+    }
+}
+
 /// A session replayed from its entries. It holds no policy: what it is advised by is kept under its name, and may be dropped.
 #[derive(Clone)]
 pub struct Live {
@@ -163,7 +169,7 @@ impl Live {
         let Passed { seen, log_return, executed_allocation, executed, standing } = passed;
         let advised = self.standing.assets.as_ref().map(|assets| assets.shares(allocation));
         let (standing, uncertainty) =
-            measured(means.advising, &means.advisor, &self.row.tenant, self.current.step(observe.period), standing)
+            measured(means.turns(), &means.advisor, &self.row.tenant, self.current.step(observe.period), standing)
                 .await?;
         let answer = Observed {
             session: observe.session.clone(),
@@ -191,13 +197,16 @@ impl Live {
 }
 
 /// The uncertainty set before `step` of the policy; of several assets, once their composition is chosen.
+///
+/// `turns` are those to advise and, where a composition must be solved for, to solve.
 pub(super) async fn measured(
-    advising: &Bounded,
+    turns: [&Bounded; 2],
     advisor: &Arc<Advisor>,
     tenant: &Tenant,
     step: usize,
     mut standing: Standing,
 ) -> Result<(Standing, Uncertainty), ServiceError> {
+    let of_several = usize::from(standing.assets.is_some());
     if standing.assets.is_none() && advisor.is_prompt(step, &standing.state) {
         let uncertainty = advisor.uncertainty(&standing.state);
         return Ok((standing, uncertainty));
@@ -207,7 +216,7 @@ pub(super) async fn measured(
         standing.compose(&measuring, step);
         (measuring.uncertainty(&standing.state), standing)
     };
-    let (uncertainty, standing) = advising.run(tenant, measure).await?;
+    let (uncertainty, standing) = turns[of_several].run(tenant, measure).await?;
     // The first session to get this far: the next advice finds its common random numbers simulated.
     let (advisor, reached) = (advisor.clone(), standing.state.clone());
     tokio::task::spawn_blocking(move || advisor.prepare(step, &reached));

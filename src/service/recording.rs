@@ -101,7 +101,8 @@ impl Sessions {
             let PutRight { before, standing, log_return, wealth_change } =
                 self.advising.run(tenant, put_right).await??;
             let step = current.step(observed);
-            let (standing, uncertainty) = measured(&self.advising, &advisor, tenant, step, standing).await?;
+            let (standing, uncertainty) =
+                measured([&self.advising, &self.resolving], &advisor, tenant, step, standing).await?;
             let radius = Some(uncertainty.radius);
             let answer = Corrected {
                 session: session.to_owned(),

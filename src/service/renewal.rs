@@ -83,7 +83,8 @@ impl Sessions {
         };
         let (standing, terms) = self.advising.run(tenant, go_on).await??;
         self.policies.starts_from(&advisor, standing.state.law.sample_size(), terms.horizon)?;
-        let (standing, uncertainty) = measured(&self.advising, &advisor, tenant, 0, standing).await?;
+        let (standing, uncertainty) =
+            measured([&self.advising, &self.resolving], &advisor, tenant, 0, standing).await?;
         let current = plan.stretch(renew.policy.clone(), observed, terms, renew.window);
         let (horizon, radius) = (current.horizon(), Some(uncertainty.radius));
         let answer = Renewed {

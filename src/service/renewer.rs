@@ -278,7 +278,7 @@ impl Renewer {
             let rate = periods.all.iter().rev().find_map(|period| period.report.rate);
             Ok::<_, ServiceError>(next(advisor.specification(), &record, renew.window, rate, wealth)?)
         };
-        let specification = self.sessions.advising.run(tenant, specify).await??;
+        let specification = self.sessions.resolving.run(tenant, specify).await??;
         let (by, key) = (Actor::service(self.clock.now_milliseconds()), key(session, attempts.number, attempts.count));
         let job = self.jobs.train_by_key(tenant, by, specification, key).await?;
         tracing::info!(

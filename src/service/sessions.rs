@@ -213,7 +213,7 @@ impl Sessions {
         let Beginning { state, assets: Some(mut assets), history } = beginning else { return Ok(beginning) };
         let advisor = advisor.clone();
         let compose = move || Beginning { state: assets.compose(&advisor, 0, &state), assets: Some(assets), history };
-        self.advising.run(tenant, compose).await
+        self.resolving.run(tenant, compose).await
     }
 
     /// Bytes of the sessions in memory.
