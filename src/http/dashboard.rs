@@ -30,6 +30,7 @@ macro_rules! assets {
 static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
     let files = assets! {
         "index.html": HTML,
+        "print.css": STYLE,
         "style.css": STYLE,
         "icon.svg": "image/svg+xml",
         "inter.woff2": "font/woff2",

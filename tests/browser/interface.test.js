@@ -38,9 +38,11 @@ test("a call shows its example, its fields and their defaults", async () => {
   const train = page.locator("#operations-jobs-train");
   await train.getByRole("button").first().click();
   await train.getByText('"target": "floor_gain"').first().waitFor();
-  await train.getByRole("tab", { name: "Schema" }).first().click();
-  await train.getByText("horizon", { exact: true }).first().waitFor();
-  await train.getByText("10", { exact: true }).first().waitFor();
+  const walk = page.locator("#operations-jobs-backtest");
+  await walk.getByRole("button").first().click();
+  await walk.getByRole("tab", { name: "Schema" }).first().click();
+  await walk.getByText("count", { exact: true }).first().waitFor();
+  await walk.getByText("100", { exact: true }).first().waitFor();
 });
 
 test("a call is tried", async () => {
