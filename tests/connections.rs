@@ -89,8 +89,8 @@ async fn answered_throughout(
     let (mut rounds, mut slowest) = (0, Duration::ZERO);
     let address = url.strip_prefix("http://").unwrap().to_owned();
     while Instant::now() < until || rounds == 0 {
-        let fresh = reqwest::Client::builder().timeout(4 * within(ANSWERED_WITHIN)).build().unwrap();
         for asked in [format!("{url}/readyz"), format!("http://{operations}/readyz"), format!("{url}{action}")] {
+            let fresh = reqwest::Client::builder().timeout(4 * within(ANSWERED_WITHIN)).build().unwrap();
             let begun = Instant::now();
             let request = fresh.get(&asked).header(AUTHORIZATION, format!("Bearer {key}"));
             let answer = request.send().await.unwrap_or_else(|error| panic!("{asked} in round {rounds}: {error:?}"));

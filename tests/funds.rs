@@ -11,7 +11,7 @@ use ballast::control::request::assets::AssetsProblem;
 use ballast::control::request::fund::CompositionRule;
 use ballast::control::request::fund::FundSpecification;
 use ballast::control::request::learning::Learning;
-use ballast::control::request::specification::Specification;
+use ballast::control::request::specification::{InitialLaws, Specification};
 use ballast::control::training::Training;
 use ballast::numerics::fund_bridges::fund_returns;
 use ballast::numerics::levelling::inverse_volatility;
@@ -74,11 +74,11 @@ fn sum(values: &[f64]) -> f64 {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_session_of_several_assets_is_lived_by_their_names() {
     let mut app = App::start().await;
-    app.train(&request(3)).await;
+    app.train(&request(4)).await;
     app.open_with(json!({ "wealth": 1000.0, "holdings": { "stocks": 0.2, "bonds": 0.1, "gold": 0.0 } })).await;
 
     // The library's own.
-    let advisor = trained(&request(3));
+    let advisor = trained(&request(4));
     let policy = app.get(&format!("/policies/{}", app.policy)).await.1;
     let of: &FundSpecification = advisor.specification().fund.as_deref().unwrap();
     assert_eq!(number(&policy["specification"]["fund"]["radius_factor"]), of.radius_factor);
@@ -134,16 +134,29 @@ async fn a_session_of_several_assets_is_lived_by_their_names() {
     assert!((number(&second["wealth"]) / (1000.0 * growth * growth_of_second) - 1.0).abs() < 1e-12, "{second}");
     assert!((number(&second["assets"]["log_returns"]["stocks"]) - 1.03_f64.ln()).abs() < 1e-15);
 
-    // Replayed from its entries it is the same, and the next prices follow on those reported.
+    // The next prices follow on those reported, and replayed from its entries it is the same.
+    let (status, third) = app.report(3, json!({ "prices": { "stocks": 106.09, "bonds": 99.0, "gold": 51.0 } })).await;
+    assert_eq!(status, 200, "{third}");
+    assert!((number(&third["assets"]["log_returns"]["stocks"]) - 1.03_f64.ln()).abs() < 1e-12);
     let before = app.action().await;
     app.restart().await;
     assert_eq!(app.action().await, before);
     let explained = app.get(&format!("/action?session={}&explain=worst_case", app.session)).await.1;
     assert!(explained["worst_case"]["sentence"].is_string(), "{explained}");
-    let (status, third) = app.report(3, json!({ "prices": { "stocks": 106.09, "bonds": 99.0, "gold": 51.0 } })).await;
-    assert_eq!(status, 200, "{third}");
-    assert!((number(&third["assets"]["log_returns"]["stocks"]) - 1.03_f64.ln()).abs() < 1e-12);
-    assert_eq!(third["completed"], true);
+    let (status, fourth) =
+        app.report(4, json!({ "prices": { "stocks": 109.2727, "bonds": 99.0, "gold": 51.0 } })).await;
+    assert_eq!(status, 200, "{fourth}");
+    assert!((number(&fourth["assets"]["log_returns"]["stocks"]) - 1.03_f64.ln()).abs() < 1e-12);
+    assert_eq!(fourth["completed"], true);
+    // What was told at the end is what a replay says.
+    let detail = |value: Value| json!([value["wealth"], value["holding"], value["assets"]["composition"]]);
+    let (path, told) = (
+        format!("/sessions/{}", app.session),
+        json!([fourth["wealth"], fourth["holding"], fourth["assets"]["composition"]]),
+    );
+    assert_eq!(detail(app.get(&path).await.1), told);
+    app.restart().await;
+    assert_eq!(detail(app.get(&path).await.1), told);
     let history = app.get(&format!("/sessions/{}/history", app.session)).await.1;
     assert_eq!(history["history"], json!(ROWS));
     assert_eq!(history["assets"], json!(["stocks", "bonds", "gold"]));
@@ -486,7 +499,27 @@ fn a_policy_of_a_fund_is_what_its_assets_give() {
         other.completed().unwrap_err().field
     };
     assert_eq!(refused(&|other| other.problem.history[3] += 0.001), "problem.history[3]");
+    assert_eq!(refused(&|other| other.design.initial_laws = InitialLaws::Given), "design.initial_laws");
     assert_eq!(refused(&|other| other.fund.as_mut().unwrap().radius_factor = 0.5), "fund.radius_factor");
     assert_eq!(refused(&|other| other.problem.learning = Learning::Decay { half_life: 9.0 }), "problem.learning");
     assert_eq!(refused(&|other| other.fund.as_mut().unwrap().history[0][0] = 9.0), "fund.history[0][0]");
+}
+
+/// Two assets that hedge each other: their fund in equal parts does not vary, and is no law to be learned from.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_fund_that_does_not_vary_is_not_taken() {
+    let mut app = App::start().await;
+    let mut request = request(2);
+    let rows: Vec<[f64; 2]> = [0.01, -0.02, 0.03, 0.005, -0.012].map(|x: f64| [x.ln_1p(), (-x).ln_1p()]).to_vec();
+    request["problem"]["assets"] = json!(["long", "short"]);
+    request["problem"]["history"] = json!(rows);
+    request["problem"]["rate_per_step"] = json!(-0.001);
+    request["problem"]["composition"] = json!("equal");
+    app.train(&request).await;
+    app.open().await;
+    let before = app.action().await;
+    assert_eq!(before.0, 200, "{}", before.1);
+    assert_ne!(before.1["composition"], json!({ "long": 0.5, "short": 0.5 }));
+    app.restart().await;
+    assert_eq!(app.action().await, before);
 }

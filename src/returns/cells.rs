@@ -202,6 +202,9 @@ fn fields(line: Line, separator: char) -> Result<Vec<Cell>, Stop> {
         };
         let after = quoted.map_or(start, |(inside, end)| &inside[end + 1..]);
         let (own, next) = after.split_once(separator).map_or((after, None), |(own, next)| (own, Some(next)));
+        if quoted.is_some() && !own.trim().is_empty() {
+            return Err(Stop::refused(format!("Line {} has {} after a closing quote.", line.number, own.trim())));
+        }
         let text: Cow<str> = match quoted {
             Some((inside, end)) if inside[..end].contains("\"\"") => inside[..end].replace("\"\"", "\"").into(),
             Some((inside, end)) => inside[..end].trim().into(),

@@ -16,6 +16,9 @@ const SURELY_FRACTIONS: f64 = 0.1;
 const SURELY_PERCENT: f64 = 1.0;
 /// Numbers above zero that average more than this, as a return a period, are rather prices.
 const LARGEST_MEAN: f64 = 0.2;
+/// Words of a heading of returns.
+const RETURNS: [&str; 12] =
+    ["ret", "return", "returns", "perf", "performance", "gain", "gains", "change", "chg", "pct", "percent", "yield"];
 /// No fractions average as much a period.
 const SURELY_NO_MEAN: f64 = 1.0;
 /// The service's bound on a log-return.
@@ -79,14 +82,15 @@ impl Numbers<'_> {
     fn kind(&self, signs: bool) -> Result<Kind, Stop> {
         let name = self.name.to_lowercase();
         let has = |words: &[&str]| words.iter().any(|word| name.contains(word));
-        let is_log =
-            name.split(|letter: char| !letter.is_alphanumeric()).any(|word| word.starts_with("log") || word == "ln");
-        let is_return = has(&["ret", "perf", "gain", "change", "chg", "%", "pct", "percent", "yield"]);
+        let words: Vec<&str> = name.split(|letter: char| !letter.is_alphanumeric()).collect();
+        let is_log = words.iter().any(|word| ["log", "ln"].contains(word) || word.starts_with("logret"));
+        let is_return = name.contains('%') || words.iter().any(|word| RETURNS.contains(word));
         let is_price = !is_return && (has(&["price", "close"]) || name == "nav");
         if is_log || signs || (self.values.iter().any(|value| *value <= 0.0) && !is_price) {
             return Ok(if is_log { Kind::Log } else { Kind::Simple });
         }
-        if is_return {
+        // An index of total return is none, though its heading says so.
+        if is_return && moments(&self.values).0 / 100.0 <= LARGEST_MEAN {
             return Ok(Kind::Simple);
         }
         if is_price || has(&["level", "index", "value", "adj"]) {

@@ -112,6 +112,11 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
             "Some of the columns are prices and some are returns: say what they are, of all alike.",
         ));
     }
+    if said.unit.is_none() && returns.iter().any(|other| other.unit != returns[0].unit) {
+        return Err(Stop::refused(
+            "Some of the columns look like percent and some like fractions: say the unit, of all alike.",
+        ));
+    }
     if count < FEWEST {
         return Err(Stop::refused("Two prices make one return: at least two returns are needed."));
     }

@@ -155,8 +155,17 @@ impl<'a> Sheet<'a> {
 
     /// The columns that are read: those said, the only one there is, or the one whose heading is the best.
     pub fn chosen(&self, said: &Choices) -> Result<Vec<&Column<'a>>, Stop> {
+        if said.columns.len() > self.columns.len() {
+            let (named, there) = (said.columns.len(), self.columns.len());
+            return Err(Stop::refused(format!("{named} columns are named: there are {there}.")));
+        }
         if !said.columns.is_empty() {
-            return said.columns.iter().map(|name| self.named(name)).collect();
+            let named = said.columns.iter().map(|name| self.named(name)).collect::<Result<Vec<_>, Stop>>()?;
+            let again = |index: usize| named[..index].iter().any(|before| std::ptr::eq(*before, named[index]));
+            return match (0..named.len()).find(|&index| again(index)) {
+                Some(index) => Err(Stop::refused(format!("Column {} is named twice.", named[index].name))),
+                None => Ok(named),
+            };
         }
         let values: Vec<&Column> = self.columns.iter().filter(|column| column.holds == Holds::Values).collect();
         let best = |wanted: &str| values.iter().copied().find(|column| plain(&column.name) == wanted);
@@ -194,7 +203,8 @@ fn is_heading(rows: &[Vec<Cell>]) -> bool {
     let [first, rest @ ..] = rows else { return false };
     let is_word = |cell: &Cell| {
         let is_missing = MISSING.contains(&cell.text.to_lowercase().as_str());
-        !is_number(&cell.text) && !is_missing && !are_dates(&[cell.text.as_ref()], true)
+        let has_letters = cell.text.is_empty() || cell.text.contains(char::is_alphabetic);
+        has_letters && !is_number(&cell.text) && !is_missing && !are_dates(&[cell.text.as_ref()], true)
     };
     let below =
         |index: usize| rest.iter().filter_map(|row| row.get(index)).map(|cell| cell.text.as_ref()).collect::<Vec<_>>();

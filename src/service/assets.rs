@@ -114,9 +114,14 @@ impl Assets {
         }
     }
 
-    /// Chooses the composition before the period after `step`, and gives the state of its fund. Cost: that of [`Fund::compose`].
+    /// Chooses the composition before the period after `step`, where the policy advises that, and gives the state of the fund. Cost:
+    /// that of [`Fund::compose`].
     pub(super) fn compose(&mut self, advisor: &Advisor, step: usize, state: &State) -> State {
-        let Some(of) = advisor.specification().fund.as_deref() else { return state.clone() };
+        let problem = &advisor.specification().problem;
+        let Some(of) = advisor.specification().fund.as_deref().filter(|_| step < problem.horizon) else {
+            self.one_step = None;
+            return State { law: problem.learning.law(&self.fund.returns()), ..*state };
+        };
         let composed = self.fund.compose(advisor, of, step, state);
         let bank = 1.0 + advisor.specification().problem.rate_per_step;
         self.one_step = self.fund.one_step(&self.names, state.wealth * bank);

@@ -162,7 +162,8 @@ impl Sessions {
             let Some(Step { before, log_return, executed_allocation, .. }) = passed else { break };
             if step >= first {
                 let (advising, local) = (self.policies.advisor(tenant, &stretch.policy).await?, stretch.step(step));
-                let advise = move || advising.advise(local, &before.state, AdviceMode::Surrogate);
+                let before = before.with_law(stretch.terms.learning).state;
+                let advise = move || advising.advise(local, &before, AdviceMode::Surrogate);
                 let advice = self.resolving.run(tenant, advise).await?;
                 // The radius after a period is the one that the next advice is within.
                 told.last_mut().into_iter().for_each(|before| before.radius = advice.radius);
@@ -178,7 +179,7 @@ impl Sessions {
                 });
             }
         }
-        let (measuring, policy) = (passage.standing.state, &periods.current().policy);
+        let (measuring, policy) = (passage.stands().state, &periods.current().policy);
         let advisor = self.policies.advisor(tenant, policy).await?;
         let radius = self.resolving.run(tenant, move || advisor.radius(&measuring)).await?;
         told.last_mut().into_iter().for_each(|last| last.radius = radius);

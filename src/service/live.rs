@@ -57,6 +57,8 @@ pub struct Live {
 /// Bytes of a session in memory, and of each of its returns: in the law with its weight, and in the history.
 pub(super) const SESSION_BYTES: usize = 3000;
 const RETURN_BYTES: usize = 24;
+/// Of several assets: in the order of the columns, in the plan, and in what was told.
+const COPIES_OF_NAMES: usize = 8;
 
 impl Live {
     /// The session that its entries tell of.
@@ -79,7 +81,9 @@ impl Live {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        SESSION_BYTES + RETURN_BYTES * self.standing.returns()
+        let names =
+            self.standing.assets.as_ref().map_or(0, |assets| assets.names.iter().map(String::len).sum::<usize>());
+        SESSION_BYTES + RETURN_BYTES * self.standing.returns() + COPIES_OF_NAMES * names
     }
 
     /// # Errors

@@ -4,6 +4,8 @@
 //! corrected report in its place. What was advised for a period stays what it was, and with it what was held where nothing
 //! else was reported. A renewal is another: from its place on the terms and the law are those of the next policy.
 
+use std::collections::BTreeMap;
+
 use serde::Deserialize;
 
 use super::answer::Corrected;
@@ -41,8 +43,8 @@ pub struct Periods {
     pub stretches: Vec<Stretch>,
     start: Standing,
     history: Record,
-    /// What was told last of several assets.
-    composed: Option<Composed>,
+    /// What a correction or a renewal told last of several assets, after so many periods.
+    composed: BTreeMap<usize, Composed>,
 }
 
 /// What the session starts from, up to some period.
@@ -133,9 +135,13 @@ impl Periods {
             Assets::told(names, history.rows_of(history.all()), composed).map(Box::new)
         });
         let assets = assets.transpose()?;
-        let returns = assets.as_ref().map(|assets| assets.fund.returns());
-        let returns = returns.as_deref().unwrap_or(history.all());
-        let state = State::new(returns, row.initial_wealth, plan.terms.learning)?.with_holding(row.initial_holding)?;
+        let (wealth, learning) = (row.initial_wealth, plan.terms.learning);
+        let state = match &assets {
+            // A fund may vary less than a history must.
+            Some(assets) => State { wealth, holding: 0.0, law: learning.law(&assets.fund.returns()) },
+            None => State::new(history.all(), wealth, learning)?,
+        };
+        let state = state.with_holding(row.initial_holding)?;
         let first = plan.stretch(row.policy.clone(), 0, plan.terms.clone(), None);
         let mut periods = Periods {
             all: Vec::new(),
@@ -143,24 +149,24 @@ impl Periods {
             stretches: vec![first],
             start: Standing::at(&row.session, state, assets),
             history,
-            composed: None,
+            composed: BTreeMap::new(),
         };
         for entry in entries {
             match entry.kind {
                 EntryKind::Observation => {
                     let report = read(&entry.content_json)?;
                     let told: Told = read(&entry.answer_json)?;
-                    periods.composed = told.assets.as_ref().map(|assets| assets.composed.clone());
                     periods.all.push(Period { report, told, stands: true, is_corrected: false });
                 }
                 EntryKind::Correction => {
                     periods.correct(&read(&entry.content_json)?)?;
-                    periods.composed = read::<Corrected>(&entry.answer_json)?.assets;
+                    let told = read::<Corrected>(&entry.answer_json)?.assets;
+                    periods.composed.extend(told.map(|told| (periods.all.len(), told)));
                 }
                 EntryKind::Renewal => {
                     let renew: Renew = read(&entry.content_json)?;
                     let Renewed { terms, assets, .. } = read(&entry.answer_json)?;
-                    periods.composed = assets;
+                    periods.composed.extend(assets.map(|told| (periods.all.len(), told)));
                     periods.stretches.push(plan.stretch(renew.policy, periods.all.len(), terms, renew.window));
                 }
             }
@@ -212,7 +218,7 @@ impl Periods {
     pub(super) fn passage(&self) -> Result<Passage<'_>, FieldError> {
         let (standing, record) = (self.start.clone(), self.history.clone());
         let mut passage = Passage { periods: self, standing, record, step: 0, stretch: 0 };
-        passage.renew()?;
+        passage.renew(None)?;
         Ok(passage)
     }
 
@@ -246,7 +252,7 @@ impl Periods {
                 })?;
             }
         }
-        let standing = passage.last()?;
+        let standing = passage.stands();
         let wealth_change = standing.state.wealth - wealth_before;
         Ok(PutRight { before, standing, log_return: corrected, wealth_change })
     }
@@ -258,7 +264,7 @@ impl Periods {
     pub(super) fn replay(&self) -> Result<Passage<'_>, ServiceError> {
         let mut passage = self.passage()?;
         while passage.next().map_err(ServiceError::of_recorded)?.is_some() {}
-        passage.standing = passage.last()?;
+        passage.standing = passage.stands();
         Ok(passage)
     }
 }
@@ -276,22 +282,17 @@ impl<'a> Passage<'a> {
         let passed = passed.map_err(|error| (period, error))?;
         let Passed { seen, log_return, executed_allocation, mut standing, .. } = passed;
         standing.price_as(report);
-        if let Some(assets) = &told.assets {
-            standing.take(&assets.composed, self.stretch().terms.learning).map_err(|error| (period, error))?;
-        }
         let before = std::mem::replace(&mut self.standing, standing);
         self.record.learn(&seen);
         self.step = period;
-        self.renew().map_err(|error| (period, error))?;
+        let told = told.assets.as_ref().map(|assets| &assets.composed);
+        self.renew(told).map_err(|error| (period, error))?;
         Ok(Some(Step { before, seen, log_return, executed_allocation }))
     }
 
-    /// Where it stands after the last period, with the composition of several assets that was told last.
-    fn last(&self) -> Result<Standing, FieldError> {
-        let mut standing = self.standing.clone();
-        let told = self.periods.composed.as_ref();
-        told.map_or(Ok(()), |told| standing.take(told, self.stretch().terms.learning))?;
-        Ok(standing)
+    /// Where it stands, with the law of several assets' fund, which is not kept up on the way.
+    pub(super) fn stands(&self) -> Standing {
+        self.standing.clone().with_law(self.stretch().terms.learning)
     }
 
     /// The policy that advises the period after those passed.
@@ -299,8 +300,10 @@ impl<'a> Passage<'a> {
         &self.periods.stretches[self.stretch]
     }
 
-    /// Goes on under the policies that begin here.
-    fn renew(&mut self) -> Result<(), FieldError> {
+    /// Goes on under the policies that begin here, with the composition of several assets that was told last: `told` with the
+    /// period, unless a correction or a renewal came after it.
+    fn renew(&mut self, told: Option<&Composed>) -> Result<(), FieldError> {
+        told.map_or(Ok(()), |told| self.standing.take(told))?;
         let begin = self.periods.stretches[self.stretch + 1..].iter().take_while(|next| next.after == self.step);
         // The last one makes its law of the same returns, whatever those before it did.
         self.stretch += begin.count();
@@ -308,7 +311,8 @@ impl<'a> Passage<'a> {
         if self.stretch > 0 && *after == self.step {
             self.standing = self.standing.renewed(&self.record, *window, terms.learning)?;
         }
-        Ok(())
+        let told_later = self.periods.composed.get(&self.step);
+        told_later.map_or(Ok(()), |told| self.standing.take(told))
     }
 }
 

@@ -42,6 +42,8 @@ use crate::store::{CreateSession, Relabel, RequestKey, SessionFacts, SessionRow,
 
 /// Entries replayed in a few milliseconds.
 const PROMPT_ENTRIES: usize = 520;
+/// Log-returns of a start that make each of them as long again.
+const RETURNS_AN_ENTRY: usize = 2000;
 
 /// Whose session it is, and its name.
 pub(super) type Name = (Tenant, String);
@@ -300,9 +302,11 @@ impl Source<Live> for Rows<'_> {
 
     async fn read(&self) -> Result<Live, ServiceError> {
         let facts = self.sessions.facts(self.tenant, self.session).await?;
-        let live = match facts.entries.len() {
-            0..=PROMPT_ENTRIES => Live::replayed(facts)?,
-            _ => self.sessions.advising.run(self.tenant, move || Live::replayed(facts)).await??,
+        let is_prompt =
+            facts.entries.len() * (1 + facts.row.initial_history.len() / RETURNS_AN_ENTRY) <= PROMPT_ENTRIES;
+        let live = match is_prompt {
+            true => Live::replayed(facts)?,
+            false => self.sessions.advising.run(self.tenant, move || Live::replayed(facts)).await??,
         };
         self.sessions.weigh(&live);
         Ok(live)

@@ -1,6 +1,5 @@
 //! Where a session stands, and where a report leads from there.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use jiff::civil::Date;
@@ -68,13 +67,15 @@ impl Standing {
         learning: Learning,
     ) -> Result<Self, FieldError> {
         let last = record.last(window);
-        let (mut assets, mut returns) = (self.assets.clone(), Cow::Borrowed(last));
-        if let Some(assets) = &mut assets {
-            assets.fund.rows = record.rows_of(last);
-            check_rows("history", &assets.fund.rows, &assets.names, None)?;
-            returns = Cow::Owned(assets.fund.returns());
-        }
-        let state = State::new(&returns, self.state.wealth, learning)?.with_holding(self.state.holding)?;
+        let mut assets = self.assets.clone();
+        let state = match &mut assets {
+            Some(assets) => {
+                assets.fund.rows = record.rows_of(last);
+                check_rows("history", &assets.fund.rows, &assets.names, None)?;
+                State { law: learning.law(&assets.fund.returns()), ..self.state }
+            }
+            None => State::new(last, self.state.wealth, learning)?.with_holding(self.state.holding)?,
+        };
         let seen = match &assets {
             Some(_) => Some(Assets::means(&record.rows_of(record.all()))),
             None => (last.len() < record.all().len()).then(|| EmpiricalDistribution::new(record.all())),
@@ -141,6 +142,7 @@ impl Standing {
         let (assets, known, session) = (assets.clone(), known.clone(), session.clone());
         let mut standing = Standing { state, assets, price, date, bet: *bet, seen: known, session };
         standing.learn(&seen, &executed, period);
+        standing.price_as(report);
         Ok(Passed { seen, log_return, executed_allocation, executed, standing })
     }
 
@@ -166,22 +168,26 @@ impl Standing {
         }
     }
 
-    /// Takes the composition that was told, and the law of its fund.
+    /// Takes the composition that was told; the law is then to be made anew.
     ///
     /// # Errors
     /// It is of other assets.
-    pub(super) fn take(&mut self, told: &Composed, learning: Learning) -> Result<(), FieldError> {
-        let Some(assets) = &mut self.assets else { return Ok(()) };
-        assets.take(told)?;
-        self.state.law = learning.law(&assets.fund.returns());
-        Ok(())
+    pub(super) fn take(&mut self, told: &Composed) -> Result<(), FieldError> {
+        self.assets.as_mut().map_or(Ok(()), |assets| assets.take(told))
     }
 
-    /// Chooses the composition before the period after `step`, where there are several assets and the policy advises it.
+    /// The same with the law of the fund, where there are several assets.
+    #[must_use]
+    pub(super) fn with_law(mut self, learning: Learning) -> Self {
+        if let Some(assets) = &self.assets {
+            self.state.law = learning.law(&assets.fund.returns());
+        }
+        self
+    }
+
+    /// Chooses the composition before the period after `step`, where there are several assets.
     pub(super) fn compose(&mut self, advisor: &Advisor, step: usize) {
-        let Some(assets) = self.assets.as_mut().filter(|_| step < advisor.specification().problem.horizon) else {
-            return;
-        };
+        let Some(assets) = &mut self.assets else { return };
         self.state = assets.compose(advisor, step, &self.state);
     }
 

@@ -62,7 +62,11 @@ test("who gets what is shown before, and what came of it after", async () => {
   await go("#/");
   await page.getByRole("link", { name: "Report for several" }).click();
   await page.getByRole("heading", { level: 1, name: "Report for several" }).waitFor();
-  await lines().fill(`Ada\t1.2\nGrace Hopper 90\nTwin 1\nNobody 2\n${short(sessions[4])}\nAda 3`);
+  // Of a session that is named twice nothing is sent: nobody can know which is meant.
+  await lines().fill("Ada 1.2\nAda 3");
+  assert.deepEqual((await rows("Returns to report")).map((row) => /is named twice$/.test(row)), [true, true]);
+  assert.equal(await page.getByRole("button", { name: "Report" }).isDisabled(), true);
+  await lines().fill(`Ada\t1.2\nGrace Hopper 90\nTwin 1\nNobody 2\n${short(sessions[4])}`);
   await page.getByLabel("Return of the others, %").fill("-0,5");
   await page.getByLabel("Last day").fill("2026-10-31");
   const before = await rows("Returns to report");
@@ -70,27 +74,28 @@ test("who gets what is shown before, and what came of it after", async () => {
   assert.match(before[2], /^Twin 1 – 1\.00 % 2 sessions are called so/);
   assert.match(before[3], /no session is called “Nobody”/);
   assert.match(before[4], new RegExp(`^${short(sessions[4])} 1 -0\\.50 % yes$`));
-  assert.match(before[5], /is named twice$/);
   await page.getByRole("button", { name: "Report for 3" }).click();
   await page.getByRole("heading", { name: "What came of it" }).waitFor();
   const told = await rows("Outcomes");
   assert.match(told[0], /^Ada \w+ 1\.20 % recorded as period 1$/);
   assert.match(told[1], /^Grace Hopper \w+ 90\.00 % .*standard deviations/);
-  await page.getByText("2 returns are recorded, and 4 left above for another try.").first().waitFor();
-  assert.equal(await lines().inputValue(), "Grace Hopper 90\nTwin 1\nNobody 2\nAda 3");
+  await page.getByText("2 returns are recorded, and 3 left above for another try.").first().waitFor();
+  assert.equal(await lines().inputValue(), "Grace Hopper 90\nTwin 1\nNobody 2");
   const [ada] = await observed(0);
   assert.deepEqual([ada.reported.simple_return, ada.date], [0.012, "2026-10-31"]);
   assert.equal((await observed(4))[0].reported.simple_return, -0.005);
   assert.equal((await observed(1)).length, 0);
 });
 
-test("an unusual return is recorded once it is said to be meant", async () => {
-  await lines().fill("Grace Hopper 90");
+test("an unusual return is recorded once it is said to be meant, and no other with it", async () => {
+  // Another that is as unusual was not asked about yet.
+  await lines().fill(`Grace Hopper 90\n${short(sessions[4])} 120`);
   await page.getByLabel("The returns are meant").check();
-  await page.getByRole("button", { name: "Report for 1" }).click();
-  await page.getByText("1 return is recorded.").first().waitFor();
+  await page.getByRole("button", { name: "Report for 2" }).click();
+  await page.getByText("1 return is recorded, and 1 left above for another try.").first().waitFor();
   assert.equal((await observed(1))[0].reported.simple_return, 0.9);
-  assert.equal(await lines().inputValue(), "");
+  assert.equal((await observed(4)).length, 1);
+  assert.equal(await lines().inputValue(), `${short(sessions[4])} 120`);
 });
 
 test("those ticked get one return, and an answer that is lost is asked for again without harm", async () => {

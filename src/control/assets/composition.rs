@@ -36,8 +36,12 @@ pub fn of(allocation: &[f64]) -> Option<Vec<f64>> {
 ///
 /// Then what the policy promises at the fund held stays true whatever proposes the new one: by induction over the steps the
 /// payoff depends on the returns through the fund held alone, and what follows is worth at least what keeping it would be.
-pub fn guarded(held: Vec<f64>, proposed: Vec<f64>, value: impl Fn(&[f64]) -> f64) -> Vec<f64> {
-    if value(&proposed) >= value(&held) { proposed } else { held }
+///
+/// Of two values both must be as high; a fund without any is never taken.
+pub fn guarded(held: Vec<f64>, proposed: Vec<f64>, value: impl Fn(&[f64]) -> Option<[f64; 2]>) -> Vec<f64> {
+    let Some(new) = value(&proposed) else { return held };
+    let is_as_high = value(&held).is_none_or(|old| new.iter().zip(old).all(|(new, old)| *new >= old));
+    if is_as_high { proposed } else { held }
 }
 
 #[cfg(test)]
@@ -70,9 +74,14 @@ mod tests {
 
     #[test]
     fn a_composition_that_the_policy_values_less_is_not_taken() {
-        let value = |fund: &[f64]| fund[0];
+        let value = |fund: &[f64]| (fund[0] > 0.1).then_some([fund[0], 0.0]);
         assert_eq!(guarded(vec![0.5, 0.5], vec![0.4, 0.6], value), [0.5, 0.5]);
         assert_eq!(guarded(vec![0.5, 0.5], vec![0.6, 0.4], value), [0.6, 0.4]);
         assert_eq!(guarded(vec![0.5, 0.5], vec![0.5, 0.5], value), [0.5, 0.5]);
+        assert_eq!(guarded(vec![0.0, 1.0], vec![0.05, 0.95], value), [0.0, 1.0]);
+        assert_eq!(guarded(vec![0.0, 1.0], vec![0.2, 0.8], value), [0.2, 0.8]);
+        // One that is dearer to get to, though it is worth more.
+        let dear = |fund: &[f64]| Some([fund[0], fund[1]]);
+        assert_eq!(guarded(vec![0.5, 0.5], vec![0.6, 0.4], dear), [0.5, 0.5]);
     }
 }

@@ -163,18 +163,18 @@ impl Fund {
             let [lowest, highest] = problem.action_interval;
             let total = ActionInterval { lowest, highest };
             let step = AssetsStep::new(law, fund.ground_norm.at(&self.rows), utility, problem.rate_per_step, total);
-            solution.insert(step.solve(self.solution.as_ref())).clone()
+            // From nothing, so that what is proposed depends on what was seen alone.
+            solution.insert(step.solve(None)).clone()
         });
         self.solution = solution;
         let left = (problem.horizon - step) as f64;
+        // What the policy values the fund, and that less the way there.
         let value = |composition: &[f64]| {
-            let state = self.state(advisor, state, composition);
-            let (total, gain) = advisor.surrogate(step, &state);
-            if problem.trading_cost <= 0.0 {
-                return gain;
-            }
+            let varies = problem.learning.check_deviation("fund", &fund_returns(&self.rows, composition)).is_ok();
+            let (total, gain) = advisor.surrogate(step, &self.state(advisor, state, composition));
             let executed: Vec<f64> = composition.iter().map(|share| total * share).collect();
-            gain / left - problem.trading_cost * self.traded(&executed)
+            let net = gain / left - problem.trading_cost * self.traded(&executed);
+            varies.then_some([gain, net])
         };
         self.composition = guarded(self.composition.clone(), proposed, value);
         self.state(advisor, state, &self.composition)

@@ -82,7 +82,8 @@ pub fn prepared_bytes(policy: &Policy) -> usize {
     let (points, inputs, functions) = designs.fold((0, 0, 0), |(sum, inputs, most), (points, own, functions)| {
         (sum + points, inputs.max(own), most.max(functions))
     });
-    bytes_ready(policy.steps().len(), points, inputs, functions)
+    let rows = policy.specification().fund.as_ref().map_or(0, |fund| fund.history.len() * fund.assets.len());
+    bytes_ready(policy.steps().len(), points, inputs, functions) + 2 * rows * size_of::<f64>()
 }
 
 /// Of so many steps with so many design points in all: the inputs as stored and for either surrogate, and the weights of

@@ -11,7 +11,7 @@ use super::fund::{CompositionRule, FundSpecification, GroundNorm, LowestReturn};
 use super::learning::Learning;
 use super::radius_rule::RadiusRule;
 use super::rules;
-use super::specification::{ProblemSpecification, Specification, UtilitySpecification, defaults};
+use super::specification::{InitialLaws, ProblemSpecification, Specification, UtilitySpecification, defaults};
 use crate::control::error::FieldError;
 use crate::numerics::fund_bridges::fund_returns;
 use crate::numerics::levelling::inverse_volatility;
@@ -206,7 +206,15 @@ const ROUNDING: f64 = 1e-9;
 ///
 /// # Errors
 /// The first field that breaks a rule.
-pub(super) fn check_fund(fund: &FundSpecification, problem: &ProblemSpecification) -> Result<(), FieldError> {
+pub(super) fn check_fund(
+    fund: &FundSpecification,
+    problem: &ProblemSpecification,
+    laws: InitialLaws,
+) -> Result<(), FieldError> {
+    if laws != InitialLaws::Resampled {
+        let rule = "must be resampled for a fund of several assets, whose law changes with its shares";
+        return Err(FieldError::new("design.initial_laws", "given", rule));
+    }
     if problem.framework != Framework::Adaptive {
         let rule = "must be adaptive for a fund of several assets";
         return Err(FieldError::new("problem.framework", problem.framework.name(), rule));

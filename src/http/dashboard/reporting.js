@@ -63,19 +63,18 @@ export function readLine(line, sessions, common) {
   return { line, back: null, trouble: `no session is called \u201c${line}\u201d` };
 }
 
-/** The lines of a text, each session once. */
+/** The lines of a text. Of a session that is named twice neither line is taken: nobody can know which is meant. */
 export function readLines(text, sessions, common) {
-  const seen = new Set();
-  return text.split("\n").map((line) => line.trim()).filter(Boolean).map((line) => {
-    const row = readLine(line, sessions, common);
-    if (row.entry && seen.has(row.entry.session)) return { ...row, trouble: "is named twice" };
-    if (row.entry) seen.add(row.entry.session);
-    return row;
-  });
+  const rows = text.split("\n").map((line) => line.trim()).filter(Boolean).map((line) => readLine(line, sessions, common));
+  const times = new Map();
+  for (const { entry } of rows) if (entry) times.set(entry.session, (times.get(entry.session) ?? 0) + 1);
+  return rows.map((row) => (row.entry && times.get(row.entry.session) > 1 ? { ...row, trouble: "is named twice" } : row));
 }
 
 function reporting(sessions, chosen) {
   let rows = [];
+  // The returns that were last refused as unusual, by session: those alone can be meant.
+  let unusual = new Map();
   const lines = area({
     name: "lines",
     label: "Sessions and their returns, %",
@@ -109,19 +108,32 @@ function reporting(sessions, chosen) {
       period: entry.period,
       simple_return: back,
       ...(day ? { date: day } : {}),
-      ...(meant.checked ? { confirm: true } : {}),
+      ...(meant.checked && unusual.get(entry.session) === back ? { confirm: true } : {}),
     }));
-    const answers = [];
-    for (let start = 0; start < reports.length; start += AT_ONCE) answers.push(...(await post("/observe", reports.slice(start, start + AT_ONCE))));
-    const told = sent.map((row, index) => ({ ...row, answer: answers[index] }));
-    for (const { entry, answer } of told) if (answer.status === 200) Object.assign(entry, { period: answer.period + 1, wealth: answer.answer.wealth, state: answer.answer.completed ? "completed" : entry.state });
+    const told = [];
+    const recorded = new Set();
+    try {
+      for (let start = 0; start < reports.length; start += AT_ONCE) {
+        const answers = await post("/observe", reports.slice(start, start + AT_ONCE));
+        for (const [index, answer] of answers.entries()) {
+          const row = sent[start + index];
+          told.push({ ...row, answer });
+          if (answer.status !== 200) continue;
+          recorded.add(row);
+          Object.assign(row.entry, { period: answer.period + 1, wealth: answer.answer.wealth, state: answer.answer.completed ? "completed" : row.entry.state });
+        }
+      }
+    } finally {
+      // What is not recorded stays for another try, also where a later list was not answered.
+      lines.control.value = rows.filter((row) => !recorded.has(row)).map(({ line }) => line).join("\n");
+      look();
+    }
+    const left = rows;
     const failed = told.filter(({ answer }) => answer.status !== 200);
+    const odd = failed.filter(({ answer }) => answer.problem.type === "/problems/unusual-return");
+    unusual = new Map(odd.map(({ entry, back }) => [entry.session, back]));
     meant.checked = false;
-    sure.hidden = !failed.some(({ answer }) => answer.problem.type === "/problems/unusual-return");
-    // What is not recorded stays for another try.
-    const left = [...failed, ...rows.filter(({ trouble }) => trouble !== null)];
-    lines.control.value = left.map(({ line }) => line).join("\n");
-    look();
+    sure.hidden = odd.length === 0;
     const words = `${counted(told.length - failed.length, "return is", "returns are")} recorded${left.length > 0 ? `, and ${count(left.length)} left above for another try` : ""}.`;
     const heading = h("p", { class: "sentence", tabindex: -1 }, words);
     outcome.replaceChildren(section("What came of it", heading, outcomes(told)));

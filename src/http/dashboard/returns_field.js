@@ -45,6 +45,7 @@ export function returnsField({ name, label, blank = null, example = false, chang
     const { signal } = asking;
     answer = null;
     if (area.value.trim() === "") {
+      said = {};
       asked.replaceChildren();
       return tell("nothing", blank ? `${blank} ${HINT}` : HINT);
     }
