@@ -3,11 +3,13 @@
 mod support;
 
 use std::collections::BTreeSet;
+use std::time::{Duration, Instant};
 
 use ballast::service::config::StoreLocation;
 use reqwest::Method;
 use serde_json::{Value, json};
-use support::{App, postgres, specification};
+use support::patience::within;
+use support::{App, execute, postgres, specification};
 
 async fn list(app: &App, query: &str) -> Value {
     let (status, page) = app.get(&format!("/sessions?{query}")).await;
@@ -200,4 +202,52 @@ async fn what_cannot_be_asked_is_named() {
     }
     assert_eq!(fields.len(), 5);
     assert_eq!(list(&app, "search=&tag=").await["total"], 0);
+}
+
+const SESSIONS: usize = 10_000;
+/// Of an overview of so many sessions.
+const OVERVIEW: Duration = Duration::from_millis(300);
+
+/// Ten thousand sessions with a name, a tag and a last entry each, made of one that was lived.
+#[tokio::test(flavor = "multi_thread")]
+async fn ten_thousand_sessions_are_listed_searched_and_put_in_order_quickly() {
+    let mut app = App::start().await;
+    app.train(&specification(2)).await;
+    app.open().await;
+    assert_eq!(app.observe(1, 0.01).await.0, 200);
+    for statement in [
+        "WITH RECURSIVE numbers (n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM numbers WHERE n < 9999)
+         INSERT INTO sessions (session, tenant, policy, initial_wealth, initial_holding, initial_history, horizon,
+                               plan_json, room, created_ms, seal)
+         SELECT printf('session_%032d', n), tenant, policy, initial_wealth, initial_holding, initial_history, horizon,
+                plan_json, room, n, seal FROM numbers CROSS JOIN sessions",
+        "INSERT INTO entries SELECT sessions.session, entry, kind, number, content_json,
+                json_set(answer_json, '$.wealth', 100.0 + sessions.sequence % 997), entries.created_ms, access_key, entries.seal
+         FROM sessions CROSS JOIN entries WHERE sessions.session LIKE 'session_0000%'",
+        "INSERT INTO labels SELECT tenant, session, 'Client ' || sequence, '', char(10) || 'x' || char(10),
+                'client ' || sequence, char(10) || 'x' || char(10) FROM sessions",
+    ] {
+        execute(app.folder(), statement).await;
+    }
+    for (query, total) in [
+        ("limit=50", SESSIONS),
+        ("limit=1000", SESSIONS),
+        ("sort=name&limit=1000", SESSIONS),
+        ("sort=-wealth&limit=1000", SESSIONS),
+        ("sort=-last_report&limit=1000", SESSIONS),
+        ("search=client%2099&sort=-wealth", 111),
+        ("tag=x&state=active&sort=wealth", SESSIONS),
+        ("state=due", 0),
+    ] {
+        let url = format!("{}/sessions?{query}", app.url);
+        let mut quickest = Duration::MAX;
+        for _ in 0..5 {
+            let started = Instant::now();
+            let page: Value = app.client.get(&url).send().await.unwrap().json().await.unwrap();
+            quickest = quickest.min(started.elapsed());
+            assert_eq!(page["total"], json!(total), "{query}");
+        }
+        println!("{query}: {quickest:?} of {SESSIONS} sessions");
+        assert!(quickest < within(OVERVIEW), "{query}: {quickest:?}");
+    }
 }
