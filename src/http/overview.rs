@@ -17,6 +17,7 @@ use crate::control::error::FieldError;
 use crate::service::Service;
 use crate::service::drift::DriftLevel;
 use crate::service::overview::Listed;
+use crate::store::LONGEST_TAG;
 use crate::store::{Labels, SessionIs, SessionKey, SessionOrder, SessionPlace, SessionQuery};
 
 /// Letters of what is searched for: more than any name has.
@@ -142,8 +143,10 @@ fn refused(field: &str, value: &str, rule: impl Into<String>) -> Problem {
 impl Asked {
     fn read(self) -> Result<SessionQuery, Problem> {
         let (limit, _) = Page::new(self.limit, None).bounds()?;
-        if let Some(search) = self.search.as_ref().filter(|search| search.chars().count() > LONGEST_SEARCH) {
-            return Err(refused("search", search, format!("must have at most {LONGEST_SEARCH} letters")));
+        for (field, given, most) in [("search", &self.search, LONGEST_SEARCH), ("tag", &self.tag, LONGEST_TAG)] {
+            if let Some(text) = given.as_ref().filter(|text| text.chars().count() > most) {
+                return Err(refused(field, text, format!("must have at most {most} letters")));
+            }
         }
         let sort = self.sort.as_deref().unwrap_or("-created");
         let (word, descending) = sort.strip_prefix('-').map_or((sort, false), |word| (word, true));
