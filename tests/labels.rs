@@ -114,6 +114,7 @@ async fn refused_by_field(app: &mut App) {
         }
     }
     assert_eq!(patch(app, &session, json!({ "title": "x" })).await.1["field"], "title");
+    assert_eq!(patch(app, &session, json!([null, null, null])).await.1["field"], "body");
 }
 
 async fn story(mut app: App) -> App {

@@ -6,8 +6,10 @@ use axum::Json;
 use axum::extract::State;
 
 use super::access::{By, Live};
-use super::extract::{Id, JsonBody};
-use super::problem::Problem;
+use super::decode;
+use super::extract::{Id, JsonBytes};
+use super::problem::{Problem, ProblemKind};
+use crate::control::error::FieldError;
 use crate::service::Service;
 use crate::store::{Labelled, Labels, Relabel};
 
@@ -22,9 +24,9 @@ pub async fn of_policy(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Live>,
     Id(id): Id,
-    JsonBody(change): JsonBody<Relabel>,
+    JsonBytes(bytes): JsonBytes,
 ) -> Result<Json<Labels>, Problem> {
-    Ok(Json(service.names.change(&caller, Labelled::Policy, &id, change).await?))
+    Ok(Json(service.names.change(&caller, Labelled::Policy, &id, change(&bytes)?).await?))
 }
 
 /// Change what a session is called: what is absent stays, what is null or empty is cleared.
@@ -38,7 +40,16 @@ pub async fn of_session(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Live>,
     Id(id): Id,
-    JsonBody(change): JsonBody<Relabel>,
+    JsonBytes(bytes): JsonBytes,
 ) -> Result<Json<Labels>, Problem> {
-    Ok(Json(service.names.change(&caller, Labelled::Session, &id, change).await?))
+    Ok(Json(service.names.change(&caller, Labelled::Session, &id, change(&bytes)?).await?))
+}
+
+/// What is asked to be changed. A list of nulls would be read as an object whose fields are null.
+fn change(bytes: &[u8]) -> Result<Relabel, Problem> {
+    if bytes.trim_ascii_start().starts_with(b"[") {
+        let error = FieldError::new("body", "a list", "must be an object");
+        return Err(Problem::of_field(ProblemKind::InvalidField, error));
+    }
+    decode::json(bytes)
 }
