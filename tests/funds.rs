@@ -85,7 +85,7 @@ async fn a_session_of_several_assets_is_lived_by_their_names() {
     assert!(of.radius_factor > 1.0);
     let mut fund = Fund::at(rows(), vec![0.2, 0.1, 0.0]);
     let start = State::new(&fund.returns(), 1000.0, Learning::default()).unwrap().with_holding(0.3).unwrap();
-    let state = fund.compose(&advisor, of, 0, &start);
+    let (state, _) = fund.compose(&advisor, of, 0, &start);
     let expected = advisor.advise(0, &state, AdviceMode::Surrogate);
     let (status, action) = app.action().await;
     assert_eq!(status, 200, "{action}");
@@ -345,7 +345,7 @@ fn identical_columns_are_one_asset() {
     let mut held = Fund::at(rows, vec![0.0; 3]);
     let state = State::new(&held.returns(), 100.0, Learning::default()).unwrap();
     let of = fund.specification().fund.clone().unwrap();
-    let state = held.compose(&fund, &of, 0, &state);
+    let (state, _) = held.compose(&fund, &of, 0, &state);
     let start = asset.initial_state(None, None).unwrap();
     for mode in [AdviceMode::Surrogate, AdviceMode::Resolve] {
         let (left, right) = (fund.advise(0, &state, mode), asset.advise(0, &start, mode));
@@ -455,7 +455,7 @@ fn the_promise_at_the_fund_held_is_kept_and_broken_without_the_guard() {
     let promised = (promise.certainty_equivalent / promise.floor).ln();
     assert!(promised > 0.01, "{promise:?}");
     let guarded =
-        |fund: &mut Fund, of: &FundSpecification, step: usize, state: &State| fund.compose(&advisor, of, step, state);
+        |fund: &mut Fund, of: &FundSpecification, step: usize, state: &State| fund.compose(&advisor, of, step, state).0;
     let proposals = [
         CompositionRule::OneStep,
         CompositionRule::Equal,

@@ -76,16 +76,16 @@ pub(super) struct SaidOfProblem {
 
 /// `None` where there is no problem to be read.
 pub(super) fn said(bytes: &[u8]) -> Option<SaidOfProblem> {
-    decode::json(bytes).ok().map(|Said { problem }| problem)
+    decode::object(bytes).ok().map(|Said { problem }| problem)
 }
 
 /// The question, with the horizon that is meant where none is given.
 fn question(bytes: &[u8]) -> Result<AdviseQuestion, Problem> {
-    let Some(problem) = said(bytes) else { return Ok(AdviseQuestion::Asset(decode::json(bytes)?)) };
+    let Some(problem) = said(bytes) else { return Ok(AdviseQuestion::Asset(decode::object(bytes)?)) };
     if problem.assets.is_some() {
-        return Ok(AdviseQuestion::Assets(decode::json(bytes)?));
+        return Ok(AdviseQuestion::Assets(decode::object(bytes)?));
     }
-    let mut question: Advise = decode::json(bytes)?;
+    let mut question: Advise = decode::object(bytes)?;
     if problem.horizon.is_none() {
         question.problem.horizon = 1;
     }

@@ -32,6 +32,15 @@ pub fn json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     }
 }
 
+/// As [`json`], of an object: a list would be read as its fields in their order.
+pub fn object<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+    if bytes.trim_ascii_start().starts_with(b"[") {
+        let error = FieldError::new("body", json::<Value>(bytes)?, "must be an object");
+        return Err(Problem::of_field(ProblemKind::InvalidField, error));
+    }
+    json(bytes)
+}
+
 /// Reads the parameters of a query string, all of them text.
 pub fn parameters<T: DeserializeOwned>(pairs: Vec<(String, String)>) -> Result<T, Problem> {
     let mut object = serde_json::Map::new();

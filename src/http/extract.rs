@@ -13,7 +13,7 @@ use super::problem::{Problem, ProblemKind};
 use crate::service::allowance::HeavyTurn;
 use crate::service::error::ServiceError;
 
-/// A JSON body.
+/// A JSON body that is an object.
 pub struct JsonBody<T>(pub T);
 
 impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T> {
@@ -21,7 +21,7 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for JsonBody<T> {
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
         let JsonBytes(bytes) = JsonBytes::from_request(request, state).await?;
-        decode::json(&bytes).map(JsonBody)
+        decode::object(&bytes).map(JsonBody)
     }
 }
 

@@ -51,9 +51,9 @@ fn request(bytes: &[u8]) -> Result<FrontierRequest, Problem> {
         Some(_) => reads::<ProblemSpecification>(bytes)?,
         None => {}
     }
-    decode::json(bytes)
+    decode::object(bytes)
 }
 
 fn reads<P: DeserializeOwned>(bytes: &[u8]) -> Result<(), Problem> {
-    decode::json::<Only<P>>(bytes).map(|Only { problem }| drop(problem))
+    decode::object::<Only<P>>(bytes).map(|Only { problem }| drop(problem))
 }

@@ -77,10 +77,10 @@ pub async fn train(
     let key = idempotency_key(&headers)?;
     let (specification, labels) = match said(&bytes) {
         Some(SaidOfProblem { assets: Some(_), .. }) => {
-            let asked = decode::json::<TrainAssets>(&bytes)?;
+            let asked = decode::object::<TrainAssets>(&bytes)?;
             asked.specified(&service.sessions, &caller.tenant).await?
         }
-        _ => decode::json::<Train>(&bytes)?.specified(),
+        _ => decode::object::<Train>(&bytes)?.specified(),
     };
     Ok(accepted(service.jobs.train(&caller, specification, labels, key).await?))
 }

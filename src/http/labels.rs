@@ -6,10 +6,8 @@ use axum::Json;
 use axum::extract::State;
 
 use super::access::{By, Live};
-use super::decode;
-use super::extract::{Id, JsonBytes};
-use super::problem::{Problem, ProblemKind};
-use crate::control::error::FieldError;
+use super::extract::{Id, JsonBody};
+use super::problem::Problem;
 use crate::service::Service;
 use crate::store::{Labelled, Labels, Relabel};
 
@@ -24,9 +22,9 @@ pub async fn of_policy(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Live>,
     Id(id): Id,
-    JsonBytes(bytes): JsonBytes,
+    JsonBody(change): JsonBody<Relabel>,
 ) -> Result<Json<Labels>, Problem> {
-    Ok(Json(service.names.change(&caller, Labelled::Policy, &id, change(&bytes)?).await?))
+    Ok(Json(service.names.change(&caller, Labelled::Policy, &id, change).await?))
 }
 
 /// Change what a session is called: what is absent stays, what is null or empty is cleared.
@@ -40,16 +38,7 @@ pub async fn of_session(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Live>,
     Id(id): Id,
-    JsonBytes(bytes): JsonBytes,
+    JsonBody(change): JsonBody<Relabel>,
 ) -> Result<Json<Labels>, Problem> {
-    Ok(Json(service.names.change(&caller, Labelled::Session, &id, change(&bytes)?).await?))
-}
-
-/// What is asked to be changed. A list of nulls would be read as an object whose fields are null.
-fn change(bytes: &[u8]) -> Result<Relabel, Problem> {
-    if bytes.trim_ascii_start().starts_with(b"[") {
-        let error = FieldError::new("body", "a list", "must be an object");
-        return Err(Problem::of_field(ProblemKind::InvalidField, error));
-    }
-    decode::json(bytes)
+    Ok(Json(service.names.change(&caller, Labelled::Session, &id, change).await?))
 }

@@ -87,7 +87,7 @@ pub async fn import(
     JsonBytes(document): JsonBytes,
 ) -> Result<Response, Problem> {
     // A document may hold 64 MB: too much to parse between two requests.
-    let decoded = tokio::task::spawn_blocking(move || decode::json::<Policy>(&document));
+    let decoded = tokio::task::spawn_blocking(move || decode::object::<Policy>(&document));
     let policy = service.policies.import(&caller, decoded.await.map_err(ServiceError::internal)??).await?;
     let location = [(header::LOCATION, format!("/policies/{policy}"))];
     Ok((StatusCode::CREATED, location, Json(wire::Imported { policy })).into_response())

@@ -12,7 +12,8 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 use super::access::{By, Live};
-use super::extract::JsonBody;
+use super::decode;
+use super::extract::JsonBytes;
 use super::problem::Problem;
 use super::sessions::as_recorded;
 use super::telemetry;
@@ -100,9 +101,9 @@ pub struct ElementAnswered {
 pub async fn observe(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Live>,
-    JsonBody(reports): JsonBody<Reports>,
+    JsonBytes(bytes): JsonBytes,
 ) -> Result<Response, Problem> {
-    match reports {
+    match decode::json(&bytes)? {
         Reports::One(report) => Ok(as_recorded(service.sessions.report(&caller, *report, &caller.turn).await?)),
         Reports::Many(reports) => {
             let reported = service.sessions.report_all(&caller, reports).await?;

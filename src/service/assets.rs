@@ -122,9 +122,9 @@ impl Assets {
             self.one_step = None;
             return State { law: problem.learning.law(&self.fund.returns()), ..*state };
         };
-        let composed = self.fund.compose(advisor, of, step, state);
-        let bank = 1.0 + advisor.specification().problem.rate_per_step;
-        self.one_step = self.fund.one_step(&self.names, state.wealth * bank);
+        let (composed, solution) = self.fund.compose(advisor, of, step, state);
+        let bank = 1.0 + problem.rate_per_step;
+        self.one_step = solution.map(|solution| self.fund.one_step(&self.names, &solution, state.wealth * bank));
         composed
     }
 

@@ -138,9 +138,9 @@ impl Standing {
             None => reached(state.wealth, report)?,
         };
         let Standing { assets, bet, seen: known, session, .. } = self;
-        let (price, date) = (report.price, report.date.or(self.date));
-        let (assets, known, session) = (assets.clone(), known.clone(), session.clone());
-        let mut standing = Standing { state, assets, price, date, bet: *bet, seen: known, session };
+        let (assets, seen_before, session) = (assets.clone(), known.clone(), session.clone());
+        let date = report.date.or(self.date);
+        let mut standing = Standing { state, assets, price: None, date, bet: *bet, seen: seen_before, session };
         standing.learn(&seen, &executed, period);
         standing.price_as(report);
         Ok(Passed { seen, log_return, executed_allocation, executed, standing })

@@ -3,11 +3,10 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
-import { fileURLToPath } from "node:url";
 import { browser, call, service, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
+import { plain, usable } from "./page.js";
 
-const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 const RETURNS = [0.04, -0.1, 0.02];
 const DATES = ["2008-01-31", "2008-02-29", "2008-03-31"];
@@ -37,7 +36,6 @@ after(async () => {
   await ballast?.stop();
 });
 
-const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
 const main = async () => plain(await page.locator("main").innerText());
 const go = async (id = session) => {
   await page.goto("about:blank");
@@ -192,15 +190,5 @@ test("a long session shows its newest periods, and all where asked", async () =>
 });
 
 test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scrolls sideways", async () => {
-  const axe = await readFile(AXE, "utf8");
-  for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
-    await page.emulateMedia({ colorScheme });
-    await page.setViewportSize({ width, height: 900 });
-    await go();
-    await page.evaluate(axe);
-    const { violations, passes } = await page.evaluate(() => axe.run(document));
-    assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join("\n")}`), []);
-    assert.ok(passes.length > 10);
-    assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0);
-  }
+  await usable(page, () => go());
 });

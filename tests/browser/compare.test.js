@@ -1,12 +1,10 @@
 // Two policies or two sessions side by side, reached by ticking two rows of their list.
 
 import assert from "node:assert/strict";
-import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
-import { fileURLToPath } from "node:url";
 import { browser, call, service, trained } from "./ballast.js";
+import { plain, usable, visitQuiet } from "./page.js";
 
-const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 
 let ballast, chromium, page, careful, bold, one, other;
@@ -31,16 +29,11 @@ after(async () => {
   await ballast?.stop();
 });
 
-const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
 const rows = async () => {
   const texts = await page.locator("tbody tr").allInnerTexts();
   return Object.fromEntries(texts.map((text) => plain(text).split("\t").map((cell) => cell.trim())).map(([name, ...cells]) => [name, cells]));
 };
-const go = async (hash) => {
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/${hash}`);
-  await page.locator("main:not([aria-busy]) h1").waitFor();
-};
+const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
 const tick = async (kind, ids) => {
   await go(`#/${kind}`);
   for (const id of ids) await page.getByRole("row", { name: id.replace(/^[a-z]+_/, "").slice(0, 10) }).first().getByRole("checkbox").check();
@@ -109,18 +102,6 @@ test("on a phone both stand beside each other", async () => {
 });
 
 test("axe finds nothing on the pages of two and on the lists, in light, in dark and at 320 pixels", async () => {
-  const axe = await readFile(AXE, "utf8");
-  for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
-    await page.emulateMedia({ colorScheme });
-    await page.setViewportSize({ width, height: 900 });
-    for (const hash of ["#/sessions", "#/policies", `#/compare?policies=${careful},${bold}`, `#/compare?sessions=${one},${other}`]) {
-      await go(hash);
-      await page.waitForLoadState("networkidle");
-      await page.evaluate(axe);
-      const { violations, passes } = await page.evaluate(() => axe.run(document));
-      assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join("\n")}`), [], `${hash} ${colorScheme} ${width}`);
-      assert.ok(passes.length > 10);
-      assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0, `${hash} at ${width}`);
-    }
-  }
+  const places = ["#/sessions", "#/policies", `#/compare?policies=${careful},${bold}`, `#/compare?sessions=${one},${other}`];
+  await usable(page, go, places);
 });

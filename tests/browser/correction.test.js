@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { browser, call, service, trained } from "./ballast.js";
+import { plain } from "./page.js";
 
 let ballast, chromium, page, session;
 
@@ -29,7 +30,6 @@ after(async () => {
   await ballast?.stop();
 });
 
-const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
 const main = async () => plain(await page.locator("main").innerText());
 const form = () => page.locator("form", { has: page.getByRole("button", { name: "Put it right" }) });
 

@@ -2,12 +2,10 @@
 // The tests follow each other on one page, as that person would.
 
 import assert from "node:assert/strict";
-import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
-import { fileURLToPath } from "node:url";
 import { browser, call, service } from "./ballast.js";
+import { accessible, visit } from "./page.js";
 
-const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
 /** Nothing that is waited for takes longer, in milliseconds. */
 const PATIENCE = 60_000;
 const RETURNS = [1.31, -4.42, 2.1, 3.3, -1.2, 0.8, 4.5, -2.7, 1.6, 0.2, 2.4, -0.9];
@@ -38,11 +36,7 @@ after(async () => {
 });
 
 const heading = (text) => page.getByRole("heading", { level: 1, name: text });
-const go = async (hash) => {
-  await page.goto("about:blank"); // a new hash alone would leave the old view standing for a moment
-  await page.goto(`${ballast.url}/${hash}`);
-  await page.locator("main:not([aria-busy]) h1").waitFor();
-};
+const go = (hash) => visit(page, `${ballast.url}/${hash}`);
 
 test("an empty service says what to do first", async () => {
   await go("");
@@ -282,20 +276,13 @@ test("every view fits, at 390 and 1600 pixels", async () => {
 });
 
 test("axe finds nothing, in light and dark", async () => {
-  const axe = await readFile(AXE, "utf8");
   await page.setViewportSize({ width: 1280, height: 900 });
   for (const colorScheme of ["light", "dark"]) {
     await page.emulateMedia({ colorScheme });
     for (const hash of views()) {
       await go(hash);
       await settled();
-      await page.evaluate(axe);
-      const { violations, passes } = await page.evaluate(() => axe.run(document));
-      const told = violations.map(
-        ({ id, nodes }) => `${id}: ${nodes.map(({ html, any }) => `${html} ${any[0]?.message ?? ""}`).join("\n")}`,
-      );
-      assert.deepEqual(told, [], `${hash} in ${colorScheme}`);
-      assert.ok(passes.length > 10);
+      await accessible(page, `${hash} in ${colorScheme}`);
     }
   }
 });

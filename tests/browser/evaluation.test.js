@@ -1,13 +1,11 @@
 // The page of an evaluation: sentences first, wealth, one colour a strategy, histograms on one scale.
 
 import assert from "node:assert/strict";
-import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
-import { fileURLToPath } from "node:url";
 import { browser, call, service, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
+import { plain, usable } from "./page.js";
 
-const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
 const HISTORY = Array.from({ length: 24 }, (_, k) => 0.01 + 0.05 * Math.sin(1.7 * k));
 
 let ballast, chromium, page, policy, report, evaluation;
@@ -37,8 +35,6 @@ after(async () => {
   await chromium?.close();
   await ballast?.stop();
 });
-
-const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
 
 test("chances and the worst of a spread are those of its outcomes", async () => {
   const { binned, chanceBelow, pieces, worstAverage } = await dashboardModule("spread.js");
@@ -93,6 +89,7 @@ test("at most four histograms stand, on one scale of wealth and of height", asyn
   const varying = report.strategies.filter(({ utility }) => utility.max.value > utility.min.value);
   assert.ok(varying.length >= 10 && varying.length < report.strategies.length);
   await page.getByText(`The other ${varying.length - 4}`).click();
+  await charts.nth(varying.length - 1).waitFor();
   assert.equal(await charts.count(), varying.length);
 });
 
@@ -110,16 +107,7 @@ test("a strategy has one colour in every chart", async () => {
 });
 
 test("axe finds nothing, in light, in dark and at 320 pixels, folds open", async () => {
-  const axe = await readFile(AXE, "utf8");
   await page.getByText("Utility, radii and coverage").click();
   await page.getByRole("table", { name: "Certainty equivalents and utility" }).waitFor();
-  for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
-    await page.emulateMedia({ colorScheme });
-    await page.setViewportSize({ width, height: 900 });
-    await page.evaluate(axe);
-    const { violations, passes } = await page.evaluate(() => axe.run(document));
-    assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join("\n")}`), []);
-    assert.ok(passes.length > 10);
-    assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0);
-  }
+  await usable(page, () => {});
 });

@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { browser, call, service, trained } from "./ballast.js";
+import { plain } from "./page.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 
@@ -19,7 +20,6 @@ after(async () => {
   await ballast?.stop();
 });
 
-const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
 const main = async () => plain(await page.locator("main").innerText());
 
 test("a policy is trained with what is added and withdrawn as the form says", async () => {

@@ -1,12 +1,10 @@
 // The page in a manager's words and in percent; the paper's words stand behind folds.
 
 import assert from "node:assert/strict";
-import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
-import { fileURLToPath } from "node:url";
 import { browser, call, service, trained } from "./ballast.js";
+import { plain, usable, visitQuiet } from "./page.js";
 
-const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 /** What stops a reader who is no mathematician. */
 const PAPER = /certainty equivalent|miscoverage|\balpha\b|surrogate|duality|lengthscale|design point|\bWasserstein|worst law|robust|multiplier|log-utility|\bradius\b/i;
@@ -26,13 +24,7 @@ after(async () => {
   await ballast?.stop();
 });
 
-const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
-const go = async (hash) => {
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/${hash}`);
-  await page.locator("main:not([aria-busy]) h1").waitFor();
-  await page.waitForLoadState("networkidle");
-};
+const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
 
 test("no page says the paper's words outside a fold", async () => {
   const { session } = await call(ballast.url, "/sessions", { policy });
@@ -131,18 +123,9 @@ test("a visit starts at the sessions", async () => {
 });
 
 test("axe finds nothing on the form and on the policy, in light, in dark and at 320 pixels", async () => {
-  const axe = await readFile(AXE, "utf8");
-  for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
-    await page.emulateMedia({ colorScheme });
-    await page.setViewportSize({ width, height: 900 });
-    for (const hash of ["#/train", `#/train?newer=${policy}`, `#/policies/${policy}`]) {
-      await go(hash);
-      for (const fold of await page.locator("summary", { hasText: "For the quant" }).all()) await fold.click();
-      await page.evaluate(axe);
-      const { violations, passes } = await page.evaluate(() => axe.run(document));
-      assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join("\n")}`), [], `${hash} ${colorScheme} ${width}`);
-      assert.ok(passes.length > 10);
-      assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0, `${hash} at ${width}`);
-    }
-  }
+  const places = ["#/train", `#/train?newer=${policy}`, `#/policies/${policy}`];
+  await usable(page, async (hash) => {
+    await go(hash);
+    for (const fold of await page.locator("summary", { hasText: "For the quant" }).all()) await fold.click();
+  }, places);
 });

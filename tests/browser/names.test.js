@@ -1,12 +1,10 @@
 // What policies and sessions are called: given where they are made, changed where they stand, and said wherever they are meant.
 
 import assert from "node:assert/strict";
-import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
-import { fileURLToPath } from "node:url";
 import { browser, call, service, trained } from "./ballast.js";
+import { usable, visitQuiet } from "./page.js";
 
-const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 
 let ballast, chromium, page, policy, session;
@@ -23,12 +21,7 @@ after(async () => {
   await ballast?.stop();
 });
 
-const go = async (hash) => {
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/${hash}`);
-  await page.locator("main:not([aria-busy]) h1").waitFor();
-  await page.waitForLoadState("networkidle");
-};
+const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
 const heading = (name) => page.getByRole("heading", { level: 1, name, exact: true }).waitFor();
 const short = (id) => id.replace(/^[a-z]+_/, "").slice(0, 10);
 
@@ -107,18 +100,9 @@ test("a name is taken away, and what was typed is left", async () => {
 });
 
 test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scrolls sideways", async () => {
-  const axe = await readFile(AXE, "utf8");
-  for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
-    await page.emulateMedia({ colorScheme });
-    await page.setViewportSize({ width, height: 900 });
-    for (const hash of [`#/sessions/${session}`, `#/policies/${policy}`, "#/sessions/new", "#/train"]) {
-      await go(hash);
-      if (hash.includes("_") || hash.includes("policies")) await page.locator(".labels button").click();
-      await page.evaluate(axe);
-      const { violations, passes } = await page.evaluate(() => axe.run(document));
-      assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join("\n")}`), [], `${hash} ${colorScheme} ${width}`);
-      assert.ok(passes.length > 10);
-      assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0, `${hash} at ${width}`);
-    }
-  }
+  const places = [`#/sessions/${session}`, `#/policies/${policy}`, "#/sessions/new", "#/train"];
+  await usable(page, async (hash) => {
+    await go(hash);
+    if (hash.includes("_") || hash.includes("policies")) await page.locator(".labels button").click();
+  }, places);
 });

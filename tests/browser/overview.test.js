@@ -1,13 +1,11 @@
 // Every client in one table: where each stands, what to do for him now, found by name, tag and state, in any order.
 
 import assert from "node:assert/strict";
-import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
-import { fileURLToPath } from "node:url";
 import { browser, call, service, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
+import { plain, usable, visitQuiet } from "./page.js";
 
-const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 const NAMES = ["Ada", "Grace", "Emmy"];
 const DAY = 86_400_000;
@@ -27,13 +25,7 @@ after(async () => {
   await ballast?.stop();
 });
 
-const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
-const go = async (hash) => {
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/${hash}`);
-  await page.locator("main:not([aria-busy]) h1").waitFor();
-  await page.waitForLoadState("networkidle");
-};
+const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
 const names = () => page.locator("tbody th a").allInnerTexts();
 const cells = async (name) => (await page.getByRole("row", { name }).locator("td").allInnerTexts()).map(plain);
 const shown = (line) => page.locator(".foot").getByText(line, { exact: true }).waitFor();
@@ -154,15 +146,5 @@ test("what needs care is told where it is so", async () => {
 });
 
 test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scrolls sideways", async () => {
-  const axe = await readFile(AXE, "utf8");
-  for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
-    await page.emulateMedia({ colorScheme });
-    await page.setViewportSize({ width, height: 900 });
-    await go("");
-    await page.evaluate(axe);
-    const { violations, passes } = await page.evaluate(() => axe.run(document));
-    assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join("\n")}`), []);
-    assert.ok(passes.length > 10);
-    assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0);
-  }
+  await usable(page, go);
 });

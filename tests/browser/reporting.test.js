@@ -1,13 +1,11 @@
 // A month for many clients at once: pasted by name, looked over, recorded, and what was refused kept for another try.
 
 import assert from "node:assert/strict";
-import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
-import { fileURLToPath } from "node:url";
 import { browser, call, service, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
+import { plain, usable, visitQuiet } from "./page.js";
 
-const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 const NAMES = ["Ada", "Grace Hopper", "Twin", "Twin", ""];
 
@@ -27,14 +25,8 @@ after(async () => {
   await ballast?.stop();
 });
 
-const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
 const short = (id) => id.replace(/^[a-z]+_/, "").slice(0, 10);
-const go = async (hash) => {
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/${hash}`);
-  await page.locator("main:not([aria-busy]) h1").waitFor();
-  await page.waitForLoadState("networkidle");
-};
+const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
 const rows = async (name) => (await page.getByRole("table", { name }).locator("tbody tr").allInnerTexts()).map((text) => plain(text).replace(/\s+/g, " "));
 const lines = () => page.getByLabel("Sessions and their returns, %");
 const observed = async (index) => (await call(ballast.url, `/sessions/${sessions[index]}/history`)).observations;
@@ -119,18 +111,10 @@ test("those ticked get one return, and an answer that is lost is asked for again
 });
 
 test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scrolls sideways", async () => {
-  const axe = await readFile(AXE, "utf8");
-  for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
-    await page.emulateMedia({ colorScheme });
-    await page.setViewportSize({ width, height: 900 });
+  await usable(page, async () => {
     await go("#/report");
     await lines().fill("Ada 500\nNobody 2");
     await page.getByRole("button", { name: "Report for 1" }).click();
     await page.getByRole("heading", { name: "What came of it" }).waitFor();
-    await page.evaluate(axe);
-    const { violations, passes } = await page.evaluate(() => axe.run(document));
-    assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join("\n")}`), []);
-    assert.ok(passes.length > 10);
-    assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0);
-  }
+  });
 });

@@ -4,9 +4,9 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { browser, call, service, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
+import { plain } from "./page.js";
 
 const { sentences, headline } = await dashboardModule("sensitivity.js");
-const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
 const said = (answer) => plain(sentences(answer).join(" "));
 
 const at = (simple_return, allocation) => ({ simple_return, allocation });

@@ -1,12 +1,10 @@
 // A session of several assets: what to hold of each, a return reported for each, and what the worst market makes of each.
 
 import assert from "node:assert/strict";
-import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
-import { fileURLToPath } from "node:url";
 import { browser, call, service, trained } from "./ballast.js";
+import { plain, usable, visitQuiet } from "./page.js";
 
-const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
 const ASSETS = ["World", "Bonds A/B", "Gold"];
 const HISTORY = [
   [0.0131, 0.003, 0.018], [-0.0442, 0.009, -0.046], [0.021, -0.004, 0.028], [0.033, 0.002, 0.015], [-0.012, 0.001, 0.005],
@@ -32,13 +30,7 @@ after(async () => {
   await ballast?.stop();
 });
 
-const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
-const go = async () => {
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/#/sessions/${session}`);
-  await page.locator("main:not([aria-busy]) h1").waitFor();
-  await page.waitForLoadState("networkidle");
-};
+const go = () => visitQuiet(page, `${ballast.url}/#/sessions/${session}`);
 const rows = async (name) => {
   const texts = await page.getByRole("table", { name }).locator("tbody tr").allInnerTexts();
   return Object.fromEntries(texts.map((text) => plain(text).replaceAll(",", "").split(/\t|\n/).map((cell) => cell.trim()).filter(Boolean)).map(([name, ...cells]) => [name, cells]));
@@ -146,15 +138,5 @@ test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scroll
   const { policy } = await call(ballast.url, `/sessions/${session}`);
   ({ session } = await call(ballast.url, "/sessions", { policy }));
   await call(ballast.url, "/observe", { session, period: 1, simple_returns: { World: 0.01, "Bonds A/B": 0, Gold: 0.01 } });
-  const axe = await readFile(AXE, "utf8");
-  for (const [colorScheme, width] of [["light", 1280], ["dark", 1280], ["light", 320]]) {
-    await page.emulateMedia({ colorScheme });
-    await page.setViewportSize({ width, height: 900 });
-    await go();
-    await page.evaluate(axe);
-    const { violations, passes } = await page.evaluate(() => axe.run(document));
-    assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join("\n")}`), []);
-    assert.ok(passes.length > 10);
-    assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0);
-  }
+  await usable(page, () => go());
 });

@@ -4,6 +4,7 @@ import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { test } from "node:test";
 import { dashboardModule } from "./modules.js";
+import { plain } from "./page.js";
 
 const { figures, minus, tick } = await dashboardModule("format.js");
 const { typed } = await dashboardModule("number_text.js");
@@ -26,7 +27,6 @@ test("a number typed is one number or none", () => {
 });
 
 test("a refusal names the field, the value and the rule in the unit of the field", () => {
-  const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
   const cases = [
     [{ value: 0, rule: "must lie in [1, 520]" }, "Decisions", null, "Decisions is 0; it must be from 1 to 520."],
     [{ value: 0.5, rule: "must lie in (1, 100]; at 1 use the log utility" }, "Risk aversion", null, "Risk aversion is 0.5; it must be above 1 and at most 100; at 1 use the log utility."],

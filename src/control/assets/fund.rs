@@ -38,8 +38,6 @@ pub struct Fund {
     pub composition: Vec<f64>,
     /// Share of wealth in each asset, before trading.
     pub holdings: Vec<f64>,
-    /// What the composition was last proposed by, where that was a one-step problem.
-    pub solution: Option<AssetsSolution>,
 }
 
 impl AssetsProblem {
@@ -109,7 +107,7 @@ impl Fund {
     /// Who has seen `rows` and holds these shares of wealth, before a composition is chosen.
     pub fn at(rows: Vec<Vec<f64>>, holdings: Vec<f64>) -> Self {
         let composition = inverse_volatility(&rows);
-        Fund { rows, composition, holdings, solution: None }
+        Fund { rows, composition, holdings }
     }
 
     /// Log-returns of the fund, date by date.
@@ -147,9 +145,16 @@ impl Fund {
         State { wealth: state.wealth, holding: state.holding, law }
     }
 
-    /// Chooses the composition before the period after `step`, below the horizon, and gives the state of its fund. Cost: a
-    /// one-step problem where the rule has one, some policy values, and a law of n returns each.
-    pub fn compose(&mut self, advisor: &Advisor, fund: &FundSpecification, step: usize, state: &State) -> State {
+    /// Chooses the composition before the period after `step`, below the horizon, and gives the state of its fund and the one-step
+    /// solution that proposed it, where one did. Cost: a one-step problem where the rule has one, some policy values, and a law of n
+    /// returns each.
+    pub fn compose(
+        &mut self,
+        advisor: &Advisor,
+        fund: &FundSpecification,
+        step: usize,
+        state: &State,
+    ) -> (State, Option<AssetsSolution>) {
         let problem = &advisor.specification().problem;
         let mut solution = None;
         let proposed = fund.composition.composition(&self.rows, || {
@@ -166,7 +171,6 @@ impl Fund {
             // From nothing, so that what is proposed depends on what was seen alone.
             solution.insert(step.solve(None)).clone()
         });
-        self.solution = solution;
         let left = (problem.horizon - step) as f64;
         // What the policy values the fund, and that less the way there.
         let value = |composition: &[f64]| {
@@ -177,17 +181,16 @@ impl Fund {
             varies.then_some([gain, net])
         };
         self.composition = guarded(self.composition.clone(), proposed, value);
-        self.state(advisor, state, &self.composition)
+        (self.state(advisor, state, &self.composition), solution)
     }
 
-    /// The one-step problem behind the composition, in wealth, by the names of the assets.
-    pub fn one_step(&self, names: &[String], floor: f64) -> Option<OneStep> {
-        let solution = self.solution.as_ref()?;
-        Some(OneStep {
+    /// A one-step solution in wealth, by the names of the assets; the bank alone makes `floor`.
+    pub fn one_step(&self, names: &[String], solution: &AssetsSolution, floor: f64) -> OneStep {
+        OneStep {
             allocation: named(names, &solution.allocation),
             certainty_equivalent: floor * solution.value.exp(),
             bound: floor * solution.bound.exp(),
             worst_means: worst_means(names, &self.rows, solution),
-        })
+        }
     }
 }

@@ -1,0 +1,47 @@
+// What tests of the page do on every one: go there, read it as one reads it, and look whether everybody can use it.
+
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { fileURLToPath } from "node:url";
+
+const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
+const LOOKS = [["light", 1280], ["dark", 1280], ["light", 320]];
+
+/** A text with common spaces and hyphens. */
+export const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
+
+/** Loads the page of an address anew: a new hash alone would leave the old view standing for a moment. */
+export async function visit(page, url) {
+  await page.goto("about:blank");
+  await page.goto(url);
+  await page.locator("main:not([aria-busy]) h1").waitFor();
+}
+
+/** As `visit`, until nothing is asked for any more. */
+export async function visitQuiet(page, url) {
+  await visit(page, url);
+  await page.waitForLoadState("networkidle");
+}
+
+/** That axe finds nothing on the page as it stands. */
+export async function accessible(page, where) {
+  await page.evaluate(await readFile(AXE, "utf8"));
+  const { violations, passes } = await page.evaluate(() => window.axe.run(document));
+  const told = violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html, any }) => `${html} ${any[0]?.message ?? ""}`).join("\n")}`);
+  assert.deepEqual(told, [], where);
+  assert.ok(passes.length > 10);
+}
+
+/** In light, in dark and at 320 pixels, each opened by `open`: that axe finds nothing and that nothing scrolls sideways. */
+export async function usable(page, open, places = [""]) {
+  for (const [colorScheme, width] of LOOKS) {
+    await page.emulateMedia({ colorScheme });
+    await page.setViewportSize({ width, height: 900 });
+    for (const place of places) {
+      await open(place);
+      const where = `${place} in ${colorScheme} at ${width}`;
+      await accessible(page, where);
+      assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0, where);
+    }
+  }
+}
