@@ -70,6 +70,7 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
         ("/problem/history", json!([0.1]), "problem.history"),
         ("/problem/history", json!([0.1, 0.1, 0.1]), "problem.history"),
         ("/problem/history", json!([0.1, 1e308]), "problem.history[1]"),
+        ("/design/accuracy", json!(0.0), "design.accuracy"),
         ("/design/count", json!(0), "design.count"),
         ("/design/count", json!(10_000_000), "design.count"),
         ("/design/initial_laws", json!("any"), "design.initial_laws"),

@@ -3,6 +3,7 @@
 mod support;
 
 use ballast::control::surrogate::design::Design;
+use ballast::control::surrogate::learning::Counts;
 use ballast::control::surrogate::target::TargetMap;
 use serde_json::{Value, json};
 use support::policies::specification;
@@ -27,7 +28,7 @@ fn wealth_alone_is_a_ladder_over_all_that_can_be_reached() {
     let mean = HISTORY.iter().sum::<f64>() / 6.0;
     let variance = HISTORY.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / 6.0;
     for step in 0..4 {
-        assert_eq!((design.count(step), design.candidate_count(step), design.guards(step)), (20, 20, 0..0));
+        assert_eq!(design.counts(step), Counts { design: 20, chosen: false, guards: 20..20 });
         let rungs: Vec<f64> = (0..20).map(|index| design.state(step, index).wealth.ln()).collect();
         let gap = (rungs[19] - rungs[0]) / 19.0;
         assert!(rungs.windows(2).all(|pair| (pair[1] - pair[0] - gap).abs() < 1e-12), "{rungs:?}");
@@ -57,7 +58,8 @@ fn where_all_states_are_one_there_is_one_design_point() {
 #[test]
 fn a_quarter_is_taken_as_drawn_and_the_guards_are_none_of_the_candidates() {
     let design = Design::new(&specification(request("adaptive", exponential())));
-    assert_eq!((design.candidate_count(2), design.as_drawn_count(2), design.guards(2)), (60, 5, 60..260));
+    let counts = design.counts(2);
+    assert_eq!((counts.candidates(20), counts.as_drawn(20), counts.guards), (60, 5, 60..260));
 }
 
 #[test]

@@ -15,11 +15,11 @@ use crate::control::request::contributions::Contributions;
 use crate::control::request::specification::{
     InitialLaws, SamplingLaw, Specification, SurrogateTarget, UtilitySpecification,
 };
-use crate::control::surrogate::design::{AS_DRAWN, CANDIDATES_PER_POINT, GUARDS};
+use crate::control::surrogate::design::GUARDS;
 use crate::control::surrogate::features::Features;
 use crate::control::surrogate::fitted::ValueSurrogate;
 use crate::control::surrogate::fitting::DesignPoint;
-use crate::control::surrogate::learning::{Candidates, Counts, Learning};
+use crate::control::surrogate::learning::{CANDIDATES_PER_POINT, Candidates, Counts, Learning};
 use crate::control::surrogate::stored::Solution;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::law::ContinuousLaw;
@@ -68,8 +68,7 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         names.extend(laws.selection.names());
         let design = specification.design.count.unwrap_or(DEFAULT_COUNT);
         let candidates = CANDIDATES_PER_POINT * design;
-        let counts =
-            Counts { design, as_drawn: design.div_ceil(AS_DRAWN), candidates, guards: candidates..candidates + GUARDS };
+        let counts = Counts { design, chosen: true, guards: candidates..candidates + GUARDS };
         let (mut values, mut after): (Vec<ControlledValue>, Option<Solution>) = (Vec::new(), None);
         for step in (1..specification.problem.horizon).rev() {
             let bellman = ControlledStep { problem, laws: &laws, step, next: values.last() };
@@ -79,7 +78,8 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
                 continue;
             }
             let (specification, names, counts) = (&specification, &names, counts.clone());
-            let learned = Learning { specification, names, step, counts, watch }.run(&states, after.as_ref())?;
+            let learned =
+                Learning { specification, names, step, counts, aim: None, watch }.run(&states, after.as_ref())?;
             if let Solution::Surrogates(stored) = &learned.solution {
                 let surrogate = ValueSurrogate::new(specification, step, stored);
                 values.push(ControlledValue::Surrogate(Box::new(surrogate)));

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::problem::actions::Band;
+use crate::control::surrogate::accuracy::ExpectedError;
 use crate::control::surrogate::stored::{SingleSolution, Solution};
 
 /// Name and version of the portable form, which fixes the features and the radii that a policy was trained with.
@@ -36,6 +37,9 @@ pub struct StepDiagnostics {
     /// Largest difference between the primal and the dual value of a robust step, in log certainty equivalent; 0 in the
     /// parametric frameworks, whose step has no dual.
     pub duality_gap: f64,
+    /// Of the value that it serves, where an accuracy was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expected_error: Option<ExpectedError>,
     /// Diagnostics of the value surrogate; absent where the step stores a single state's solution.
     pub value: Option<SurrogateDiagnostics>,
     /// Diagnostics of the policy surrogate; absent where the step stores a single state's solution.
@@ -84,6 +88,7 @@ impl StepSolution {
                 all_bank_share: 1.0,
                 uncertified_share: 0.0,
                 duality_gap: 0.0,
+                expected_error: None,
                 value: None,
                 policy: None,
             },

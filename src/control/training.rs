@@ -19,10 +19,11 @@ use crate::control::problem::state::State;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::specification::Specification;
 use crate::control::solved_step::StepSolution;
+use crate::control::surrogate::accuracy::Aim;
 use crate::control::surrogate::design::Design;
 use crate::control::surrogate::features::{Features, LawSummary};
 use crate::control::surrogate::fitting::DesignPoint;
-use crate::control::surrogate::learning::{Candidates, Counts, Learning, diagnostics};
+use crate::control::surrogate::learning::{Candidates, Learning, diagnostics};
 use crate::control::surrogate::stored::{SingleSolution, Solution};
 use crate::control::uncertainty::measured::Measured;
 
@@ -85,23 +86,21 @@ impl Training {
     ) -> Result<StepSolution, TrainError> {
         let next = NextValue::new(&self.problem.specification, step + 1, after.map(|after| &after.solution));
         let bellman = BellmanStep { problem: &self.problem, step, next: &next };
-        let count = self.design.count(step);
-        let radii = vec![OnceLock::new(); self.design.candidate_count(step)];
+        let counts = self.design.counts(step);
+        let radii = vec![OnceLock::new(); counts.candidates(counts.design)];
         let solver = DesignSolver { bellman, design: &self.design, measured: &self.measured, radii };
-        if count == 1 {
+        if counts.design == 1 {
             watch.go_on()?;
             let solved = solver.solve_the_only()?;
             (watch.progress)(StepProgress { step, phase: Phase::Solving, done: 1, total: 1 });
             return Ok(solved);
         }
-        let counts = Counts {
-            design: count,
-            as_drawn: self.design.as_drawn_count(step),
-            candidates: self.design.candidate_count(step),
-            guards: self.design.guards(step),
-        };
+        // The first step has one state where all sessions start alike.
+        let erring = step + usize::from(self.design.count(0) > 1);
+        let asked = Some(&self.problem.specification.design).filter(|_| counts.chosen);
+        let aim = asked.and_then(|design| Aim::of(design, step, erring, after.map(|after| &after.diagnostics)));
         let (specification, names) = (&self.problem.specification, &self.problem.selection.names());
-        Learning { specification, names, step, counts, watch }.run(&solver, after.map(|after| &after.solution))
+        Learning { specification, names, step, counts, aim, watch }.run(&solver, after.map(|after| &after.solution))
     }
 
     /// The policy made of all steps, in ascending order of step.

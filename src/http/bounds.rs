@@ -12,8 +12,8 @@ use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
 use crate::control::request::frontier::{LARGEST_SCALE, RESAMPLES, SCALES};
 use crate::control::request::learning::HALF_LIFE;
 use crate::control::request::rules::{
-    COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR, RADIUS_SCALE, RATE,
-    RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST, WEALTH,
+    ACCURACY, COUNT, FIXED_RADIUS, HISTORY_LENGTH, HORIZON, LOG_RETURN, MOMENTS, PATHS, PERIODS_PER_YEAR, RADIUS_SCALE,
+    RATE, RISK_AVERSION, RISK_AVERSION_RELATIVE, TRADING_COST, WEALTH,
 };
 use crate::service::plan::MOST_RENEWALS;
 use crate::service::report::{LONGEST_REASON, MOST_CORRECTIONS, PRICE};
@@ -71,6 +71,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("MixtureComponent", "weight", json!({ "exclusiveMinimum": 0, "maximum": 1 })),
         ("MixtureComponent", "mean", within((-1.0, 1.0))),
         ("MixtureComponent", "variance", within((1e-12, 1.0))),
+        ("DesignSpecification", "accuracy", within(ACCURACY)),
         ("DesignSpecification", "count", whole(&COUNT)),
         ("SurrogateSpecification", "moment_count", whole(&MOMENTS)),
         ("HyperparameterBounds", "lengthscale", pair.clone()),
@@ -289,7 +290,7 @@ mod tests {
                 "initial_wealth": 100.0, "trading_cost": 0.0, "utility": { "kind": "exponential", "risk_aversion": 0.01 },
                 "radius": { "rule": "bridge", "alpha": 0.1, "paths": 200, "scale": 1.0 },
                 "learning": { "kind": "decay", "half_life": 2.0 } },
-            "design": { "count": 20, "sampling_law": { "kind": "student_t", "location": 0.0, "scale": 0.1,
+            "design": { "accuracy": 1.0, "count": 20, "sampling_law": { "kind": "student_t", "location": 0.0, "scale": 0.1,
                 "degrees_of_freedom": 5.0 } },
             "surrogate": { "moment_count": 4 }
         });
@@ -317,6 +318,7 @@ mod tests {
             ("/problem/radius/paths", of("RadiusRule", Some(0), "paths"), 1.0),
             ("/problem/radius/scale", of("RadiusRule", Some(0), "scale"), 1e-3),
             ("/problem/radius/alpha", of("RadiusRule", Some(0), "alpha"), 1e-4),
+            ("/design/accuracy", of("DesignSpecification", None, "accuracy"), 1e-3),
             ("/design/count", of("DesignSpecification", None, "count"), 1.0),
             ("/design/sampling_law/location", of("SamplingLaw", Some(2), "location"), 1e-3),
             ("/design/sampling_law/scale", of("SamplingLaw", Some(2), "scale"), 1e-7),

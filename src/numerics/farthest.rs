@@ -1,16 +1,22 @@
 //! Space-filling selection.
 
-/// Indices of `count` rows of `rows` that lie far apart, the first `given` of them as they are: each further one is the
+/// Indices of `count` rows of `rows` that lie far apart, the first of them as `given`: each further one is the
 /// row farthest from all chosen before it (the first such row), in the metric `sum_i ((x_i - y_i) / scales_i)^2`, its
-/// distance counted as many times as its entry of `weights` says.
+/// distance counted as many times as its entry of `weights` says; rows without one are given, never chosen.
 ///
 /// Under equal weights twice the least covering radius at worst. Cost O(rows count d). Source: Gonzalez (1985),
 /// Theoretical Computer Science 38; weights as in Dyer and Frieze (1985), Operations Research Letters 3.
-pub fn farthest_points(rows: &[Vec<f64>], scales: &[f64], weights: &[f64], given: usize, count: usize) -> Vec<usize> {
-    assert_eq!(rows.len(), weights.len(), "one weight for each row");
+pub fn farthest_points(
+    rows: &[Vec<f64>],
+    scales: &[f64],
+    weights: &[f64],
+    given: &[usize],
+    count: usize,
+) -> Vec<usize> {
+    assert!(weights.len() <= rows.len(), "one weight for each row that may be chosen");
     let scaled: Vec<Vec<f64>> =
         rows.iter().map(|row| row.iter().zip(scales).map(|(x, scale)| x / scale).collect()).collect();
-    let mut chosen: Vec<usize> = (0..given.min(rows.len())).collect();
+    let mut chosen = given.to_vec();
     let mut nearest = vec![f64::INFINITY; rows.len()];
     for &centre in &chosen {
         approach(&mut nearest, &scaled, centre);
@@ -46,8 +52,8 @@ mod tests {
     #[test]
     fn the_farthest_come_first_and_none_twice() {
         let rows: Vec<Vec<f64>> = [0.0, 1.0, 5.0, 9.0, 10.0, 0.0].iter().map(|&x| vec![x, 0.0]).collect();
-        assert_eq!(farthest_points(&rows, &[1.0, 1.0], &[1.0; 6], 1, 3), [0, 4, 2]);
-        let mut all = farthest_points(&rows, &[1.0, 1.0], &[1.0; 6], 2, 9);
+        assert_eq!(farthest_points(&rows, &[1.0, 1.0], &[1.0; 6], &[0], 3), [0, 4, 2]);
+        let mut all = farthest_points(&rows, &[1.0, 1.0], &[1.0; 6], &[0, 1], 9);
         all.sort_unstable();
         assert_eq!(all, [0, 1, 2, 3, 4, 5]);
     }
@@ -55,14 +61,14 @@ mod tests {
     #[test]
     fn a_long_scale_hides_its_coordinate() {
         let rows = vec![vec![0.0, 0.0], vec![0.0, 50.0], vec![2.0, 0.0]];
-        assert_eq!(farthest_points(&rows, &[1.0, 100.0], &[1.0; 3], 1, 2), [0, 2]);
-        assert_eq!(farthest_points(&rows, &[1.0, 1.0], &[1.0; 3], 1, 2), [0, 1]);
+        assert_eq!(farthest_points(&rows, &[1.0, 100.0], &[1.0; 3], &[0], 2), [0, 2]);
+        assert_eq!(farthest_points(&rows, &[1.0, 1.0], &[1.0; 3], &[0], 2), [0, 1]);
     }
 
     #[test]
     fn a_weight_multiplies_the_distance() {
         let rows: Vec<Vec<f64>> = [0.0, 3.0, -5.0].iter().map(|&x| vec![x]).collect();
-        assert_eq!(farthest_points(&rows, &[1.0], &[1.0, 1.6, 1.0], 1, 2), [0, 2]);
-        assert_eq!(farthest_points(&rows, &[1.0], &[1.0, 1.7, 1.0], 1, 2), [0, 1]);
+        assert_eq!(farthest_points(&rows, &[1.0], &[1.0, 1.6, 1.0], &[0], 2), [0, 2]);
+        assert_eq!(farthest_points(&rows, &[1.0], &[1.0, 1.7, 1.0], &[0], 2), [0, 1]);
     }
 }

@@ -37,6 +37,9 @@ pub struct AccuracyBench {
     /// Design points per step, one row each
     #[arg(long, value_delimiter = ',', default_values_t = [1000])]
     counts: Vec<usize>,
+    /// Basis points asked for in the place of a number of points, one row each; the largest of --counts is then the most
+    #[arg(long, value_delimiter = ',')]
+    accuracies: Vec<f64>,
     #[arg(long, default_value_t = 0.1)]
     alpha: f64,
     /// Returns of the history
@@ -104,7 +107,13 @@ fn compare(bench: &AccuracyBench) -> Result<(), TrainError> {
         truths.push((last - 1, nested_truth(&problem, bench.nested_states)));
     }
     heading();
-    for &count in &bench.counts {
+    let most = bench.counts.iter().copied().max();
+    let mut designs: Vec<(Option<usize>, Option<f64>)> =
+        bench.accuracies.iter().map(|&accuracy| (most, Some(accuracy))).collect();
+    if designs.is_empty() {
+        designs = bench.counts.iter().map(|&count| (Some(count), None)).collect();
+    }
+    for (count, accuracy) in designs {
         let mut variants = vec![(SurrogateTarget::FloorGain, FeatureMap::Standardized)];
         if bench.variants {
             variants.push((SurrogateTarget::Value, FeatureMap::Standardized));
@@ -112,7 +121,7 @@ fn compare(bench: &AccuracyBench) -> Result<(), TrainError> {
         }
         for (target, features) in variants {
             let mut specification = base.clone();
-            specification.design.count = Some(count);
+            (specification.design.count, specification.design.accuracy) = (count, accuracy);
             specification.surrogate.target = target;
             specification.surrogate.features = features;
             let advisor = trained(&specification, truths.len())?;
@@ -180,17 +189,18 @@ fn trained(specification: &Specification, steps: usize) -> Result<Advisor, Train
 
 fn heading() {
     println!(
-        "{:>5} {:<12} {:<13} {:>4}  {:^23}  {:^23}  {:>6}  {:>6}",
-        "", "", "", "", "value error", "regret as served", "in", "within"
+        "{:>5} {:<12} {:<13} {:>4}  {:>7}  {:^23}  {:^23}  {:>6}  {:>6}",
+        "", "", "", "", "claimed", "value error", "regret as served", "in", "within"
     );
     println!(
-        "{:>5} {:<12} {:<13} {:>4}  {:>7} {:>7} {:>7}  {:>7} {:>7} {:>7}  {:>6}  {:>6}",
-        "N", "target", "features", "step", "RMS", "99 %", "worst", "mean", "99 %", "worst", "design", "2 sd"
+        "{:>5} {:<12} {:<13} {:>4}  {:>7}  {:>7} {:>7} {:>7}  {:>7} {:>7} {:>7}  {:>6}  {:>6}",
+        "N", "target", "features", "step", "RMS", "RMS", "99 %", "worst", "mean", "99 %", "worst", "design", "2 sd"
     );
 }
 
 fn report(problem: &Problem, advisor: &Advisor, step: usize, truths: &[Truth]) {
     let specification = advisor.specification();
+    let diagnostics = &advisor.policy().steps()[step].diagnostics;
     let next = match step + 1 < specification.problem.horizon {
         true => exact_last_value(&problem.specification),
         false => NextValue::Terminal,
@@ -211,8 +221,9 @@ fn report(problem: &Problem, advisor: &Advisor, step: usize, truths: &[Truth]) {
         FeatureMap::RawMoments => "raw_moments",
     };
     println!(
-        "{:>5} {target:<12} {features:<13} {step:>4}  {:>7.3} {:>7.3} {:>7.3}  {:>7.4} {:>7.3} {:>7.3}  {:>6.4}  {:>6.4}",
-        specification.design.count.unwrap_or(0),
+        "{:>5} {target:<12} {features:<13} {step:>4}  {:>7}  {:>7.3} {:>7.3} {:>7.3}  {:>7.4} {:>7.3} {:>7.3}  {:>6.4}  {:>6.4}",
+        diagnostics.design_count,
+        diagnostics.expected_error.map_or_else(|| "-".to_owned(), |expected| format!("{:.3}", expected.total)),
         root_mean_square(&errors),
         quantile(&errors, 0.99),
         quantile(&errors, 1.0),

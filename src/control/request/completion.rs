@@ -5,8 +5,10 @@ use crate::control::request::assets::check_fund;
 use crate::control::request::rules;
 use crate::control::request::specification::{Interval, SamplingLaw, Specification};
 
-/// Design points per step where the law is part of the state: the paper's count.
+/// Design points per step where the law is part of the state, at most: the paper's count.
 pub const DEFAULT_COUNT: usize = 1000;
+/// Where no count of design points is asked for, in basis points.
+pub const DEFAULT_ACCURACY: f64 = 0.5;
 /// Design points per step where the state is wealth alone: the paper's count.
 pub const DEFAULT_COUNT_WEALTH_ALONE: usize = 200;
 
@@ -23,6 +25,9 @@ impl Specification {
         self.problem.contributions = self.problem.contributions.canonical();
         self.problem.utility = self.problem.utility.absolute(wealth);
         self.problem.radius = Some(self.problem.radius_rule());
+        if learns && self.design.count.is_none() {
+            self.design.accuracy.get_or_insert(DEFAULT_ACCURACY);
+        }
         self.design.count.get_or_insert(if learns { DEFAULT_COUNT } else { DEFAULT_COUNT_WEALTH_ALONE });
         self.design.sampling_law.get_or_insert(SamplingLaw::Bootstrap {});
         self.design.wealth.get_or_insert(Interval { min: wealth, max: wealth });

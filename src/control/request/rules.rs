@@ -13,6 +13,8 @@ use crate::control::request::withdrawals;
 
 /// The covariance matrix of 10,000 points takes 800 MB.
 pub const LARGEST_COUNT: usize = 10_000;
+/// Ends of `design.accuracy`, in basis points.
+pub const ACCURACY: (f64, f64) = (0.01, 100.0);
 /// Design points of a step.
 pub const COUNT: std::ops::RangeInclusive<usize> = 10..=LARGEST_COUNT;
 /// Ten years of weeks.
@@ -246,6 +248,9 @@ pub fn log_return(field: &str, value: f64) -> Result<(), FieldError> {
 
 fn design(specification: &Specification) -> Result<(), FieldError> {
     let design = &specification.design;
+    if let Some(accuracy) = design.accuracy {
+        within("design.accuracy", accuracy, ACCURACY.0, ACCURACY.1)?;
+    }
     if let Some(count) = design.count {
         whole("design.count", count, &COUNT)?;
         let numbers = count.saturating_mul(specification.problem.history.len() + specification.problem.horizon);

@@ -224,7 +224,12 @@ pub struct MixtureComponent {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DesignSpecification {
-    /// Design points per step, N. Default 1000; 200 where the state is wealth alone.
+    /// Basis points of the certainty equivalent by which the value served may be off, as a root mean square over the states of a
+    /// step, the errors of the steps after it included. Design points are added until fresh states say that it is reached.
+    /// Default 0.5 where there is no `count`; where the state is wealth alone, `count` decides.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<f64>,
+    /// Design points per step, N; with an `accuracy`, at most. Default 1000; 200 where the state is wealth alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<usize>,
     /// Where the empirical laws of the design start.

@@ -5,10 +5,9 @@
 //! drawn and the rest from where the candidates lie farthest apart, so that its edges are inside. Where the points drawn
 //! say that a surrogate errs, candidates count as farther apart than they are.
 
-use std::ops::Range;
-
 use rand::RngExt;
 
+use super::learning::Counts;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::sampling_law::{admissible, continuous_law};
 use crate::control::problem::state::State;
@@ -21,14 +20,10 @@ use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::streams::stream;
 
-/// Candidates simulated for each design point.
-pub const CANDIDATES_PER_POINT: usize = 3;
 /// States that set the guard, at most: 5 of them lie beyond a guard that 99.5 % pass.
 pub const GUARDS: usize = 1000;
 /// Of a small design so many for each design point: their features would cost more than solving it.
 const GUARDS_PER_POINT: usize = 10;
-/// One design point in this many is taken as drawn.
-pub const AS_DRAWN: usize = 4;
 
 /// The states that a training may be asked to solve.
 pub struct Design {
@@ -81,23 +76,14 @@ impl Design {
         if self.constant || (step == 0 && self.start_is_single) { 1 } else { self.count }
     }
 
-    /// Candidates from which the design points of a step are chosen: as many as those where there is no choice.
-    pub fn candidate_count(&self, step: usize) -> usize {
-        let count = self.count(step);
-        if count == 1 || !self.ladder.is_empty() { count } else { CANDIDATES_PER_POINT * count }
-    }
-
-    /// The first so many candidates are design points as they are.
-    pub fn as_drawn_count(&self, step: usize) -> usize {
-        let count = self.count(step);
-        if self.candidate_count(step) == count { count } else { count.div_ceil(AS_DRAWN) }
-    }
-
-    /// Independent draws of the design's law, to judge the surrogates by; none where the state is wealth alone.
-    pub fn guards(&self, step: usize) -> Range<usize> {
-        let candidates = self.candidate_count(step);
-        let guards = GUARDS.min(GUARDS_PER_POINT * self.count(step));
-        if self.ladder.is_empty() { candidates..candidates + guards } else { 0..0 }
+    /// The states of a step by kind. Guards are independent draws of the design's law, to judge the surrogates by; none where the
+    /// state is wealth alone.
+    pub fn counts(&self, step: usize) -> Counts {
+        let design = self.count(step);
+        let chosen = design > 1 && self.ladder.is_empty();
+        let first = Counts { design, chosen, guards: 0..0 }.candidates(design);
+        let guards = if self.ladder.is_empty() { GUARDS.min(GUARDS_PER_POINT * design) } else { 0 };
+        Counts { design, chosen, guards: first..first + guards }
     }
 
     /// State `index` of `step`; those beyond the candidates are independent draws of the same law. Streams:

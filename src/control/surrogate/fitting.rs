@@ -5,14 +5,14 @@ use rayon::prelude::*;
 
 use super::features::Features;
 use super::scaling::Scaling;
-use super::stored::{Solution, StepSurrogates, StoredSurrogate};
+use super::stored::{StepSurrogates, StoredSurrogate};
 use super::target::TargetMap;
 use crate::control::error::TrainError;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::holdings::Holdings;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::specification::Specification;
-use crate::control::solved_step::{StepDiagnostics, SurrogateDiagnostics};
+use crate::control::solved_step::SurrogateDiagnostics;
 use crate::numerics::gp::{GaussianProcess, Hyperparameters, LeaveOneOut};
 use crate::numerics::gp_fit::{self, Bounds, FitError};
 use crate::numerics::summary::quantile;
@@ -72,6 +72,18 @@ pub struct Fitting<'a> {
     pub watch: &'a Watch<'a>,
 }
 
+/// Both surrogates of a design, with the figures that describe them.
+pub struct Fit {
+    /// As they are kept.
+    pub stored: StepSurrogates,
+    /// Of the value target, predicted at each state that set the guard, in units of the value's `scale`.
+    pub deviations: Vec<f64>,
+    /// Of the value.
+    pub value: SurrogateDiagnostics,
+    /// Of the policy.
+    pub policy: SurrogateDiagnostics,
+}
+
 /// A regression problem: functions of zero prior mean and, together, of unit size.
 struct Targets {
     scaled: Vec<Vec<f64>>,
@@ -107,15 +119,12 @@ enum PriorMean {
 }
 
 impl Fitting<'_> {
-    /// The hyperparameters of the step after, if it has surrogates of the same inputs.
-    pub fn start_from(&self, after: &Solution) -> Option<StartingScales> {
-        match after {
-            Solution::Surrogates(stored) if stored.scaling.active == self.scaling.active => Some(StartingScales {
-                value: stored.value.hyperparameters.clone(),
-                policy: stored.policy.hyperparameters.clone(),
-            }),
-            _ => None,
-        }
+    /// The hyperparameters of surrogates fitted before, if they are of the same inputs.
+    pub fn start_from(&self, before: &StepSurrogates) -> Option<StartingScales> {
+        (before.scaling.active == self.scaling.active).then(|| StartingScales {
+            value: before.value.hyperparameters.clone(),
+            policy: before.policy.hyperparameters.clone(),
+        })
     }
 
     /// A first fit to few design points.
@@ -159,9 +168,9 @@ impl Fitting<'_> {
         Ok(inputs.par_iter().map(weight).collect())
     }
 
-    /// Both surrogates, by maximum likelihood. `guards` are features of independent states of the design's own law: the
-    /// guard is set so that the share `GUARDED_SHARE` of them passes. Where there are none, the design points take
-    /// their place, each predicted from the others.
+    /// Both surrogates, by maximum likelihood, and the deviations of the value that the guard is set by. `guards` are features
+    /// of independent states of the design's own law: the share `GUARDED_SHARE` of them passes. Where there are none, the
+    /// design points take their place, each predicted from the others.
     ///
     /// # Errors
     /// A covariance matrix that stays singular; the stop signal.
@@ -170,8 +179,7 @@ impl Fitting<'_> {
         solved: &[DesignPoint],
         start: &StartingScales,
         guards: &[Features],
-        diagnostics: &mut StepDiagnostics,
-    ) -> Result<Solution, TrainError> {
+    ) -> Result<Fit, TrainError> {
         let total = solved.len();
         (self.watch.progress)(StepProgress { step: self.step, phase: Phase::Fitting, done: total, total });
         self.watch.go_on()?;
@@ -190,16 +198,16 @@ impl Fitting<'_> {
             variances.map(f64::sqrt).collect()
         };
         let names: Vec<String> = self.scaling.active.iter().map(|&feature| self.names[feature].clone()).collect();
-        diagnostics.value = Some(value.diagnostics(&names));
-        diagnostics.policy = Some(policy.diagnostics(&names));
-        Ok(Solution::Surrogates(Box::new(StepSurrogates {
+        let [of_value, of_policy] = [&value, &policy].map(|fitted| fitted.diagnostics(&names));
+        let stored = StepSurrogates {
             inputs: inputs.column_iter().map(|column| column.iter().copied().collect()).collect(),
             scaling: self.scaling.clone(),
             deviation_limit: quantile(&deviations, GUARDED_SHARE),
             largest_gain: solved.iter().flat_map(|point| &point.floor_gains).copied().fold(0.0, f64::max),
             value: value.stored,
             policy: policy.stored,
-        })))
+        };
+        Ok(Fit { stored, deviations, value: of_value, policy: of_policy })
     }
 
     fn inputs(&self, solved: &[DesignPoint]) -> DMatrix<f64> {

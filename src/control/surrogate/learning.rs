@@ -1,15 +1,18 @@
 //! From the states of a step to its surrogates: some are solved as drawn, the rest of the design where candidates lie farthest
-//! apart, and both surrogates are fitted to all of them (paper, section 3.1, steps 2 to 5).
+//! apart, and both surrogates are fitted to all of them (paper, section 3.1, steps 2 to 5). Where an accuracy is asked for in the
+//! place of a number of points, the design begins small, and grows until fresh states say that it is reached.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
+use super::accuracy::{Aim, Checks};
 use super::features::Features;
-use super::fitting::{DesignPoint, Fitting};
+use super::fitted::ValueSurrogate;
+use super::fitting::{DesignPoint, Fit, Fitting};
 use super::scaling::Scaling;
-use super::stored::Solution;
+use super::stored::{Solution, StepSurrogates};
 use crate::control::error::TrainError;
 use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::specification::Specification;
@@ -42,17 +45,38 @@ pub fn together(values: usize, paths: usize) -> usize {
     (BYTES_TOGETHER / (LAW_BYTES * values + size_of::<f64>() * paths).max(1)).clamp(1, MOST_TOGETHER)
 }
 
+/// Candidates simulated for each design point.
+pub const CANDIDATES_PER_POINT: usize = 3;
+/// One design point in this many is taken as drawn.
+const AS_DRAWN: usize = 4;
+
 /// How many states there are of each kind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Counts {
-    /// Design points, N.
+    /// Design points, N; at most, where an accuracy is asked for.
     pub design: usize,
-    /// The first so many candidates are design points as they are.
-    pub as_drawn: usize,
-    /// From which the rest of the design is chosen.
-    pub candidates: usize,
+    /// Whether they are chosen among candidates; else they are all there are.
+    pub chosen: bool,
     /// Fresh states that set the guard.
     pub guards: Range<usize>,
+}
+
+impl Counts {
+    /// Of `design` points so many are the first candidates as they are.
+    pub fn as_drawn(&self, design: usize) -> usize {
+        if self.chosen { design.div_ceil(AS_DRAWN) } else { design }
+    }
+
+    /// Candidates for `design` points.
+    pub fn candidates(&self, design: usize) -> usize {
+        if self.chosen { CANDIDATES_PER_POINT * design } else { design }
+    }
+
+    /// The fresh states of a round are its own.
+    fn guards(&self, round: usize) -> Range<usize> {
+        let start = self.guards.start + round * self.guards.len();
+        start..start + self.guards.len()
+    }
 }
 
 /// How the surrogates of one step are learned.
@@ -65,8 +89,21 @@ pub struct Learning<'a> {
     pub step: usize,
     /// Of its states.
     pub counts: Counts,
+    /// What it may err by; `None` where all design points are solved.
+    pub aim: Option<Aim>,
     /// Told of progress, asked whether to stop.
     pub watch: &'a Watch<'a>,
+}
+
+/// What is known of a step as its design grows.
+#[derive(Default)]
+struct Known {
+    /// Of the candidates so far.
+    features: Vec<Features>,
+    /// Candidates that are design points.
+    chosen: Vec<usize>,
+    /// Those, and the states that earlier fits were judged by.
+    solved: Vec<DesignPoint>,
 }
 
 impl Learning<'_> {
@@ -76,29 +113,74 @@ impl Learning<'_> {
     /// [`TrainError::Stopped`] soon after the stop signal; a robust step that is not finite; a covariance matrix that stays
     /// singular.
     pub fn run(&self, states: &impl Candidates, after: Option<&Solution>) -> Result<StepSolution, TrainError> {
-        let Counts { design, as_drawn, candidates, ref guards } = self.counts;
-        let features = self.features(states, 0..candidates)?;
-        let scaling = Scaling::of(&features);
-        let (specification, names, step, watch) = (self.specification, self.names, self.step, self.watch);
-        let fitting = Fitting { specification, names, step, scaling: &scaling, watch };
-        let drawn: Vec<usize> = (0..as_drawn).collect();
-        let mut solved = self.solve(states, &drawn, &features, Vec::new())?;
-        let start = match after.and_then(|after| fitting.start_from(after)) {
-            Some(start) => start,
-            None => fitting.coarse(&solved)?,
-        };
-        if design > as_drawn {
-            let inputs: Vec<Vec<f64>> = features.iter().map(|features| scaling.apply(features)).collect();
-            let weights = fitting.weights(&solved, &start.value, &inputs)?;
-            let chosen = farthest_points(&inputs, &start.value.lengthscales, &weights, as_drawn, design);
-            solved = self.solve(states, &chosen[as_drawn..], &features, solved)?;
+        let (step, most) = (self.step, self.counts.design);
+        let mut wanted = self.aim.as_ref().map_or(most, |aim| aim.first.min(most));
+        let (mut known, mut round) = (Known::default(), 0);
+        let after = after.and_then(Solution::surrogates);
+        let mut last: Option<StepSurrogates> = None;
+        loop {
+            let fresh = self.counts.guards(round);
+            let guards = self.features(states, fresh.clone())?;
+            let Fit { stored, deviations, value, policy } =
+                self.round(states, &mut known, wanted, last.as_ref().or(after), &guards)?;
+            let mut diagnostics =
+                StepDiagnostics { value: Some(value), policy: Some(policy), ..diagnostics(step, &known.solved) };
+            if let Some(aim) = &self.aim {
+                let checks = Checks::of(&deviations, stored.deviation_limit, self.specification.seed, step, round);
+                let some = checks.weighted.iter().map(|&(state, _)| (fresh.start + state, guards[state].clone()));
+                let before = known.solved.len();
+                let checked = self.solve(states, some.collect(), before, before + checks.weighted.len())?;
+                let served = ValueSurrogate::new(self.specification, step, &stored);
+                let own = checks.error(&served, self.specification, step, &checked);
+                if !aim.is_met_by(own) && known.solved.len() < most {
+                    wanted = aim.next(known.solved.len(), own).min(most);
+                    known.solved.extend(checked.into_iter().take(most - known.solved.len()));
+                    (last, round) = (Some(stored), round + 1);
+                    continue;
+                }
+                diagnostics.expected_error = Some(aim.expected_error(own));
+            }
+            return Ok(StepSolution { step, solution: Solution::Surrogates(Box::new(stored)), diagnostics });
         }
-        let guards = self.features(states, guards.clone())?;
-        let mut diagnostics = diagnostics(step, &solved);
-        let solution = fitting.surrogates(&solved, &start, &guards, &mut diagnostics)?;
-        Ok(StepSolution { step, solution, diagnostics })
     }
 
+    /// Solves as many more design points as are wanted, and fits both surrogates to all. `before` are surrogates whose scales may
+    /// be near, `guards` the fresh states to tell deviations at.
+    fn round(
+        &self,
+        states: &impl Candidates,
+        known: &mut Known,
+        wanted: usize,
+        before: Option<&StepSurrogates>,
+        guards: &[Features],
+    ) -> Result<Fit, TrainError> {
+        let Known { features, chosen, solved } = known;
+        features.extend(self.features(states, features.len()..self.counts.candidates(wanted))?);
+        let scaling = Scaling::of(features);
+        let (specification, names, step, watch) = (self.specification, self.names, self.step, self.watch);
+        let fitting = Fitting { specification, names, step, scaling: &scaling, watch };
+        let named = |index: &usize| (*index, features[*index].clone());
+        let drawn: Vec<usize> = (0..self.counts.as_drawn(wanted)).filter(|index| !chosen.contains(index)).collect();
+        solved.extend(self.solve(states, drawn.iter().map(named).collect(), solved.len(), wanted)?);
+        chosen.extend(drawn);
+        let start = match before.and_then(|before| fitting.start_from(before)) {
+            Some(start) => start,
+            None => fitting.coarse(solved)?,
+        };
+        if solved.len() < wanted {
+            let mut inputs: Vec<Vec<f64>> = features.iter().map(|features| scaling.apply(features)).collect();
+            let weights = fitting.weights(solved, &start.value, &inputs)?;
+            // What earlier fits were judged by is no candidate, and yet known.
+            let known = inputs.len()..inputs.len() + solved.len();
+            inputs.extend(solved.iter().map(|point| scaling.apply(&point.features)));
+            let given: Vec<usize> = chosen.iter().copied().chain(known).collect();
+            let count = given.len() + wanted - solved.len();
+            let more = &farthest_points(&inputs, &start.value.lengthscales, &weights, &given, count)[given.len()..];
+            solved.extend(self.solve(states, more.iter().map(named).collect(), solved.len(), wanted)?);
+            chosen.extend(more);
+        }
+        fitting.surrogates(solved, &start, guards)
+    }
     fn features(&self, states: &impl Candidates, some: Range<usize>) -> Result<Vec<Features>, TrainError> {
         let problem = &self.specification.problem;
         let together = together(problem.history.len() + self.step, problem.radius_rule().paths());
@@ -111,31 +193,27 @@ impl Learning<'_> {
         Ok(found?.concat())
     }
 
-    /// Solves the robust step at the states named, after those solved before. `features` are those of all candidates.
+    /// Solves the robust step at states by number, with their features, where so many of `total` are solved already.
     fn solve(
         &self,
         states: &impl Candidates,
-        points: &[usize],
-        features: &[Features],
-        before: Vec<DesignPoint>,
+        some: Vec<(usize, Features)>,
+        before: usize,
+        total: usize,
     ) -> Result<Vec<DesignPoint>, TrainError> {
-        let (total, first) = (self.counts.design, before.len());
         let every = (total / REPORTS_PER_STEP).max(1);
-        let done = AtomicUsize::new(first);
-        self.report(first, total);
-        let solve = |&point: &usize| {
+        let done = AtomicUsize::new(before);
+        self.report(before, total);
+        let solve = |(index, features): (usize, Features)| {
             self.watch.go_on()?;
-            let solved = states.solve(point, features[point].clone())?;
+            let solved = states.solve(index, features)?;
             let finished = done.fetch_add(1, Ordering::Relaxed) + 1;
             if finished.is_multiple_of(every) || finished == total {
                 self.report(finished, total);
             }
             Ok(solved)
         };
-        let found: Result<Vec<DesignPoint>, TrainError> = points.par_iter().map(solve).collect();
-        let mut solved = before;
-        solved.extend(found?);
-        Ok(solved)
+        some.into_par_iter().map(solve).collect()
     }
 
     fn report(&self, done: usize, total: usize) {
@@ -154,6 +232,7 @@ pub fn diagnostics(step: usize, solved: &[DesignPoint]) -> StepDiagnostics {
         all_bank_share: share(&|point| point.action <= 0.0),
         uncertified_share: share(&|point| !point.certified),
         duality_gap: solved.iter().map(|point| point.duality_gap.abs()).fold(0.0, f64::max),
+        expected_error: None,
         value: None,
         policy: None,
     }

@@ -64,6 +64,16 @@ pub enum Solution {
     Surrogates(Box<StepSurrogates>),
 }
 
+impl Solution {
+    /// Where states differ.
+    pub fn surrogates(&self) -> Option<&StepSurrogates> {
+        match self {
+            Solution::Single(_) => None,
+            Solution::Surrogates(stored) => Some(stored),
+        }
+    }
+}
+
 impl StepSurrogates {
     /// Design points, N.
     pub fn count(&self) -> usize {

@@ -122,7 +122,8 @@ function surface({ policy: id, specification, diagnostics }, leaving) {
 /** One line for a manager, and the rest for the quant. */
 function solved(specification, diagnostics) {
   const widest = Math.max(...diagnostics.map(({ duality_gap }) => duality_gap));
-  const rough = Math.max(0, ...diagnostics.map(({ value }) => value?.leave_one_out_error ?? 0));
+  const error = ({ expected_error, value }) => (expected_error ? 1e-4 * expected_error.total : (value?.leave_one_out_error ?? 0));
+  const rough = Math.max(0, ...diagnostics.map(error));
   const within = (value) => (value < 5e-7 ? "less than 0.0001\u202f%" : percent(value, 4));
   const words = `Every step was solved to ${within(widest)} of what it is worth, and is read between the situations solved to ${within(rough)}.`;
   return section(
@@ -162,6 +163,7 @@ function steps(diagnostics) {
     figure("Design points", ({ design_count }) => count(design_count)),
     figure("All in the bank", ({ all_bank_share }) => percent(all_bank_share)),
     figure("Uncertified", ({ uncertified_share }) => percent(uncertified_share)),
+    figure("Expected error", ({ expected_error }) => basisPoints(expected_error && 1e-4 * expected_error.total)),
     figure("Duality gap", ({ duality_gap }) => basisPoints(duality_gap)),
     figure("Value, left out", ({ value }) => basisPoints(value?.leave_one_out_error)),
     figure("Policy, left out", ({ policy }) => percent(policy?.leave_one_out_error, 2)),

@@ -108,7 +108,8 @@ export function trainFields(changed) {
       "Relative risk aversion",
       "Over the initial wealth: of one who starts with 100, 3 is 0.03 per unit of wealth.",
     ),
-    field("design.count", "Design points", "States solved per step: more is finer and slower, 10 to 10,000."),
+    field("design.accuracy", "Accuracy", "Basis points by which the value may be off: design points are added until it is reached."),
+    field("design.count", "Design points", "States solved per step: 10 to 10,000, at most so many where an accuracy is given."),
     field("seed", "Seed", "The same request and seed give the same policy."),
   ];
   const quant = h("details", {}, h("summary", {}, "For the quant"), fieldset("Utility and precision", paper));

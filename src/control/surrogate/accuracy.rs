@@ -1,0 +1,198 @@
+//! How far off a fitted value surrogate is at states it has not learned from, and how many design points make it as accurate
+//! as is asked for.
+//!
+//! Errors of a surrogate have heavy tails, and leaving one design point out says little of them: the error at fresh states of the
+//! design's own law was between a fifth and five times what it said, over the counts, levels, costs and utilities of the tests. So
+//! some fresh states are solved. Half of the chance to be one goes by the variance predicted, which is where errors lie, and what
+//! is found is weighed by its inverse (importance sampling; Owen, Monte Carlo theory, methods and examples, chapter 9): no
+//! state weighs more than twice what it would, and the estimate has no bias.
+
+use rand::RngExt;
+
+use super::fitted::ValueSurrogate;
+use super::fitting::DesignPoint;
+use crate::control::problem::dynamics::Dynamics;
+use crate::control::request::specification::{DesignSpecification, Specification};
+use crate::control::solved_step::StepDiagnostics;
+use crate::numerics::streams::stream;
+
+/// Fresh states that are solved to judge a fit.
+pub const CHECKS: usize = 100;
+/// Design points of a step to begin with.
+const LEAST: usize = 100;
+/// Errors fall about as the inverse of the number of design points, and aiming below the aim spares a round.
+const MARGIN: f64 = 1.15;
+/// Of the number of design points from one round to the next.
+const GROWTH: [f64; 2] = [1.25, 2.0];
+/// Of what every step may err by, the least that one is asked for where others erred by more.
+const LEAST_SHARE: f64 = 0.5;
+const BASIS_POINTS: f64 = 1e4;
+
+/// Root mean square errors of the value that a step serves, over the design's own law of its states, in basis points of the
+/// certainty equivalent.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ExpectedError {
+    /// Of the surrogate of the step alone.
+    pub own: f64,
+    /// With those of the steps after it, as errors that are independent of each other add up.
+    pub total: f64,
+}
+
+/// What one step may err by, and how many design points to begin with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Aim {
+    /// By its surrogate alone, in basis points.
+    pub own: f64,
+    /// What the step after errs by, in basis points.
+    pub later: f64,
+    /// Design points to begin with.
+    pub first: usize,
+}
+
+impl Aim {
+    /// Of a step where `erring` steps are left that have surrogates, itself among them, and `after` is how well the next was
+    /// solved. `None` where a number of points is asked for. What later steps did not use is shared among the earlier.
+    pub fn of(
+        design: &DesignSpecification,
+        step: usize,
+        erring: usize,
+        after: Option<&StepDiagnostics>,
+    ) -> Option<Self> {
+        let accuracy = design.accuracy?;
+        let next = after.and_then(|after| after.expected_error).unwrap_or_default();
+        let steps = (erring + after.map_or(0, |_| 1)).max(step + 1) as f64;
+        let left = (accuracy * accuracy - next.total * next.total).max(0.0) / erring.max(1) as f64;
+        let own = left.sqrt().max(LEAST_SHARE * accuracy / steps.sqrt());
+        let points = after.filter(|after| after.expected_error.is_some()).map_or(0, |after| after.design_count);
+        let first = (points as f64 * (MARGIN * next.own / own).min(1.0)).ceil() as usize;
+        Some(Aim { own, later: next.total, first: first.max(LEAST) })
+    }
+
+    /// Whether an error is no more than what is aimed at.
+    pub fn is_met_by(&self, own: f64) -> bool {
+        own <= self.own
+    }
+
+    /// How many design points to go on with, where `count` of them erred by `own`.
+    pub fn next(&self, count: usize, own: f64) -> usize {
+        let [least, most] = GROWTH;
+        (count as f64 * (MARGIN * own / self.own).clamp(least, most)).ceil() as usize
+    }
+
+    /// With the errors of the steps after.
+    pub fn expected_error(&self, own: f64) -> ExpectedError {
+        ExpectedError { own, total: own.hypot(self.later) }
+    }
+}
+
+/// Which fresh states are solved, and how much each counts.
+pub struct Checks {
+    /// By number, ascending, with the weight of its squared error; the mean square is the sum of both multiplied.
+    pub weighted: Vec<(usize, f64)>,
+}
+
+impl Checks {
+    /// Of the states with these predicted deviations: [`CHECKS`] draws, evenly along the chances added up, so that one state may be
+    /// drawn more than once. Beyond the `limit` nothing is served by the surrogate, and nothing off.
+    /// Streams: ("accuracy", step, round).
+    pub fn of(deviations: &[f64], limit: f64, seed: u64, step: usize, round: usize) -> Self {
+        let states = deviations.len() as f64;
+        let within = || deviations.iter().filter(|deviation| **deviation <= limit);
+        let (served, variance) =
+            (within().count() as f64, within().map(|deviation| deviation * deviation).sum::<f64>());
+        let chance = |deviation: &f64| {
+            if *deviation > limit {
+                return 0.0;
+            }
+            let by_variance = if variance > 0.0 { deviation * deviation / variance } else { 1.0 / served };
+            0.5 * by_variance + 0.5 / served
+        };
+        let start: f64 = stream(seed, "accuracy", step, round).random();
+        let (mut reached, mut drawn) = (0.0, 0);
+        let mut weighted = Vec::new();
+        for (state, chance) in deviations.iter().map(chance).enumerate() {
+            reached += chance;
+            let before = drawn;
+            while drawn < CHECKS && (drawn as f64 + start) / (CHECKS as f64) < reached {
+                drawn += 1;
+            }
+            if drawn > before {
+                weighted.push((state, (drawn - before) as f64 / (CHECKS as f64 * states * chance)));
+            }
+        }
+        Checks { weighted }
+    }
+
+    /// The root mean square of what `served` is off by, in basis points, from the states solved in the order of the checks.
+    pub fn error(
+        &self,
+        served: &ValueSurrogate,
+        specification: &Specification,
+        step: usize,
+        solved: &[DesignPoint],
+    ) -> f64 {
+        let dynamics = Dynamics::of(&specification.problem)[step];
+        let squares = |point: &DesignPoint| {
+            let predictions = served.prediction(&point.features);
+            let totals = served.holdings().nodes().map(|holding| dynamics.total(point.wealth, holding));
+            let of_holding = |((prediction, total), gain): ((f64, f64), &f64)| {
+                (served.clamped_gain(prediction, total) - gain).powi(2)
+            };
+            let squares = predictions.into_iter().zip(totals).zip(&point.floor_gains).map(of_holding);
+            squares.sum::<f64>() / point.floor_gains.len() as f64
+        };
+        let mean: f64 = self.weighted.iter().zip(solved).map(|((_, weight), point)| weight * squares(point)).sum();
+        BASIS_POINTS * mean.sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_square_has_no_bias_and_varies_less_than_that_of_states_drawn_alike() {
+        // Errors twice the deviations, of which few are large: 3 of 1000 hold two thirds of the mean square.
+        let deviations: Vec<f64> = (0..1000).map(|state| if state % 400 == 7 { 20.0 } else { 0.75 }).collect();
+        let square = |state: usize| 4.0 * deviations[state] * deviations[state];
+        let truth = (0..1000).map(square).sum::<f64>() / 1000.0;
+        let found: Vec<f64> = (0..400)
+            .map(|round| {
+                let checks = Checks::of(&deviations, f64::INFINITY, 3, 1, round);
+                checks.weighted.iter().map(|&(state, weight)| weight * square(state)).sum()
+            })
+            .collect();
+        let mean = found.iter().sum::<f64>() / 400.0;
+        let deviation = (found.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / 400.0).sqrt();
+        // Of 100 states drawn alike the mean square would deviate by sqrt(E e^4 - (E e^2)^2) / 10 = 8.7.
+        assert!(deviation < 2.0, "{deviation} around {truth}");
+        // Four standard errors of 400 rounds.
+        assert!((mean - truth).abs() < 4.0 * deviation.max(1e-9) / 20.0, "{mean} against {truth}");
+    }
+
+    #[test]
+    fn what_later_steps_did_not_use_is_left_to_the_earlier() {
+        let design = DesignSpecification { accuracy: Some(0.5), ..DesignSpecification::default() };
+        let last = Aim::of(&design, 9, 9, None).unwrap();
+        assert!((last.own - 0.5 / 3.0).abs() < 1e-12 && last.first == LEAST, "{last:?}");
+        let mut diagnostics = StepDiagnostics {
+            step: 9,
+            design_count: 400,
+            all_bank_share: 0.0,
+            uncertified_share: 0.0,
+            duality_gap: 0.0,
+            expected_error: Some(last.expected_error(0.1)),
+            value: None,
+            policy: None,
+        };
+        let next = Aim::of(&design, 8, 8, Some(&diagnostics)).unwrap();
+        assert!((next.own - (0.24_f64 / 8.0).sqrt()).abs() < 1e-12, "{next:?}");
+        assert_eq!(next.first, (400.0 * MARGIN * 0.1 / next.own).ceil() as usize);
+        // A step that could not keep to it leaves half of an even share to each.
+        diagnostics.expected_error = Some(ExpectedError { own: 2.0, total: 2.0 });
+        let least = Aim::of(&design, 8, 8, Some(&diagnostics)).unwrap();
+        assert!((least.own - 0.25 / 3.0).abs() < 1e-12 && least.first == 400, "{least:?}");
+        assert_eq!(Aim::of(&DesignSpecification::default(), 8, 8, None), None);
+    }
+}
