@@ -68,7 +68,8 @@ test("the worst fall is that of the wealth lived through", async () => {
 });
 
 test("money that comes and goes is no fall and no gain", async () => {
-  const { falls, mixed, worstFall } = await dashboardModule("comparators.js");
+  const { falls, mixed } = await dashboardModule("comparators.js");
+  const { worstFalls } = await dashboardModule("track.js");
   const row = (flow, wealth) => ({ log_return: 0, reported: { flow, rate: 0.01 }, wealth });
   const history = {
     initial_wealth: 100,
@@ -78,7 +79,7 @@ test("money that comes and goes is no fall and no gain", async () => {
     observations: [row(-50, 50), row(0, 45), row(10, 60)],
   };
   assert.deepEqual(falls(history).map((fall) => fall.toFixed(4)), ["0.0000", "0.0000", "-0.1000", "0.0000"]);
-  const worst = worstFall(falls(history));
+  const [worst] = worstFalls(falls(history), 1);
   assert.deepEqual([worst.from, worst.to, worst.depth.toFixed(2)], [1, 2, "-0.10"]);
   // Half is sold at 2 %, the bank pays 1 %, and the money moves.
   const bank = [100, 99 * 1.01 - 50];

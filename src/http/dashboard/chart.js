@@ -14,6 +14,15 @@ export function ticks(low, high, wanted) {
   return values;
 }
 
+/** Round numbers that span `[low, high]`, both above 0, where equal ratios take equal room. */
+function logTicks(low, high) {
+  const decades = Array.from({ length: Math.ceil(Math.log10(high)) - Math.floor(Math.log10(low)) + 1 }, (_, k) => 10 ** (Math.floor(Math.log10(low)) + k));
+  const within = (factors) => decades.flatMap((decade) => factors.map((factor) => factor * decade)).filter((value) => value >= low && value <= high);
+  const [few, some] = [within([1]), within([1, 2, 5])];
+  if (few.length >= 4) return few;
+  return some.length >= 3 ? some : ticks(low, high, 4);
+}
+
 /** The map from `[low, high]` onto `[from, to]`. */
 export function scale([low, high], [from, to]) {
   const slope = high > low ? (to - from) / (high - low) : 0;
@@ -35,15 +44,16 @@ export function extent(values, also = []) {
 /** No drawing is narrower, in pixels. */
 const LEAST_WIDTH = 180;
 
-/** An element whose drawing follows its width: `draw(width)` gives the SVG's children. */
+/** An element whose drawing follows its width: `draw(width)` gives the SVG's children; its `height` may follow it too. */
 export function plot(height, draw) {
+  const tall = (width) => (typeof height === "function" ? height(width) : height);
   const holder = h("div", { class: "plot" });
   // Its room is kept before it is drawn, so that nothing below it moves.
-  holder.style.minHeight = `${height}px`;
+  holder.style.minHeight = `${tall(Infinity)}px`;
   const drawn = (width) => {
     const picture = s(
       "svg",
-      { width, height, viewBox: `0 0 ${width} ${height}`, "aria-hidden": "true", focusable: "false" },
+      { width, height: tall(width), viewBox: `0 0 ${width} ${tall(width)}`, "aria-hidden": "true", focusable: "false" },
       draw(width),
     );
     holder.replaceChildren(picture);
@@ -144,7 +154,7 @@ export function figure({ title, legend, holder, rows, note }) {
 
 /**
  * Lines over common positions.
- * x: `{values, domain, label, here, format, tick, whole, between}`, `between` where x names the unit before it and `here` what stands beside a value read, where that is not label and format; y: `{format, tick, also}`;
+ * x: `{values, domain, label, here, format, tick, whole, between}`, `between` where x names the unit before it and `here` what stands beside a value read, where that is not label and format; y: `{format, tick, also, log}`, `log` where equal ratios take equal room;
  * series: `[{name, values, kind: "line" | "bars" | "levels", bare, colour}]`, null where there is nothing. Bars and levels span
  * the unit before their x; a bare line has no dots; `colour` is the series' place unless said. What is read at first is `start`, or the last value of the first series; `gutter` lines up charts that stand above each other.
  */
@@ -163,8 +173,9 @@ export function lineChart({ title, x, y, series: given, height = 190, note, star
       h("span", {}, name ? [kind === "bars" ? block(colour) : swatch(colour), `${name} `] : null, outputs[index]),
     ),
   );
+  const [size, sized] = y.log ? [Math.log, Math.exp] : [(value) => value, (value) => value];
   const yDomain = extent(
-    series.flatMap(({ values }) => values),
+    series.flatMap(({ values }) => values.map((value) => (value === null ? null : size(value)))),
     y.also,
   );
   const xDomain = x.domain ?? [x.values[0], x.values.at(-1)];
@@ -180,13 +191,14 @@ export function lineChart({ title, x, y, series: given, height = 190, note, star
   let position = start;
   const shift = x.between ? 0.5 : 0;
   const holder = plot(height, (width) => {
-    const yTicks = ticks(...yDomain, height / 38);
+    const yTicks = y.log ? logTicks(...yDomain.map(sized)) : ticks(...yDomain, height / 38);
     const left = Math.max(
       gutter,
       16 + 6.6 * Math.max(...yTicks.map((tick) => y.tick(tick, yTicks[1] - yTicks[0]).length)),
     );
     xScale = scale(xDomain, [left, width - 14]);
-    const frame = { x: xScale, y: scale(yDomain, [height - 30, 10]), left, right: width - 4, bottom: height - 30 };
+    const up = scale(yDomain, [height - 30, 10]);
+    const frame = { x: xScale, y: (value) => up(size(value)), left, right: width - 4, bottom: height - 30 };
     const xTicks = ticks(...xDomain, Math.min(12, width / 70)).filter(
       (tick) => (!x.whole || Number.isInteger(tick)) && !(x.between && tick === 0),
     );

@@ -1,6 +1,7 @@
 // The same start, lived otherwise: what shares held through the same returns, rates and flows would have come to.
 
 import { standing, termsOf, addedIn } from "./flows.js";
+import { belowHighest } from "./track.js";
 
 /** What is held beside the bank, in words. */
 export const risky = ({ assets }) => (assets ? "the assets" : "stocks");
@@ -36,18 +37,6 @@ export const wealths = (history) => [history.initial_wealth, ...history.observat
 
 /** How far wealth lies below its highest so far, 0 or less, with money that comes and goes taken out. */
 export function falls(history, wealth = wealths(history)) {
-  let [level, highest] = [1, 1];
-  return wealth.map((value, index) => {
-    if (index === 0) return 0;
-    level *= (value - addedIn(history, index)) / wealth[index - 1];
-    highest = Math.max(highest, level);
-    return level / highest - 1;
-  });
-}
-
-/** The worst of them: `{depth, from, to}`, the periods after which it began and was deepest; null where there was none. */
-export function worstFall(falls) {
-  const to = falls.reduce((worst, value, index) => (value < falls[worst] ? index : worst), 0);
-  if (falls[to] >= 0) return null;
-  return { depth: falls[to], from: falls.slice(0, to).findLastIndex((value) => value >= 0), to };
+  let level = 1;
+  return belowHighest(wealth.map((value, index) => (index === 0 ? 1 : (level *= (value - addedIn(history, index)) / wealth[index - 1]))));
 }

@@ -4,7 +4,7 @@ import { heldInAll, orders } from "./advised.js";
 import { get } from "./api.js";
 import { beside, LETTERS } from "./beside.js";
 import { lineChart } from "./chart.js";
-import { falls, risky, wealths, worstFall } from "./comparators.js";
+import { falls, risky, wealths } from "./comparators.js";
 import { LEAST_FALL, LEAST_SHARE } from "./course.js";
 import { h, section } from "./dom.js";
 import { addedIn, netAdded } from "./flows.js";
@@ -12,6 +12,7 @@ import { allocation, count, percent, percentTick, points, tick, wealth } from ".
 import { called } from "./naming.js";
 import { calendar } from "./periods.js";
 import { caution, utility } from "./specification.js";
+import { worstFalls } from "./track.js";
 
 export async function sessionsBeside(ids, leaving) {
   const both = await Promise.all(ids.map((id) => read(id, leaving)));
@@ -59,7 +60,7 @@ function rows(both) {
   const money = (size) => ({ size, words: wealth(size) });
   const share = (size) => ({ size, words: allocation(size) });
   const trade = ({ action, session, problem }) => orders(action, session.wealth, problem.trading_cost).join(", ").toLowerCase();
-  const deepest = ({ history }) => worstFall(falls(history))?.depth ?? 0;
+  const deepest = ({ history }) => worstFalls(falls(history), 1)[0]?.depth ?? 0;
   const active = (read) => (one) => (one.action ? read(one) : null);
   const last = ({ calendar, session }) => (session.period === 1 ? "none yet" : calendar.name(session.period - 1));
   return [

@@ -1,11 +1,12 @@
 // How a session went: wealth beside what the same start would have come to otherwise, the worst fall, what was held.
 
 import { lineChart } from "./chart.js";
-import { falls, mixed, risky, wealths, worstFall } from "./comparators.js";
+import { falls, mixed, risky, wealths } from "./comparators.js";
 import { h, section } from "./dom.js";
 import { banked } from "./flows.js";
 import { allocation, percent, percentTick, tick, wealth } from "./format.js";
 import { isCautious } from "./specification.js";
+import { worstFalls } from "./track.js";
 
 /** What the session is measured by, each held through the same returns; 60/40 as people call it. */
 export const besides = (history) => [
@@ -68,8 +69,8 @@ function comparison({ history }, own) {
 
 /** The worst fall as a fact: `[name, value, note]`. */
 export function worstFallFact({ history, calendar }) {
-  const worst = worstFall(falls(history));
-  if (worst === null) return ["Worst fall so far", "None", "never below its highest"];
+  const [worst] = worstFalls(falls(history), 1);
+  if (!worst) return ["Worst fall so far", "None", "never below its highest"];
   const from = worst.from === 0 ? "from the start" : `from ${calendar.inText(worst.from)}`;
   return ["Worst fall so far", percent(worst.depth), `${from} to ${calendar.inText(worst.to)}`];
 }

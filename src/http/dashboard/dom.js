@@ -84,6 +84,13 @@ export function section(title, ...children) {
   return h("section", { "aria-labelledby": heading.id }, heading, children);
 }
 
+/** What the quant opens, at the end of a page; it is not printed. */
+export function quantSection(summary, build) {
+  const element = section("For the quant", disclosure(summary, build));
+  element.classList.add("asked-for");
+  return element;
+}
+
 /** Says something to readers of screens without moving them. */
 export function announce(text) {
   document.getElementById("status").textContent = text;

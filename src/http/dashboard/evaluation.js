@@ -2,7 +2,7 @@
 
 import { download, get } from "./api.js";
 import { lineChart } from "./chart.js";
-import { disclosure, h, section, table } from "./dom.js";
+import { disclosure, h, quantSection, section, table } from "./dom.js";
 import { count, counted, duration, figures, minus, percent, percentTick, short, significant, tick, wealth } from "./format.js";
 import { histogram } from "./histogram.js";
 import { intervalChart } from "./interval_chart.js";
@@ -11,6 +11,7 @@ import { policyLink } from "./naming.js";
 import { unitOf } from "./periods.js";
 import { FRAMEWORKS, investorWords, PAPER, worth } from "./specification.js";
 import { binned, chanceBelow, pieces, worstAverage } from "./spread.js";
+import { changing, interval, ordinal } from "./verdict.js";
 
 /** One colour a kind of policy, in every chart; constant mixes have one of their own. */
 const COLOURS = { adaptive: 0, static: 1, plug_in: 3, known_law: 4, parametric_adaptive: 5, parametric_static: 6 };
@@ -74,9 +75,6 @@ function outcomes({ strategies, histogram_edges, request }) {
     .sort((one, other) => other.certainty_equivalent.value - one.certainty_equivalent.value);
 }
 
-/** An estimate with its interval. */
-const interval = ({ value, low, high }, format) => `${format(value)} (${format(low)} to ${format(high)})`;
-
 /** What was compared, on what, for whom. */
 function compared({ request, histories, strategies }) {
   const { problem } = request;
@@ -128,17 +126,7 @@ function conclusions({ reference }, ended) {
     const beside = stocks && stocks !== main ? ` All in stocks does so in ${percent(stocks.loss, 0)}, with ${wealth(stocks.tail)}.` : "";
     said.push(`${called(main)} ends with less than was put in in ${percent(main.loss, 0)} of the futures; the worst 5\u202f% of them end with ${wealth(main.tail)} on average.${beside}`);
   }
-  return main?.own_mix ? [...said, changing(main)] : said;
-}
-
-const ordinal = (place) => `${place}${{ 1: "st", 2: "nd", 3: "rd" }[place % 100 > 10 && place % 100 < 14 ? 0 : place % 10] ?? "th"}`;
-
-/** Whether changing the share held earned anything. */
-function changing(strategy) {
-  const { allocation, beyond } = strategy.own_mix;
-  const size = `${tick(Math.abs(beyond.value), 0.01)} (${tick(beyond.low, 0.01)} to ${tick(beyond.high, 0.01)})`;
-  const verdict = beyond.low > 0 || beyond.high < 0 ? "" : ": these futures do not show that it did anything";
-  return `${called(strategy)} holds ${percent(allocation)} on average; that it changes the share ${beyond.value < 0 ? "cost" : "earned"} ${size} beside holding that all along${verdict}.`;
+  return main?.own_mix ? [...said, changing({ name: called(main), ...main.own_mix, shown: "these futures do" })] : said;
 }
 
 function results(report, ended) {
@@ -240,9 +228,7 @@ function quant(report, ended) {
       radii(report),
       coverage(report),
     );
-  const element = section("For the quant", disclosure("Utility, radii and coverage", build));
-  element.classList.add("asked-for");
-  return element;
+  return quantSection("Utility, radii and coverage", build);
 }
 
 function radii({ strategies }) {

@@ -1,15 +1,22 @@
-// Out-of-sample comparisons: those asked for.
+// Comparisons of strategies: through futures drawn, and through a record that was lived.
 
 import { h } from "./dom.js";
 import { jobList } from "./jobs.js";
 import { foot, Pages } from "./pages.js";
 
+const KINDS = ["evaluate", "backtest"];
+
 export async function view(_, leaving) {
-  const pages = new Pages("/jobs", "jobs", leaving, { keep: ({ kind }) => kind === "evaluate" });
+  const pages = new Pages("/jobs", "jobs", leaving, { keep: ({ kind }) => KINDS.includes(kind) });
   const entries = await pages.next();
-  const actions = h("a", { class: "button", href: "#/evaluations/new" }, "Compare out of sample");
+  const actions = h(
+    "div",
+    { class: "actions" },
+    h("a", { class: "button quiet", href: "#/backtests/new" }, "Backtest a record"),
+    h("a", { class: "button", href: "#/evaluations/new" }, "Compare out of sample"),
+  );
   const lead =
-    "No evaluation yet. One sends every kind of policy, and simple constant mixes, through the same futures, and says what each of them ended with.";
+    "No evaluation yet. One sends every kind of policy, and simple constant mixes, through the same futures, and says what each of them ended with. A backtest walks them through a record of returns.";
   if (entries.length === 0) return { title: "Evaluations", actions, body: h("p", { class: "lead" }, lead) };
   const jobs = jobList(entries, leaving);
   return {

@@ -4,14 +4,19 @@ import { extent, figure, plot, scale, ticks } from "./chart.js";
 import { s, table } from "./dom.js";
 
 const LINE = 26;
+/** The same where a name has a line of its own. */
+const TWO = 42;
 
 /** `rows`: `{name, value, low, high, colour}`; `noun` says what has the names. */
 export function intervalChart({ title, noun = "Strategy", rows, format, tick }) {
-  const height = LINE * rows.length + 34;
-  const bottom = LINE * rows.length + 4;
+  const names = 20 + 7.2 * Math.max(...rows.map(({ name }) => name.length));
+  /** Beside their names the ranges have no room. */
+  const narrow = (width) => names > 0.55 * width;
+  const line = (width) => (narrow(width) ? TWO : LINE);
   const domain = extent(rows.flatMap(({ low, high }) => [low, high]));
-  const holder = plot(height, (width) => {
-    const left = 20 + 7.2 * Math.max(...rows.map(({ name }) => name.length));
+  const holder = plot((width) => line(width) * rows.length + 34, (width) => {
+    const left = narrow(width) ? 8 : names;
+    const bottom = line(width) * rows.length + 4;
     const x = scale(domain, [left, width - 24]);
     const places = ticks(...domain, (width - left) / 110);
     return [
@@ -24,9 +29,9 @@ export function intervalChart({ title, noun = "Strategy", rows, format, tick }) 
         ),
       ]),
       rows.map(({ name, value, low, high, colour = 0 }, index) => {
-        const y = LINE * (index + 0.5) + 2;
+        const y = line(width) * (index + (narrow(width) ? 0.75 : 0.5)) + 2;
         return [
-          s("text", { class: "tick name", x: 0, y, dy: "0.32em" }, name),
+          s("text", { class: "tick name", x: 0, y: narrow(width) ? y - 16 : y, dy: "0.32em" }, name),
           s("line", { class: `range s${colour}`, x1: x(low), x2: Math.max(x(high), x(low) + 1), y1: y, y2: y }),
           s("circle", { class: `dot s${colour}`, cx: x(value), cy: y, r: 4.5 }),
         ];

@@ -1,6 +1,6 @@
 // Jobs: what is being computed, how far it is, and how to stop it.
 
-import { download, follow, get, isOver, post, Problem } from "./api.js";
+import { follow, get, isOver, post, Problem } from "./api.js";
 import { announce, h } from "./dom.js";
 import { count, counted, duration, moment, short } from "./format.js";
 import { foot, Pages } from "./pages.js";
@@ -11,9 +11,9 @@ const FOLLOWED = 2;
 /** Jobs that are not followed are asked for this often, in milliseconds. */
 const POLL = 1000;
 
-const WORDS = { train: "Training", evaluate: "Evaluation", backtest: "Walk-forward", frontier: "Frontier of caution" };
+const WORDS = { train: "Training", evaluate: "Evaluation", backtest: "Backtest", frontier: "Frontier of caution" };
 /** Where the page of a report is. */
-const REPORTS = { evaluate: "evaluations", frontier: "frontiers" };
+const REPORTS = { evaluate: "evaluations", backtest: "backtests", frontier: "frontiers" };
 const named = (kind) => WORDS[kind] ?? kind.replace(/_/g, " ");
 
 export async function view(_, leaving) {
@@ -166,10 +166,6 @@ function times({ created_ms, started_ms, finished_ms }) {
 function links(card) {
   const { job } = card;
   if (job.policy) return h("a", { class: "button quiet", href: `#/policies/${job.policy}` }, "See the policy");
-  if (job.state === "succeeded" && job.kind === "backtest") {
-    const name = `walk-forward-${short(job.job)}.json`;
-    return h("a", { class: "button quiet", href: job.report, download: name, onclick: download }, "Export the report");
-  }
   if (job.state === "succeeded")
     return h("a", { class: "button quiet", href: `#/${REPORTS[job.kind]}/${job.job}` }, "See the report");
   if (isOver(job)) return null;

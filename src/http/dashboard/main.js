@@ -2,6 +2,8 @@
 
 import { offers, Problem } from "./api.js";
 import { announce, h } from "./dom.js";
+import * as backtest from "./backtest.js";
+import * as backtestAsking from "./backtest_asking.js";
 import * as compare from "./compare.js";
 import * as evaluation from "./evaluation.js";
 import * as evaluationAsking from "./evaluation_asking.js";
@@ -30,6 +32,8 @@ const ROUTES = [
   [/^#\/evaluations$/, evaluations.view, "evaluations"],
   [/^#\/evaluations\/new(?:\?(.*))?$/, evaluationAsking.view, "evaluations"],
   [/^#\/evaluations\/([^/]+)$/, evaluation.view, "evaluations"],
+  [/^#\/backtests\/new$/, backtestAsking.view, "evaluations"],
+  [/^#\/backtests\/([^/]+)$/, backtest.view, "evaluations"],
   [/^#\/compare(?:\?(.*))?$/, compare.view, "compare"],
   [/^#\/frontiers\/([^/]+)$/, frontier.view, "jobs"],
   [/^#\/key$/, key, "key"],

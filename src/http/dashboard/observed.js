@@ -4,6 +4,7 @@ import { post } from "./api.js";
 import { falls, mixed, wealths } from "./comparators.js";
 import { correctionForm } from "./correction.js";
 import { besides } from "./course.js";
+import { csvText, hundred } from "./csv.js";
 import { announce, disclosure, h, section, table } from "./dom.js";
 import { standing } from "./flows.js";
 import { allocation, count, figures, moment, percent, short, wealth } from "./format.js";
@@ -75,20 +76,16 @@ export function csv({ history, calendar }) {
   const own = wealths(history);
   const beside = besides(history).map(({ name, share }) => [name, mixed(history, share)]);
   const deep = falls(history);
-  const cell = (value) => (/[",\n]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value);
-  const hundred = (value) => (value === null ? "" : String(Number((100 * value).toPrecision(12))));
-  const plain = (value) => String(Number(value.toPrecision(12)));
   const head = ["Period", "Name", "Last day", "Return, %", "Advised, %", "Held, %", "Wealth", ...beside.map(([name]) => name), "Below the highest, %"];
-  const start = ["0", "Start", "", "", "", "", plain(own[0]), ...beside.map(() => plain(own[0])), "0"];
+  const start = [0, "Start", "", "", "", "", own[0], ...beside.map(() => own[0]), 0];
   const lines = history.observations.map((row, index) => {
     const stands = row.now ?? row;
     const back = stands.log_return === null ? null : Math.expm1(stands.log_return);
     const shares = [back, stands.advised_allocation, stands.executed_allocation].map(hundred);
-    const others = beside.map(([, wealths]) => plain(wealths[index + 1]));
-    const name = calendar.name(row.period);
-    return [String(row.period), name, standing(row).date ?? "", ...shares, plain(stands.wealth), ...others, hundred(deep[index + 1])];
+    const others = beside.map(([, wealths]) => wealths[index + 1]);
+    return [row.period, calendar.name(row.period), standing(row).date ?? "", ...shares, stands.wealth, ...others, hundred(deep[index + 1])];
   });
-  return `${[head, start, ...lines].map((line) => line.map(cell).join(",")).join("\r\n")}\r\n`;
+  return csvText([head, start, ...lines]);
 }
 
 const REPORT = ["log_return", "simple_return", "price", "previous_price", "missing", "date", "rate", "flow", "executed_allocation", "wealth"];

@@ -29,6 +29,9 @@ const told = (time, options) => new Date(time).toLocaleDateString("en-GB", { tim
 /** A day, as 30 Sep 2008. */
 export const day = (date) => told(parsed(date), { day: "numeric", month: "short", year: "numeric" });
 
+/** A day as above, a month as September 2008, a year as it is. */
+export const dated = (date) => (date.length > 7 ? day(date) : date.length > 4 ? told(parsed(`${date}-01`), { month: "long", year: "numeric" }) : date);
+
 /** So many months later: the last day of a month stays that. */
 function later(time, months) {
   const from = new Date(time);

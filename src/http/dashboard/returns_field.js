@@ -13,19 +13,20 @@ const ORDERS = { false: "The oldest", true: "The newest" };
 const PAUSE = 300;
 /** The service takes no longer history, and a chart shows no more. */
 const MOST = 20_000;
-/** Twenty years of months of the US stock market: what the demo trains on. */
-const EXAMPLE = { file: "/dashboard/us_market_monthly.csv", said: { latest: 240 } };
+/** Months of the US stock market. */
+const EXAMPLE = "/dashboard/us_market_monthly.csv";
 const HINT = "With dates, or oldest first. Separated by spaces, commas, semicolons, tabs or lines.";
 /** What was said of these is asked anew once another column or kind is chosen. */
 const FOLLOWS = { columns: ["kind", "unit", "large_deviation", "decimal_comma"], kind: ["unit", "large_deviation"] };
 
 /**
- * `{element, show(logReturns), trouble()}`; `changed(logReturns)` at every change, with none of them while the text is not
- * one reading. `trouble()` waits for what is still being read, and says why there are no returns, or null. `name` is the
- * request's field; `blank` is what an empty field means, where it may be empty; `bank(rate, periodsPerYear)` takes what a
+ * `{element, show(logReturns), trouble()}`; `changed(logReturns, answer)` at every change, with none of them and null while the
+ * text is not one reading, else with all that the service read. `trouble()` waits for what is still being read, and says why there are no returns, or null. `name` is the
+ * request's field; `blank` is what an empty field means, where it may be empty; `example` what is said of the bundled returns
+ * where they are offered; `bank(rate, periodsPerYear)` takes what a
  * column says that the bank paid last.
  */
-export function returnsField({ name, label, blank = null, example = false, changed, bank = null }) {
+export function returnsField({ name, label, blank = null, example = null, changed, bank = null }) {
   const id = `f-${name.replace(/[^a-z0-9]+/gi, "-")}`;
   const area = h("textarea", { id, name, rows: 6, spellcheck: "false", "aria-describedby": `${id}-note` });
   area.dataset.described = `${id}-note`;
@@ -61,8 +62,8 @@ export function returnsField({ name, label, blank = null, example = false, chang
   const take = () => {
     clearTimeout(pending);
     pending = 0;
-    changed([]);
-    reading = judge().then(() => answer?.outcome === "read" && changed(answer.series[0].log_returns));
+    changed([], null);
+    reading = judge().then(() => answer?.outcome === "read" && changed(answer.series[0].log_returns, answer));
     return reading;
   };
   const say = (more) => {
@@ -134,7 +135,7 @@ function drop(id, open, example) {
   file.addEventListener("change", () => opened(file.files[0]));
   const chosen = h("label", { class: "button quiet", for: file.id }, "Choose a CSV file");
   const zone = h("div", { class: "drop" }, h("p", {}, file, chosen, " or drop one here, or paste below."));
-  const load = () => text(EXAMPLE.file).then((content) => open(content, EXAMPLE.said), fail);
+  const load = () => text(EXAMPLE).then((content) => open(content, example), fail);
   const offer = h(
     "button",
     { type: "button", class: "link", onclick: load },

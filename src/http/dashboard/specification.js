@@ -37,6 +37,10 @@ const MEANINGS = {
 /** Investors by their relative risk aversion, of power utility. */
 export const INVESTORS = { cautious: 6, balanced: 3, bold: 1.5 };
 
+/** The presets to choose from, and what they are. */
+export const investorChoices = () => Object.keys(INVESTORS).map((name) => [name, `${name[0].toUpperCase()}${name.slice(1)}`]);
+export const investorNote = `How much a loss hurts: risk aversion ${Object.values(INVESTORS).join(", ").replace(/, (?=[^,]*$)/, " and ")}.`;
+
 /** The preset that a utility is, if it is one. */
 export const presetOf = ({ kind, risk_aversion }) =>
   kind === "power" ? Object.keys(INVESTORS).find((name) => INVESTORS[name] === risk_aversion) : undefined;
@@ -44,6 +48,9 @@ export const presetOf = ({ kind, risk_aversion }) =>
 /** Whom a policy is for, after "for". */
 export const investorWords = (asked) =>
   presetOf(asked) ? `a ${presetOf(asked)} investor (risk aversion ${significant(asked.risk_aversion)})` : `an investor with ${utility(asked)}`;
+
+/** A share that a thing is named by, with the digits it has: 95 %, 97.5 %. */
+export const percentName = (share) => `${Number((100 * share).toPrecision(6))}\u202f%`;
 
 /** Utility in a few words. */
 export function utility({ kind, risk_aversion }) {
@@ -105,6 +112,17 @@ export const isCautious = (problem) => hasBall(problem) || isParametric(problem.
 /** What may be a mistake in a request. */
 export function warningList(warnings) {
   return warnings.map(({ message }) => h("p", { class: "note wrong" }, minus(message)));
+}
+
+/** What stands in the place of a form once a job is queued, on the page `at`, whose request may be a mistake. */
+export function queued(noun, at, warnings) {
+  return h(
+    "div",
+    { class: "words", role: "status" },
+    h("p", {}, `The ${noun} is queued. Is this meant?`),
+    warningList(warnings),
+    h("p", {}, "If not, cancel it ", h("a", { href: at }, "where it is listed"), " and ask anew."),
+  );
 }
 
 /** How cautious a policy is, in a few words. */

@@ -5,7 +5,7 @@ import { announce, h } from "./dom.js";
 import { fieldset, showProblem } from "./form.js";
 import { labelFields, policyLink } from "./naming.js";
 import { returnsField } from "./returns_field.js";
-import { warningList } from "./specification.js";
+import { queued } from "./specification.js";
 import { put, radiusFor, trainFields, UTILITY } from "./train_fields.js";
 
 /** What the form starts from; what is null is to be filled in, or may be left out. */
@@ -46,7 +46,7 @@ export async function view(query, leaving) {
   const source = returnsField({
     name: "problem.history",
     label: "Returns or prices",
-    example: true,
+    example: { latest: 240 },
     changed: (returns) => {
       put(request, "problem.history", returns);
       written();
@@ -126,7 +126,7 @@ export async function view(query, leaving) {
     try {
       const job = await post("/train", json.value);
       announce(`Training ${job.job} is queued.`);
-      if (job.warnings.length > 0) form.replaceWith(warned(job.warnings));
+      if (job.warnings.length > 0) form.replaceWith(queued("training", "#/jobs", job.warnings));
       else location.hash = "#/jobs";
     } catch (error) {
       if (error.field === "body") advanced.open = true;
@@ -148,17 +148,6 @@ function told(newer) {
     ? "Everything is as that policy was trained, its returns too: put newer ones in their place, and train."
     : "Everything is as that policy was trained: change one thing, train, and compare the two.";
   return h("p", { class: "lead" }, words);
-}
-
-/** What stands in the place of the form once a training is queued whose request may be a mistake. */
-function warned(warnings) {
-  return h(
-    "div",
-    { class: "words", role: "status" },
-    h("p", {}, "The training is queued. Is this meant?"),
-    warningList(warnings),
-    h("p", {}, "If not, cancel it among the ", h("a", { href: "#/jobs" }, "jobs"), " and train anew."),
-  );
 }
 
 /** JSON with a line a field, numbers of the history side by side. */

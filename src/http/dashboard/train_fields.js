@@ -4,7 +4,7 @@ import { h } from "./dom.js";
 import { fieldset, input, select } from "./form.js";
 import { fraction, typed } from "./number_text.js";
 import { unitOf } from "./periods.js";
-import { FRAMEWORKS, INVESTORS, isParametric, presetOf } from "./specification.js";
+import { FRAMEWORKS, INVESTORS, investorChoices, investorNote, isParametric, presetOf } from "./specification.js";
 
 /** Each kind of utility with a usual risk aversion, in multiples of one over the initial wealth where that is meant. */
 export const UTILITY = {
@@ -59,12 +59,11 @@ export function trainFields(changed) {
     const edited = (text) => changed(path, READING[unit].read(text));
     return input({ name: path, label, note, changed: edited, unit: unit === "plain" ? null : unit });
   };
-  const presets = Object.keys(INVESTORS).map((name) => [name, capital(name)]);
   const investor = select({
     name: "investor",
     label: "Investor",
-    note: `How much a loss hurts: risk aversion ${Object.values(INVESTORS).join(", ").replace(/, (?=[^,]*$)/, " and ")}.`,
-    choices: [...presets, [OWN, "Set for the quant"]],
+    note: investorNote,
+    choices: [...investorChoices(), [OWN, "Set for the quant"]],
     changed: (name) => {
       if (name === OWN) quant.open = true;
       else changed("problem.utility", { kind: "power", risk_aversion: INVESTORS[name] });

@@ -1,0 +1,339 @@
+// The report of one backtest: what strategies came to that were walked through a record, and one of them year by year.
+
+import { download, get } from "./api.js";
+import { lineChart } from "./chart.js";
+import { csvText, hundred } from "./csv.js";
+import { h, quantSection, section, table } from "./dom.js";
+import { select } from "./form.js";
+import { allocation, count, counted, figures, minus, percent, percentTick, short, tick, wealth } from "./format.js";
+import { intervalChart } from "./interval_chart.js";
+import { until } from "./jobs.js";
+import { dated, unitOf } from "./periods.js";
+import { save } from "./picture.js";
+import { FRAMEWORKS, investorWords, percentName } from "./specification.js";
+import { belowHighest, compounded, grouped, places, returnsOf, worstFalls } from "./track.js";
+import { changing, interval, ordinal } from "./verdict.js";
+
+const START = 100;
+/** Falls listed. */
+const FALLS = 5;
+/** Years below which no strategy is called better than another. */
+const FEWEST_YEARS = 10;
+/** One colour a strategy, in every chart; the three that everybody knows as on the page of a session. */
+const COLOURS = { static: 4, "plug-in": 5, "cost-blind": 6, constant: 9, "60/40": 3, "all-stock": 1, "all-bank": 2 };
+/** Of cautious ones that learn, by how many there are: what most is said of comes first. */
+const LEVELS = { 1: [0], 2: [7, 0], 3: [7, 0, 8] };
+const KNOWN = ["all-bank", "60/40", "all-stock"];
+
+export async function view(id, leaving) {
+  const job = await get(`/jobs/${id}`, leaving);
+  const trail = h("p", { class: "trail" }, h("a", { href: "#/evaluations" }, "Evaluations"));
+  const title = `Backtest ${short(id)}`;
+  if (job.state !== "succeeded") return { title, trail, body: until(job, leaving) };
+  const report = await get(job.report, leaving);
+  const name = `backtest-${short(id)}`;
+  const actions = h(
+    "div",
+    { class: "actions" },
+    h("button", { class: "quiet", onclick: () => save(csv(told), `${name}.csv`, "text/csv") }, "Save as CSV"),
+    h("a", { class: "button quiet", href: job.report, download: `${name}.json`, onclick: download }, "Export"),
+  );
+  const told = { ...report, lines: lines(report), unit: unitOf(report.periods_per_year), times: times(report) };
+  return { title, trail, actions, body: [walked(told), results(told), chosen(told), quant(told)] };
+}
+
+/** A strategy's kind, by its name in the report. */
+const kindOf = (strategy) => strategy.replace(/[ ,].*/, "");
+
+function named({ strategy, mean_allocation }, { choices }) {
+  const level = /alpha (.+)$/.exec(strategy)?.[1];
+  switch (kindOf(strategy)) {
+    case "adaptive":
+      return choices.alpha.length > 1 ? `${FRAMEWORKS.adaptive}, ${percentName(1 - level)}` : FRAMEWORKS.adaptive;
+    case "static":
+      return FRAMEWORKS.static;
+    case "plug-in":
+      return FRAMEWORKS.plug_in;
+    case "cost-blind":
+      return "Learns, blind to costs";
+    case "constant":
+      return `Hindsight: ${percent(mean_allocation)} in stocks`;
+    default:
+      return { "all-stock": "All in stocks", "all-bank": "All in the bank" }[strategy] ?? strategy;
+  }
+}
+
+/** Every strategy with its name, its colour and its wealth from the start on, in the order of the report. */
+const lines = (report) =>
+  report.strategies.map((figures, index) => ({
+    ...figures,
+    periods: report.periods[index],
+    wealth: [START, ...report.periods[index].wealth],
+    name: named(figures, report),
+    colour: COLOURS[kindOf(figures.strategy)] ?? LEVELS[report.choices.alpha.length][index],
+  }));
+
+/** The one that most is said about: the second cautious one that learns, or the only one. */
+const mainOf = ({ lines, choices }) => lines[Math.min(1, choices.alpha.length - 1)];
+const known = ({ lines }, name) => lines.find(({ strategy }) => strategy === name);
+
+/** Where the start and the end of each period stand on an axis, in years, and what they are called. */
+function times({ dates, periods_per_year, periods }) {
+  const length = periods[0].wealth.length;
+  const [first, last] = dates ? [inYears(dates[0]), inYears(dates[length - 1])] : [0, (length - 1) / periods_per_year];
+  const step = length > 1 ? (last - first) / (length - 1) : 1;
+  const values = Array.from({ length: length + 1 }, (_, k) => first + k * step);
+  const name = (period) => (dates ? dated(dates[period - 1]) : `period ${count(period)}`);
+  return { values, name, after: (k) => (k === 0 ? "At the start" : `${dates ? "" : "After "}${name(k)}`) };
+}
+
+/** The start of a day, a month or a year, counted in years. */
+function inYears(date) {
+  const [year, month = 1, day = 1] = date.split("-").map(Number);
+  return year + (month - 1) / 12 + (day - 1) / 372;
+}
+
+/** What was walked through, how, and for whom. */
+function walked({ choices, lines, unit, times }) {
+  const { every, window, horizon, trading_cost, risk_aversion } = choices;
+  const length = lines[0].wealth.length - 1;
+  const investor = investorWords(risk_aversion === 1 ? { kind: "log" } : { kind: "power", risk_aversion });
+  const cost = trading_cost > 0 ? `Trading costs ${percent(trading_cost, 2)} of what is traded.` : "Trading is free, so who trades much looks better than he would be.";
+  const ahead = horizon === every ? "" : `, looking ${counted(horizon, unit)} ahead`;
+  return h(
+    "div",
+    { class: "words" },
+    h("p", {}, `${count(lines.filter(({ hindsight }) => !hindsight).length)} ways to hold stocks, through ${counted(length, unit)}, ${times.name(1)} to ${times.name(length)}, for ${investor}.`),
+    h("p", {}, `Every ${counted(every, unit)} policies are trained on the ${counted(window, unit)} before${ahead}, and lived by until the next: nothing later is used for what is held. ${cost}`),
+  );
+}
+
+/** What the figures say. */
+function conclusions(told) {
+  const { lines, whole_years } = told;
+  const main = mainOf(told);
+  const [bank, stocks] = [known(told, "all-bank"), known(told, "all-stock")];
+  const worth = ({ yearly_certainty_equivalent: { value } }) => value;
+  const real = lines.filter(({ hindsight }) => !hindsight).sort((one, other) => worth(other) - worth(one));
+  const [best] = real;
+  const quoted = `\u201c${main.name}\u201d`;
+  const said = [
+    `${best === main || !KNOWN.includes(best.strategy) ? `\u201c${best.name}\u201d` : best.name} is worth the most to this investor: a year from ${START} counts as a sure ${wealth(worth(best))}${best === bank ? "" : `, where all in the bank comes to ${wealth(worth(bank))}`}.`,
+  ];
+  if (best !== main) said.push(`${quoted} comes ${ordinal(real.indexOf(main) + 1)} of ${real.length}, with ${wealth(worth(main))}.`);
+  if (whole_years < FEWEST_YEARS) said.push(`The record has ${counted(whole_years, "whole year")} to decide about, fewer than ${FEWEST_YEARS}: it does not tell the strategies apart.`);
+  else said.push(apart(told, main, quoted));
+  said.push(`The worst fall of ${quoted} was ${percent(main.max_drawdown)}, that of all in stocks ${percent(stocks.max_drawdown)}; from ${START} it came to ${wealth(main.final_wealth)}, all in stocks to ${wealth(stocks.final_wealth)}.`);
+  if (whole_years >= FEWEST_YEARS && main.beyond_own_mix) said.push(changing({ name: quoted, allocation: main.mean_allocation, beyond: estimate(main.beyond_own_mix), shown: "the record does" }));
+  said.push(`It was all in the bank in ${percent(main.all_bank_share, 0)} of the ${told.unit}s.`);
+  return said;
+}
+
+/** Ahead of whom the record shows it, behind whom, and who cannot be told from it. */
+function apart({ lines }, main, quoted) {
+  const others = lines.filter((line) => line !== main);
+  const ahead = others.filter(({ adaptive_ahead: { interval } }) => interval[0] > 0);
+  const behind = others.filter(({ adaptive_ahead: { interval } }) => interval[1] < 0);
+  const list = (some) => some.map(({ name }) => `\u201c${name}\u201d`).join(", ").replace(/, (?=[^,]*$)/, some.length > 1 && !some.at(-1).name.includes(",") ? " and " : ", ");
+  const parts = [ahead.length > 0 && `ahead of ${list(ahead)}`, behind.length > 0 && `behind ${list(behind)}`].filter(Boolean);
+  if (parts.length === 0) return `The record cannot tell ${quoted} from any of the others.`;
+  const rest = others.length - ahead.length - behind.length;
+  return `The record shows ${quoted} ${parts.join(" and ")}${rest > 0 ? `; it cannot tell it from the other ${rest}` : ""}.`;
+}
+
+const estimate = ({ value, interval: [low, high] }) => ({ value, low, high });
+
+function results(told) {
+  const { lines, intervals } = told;
+  const rows = [...lines].sort((one, other) => other.yearly_certainty_equivalent.value - one.yearly_certainty_equivalent.value);
+  const number = (name, cell) => ({ name, numeric: true, cell });
+  return section(
+    "What each came to",
+    h("div", { class: "words" }, conclusions(told).map((sentence) => h("p", {}, sentence))),
+    intervalChart({
+      title: `A year from ${START} is worth as much as a sure`,
+      rows: rows.map(({ name, colour, yearly_certainty_equivalent }) => ({ name, colour, ...estimate(yearly_certainty_equivalent) })),
+      format: wealth,
+      tick,
+    }),
+    table(
+      "Strategies, by what a year of each is worth",
+      [
+        { name: "Strategy", cell: ({ name }) => name },
+        number("A year is worth a sure", (row) => wealth(row.yearly_certainty_equivalent.value)),
+        number(`${START} became`, ({ final_wealth }) => wealth(final_wealth)),
+        number("Return a year", ({ annual_mean }) => percent(annual_mean.value)),
+        number("Deviation a year", ({ annual_volatility }) => percent(annual_volatility.value)),
+        number("Worst fall", ({ max_drawdown }) => percent(max_drawdown)),
+        number("Held on average", ({ mean_allocation }) => allocation(mean_allocation)),
+        number("Traded a year", ({ annual_turnover }) => percent(annual_turnover.value)),
+      ],
+      rows,
+    ),
+    h("p", { class: "note" }, `Ranges in the chart hold with ${percent(intervals.confidence, 0)} confidence as far as the past is one draw of what may come. \u201cHindsight\u201d holds what \u201c${mainOf(told).name}\u201d held on average, which nobody knew beforehand.`),
+  );
+}
+
+/** One strategy beside the three that everybody knows; which one is chosen here. */
+function chosen(told) {
+  const { lines } = told;
+  const names = lines.map(({ name }, index) => [index, name]);
+  const holder = h("div", {});
+  const show = (line) => holder.replaceChildren(...course(told, line), ...falls(told, line), ...years(told, line));
+  const strategy = select({ name: "strategy", label: "Strategy", choices: names, changed: (index) => show(lines[index]) });
+  strategy.element.classList.add("choosing");
+  strategy.control.value = lines.indexOf(mainOf(told));
+  show(mainOf(told));
+  return section("One strategy through the years", strategy.element, holder);
+}
+
+/** It and those that everybody knows, each once. */
+const beside = (told, line) => [line, ...KNOWN.map((name) => known(told, name)).filter((other) => other !== line)];
+
+function course(told, line) {
+  const { times } = told;
+  const x = { values: times.values, label: "Period", format: (_, index) => index, here: null, tick: String, whole: true };
+  const at = (value) => times.after(times.values.indexOf(value));
+  Object.assign(x, { format: at, here: at });
+  const drawn = (one, values) => ({ name: one.name, colour: one.colour, kind: "line", bare: true, values });
+  const gutter = 64;
+  const stocks = known(told, "all-stock");
+  const held = (one) => [...one.periods.allocation, null];
+  return [
+    lineChart({ title: `Wealth from ${START}, equal ratios alike`, gutter, height: 250, x, y: { format: wealth, tick, log: true }, series: beside(told, line).map((one) => drawn(one, one.wealth)) }),
+    lineChart({
+      title: "Below the highest so far",
+      gutter,
+      height: 130,
+      x,
+      y: { format: percent, tick: percentTick, also: [0] },
+      series: [...new Set([line, stocks])].map((one) => drawn(one, belowHighest(one.wealth))),
+    }),
+    lineChart({
+      title: "Share held in stocks",
+      gutter,
+      height: 130,
+      x: { ...x, here: (value) => times.name(1 + times.values.indexOf(value)), format: (value) => times.name(1 + times.values.indexOf(value)) },
+      y: { format: allocation, tick: percentTick, also: [0, 0.1] },
+      series: [drawn(line, held(line))],
+    }),
+  ];
+}
+
+/** The worst falls of a strategy, when they began and how long they lasted. */
+function falls(told, line) {
+  const { times, unit } = told;
+  const stocks = known(told, "all-stock");
+  const worst = worstFalls(belowHighest(line.wealth), FALLS);
+  if (worst.length === 0) return [h("p", { class: "note" }, `\u201c${line.name}\u201d never fell below its highest.`)];
+  const number = (name, cell) => ({ name, numeric: true, cell });
+  const back = ({ from, to }, wealth) => wealth[to] / wealth[from] - 1;
+  const columns = [
+    { name: "Highest before", cell: ({ from }) => times.after(from) },
+    { name: "Lowest", cell: ({ to }) => times.after(to) },
+    { name: "Made good", cell: ({ back }) => (back === null ? "Not yet" : times.after(back)) },
+    number("Fall", ({ depth }) => percent(depth)),
+    ...(line === stocks ? [] : [number("All in stocks meanwhile", (fall) => percent(back(fall, stocks.wealth)))]),
+    number("Lasted", ({ from, back }) => counted((back ?? line.wealth.length - 1) - from, unit)),
+  ];
+  return [h("h3", {}, "Its worst falls"), table(`The worst falls of ${line.name}`, columns, worst)];
+}
+
+/** Returns by the year, beside the others', and by the month as a map. */
+function years(told, line) {
+  const { dates, periods_per_year } = told;
+  const of = (one) => returnsOf(one.wealth);
+  const where = places(dates, line.wealth.length - 1, periods_per_year);
+  const byYear = grouped(where, ({ year }) => year);
+  const called = dates ? "" : "Year ";
+  const most = Math.max(...byYear.map(([, indices]) => indices.length));
+  const part = (indices) => (indices.length < Math.min(most, periods_per_year) - 5 * (periods_per_year > 100) ? h("span", { class: "under" }, counted(indices.length, told.unit)) : "");
+  const others = beside(told, line).map((one) => ({ one, returns: of(one) }));
+  const over = (returns, indices) => compounded(indices.map((index) => returns[index]));
+  const yearly = table(
+    `Returns by the year of ${line.name} and of others`,
+    [
+      { name: "Year", cell: ([year, indices]) => [`${called}${year}`, part(indices)] },
+      ...others.map(({ one, returns }) => ({ name: one.name, numeric: true, cell: ([, indices]) => percent(over(returns, indices)) })),
+    ],
+    byYear,
+  );
+  return [h("h3", {}, "Year by year"), yearly, ...map(told, line, where, byYear, called)];
+}
+
+const MONTHS = Array.from({ length: 12 }, (_, month) => new Date(Date.UTC(2000, month)).toLocaleDateString("en-GB", { timeZone: "UTC", month: "short" }).slice(0, 3));
+/** The stylesheet has so many shades of gain and of loss. */
+const SHADES = 4;
+
+/** Each year's parts as cells, darker where more was gained or lost; the figure stands in each. */
+function map({ dates, unit }, line, where, byYear, called) {
+  const parts = [...new Set(where.map(({ part }) => part))].filter(Boolean).sort((one, other) => one - other);
+  if (parts.length === 0) return [];
+  const returns = returnsOf(line.wealth);
+  const cells = new Map(grouped(where, ({ year, part }) => `${year} ${part}`).map(([key, indices]) => [key, compounded(indices.map((index) => returns[index]))]));
+  const largest = Math.max(1e-12, ...[...cells.values()].map(Math.abs));
+  const shade = (back) => (Math.abs(back) < 5e-5 ? "" : `${back > 0 ? "gain" : "loss"}${Math.ceil((SHADES * Math.abs(back)) / largest)}`);
+  const cell = (part) => ([year]) => {
+    const back = cells.get(`${year} ${part}`);
+    return back === undefined ? "" : h("span", { class: `shaded ${shade(back)}` }, percent(back));
+  };
+  const whole = { name: "Whole year", numeric: true, cell: ([, indices]) => percent(compounded(indices.map((index) => returns[index]))) };
+  const name = (part) => (dates ? MONTHS[part - 1] : part);
+  const grain = dates && parts.length > 4 ? "month" : unit;
+  const drawn = table(
+    `Returns of ${line.name} ${grain} by ${grain}`,
+    [{ name: "Year", cell: ([year]) => `${called}${year}` }, ...parts.map((part) => ({ name: name(part), numeric: true, cell: cell(part) })), whole],
+    byYear,
+  );
+  drawn.classList.add("map");
+  return [h("h3", {}, `${grain[0].toUpperCase()}${grain.slice(1)} by ${grain}`), drawn];
+}
+
+/** What else is known: sentences by the report's own names, estimates with their ranges, radii. */
+function quant(told) {
+  const { sentences, lines, intervals, choices, times } = told;
+  const guarding = lines.filter(({ periods }) => periods.radius.some((radius) => radius > 0));
+  const range = (name, read, format) => ({ name, numeric: true, cell: (row) => (read(row) ? interval(estimate(read(row)), format) : "\u2013") });
+  const hundredth = (value) => tick(value, 0.01);
+  const build = () =>
+    h(
+      "div",
+      {},
+      h("p", { class: "note" }, sentences.map((sentence) => minus(sentence)).join(" ")),
+      h("p", { class: "note" }, `Each range is the middle ${percent(intervals.confidence, 0)} of ${count(intervals.resamples)} circular block-bootstrap resamples, the same for all strategies: blocks of ${counted(intervals.period_block, "period")}, and of ${counted(intervals.year_block, "year")} for certainty equivalents. ${counted(choices.count, "design point")} a step, seed ${count(choices.seed)}.`),
+      table(
+        "Estimates with their ranges",
+        [
+          { name: "Strategy", cell: ({ strategy }) => strategy },
+          range("Certainty equivalent of a year", (row) => row.yearly_certainty_equivalent, wealth),
+          range(`More than ${mainOf(told).strategy}`, ({ adaptive_ahead: { value, interval } }) => ({ value: -value, interval: [-interval[1], -interval[0]] }), hundredth),
+          range("Beyond its own mix", (row) => row.beyond_own_mix, hundredth),
+          range("Sharpe ratio", (row) => row.sharpe_ratio, hundredth),
+          range("Mean return", (row) => row.annual_mean, percent),
+          range("Volatility", (row) => row.annual_volatility, percent),
+        ],
+        lines,
+      ),
+      guarding.length > 0
+        ? lineChart({
+            title: "Radius",
+            x: { values: times.values.slice(0, -1), label: "Period", format: (value) => times.name(1 + times.values.indexOf(value)), here: (value) => times.name(1 + times.values.indexOf(value)), tick: String, whole: true },
+            y: { format: (value) => figures(value, 3), tick, also: [0] },
+            series: guarding.map(({ name, colour, periods }) => ({ name, colour, kind: "line", bare: true, values: periods.radius })),
+          })
+        : "",
+    );
+  return quantSection("Ranges, ratios and radii", build);
+}
+
+/** What every strategy did, a period a line. */
+function csv({ lines, dates }) {
+  const head = ["Period", "Date", ...lines.flatMap(({ name }) => [`${name}: held, %`, `${name}: return, %`, `${name}: wealth`])];
+  const returns = lines.map(({ wealth }) => returnsOf(wealth));
+  const rows = lines[0].periods.wealth.map((_, k) => [
+    k + 1,
+    dates?.[k] ?? "",
+    ...lines.flatMap(({ periods, wealth }, index) => [hundred(periods.allocation[k]), hundred(returns[index][k]), wealth[k + 1]]),
+  ]);
+  return csvText([head, [0, "Start", ...lines.flatMap(() => ["", "", START])], ...rows]);
+}

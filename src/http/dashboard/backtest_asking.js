@@ -1,0 +1,102 @@
+// The form that asks for a backtest of a record, on a page of its own.
+
+import { post } from "./api.js";
+import { announce, h } from "./dom.js";
+import { fieldset, input, select, showProblem } from "./form.js";
+import { fraction, typed } from "./number_text.js";
+import { unitOf } from "./periods.js";
+import { returnsField } from "./returns_field.js";
+import { INVESTORS, investorChoices, investorNote, queued } from "./specification.js";
+
+const OWN = "own";
+/** Twenty years to be trained on first, and ten to live through. */
+const EXAMPLE = { latest: 360 };
+
+export async function view() {
+  const trail = h("p", { class: "trail" }, h("a", { href: "#/evaluations" }, "Evaluations"));
+  const lead = "Policies are trained on the years before and lived by, again and again, through a record of returns: nothing later is used for what is held.";
+  return { title: "Backtest a record", trail, body: [h("p", { class: "lead" }, lead), asking()] };
+}
+
+function asking() {
+  let record = null;
+  const source = returnsField({
+    name: "log_returns",
+    label: "Returns or prices",
+    example: EXAMPLE,
+    changed: (_, answer) => {
+      record = answer;
+      shown();
+    },
+  });
+  const percentField = (name, label, note, value) => input({ name, label, note, value, unit: "percent" });
+  const rate = percentField("rate", "Bank return per period, %", "The same in all.");
+  const yearly = input({ name: "periods_per_year", label: "Periods a year", note: "12 of months; the record has no dates that tell." });
+  const cost = percentField("trading_cost", "Trading cost, %", "Of what is traded; 0 is free.", "0.1");
+  const investor = select({
+    name: "investor",
+    label: "Investor",
+    note: investorNote,
+    choices: [...investorChoices(), [OWN, "By risk aversion"]],
+    changed: () => (aversion.element.hidden = investor.control.value !== OWN),
+  });
+  investor.control.value = "balanced";
+  const aversion = input({ name: "risk_aversion", label: "Risk aversion", note: "Relative, 1 to 100.", value: "3" });
+  aversion.element.hidden = true;
+  const window = input({ name: "window", label: "Trained on", note: "Periods before. Blank: 20 years." });
+  const every = input({ name: "every", label: "Trained anew every", note: "Periods. Blank: a year." });
+  const horizon = input({ name: "horizon", label: "Looking ahead", note: "Periods. Blank: until the next training." });
+  const levels = input({ name: "alpha", label: "Confidence, %", note: "One to three, apart by semicolons; most is said of the second.", value: "95; 90; 50", unit: "confidence" });
+  const points = input({ name: "count", label: "Design points", note: "More is finer and slower, 10 to 10,000.", value: "100" });
+  const seed = input({ name: "seed", label: "Seed", value: "1" });
+  const blind = select({ name: "cost_blind", label: "Policies know of the trading cost", choices: { false: "Yes", true: "No" } });
+  const shown = () => {
+    const unit = unitOf(record?.periods_per_year);
+    rate.element.querySelector("label").textContent = `Bank return per ${unit}, %`;
+    rate.element.querySelector(".note").textContent = record?.rate ? `Blank: what ${record.rate.column} says, ${unit} by ${unit}.` : "The same in all; 3 % a year are 0.247 % a month.";
+    yearly.element.hidden = record === null || Boolean(record.periods_per_year);
+  };
+  shown();
+  const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
+  const send = h("button", { type: "submit" }, "Backtest");
+  const more = h("details", {}, h("summary", {}, "How it walks, and for the quant"), fieldset("How it walks", [window, every, horizon, levels, blind, points, seed]));
+  const form = h(
+    "form",
+    { novalidate: true },
+    h("fieldset", {}, h("legend", {}, "The record"), source.element),
+    fieldset("The investor", [investor, aversion, rate, yearly, cost]),
+    more,
+    message,
+    h("p", { class: "send" }, send, h("span", { class: "note" }, "Runs in the background. Ten years of months take a minute or two.")),
+  );
+  const text = ({ control }) => control.value.trim();
+  const compose = () => {
+    const request = { log_returns: record.series[0].log_returns, dates: record.dates };
+    request.rate = text(rate) === "" ? record.rate?.rates : (fraction(text(rate)) ?? text(rate));
+    request.risk_aversion = investor.control.value === OWN ? typed(text(aversion)) : INVESTORS[investor.control.value];
+    request.trading_cost = fraction(text(cost)) ?? text(cost);
+    request.alpha = text(levels).split(";").map((part) => (fraction(part) === null ? part : Number((1 - fraction(part)).toPrecision(12))));
+    request.cost_blind = blind.control.value === "true";
+    if (!yearly.element.hidden) request.periods_per_year = typed(text(yearly));
+    for (const field of [window, every, horizon, points, seed]) if (text(field) !== "") request[field.name] = typed(text(field));
+    return request;
+  };
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const trouble = await source.trouble();
+    if (trouble) return showProblem(form, message, { field: "log_returns", message: trouble });
+    if (text(rate) === "" && !record.rate) return showProblem(form, message, { field: "rate", message: "What the bank paid is needed: a number here, or a column of the record." });
+    send.disabled = true;
+    try {
+      const { job, warnings } = await post("/backtest", compose());
+      announce("The backtest is queued.");
+      const at = `#/backtests/${job}`;
+      if (warnings.length > 0) form.replaceWith(queued("backtest", at, warnings));
+      else location.hash = at;
+    } catch (error) {
+      showProblem(form, message, error);
+    }
+    send.disabled = false;
+  });
+  return form;
+}

@@ -1,0 +1,149 @@
+// A backtest asked for and shown on the page: sentences first, then every strategy, then one of them year by year.
+
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { after, before, test } from "node:test";
+import { browser, call, service } from "./ballast.js";
+import { dashboardModule } from "./modules.js";
+import { plain, usable, visitQuiet } from "./page.js";
+
+const QUARTERS = 56;
+const WINDOW = 8;
+/** Quarters from March 2004 on, the newest first, in percent. */
+const RETURNS = Array.from({ length: QUARTERS }, (_, k) => Number((2.5 + 7 * Math.sin(1.7 * k) - (k === 30 ? 22 : 0)).toFixed(2)));
+const RATES = Array.from({ length: QUARTERS }, (_, k) => (k % 8 < 4 ? 0.5 : 0.3));
+const date = (k) => `${2004 + Math.floor(k / 4)}-${String(3 * (k % 4) + 3).padStart(2, "0")}`;
+const rows = RETURNS.map((back, k) => `${date(k)},${back},${RATES[k]}`).reverse();
+const TEXT = `quarter,fund,rf\n${rows.join("\n")}\n`;
+
+let ballast, chromium, page, report;
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  page.setDefaultTimeout(20_000);
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+const main = async () => plain(await page.locator("main").innerText());
+const cells = async (name) => {
+  const table = page.getByRole("table", { name });
+  const read = (locator) => locator.evaluateAll((found) => found.map((row) => [...row.children].map(({ textContent }) => textContent)));
+  return (await read(table.locator("tr"))).map((row) => row.map(plain));
+};
+const percent = (fraction) => `${(100 * fraction).toFixed(1).replace(/^-(?=0\.0$)/, "")} %`;
+
+test("what is asked for is the record as it was read, and few choices", async () => {
+  await visitQuiet(page, `${ballast.url}/#/evaluations`);
+  await page.getByRole("link", { name: "Backtest a record" }).click();
+  await page.getByRole("button", { name: "Backtest", exact: true }).click();
+  await page.getByText("Returns are needed: paste them, or choose a file.").waitFor();
+  await page.getByLabel("Returns or prices").fill("0.01 0.02 -0.03 0.04 0.01 -0.02");
+  await page.getByText("6 simple returns").waitFor();
+  await page.getByRole("button", { name: "Backtest", exact: true }).click();
+  await page.getByText("What the bank paid is needed").waitFor();
+  await page.getByLabel("Periods a year").waitFor();
+  await page.getByLabel("Returns or prices").fill(TEXT);
+  await page.getByText("Blank: what rf says, quarter by quarter.").waitFor();
+  assert.equal(await page.getByLabel("Periods a year").isVisible(), false);
+  await page.getByText("How it walks, and for the quant").click();
+  await page.getByLabel("Trained on").fill("600");
+  await page.getByRole("button", { name: "Backtest", exact: true }).click();
+  await page.locator(".error").getByText(/must hold at least 604, the window and a year/).waitFor();
+  await page.getByLabel("Trained on").fill(String(WINDOW));
+  await page.getByLabel("Confidence, %").fill("90; 50");
+  await page.getByLabel("Design points").fill("10");
+  const asked = page.waitForRequest((request) => request.method() === "POST" && request.url().endsWith("/backtest"));
+  await page.getByRole("button", { name: "Backtest", exact: true }).click();
+  const request = (await asked).postDataJSON();
+  assert.deepEqual([request.dates[0], request.dates.at(-1)], ["2004-03", date(QUARTERS - 1)]);
+  assert.ok(Math.abs(Math.expm1(request.log_returns[3]) - RETURNS[3] / 100) < 1e-12);
+  assert.deepEqual([request.rate.length, request.rate[0], request.alpha, request.trading_cost, request.risk_aversion], [QUARTERS, 0.005, [0.1, 0.5], 0.001, 3]);
+});
+
+test("it is followed to its end, and what it says comes first", async () => {
+  await page.getByRole("heading", { name: "What each came to" }).waitFor();
+  const job = page.url().split("/").at(-1);
+  report = await call(ballast.url, `/jobs/${job}/report`);
+  const words = await main();
+  assert.match(words, /8 ways to hold stocks, through 48 quarters, March 2006 to December 2017, for a balanced investor/);
+  assert.match(words, /Every 4 quarters policies are trained on the 8 quarters before, and lived by until the next/);
+  const [, second] = report.strategies;
+  assert.ok(words.includes(`was all in the bank in ${(100 * second.all_bank_share).toFixed(0)} % of the quarters`), words);
+  const shown = await cells("Strategies, by what a year of each is worth");
+  const worths = shown.slice(1).map(([, worth]) => Number(worth));
+  assert.equal(worths.length, report.strategies.length);
+  assert.deepEqual(worths, [...worths].sort((one, other) => other - one));
+  const mixed = report.strategies.find(({ strategy }) => strategy === "60/40");
+  const row = shown.find(([name]) => name === "60/40");
+  assert.deepEqual(row.slice(1, 5), [mixed.yearly_certainty_equivalent.value.toFixed(2), mixed.final_wealth.toFixed(2), percent(mixed.annual_mean.value), percent(mixed.annual_volatility.value)]);
+  assert.doesNotMatch(words, /undefined|NaN|null|alpha|plug-in|risky asset/);
+});
+
+test("one strategy is told by its worst falls, its years and its quarters", async () => {
+  await page.getByLabel("Strategy", { exact: true }).selectOption("All in stocks");
+  // Bought once at a cost of a thousandth, then what the record says.
+  const lived = RETURNS.slice(WINDOW).map((back) => 1 + back / 100);
+  lived[0] *= 1 - 0.001;
+  const wealth = lived.reduce((levels, growth) => [...levels, levels.at(-1) * growth], [100]);
+  const worst = wealth.reduce((worst, level, to) => {
+    const depth = level / Math.max(...wealth.slice(0, to + 1)) - 1;
+    return depth < worst.depth ? { depth, to } : worst;
+  }, { depth: 0 });
+  const named = (k) => new Date(`${date(WINDOW + k - 1)}-01T00:00:00Z`).toLocaleDateString("en-GB", { month: "long", year: "numeric", timeZone: "UTC" });
+  const peak = Math.max(...wealth.slice(0, worst.to));
+  const made = wealth.findIndex((level, k) => k > worst.to && level >= peak);
+  const [, deepest] = await cells("The worst falls of All in stocks");
+  assert.deepEqual(deepest, [named(wealth.indexOf(peak)), named(worst.to), named(made), percent(worst.depth), `${made - wealth.indexOf(peak)} quarters`]);
+  const years = await cells("Returns by the year of All in stocks and of others");
+  const of2008 = lived.slice(8, 12).reduce((product, growth) => product * growth) - 1;
+  assert.equal(years.find(([year]) => year === "2008")[1], percent(of2008));
+  const map = await cells("Returns of All in stocks quarter by quarter");
+  assert.deepEqual(map[0].slice(1), ["Mar", "Jun", "Sep", "Dec", "Whole year"]);
+  assert.deepEqual(map.find(([year]) => year === "2008").slice(1), [...lived.slice(8, 12).map((growth) => percent(growth - 1)), percent(of2008)]);
+});
+
+test("a strategy has one colour in every chart", async () => {
+  const stroke = (locator) => locator.evaluate((element) => getComputedStyle(element).stroke);
+  await page.getByLabel("Strategy", { exact: true }).selectOption("Trusts the record");
+  const [, own] = [await page.getByText("Radius").count(), await stroke(page.locator("figure:has-text('Wealth from 100') path.line").first())];
+  const ranges = page.locator("figure:has-text('is worth as much as a sure') line.range");
+  const names = await page.locator("figure:has-text('is worth as much as a sure') text.name").allTextContents();
+  assert.equal(await stroke(ranges.nth(names.indexOf("Trusts the record"))), own);
+  const colours = await ranges.evaluateAll((lines) => lines.map((line) => getComputedStyle(line).stroke));
+  assert.equal(new Set(colours).size, report.strategies.length);
+});
+
+test("what every strategy did is saved as a file", async () => {
+  const saving = page.waitForEvent("download");
+  await page.getByRole("button", { name: "Save as CSV" }).click();
+  const lines = (await readFile(await (await saving).path(), "utf8")).trim().split("\r\n");
+  assert.equal(lines.length, 2 + QUARTERS - WINDOW);
+  assert.equal(lines[0].match(/: wealth/g).length, report.strategies.length);
+  const last = lines.at(-1).split(",");
+  assert.deepEqual(last.slice(0, 2), ["48", "2017-12"]);
+  assert.ok(Math.abs(last.at(-1) - report.strategies.at(-1).final_wealth) < 1e-6);
+});
+
+test("falls, years and months of a track record are those of its levels", async () => {
+  const { belowHighest, compounded, grouped, places, returnsOf, worstFalls } = await dashboardModule("track.js");
+  const levels = [100, 110, 99, 121, 60.5, 90, 121, 120];
+  assert.deepEqual(worstFalls(belowHighest(levels), 2).map(({ depth, from, to, back }) => [Number(depth.toFixed(6)), from, to, back]), [[-0.5, 3, 4, 6], [-0.1, 1, 2, 3]]);
+  assert.equal(worstFalls(belowHighest(levels), 9).at(-1).back, null);
+  assert.ok(Math.abs(compounded(returnsOf(levels)) - 0.2) < 1e-12);
+  const days = places(["2008-01-30", "2008-01-31", "2008-02-01", "2009-02-02"], 4, 252);
+  assert.deepEqual(grouped(days, ({ year, part }) => `${year} ${part}`), [["2008 01", [0, 1]], ["2008 02", [2]], ["2009 02", [3]]]);
+  assert.deepEqual(places(null, 14, 12).slice(11, 13), [{ year: "1", part: "12" }, { year: "2", part: "1" }]);
+  assert.deepEqual([places(null, 2, 1)[1], places(["2008", "2009"], 2, 1)[1]], [{ year: "2", part: null }, { year: "2009", part: null }]);
+});
+
+test("axe finds nothing, in light, in dark and at 320 pixels, folds open", async () => {
+  await page.getByText("Ranges, ratios and radii").click();
+  await page.getByRole("table", { name: "Estimates with their ranges" }).waitFor();
+  await usable(page, () => {});
+  await usable(page, () => visitQuiet(page, `${ballast.url}/#/backtests/new`));
+});
