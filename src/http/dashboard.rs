@@ -80,6 +80,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "returns_field.js": SCRIPT,
         "sensitivity.js": SCRIPT,
         "several.js": SCRIPT,
+        "several_fields.js": SCRIPT,
         "session.js": SCRIPT,
         "session_opening.js": SCRIPT,
         "sessions.js": SCRIPT,

@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { browser, call, service, trained } from "./ballast.js";
+import { dashboardModule } from "./modules.js";
 import { plain, usable, visitQuiet } from "./page.js";
 
 const ASSETS = ["World", "Bonds A/B", "Gold"];
@@ -111,6 +112,59 @@ test("what was held stands one above the other, read by keyboard and as a table"
   near(heights.reduce((sum, height) => sum + height, 0), 0.7 * 150, 0.01);
   const told = await rows("Observed periods, newest first");
   assert.ok(told["November 2026"].filter((cell) => cell === "1.00 %").length >= 3, `${told["November 2026"]}`);
+});
+
+test("a period that passed is put right by name, and what was reported stays on record", async () => {
+  await go();
+  await page.getByText("Last report, November 2026: 1.00\u202f% of the assets together").waitFor();
+  await page.getByText("Put a period right").click();
+  const form = page.locator("form", { has: page.getByRole("button", { name: "Put it right" }) });
+  assert.equal(await form.getByLabel("Return of World, %").inputValue(), "1");
+  await form.getByText("I held other shares").click();
+  assert.equal(await form.getByLabel("World held, %").inputValue(), "40");
+  await form.getByLabel("Period").selectOption({ label: "October 2026" });
+  assert.equal(await form.getByLabel("Return of World, %").inputValue(), "1.5");
+  assert.equal(await form.getByLabel("World held, %").inputValue(), "");
+  await form.getByLabel("World held, %").fill("30");
+  await form.getByLabel("Why").fill("a slip");
+  await form.getByRole("button", { name: "Put it right" }).click();
+  await form.getByText("Where one share is said, all are.").waitFor();
+  await form.getByLabel("Bonds A/B held, %").fill("10");
+  await form.getByLabel("Gold held, %").fill("5");
+  await form.getByLabel("Return of World, %").fill("0.5");
+  await form.getByRole("button", { name: "Put it right" }).click();
+  await page.getByText(/October 2026 was put right on .*: a slip/).waitFor();
+  const history = await call(ballast.url, `/sessions/${session}/history`);
+  assert.deepEqual(history.observations[0].now.reported.simple_returns, { World: 0.005, "Bonds A/B": 0.002, Gold: -0.01 });
+  assert.deepEqual(history.observations[0].now.reported.executed_allocations, { World: 0.3, "Bonds A/B": 0.1, Gold: 0.05 });
+  const told = await rows("Observed periods, newest first");
+  assert.ok(told["October 2026"].includes("0.50 %"), `${told["October 2026"]}`);
+  const chart = page.getByRole("slider", { name: "Share of wealth in each asset" });
+  await chart.press("Home");
+  assert.equal(plain(await chart.getAttribute("aria-valuetext")), "October 2026: World 30.0 %, Bonds A/B 10.0 %, Gold 5.0 %, Bank 55.0 %");
+  await page.getByRole("button", { name: "Undo", exact: true }).click();
+  await page.getByText(/: Correction 1 was undone/).waitFor();
+  const undone = (await call(ballast.url, `/sessions/${session}/history`)).observations[0].now;
+  assert.deepEqual(undone.reported.simple_returns, { World: 0.015, "Bonds A/B": 0.002, Gold: -0.01 });
+  near(undone.wealth, history.observations[0].wealth, 1e-6);
+});
+
+test("the last report of several is taken back, and returns by price are told by asset", async () => {
+  page.once("dialog", (dialog) => dialog.accept());
+  await page.getByRole("button", { name: "take it back" }).click();
+  await page.getByText("The report was taken back").waitFor();
+  const { now } = (await call(ballast.url, `/sessions/${session}/history`)).observations[1];
+  assert.deepEqual([now.log_return, now.reported.executed_allocations.World], [null, 0.4]);
+  await page.getByText("Last report, November 2026: no return is known.").waitFor();
+  await page.getByRole("button", { name: "Undo", exact: true }).click();
+  await page.getByText(/: Correction 3 was undone/).waitFor();
+  const { assetReturns } = await dashboardModule("several_fields.js");
+  const reported = [{ prices: { a: 10, b: 4 }, previous_prices: { a: 8, b: 4 } }, { prices: { a: 11, b: 2 } }, { missing: true }, { log_returns: { a: 0.1, b: 0 } }];
+  const history = { assets: ["a", "b"], observations: reported.map((reported) => ({ reported })) };
+  const told = reported.map((_, index) => assetReturns(history, index));
+  near(told[0].a, Math.log(1.25), 1e-12);
+  near(told[1].b, -Math.log(2), 1e-12);
+  assert.deepEqual(told.slice(2), [null, { a: 0.1, b: 0 }]);
 });
 
 test("it stands beside another session by what it holds in all", async () => {

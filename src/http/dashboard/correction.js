@@ -4,6 +4,7 @@ import { h } from "./dom.js";
 import { standing } from "./flows.js";
 import { input, select } from "./form.js";
 import { reportFields, sendReports } from "./report_fields.js";
+import { severalFields } from "./several_fields.js";
 
 /** The form for a session with observed periods. */
 export function correctionForm({ id, session, history, policy, calendar, refresh }) {
@@ -11,17 +12,15 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
   const periods = history.observations.map(({ period }) => [period, calendar.name(period)]);
   const fill = (chosen) => {
     const row = history.observations[chosen - 1];
-    fields.fill(standing(row), (row.now ?? row).log_return);
+    if (history.assets) fields.fill(history, chosen - 1);
+    else fields.fill(standing(row), (row.now ?? row).log_return);
   };
   const period = select({ within, name: "period", label: "Period", choices: periods.reverse(), changed: (value) => fill(Number(value)) });
   const { rate_per_step, contributions } = policy.specification.problem;
-  const fields = reportFields({
-    within,
-    label: "Return, %",
-    rate: rate_per_step,
-    contribution: Array.isArray(contributions) ? null : contributions,
-  });
-  fields.advised(null);
+  const contribution = Array.isArray(contributions) ? null : contributions;
+  const fields = history.assets
+    ? severalFields(history.assets, { within, advised: null, rate: rate_per_step, added: contribution })
+    : reportFields({ within, label: "Return, %", rate: rate_per_step, contribution });
   fill(history.observations.length);
   const reason = input({
     within,

@@ -11,6 +11,7 @@ import { allocation, count, figures, moment, percent, short, wealth } from "./fo
 import { policyLink } from "./naming.js";
 import { day } from "./periods.js";
 import { save } from "./picture.js";
+import { assetReturns, assetsHeld } from "./several_fields.js";
 
 /** Periods shown at first; who wants all asks. */
 const NEWEST = 24;
@@ -33,7 +34,7 @@ export function observed(shown) {
         period,
         ...(calendar.dated ? [{ name: "Last day", cell: (row) => (standing(row).date ? day(standing(row).date) : "") }] : []),
         number("Return", now("log_return", (value) => percent(Math.expm1(value), 2))),
-        ...(history.assets ?? []).map((name) => number(name, ({ assets, now }) => percent(Math.expm1((now?.assets ?? assets).log_returns?.[name] ?? Number.NaN), 2))),
+        ...(history.assets ?? []).map((name) => number(name, ({ period }) => percent(Math.expm1(assetReturns(history, period - 1)?.[name] ?? Number.NaN), 2))),
         number("Advised", now("advised_allocation", allocation)),
         number("Held", now("executed_allocation", allocation)),
         number("Wealth", now("wealth", wealth)),
@@ -88,7 +89,8 @@ export function csv({ history, calendar }) {
   return csvText([head, start, ...lines]);
 }
 
-const REPORT = ["log_return", "simple_return", "price", "previous_price", "missing", "date", "rate", "flow", "executed_allocation", "wealth"];
+const ONE = ["log_return", "simple_return", "price", "previous_price", "executed_allocation"];
+const REPORT = [...ONE, ...ONE.map((name) => `${name}s`), "missing", "date", "rate", "flow", "wealth"];
 const reportOf = (said) => Object.fromEntries(REPORT.filter((name) => (said[name] ?? false) !== false).map((name) => [name, said[name]]));
 
 /** Sends a correction that was said before, or that takes a return away. */
@@ -106,12 +108,13 @@ export function lastReport(shown) {
   const row = history.observations.at(-1);
   if (!row) return "";
   const { log_return, executed_allocation } = row.now ?? row;
+  const held = history.assets ? { executed_allocations: assetsHeld(row) } : { executed_allocation };
   const name = calendar.inText(row.period);
   const { date } = standing(row);
   const undo = () => {
     const words = `Take back the return of ${name}?\n\nThe period stays, without a return, until you put one in. What was reported stays on record.`;
     if (!confirm(words)) return;
-    const report = { missing: true, executed_allocation, ...(date ? { date } : {}) };
+    const report = { missing: true, ...held, ...(date ? { date } : {}) };
     correct(shown, row.period, report, "The report was taken back", `The return of ${name} is taken back.`);
   };
   const mend = () => {
@@ -119,7 +122,8 @@ export function lastReport(shown) {
     shown.right.querySelector("form")?.scrollIntoView({ block: "center" });
     requestAnimationFrame(() => shown.right.querySelector("form input")?.focus());
   };
-  const said = log_return === null ? "no return is known" : percent(Math.expm1(log_return), 2);
+  const back = log_return === null ? "no return is known" : percent(Math.expm1(log_return), 2);
+  const said = log_return !== null && history.assets ? `${back} of the assets together` : back;
   return h(
     "p",
     { class: "note last" },

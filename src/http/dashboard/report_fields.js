@@ -31,7 +31,7 @@ export function reportFields({ within, label, rate, contribution, date: likely =
     },
   });
   const share = (name, label, note) => input({ within, name, label, note, unit: "percent", changed: edited });
-  const held = share("executed_allocation", "Share held, %", " ");
+  const held = share("executed_allocation", "Share held, %", "Blank: as advised.");
   const paid = share("rate", "The bank paid, %", `Blank: ${percent(rate, 3)}, the policy\u2019s.`);
   const flow = input({
     within,
@@ -94,7 +94,7 @@ export function reportFields({ within, label, rate, contribution, date: likely =
       return { message: words, field: "return" };
     },
     advised(allocated) {
-      held.element.querySelector(".note").textContent = allocated === null ? "Blank: as it was." : `Blank: the ${allocation(allocated)} advised.`;
+      held.element.querySelector(".note").textContent = `Blank: the ${allocation(allocated)} advised.`;
     },
   };
 }

@@ -65,9 +65,9 @@ const cautionScale = (problem) => (isParametric(problem.framework) ? moments(pro
 async function fill(holder, told) {
   const { id, session, history, calendar, policy, leaving } = told;
   const shown = { ...told, right: null };
-  shown.right = history.observations.length > 0 && !history.assets ? righting(shown) : null;
+  shown.right = history.observations.length > 0 ? righting(shown) : null;
   if (session.state !== "active") {
-    const ended = [h("div", {}, completed(shown), history.assets ? "" : lastReport(shown)), wealthCourse(shown)];
+    const ended = [h("div", {}, completed(shown), lastReport(shown)), wealthCourse(shown)];
     return holder.replaceChildren(h("div", { class: "columns" }, ended), figures(shown, null), history.assets ? severalHeld(shown) : held(shown, null), observed(shown));
   }
   const action = await get(`/action?session=${id}`, leaving);
@@ -91,10 +91,10 @@ async function fill(holder, told) {
   );
 }
 
-/** The same of several assets, of which neither a period put right nor another caution is told. */
+/** The same of several assets, of which no other caution is told. */
 function fillSeveral(holder, shown, action) {
   const { history, calendar } = shown;
-  const advice = severalAdvice(action, place(shown, action), history.assets, severalForm(action, shown));
+  const advice = severalAdvice(action, place(shown, action), history.assets, [severalForm(action, shown), lastReport(shown)]);
   holder.replaceChildren(
     changed(shown),
     due(shown),

@@ -3,10 +3,9 @@
 import { SOURCES, why } from "./advice.js";
 import { disclosure, h, section, table } from "./dom.js";
 import { endWords } from "./flows.js";
-import { input } from "./form.js";
 import { allocation, figures, minus, percent, points, wealth } from "./format.js";
-import { fraction, typed } from "./number_text.js";
 import { sendReports } from "./report_fields.js";
+import { assetsHeld, severalFields } from "./several_fields.js";
 import { stackedChart } from "./stacked.js";
 
 /** A trade of a smaller share of wealth is none. */
@@ -57,44 +56,6 @@ export function severalAdvice(action, place, assets, rest) {
   );
 }
 
-/** The fields of a period's report: a return of each asset, and on demand what else was held, paid, added and reached. */
-function severalFields(action, assets, { rate, date, changed }) {
-  const part = (list, label, note) =>
-    assets.map((name, index) => input({ within: `asset-${index}-`, name: `${list}.${name}`, label: label(name), note: note(name), unit: "percent", changed }));
-  const returns = part("simple_returns", (name) => `Return of ${name}, %`, () => null);
-  const held = part("executed_allocations", (name) => `${name} held, %`, (name) => `Blank: the ${allocation(action.allocation[name])} advised.`);
-  const day = input({ name: "date", label: "Last day", note: "Such as 2008-09-30. May be blank.", inputmode: "text", value: date ?? "" });
-  const paid = input({ name: "rate", label: "The bank paid, %", note: `Blank: ${percent(rate, 3)}, the policy\u2019s.`, unit: "percent", changed });
-  const flow = input({ name: "flow", label: "Money added at the end", note: `Blank: ${wealth(action.contribution)}, the policy\u2019s. \u2212100 is 100 taken.`, changed });
-  const reached = input({ name: "wealth", label: "Wealth reached", note: "Blank: what all the rest gives.", changed });
-  const elements = (fields) => h("div", { class: "fields" }, fields.map(({ element }) => element));
-  const more = h("details", {}, h("summary", {}, "I held other shares, or money came or went"), elements([...held, paid, flow, reached]));
-  const text = ({ control }) => control.value.trim();
-  const byName = (fields, blank) => Object.fromEntries(assets.map((name, index) => [name, text(fields[index]) === "" ? blank(name) : (fraction(text(fields[index])) ?? text(fields[index]))]));
-  const executed = () => byName(held, (name) => action.allocation[name]);
-  return {
-    element: h("div", {}, elements([...returns, day]), more),
-    trouble() {
-      const wrong = returns.find((field) => fraction(text(field)) === null);
-      if (!wrong) return null;
-      return { field: wrong.name, message: text(wrong) === "" ? "The return is blank." : `\u201c${text(wrong)}\u201d is not a number of percent.` };
-    },
-    report() {
-      const report = { simple_returns: byName(returns, () => null) };
-      if (held.some((field) => text(field) !== "")) report.executed_allocations = executed();
-      for (const [field, read] of [[paid, fraction], [flow, typed], [reached, typed], [day, (said) => said]]) if (text(field) !== "") report[field.name] = read(text(field)) ?? text(field);
-      return report;
-    },
-    /** What the period brought, or null where something cannot be read. */
-    read() {
-      const blank = (field, otherwise, read) => (text(field) === "" ? otherwise : read(text(field)));
-      const told = { back: byName(returns, () => null), held: executed(), rate: blank(paid, rate, fraction), added: blank(flow, action.contribution, typed), ended: blank(reached, Number.NaN, typed) };
-      const numbers = [...Object.values(told.back), ...Object.values(told.held), told.rate, told.added, told.ended];
-      return numbers.every((number) => typeof number === "number") ? told : null;
-    },
-  };
-}
-
 /** The form for the coming period; what is held where nothing else is said is the advice. */
 export function severalForm(action, { id, session, history: { assets }, policy, calendar, refresh }) {
   const { rate_per_step, trading_cost } = policy.specification.problem;
@@ -109,7 +70,7 @@ export function severalForm(action, { id, session, history: { assets }, policy, 
     const reached = Number.isNaN(told.ended) ? session.wealth * (1 - cost) * grown + told.added : told.ended;
     preview.textContent = `Wealth ${wealth(session.wealth)} \u2192 ${wealth(reached)} at ${allocation(whole)} held. ${endWords(told.added)}`;
   };
-  const fields = severalFields(action, assets, { rate: rate_per_step, date: calendar.next, changed: () => foretell() });
+  const fields = severalFields(assets, { advised: action.allocation, rate: rate_per_step, added: action.contribution, date: calendar.next, changed: () => foretell() });
   const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
   const button = h("button", { type: "submit" }, `Report ${calendar.inText(action.period)}`);
   const form = h("form", { class: "observe", novalidate: true }, fields.element, preview, message, h("p", { class: "send" }, button));
@@ -151,7 +112,7 @@ export function severalWorst(action, assets, { unit }) {
 
 /** What was held of each, period by period. */
 export function severalHeld({ history, calendar }) {
-  const shares = history.observations.map((row) => ((row.now ?? row).assets ?? row.assets).executed_allocations ?? row.assets.executed_allocations);
+  const shares = history.observations.map(assetsHeld);
   if (shares.length === 0) return "";
   return section("What it held", stackedChart({ title: "Share of wealth in each asset", assets: history.assets, shares, x: { name: calendar.name, tick: calendar.brief } }));
 }

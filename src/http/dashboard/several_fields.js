@@ -1,0 +1,91 @@
+// What is said of a period of several assets, in its report and in a correction of it: a return of each, and how else it went.
+
+import { h } from "./dom.js";
+import { standing } from "./flows.js";
+import { input, select } from "./form.js";
+import { allocation, percent, wealth } from "./format.js";
+import { fraction, typed } from "./number_text.js";
+import { inPercent } from "./report_fields.js";
+
+const KINDS = { simple: "Gains or losses", missing: "None is known" };
+
+/** The log-return of each asset in an observed period, counted from 0, as it stands; null where none is known. */
+export function assetReturns({ assets, observations }, index) {
+  const said = standing(observations[index]);
+  const before = (name) => said.previous_prices?.[name] ?? standing(observations[index - 1]).prices?.[name];
+  const one = (name) => {
+    if (said.simple_returns) return Math.log1p(said.simple_returns[name]);
+    return said.log_returns ? said.log_returns[name] : Math.log(said.prices[name] / before(name));
+  };
+  return said.missing ? null : Object.fromEntries(assets.map((name) => [name, one(name)]));
+}
+
+/** What was held of each through an observed period as it stands; where nothing is said, what was advised when it came. */
+export const assetsHeld = (row) => standing(row).executed_allocations ?? row.assets.advised_allocations;
+
+/**
+ * The fields: `advised` is the share of each where none is typed, null where that is what was advised then; `rate` and `added` are
+ * the policy's, `added` null where it differs from period to period, `date` the last day as it most likely is.
+ */
+export function severalFields(assets, { within = "", advised, rate, added, date = null, changed = null }) {
+  const part = (list, label, note) =>
+    assets.map((name, index) => input({ within: `${within}asset-${index}-`, name: `${list}.${name}`, label: label(name), note: note(name), unit: "percent", changed }));
+  const returns = part("simple_returns", (name) => `Return of ${name}, %`, () => null);
+  const held = part("executed_allocations", (name) => `${name} held, %`, (name) => (advised ? `Blank: the ${allocation(advised[name])} advised.` : "Blank: as advised."));
+  const field = (name, label, note, more = {}) => input({ within, name, label, note, changed, ...more });
+  const day = field("date", "Last day", "Such as 2008-09-30. May be blank.", { inputmode: "text", value: date ?? "" });
+  const paid = field("rate", "The bank paid, %", `Blank: ${percent(rate, 3)}, the policy\u2019s.`, { unit: "percent" });
+  const flow = field("flow", "Money added at the end", `Blank: ${added === null ? "what the policy says" : `${wealth(added)}, the policy\u2019s`}. \u2212100 is 100 taken.`);
+  const reached = field("wealth", "Wealth reached", "Blank: what all the rest gives.");
+  const isMissing = () => kind.control.value === "missing";
+  const silenced = () => returns.forEach(({ control }) => (control.disabled = isMissing()));
+  const kind = select({
+    within,
+    name: "kind",
+    label: "Returns",
+    choices: KINDS,
+    changed: () => {
+      silenced();
+      changed?.();
+    },
+  });
+  const elements = (fields) => h("div", { class: "fields" }, fields.map(({ element }) => element));
+  const more = h("details", {}, h("summary", {}, "I held other shares, or money came or went"), elements([...held, paid, flow, reached]));
+  const text = ({ control }) => control.value.trim();
+  const byName = (fields, blank) => Object.fromEntries(assets.map((name, index) => [name, text(fields[index]) === "" ? blank(name) : (fraction(text(fields[index])) ?? text(fields[index]))]));
+  const isHeldSaid = () => held.some((field) => text(field) !== "");
+  return {
+    element: h("div", {}, elements([...returns, day, kind]), more),
+    /** What an observed period reported as it stands, into the fields. */
+    fill(history, index) {
+      const [said, back] = [standing(history.observations[index]), assetReturns(history, index)];
+      assets.forEach((name, at) => {
+        returns[at].control.value = back ? inPercent(said.simple_returns?.[name] ?? Math.expm1(back[name])) : "";
+        held[at].control.value = inPercent(said.executed_allocations?.[name]);
+      });
+      for (const [{ control }, value] of [[paid, inPercent(said.rate)], [flow, said.flow], [reached, said.wealth], [day, said.date]]) control.value = value ?? "";
+      kind.control.value = back ? "simple" : "missing";
+      silenced();
+    },
+    trouble() {
+      const wrong = isMissing() ? null : returns.find((field) => fraction(text(field)) === null);
+      if (wrong) return { field: wrong.name, message: text(wrong) === "" ? "The return is blank." : `\u201c${text(wrong)}\u201d is not a number of percent.` };
+      const bare = isHeldSaid() && !advised ? held.find((field) => text(field) === "") : null;
+      return bare ? { field: bare.name, message: "Where one share is said, all are." } : null;
+    },
+    report() {
+      const report = isMissing() ? { missing: true } : { simple_returns: byName(returns, () => null) };
+      if (isHeldSaid()) report.executed_allocations = byName(held, (name) => advised[name]);
+      for (const [field, read] of [[paid, fraction], [flow, typed], [reached, typed], [day, (said) => said]]) if (text(field) !== "") report[field.name] = read(text(field)) ?? text(field);
+      return report;
+    },
+    /** What the period brought, or null where something cannot be read; what is not known counts as unmoved. */
+    read() {
+      const blank = (field, otherwise, read) => (text(field) === "" ? otherwise : read(text(field)));
+      const back = isMissing() ? Object.fromEntries(assets.map((name) => [name, 0])) : byName(returns, () => null);
+      const told = { back, held: byName(held, (name) => advised[name]), rate: blank(paid, rate, fraction), added: blank(flow, added, typed), ended: blank(reached, Number.NaN, typed) };
+      const numbers = [...Object.values(told.back), ...Object.values(told.held), told.rate, told.added, told.ended];
+      return numbers.every((number) => typeof number === "number") ? told : null;
+    },
+  };
+}
