@@ -94,10 +94,13 @@ test("questions are answered by the keyboard alone, and nothing is trained befor
 
 test("two columns of numbers are asked about, and another answer reads the file anew", async () => {
   await chosen("two.csv", "month,fund,index\n2020-01,1.5,100\n2020-02,-2.5,99\n2020-03,3,101\n");
-  await page.getByRole("radio", { name: /^fund / }).check();
+  await page.getByRole("checkbox", { name: /^fund / }).check();
   await page.getByRole("button", { name: "Read it so" }).click();
   await note().getByText("3 monthly simple returns in percent, January 2020 to March 2020, as in column fund.").waitFor();
-  await page.getByLabel("Column").selectOption("index");
+  const column = (name) => page.getByRole("group", { name: "Columns" }).getByLabel(name).click();
+  await column("index");
+  await note().getByText("as in columns fund, index").waitFor();
+  await column("fund");
   await note().getByText("2 monthly returns of prices, February 2020 to March 2020, as in column index.").waitFor();
   close(await history(), [Math.log(99 / 100), Math.log(101 / 99)]);
 });

@@ -18,7 +18,7 @@ let ballast, chromium, page, session;
 before(async () => {
   [ballast, chromium] = await Promise.all([service(), browser()]);
   page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
+  page.setDefaultTimeout(10_000);
   const policy = await trained(ballast.url, {
     problem: { assets: ASSETS, horizon: 4, rate_per_step: 0.001, periods_per_year: 12, history: HISTORY, trading_cost: COST, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } },
     design: { count: 20 },
@@ -188,9 +188,86 @@ test("a session of several that has ended says so, and what it held", async () =
   await page.getByRole("slider", { name: "Share of wealth in each asset" }).waitFor();
 });
 
+/** A table as it is pasted: dates, three columns, the bank. */
+const TABLE = ["month\tWorld\tBonds A/B\tGold\trf", ...HISTORY.map((row, k) => [`2025-${String(k + 1).padStart(2, "0")}`, ...row.map((value) => (100 * Math.expm1(value)).toFixed(4)), "0.1"].join("\t"))].join("\n");
+
+test("a policy of several is trained from a table that is pasted, and its columns are the assets", async () => {
+  await visitQuiet(page, `${ballast.url}/#/train`);
+  await page.getByLabel("Returns or prices").fill(TABLE);
+  const columns = page.getByRole("group", { name: "Which column holds the returns or prices? Several columns are several assets." });
+  for (const name of ["World", "Bonds A/B", "Gold"]) await columns.getByLabel(name, { exact: false }).first().check();
+  await page.getByRole("button", { name: "Read it so" }).click();
+  await page.getByLabel(/^Percent/).check();
+  await page.getByRole("button", { name: "Read it so" }).click();
+  await page.getByText("as in columns World, Bonds A/B, Gold").waitFor();
+  assert.equal(await page.getByLabel("Kind of policy").isVisible(), false);
+  await page.getByLabel("How the assets are mixed").selectOption("Less of what varies more");
+  await page.getByRole("button", { name: /Take the bank.s rate from rf/ }).click();
+  await page.getByRole("group", { name: "Columns" }).getByLabel("Gold").click();
+  await page.getByText("as in columns World, Bonds A/B.").waitFor();
+  await page.getByRole("group", { name: "Columns" }).getByLabel("Gold").click();
+  await page.getByText("as in columns World, Bonds A/B, Gold").waitFor();
+  await page.getByLabel("Months ahead").fill("2");
+  await page.getByText("For the quant", { exact: true }).click();
+  await page.getByLabel("Design points").fill("20");
+  const sent = page.waitForRequest((request) => request.method() === "POST" && request.url().endsWith("/train"));
+  await page.getByRole("button", { name: "Train", exact: true }).click();
+  const { problem } = (await sent).postDataJSON();
+  assert.deepEqual([problem.assets, problem.composition, problem.rate_per_step], [ASSETS, "inverse_volatility", 0.001]);
+  for (const [date, row] of HISTORY.entries()) for (const [asset, value] of row.entries()) near(problem.history[date][asset], value, 1e-6);
+  await page.getByRole("link", { name: "See the policy" }).first().click();
+  await page.getByText("It is for World, Bonds A/B and Gold;", { exact: false }).waitFor();
+});
+
+test("a session of it is opened with what is held of each", async () => {
+  await page.getByRole("link", { name: "Open a session" }).first().click();
+  await page.getByLabel("World held already, %").fill("30");
+  await page.getByLabel("Gold held already, %").fill("12,5");
+  assert.equal(await page.getByLabel("Share of it held already, %").isVisible(), false);
+  await page.getByText("Other returns are known").click();
+  await page.getByLabel("Returns or prices known").fill(["Gold,World,Bonds A/B", ...HISTORY.slice(0, 8).map(([world, bonds, gold]) => [gold, world, bonds].join())].join("\n"));
+  const columns = page.getByRole("group", { name: /^Which column/ });
+  for (const name of ["Gold", "World", "Bonds A/B"]) await columns.getByLabel(name, { exact: false }).first().check();
+  await page.getByRole("button", { name: "Read it so" }).click();
+  for (const answer of ["Log-returns", "The oldest", "Fractions"]) {
+    const option = page.getByRole("radio", { name: answer, exact: false });
+    if ((await option.count()) > 0) await option.first().check();
+  }
+  if (await page.getByRole("button", { name: "Read it so" }).isVisible()) await page.getByRole("button", { name: "Read it so" }).click();
+  await page.getByLabel("They are").selectOption("log");
+  await page.getByText(/8 log-returns as fractions/).waitFor();
+  await page.getByRole("button", { name: "Open", exact: true }).click();
+  await page.getByRole("table", { name: "What to hold of each asset" }).waitFor();
+  const opened = await call(ballast.url, `/sessions/${page.url().split("/").at(-1)}`);
+  near(opened.holding, 0.425, 1e-12);
+  near(opened.assets.holdings.Gold, 0.125, 1e-12);
+  const { history } = await call(ballast.url, `/sessions/${opened.session}/history`);
+  assert.equal(history.length, 8);
+  for (const [asset, value] of HISTORY[0].entries()) near(history[0][asset], value, 1e-9);
+});
+
+test("the form is filled from a policy of several by its assets, and trains the same policy", async () => {
+  const { policy } = await call(ballast.url, `/sessions/${session}`);
+  await visitQuiet(page, `${ballast.url}/#/train?from=${policy}`);
+  await page.getByText("as in columns World, Bonds A/B, Gold").waitFor();
+  const sent = page.waitForResponse((response) => response.request().method() === "POST" && response.url().endsWith("/train"));
+  await page.getByRole("button", { name: "Train", exact: true }).click();
+  const { job } = await (await sent).json();
+  for (;;) {
+    const now = await call(ballast.url, `/jobs/${job}`);
+    if (now.finished_ms === null) await new Promise((resolve) => setTimeout(resolve, 50));
+    else {
+      assert.equal(now.policy, policy);
+      break;
+    }
+  }
+});
+
 test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scrolls sideways", async () => {
   const { policy } = await call(ballast.url, `/sessions/${session}`);
   ({ session } = await call(ballast.url, "/sessions", { policy }));
   await call(ballast.url, "/observe", { session, period: 1, simple_returns: { World: 0.01, "Bonds A/B": 0, Gold: 0.01 } });
   await usable(page, () => go());
+  const forms = [`train?from=${policy}`, `sessions/new?policy=${policy}`];
+  await usable(page, (form) => visitQuiet(page, `${ballast.url}/#/${form}`), forms);
 });

@@ -15,18 +15,21 @@ const PAUSE = 300;
 const MOST = 20_000;
 /** Months of the US stock market. */
 const EXAMPLE = "/dashboard/us_market_monthly.csv";
+/** More lines than these are not told apart. */
+const LINES = 7;
 const HINT = "With dates, or oldest first. Separated by spaces, commas, semicolons, tabs or lines.";
 /** What was said of these is asked anew once another column or kind is chosen. */
 const FOLLOWS = { columns: ["kind", "unit", "large_deviation", "decimal_comma"], kind: ["unit", "large_deviation"] };
 
 /**
- * `{element, show(logReturns), trouble()}`; `changed(logReturns, answer)` at every change, with none of them and null while the
- * text is not one reading, else with all that the service read. `trouble()` waits for what is still being read, and says why there are no returns, or null. `name` is the
+ * `{element, show(history, assets), trouble()}`; `changed(series, answer)` at every change, with the series that were read, `{column,
+ * log_returns}`, and all that the service answered; with none and null while the text is not one reading. With `several` more than
+ * one column may be chosen. `trouble()` waits for what is still being read, and says why there are no returns, or null. `name` is the
  * request's field; `blank` is what an empty field means, where it may be empty; `example` what is said of the bundled returns
  * where they are offered; `bank(rate, periodsPerYear)` takes what a
  * column says that the bank paid last.
  */
-export function returnsField({ name, label, blank = null, example = null, changed, bank = null }) {
+export function returnsField({ name, label, blank = null, example = null, several = false, changed, bank = null }) {
   const id = `f-${name.replace(/[^a-z0-9]+/gi, "-")}`;
   const area = h("textarea", { id, name, rows: 6, spellcheck: "false", "aria-describedby": `${id}-note` });
   area.dataset.described = `${id}-note`;
@@ -57,13 +60,13 @@ export function returnsField({ name, label, blank = null, example = null, change
       answer = { outcome: "refused", sentence: error.message };
     }
     tell(answer.outcome, words(answer));
-    asked.replaceChildren(...below(answer, { said, say, forget, area, bank }));
+    asked.replaceChildren(...below(answer, { said, say, forget, area, bank, several }));
   };
   const take = () => {
     clearTimeout(pending);
     pending = 0;
     changed([], null);
-    reading = judge().then(() => answer?.outcome === "read" && changed(answer.series[0].log_returns, answer));
+    reading = judge().then(() => answer?.outcome === "read" && changed(answer.series, answer));
     return reading;
   };
   const say = (more) => {
@@ -91,9 +94,9 @@ export function returnsField({ name, label, blank = null, example = null, change
     if (answer === null) return blank ? null : "Returns are needed: paste them, or choose a file.";
     return answer.outcome === "asked" ? `To be answered first: ${words(answer)}` : words(answer);
   };
-  const show = (returns) => {
-    said = { kind: "log", unit: "fraction", large_deviation: true };
-    area.value = returns.join(" ");
+  const show = (history, assets = null) => {
+    said = { kind: "log", unit: "fraction", large_deviation: true, ...(assets ? { columns: assets } : {}) };
+    area.value = assets ? [assets, ...history].map((row) => row.join("\t")).join("\n") : history.join(" ");
     reading = judge();
   };
   const element = h(
@@ -156,45 +159,49 @@ function drop(id, open, example) {
 }
 
 /** What a person can say of the text: the answers to questions, the place of a fault, or another reading. */
-function below(answer, { said, say, forget, area, bank }) {
+function below(answer, { said, say, forget, area, bank, several }) {
   const again = h("button", { type: "button", class: "link", onclick: forget }, "Forget what was said of it");
   const isSaid = Object.keys(said).some((name) => name !== "latest");
   switch (answer.outcome) {
     case "asked":
-      return [questions(answer.questions, say), ...(isSaid ? [again] : [])];
+      return [questions(answer.questions, say, several), ...(isSaid ? [again] : [])];
     case "refused":
       return [...(answer.place ? [shown(answer.place, area)] : []), ...(isSaid ? [again] : [])];
     default:
       return [
-        h("div", { class: "fields" }, otherwise(answer, said, say)),
+        h("div", { class: "fields" }, otherwise(answer, said, say, several)),
         ...(bank && answer.rate ? [offered(answer, bank)] : []),
-        ...(answer.series[0].log_returns.length <= MOST ? [picture(answer)] : []),
+        ...(answer.series[0].log_returns.length <= MOST && answer.series.length <= LINES ? [picture(answer)] : []),
       ];
   }
 }
 
-/** Each question with its answers as radio buttons, and one button that takes them all. */
-function questions(asked, say) {
-  const group = ({ asks, question, options }) =>
+/** Each question with its answers as radio buttons, of columns as boxes to tick where `several` may be chosen, and one button that
+ * takes them all. */
+function questions(asked, say, several) {
+  const isMany = ({ asks }) => several && asks === "columns";
+  const group = (one) =>
     h(
       "fieldset",
       {},
-      h("legend", {}, question),
-      options.map(({ label, sentence }, index) =>
+      h("legend", {}, isMany(one) ? `${one.question} Several columns are several assets.` : one.question),
+      one.options.map(({ label, sentence }, index) =>
         h(
           "label",
           { class: "option" },
-          h("input", { type: "radio", name: `asked-${asks}`, value: index }),
+          h("input", { type: isMany(one) ? "checkbox" : "radio", name: `asked-${one.asks}`, value: index }),
           h("span", {}, label, sentence ? h("span", { class: "note" }, ` ${sentence}`) : null),
         ),
       ),
     );
   const groups = asked.map(group);
   const answered = () => {
-    const chosen = groups.map((group) => group.querySelector(":checked"));
-    const open = chosen.indexOf(null);
+    const chosen = groups.map((group) => [...group.querySelectorAll(":checked")]);
+    const open = chosen.findIndex((boxes) => boxes.length === 0);
     if (open >= 0) return groups[open].querySelector("input").focus();
-    say(Object.assign({}, ...chosen.map(({ value }, index) => asked[index].options[value].choices)));
+    const choices = (index) => chosen[index].map(({ value }) => asked[index].options[value].choices);
+    const columns = (index) => ({ columns: choices(index).flatMap((choice) => choice.columns) });
+    say(Object.assign({}, ...asked.flatMap((one, index) => (isMany(one) ? columns(index) : choices(index)))));
   };
   const button = h("button", { type: "button", class: "quiet", onclick: answered }, "Read it so");
   return h("div", {}, groups, h("p", { class: "actions" }, button));
@@ -211,9 +218,10 @@ function shown({ line, value }, area) {
 }
 
 /** Choices that read the same text otherwise. */
-function otherwise({ columns, series, newest_first, count: all }, said, say) {
+function otherwise({ columns, series, newest_first, count: all }, said, say, several) {
   const [{ column, kind, unit }] = series;
-  const values = columns.filter(({ name, holds }) => holds === "values" || name === column);
+  const taken = series.map(({ column }) => column);
+  const values = columns.filter(({ name, holds }) => holds === "values" || taken.includes(name));
   const choice = (name, label, choices, value, read = (value) => value) =>
     field(
       label,
@@ -228,13 +236,29 @@ function otherwise({ columns, series, newest_first, count: all }, said, say) {
   const latest = h("input", { id: "read-latest", type: "number", min: 2, max: all, onchange: keep });
   latest.value = Math.min(all, said.latest ?? all);
   return [
-    values.length > 1 && choice("columns", "Column", names, column, (name) => [name]),
+    values.length > 1 && (several ? ticked(values, taken, (columns) => say(columns.length > 1 ? { columns, kind, ...(unit ? { unit } : {}) } : { columns })) : choice("columns", "Column", names, column, (name) => [name])),
     choice("kind", "They are", KINDS, kind),
     unit && choice("unit", "In", UNITS, unit),
     newest_first !== undefined &&
       choice("newest_first", "The first is", ORDERS, String(newest_first), (value) => value === "true"),
     field(`Latest returns used, of ${count(all)}`, latest),
   ];
+}
+
+/** The columns that count, each an asset; all are of one kind. */
+function ticked(values, taken, say) {
+  const element = h("div", { class: "field checks", role: "group", "aria-label": "Columns" });
+  const boxes = () => [...element.querySelectorAll("input")];
+  const change = ({ target }) => {
+    const columns = boxes().filter(({ checked }) => checked).map(({ value }) => value);
+    if (columns.length > 0) say(columns);
+    else target.checked = true;
+  };
+  element.append(
+    h("span", {}, "Columns, each an asset"),
+    ...values.map(({ name }) => h("label", {}, h("input", { type: "checkbox", name: "read-columns", value: name, checked: taken.includes(name), onchange: change }), name)),
+  );
+  return element;
 }
 
 const field = (label, control) => h("div", { class: "field" }, h("label", { for: control.id }, label), control);
@@ -247,8 +271,8 @@ function offered({ rate: { column, rates }, periods_per_year }, bank) {
   return h("p", {}, h("button", { type: "button", class: "quiet", onclick: use }, label));
 }
 
-function picture({ series: [{ log_returns }], dates }) {
-  const values = log_returns.map(Math.expm1);
+function picture({ series, dates }) {
+  const [values, ...others] = series.map(({ log_returns }) => log_returns.map(Math.expm1));
   const at = (index) => (index < values.length ? (dates?.[index] ?? String(index + 1)) : "");
   return lineChart({
     title: `Returns read, ${at(0)} to ${at(values.length - 1)}`,
@@ -262,6 +286,6 @@ function picture({ series: [{ log_returns }], dates }) {
       whole: true,
     },
     y: { format: (value) => percent(value, 2), tick: percentTick, also: [0] },
-    series: [{ name: "", kind: "line", bare: true, values }],
+    series: [values, ...others].map((values, index) => ({ name: others.length > 0 ? series[index].column : "", kind: "line", bare: true, values })),
   });
 }

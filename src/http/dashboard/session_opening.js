@@ -1,7 +1,7 @@
 // The form that opens a session: on a page of its own, so that whoever asks for it stands before it.
 
-import { post } from "./api.js";
-import { h } from "./dom.js";
+import { get, post } from "./api.js";
+import { announce, h } from "./dom.js";
 import { fieldset, input, select, showProblem } from "./form.js";
 import { moment, short } from "./format.js";
 import { labelFields } from "./naming.js";
@@ -14,10 +14,10 @@ export async function view(query, leaving) {
   const asked = new URLSearchParams(query ?? "").get("policy");
   const trail = h("p", { class: "trail" }, h("a", { href: "#/sessions" }, "Sessions"));
   const none = h("p", {}, "A session needs a policy first. ", h("a", { href: "#/train" }, "Train one"), ".");
-  return { title: "Open a session", trail, body: policies.length > 0 ? opening(policies, asked) : none };
+  return { title: "Open a session", trail, body: policies.length > 0 ? opening(policies, asked, leaving) : none };
 }
 
-function opening(policies, asked) {
+function opening(policies, asked, leaving) {
   const labels = labelFields();
   const policy = select({ name: "policy", label: "Policy", choices: policyChoices(policies) });
   if (policies.some(({ policy }) => policy === asked)) policy.control.value = asked;
@@ -44,8 +44,25 @@ function opening(policies, asked) {
     name: "history",
     label: "Returns or prices known",
     blank: "Blank: the policy\u2019s own history.",
-    changed: (returns) => (known = returns),
+    several: true,
+    changed: (series) => (known = series),
   });
+  let assets = null;
+  const shares = h("div", { class: "fields", hidden: true });
+  const chosen = async () => {
+    const asked = policy.control.value;
+    const { specification } = await get(`/policies/${asked}`, leaving);
+    if (asked !== policy.control.value) return;
+    assets = specification.fund?.assets ?? null;
+    holding.element.hidden = assets !== null;
+    shares.hidden = assets === null;
+    const field = (name, index) => input({ within: `asset-${index}-`, name: `holdings.${name}`, label: `${name} held already, %`, note: "Of wealth. Blank: nothing.", unit: "percent" });
+    shares.replaceChildren(...(assets ?? []).map((name, index) => field(name, index).element));
+  };
+  let choosing = Promise.resolve();
+  const choose = () => (choosing = chosen().catch((error) => leaving.aborted || announce(error.message)));
+  policy.control.addEventListener("change", choose);
+  choose();
   const other = h(
     "details",
     {},
@@ -57,7 +74,7 @@ function opening(policies, asked) {
   const form = h(
     "form",
     { novalidate: true },
-    fieldset("Whose session", [labels.name, policy, stake, holding]),
+    fieldset("Whose session", [labels.name, policy, stake, holding, shares]),
     fieldset("How long", [going, every, window]),
     other,
     more,
@@ -69,11 +86,15 @@ function opening(policies, asked) {
     const trouble = await history.trouble();
     if (trouble) return showProblem(form, message, { field: "history", message: trouble });
     const request = { policy: policy.control.value, ...labels.read() };
-    if (known.length > 0) request.history = known;
+    await choosing;
+    if (known.length > 0) request.history = assets ? byDate(known, assets) : known[0].log_returns;
     const wealth = typed(stake.control.value);
     if (wealth !== null) request.wealth = wealth;
-    const held = holding.control.value;
-    if (held.trim() !== "") request.holding = fraction(held) ?? held;
+    const share = (text) => fraction(text) ?? text.trim();
+    const texts = assets ? [...shares.querySelectorAll("input")].map(({ value }) => value) : [holding.control.value];
+    const isSaid = texts.some((text) => text.trim() !== "");
+    if (isSaid && assets) request.holdings = Object.fromEntries(assets.map((name, index) => [name, texts[index].trim() === "" ? 0 : share(texts[index])]));
+    else if (isSaid) request.holding = share(texts[0]);
     if (going.control.value === "rolls") request.rolling = true;
     if (going.control.value === "renews")
       request.renew = { every: typed(every.control.value), window: typed(window.control.value) };
@@ -85,6 +106,13 @@ function opening(policies, asked) {
     }
   });
   return form;
+}
+
+/** Returns date by date, in the order of `assets`; where a column is of none of them, as the columns stand. */
+function byDate(series, assets) {
+  const named = assets.map((name) => series.find(({ column }) => column === name));
+  const columns = named.every(Boolean) ? named : series;
+  return columns[0].log_returns.map((_, date) => columns.map(({ log_returns }) => log_returns[date]));
 }
 
 /** Policies to choose from, by what tells them apart. */

@@ -29,10 +29,34 @@ const initial = () => ({
 /** What changes which fields there are, or what they are called. */
 const REDRAWN = ["problem.framework", "problem.periods_per_year"];
 
-/** The request that another policy was trained by. */
+/** The request that another policy was trained by; of several assets by their names. */
 async function like(policy, leaving) {
   const { specification } = await get(`/policies/${policy}`, leaving);
-  return structuredClone(specification);
+  if (!specification.fund) return structuredClone(specification);
+  const { radius_factor, support, ...named } = specification.fund;
+  const { framework, learning, radius, support: ofFund, ...problem } = specification.problem;
+  const scale = radius.scale === undefined ? {} : { scale: Number((radius.scale / radius_factor).toPrecision(12)) };
+  const { count } = specification.design;
+  const bounded = support ? { support } : {};
+  return structuredClone({ problem: { ...problem, ...named, ...bounded, radius: { ...radius, ...scale } }, design: { count }, seed: specification.seed });
+}
+
+/** Takes returns into a request: those of several columns are of assets by these names. None are there yet where nothing is read. */
+function taken({ problem }, series) {
+  problem.history = [];
+  if (series.length === 0) return;
+  if (series.length === 1) {
+    problem.history = series[0].log_returns;
+    if (!problem.assets) return;
+    for (const name of ["assets", "composition", "ground_norm"]) delete problem[name];
+    problem.framework = "adaptive";
+    return;
+  }
+  problem.assets = series.map(({ column }) => column);
+  problem.history = series[0].log_returns.map((_, date) => series.map(({ log_returns }) => log_returns[date]));
+  for (const name of ["framework", "learning"]) delete problem[name];
+  problem.composition ??= "one_step";
+  if (problem.radius?.rule === "chi_square") problem.radius = radiusFor("adaptive", problem.radius);
 }
 
 /** `query`: `from=POLICY` fills the form with what that policy was trained by, `newer=POLICY` likewise to be given newer returns. */
@@ -47,8 +71,10 @@ export async function view(query, leaving) {
     name: "problem.history",
     label: "Returns or prices",
     example: { latest: 240 },
-    changed: (returns) => {
-      put(request, "problem.history", returns);
+    several: true,
+    changed: (series) => {
+      taken(request, series);
+      fields.show(request);
       written();
     },
     bank: (rate, periods) => {
@@ -75,13 +101,14 @@ export async function view(query, leaving) {
     json.value = compact(request);
     jsonError.hidden = true;
   };
+  const showRecord = () => source.show([request.problem?.history ?? []].flat(), request.problem?.assets);
   json.addEventListener("input", () => {
     try {
       request = JSON.parse(json.value);
       jsonError.hidden = true;
       fields.show(request);
       labels.show(request);
-      source.show([request.problem?.history ?? []].flat());
+      showRecord();
     } catch (error) {
       jsonError.textContent = error.message;
       jsonError.hidden = false;
@@ -135,7 +162,7 @@ export async function view(query, leaving) {
     send.disabled = false;
   });
   fields.show(request);
-  if (origin) source.show(request.problem.history);
+  if (origin) showRecord();
   written();
   const trail = h("p", { class: "trail" }, origin ? ["Like ", policyLink(origin)] : h("a", { href: "#/jobs" }, "Jobs"));
   const newer = asked.has("newer");

@@ -17,6 +17,9 @@ const UTILITIES = { exponential: "Exponential", power: "Power", log: "Log" };
 const OFFERED = Object.fromEntries(Object.entries(FRAMEWORKS).filter(([framework]) => framework !== "known_law"));
 /** What weighs less with age, if anything does. */
 const HALF_LIFE = "problem.learning.half_life";
+/** What proposes the shares of several assets. */
+const COMPOSITION = "problem.composition";
+const COMPOSITIONS = { one_step: "Anew each period, against the worst market", inverse_volatility: "Less of what varies more", equal: "All alike" };
 /** The choice of an investor that no preset is. */
 const OWN = "own";
 
@@ -89,6 +92,13 @@ export function trainFields(changed) {
   });
   const confidence = field("problem.radius.alpha", "Confidence, %", "More guards against more: usual is 90 %.", "confidence");
   const caution = field("problem.radius.scale", "Caution, times", "1 is what the confidence asks for; 0 trusts the record.");
+  const composition = select({
+    name: COMPOSITION,
+    label: "How the assets are mixed",
+    note: "What each one\u2019s share is of all that is held.",
+    choices: COMPOSITIONS,
+    changed: (value) => changed(COMPOSITION, value),
+  });
   const halfLife = input({
     name: HALF_LIFE,
     label: "Half-life of returns",
@@ -112,11 +122,11 @@ export function trainFields(changed) {
     field("seed", "Seed", "The same request and seed give the same policy."),
   ];
   const quant = h("details", {}, h("summary", {}, "For the quant"), fieldset("Utility and precision", paper));
-  const parts = [horizon, rate, yearly, start, cost, flow, framework, confidence, caution, halfLife, ...paper];
+  const parts = [horizon, rate, yearly, start, cost, flow, framework, composition, confidence, caution, halfLife, ...paper];
   const show = (request) => {
     for (const part of parts) {
       const found = at(request, part.name);
-      const value = found === undefined && part.name === HALF_LIFE ? "" : found;
+      const value = found === undefined && part.name === HALF_LIFE && !request.problem?.assets ? "" : found;
       const shown = [value ?? ""].flat().map(readings[part.name]?.show ?? ((each) => each));
       if (part.control !== document.activeElement) part.control.value = shown.join("; ");
       part.element.hidden = value === undefined;
@@ -133,7 +143,7 @@ export function trainFields(changed) {
   };
   const elements = [
     fieldset("The investor", [investor, horizon, rate, yearly, start, cost, flow]),
-    fieldset("What he guards against", [framework, confidence, caution, halfLife]),
+    fieldset("What he guards against", [framework, composition, confidence, caution, halfLife]),
     quant,
   ];
   return { elements, show };
