@@ -54,6 +54,7 @@ pub fn access(method: &str, route: Option<&str>) -> Access {
         | ("DELETE", "/jobs/{id}" | "/policies/{id}")
         | ("PATCH", "/policies/{id}") => Access::Role(KeyRole::Train),
         (_, "/health" | "/metrics" | "/audit") => Access::Role(KeyRole::Admin),
+        ("GET" | "HEAD", "/key") => Access::AnyKey,
         ("GET" | "HEAD", _) | ("POST", "/what-if" | "/advise" | "/returns") => Access::Role(KeyRole::Read),
         _ => Access::Role(KeyRole::Admin),
     }
@@ -306,6 +307,7 @@ mod tests {
             ("DELETE", Some("/jobs/{id}"), Access::Role(KeyRole::Train)),
             ("GET", Some("/metrics"), Access::Role(KeyRole::Admin)),
             ("POST", Some("/of-tomorrow"), Access::Role(KeyRole::Admin)),
+            ("GET", Some("/key"), Access::AnyKey),
             ("GET", None, Access::AnyKey),
         ] {
             assert_eq!(access(method, route), expected, "{method} {route:?}");

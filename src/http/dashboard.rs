@@ -59,6 +59,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "format.js": SCRIPT,
         "heatmap.js": SCRIPT,
         "histogram.js": SCRIPT,
+        "holder.js": SCRIPT,
         "interval_chart.js": SCRIPT,
         "jobs.js": SCRIPT,
         "key.js": SCRIPT,

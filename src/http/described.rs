@@ -33,9 +33,14 @@ pub fn with_every_problem(description: &mut OpenApi) {
             }
             let mut kinds = by_shape(operation);
             kinds.extend(by_deed(method, path));
-            if let Access::Role(role) = access(method, Some(path)) {
-                guard(operation, role.as_str());
+            let access = access(method, Some(path));
+            if access != Access::Open {
                 kinds.extend([ProblemKind::Unauthenticated, ProblemKind::TooManyRequests]);
+            }
+            match access {
+                Access::Open => {}
+                Access::AnyKey => operation.security = Some(vec![SecurityRequirement::new(SCHEME, [""; 0])]),
+                Access::Role(role) => guard(operation, role.as_str()),
             }
             describe(operation, &kinds);
         }

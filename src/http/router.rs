@@ -22,7 +22,8 @@ use super::hosts::Hosts;
 use super::problem::{Problem, ProblemKind};
 use super::{
     access, advise, audit, backtests, bounds, dashboard, defaults, described, documentation, evaluations, events,
-    frontiers, jobs, labels, operations, overview, policies, reports, returns, sessions, telemetry, what_if, wire,
+    frontiers, holder, jobs, labels, operations, overview, policies, reports, returns, sessions, telemetry, what_if,
+    wire,
 };
 use crate::service::Service;
 use crate::service::config::Config;
@@ -73,6 +74,7 @@ fn users() -> OpenApiRouter<Arc<Service>> {
         .routes(routes!(what_if::what_if))
         .routes(routes!(advise::advise))
         .routes(routes!(returns::read))
+        .routes(routes!(holder::get))
 }
 
 fn operators() -> OpenApiRouter<Arc<Service>> {

@@ -133,7 +133,8 @@ impl Caller {
         self.revoked.load(Ordering::Relaxed) || self.expires_ms().is_some_and(|expires_ms| expires_ms <= now_ms())
     }
 
-    fn expires_ms(&self) -> Option<i64> {
+    /// When the key ends, in milliseconds since 1970; `None` where that is not set.
+    pub fn expires_ms(&self) -> Option<i64> {
         Some(self.expires_ms.load(Ordering::Relaxed)).filter(|expires_ms| *expires_ms != NEVER)
     }
 

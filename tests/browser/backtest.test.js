@@ -141,7 +141,7 @@ test("falls, years and months of a track record are those of its levels", async 
   assert.deepEqual([places(null, 2, 1)[1], places(["2008", "2009"], 2, 1)[1]], [{ year: "2", part: null }, { year: "2009", part: null }]);
 });
 
-test("axe finds nothing, in light, in dark and at 320 pixels, folds open", async () => {
+test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, folds open", async () => {
   await page.getByText("Ranges, ratios and radii").click();
   await page.getByRole("table", { name: "Estimates with their ranges" }).waitFor();
   await usable(page, () => {});

@@ -190,6 +190,6 @@ test("a long session shows its newest periods, and all where asked", async () =>
   assert.equal(await rows.count(), 301);
 });
 
-test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scrolls sideways", async () => {
+test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {
   await usable(page, () => go());
 });

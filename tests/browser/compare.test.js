@@ -101,7 +101,7 @@ test("on a phone both stand beside each other", async () => {
   assert.ok(wide <= room, `${wide} of ${room}`);
 });
 
-test("axe finds nothing on the pages of two and on the lists, in light, in dark and at 320 pixels", async () => {
+test("axe finds nothing on the pages of two and on the lists, in light, in dark, at 200 % and at 320 pixels", async () => {
   const places = ["#/sessions", "#/policies", `#/compare?policies=${careful},${bold}`, `#/compare?sessions=${one},${other}`];
   await usable(page, go, places);
 });

@@ -106,7 +106,7 @@ test("a strategy has one colour in every chart", async () => {
   assert.notEqual(seen.adaptive[0], seen.plug_in[0]);
 });
 
-test("axe finds nothing, in light, in dark and at 320 pixels, folds open", async () => {
+test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, folds open", async () => {
   await page.getByText("Utility, radii and coverage").click();
   await page.getByRole("table", { name: "Certainty equivalents and utility" }).waitFor();
   await usable(page, () => {});

@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { browser, call, service, trained } from "./ballast.js";
+import { usable } from "./page.js";
 
 test("a session's page asks, and the report is drawn with its sentences and a table for each law", async () => {
   const [ballast, chromium] = await Promise.all([service(), browser()]);
@@ -22,9 +23,12 @@ test("a session's page asks, and the report is drawn with its sentences and a ta
     const shown = await page.locator("main").innerText();
     const plain = (text) => text.replaceAll("\u2212", "-");
     for (const words of report.sentences) assert.ok(plain(shown).includes(plain(words)), words);
+    assert.match(shown, /loses least on average: \d+\.\d{3} % a year/);
+    assert.doesNotMatch(shown, /basis point|premium|\bscale\b/);
     assert.equal(await page.locator("main svg").count(), 3);
     assert.equal(await page.getByRole("table").count(), 3);
     assert.ok(!/undefined|NaN|null/.test(shown), shown);
+    await usable(page, () => {});
     await page.goto(`${ballast.url}/#/jobs`);
     await page.getByRole("link", { name: "See the report" }).click();
     await page.getByRole("heading", { name: /^Frontier of caution/ }).waitFor();

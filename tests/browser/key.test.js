@@ -4,6 +4,7 @@ import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { browser, service } from "./ballast.js";
+import { usable, visitQuiet } from "./page.js";
 
 let ballast, chromium, page, key;
 const faults = [];
@@ -49,6 +50,22 @@ test("with the key the page works, and its streams and files show it too", async
   await page.getByRole("link", { name: "Export" }).click();
   const saved = JSON.parse(await readFile(await (await saving).path(), "utf8"));
   assert.equal(saved.format, "ballast-policy-1");
+});
+
+test("the page says who the key is, and what it may do", async () => {
+  await page.getByRole("link", { name: "Key", exact: true }).click();
+  const words = page.getByText("You are the tenant default");
+  await words.waitFor();
+  const { key: name } = await (await fetch(`${ballast.url}/key`, { headers: { authorization: `Bearer ${key}` } })).json();
+  assert.match(await words.innerText(), new RegExp(`by the key ${name.split("_")[1].slice(0, 10)} \\(read, operate and train\\)\\. You may see what there is, open sessions and report their returns and train policies`));
+  assert.doesNotMatch(await words.innerText(), /audit/);
+  const reader = await ballast.key("read");
+  await page.getByLabel("Key", { exact: true }).fill(reader);
+  while ((await fetch(`${ballast.url}/key`, { headers: { authorization: `Bearer ${reader}` } })).status !== 200) await new Promise((resolve) => setTimeout(resolve, 50));
+  await page.getByRole("button", { name: "Use this key" }).click();
+  await page.getByRole("heading", { level: 1, name: "Overview" }).waitFor();
+  await usable(page, () => visitQuiet(page, `${ballast.url}/#/key`));
+  await page.getByText("and not open sessions and report their returns, nor train policies and compare strategies").waitFor();
 });
 
 test("a key that is given up is gone", async () => {

@@ -102,7 +102,7 @@ test("a key that may not train is told so without an editor springing open", asy
 test("a session that is not there leads back to the list", async () => {
   await go("#/sessions/session_of_nobody");
   await page.getByRole("link", { name: "See the sessions" }).click();
-  await page.getByRole("heading", { level: 1, name: "Sessions" }).waitFor();
+  await page.getByRole("heading", { level: 1, name: "Overview" }).waitFor();
 });
 
 test("a service that stopped answering is said to have, and heard again", async () => {
@@ -119,10 +119,10 @@ test("a service that stopped answering is said to have, and heard again", async 
 
 test("a visit starts at the sessions", async () => {
   await go("");
-  assert.equal(await page.locator("h1").innerText(), "Sessions");
+  assert.equal(await page.locator("h1").innerText(), "Overview");
 });
 
-test("axe finds nothing on the form and on the policy, in light, in dark and at 320 pixels", async () => {
+test("axe finds nothing on the form and on the policy, in light, in dark, at 200 % and at 320 pixels", async () => {
   const places = ["#/train", `#/train?newer=${policy}`, `#/policies/${policy}`];
   await usable(page, async (hash) => {
     await go(hash);

@@ -145,6 +145,6 @@ test("what needs care is told where it is so", async () => {
   for (const name of NAMES) assert.doesNotMatch((await cells(name))[6], /changed|Due/);
 });
 
-test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scrolls sideways", async () => {
+test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {
   await usable(page, go);
 });

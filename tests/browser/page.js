@@ -5,7 +5,13 @@ import { readFile } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
 
 const AXE = fileURLToPath(new URL("node_modules/axe-core/axe.min.js", import.meta.url));
-const LOOKS = [["light", 1280], ["dark", 1280], ["light", 320]];
+/** The last but one is a screen of 1280 by 800 at 200 %. */
+const LOOKS = [
+  { colorScheme: "light", width: 1280, height: 900 },
+  { colorScheme: "dark", width: 1280, height: 900 },
+  { colorScheme: "light", width: 640, height: 400, deviceScaleFactor: 2 },
+  { colorScheme: "light", width: 320, height: 900 },
+];
 
 /** A text with common spaces and hyphens. */
 export const plain = (text) => text.replaceAll("\u202f", " ").replaceAll("\u2212", "-");
@@ -32,16 +38,21 @@ export async function accessible(page, where) {
   assert.ok(passes.length > 10);
 }
 
-/** In light, in dark and at 320 pixels, each opened by `open`: that axe finds nothing and that nothing scrolls sideways. */
+/** In light, in dark, at 200 % and at 320 pixels, each opened by `open`: that axe finds nothing and that nothing scrolls sideways. */
 export async function usable(page, open, places = [""]) {
-  for (const [colorScheme, width] of LOOKS) {
+  for (const { colorScheme, width, height, deviceScaleFactor = 1 } of LOOKS) {
     await page.emulateMedia({ colorScheme });
-    await page.setViewportSize({ width, height: 900 });
+    await page.setViewportSize({ width, height });
+    const zoom = deviceScaleFactor === 1 ? null : await page.context().newCDPSession(page);
+    await zoom?.send("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor, mobile: false });
     for (const place of places) {
       await open(place);
       const where = `${place} in ${colorScheme} at ${width}`;
+      assert.equal(await page.evaluate(() => devicePixelRatio), deviceScaleFactor, where);
       await accessible(page, where);
       assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0, where);
     }
+    await zoom?.send("Emulation.clearDeviceMetricsOverride");
+    await zoom?.detach();
   }
 }

@@ -110,7 +110,7 @@ test("those ticked get one return, and an answer that is lost is asked for again
   for (const index of [2, 3]) assert.equal((await observed(index)).length, 1);
 });
 
-test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scrolls sideways", async () => {
+test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {
   await usable(page, async () => {
     await go("#/report");
     await lines().fill("Ada 500\nNobody 2");

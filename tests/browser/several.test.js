@@ -263,7 +263,7 @@ test("the form is filled from a policy of several by its assets, and trains the 
   }
 });
 
-test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scrolls sideways", async () => {
+test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {
   const { policy } = await call(ballast.url, `/sessions/${session}`);
   ({ session } = await call(ballast.url, "/sessions", { policy }));
   await call(ballast.url, "/observe", { session, period: 1, simple_returns: { World: 0.01, "Bonds A/B": 0, Gold: 0.01 } });

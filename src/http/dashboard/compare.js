@@ -15,6 +15,6 @@ export async function view(query, leaving) {
     const lists = Object.keys(KINDS).map((name, index) => [index > 0 ? " or of the " : "", h("a", { href: `#/${name}` }, name)]);
     return { title: "Compare two", body: h("p", { class: "lead" }, "Tick two rows of the ", lists, ".") };
   }
-  const trail = h("p", { class: "trail" }, h("a", { href: `#/${kind}` }, kind === "policies" ? "Policies" : "Sessions"));
+  const trail = h("p", { class: "trail" }, h("a", { href: `#/${kind}` }, kind === "policies" ? "Policies" : "Overview"));
   return { title: kind === "policies" ? "Two policies" : "Two sessions", trail, body: await KINDS[kind](ids, leaving) };
 }

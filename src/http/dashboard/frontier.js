@@ -34,16 +34,17 @@ const scaled = (scale) => ({ 0: "No caution", 1: "This caution" })[scale] ?? `${
 
 /** One law: what each scale loses, and how much that varies. */
 function drawn({ own, per_year }, { bootstrap, best, points: scales }) {
+  const title = TITLES[bootstrap.kind](bootstrap);
   const total = (shares) => shares.reduce((sum, share) => sum + share, 0);
   const lost = `Lost ${per_year ? "a year" : "a period"}, %`;
   const rows = scales.map((point, index) => ({ ...point, name: scaled(point.scale), own: total(own[index]) }));
   const number = (name, cell) => ({ name, numeric: true, cell });
   return section(
-    TITLES[bootstrap.kind](bootstrap),
+    title,
     h("p", { class: "note" }, `Who knows this market holds ${percent(total(best))}.`),
     intervalChart({ title: lost, noun: "Caution", rows: rows.map(({ name, lost }) => ({ name, ...lost })), format: inPercent, tick: (value, step) => tick(value / 100, step / 100) }),
     table(
-      `${lost}, at each multiple of the caution`,
+      `${title}: ${lost.toLowerCase()}, at each multiple of the caution`,
       [
         { name: "Caution", cell: ({ name }) => name },
         number("Lost on average", ({ lost }) => inPercent(lost.value)),

@@ -9,6 +9,7 @@ import * as evaluation from "./evaluation.js";
 import * as evaluationAsking from "./evaluation_asking.js";
 import * as evaluations from "./evaluations.js";
 import * as frontier from "./frontier.js";
+import { holderWords } from "./holder.js";
 import * as jobs from "./jobs.js";
 import { held, keyForm } from "./key.js";
 import * as policies from "./policies.js";
@@ -78,9 +79,9 @@ async function show() {
 }
 
 /** Where a key is typed in, or given up. */
-function key() {
+async function key(_, signal) {
   const note = "A service that asks for keys shows nothing without one. This tab alone keeps it, until it is closed.";
-  return { title: "Key", body: [h("p", {}, note), keyForm(() => location.assign("#/"))] };
+  return { title: "Key", body: [await holderWords(signal), h("p", {}, note), keyForm(() => location.assign("#/"))] };
 }
 
 const capital = (sentence) => `${sentence[0].toUpperCase()}${sentence.slice(1)}`;

@@ -18,7 +18,7 @@ export async function view(query, leaving) {
   const sessions = await all("/sessions", "sessions", leaving);
   const asked = (new URLSearchParams(query ?? "").get("sessions") ?? "").split(",");
   const chosen = sessions.filter(({ session }) => asked.includes(session));
-  const trail = h("p", { class: "trail" }, h("a", { href: "#/" }, "Sessions"));
+  const trail = h("p", { class: "trail" }, h("a", { href: "#/" }, "Overview"));
   return { title: "Report for several", trail, body: reporting(sessions, chosen) };
 }
 

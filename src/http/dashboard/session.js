@@ -51,7 +51,7 @@ export async function view(id, leaving) {
   const trail = h(
     "p",
     { class: "trail" },
-    h("a", { href: "#/sessions" }, "Sessions"),
+    h("a", { href: "#/sessions" }, "Overview"),
     " \u203a ",
     h("a", { href: `#/policies/${session.policy}` }, titled("Policy", session.policy, policy.name)),
     `, ${utility(policy.specification.problem.utility)}`,

@@ -12,7 +12,7 @@ import { returnsField } from "./returns_field.js";
 export async function view(query, leaving) {
   const policies = await all("/policies", "policies", leaving);
   const asked = new URLSearchParams(query ?? "").get("policy");
-  const trail = h("p", { class: "trail" }, h("a", { href: "#/sessions" }, "Sessions"));
+  const trail = h("p", { class: "trail" }, h("a", { href: "#/sessions" }, "Overview"));
   const none = h("p", {}, "A session needs a policy first. ", h("a", { href: "#/train" }, "Train one"), ".");
   return { title: "Open a session", trail, body: policies.length > 0 ? opening(policies, asked, leaving) : none };
 }

@@ -5,6 +5,7 @@ import { get } from "./api.js";
 import { h, table } from "./dom.js";
 import { input, select } from "./form.js";
 import { allocation, count, counted, moment, percent, wealth } from "./format.js";
+import { holderWords } from "./holder.js";
 import { jobList } from "./jobs.js";
 import { called, headed, tagList } from "./naming.js";
 import { day, daysLate, isoDay, nextDay } from "./periods.js";
@@ -27,11 +28,12 @@ export async function view(_, leaving) {
   const several = h("a", { class: "button quiet", href: "#/report" }, "Report for several");
   const actions = h("div", { class: "actions" }, several, h("a", { class: "button", href: "#/sessions/new" }, "Open a session"));
   const first = await read(chosen, null, leaving);
-  const title = "Sessions";
+  const title = "Overview";
   if (first.total === 0 && !filtered(chosen)) {
     const [{ policies }, { jobs }] = await Promise.all(["/policies?limit=1", "/jobs?limit=1"].map((path) => get(path, leaving)));
-    if (policies.length > 0) return { title, actions, body: lead() };
-    return { title, body: jobs.length > 0 ? [lead(), jobList(jobs, leaving).element] : welcome() };
+    const who = await holderWords(leaving);
+    if (policies.length > 0) return { title, actions, body: [lead(), who] };
+    return { title, body: [...(jobs.length > 0 ? [lead(), jobList(jobs, leaving).element] : [welcome()]), who] };
   }
   return { title, actions, body: overview(chosen, first, leaving) };
 }

@@ -395,6 +395,19 @@ JobKind: TypeAlias = Literal["train", "evaluate", "backtest", "frontier"]
 JobState: TypeAlias = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 
 
+class KeyHolder(TypedDict):
+    """Who a call is answered to."""
+
+    key: NotRequired[str | None]
+    """The key's name, which is no secret; null where the store asks for none."""
+    tenant: str
+    """Whose jobs, policies and sessions are answered."""
+    roles: list[str]
+    """What the holder may do: `read`, `operate`, `train`, `admin`. Who is an admin may do all of them."""
+    expires_ms: NotRequired[int | None]
+    """When the key ends, in milliseconds since 1970; null where that is not set."""
+
+
 Kind: TypeAlias = Literal["simple", "log", "price"]
 """What the numbers are."""
 

@@ -11,26 +11,58 @@ pub(super) fn sentences(resampled: &[Resampled], evidence: f64, per_year: bool) 
     sentences.extend(resampled.first().map(|first| of_own_mix(first, per_year)));
     let behind = if evidence < 0.0 { "below" } else { "above" };
     let errors = evidence.abs();
-    let told = if errors < TOLD { "the record cannot tell it from none" } else { "the record tells it from none" };
+    let told = if errors < TOLD { "that may be chance" } else { "that is hardly chance" };
     sentences.push(format!(
-        "The mean return of the record lies {errors:.1} standard errors {behind} the bank's: {told}. The first two figures are of laws with that mean, the third of one with the mean of the bank; which is true the record says no better than that."
+        "The average return of the record lies {behind} the bank's by {errors:.1} standard errors: {told}. The first two figures are of markets with that average, the third of one with the bank's; which is true the record says no better than that."
     ));
     sentences.push(
-        "A scale that did best in the past says next to nothing about the future: choose by how much loss from record to record you can bear."
+        "What did best on such records says next to nothing about the future: choose by how much loss from record to record you can bear."
             .to_owned(),
     );
     sentences
 }
 
+/// What comes in basis points, in percent.
+fn percent(basis_points: f64) -> String {
+    format!("{:.3} %", basis_points / 100.0)
+}
+
+/// A multiple of the caution asked for, within a sentence.
+fn caution(scale: f64) -> String {
+    match scale {
+        0.0 => "no caution".to_owned(),
+        1.0 => "this caution".to_owned(),
+        scale => format!("{scale} times this caution"),
+    }
+}
+
+/// Several names, as a sentence lists them.
+fn listed(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [only] => only.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// The same at the start of a sentence.
+fn opening(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
 /// What following each record earned beside holding what is advised on average.
 fn of_own_mix(resampled: &Resampled, per_year: bool) -> String {
     let per = if per_year { "a year" } else { "a period" };
-    let lost = resampled.points.iter().map(|point| format!("{:.1}", (-point.beyond_own_mix.value).max(0.0)));
-    let scales = resampled.points.iter().map(|point| point.scale.to_string());
+    let lost = |beyond: f64| percent((-beyond).max(0.0));
+    let each: Vec<String> = resampled
+        .points
+        .iter()
+        .map(|point| format!("{} with {}", lost(point.beyond_own_mix.value), caution(point.scale)))
+        .collect();
     format!(
-        "While the law stays as it is, an allocation that follows the record earns nothing beyond a constant mix of its own average: at scales {} it is {} basis points {per} behind on the first records.",
-        scales.collect::<Vec<_>>().join(", "),
-        lost.collect::<Vec<_>>().join(", ")
+        "While the market stays as it is, following the record earns nothing beyond holding the average of what it advises: on the first records it loses {per} {}.",
+        listed(&each)
     )
 }
 
@@ -43,20 +75,23 @@ fn of_one(resampled: &Resampled, per_year: bool) -> Option<String> {
     let records = match resampled.bootstrap {
         Bootstrap::Smoothed { .. } => "On records drawn from the smoothed returns".to_owned(),
         Bootstrap::Block { length } => format!("On records of blocks of {length} periods"),
-        Bootstrap::WithoutPremium { .. } => "Were there no premium,".to_owned(),
+        Bootstrap::WithoutPremium { .. } => "Were the market to pay no more than the bank,".to_owned(),
     };
     let alike: Vec<String> = resampled
         .points
         .iter()
         .filter(|point| point.beyond_least.is_some_and(|beyond| beyond.low <= 0.0))
-        .map(|point| point.scale.to_string())
+        .map(|point| caution(point.scale))
         .collect();
     let alike = match alike.as_slice() {
         [] => String::new(),
-        alike => format!("; {} cannot be told apart from it", alike.join(", ")),
+        alike => format!("; {} cannot be told apart from it", listed(alike)),
     };
     Some(format!(
-        "{records} scale {} loses least on average: {:.1} basis points {per}{alike}. Scale {} varies least from record to record, by {:.1}.",
-        least.scale, least.lost.value, steadiest.scale, steadiest.deviation.value
+        "{records} {} loses least on average: {} {per}{alike}. {} varies least from record to record, by {}.",
+        caution(least.scale),
+        percent(least.lost.value),
+        opening(&caution(steadiest.scale)),
+        percent(steadiest.deviation.value)
     ))
 }

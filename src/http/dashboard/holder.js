@@ -1,0 +1,36 @@
+// Who the key in use makes of the person before the page, in words.
+
+import { get } from "./api.js";
+import { h } from "./dom.js";
+import { moment, short } from "./format.js";
+
+/** What each role may do; an admin all of it. */
+const ROLES = {
+  read: "see what there is",
+  operate: "open sessions and report their returns",
+  train: "train policies and compare strategies",
+  admin: "see the audit, and the service\u2019s figures over all tenants",
+};
+
+const listed = (words) => words.join(", ").replace(/, (?=[^,]*$)/, " and ");
+
+/** A sentence or two, where the service says; nothing where it does not. */
+export async function holderWords(signal) {
+  const holder = await get("/key", signal).catch(() => null);
+  if (holder === null) return "";
+  const { key, tenant, roles, expires_ms } = holder;
+  const whose = h("b", {}, tenant);
+  if (key === null)
+    return h("p", { class: "note" }, "This service asks for no key: whoever reaches it may do everything, as the tenant ", whose, ".");
+  const may = Object.keys(ROLES).filter((role) => roles.includes(role));
+  const missing = Object.keys(ROLES).filter((role) => role !== "admin" && !roles.includes(role));
+  return h(
+    "p",
+    { class: "note" },
+    "You are the tenant ",
+    whose,
+    `, by the key ${short(key)} (${listed(may)}). You may ${listed(may.map((role) => ROLES[role]))}${missing.length > 0 ? `, and not ${missing.map((role) => ROLES[role]).join(", nor ")}` : ""}.`,
+    expires_ms === null ? "" : ` The key ends on ${moment(expires_ms)}.`,
+    " What other tenants have does not show.",
+  );
+}
