@@ -68,7 +68,7 @@ test("a policy is named in place, and a session by it is opened under a name", a
 
 test("the name is said in the trail, the lists and beside another, with the identifier behind it", async () => {
   await go(`#/sessions/${session}`);
-  assert.match(await page.locator(".trail").innerText(), /^Sessions \u203a Careful,/);
+  assert.match(await page.locator(".trail").innerText(), /^Overview \u203a Careful,/);
   assert.match(await page.locator(".labels").innerText(), new RegExp(`Session ${short(session)}\\s+pension\\s+Edit`));
   for (const [hash, name, id] of [["#/", "Ada", session], ["#/policies", "Careful", policy]]) {
     await go(hash);
@@ -99,7 +99,30 @@ test("a name is taken away, and what was typed is left", async () => {
   assert.deepEqual([name, tags], ["", ["pension"]]);
 });
 
-test("axe finds nothing, in light, in dark and at 320 pixels, and nothing scrolls sideways", async () => {
+test("what is changed goes out alone, and a tag with a comma stays whole", async () => {
+  const labelled = (body) => fetch(`${ballast.url}/sessions/${session}`, { method: "PATCH", headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
+  await labelled({ name: "Ada", tags: ["Leeds, UK", 'the "old"', '"first'] });
+  await go(`#/sessions/${session}`);
+  await page.getByRole("button", { name: "Edit" }).click();
+  assert.equal(await page.getByLabel("Tags").inputValue(), '"Leeds, UK", the "old", """first"');
+  // Somebody else writes notes meanwhile.
+  await labelled({ notes: "Reports by post." });
+  await page.getByLabel("Tags").fill('"Leeds, UK", the "old", """first", monthly');
+  const sent = page.waitForRequest((request) => request.method() === "PATCH");
+  await page.getByRole("button", { name: "Save", exact: true }).click();
+  assert.deepEqual((await sent).postDataJSON(), { tags: ["Leeds, UK", 'the "old"', '"first', "monthly"] });
+  await page.getByText("Reports by post.").waitFor();
+  const { name, notes } = await call(ballast.url, `/sessions/${session}`);
+  assert.deepEqual([name, notes], ["Ada", "Reports by post."]);
+  const patches = [];
+  page.on("request", (request) => request.method() === "PATCH" && patches.push(request.url()));
+  await page.getByRole("button", { name: "Edit" }).click();
+  await page.getByRole("button", { name: "Save", exact: true }).click();
+  await page.getByRole("button", { name: "Edit" }).waitFor();
+  assert.deepEqual(patches, []);
+});
+
+test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {
   const places = [`#/sessions/${session}`, `#/policies/${policy}`, "#/sessions/new", "#/train"];
   await usable(page, async (hash) => {
     await go(hash);

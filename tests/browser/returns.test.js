@@ -158,3 +158,23 @@ test("what is asked, read and refused breaks no rule of accessibility", async ()
     await accessible(page, text);
   }
 });
+
+test("a long text is read once its field is left, and not at every pause", async () => {
+  const rows = Array.from({ length: 4000 }, (_, k) => (1.5 * Math.sin(1.7 * k)).toFixed(9).padEnd(60));
+  assert.ok(rows.join("\n").length > 200_000);
+  await chosen("long.csv", rows.join("\n"));
+  await note().getByText("4000 simple returns in percent").waitFor();
+  const asked = [];
+  page.on("request", (request) => request.url().endsWith("/returns") && asked.push(request.url()));
+  await area().press("Control+End");
+  await page.keyboard.type("\n0.5");
+  await note().getByText("It is read once you leave the field.").waitFor();
+  assert.deepEqual(await history(), []);
+  await page.waitForTimeout(600);
+  assert.deepEqual(asked, []);
+  await page.keyboard.press("Tab");
+  await note().getByText("4001 simple returns in percent").waitFor();
+  assert.equal(asked.length, 1);
+  await area().fill("1.5 -2 3");
+  await note().getByText("3 simple returns in percent").waitFor();
+});

@@ -27,6 +27,15 @@ export function policyLink(id, asked = true) {
 
 export const tagList = (tags) => (tags.length > 0 ? h("span", { class: "tags" }, tags.map((tag) => h("span", { class: "tag" }, tag))) : null);
 
+/** The tags in a text, apart by commas; what stands in quotes is one tag, a quote in it doubled. */
+export const tagsOf = (text) =>
+  [...text.matchAll(/\s*(?:"((?:[^"]|"")*)"\s*|([^,]*))(?:,|$)/g)]
+    .map(([, whole, plain]) => (whole === undefined ? plain : whole.replaceAll('""', '"')).trim())
+    .filter(Boolean);
+
+/** A tag as it is typed. */
+const quoted = (tag) => (/^"|,/.test(tag) ? `"${tag.replaceAll('"', '""')}"` : tag);
+
 const CLEARED = { name: "", notes: "", tags: [] };
 
 /** `{parts, read(), show(labels)}`: the fields of what a thing is called. `read()` gives those that are not blank, or with `{all: true}` all
@@ -34,19 +43,19 @@ const CLEARED = { name: "", notes: "", tags: [] };
 export function labelFields({ within, changed } = {}) {
   const text = { within, inputmode: "text", changed };
   const name = input({ ...text, name: "name", label: "Name", note: "What it is called. May be blank." });
-  const tags = input({ ...text, name: "tags", label: "Tags", note: "To find it by, apart by commas. May be blank." });
+  const tags = input({ ...text, name: "tags", label: "Tags", note: "To find it by, apart by commas; one that has a comma in quotes. May be blank." });
   const notes = area({ within, changed, name: "notes", label: "Notes", note: "May be blank." });
   const read = ({ all = false } = {}) => {
     const said = {
       name: name.control.value.trim(),
       notes: notes.control.value.trim(),
-      tags: tags.control.value.split(",").map((tag) => tag.trim()).filter(Boolean),
+      tags: tagsOf(tags.control.value),
     };
     return Object.fromEntries(Object.entries(said).filter(([, value]) => all || value.length > 0));
   };
   const show = (labels) => {
     const given = { ...CLEARED, ...labels };
-    for (const [field, value] of [[name, given.name], [notes, given.notes], [tags, [given.tags].flat().join(", ")]])
+    for (const [field, value] of [[name, given.name], [notes, given.notes], [tags, [given.tags].flat().map(quoted).join(", ")]])
       if (field.control !== document.activeElement) field.control.value = value ?? "";
   };
   return { name, tags, notes, parts: [name, tags, notes], read, show };
@@ -64,6 +73,7 @@ export function labelled(noun, path, id, labels) {
   const change = () => {
     const fields = labelFields({ within: "label-" });
     fields.show(labels);
+    const before = fields.read({ all: true });
     const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
     const save = h("button", { type: "submit" }, "Save");
     const leave = h("button", { type: "button", class: "quiet", onclick: () => rest().focus() }, "Leave as it was");
@@ -72,7 +82,8 @@ export function labelled(noun, path, id, labels) {
       event.preventDefault();
       save.disabled = true;
       try {
-        labels = await patch(path, fields.read({ all: true }));
+        const edited = Object.entries(fields.read({ all: true })).filter(([name, value]) => JSON.stringify(value) !== JSON.stringify(before[name]));
+        if (edited.length > 0) labels = await patch(path, Object.fromEntries(edited));
         const title = titled(noun, id, labels.name);
         document.querySelector("h1").textContent = title;
         document.title = `${title} \u00b7 Ballast`;

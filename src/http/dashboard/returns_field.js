@@ -11,6 +11,8 @@ const UNITS = { percent: "Percent (1.2)", fraction: "Fractions (0.012)" };
 const ORDERS = { false: "The oldest", true: "The newest" };
 /** Numbers are not judged while they are being typed, for so long, in milliseconds. */
 const PAUSE = 300;
+/** A longer text, in letters, is judged when its field is left. */
+const LONG = 200_000;
 /** The service takes no longer history, and a chart shows no more. */
 const MOST = 20_000;
 /** Months of the US stock market. */
@@ -35,7 +37,7 @@ export function returnsField({ name, label, blank = null, example = null, severa
   area.dataset.described = `${id}-note`;
   const note = h("p", { class: "note", id: `${id}-note`, role: "status", tabindex: -1 });
   const asked = h("div", { class: "asked" });
-  let [said, answer, pending, reading, asking] = [{}, null, 0, Promise.resolve(), new AbortController()];
+  let [said, answer, pending, reading, asking, stale] = [{}, null, 0, Promise.resolve(), new AbortController(), false];
   const tell = (outcome, sentence) => {
     note.classList.toggle("wrong", outcome === "refused");
     note.classList.toggle("telling", outcome === "read" || outcome === "asked");
@@ -64,10 +66,17 @@ export function returnsField({ name, label, blank = null, example = null, severa
   };
   const take = () => {
     clearTimeout(pending);
-    pending = 0;
+    stale = false;
     changed([], null);
     reading = judge().then(() => answer?.outcome === "read" && changed(answer.series, answer));
     return reading;
+  };
+  const wait = () => {
+    asking.abort();
+    answer = null;
+    changed([], null);
+    asked.replaceChildren();
+    tell("nothing", "It is read once you leave the field.");
   };
   const say = (more) => {
     for (const name of Object.keys(more)) for (const after of FOLLOWS[name] ?? []) delete said[after];
@@ -85,11 +94,14 @@ export function returnsField({ name, label, blank = null, example = null, severa
   };
   area.addEventListener("input", (event) => {
     clearTimeout(pending);
-    if (isTyping(event)) pending = setTimeout(take, PAUSE);
-    else open(area.value);
+    if (!isTyping(event)) return open(area.value);
+    stale = true;
+    if (area.value.length <= LONG) pending = setTimeout(take, PAUSE);
+    else wait();
   });
+  area.addEventListener("change", () => stale && take());
   const trouble = async () => {
-    await (pending ? take() : reading);
+    await (stale ? take() : reading);
     if (answer?.outcome === "read") return null;
     if (answer === null) return blank ? null : "Returns are needed: paste them, or choose a file.";
     return answer.outcome === "asked" ? `To be answered first: ${words(answer)}` : words(answer);
