@@ -99,6 +99,7 @@ export function trainFields(changed) {
     choices: COMPOSITIONS,
     changed: (value) => changed(COMPOSITION, value),
   });
+  composition.element.classList.add("broad");
   const halfLife = input({
     name: HALF_LIFE,
     label: "Half-life of returns",

@@ -1,0 +1,65 @@
+// A session of 500 periods: its page stands within a second, and stays short.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { browser, call, service, trained } from "./ballast.js";
+import { usable, visitQuiet } from "./page.js";
+
+const PERIODS = 500;
+/** From the address until the last part of the page stands, in milliseconds; what other programs do, only some rounds wait for. */
+const DRAWN = 1000;
+const ROUNDS = 20;
+
+let ballast, chromium, page, session;
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  page.setDefaultTimeout(20_000);
+  const history = Array.from({ length: 40 }, (_, k) => 0.005 + 0.04 * Math.sin(1.7 * k));
+  // One that rolls needs no horizon of 500 periods to be trained.
+  const problem = { horizon: 2, rate_per_step: 0.001, periods_per_year: 252, history, learning: { kind: "decay", half_life: 4 }, radius: { rule: "bridge", alpha: 0.5, scale: 0.1 } };
+  const policy = await trained(ballast.url, { problem, design: { count: 20, initial_laws: "resampled" } });
+  ({ session } = await call(ballast.url, "/sessions", { policy, rolling: true }));
+  const first = Date.UTC(2020, 0, 1);
+  for (let period = 1; period <= PERIODS; period++) {
+    const date = new Date(first + 86_400_000 * period).toISOString().slice(0, 10);
+    await call(ballast.url, "/observe", { session, period, simple_return: 0.01 * Math.sin(3 * period), date });
+  }
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+const address = () => `${ballast.url}/#/sessions/${session}`;
+
+test("the page stands within a second", async (t) => {
+  const rounds = [];
+  while (rounds.length < ROUNDS && !(Math.min(...rounds) < DRAWN)) {
+    await page.goto("about:blank");
+    await page.goto(address());
+    rounds.push(await page.evaluate(async () => {
+      const stands = () => document.querySelector("#h-periods-so-far") && document.querySelectorAll("main svg path.line").length >= 4;
+      while (!stands()) await new Promise(requestAnimationFrame);
+      return performance.now();
+    }));
+    t.diagnostic(`${rounds.at(-1).toFixed(0)} ms`);
+  }
+  assert.ok(Math.min(...rounds) < DRAWN, `it stood after ${rounds} ms`);
+});
+
+test("its newest periods stand, and all where they are asked for, with no chart of stripes", async () => {
+  await visitQuiet(page, address());
+  const rows = page.getByRole("table", { name: "Observed periods, newest first" }).locator("tbody tr");
+  assert.equal(await rows.count(), 24);
+  assert.ok((await page.evaluate(() => document.documentElement.scrollHeight)) < 6000);
+  assert.equal(await page.locator("main .plot rect.bar").count(), 0);
+  await page.getByRole("button", { name: `Show all ${PERIODS}` }).click();
+  assert.equal(await rows.count(), PERIODS);
+});
+
+test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {
+  await usable(page, () => visitQuiet(page, address()));
+});
