@@ -84,7 +84,9 @@ function times({ dates, periods_per_year, periods }) {
   const step = length > 1 ? (last - first) / (length - 1) : 1;
   const values = Array.from({ length: length + 1 }, (_, k) => first + k * step);
   const name = (period) => (dates ? dated(dates[period - 1]) : `period ${count(period)}`);
-  return { values, name, after: (k) => (k === 0 ? "At the start" : `${dates ? "" : "After "}${name(k)}`) };
+  const index = (value) => Math.round((value - first) / step);
+  const during = (value) => name(1 + index(value));
+  return { values, index, name, during: { format: during, here: during }, after: (k) => (k === 0 ? "At the start" : `${dates ? "" : "After "}${name(k)}`) };
 }
 
 /** The start of a day, a month or a year, counted in years. */
@@ -192,13 +194,11 @@ const beside = (told, line) => [line, ...KNOWN.map((name) => known(told, name)).
 
 function course(told, line) {
   const { times } = told;
-  const x = { values: times.values, label: "Period", format: (_, index) => index, here: null, tick: String, whole: true };
-  const at = (value) => times.after(times.values.indexOf(value));
-  Object.assign(x, { format: at, here: at });
+  const at = (value) => times.after(times.index(value));
+  const x = { values: times.values, label: "Period", format: at, here: at, tick: String, whole: true };
   const drawn = (one, values) => ({ name: one.name, colour: one.colour, kind: "line", bare: true, values });
   const gutter = 64;
   const stocks = known(told, "all-stock");
-  const held = (one) => [...one.periods.allocation, null];
   return [
     lineChart({ title: `Wealth from ${START}, equal ratios alike`, gutter, height: 250, x, y: { format: wealth, tick, log: true }, series: beside(told, line).map((one) => drawn(one, one.wealth)) }),
     lineChart({
@@ -213,9 +213,9 @@ function course(told, line) {
       title: "Share held in stocks",
       gutter,
       height: 130,
-      x: { ...x, here: (value) => times.name(1 + times.values.indexOf(value)), format: (value) => times.name(1 + times.values.indexOf(value)) },
+      x: { ...x, ...times.during },
       y: { format: allocation, tick: percentTick, also: [0, 0.1] },
-      series: [drawn(line, held(line))],
+      series: [drawn(line, [...line.periods.allocation, null])],
     }),
   ];
 }
@@ -317,7 +317,7 @@ function quant(told) {
       guarding.length > 0
         ? lineChart({
             title: "Radius",
-            x: { values: times.values.slice(0, -1), label: "Period", format: (value) => times.name(1 + times.values.indexOf(value)), here: (value) => times.name(1 + times.values.indexOf(value)), tick: String, whole: true },
+            x: { values: times.values.slice(0, -1), label: "Period", ...times.during, tick: String, whole: true },
             y: { format: (value) => figures(value, 3), tick, also: [0] },
             series: guarding.map(({ name, colour, periods }) => ({ name, colour, kind: "line", bare: true, values: periods.radius })),
           })
