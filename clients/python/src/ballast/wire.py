@@ -261,6 +261,18 @@ class Estimate(TypedDict):
 ConstantMix: TypeAlias = float
 
 
+class ExpectedError(TypedDict):
+    """
+    Root mean square errors of the value that a step serves, over the design's own law of its states, in basis points of the
+    certainty equivalent.
+    """
+
+    own: float
+    """Of the surrogate of the step alone."""
+    total: float
+    """With those of the steps after it, as errors that are independent of each other add up."""
+
+
 Explain: TypeAlias = Literal["worst_case"]
 
 
@@ -1243,8 +1255,14 @@ class CoverageAtSize(TypedDict):
 class DesignSpecification(TypedDict):
     """Which states the surrogates are trained on."""
 
+    accuracy: NotRequired[float | None]
+    """
+    Basis points of the certainty equivalent by which the value served may be off, as a root mean square over the states of a
+    step, the errors of the steps after it included. Design points are added until fresh states say that it is reached.
+    Default 0.5 where there is no `count`; where the state is wealth alone, `count` decides.
+    """
     count: NotRequired[int | None]
-    """Design points per step, N. Default 1000; 200 where the state is wealth alone."""
+    """Design points per step, N; with an `accuracy`, at most. Default 1000; 200 where the state is wealth alone."""
     initial_laws: NotRequired[InitialLaws]
     """Where the empirical laws of the design start."""
     sampling_law: NotRequired[SamplingLaw | None]
@@ -1538,6 +1556,7 @@ class StepDiagnostics(TypedDict):
     Largest difference between the primal and the dual value of a robust step, in log certainty equivalent; 0 in the
     parametric frameworks, whose step has no dual.
     """
+    expected_error: NotRequired[ExpectedError | None]
     value: NotRequired[SurrogateDiagnostics | None]
     policy: NotRequired[SurrogateDiagnostics | None]
 
