@@ -1,16 +1,19 @@
 //! The one-step problem of several assets: against direct solutions, one asset, and laws of its own ball.
 
 use ballast::control::assets::{AssetsLaw, AssetsSolution, AssetsStep};
+use ballast::control::policy::advisor::Advisor;
 use ballast::control::problem::actions::ActionInterval;
 use ballast::control::problem::utility::RelativeUtility;
-use ballast::control::request::specification::UtilitySpecification;
+use ballast::control::progress::Watch;
+use ballast::control::request::specification::{Specification, UtilitySpecification};
+use ballast::control::training::Training;
 use ballast::numerics::bridge::Quantile;
-use ballast::numerics::fund_bridges::FundBridges;
+use ballast::numerics::fund_bridges::{FundBridges, fund_returns};
 use ballast::numerics::levelling::{Ground, inverse_volatility};
 use ballast::numerics::streams::stream;
 use ballast::numerics::wasserstein::WassersteinBall;
 use rand::RngExt;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// A hundredth of a percent.
 const BP: f64 = 1e-4;
@@ -127,6 +130,36 @@ fn identical_columns_are_one_asset() {
         }
     }
     assert_eq!(checked, 72 * 4);
+}
+
+/// The law of a static framework is the same in every period, and under power and log utility nothing else of the past counts: with
+/// T - t periods left the policy of the best fund promises T - t times what one step gains.
+#[test]
+fn a_static_policy_promises_the_gain_of_one_step_for_every_period_left() {
+    const HORIZON: usize = 6;
+    let returns = sample(3, 60, 4);
+    for (utility, relative) in
+        [(json!({ "kind": "power", "risk_aversion": 3.0 }), POWER), (json!({ "kind": "log" }), RelativeUtility::Log)]
+    {
+        let solution = without_floor(&returns, &Ground::Sup, relative, 0.003).solve(None);
+        certified(&solution);
+        let total: f64 = solution.allocation.iter().sum();
+        assert!(solution.value > BP && total < 1.0, "{solution:?}");
+        let fund: Vec<f64> = solution.allocation.iter().map(|share| share / total).collect();
+        let specification: Specification = serde_json::from_value(json!({ "problem": { "framework": "static",
+            "horizon": HORIZON, "rate_per_step": 0.002, "utility": utility, "history": fund_returns(&returns, &fund),
+            "radius": { "rule": "fixed", "radius": 0.003 } } }))
+        .unwrap();
+        let advisor = Advisor::new(Training::new(&specification).unwrap().run(&Watch::unwatched()).unwrap());
+        let lived = [0.03, -0.08, 0.01, 0.0, 0.05, -0.02];
+        let promised = advisor.walk(advisor.initial_state(None, None).unwrap(), &lived);
+        let promised: Vec<f64> = promised.map(|advice| (advice.certainty_equivalent / advice.floor).ln()).collect();
+        assert_eq!(promised.len(), HORIZON);
+        for (step, gained) in promised.iter().enumerate() {
+            let expected = (HORIZON - step) as f64 * solution.value;
+            assert!((gained - expected).abs() < 0.01 * BP, "{step}: {} {}", gained / BP, expected / BP);
+        }
+    }
 }
 
 #[test]
