@@ -170,3 +170,83 @@ async fn what_may_be_a_mistake_is_said() {
     assert!(told("message").iter().zip(told("field")).all(|(message, field)| message.starts_with(&field)), "{job}");
     app.cancel(job["job"].as_str().unwrap()).await;
 }
+
+/// 1/N by hand, with what trading costs; what the others hold is by name, within the whole.
+#[test]
+fn a_file_of_several_assets_is_walked_by_the_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let (risky, bank, dates) = record(28);
+    let other = |quarter: usize| 0.015 + 0.02 * (2.9 * quarter as f64).cos();
+    let row = |index: usize| format!("{},{},{},{}\n", dates[index], risky[index], other(index), bank[index]);
+    let rows: String = (0..28).map(row).collect();
+    let file = folder.path().join("assets.csv");
+    std::fs::write(&file, format!("date,energy,health,rf\n{rows}")).unwrap();
+    let out = folder.path().join("report");
+    let command = |options: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
+        command.arg("backtest").args([&file, &std::path::PathBuf::from("--out"), &out]).args(options.split(' '));
+        command.output().unwrap()
+    };
+    let done = command("--window 12,all --every 2 --alpha 0.9 --cost-bp 100");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
+    let report: Value = serde_json::from_str(&read("report.json")).unwrap();
+    assert_eq!((&report["assets"], &report["choices"]["windows"]), (&json!(["energy", "health"]), &json!([12, null])));
+    assert_eq!((report["dates"].as_array().unwrap().len(), &report["dates"][0]), (16, &json!("2013-01")));
+    let names: Vec<&str> =
+        report["strategies"].as_array().unwrap().iter().map(|one| one["strategy"].as_str().unwrap()).collect();
+    assert_eq!((names.len(), names[0], names[16]), (18, "robust scaled_one, scale 0.5, 3 years", "1/N"));
+
+    let (mut wealth, mut held) = (100.0, [0.0, 0.0]);
+    let mut highest: f64 = 100.0;
+    let mut fall: f64 = 0.0;
+    for quarter in 12..28 {
+        let traded: f64 = held.iter().map(|share: &f64| (0.5 - share).abs()).sum();
+        let grown = [0.5 * (1.0 + risky[quarter]), 0.5 * (1.0 + other(quarter))];
+        wealth *= (1.0 - 0.01 * traded) * (grown[0] + grown[1]);
+        held = grown.map(|position| position / (grown[0] + grown[1]));
+        highest = highest.max(wealth);
+        fall = fall.max(1.0 - wealth / highest);
+        let found = report["periods"][16]["wealth"][quarter - 12].as_f64().unwrap();
+        assert!((found / wealth - 1.0).abs() < 1e-12, "{quarter}: {found} {wealth}");
+    }
+    let equal = &report["strategies"][16];
+    assert!((equal["final_wealth"].as_f64().unwrap() / wealth - 1.0).abs() < 1e-12, "{equal} {wealth}");
+    assert!((equal["max_drawdown"].as_f64().unwrap() - fall).abs() < 1e-12, "{equal} {fall}");
+    assert_eq!((&equal["effective_assets"], &equal["mean_allocations"]["health"]), (&json!(2.0), &json!(0.5)));
+
+    for periods in report["periods"].as_array().unwrap() {
+        let of =
+            |name: &str| periods["allocations"][name].as_array().unwrap().iter().map(|share| share.as_f64().unwrap());
+        assert!(
+            of("energy").zip(of("health")).all(|(one, other)| one >= 0.0 && other >= 0.0 && one + other < 1.0 + 1e-9)
+        );
+    }
+    assert_eq!(read("periods.csv").lines().count(), 1 + 16 * 18);
+    assert!(
+        read("periods.csv")
+            .starts_with("date,strategy,allocation,radius,traded,wealth,drawdown,held: energy,held: health\n")
+    );
+    let page = read("report.html");
+    assert!(page.contains("<svg") && page.contains("Mean share of wealth in each asset") && !page.contains("<script"));
+    let told = String::from_utf8(done.stdout).unwrap();
+    assert!(told.contains("Each of the 2 columns is an asset") && told.contains("place "), "{told}");
+    assert!(
+        told.contains("Trading costs 100 bp of what is traded in every account; no strategy knows of it."),
+        "{told}"
+    );
+
+    for (options, said) in [
+        ("--horizon 4", "--horizon is 4: must be left out of several assets, for which nothing is trained"),
+        ("--alpha 0.1,0.2", "--alpha is 2 levels: must be one of several assets"),
+        ("--window 40", "the file is 28 periods: must hold at least 44, the longest window and a year"),
+        (
+            "--column energy --window 12,all",
+            "--window is 12,all: must be one number of periods, as the file has one asset",
+        ),
+    ] {
+        let refused = command(options);
+        let error = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(!refused.status.success() && error.contains(said), "{options}: {error}");
+    }
+}

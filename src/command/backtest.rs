@@ -1,10 +1,13 @@
 //! `ballast backtest`: the walk-forward report on real returns.
 //!
 //! Every so many periods, a year of them unless chosen otherwise, a policy is trained on the window before and lived by
-//! until the next one; nothing later than a period is used for its allocation. What comes out is a page to read, and the
-//! same as JSON and CSV.
+//! until the next one; nothing later than a period is used for its allocation. A file of several assets is walked through
+//! by the one-step problem and by rules that people use (`assets`). What comes out is a page to read, and the same as JSON
+//! and CSV.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::time::Instant;
 
 use ballast::control::error::{FieldError, TrainError};
@@ -17,9 +20,10 @@ use ballast::report::ChartError;
 use clap::Args;
 use thiserror::Error;
 
-use super::returns::{Returns, ReturnsError, ReturnsFile, Row};
-use progress::Trainings;
+use super::returns::{AnyReturns, Returns, ReturnsError, ReturnsFile, Row};
+use progress::Parts;
 
+mod assets;
 mod files;
 mod page;
 mod progress;
@@ -31,30 +35,33 @@ pub struct BacktestArgs {
     /// Folder for report.html, report.json, periods.csv and strategies.csv; made if absent
     #[arg(long)]
     out: PathBuf,
-    /// Periods of history that each policy is trained on; 20 years of them unless given
-    #[arg(long)]
-    window: Option<usize>,
-    /// Periods from one training to the next; a year of them unless given
+    /// Periods of history that each policy is trained on; 20 years of them unless given. Of several assets: periods that
+    /// strategies know, several of them or `all`; 10 years, 20 years and all unless given
+    #[arg(long, value_delimiter = ',')]
+    window: Vec<Window>,
+    /// Periods from one training to the next, of several assets from one measuring of the radius; a year of them unless given
     #[arg(long)]
     every: Option<usize>,
     /// Periods that a policy looks ahead; those to the next training unless given
     #[arg(long)]
     horizon: Option<usize>,
-    /// Levels of the adaptive strategies; the static one takes the second, or the first of one
-    #[arg(long, value_delimiter = ',', default_values_t = defaults::alpha())]
+    /// Levels of the adaptive strategies, 0.05, 0.1 and 0.5 unless given; the static one takes the second, or the first of one.
+    /// Of several assets one level, 0.1 unless given
+    #[arg(long, value_delimiter = ',')]
     alpha: Vec<f64>,
     /// Relative risk aversion: 1 is log utility
     #[arg(long, default_value_t = defaults::risk_aversion())]
     risk_aversion: f64,
-    /// Trading cost, in hundredths of a per cent of what is traded; policies are trained with it
+    /// Trading cost, in hundredths of a per cent of what is traded; policies are trained with it, strategies of several
+    /// assets do not know of it
     #[arg(long, default_value_t = 0.0)]
     cost_bp: f64,
     /// Train every policy as if trading were free
     #[arg(long)]
     cost_blind: bool,
-    /// Design points per step: more is more accurate and slower
-    #[arg(long, default_value_t = defaults::count())]
-    count: usize,
+    /// Design points per step: more is more accurate and slower; 100 unless given
+    #[arg(long)]
+    count: Option<usize>,
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Threads that train; every core unless given
@@ -80,6 +87,34 @@ pub enum BacktestError {
     Json(#[from] serde_json::Error),
 }
 
+/// How much of the past is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Window {
+    /// The last so many periods.
+    Last(usize),
+    All,
+}
+
+impl FromStr for Window {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text {
+            "all" => Ok(Window::All),
+            text => text.parse().map(Window::Last).map_err(|_| "must be a number of periods, or all"),
+        }
+    }
+}
+
+impl fmt::Display for Window {
+    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Window::Last(periods) => write!(formatter, "{periods}"),
+            Window::All => write!(formatter, "all"),
+        }
+    }
+}
+
 /// Everything the page is made from.
 pub struct Shown {
     pub walked: Walked,
@@ -89,13 +124,25 @@ pub struct Shown {
     pub seconds: f64,
 }
 
-/// Trains, counts and writes.
+/// Walks, counts and writes.
 pub fn run(args: &BacktestArgs) -> Result<(), BacktestError> {
-    let returns = args.returns.read()?;
-    println!("{}\n", returns.sentence());
-    let shown = walk(args, returns)?;
-    files::write(&shown, &args.out)?;
-    shown.report.sentences.iter().for_each(|sentence| println!("{sentence}"));
+    let sentences = match args.returns.read_any()? {
+        AnyReturns::One(returns) => {
+            println!("{}\n", returns.sentence());
+            let shown = walk(args, returns)?;
+            let (strategies, periods) = (files::strategies(&shown.report.strategies), files::periods(&shown));
+            files::write(&args.out, &page::page(&shown), &shown.report, &strategies, &periods)?;
+            shown.report.sentences
+        }
+        AnyReturns::Several(returns) => {
+            println!("{}\n", returns.sentence);
+            let shown = assets::walk(args, returns)?;
+            let (strategies, periods) = (assets::files::strategies(&shown.report), assets::files::periods(&shown));
+            files::write(&args.out, &assets::page::page(&shown), &shown.report, &strategies, &periods)?;
+            shown.report.sentences
+        }
+    };
+    sentences.iter().for_each(|sentence| println!("{sentence}"));
     println!("\nThe report is {}.", args.out.join(files::PAGE).display());
     Ok(())
 }
@@ -103,10 +150,15 @@ pub fn run(args: &BacktestArgs) -> Result<(), BacktestError> {
 impl BacktestArgs {
     /// The request that these arguments are.
     fn request(&self, returns: &Returns) -> Result<BacktestRequest, BacktestError> {
-        if !(0.0..=1000.0).contains(&self.cost_bp) {
-            let (option, rule) = ("--cost-bp".into(), "must lie in [0, 1000]".into());
-            return Err(BacktestError::Option { option, value: self.cost_bp.to_string(), rule });
-        }
+        let window = match self.window[..] {
+            [] => None,
+            [Window::Last(periods)] => Some(periods),
+            _ => {
+                let given: Vec<String> = self.window.iter().map(Window::to_string).collect();
+                let rule = "must be one number of periods, as the file has one asset";
+                return Err(refused("--window", given.join(","), rule));
+            }
+        };
         let rows = returns.rows();
         Ok(BacktestRequest {
             log_returns: None,
@@ -114,16 +166,29 @@ impl BacktestArgs {
             rate: Rates::Listed(rows.iter().map(|row| row.risk_free_return).collect()),
             dates: Some(rows.iter().map(|row| row.date.clone()).collect()),
             periods_per_year: Some(returns.periods_per_year),
-            window: self.window,
+            window,
             every: self.every,
             horizon: self.horizon,
-            alpha: self.alpha.clone(),
+            alpha: if self.alpha.is_empty() { defaults::alpha() } else { self.alpha.clone() },
             risk_aversion: self.risk_aversion,
-            trading_cost: 1e-4 * self.cost_bp,
+            trading_cost: self.trading_cost()?,
             cost_blind: self.cost_blind,
-            count: self.count,
+            count: self.count.unwrap_or_else(defaults::count),
             seed: self.seed,
         })
+    }
+
+    /// As a share of what is traded.
+    fn trading_cost(&self) -> Result<f64, BacktestError> {
+        if (0.0..=1000.0).contains(&self.cost_bp) {
+            return Ok(1e-4 * self.cost_bp);
+        }
+        Err(refused("--cost-bp", self.cost_bp, "must lie in [0, 1000]"))
+    }
+
+    fn pool(&self) -> Result<TrainingPool, PoolError> {
+        let threads = self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+        TrainingPool::new(threads)
     }
 
     fn backtest(&self, returns: &Returns) -> Result<Backtest, BacktestError> {
@@ -131,12 +196,17 @@ impl BacktestArgs {
     }
 }
 
+fn refused(option: &str, value: impl ToString, rule: &str) -> BacktestError {
+    BacktestError::Option { option: option.into(), value: value.to_string(), rule: rule.into() }
+}
+
 /// A field of the request is an option, or the file.
 impl From<FieldError> for BacktestError {
     fn from(FieldError { field, value, rule }: FieldError) -> Self {
-        let option = match field.strip_prefix("simple_returns") {
-            Some(at) => format!("the file{at}"),
-            None => format!("--{}", field.replace('_', "-")),
+        let option = match (field.strip_prefix("simple_returns"), field.strip_prefix("assets")) {
+            (Some(at), _) => format!("the file{at}"),
+            (None, Some(at)) => format!("--column{at}"),
+            (None, None) => format!("--{}", field.replace('_', "-")),
         };
         BacktestError::Option { option, value, rule }
     }
@@ -153,10 +223,8 @@ impl Shown {
 fn walk(args: &BacktestArgs, returns: Returns) -> Result<Shown, BacktestError> {
     let backtest = args.backtest(&returns)?;
     let started = Instant::now();
-    let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let pool = TrainingPool::new(threads)?;
-    let trainings = Trainings::new(backtest.trainings());
-    let walked = pool.install(|| backtest.run(&Watch::unwatched(), &|| trainings.one_more()))?;
+    let trainings = Parts::new(backtest.trainings(), "trainings");
+    let walked = args.pool()?.install(|| backtest.run(&Watch::unwatched(), &|| trainings.one_more()))?;
     trainings.finish();
     let report = BacktestReport::new(&walked);
     Ok(Shown { walked, report, returns, seconds: started.elapsed().as_secs_f64() })
@@ -257,10 +325,10 @@ mod tests {
         let every = "must be at least 1, and at most horizon: a policy is lived by until the next is trained";
         assert_eq!(message(&["--every", "0"]), format!("--every is 0: {every}"));
         assert_eq!(message(&["--every", "7", "--horizon", "6"]), format!("--every is 7: {every}"));
-        let long = BacktestArgs { window: Some(50), ..arguments(&[]) };
+        let long = BacktestArgs { window: vec![Window::Last(50)], ..arguments(&[]) };
         let short = walk(&long, months(48)).err().unwrap().to_string();
         assert_eq!(short, "the file is 48 periods: must hold at least 62, the window and a year");
-        let few = BacktestArgs { count: 3, ..arguments(&[]) };
+        let few = BacktestArgs { count: Some(3), ..arguments(&[]) };
         let few = walk(&few, months(48)).err().unwrap().to_string();
         assert_eq!(few, "--count is 3: must lie in [10, 10000]");
         assert_eq!(message(&["--alpha", "0.1,2"]), "--alpha[1] is 2: must be a number in [0.001, 0.999]");

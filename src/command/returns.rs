@@ -6,6 +6,7 @@
 use std::path::PathBuf;
 
 use ballast::control::evaluation::account::Annual;
+use ballast::control::evaluation::assets::AssetsRecord;
 use ballast::control::evaluation::rolling::Period;
 use ballast::control::request::dates;
 pub use ballast::control::request::frequency::Frequency;
@@ -66,6 +67,35 @@ pub struct Returns {
     remarks: Vec<String>,
 }
 
+/// Periods of several assets.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeveralReturns {
+    pub record: AssetsRecord,
+    /// When the periods ended, in years.
+    pub times: Vec<f64>,
+    /// What was read, for a reader to see whether it is what he meant.
+    pub sentence: String,
+}
+
+/// What a file holds.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AnyReturns {
+    /// Of one asset.
+    One(Returns),
+    /// Of several.
+    Several(SeveralReturns),
+}
+
+/// What is known of the periods themselves.
+struct Calendar {
+    dates: Vec<String>,
+    frequency: Frequency,
+    periods_per_year: usize,
+    /// What the bank paid, and where that is said.
+    rates: Vec<f64>,
+    bank: String,
+}
+
 impl Row {
     pub fn period(&self) -> Period {
         Period { log_return: self.log_return, bank_return: self.risk_free_return }
@@ -76,10 +106,21 @@ impl ReturnsFile {
     /// # Errors
     /// The file cannot be read, a place in it or an option breaks a rule, or an option must say what the file does not.
     pub fn read(&self) -> Result<Returns, ReturnsError> {
+        Returns::parse(&self.text()?, &self.choices, self.rate, self.periods_per_year)
+    }
+
+    /// Columns that nothing tells apart are an asset each.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_any(&self) -> Result<AnyReturns, ReturnsError> {
+        AnyReturns::parse(&self.text()?, &self.choices, self.rate, self.periods_per_year)
+    }
+
+    fn text(&self) -> Result<String, ReturnsError> {
         let read = std::fs::read(&self.file);
         let bytes = read.map_err(|source| ReturnsError::Read { path: self.file.clone(), source })?;
-        let text = decoded(&bytes).map_err(|said| ReturnsError::Refused { said })?;
-        Returns::parse(&text, &self.choices, self.rate, self.periods_per_year)
+        decoded(&bytes).map_err(|said| ReturnsError::Refused { said })
     }
 }
 
@@ -99,36 +140,16 @@ impl Returns {
         rate: Option<f64>,
         periods_per_year: Option<usize>,
     ) -> Result<Self, ReturnsError> {
-        check(rate, periods_per_year)?;
-        let reading = read(text, choices);
-        if let Reading::Read(Record { columns, .. }) | Reading::Asked { columns, .. } = &reading
-            && rate.is_none()
-            && !columns.is_empty()
-            && columns.iter().all(|column| column.holds != Holds::Rate)
-        {
-            return Err(ReturnsError::NoBank { remarks: String::new() });
-        }
-        match reading {
-            Reading::Read(record) => Self::of(record, rate, periods_per_year),
-            Reading::Asked { questions, .. } => Err(ReturnsError::asked(&questions)),
-            Reading::Refused { sentence, .. } => Err(ReturnsError::Refused { said: sentence }),
-        }
+        Self::of(record(text, choices, rate, periods_per_year)?, rate, periods_per_year)
     }
 
     fn of(record: Record, rate: Option<f64>, periods_per_year: Option<usize>) -> Result<Self, ReturnsError> {
-        let Record { series, dates: days, frequency, rate: column, remarks, .. } = record;
-        let (Some(frequency), Some(days), Some(periods)) = (frequency, days, record.periods_per_year) else {
-            return Err(ReturnsError::NoFrequency);
-        };
-        let [series] = &series[..] else { return Err(ReturnsError::Several { found: series.len() }) };
-        let bank = match (rate, column) {
-            (Some(rate), _) => ("--rate".to_owned(), vec![rate; days.len()]),
-            (None, Some(column)) => (format!("the last row of column {}", column.column), column.rates),
-            (None, None) => return Err(ReturnsError::NoBank { remarks: format!("\n{}", remarks.join(" ")) }),
-        };
-        let rows = days.into_iter().zip(&series.log_returns).zip(&series.simple_returns).zip(bank.1);
+        let Calendar { dates, frequency, periods_per_year, rates, bank } =
+            Calendar::of(&record, rate, periods_per_year)?;
+        let [series] = &record.series[..] else { return Err(ReturnsError::Several { found: record.series.len() }) };
+        let rows = dates.into_iter().zip(&series.log_returns).zip(&series.simple_returns).zip(rates);
         let row = |(((date, log_return), risky_return), risk_free_return): (((String, &f64), &f64), f64)| Row {
-            time: dates::date(&date).map_or(0.0, |date| frequency.time(date)),
+            time: time(&date, frequency),
             date,
             log_return: *log_return,
             risky_return: *risky_return,
@@ -138,9 +159,8 @@ impl Returns {
             Series { kind: Kind::Simple, unit: Some(Unit::Fraction), .. } => "returns",
             series => series.what(),
         };
-        let (rows, periods_per_year) = (rows.map(row).collect(), periods_per_year.unwrap_or(periods));
-        let column = series.column.clone();
-        Ok(Returns { rows, frequency, periods_per_year, what, column, bank: bank.0, remarks })
+        let (rows, column) = (rows.map(row).collect(), series.column.clone());
+        Ok(Returns { rows, frequency, periods_per_year, what, column, bank, remarks: record.remarks })
     }
 
     pub fn rows(&self) -> &[Row] {
@@ -212,6 +232,95 @@ impl Returns {
             self.bank
         )
     }
+}
+
+impl AnyReturns {
+    /// As [`Returns::parse`]; where it would be asked which column is meant, all of them are.
+    ///
+    /// # Errors
+    /// As [`Returns::parse`].
+    pub fn parse(
+        text: &str,
+        choices: &Choices,
+        rate: Option<f64>,
+        periods_per_year: Option<usize>,
+    ) -> Result<Self, ReturnsError> {
+        let all = match read(text, choices) {
+            Reading::Asked { questions, columns } if questions.iter().any(|question| question.asks == "columns") => {
+                let values = columns.into_iter().filter(|column| column.holds == Holds::Values);
+                Choices { columns: values.map(|column| column.name).collect(), ..choices.clone() }
+            }
+            _ => choices.clone(),
+        };
+        let record = record(text, &all, rate, periods_per_year)?;
+        if record.series.len() == 1 {
+            return Returns::of(record, rate, periods_per_year).map(AnyReturns::One);
+        }
+        let calendar = Calendar::of(&record, rate, periods_per_year)?;
+        let Calendar { dates, frequency, periods_per_year, rates, .. } = calendar;
+        let row = |period: usize| record.series.iter().map(|series| series.log_returns[period]).collect();
+        let by_option = rate.map_or(String::new(), |rate| format!(" The bank pays {:.3} % by --rate.", 100.0 * rate));
+        Ok(AnyReturns::Several(SeveralReturns {
+            times: dates.iter().map(|date| time(date, frequency)).collect(),
+            sentence: format!(
+                "{}{by_option} Each of the {} columns is an asset; --column takes one alone.",
+                record.sentence,
+                record.series.len()
+            ),
+            record: AssetsRecord {
+                assets: record.series.iter().map(|series| series.column.clone()).collect(),
+                rows: (0..dates.len()).map(row).collect(),
+                bank: rates,
+                dates,
+                frequency,
+                periods_per_year,
+            },
+        }))
+    }
+}
+
+/// What is read, or why nothing is.
+fn record(
+    text: &str,
+    choices: &Choices,
+    rate: Option<f64>,
+    periods_per_year: Option<usize>,
+) -> Result<Record, ReturnsError> {
+    check(rate, periods_per_year)?;
+    let reading = read(text, choices);
+    if let Reading::Read(Record { columns, .. }) | Reading::Asked { columns, .. } = &reading
+        && rate.is_none()
+        && !columns.is_empty()
+        && columns.iter().all(|column| column.holds != Holds::Rate)
+    {
+        return Err(ReturnsError::NoBank { remarks: String::new() });
+    }
+    match reading {
+        Reading::Read(record) => Ok(record),
+        Reading::Asked { questions, .. } => Err(ReturnsError::asked(&questions)),
+        Reading::Refused { sentence, .. } => Err(ReturnsError::Refused { said: sentence }),
+    }
+}
+
+impl Calendar {
+    fn of(record: &Record, rate: Option<f64>, periods_per_year: Option<usize>) -> Result<Self, ReturnsError> {
+        let (Some(frequency), Some(dates), Some(periods)) =
+            (record.frequency, record.dates.clone(), record.periods_per_year)
+        else {
+            return Err(ReturnsError::NoFrequency);
+        };
+        let (bank, rates) = match (rate, &record.rate) {
+            (Some(rate), _) => ("--rate".to_owned(), vec![rate; dates.len()]),
+            (None, Some(column)) => (format!("the last row of column {}", column.column), column.rates.clone()),
+            (None, None) => return Err(ReturnsError::NoBank { remarks: format!("\n{}", record.remarks.join(" ")) }),
+        };
+        Ok(Calendar { dates, frequency, periods_per_year: periods_per_year.unwrap_or(periods), rates, bank })
+    }
+}
+
+/// In years.
+fn time(date: &str, frequency: Frequency) -> f64 {
+    dates::date(date).map_or(0.0, |date| frequency.time(date))
 }
 
 /// The rules of the options.

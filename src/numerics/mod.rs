@@ -20,6 +20,7 @@ pub mod gp_likelihood;
 pub mod grown_bridges;
 pub mod law;
 pub mod law_distance;
+pub mod least_variance;
 pub mod levelling;
 pub mod matern;
 pub mod minimise;

@@ -3,50 +3,73 @@
 use std::fmt::Display;
 use std::path::Path;
 
-use ballast::report::Csv;
+use ballast::control::evaluation::backtest_report::{BacktestFigures, BootstrapEstimate};
+use ballast::report::{Csv, Page};
+use serde::Serialize;
 
-use super::{BacktestError, Shown, file, page};
+use super::{BacktestError, Shown, file};
 
 pub const PAGE: &str = "report.html";
 
-pub fn write(shown: &Shown, folder: &Path) -> Result<(), BacktestError> {
+/// A figure of a strategy, with its interval where it has one.
+pub type Figure = (&'static str, f64, Option<[f64; 2]>);
+
+pub fn write(
+    folder: &Path,
+    page: &Page,
+    report: &impl Serialize,
+    strategies: &str,
+    periods: &str,
+) -> Result<(), BacktestError> {
     let made = std::fs::create_dir_all(folder);
     made.map_err(|source| BacktestError::Write { path: folder.into(), source })?;
-    file(folder, PAGE, &page::page(shown).html()?)?;
-    file(folder, "report.json", &(serde_json::to_string_pretty(&shown.report)? + "\n"))?;
-    file(folder, "strategies.csv", &strategies(shown))?;
-    file(folder, "periods.csv", &periods(shown))
+    file(folder, PAGE, &page.html()?)?;
+    file(folder, "report.json", &(serde_json::to_string_pretty(report)? + "\n"))?;
+    file(folder, "strategies.csv", strategies)?;
+    file(folder, "periods.csv", periods)
 }
 
-fn strategies(shown: &Shown) -> String {
+pub fn estimated(name: &'static str, estimate: BootstrapEstimate) -> Figure {
+    (name, estimate.value, Some(estimate.interval))
+}
+
+pub fn plain(name: &'static str, value: f64) -> Figure {
+    (name, value, None)
+}
+
+/// One line a strategy and figure.
+pub fn figures(strategies: impl IntoIterator<Item = (String, Vec<Figure>)>) -> String {
     let mut csv = Csv::new(&["strategy", "figure", "value", "low", "high"]);
-    for figures in &shown.report.strategies {
-        let estimates = [
-            ("yearly_certainty_equivalent", figures.yearly_certainty_equivalent),
-            ("adaptive_ahead", figures.adaptive_ahead),
-            ("annual_mean", figures.annual_mean),
-            ("annual_volatility", figures.annual_volatility),
-            ("sharpe_ratio", figures.sharpe_ratio),
-            ("annual_turnover", figures.annual_turnover),
-        ];
-        let beyond = figures.beyond_own_mix.map(|beyond| ("beyond_own_mix", beyond));
-        for (name, estimate) in estimates.into_iter().chain(beyond) {
-            let [low, high] = estimate.interval;
-            let fields: [&dyn Display; 5] = [&figures.strategy, &name, &estimate.value, &low, &high];
-            csv.row(fields);
-        }
-        let plain = [
-            ("max_drawdown", figures.max_drawdown),
-            ("final_wealth", figures.final_wealth),
-            ("mean_allocation", figures.mean_allocation),
-            ("all_bank_share", figures.all_bank_share),
-        ];
-        for (name, value) in plain {
-            let fields: [&dyn Display; 5] = [&figures.strategy, &name, &value, &"", &""];
+    for (strategy, figures) in strategies {
+        for (name, value, interval) in figures {
+            let [low, high] = interval.map_or_else(Default::default, |ends| ends.map(|end| end.to_string()));
+            let fields: [&dyn Display; 5] = [&strategy, &name, &value, &low, &high];
             csv.row(fields);
         }
     }
     csv.into_text()
+}
+
+pub fn strategies(strategies: &[BacktestFigures]) -> String {
+    let of = |figures: &BacktestFigures| {
+        let mut all = vec![
+            estimated("yearly_certainty_equivalent", figures.yearly_certainty_equivalent),
+            estimated("adaptive_ahead", figures.adaptive_ahead),
+            estimated("annual_mean", figures.annual_mean),
+            estimated("annual_volatility", figures.annual_volatility),
+            estimated("sharpe_ratio", figures.sharpe_ratio),
+            estimated("annual_turnover", figures.annual_turnover),
+        ];
+        all.extend(figures.beyond_own_mix.map(|beyond| estimated("beyond_own_mix", beyond)));
+        all.extend([
+            plain("max_drawdown", figures.max_drawdown),
+            plain("final_wealth", figures.final_wealth),
+            plain("mean_allocation", figures.mean_allocation),
+            plain("all_bank_share", figures.all_bank_share),
+        ]);
+        (figures.strategy.clone(), all)
+    };
+    figures(strategies.iter().map(of))
 }
 
 /// One line a period and strategy; wealth and drawdown at its end.

@@ -1,7 +1,8 @@
 //! The report as a page.
 
-use ballast::control::evaluation::analysis::{CONFIDENCE, Line, RESAMPLES, YEAR_BLOCK};
+use ballast::control::evaluation::analysis::Line;
 use ballast::control::evaluation::backtest_report::{BacktestFigures, BootstrapEstimate};
+use ballast::control::evaluation::resampling::{CONFIDENCE, RESAMPLES, YEAR_BLOCK};
 use ballast::report::{Axis, BarChart, Chart, Page, Table, interval, number};
 
 use super::{Row, Shown};
@@ -15,14 +16,7 @@ pub fn page(shown: &Shown) -> Page {
         .section("What it shows")
         .points(shown.report.sentences.clone())
         .table(utility_table(shown))
-        .figure(
-            certainty_equivalents(shown),
-            &format!(
-                "Mean utility over {} years, each from 100, as wealth for certain, with {:.0} % intervals.",
-                shown.report.whole_years,
-                100.0 * CONFIDENCE
-            ),
-        )
+        .figure(certainty_equivalents(shown), &of_years(shown.report.whole_years))
         .section("Wealth")
         .figure(wealth(shown), "Equal ratios take equal room. The start is 100, all in the bank.")
         .figure(drawdowns(shown), "How far wealth is below its highest so far.")
@@ -48,7 +42,11 @@ fn noun(shown: &Shown) -> &'static str {
 
 /// So many periods, in words.
 fn periods(shown: &Shown, count: usize) -> String {
-    format!("{count} {}{}", noun(shown), if count == 1 { "" } else { "s" })
+    counted(count, noun(shown))
+}
+
+pub fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 fn method(shown: &Shown) -> String {
@@ -65,6 +63,24 @@ fn method(shown: &Shown) -> String {
     )
 }
 
+/// What certainty equivalents are.
+pub fn of_years(years: usize) -> String {
+    format!(
+        "Mean utility over {years} years, each from 100, as wealth for certain, with {:.0} % intervals.",
+        100.0 * CONFIDENCE
+    )
+}
+
+/// How intervals are made, from such blocks of periods.
+pub fn intervals(block: &str) -> String {
+    format!(
+        "Intervals are the middle {:.0} % of {RESAMPLES} circular block-bootstrap resamples, alike for all strategies: \
+         blocks of {block}, and of {YEAR_BLOCK} years for certainty equivalents. They take the past as one \
+         draw of a stationary world, so they are too narrow for what was never seen.",
+        100.0 * CONFIDENCE
+    )
+}
+
 fn notes(shown: &Shown) -> Vec<String> {
     let (choices, noun) = (&shown.report.choices, noun(shown));
     let block = periods(shown, shown.returns.periods_per_year);
@@ -74,12 +90,7 @@ fn notes(shown: &Shown) -> Vec<String> {
             "A policy takes the bank to go on paying what it paid in the last {noun} before its training; accounts are \
              credited with what it really paid."
         ),
-        format!(
-            "Intervals are the middle {:.0} % of {RESAMPLES} circular block-bootstrap resamples, alike for all strategies: \
-             blocks of {block}, and of {YEAR_BLOCK} years for certainty equivalents. They take the past as one \
-             draw of a stationary world, so they are too narrow for what was never seen.",
-            100.0 * CONFIDENCE
-        ),
+        intervals(&block),
         "The constant mix of the adaptive strategy's average allocation was chosen with hindsight; it is there to measure \
          timing, not to be had."
             .into(),
@@ -94,7 +105,7 @@ fn years(shown: &Shown) -> Vec<f64> {
     shown.rows().iter().map(|row| row.time).collect()
 }
 
-fn time() -> Axis {
+pub fn time() -> Axis {
     Axis::new("year").tight()
 }
 
@@ -103,11 +114,14 @@ fn followed(shown: &Shown) -> impl Iterator<Item = &Line> {
     shown.walked.lines.iter().filter(|line| !line.hindsight)
 }
 
+/// The start, and the ends of periods that start at these times.
+pub fn ends(starts: &[f64], periods_per_year: usize) -> Vec<f64> {
+    let period = 1.0 / periods_per_year as f64;
+    starts.first().copied().into_iter().chain(starts.iter().map(|start| start + period)).collect()
+}
+
 fn wealth(shown: &Shown) -> Chart {
-    let years = years(shown);
-    let start = years.first().map_or(0.0, |first| *first);
-    let period = 1.0 / shown.returns.periods_per_year as f64;
-    let times: Vec<f64> = [start].into_iter().chain(years.iter().map(|year| year + period)).collect();
+    let times = ends(&years(shown), shown.returns.periods_per_year);
     let chart = Chart::new("Wealth", time(), Axis::new("wealth, logarithmic").log());
     // The cost-blind strategy lies too close beside the one it is compared with, and a chart holds eight lines.
     let blind = shown.walked.backtest.blind_line();
@@ -157,11 +171,15 @@ fn trained(shown: &Shown) -> impl Iterator<Item = &Line> {
 }
 
 fn certainty_equivalents(shown: &Shown) -> BarChart {
-    // From 100 on, what a year adds: bars from zero would all look alike.
+    let figures = shown.report.strategies.iter();
+    beyond_100(figures.map(|figures| (figures.strategy.as_str(), figures.yearly_certainty_equivalent)))
+}
+
+/// From 100 on, what a year adds: bars from zero would all look alike.
+pub fn beyond_100<'a>(strategies: impl Iterator<Item = (&'a str, BootstrapEstimate)>) -> BarChart {
     let chart = BarChart::new("What a year from 100 counts as, beyond 100", Axis::new("certainty equivalent less 100"));
-    shown.report.strategies.iter().fold(chart, |chart, figures| {
-        let BootstrapEstimate { value, interval: [low, high] } = figures.yearly_certainty_equivalent;
-        chart.bar(&figures.strategy, value - 100.0, Some([low - 100.0, high - 100.0]))
+    strategies.fold(chart, |chart, (name, BootstrapEstimate { value, interval: [low, high] })| {
+        chart.bar(name, value - 100.0, Some([low - 100.0, high - 100.0]))
     })
 }
 
@@ -208,6 +226,6 @@ fn performance_table(shown: &Shown) -> Table {
     })
 }
 
-fn estimate(estimate: BootstrapEstimate, unit: f64, decimals: usize) -> ballast::report::Cell {
+pub fn estimate(estimate: BootstrapEstimate, unit: f64, decimals: usize) -> ballast::report::Cell {
     interval(unit * estimate.value, estimate.interval.map(|end| unit * end), decimals)
 }

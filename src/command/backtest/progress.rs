@@ -1,4 +1,4 @@
-//! How far the trainings are: a bar on a terminal, elsewhere a line now and then.
+//! How many parts of the work are done: a bar on a terminal, elsewhere a line now and then.
 
 use std::io::{IsTerminal, stderr};
 use std::sync::{Mutex, PoisonError};
@@ -9,22 +9,26 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// From one line to the next.
 const PAUSE: Duration = Duration::from_secs(30);
 
-pub struct Trainings {
+pub struct Parts {
     /// Draws itself on a terminal alone.
     bar: ProgressBar,
+    /// What the parts are.
+    noun: &'static str,
     is_terminal: bool,
     started: Instant,
     /// When the last line was written.
     told: Mutex<Option<Instant>>,
 }
 
-impl Trainings {
-    pub fn new(count: usize) -> Self {
+impl Parts {
+    pub fn new(count: usize, noun: &'static str) -> Self {
         let bar = ProgressBar::new(count as u64);
-        if let Ok(style) = ProgressStyle::with_template("  [{bar:32}] {pos} of {len} trainings, {eta} left") {
+        if let Ok(style) =
+            ProgressStyle::with_template(&format!("  [{{bar:32}}] {{pos}} of {{len}} {noun}, {{eta}} left"))
+        {
             bar.set_style(style.progress_chars("=> "));
         }
-        Trainings { bar, is_terminal: stderr().is_terminal(), started: Instant::now(), told: Mutex::new(None) }
+        Parts { bar, noun, is_terminal: stderr().is_terminal(), started: Instant::now(), told: Mutex::new(None) }
     }
 
     pub fn one_more(&self) {
@@ -35,7 +39,7 @@ impl Trainings {
         }
         *told = Some(Instant::now());
         let (done, all) = (self.bar.position(), self.bar.length().unwrap_or_default());
-        eprintln!("  {:>6.0} s  {done} of {all} trainings", self.started.elapsed().as_secs_f64());
+        eprintln!("  {:>6.0} s  {done} of {all} {}", self.started.elapsed().as_secs_f64(), self.noun);
     }
 
     /// Takes the bar off the screen.

@@ -141,3 +141,31 @@ fn a_window_is_the_last_returns() {
         );
     }
 }
+
+#[test]
+fn columns_that_nothing_tells_apart_are_assets_and_a_known_heading_is_one() {
+    let parse = |header: &str, columns: &[&str]| {
+        let text = format!("date,{header},rf\n2008-01,0.01,0.04,0.002\n2008-02,-0.03,-0.02,0.001\n");
+        let columns = columns.iter().map(ToString::to_string).collect();
+        AnyReturns::parse(&text, &Choices { columns, ..Choices::default() }, None, None).unwrap()
+    };
+    let AnyReturns::Several(several) = parse("energy,health", &[]) else { panic!("one asset") };
+    let AssetsRecord { assets, rows, bank, dates, periods_per_year, .. } = several.record.clone();
+    assert_eq!(
+        (&assets[..], &bank[..], periods_per_year),
+        (&["energy".into(), "health".into()][..], &[0.002, 0.001][..], 12)
+    );
+    assert_eq!(
+        (&rows[1][..], &dates[..]),
+        (&[-0.03_f64, -0.02].map(f64::ln_1p)[..], &["2008-01".into(), "2008-02".into()][..])
+    );
+    assert!(
+        several.sentence.ends_with("Each of the 2 columns is an asset; --column takes one alone."),
+        "{}",
+        several.sentence
+    );
+    let one = |any: &AnyReturns| matches!(any, AnyReturns::One(returns) if returns.rows[0].risky_return == 0.04);
+    assert!(one(&parse("energy,health", &["health"])) && one(&parse("energy,return", &[])));
+    let AnyReturns::Several(turned) = parse("energy,return", &["return", "energy"]) else { panic!("one asset") };
+    assert_eq!(turned.record.assets, ["return", "energy"]);
+}

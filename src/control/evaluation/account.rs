@@ -11,9 +11,9 @@ use crate::control::request::specification::UtilitySpecification;
 pub struct Account {
     /// Wealth at the start of each period, and at the end of the last.
     pub wealth: Vec<f64>,
-    /// Share of wealth held through each period.
+    /// Share of wealth held through each period, in all assets together.
     pub allocations: Vec<f64>,
-    /// Share of wealth that changed between bank and asset at the start of each period.
+    /// Share of wealth that changed between bank and assets, or from one to another, at the start of each period.
     pub traded: Vec<f64>,
 }
 
@@ -34,6 +34,24 @@ pub fn keep(bands: impl IntoIterator<Item = Band>, periods: &[Period], cost: f64
     Account { wealth, allocations, traded }
 }
 
+/// Keeps the books of several assets. At the start of a period what is held of each, which its last return moved, is brought to its
+/// share of wealth, `held`; `cost` is lost of all that is traded, of wealth at once. `rows` are log-returns, date by date, and
+/// `bank` is what the bank paid. Checked by: `assets_that_are_one_give_the_books_of_one`.
+pub fn keep_assets(held: &[Vec<f64>], rows: &[Vec<f64>], bank: &[f64], cost: f64, initial_wealth: f64) -> Account {
+    let (mut wealth, mut traded, mut now) = (vec![initial_wealth], Vec::with_capacity(held.len()), initial_wealth);
+    let mut before = vec![0.0; held.first().map_or(0, Vec::len)];
+    for ((shares, log_returns), rate) in held.iter().zip(rows).zip(bank) {
+        let moved: f64 = shares.iter().zip(&before).map(|(share, had)| f64::abs(share - had)).sum();
+        before = shares.iter().zip(log_returns).map(|(share, z)| share * z.exp()).collect();
+        let growth = (1.0 - shares.iter().sum::<f64>()) * (1.0 + rate) + before.iter().sum::<f64>();
+        before.iter_mut().for_each(|position| *position /= growth);
+        now = now * (1.0 - cost * moved) * growth;
+        traded.push(moved);
+        wealth.push(now);
+    }
+    Account { wealth, allocations: held.iter().map(|shares| shares.iter().sum()).collect(), traded }
+}
+
 impl Account {
     /// Simple returns, net of cost.
     pub fn returns(&self) -> Vec<f64> {
@@ -48,6 +66,21 @@ impl Account {
             1.0 - wealth / highest
         };
         self.wealth.iter().map(below).collect()
+    }
+
+    /// The largest of the [`drawdowns`](Self::drawdowns).
+    pub fn max_drawdown(&self) -> f64 {
+        self.drawdowns().into_iter().fold(0.0, f64::max)
+    }
+
+    /// Wealth at the end.
+    pub fn final_wealth(&self) -> f64 {
+        self.wealth.last().copied().unwrap_or_default()
+    }
+
+    /// The mean share of wealth held.
+    pub fn mean_allocation(&self) -> f64 {
+        self.allocations.iter().sum::<f64>() / self.allocations.len() as f64
     }
 
     /// Wealth at the end of each whole year per unit at its start.
@@ -121,6 +154,27 @@ mod tests {
         assert_eq!(account.drawdowns()[..2], [0.0, 0.0]);
         assert_eq!(account.yearly_growth(3), [account.wealth[3] / 100.0]);
         assert_eq!(account.yearly_growth(2).len(), 1);
+    }
+
+    /// Shares of 10 % and 30 % of two assets with the same returns are 40 % of one. From then on a trade from one to the other costs
+    /// what it moves twice, though the whole is the same.
+    #[test]
+    fn assets_that_are_one_give_the_books_of_one() {
+        let returns = [0.2, -0.1, 0.05].map(f64::ln_1p);
+        let rows = returns.map(|z| vec![z, z]);
+        let (bank, one) = ([0.01; 3], [0.4, 0.3, 0.6]);
+        let periods = returns.map(|log_return| Period { log_return, bank_return: 0.01 });
+        let expected = keep(one.map(|share| Band::of(&[share])), &periods, 0.01, 100.0);
+        let held = one.map(|share| vec![0.25 * share, 0.75 * share]);
+        let found = keep_assets(&held, &rows, &bank, 0.01, 100.0);
+        let all = |account: &Account| [&account.wealth[..], &account.allocations, &account.traded].concat();
+        for (found, expected) in all(&found).iter().zip(all(&expected)) {
+            assert!((found - expected).abs() < 1e-12 * expected, "{found} {expected}");
+        }
+        let exchanged = [vec![0.4, 0.0], vec![0.0, 0.4]];
+        let traded = keep_assets(&exchanged, &rows, &bank, 0.01, 100.0).traded;
+        // 0.48 / 1.086 is sold of the one, and 0.4 bought of the other.
+        assert!((traded[1] - (0.48 / 1.086 + 0.4)).abs() < 1e-12, "{traded:?}");
     }
 
     #[test]

@@ -3,7 +3,8 @@
 use jiff::civil::Date;
 
 use crate::control::error::{FieldError, TrainError};
-use crate::control::evaluation::analysis::{Analysis, Line, Scale};
+use crate::control::evaluation::analysis::{Analysis, Line};
+use crate::control::evaluation::resampling::Scale;
 use crate::control::evaluation::rolling::{Decision, Period, Strategy, WalkForward};
 use crate::control::progress::Watch;
 use crate::control::request::backtest::BacktestRequest;
@@ -159,8 +160,8 @@ impl Backtest {
             names.zip(decisions).map(|(name, decisions)| Line::new(name, decisions, lived, cost)).collect();
         lines.push(lines[main].hindsight(lived, cost));
         let (periods_per_year, seed) = (self.periods_per_year, self.walk.seed);
-        let scale = Scale { periods_per_year, utility: self.walk.utility(), trading_cost: cost, seed };
-        let analysis = Analysis::of(&lines, main, lived, &scale);
+        let scale = Scale { periods_per_year, utility: self.walk.utility(), seed };
+        let analysis = Analysis::of(&lines, main, lived, cost, &scale);
         Walked { backtest: self, lines, analysis }
     }
 }

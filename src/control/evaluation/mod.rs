@@ -2,12 +2,14 @@
 
 pub mod account;
 pub mod analysis;
+pub mod assets;
 pub mod backtest;
 pub mod backtest_report;
 pub mod coverage;
 pub mod frontier;
 pub mod paths;
 pub mod report;
+pub mod resampling;
 pub mod rolling;
 pub mod statistics;
 pub mod verdict;

@@ -1,11 +1,12 @@
 //! What the figures say, flattering or not: every sentence follows from them by a rule that is blind to the strategy. And the
 //! report of both.
 
-use crate::control::evaluation::analysis::{CONFIDENCE, Line, RESAMPLES, YEAR_BLOCK};
+use crate::control::evaluation::analysis::Line;
 use crate::control::evaluation::backtest::{Backtest, Walked};
 use crate::control::evaluation::backtest_report::{
-    BacktestChoices, BacktestFigures, BacktestIntervals, BacktestPeriods, BacktestReport, BootstrapEstimate, FORMAT,
+    BacktestChoices, BacktestFigures, BacktestPeriods, BacktestReport, BootstrapEstimate, FORMAT,
 };
+use crate::control::evaluation::resampling::intervals;
 use crate::control::evaluation::rolling::Decision;
 use crate::control::policy::advice::AdviceSource;
 
@@ -18,21 +19,32 @@ pub fn sentences(walked: &Walked) -> Vec<String> {
     let (figures, main) = (&analysis.figures, backtest.main_line());
     let mut sentences = vec![ranking(figures, main)];
     let others = figures.iter().enumerate().filter(|(index, _)| *index != main).map(|(_, other)| other);
-    let years = analysis.years;
-    if years < FEWEST_YEARS {
-        sentences.push(format!(
-            "The whole years are {years}, fewer than {FEWEST_YEARS}: they do not tell the strategies apart, and the intervals mean nothing."
-        ));
-    } else {
-        sentences.push(against(others));
-        sentences.extend(timing(figures, main));
-        sentences.push(timing_of_others(figures, main));
+    match few_years(analysis.years) {
+        Some(sentence) => sentences.push(sentence),
+        None => {
+            sentences.push(against(others));
+            sentences.extend(timing(figures, main));
+            sentences.push(timing_of_others(figures, main));
+        }
     }
     sentences.push(holding(&figures[main], backtest));
     sentences.extend(drawdown(figures, main));
     sentences.push(guard(&lines[main], backtest.noun()));
-    sentences.push(cost(backtest));
+    let blind = backtest.request.cost_blind;
+    let known =
+        if blind { "no policy knows of it" } else { "policies are trained with it, but for the cost-blind one" };
+    sentences.push(cost(backtest.request.trading_cost, known));
     sentences
+}
+
+/// What is said in the place of comparisons, where so few years cannot be compared.
+pub fn few_years(years: usize) -> Option<String> {
+    let sentence = || {
+        format!(
+            "The whole years are {years}, fewer than {FEWEST_YEARS}: they do not tell the strategies apart, and the intervals mean nothing."
+        )
+    };
+    (years < FEWEST_YEARS).then(sentence)
 }
 
 fn ranking(figures: &[BacktestFigures], main: usize) -> String {
@@ -52,14 +64,15 @@ fn ranking(figures: &[BacktestFigures], main: usize) -> String {
 
 /// Which strategies are behind, ahead, or not to be told apart.
 fn against<'a>(others: impl Iterator<Item = &'a BacktestFigures>) -> String {
-    let [better, worse, unclear] = grouped(others.map(|other| (other.strategy.as_str(), other.adaptive_ahead)));
+    let [better, worse, unclear] =
+        grouped(others.map(|other| (other.strategy.as_str(), other.adaptive_ahead))).map(|names| listed(&names));
     format!(
         "By the interval of the difference it is better than: {better}. Worse than: {worse}. Not to be told apart from: {unclear}."
     )
 }
 
 /// Who has an interval above zero, who below, and who around it.
-fn grouped<'a>(differences: impl Iterator<Item = (&'a str, BootstrapEstimate)>) -> [String; 3] {
+pub fn grouped<'a>(differences: impl Iterator<Item = (&'a str, BootstrapEstimate)>) -> [Vec<&'a str>; 3] {
     let mut groups: [Vec<&str>; 3] = Default::default();
     for (name, BootstrapEstimate { interval: [low, high], .. }) in differences {
         let group = match () {
@@ -69,7 +82,12 @@ fn grouped<'a>(differences: impl Iterator<Item = (&'a str, BootstrapEstimate)>) 
         };
         groups[group].push(name);
     }
-    groups.map(|names| if names.is_empty() { "none".into() } else { names.join("; ") })
+    groups
+}
+
+/// Names one after the other.
+pub fn listed(names: &[&str]) -> String {
+    if names.is_empty() { "none".into() } else { names.join("; ") }
 }
 
 /// What a strategy earned beside a constant mix of its own average allocation, and whether `witness` shows that changing the
@@ -98,7 +116,8 @@ fn timing(figures: &[BacktestFigures], main: usize) -> Option<String> {
 fn timing_of_others(figures: &[BacktestFigures], main: usize) -> String {
     let others = figures.iter().enumerate().filter(|(index, _)| *index != main);
     let [paid, cost, unclear] =
-        grouped(others.filter_map(|(_, other)| Some((other.strategy.as_str(), other.beyond_own_mix?))));
+        grouped(others.filter_map(|(_, other)| Some((other.strategy.as_str(), other.beyond_own_mix?))))
+            .map(|names| listed(&names));
     format!(
         "Against such mixes of their own, changing the allocation paid for: {paid}. It cost: {cost}. The record shows neither for: {unclear}."
     )
@@ -139,13 +158,11 @@ fn guard(line: &Line, noun: &str) -> String {
     )
 }
 
-fn cost(backtest: &Backtest) -> String {
-    let (cost, blind) = (backtest.request.trading_cost, backtest.request.cost_blind);
+/// What trading costs in every account, and who knows of it.
+pub fn cost(cost: f64, known: &str) -> String {
     if cost > 0.0 {
         // To a millionth, below which digits are those of binary fractions.
         let basis_points = (1e10 * cost).round() / 1e6;
-        let known =
-            if blind { "no policy knows of it" } else { "policies are trained with it, but for the cost-blind one" };
         format!("Trading costs {basis_points} bp of what is traded in every account; {known}.")
     } else {
         "Trading costs nothing here: strategies that trade much look better than they would be.".into()
@@ -174,12 +191,7 @@ impl BacktestReport {
                 count: request.count,
                 seed: request.seed,
             },
-            intervals: BacktestIntervals {
-                confidence: CONFIDENCE,
-                resamples: RESAMPLES,
-                period_block: backtest.periods_per_year,
-                year_block: YEAR_BLOCK,
-            },
+            intervals: intervals(backtest.periods_per_year),
             strategies: analysis.figures.clone(),
             periods: lines.iter().map(BacktestPeriods::new).collect(),
             sentences: sentences(walked),

@@ -121,7 +121,10 @@ impl AssetsProblem {
 }
 
 /// Checks the names of assets, in the field `named`.
-fn check_names(named: &str, assets: &[String]) -> Result<(), FieldError> {
+///
+/// # Errors
+/// There are too few or too many, or one breaks a rule.
+pub fn check_names(named: &str, assets: &[String]) -> Result<(), FieldError> {
     if !ASSETS.contains(&assets.len()) {
         let rule = format!("must name {} to {} assets, each with a column of history", ASSETS.start(), ASSETS.end());
         return Err(FieldError::new(named, format!("{} names", assets.len()), rule));

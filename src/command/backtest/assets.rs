@@ -1,0 +1,77 @@
+//! A file of several assets, walked through by the one-step problem and by rules that people use.
+
+use std::time::Instant;
+
+use ballast::control::evaluation::assets::report::AssetsBacktestReport;
+use ballast::control::evaluation::assets::{AssetsBacktest, AssetsChoices, AssetsRecord, AssetsWalked};
+
+use super::progress::Parts;
+use super::{BacktestArgs, BacktestError, Window, refused};
+use crate::command::returns::SeveralReturns;
+
+pub mod files;
+pub mod page;
+
+/// Everything the page is made from.
+pub struct Shown {
+    pub walked: AssetsWalked,
+    pub report: AssetsBacktestReport,
+    /// What was read, in a sentence.
+    pub read: String,
+    /// When the periods decided about ended, in years.
+    pub times: Vec<f64>,
+    pub seconds: f64,
+}
+
+impl BacktestArgs {
+    /// The walk that these arguments ask for.
+    fn of_assets(&self, record: AssetsRecord) -> Result<AssetsBacktest, BacktestError> {
+        let of_training = [
+            ("--horizon", self.horizon.map(|horizon| horizon.to_string())),
+            ("--count", self.count.map(|count| count.to_string())),
+            ("--cost-blind", self.cost_blind.then(|| "given".to_owned())),
+        ];
+        if let Some((option, value)) = of_training.into_iter().find_map(|(option, value)| Some((option, value?))) {
+            return Err(refused(option, value, "must be left out of several assets, for which nothing is trained"));
+        }
+        let usual = AssetsChoices::usual(record.periods_per_year);
+        let window = |window: &Window| match window {
+            Window::Last(periods) => Some(*periods),
+            Window::All => None,
+        };
+        let windows: Vec<Option<usize>> = self.window.iter().map(window).collect();
+        let alpha = match self.alpha[..] {
+            [] => usual.alpha,
+            [alpha] => alpha,
+            _ => {
+                return Err(refused(
+                    "--alpha",
+                    format!("{} levels", self.alpha.len()),
+                    "must be one of several assets",
+                ));
+            }
+        };
+        let choices = AssetsChoices {
+            windows: if windows.is_empty() { usual.windows } else { windows },
+            every: self.every.unwrap_or(usual.every),
+            alpha,
+            risk_aversion: self.risk_aversion,
+            trading_cost: self.trading_cost()?,
+            seed: self.seed,
+        };
+        Ok(AssetsBacktest::new(record, choices)?)
+    }
+}
+
+/// Decides every period, keeps the books, and measures them.
+pub fn walk(args: &BacktestArgs, returns: SeveralReturns) -> Result<Shown, BacktestError> {
+    let SeveralReturns { record, times, sentence } = returns;
+    let backtest = args.of_assets(record)?;
+    let started = Instant::now();
+    let parts = Parts::new(backtest.parts(), "stretches");
+    let walked = args.pool()?.install(|| backtest.run(&|| parts.one_more()));
+    parts.finish();
+    let report = AssetsBacktestReport::new(&walked);
+    let times = times[walked.backtest.first..].to_vec();
+    Ok(Shown { walked, report, read: sentence, times, seconds: started.elapsed().as_secs_f64() })
+}

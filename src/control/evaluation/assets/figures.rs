@@ -1,0 +1,104 @@
+//! From the books of several assets to the report.
+
+use super::report::{AssetsBacktestReport, AssetsFigures, AssetsPeriods, FORMAT};
+use super::words::sentences;
+use super::{AssetsLine, AssetsWalked};
+use crate::control::assets::advice::named;
+use crate::control::evaluation::resampling::{Resampled, Scale, Series, intervals};
+
+/// The place of 1/N, with all wealth in equal shares: the last but one.
+fn reference(lines: &[AssetsLine]) -> usize {
+    lines.len() - 2
+}
+
+impl AssetsBacktestReport {
+    /// Of all that was lived.
+    pub fn new(walked: &AssetsWalked) -> Self {
+        let AssetsWalked { backtest, lines } = walked;
+        let (record, choices) = (&backtest.record, &backtest.choices);
+        let (year, seed) = (record.periods_per_year, choices.seed);
+        let series: Vec<Series> =
+            lines.iter().map(|line| Series::of(&line.account, line.own_mix.as_ref(), year)).collect();
+        let scale = Scale { periods_per_year: year, utility: backtest.utility(), seed };
+        let resampled = Resampled::of(&series, backtest.bank(), &scale);
+        let strategies: Vec<AssetsFigures> = (0..lines.len()).map(|index| figures(walked, index, &resampled)).collect();
+        let whole_years = backtest.lived().len() / year;
+        AssetsBacktestReport {
+            format: FORMAT.to_owned(),
+            assets: record.assets.clone(),
+            frequency: record.frequency.adjective().to_owned(),
+            periods_per_year: year,
+            dates: backtest.dates().to_vec(),
+            whole_years,
+            choices: choices.clone(),
+            intervals: intervals(year),
+            periods: lines.iter().map(|line| periods(&record.assets, line)).collect(),
+            sentences: sentences(walked, &strategies, whole_years),
+            strategies,
+        }
+    }
+}
+
+fn figures(walked: &AssetsWalked, index: usize, resampled: &Resampled) -> AssetsFigures {
+    let line = &walked.lines[index];
+    let equal = reference(&walked.lines);
+    let assets = &walked.backtest.record.assets;
+    let mean = |asset: usize| line.held.iter().map(|shares| shares[asset]).sum::<f64>() / line.held.len() as f64;
+    AssetsFigures {
+        strategy: line.name.clone(),
+        yearly_certainty_equivalent: resampled.estimate(|all| all[index].certainty_equivalent),
+        beyond_equal: (index != equal)
+            .then(|| resampled.estimate(|all| all[index].certainty_equivalent - all[equal].certainty_equivalent)),
+        beyond_own_mix: line
+            .own_mix
+            .is_some()
+            .then(|| resampled.estimate(|all| all[index].certainty_equivalent - all[index].of_own_mix)),
+        annual_mean: resampled.estimate(|all| all[index].annual.mean),
+        annual_volatility: resampled.estimate(|all| all[index].annual.volatility),
+        sharpe_ratio: resampled.estimate(|all| all[index].annual.sharpe_ratio),
+        annual_turnover: resampled.estimate(|all| all[index].turnover),
+        max_drawdown: line.account.max_drawdown(),
+        final_wealth: line.account.final_wealth(),
+        mean_allocation: line.account.mean_allocation(),
+        effective_assets: effective_assets(&line.held),
+        mean_allocations: named(assets, &(0..assets.len()).map(mean).collect::<Vec<f64>>()),
+    }
+}
+
+/// `(sum a)^2 / sum a^2`, the mean over the periods in which anything is held.
+fn effective_assets(held: &[Vec<f64>]) -> Option<f64> {
+    let of = |shares: &Vec<f64>| {
+        let squares = shares.iter().map(|share| share * share).sum::<f64>();
+        (squares > 0.0).then(|| shares.iter().sum::<f64>().powi(2) / squares)
+    };
+    let numbers: Vec<f64> = held.iter().filter_map(of).collect();
+    (!numbers.is_empty()).then(|| numbers.iter().sum::<f64>() / numbers.len() as f64)
+}
+
+fn periods(assets: &[String], line: &AssetsLine) -> AssetsPeriods {
+    let of = |(asset, name): (usize, &String)| {
+        (name.clone(), line.held.iter().map(|shares| shares[asset]).collect::<Vec<f64>>())
+    };
+    AssetsPeriods {
+        strategy: line.name.clone(),
+        allocations: assets.iter().enumerate().map(of).collect(),
+        radius: line.radii.clone(),
+        traded: line.account.traded.clone(),
+        wealth: line.account.wealth[1..].to_vec(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_shares_are_as_many_assets_as_there_are_and_one_is_one() {
+        let held = [vec![0.1, 0.1, 0.1, 0.1], vec![0.0; 4], vec![0.0, 0.9, 0.0, 0.0]];
+        assert_eq!(effective_assets(&held[..2]), Some(4.0));
+        assert_eq!(effective_assets(&held), Some(2.5));
+        assert_eq!(effective_assets(&held[1..2]), None);
+        // (0.3 + 0.1)^2 / (0.09 + 0.01).
+        assert!((effective_assets(&[vec![0.3, 0.1]]).unwrap() - 1.6).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,420 @@
+//! Several assets walked through: what to hold of each through every period, by the one-step problem and by rules that people use.
+//!
+//! Before a period a strategy chooses shares of wealth in the assets, the rest in the bank, from the returns that it knows, and they
+//! are held through it; nothing later is used. *Robust* is the one-step problem ([`crate::control::assets`]) under power or log
+//! utility. Its radius is that of all funds at once ([`FundBridges::joint_factor`]) times a scale, and is measured at the start of
+//! every stretch of periods. *Static* solves once a stretch and keeps its shares; *plug-in* has the radius 0. No strategy knows of
+//! the trading cost. Nothing is trained: a policy of a fund over many periods holds what the one-step problem proposes, and its
+//! worth beyond that is some basis points a year.
+
+use serde::Serialize;
+
+use self::rules::{AssetsStrategy, Rule, equal, strategies};
+use crate::control::error::FieldError;
+use crate::control::evaluation::account::{Account, keep_assets};
+use crate::control::evaluation::resampling::INITIAL_WEALTH;
+use crate::control::pool;
+use crate::control::request::assets::{DATES, check_names, check_rows};
+use crate::control::request::backtest::{ALPHA, RELATIVE, defaults};
+use crate::control::request::frequency::Frequency;
+use crate::control::request::rules::{TRADING_COST, whole, within};
+use crate::control::request::specification::{UtilitySpecification, default_seed};
+use crate::numerics::fund_bridges::FundBridges;
+use crate::numerics::levelling::inverse_volatility;
+
+mod figures;
+pub mod report;
+pub mod rules;
+mod words;
+
+/// Simulated bridges: the standard error of a radius is then a hundredth of it or two.
+const PATHS: usize = 500;
+/// Years that windows have, beside all.
+const WINDOW_YEARS: [usize; 2] = [10, 20];
+/// Windows at most.
+const MOST_WINDOWS: usize = 5;
+
+/// What several assets and the bank paid, period by period.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AssetsRecord {
+    /// Names of the assets.
+    pub assets: Vec<String>,
+    /// Log-returns, one for each asset.
+    pub rows: Vec<Vec<f64>>,
+    /// Simple returns of the bank.
+    pub bank: Vec<f64>,
+    /// As fine as the frequency.
+    pub dates: Vec<String>,
+    /// How often there is a period.
+    pub frequency: Frequency,
+    /// Periods in a year.
+    pub periods_per_year: usize,
+}
+
+/// How a record of several assets is walked through.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AssetsChoices {
+    /// Periods that strategies know; null is all since the first.
+    pub windows: Vec<Option<usize>>,
+    /// Periods from one measuring of the radius, and one choice of the static strategy, to the next.
+    pub every: usize,
+    /// Miscoverage of the radius.
+    pub alpha: f64,
+    /// Relative.
+    pub risk_aversion: f64,
+    /// Lost of what is traded, as a share of it.
+    pub trading_cost: f64,
+    /// Of the bridges and of the resamples.
+    pub seed: u64,
+}
+
+/// A prepared walk.
+#[derive(Debug, Clone)]
+pub struct AssetsBacktest {
+    /// The whole record.
+    pub record: AssetsRecord,
+    /// As checked.
+    pub choices: AssetsChoices,
+    /// The first period decided about: after the longest window, and after 20 years where all is known.
+    pub first: usize,
+}
+
+/// What became of a strategy.
+pub struct AssetsLine {
+    /// In words.
+    pub name: String,
+    /// How it found its shares.
+    pub strategy: AssetsStrategy,
+    /// Shares of wealth in the assets, period by period.
+    pub held: Vec<Vec<f64>>,
+    /// Radius of the ball in each period; 0 where there is none.
+    pub radii: Vec<f64>,
+    /// Its books; an allocation is that in all assets together.
+    pub account: Account,
+    /// The books of equal shares at its own average total; none of equal shares.
+    pub own_mix: Option<Account>,
+}
+
+/// What was decided, and what became of it.
+pub struct AssetsWalked {
+    /// What was asked for.
+    pub backtest: AssetsBacktest,
+    /// Strategies in their order.
+    pub lines: Vec<AssetsLine>,
+}
+
+impl AssetsRecord {
+    /// The log-returns before `period` that are within a window.
+    fn known(&self, period: usize, window: Option<usize>) -> &[Vec<f64>] {
+        &self.rows[window.map_or(0, |window| period.saturating_sub(window))..period]
+    }
+}
+
+impl AssetsChoices {
+    /// Those that count where nothing is said, of so many periods a year.
+    pub fn usual(periods_per_year: usize) -> Self {
+        let windows = WINDOW_YEARS.map(|years| Some(years * periods_per_year));
+        AssetsChoices {
+            windows: windows.into_iter().chain([None]).collect(),
+            every: periods_per_year,
+            alpha: 0.1,
+            risk_aversion: defaults::risk_aversion(),
+            trading_cost: 0.0,
+            seed: default_seed(),
+        }
+    }
+
+    fn check(&self) -> Result<(), FieldError> {
+        let count = self.windows.len();
+        if !(1..=MOST_WINDOWS).contains(&count) {
+            return Err(FieldError::new("window", format!("{count} windows"), format!("must be 1 to {MOST_WINDOWS}")));
+        }
+        for (index, window) in self.windows.iter().enumerate() {
+            window.map_or(Ok(()), |window| whole("window", window, &DATES))?;
+            if self.windows[..index].contains(window) {
+                let value = window.map_or("all".to_owned(), |window| window.to_string());
+                return Err(FieldError::new("window", value, "must not be named twice"));
+            }
+        }
+        whole("every", self.every, &(1..=*DATES.end()))?;
+        within("alpha", self.alpha, ALPHA.0, ALPHA.1)?;
+        within("risk_aversion", self.risk_aversion, RELATIVE.0, RELATIVE.1)?;
+        within("trading_cost", self.trading_cost, TRADING_COST.0, TRADING_COST.1)
+    }
+}
+
+impl AssetsBacktest {
+    /// Checks the choices, and every window of the record.
+    ///
+    /// # Errors
+    /// A field that breaks its rule; the record is `simple_returns`.
+    pub fn new(record: AssetsRecord, choices: AssetsChoices) -> Result<Self, FieldError> {
+        choices.check()?;
+        check_names("assets", &record.assets)?;
+        let (found, year) = (record.rows.len(), record.periods_per_year);
+        let longest = choices.windows.iter().flatten().max();
+        let first = longest.copied().unwrap_or(WINDOW_YEARS[1] * year);
+        let wanted = first + year;
+        if found < wanted {
+            let rule = format!("must hold at least {wanted}, the longest window and a year");
+            return Err(FieldError::new("simple_returns", format!("{found} periods"), rule));
+        }
+        let backtest = AssetsBacktest { record, choices, first };
+        for window in &backtest.choices.windows {
+            for start in backtest.starts() {
+                let known = backtest.record.known(start, *window);
+                check_rows("simple_returns", known, &backtest.record.assets, None).map_err(|error| {
+                    let rule = format!("{}, in the {} periods before period {}", error.rule, known.len(), start + 1);
+                    FieldError::new(error.field, error.value, rule)
+                })?;
+            }
+        }
+        Ok(backtest)
+    }
+
+    /// The periods decided about.
+    pub fn lived(&self) -> &[Vec<f64>] {
+        &self.record.rows[self.first..]
+    }
+
+    /// What the bank paid in them.
+    pub fn bank(&self) -> &[f64] {
+        &self.record.bank[self.first..]
+    }
+
+    /// Their dates.
+    pub fn dates(&self) -> &[String] {
+        &self.record.dates[self.first..]
+    }
+
+    /// Of terminal wealth, and of a year's in the figures.
+    pub fn utility(&self) -> UtilitySpecification {
+        UtilitySpecification::relative(self.choices.risk_aversion)
+    }
+
+    /// How much of the past strategies of a window know, in words.
+    pub fn window_in_words(&self, window: Option<usize>) -> String {
+        words::window(window, self.record.periods_per_year, self.record.frequency.noun())
+    }
+
+    /// Parts of the work: stretches of a strategy, and radii of a window.
+    pub fn parts(&self) -> usize {
+        let windows = &self.choices.windows;
+        self.starts().count() * (strategies(windows).len() + windows.len())
+    }
+
+    /// The first periods of the stretches.
+    fn starts(&self) -> impl Iterator<Item = usize> + use<> {
+        (self.first..self.record.rows.len()).step_by(self.choices.every)
+    }
+
+    /// Decides every period on the current pool and keeps the books; `done` hears of every one of the [`parts`](Self::parts).
+    /// Cost: a one-step problem a period for each of the robust strategies.
+    pub fn run(self, done: &(dyn Fn() + Sync)) -> AssetsWalked {
+        let radii: Vec<Vec<f64>> = self.choices.windows.iter().map(|&window| self.radii(window, done)).collect();
+        let decide = |strategy: AssetsStrategy| {
+            let at = self.choices.windows.iter().position(|window| *window == strategy.window);
+            let radii = at.map_or(&[][..], |at| &radii[at]);
+            self.line(strategy, strategy.decide(&self, radii, done), radii)
+        };
+        let lines = pool::map(strategies(&self.choices.windows), decide);
+        AssetsWalked { backtest: self, lines }
+    }
+
+    /// The radius of all funds at once at the start of every stretch.
+    fn radii(&self, window: Option<usize>, done: &(dyn Fn() + Sync)) -> Vec<f64> {
+        let radius = |start: usize| {
+            let rows = self.record.known(start, window);
+            let bridges = FundBridges::simulate(rows, PATHS, self.choices.seed);
+            let own = bridges.quantile(&inverse_volatility(rows), self.choices.alpha).value;
+            let radius = bridges.joint_factor(self.choices.alpha).value * own / (rows.len() as f64).sqrt();
+            done();
+            radius
+        };
+        pool::map(self.starts().collect(), radius)
+    }
+
+    fn line(&self, strategy: AssetsStrategy, held: Vec<Vec<f64>>, radii: &[f64]) -> AssetsLine {
+        let keep =
+            |held: &[Vec<f64>]| keep_assets(held, self.lived(), self.bank(), self.choices.trading_cost, INITIAL_WEALTH);
+        let account = keep(&held);
+        let is_equal = matches!(strategy.rule, Rule::Equal { .. });
+        let mix = || vec![equal(self.record.assets.len(), account.mean_allocation()); held.len()];
+        let own_mix = (!is_equal).then(|| keep(&mix()));
+        let scale = strategy.rule.scale().unwrap_or_default();
+        let radius = |period: usize| radii.get(period / self.choices.every).map_or(0.0, |radius| scale * radius);
+        let name = strategy.name(|window| self.window_in_words(window));
+        AssetsLine { name, strategy, radii: (0..held.len()).map(radius).collect(), held, account, own_mix }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::report::AssetsBacktestReport;
+    use super::*;
+    use crate::control::evaluation::analysis::{Analysis, Line};
+    use crate::control::evaluation::backtest_report::BacktestFigures;
+    use crate::control::evaluation::resampling::Scale;
+    use crate::control::evaluation::rolling::{Decision, Period};
+    use crate::control::problem::actions::Band;
+
+    const BANK: f64 = 0.002;
+    const COST: f64 = 0.001;
+
+    fn log_return(asset: usize, period: usize) -> f64 {
+        let (asset, period) = (asset as f64, period as f64);
+        0.012 + 0.002 * asset + 0.03 * (1.7 * period).sin() + 0.02 * ((2.3 + asset) * period + asset).cos()
+    }
+
+    fn record(assets: usize, periods: usize, of: impl Fn(usize, usize) -> f64) -> AssetsRecord {
+        AssetsRecord {
+            assets: (0..assets).map(|asset| format!("asset {asset}")).collect(),
+            rows: (0..periods).map(|period| (0..assets).map(|asset| of(asset, period)).collect()).collect(),
+            bank: vec![BANK; periods],
+            dates: (0..periods).map(|period| period.to_string()).collect(),
+            frequency: Frequency::Quarterly,
+            periods_per_year: 4,
+        }
+    }
+
+    fn walk(record: AssetsRecord) -> AssetsWalked {
+        let choices = AssetsChoices {
+            windows: vec![Some(12), None],
+            alpha: 0.9,
+            trading_cost: COST,
+            ..AssetsChoices::usual(record.periods_per_year)
+        };
+        AssetsBacktest::new(record, choices).unwrap().run(&|| ())
+    }
+
+    fn named<'a>(walked: &'a AssetsWalked, name: &str) -> &'a AssetsLine {
+        let names: Vec<&str> = walked.lines.iter().map(|line| line.name.as_str()).collect();
+        walked.lines.iter().find(|line| line.name == name).unwrap_or_else(|| panic!("{name} is none of {names:?}"))
+    }
+
+    /// The robust one too: half of three equal assets is half of one.
+    #[test]
+    fn assets_that_are_one_have_the_rows_of_one() {
+        let walked = walk(record(3, 30, |_, period| log_return(0, period)));
+        let lived: Vec<Period> =
+            (12..30).map(|period| Period { log_return: log_return(0, period), bank_return: BANK }).collect();
+        let names = ["1/N", "60 % 1/N", "robust scaled_one, scale 0.5, 3 years"];
+        let line = |name: &str| {
+            let decision = |share: &f64| Decision { band: Band::of(&[*share]), radius: 0.0, source: None };
+            let decisions = named(&walked, name).account.allocations.iter().map(decision).collect();
+            Line::new(name.into(), decisions, &lived, COST)
+        };
+        let lines = names.map(line);
+        assert!(lines[2].account.allocations.iter().all(|share| (0.05..1.0).contains(share)), "{:?}", lines[2].account);
+        let scale =
+            Scale { periods_per_year: 4, utility: walked.backtest.utility(), seed: walked.backtest.choices.seed };
+        let expected = Analysis::of(&lines, 0, &lived, COST, &scale).figures;
+        let report = AssetsBacktestReport::new(&walked);
+        for BacktestFigures { strategy, beyond_own_mix, .. } in &expected {
+            let found = report.strategies.iter().find(|figures| figures.strategy == *strategy).unwrap();
+            let one = expected.iter().find(|figures| figures.strategy == *strategy).unwrap();
+            let estimates = [
+                (found.yearly_certainty_equivalent, one.yearly_certainty_equivalent),
+                (found.annual_mean, one.annual_mean),
+                (found.annual_volatility, one.annual_volatility),
+                (found.annual_turnover, one.annual_turnover),
+            ];
+            let beyond = found.beyond_own_mix.zip(*beyond_own_mix);
+            assert_eq!(
+                (beyond.is_some(), found.beyond_own_mix.is_some()),
+                (strategy.starts_with("robust"), beyond_own_mix.is_some())
+            );
+            for (found, one) in estimates.into_iter().chain(beyond) {
+                let ends = found.interval.iter().zip(one.interval);
+                let apart =
+                    ends.map(|(found, one)| (found - one).abs()).fold((found.value - one.value).abs(), f64::max);
+                assert!(apart < 1e-4, "{strategy}: {found:?} {one:?}");
+            }
+            assert!((found.max_drawdown - one.max_drawdown).abs() < 1e-6 && found.effective_assets.unwrap() > 2.99);
+        }
+    }
+
+    /// Plug-in is the best mean utility over all funds of the returns known: no other share of its fund is worth more.
+    #[test]
+    fn plug_in_is_best_by_direct_search_and_robust_holds_less() {
+        let walked = walk(record(2, 24, log_return));
+        let plug_in = &named(&walked, "plug-in, all").held[0];
+        let rows = &walked.backtest.record.rows[..12];
+        let mean = |shares: [f64; 2]| {
+            let wealth = |row: &Vec<f64>| {
+                let risky: f64 = shares.iter().zip(row).map(|(share, z)| share * z.exp()).sum();
+                (1.0 - shares[0] - shares[1]) * (1.0 + BANK) + risky
+            };
+            -rows.iter().map(|row| wealth(row).powi(-2)).sum::<f64>()
+        };
+        let grid = (0..=100).flat_map(|i| (0..=100 - i).map(move |j| [i as f64 / 100.0, j as f64 / 100.0]));
+        let best = grid.map(mean).fold(f64::NEG_INFINITY, f64::max);
+        // Twelve periods of a hundredth of a basis point.
+        assert!(mean([plug_in[0], plug_in[1]]) > best - 12.0 * 2.0 * 1e-6, "{plug_in:?}");
+        let total = |name: &str| named(&walked, name).account.allocations[0];
+        assert!(total("robust sup, scale 1, all") < total("robust sup, scale 0.5, all"));
+        assert!(total("robust sup, scale 0.5, all") < plug_in.iter().sum());
+    }
+
+    #[test]
+    fn nothing_later_is_used_and_a_window_forgets() {
+        let walked = walk(record(2, 28, log_return));
+        let changed = |from: usize, to: usize| {
+            walk(record(2, 28, |asset, period| {
+                log_return(asset, period) - if (from..to).contains(&period) { 0.05 } else { 0.0 }
+            }))
+        };
+        let later = changed(20, 28);
+        for (line, other) in walked.lines.iter().zip(&later.lines) {
+            assert_eq!(line.held[..=8], other.held[..=8], "{}", line.name);
+            let knows = !matches!(line.strategy.rule, Rule::Equal { .. });
+            assert_eq!(line.held[9..] != other.held[9..], knows, "{}", line.name);
+        }
+        let before = changed(0, 4);
+        for (line, other) in walked.lines.iter().zip(&before.lines) {
+            // Radii and static shares of a year are of its start, three years and more after the change.
+            let forgets = line.strategy.window.is_some() || matches!(line.strategy.rule, Rule::Equal { .. });
+            let apart = line.held[4..].iter().flatten().zip(other.held[4..].iter().flatten());
+            let apart = apart.map(|(one, other)| (one - other).abs()).fold(0.0, f64::max);
+            assert_eq!(apart < 1e-4, forgets, "{}: {apart}", line.name);
+        }
+    }
+
+    #[test]
+    fn static_keeps_its_shares_for_a_year_and_radii_are_those_of_its_start() {
+        let walked = walk(record(2, 22, log_return));
+        let kept = named(&walked, "static scaled_one, scale 0.5, all");
+        assert!(kept.held.len() == 10 && kept.held.chunks(4).all(|year| year.iter().all(|held| *held == year[0])));
+        assert_ne!(kept.held[3], kept.held[4]);
+        let robust = named(&walked, "robust scaled_one, scale 0.5, all");
+        assert_eq!((&kept.held[0], &kept.radii), (&robust.held[0], &robust.radii));
+        let wide = named(&walked, "robust scaled_one, scale 1, all");
+        assert!(wide.radii.iter().zip(&robust.radii).all(|(one, half)| (one - 2.0 * half).abs() < 1e-12));
+        // Of one fund at least: its bridges' quantile over the root of the number of returns.
+        let rows = &walked.backtest.record.rows[..16];
+        let bridges = FundBridges::simulate(rows, PATHS, walked.backtest.choices.seed);
+        let half = bridges.quantile(&[0.5, 0.5], 0.9).value / 4.0;
+        assert!(wide.radii[4] > half && wide.radii[4] < 3.0 * half, "{} {half}", wide.radii[4]);
+    }
+
+    #[test]
+    fn choices_and_records_that_break_a_rule_are_named() {
+        let record = |periods| record(2, periods, log_return);
+        let usual = AssetsChoices { windows: vec![Some(8)], ..AssetsChoices::usual(4) };
+        let message = |record, choices| AssetsBacktest::new(record, choices).err().unwrap().to_string();
+        let windows = |windows: &[Option<usize>]| AssetsChoices { windows: windows.to_vec(), ..usual.clone() };
+        assert_eq!(message(record(30), windows(&[None, None])), "window is all: must not be named twice");
+        assert_eq!(message(record(30), windows(&[Some(1)])), "window is 1: must lie in [2, 2000]");
+        let short = "simple_returns is 11 periods: must hold at least 12, the longest window and a year";
+        assert_eq!(message(record(11), usual.clone()), short);
+        assert_eq!(
+            message(record(30), AssetsChoices { every: 0, ..usual.clone() }),
+            "every is 0: must lie in [1, 2000]"
+        );
+        let still = AssetsRecord { rows: vec![vec![0.01, 0.02]; 30], ..record(30) };
+        let still = message(still, usual.clone());
+        assert!(still.contains("must vary") && still.ends_with("in the 8 periods before period 9"), "{still}");
+        let alike = AssetsRecord { assets: vec!["a".into(), "a".into()], ..record(30) };
+        assert_eq!(message(alike, usual), "assets[1] is a: must be a name of its own");
+    }
+}

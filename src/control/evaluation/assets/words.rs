@@ -1,0 +1,110 @@
+//! What the figures of several assets say, by rules that are blind to the strategy.
+
+use super::report::AssetsFigures;
+use super::{AssetsLine, AssetsWalked};
+use crate::control::evaluation::backtest_report::BootstrapEstimate;
+use crate::control::evaluation::verdict::{cost, few_years, grouped, listed};
+
+/// How much of the past a strategy knows.
+pub fn window(window: Option<usize>, year: usize, noun: &str) -> String {
+    let counted = |count: usize, noun: &str| format!("{count} {noun}{}", if count == 1 { "" } else { "s" });
+    match window {
+        None => "all".into(),
+        Some(periods) if periods.is_multiple_of(year) => counted(periods / year, "year"),
+        Some(periods) => counted(periods, noun),
+    }
+}
+
+/// One statement each, the most important first.
+pub fn sentences(walked: &AssetsWalked, figures: &[AssetsFigures], whole_years: usize) -> Vec<String> {
+    let mut sentences = vec![ranking(figures)];
+    match few_years(whole_years) {
+        Some(sentence) => sentences.push(sentence),
+        None => sentences.extend([against_equal(figures), against_own_mix(figures)]),
+    }
+    let number = |figures: &AssetsFigures| figures.effective_assets;
+    let fall = |figures: &AssetsFigures| Some(100.0 * figures.max_drawdown);
+    let share = |figures: &AssetsFigures| Some(100.0 * figures.mean_allocation);
+    sentences.extend([
+        format!("Effective number of assets held: {}.", ranges(&walked.lines, figures, number, 1, "")),
+        format!("On average held of wealth: {}.", ranges(&walked.lines, figures, share, 0, " %")),
+        format!("Largest fall from a peak: {}.", ranges(&walked.lines, figures, fall, 0, " %")),
+        cost(walked.backtest.choices.trading_cost, "no strategy knows of it"),
+    ]);
+    sentences
+}
+
+fn ranking(figures: &[AssetsFigures]) -> String {
+    let value = |figures: &AssetsFigures| figures.yearly_certainty_equivalent.value;
+    let equal = figures.iter().find(|figures| figures.beyond_equal.is_none());
+    let best = figures.iter().max_by(|a, b| value(a).total_cmp(&value(b)));
+    let Some((equal, best)) = equal.zip(best) else { return String::new() };
+    let place = 1 + figures.iter().filter(|other| value(other) > value(equal)).count();
+    format!(
+        "A year from 100 counts as {:.2} for certain with 1/N, equal shares in all assets, at place {place} of {}. The first is {} \
+         with {:.2}.",
+        value(equal),
+        figures.len(),
+        best.strategy,
+        value(best)
+    )
+}
+
+fn against_equal(figures: &[AssetsFigures]) -> String {
+    let [ahead, behind, unclear] = of_each(figures, |figures| figures.beyond_equal);
+    format!(
+        "By the interval of the difference, ahead of 1/N: {ahead}. Behind it: {behind}. Not to be told apart from it: {unclear}."
+    )
+}
+
+fn against_own_mix(figures: &[AssetsFigures]) -> String {
+    let [paid, cost, unclear] = of_each(figures, |figures| figures.beyond_own_mix);
+    format!(
+        "Against equal shares at their own average total, which nobody knew beforehand, choosing among assets and times paid for: \
+         {paid}. It cost: {cost}. The record shows neither for {unclear}."
+    )
+}
+
+/// Who has an interval above zero and who below, by name; how many have it around zero.
+fn of_each(figures: &[AssetsFigures], of: impl Fn(&AssetsFigures) -> Option<BootstrapEstimate>) -> [String; 3] {
+    let [above, below, around] =
+        grouped(figures.iter().filter_map(|figures| Some((figures.strategy.as_str(), of(figures)?))));
+    [listed(&above), listed(&below), format!("the other {}", around.len())]
+}
+
+/// From the least to the most of every family of strategies.
+fn ranges(
+    lines: &[AssetsLine],
+    figures: &[AssetsFigures],
+    of: impl Fn(&AssetsFigures) -> Option<f64>,
+    decimals: usize,
+    unit: &str,
+) -> String {
+    let mut families: Vec<(String, [f64; 2])> = Vec::new();
+    for (line, figures) in lines.iter().zip(figures) {
+        let (family, Some(value)) = (line.strategy.rule.family(), of(figures)) else { continue };
+        match families.iter_mut().find(|(name, _)| *name == family) {
+            Some((_, [low, high])) => (*low, *high) = (low.min(value), high.max(value)),
+            None => families.push((family, [value; 2])),
+        }
+    }
+    let told = |(family, ends): &(String, [f64; 2])| {
+        let [low, high] = ends.map(|end| format!("{end:.decimals$}"));
+        if low == high { format!("{family} {low}{unit}") } else { format!("{family} {low} to {high}{unit}") }
+    };
+    families.iter().map(told).collect::<Vec<String>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_are_told_in_years_where_they_are_whole() {
+        let told = |periods| window(periods, 12, "month");
+        assert_eq!(
+            [None, Some(12), Some(120), Some(125), Some(1)].map(told),
+            ["all", "1 year", "10 years", "125 months", "1 month"]
+        );
+    }
+}
