@@ -1,7 +1,8 @@
 //! `ballast demo`: the whole way once, on real returns, over HTTP.
 //!
 //! Starts the service in this process on a free loopback port with a data folder of its own, trains on the 240 months
-//! before 2008, and lives through 2008 as an investor's program would: ask, hold, report.
+//! before 2008, and lives through 2008 as an investor's program would: ask, hold, report. A second act does the same with
+//! four industries.
 
 use std::net::SocketAddr;
 use std::time::Instant;
@@ -13,6 +14,7 @@ use super::api_client::{ApiClient, ApiError};
 use super::host::{Host, HostError};
 use super::returns::ReturnsError;
 
+mod assets;
 mod calls;
 mod past;
 mod progress;
@@ -59,7 +61,9 @@ pub async fn run(args: DemoArgs) -> Result<(), DemoError> {
 }
 
 async fn whole(address: SocketAddr, args: &DemoArgs, started: Instant) -> Result<(), DemoError> {
-    story::narrate(&ApiClient::new(address), args.count).await?;
+    let api = ApiClient::new(address);
+    story::narrate(&api, args.count).await?;
+    assets::narrate(&api, args.count).await?;
     println!("\nDone in {:.0} s.", started.elapsed().as_secs_f64());
     if args.stay {
         println!("The service stays up on http://{address} until Ctrl-C.");

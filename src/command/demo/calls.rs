@@ -1,12 +1,14 @@
 //! What the demo asks of the service, and what it reads in the answers.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
 use super::DemoError;
-use super::past::{ALPHA, INITIAL_WEALTH, Past, RISK_AVERSION};
+use super::past::{ALPHA, INITIAL_WEALTH, RISK_AVERSION};
 use super::progress::{Job, ProgressView};
 use crate::command::api_client::ApiClient;
 
@@ -23,6 +25,32 @@ pub struct Advice {
     pub certainty_equivalent: f64,
     pub floor: f64,
     pub worst_case: Option<WorstCase>,
+}
+
+/// The same of several assets, by their names.
+#[derive(Debug, Clone, Deserialize)]
+pub struct AssetsAdvice {
+    pub period: usize,
+    pub allocation: BTreeMap<String, f64>,
+    pub trade: BTreeMap<String, f64>,
+    pub total: f64,
+    pub radius: f64,
+    pub certainty_equivalent: f64,
+    pub floor: f64,
+    pub one_step: OneStep,
+    pub worst_case: Option<WorstCase>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+pub struct OneStep {
+    pub worst_means: BTreeMap<String, WorstMean>,
+}
+
+/// Of an asset's log-return.
+#[derive(Debug, Clone, Deserialize)]
+pub struct WorstMean {
+    pub seen: f64,
+    pub worst: f64,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -49,20 +77,19 @@ fn read<T: for<'a> Deserialize<'a>>(call: &'static str, value: Value) -> Result<
     serde_json::from_value(value).map_err(|source| DemoError::Shape { call, source })
 }
 
-/// Queues the training, follows its events to the end, and returns the policy's name.
-pub async fn train(api: &ApiClient, past: &Past, horizon: usize, count: usize) -> Result<String, DemoError> {
-    let request = json!({
-        "problem": {
-            "framework": "adaptive",
-            "horizon": horizon,
-            "rate_per_step": past.rate,
-            "initial_wealth": INITIAL_WEALTH,
-            "utility": { "kind": "power", "risk_aversion": RISK_AVERSION },
-            "radius": { "rule": "bridge", "alpha": ALPHA },
-            "history": past.log_returns,
-        },
-        "design": { "count": count },
+/// Queues the training of the demo's investor for what `record` says of returns, follows its events to the end, and returns the
+/// policy's name.
+pub async fn train(api: &ApiClient, record: Value, horizon: usize, count: usize) -> Result<String, DemoError> {
+    let mut problem = json!({
+        "horizon": horizon,
+        "initial_wealth": INITIAL_WEALTH,
+        "utility": { "kind": "power", "risk_aversion": RISK_AVERSION },
+        "radius": { "rule": "bridge", "alpha": ALPHA },
     });
+    if let (Some(problem), Value::Object(record)) = (problem.as_object_mut(), record) {
+        problem.extend(record);
+    }
+    let request = json!({ "problem": problem, "design": { "count": count } });
     let mut job: Job = read("POST /train", api.post("/train", &request).await?)?;
     let path = format!("/jobs/{}", job.job);
     let mut view = ProgressView::new(horizon);
@@ -94,18 +121,23 @@ pub async fn open_session(api: &ApiClient, policy: &str) -> Result<String, DemoE
     Ok(session.session)
 }
 
-pub async fn advice(api: &ApiClient, session: &str, explained: bool) -> Result<Advice, DemoError> {
+pub async fn advice<T: DeserializeOwned>(api: &ApiClient, session: &str, explained: bool) -> Result<T, DemoError> {
     let explain = if explained { "&explain=worst_case" } else { "" };
     read("GET /action", api.get(&format!("/action?session={session}{explain}")).await?)
 }
 
-/// Reports the return of a period; the wealth it led to.
-pub async fn observe(api: &ApiClient, session: &str, period: usize, simple_return: f64) -> Result<f64, DemoError> {
+/// Reports what came of a period, `returns` by the name that they have in the call; the wealth it led to.
+pub async fn observe(
+    api: &ApiClient,
+    session: &str,
+    period: usize,
+    (name, returns): (&str, Value),
+) -> Result<f64, DemoError> {
     #[derive(Deserialize)]
     struct Observed {
         wealth: f64,
     }
-    let report = json!({ "session": session, "period": period, "simple_return": simple_return });
+    let report = json!({ "session": session, "period": period, name: returns });
     let observed: Observed = read("POST /observe", api.post("/observe", &report).await?)?;
     Ok(observed.wealth)
 }

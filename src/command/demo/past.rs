@@ -1,5 +1,7 @@
 //! The investor of the story: what he wants, and what was known before a month.
 
+use serde_json::{Value, json};
+
 use super::DemoError;
 use crate::command::returns::Returns;
 
@@ -12,7 +14,7 @@ pub const ALPHA: f64 = 0.1;
 /// What was known before a month.
 pub struct Past {
     pub month: String,
-    pub log_returns: Vec<f64>,
+    log_returns: Vec<f64>,
     /// Bank return per month: that of the last month known.
     pub rate: f64,
     mean_return: f64,
@@ -27,6 +29,11 @@ impl Past {
             rate: months.last().map_or(0.0, |row| row.risk_free_return),
             mean_return: months.iter().map(|row| row.risky_return).sum::<f64>() / months.len() as f64,
         })
+    }
+
+    /// What is known, as a request says it.
+    pub fn record(&self) -> Value {
+        json!({ "framework": "adaptive", "rate_per_step": self.rate, "history": self.log_returns })
     }
 
     /// How much more than the bank the average month paid.

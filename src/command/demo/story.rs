@@ -1,16 +1,18 @@
 //! The story the demo tells: what was known before 2008, what the investor was told, what became of him.
 
+use serde_json::json;
+
 use super::DemoError;
-use super::calls::{Advice, Move, advice, observe, open_session, train};
+use super::calls::{Advice, Move, WorstCase, advice, observe, open_session, train};
 use super::past::{ALPHA, HISTORY, INITIAL_WEALTH, Past, RISK_AVERSION};
 use crate::command::api_client::ApiClient;
 use crate::command::returns::{Returns, Row};
 
-const YEAR: &str = "2008";
-const FIRST_MONTH: &str = "2008-01";
+pub const YEAR: &str = "2008";
+pub const FIRST_MONTH: &str = "2008-01";
 /// Januaries in which the same rule, looking one month ahead, is asked for comparison.
 const JANUARIES: [&str; 4] = ["1947-01", "1975-01", "1987-01", FIRST_MONTH];
-const HORIZON: usize = 12;
+pub const HORIZON: usize = 12;
 const LINE_WIDTH: usize = 108;
 /// Moves of the worst-case law that are told one by one.
 const MOVES_TOLD: usize = 3;
@@ -25,17 +27,17 @@ pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
     println!(
         "power utility, risk aversion {RISK_AVERSION}, bridge radius at alpha {ALPHA}, {count} design points a step."
     );
-    let policy = train(api, &past, HORIZON, count).await?;
+    let policy = train(api, past.record(), HORIZON, count).await?;
     let session = open_session(api, &policy).await?;
     println!("Policy {policy:.12} is trained; session {session} starts with wealth {INITIAL_WEALTH}.");
-    let first = advice(api, &session, true).await?;
+    let first: Advice = advice(api, &session, true).await?;
     tell_why(&past, &first);
-    tell_worst_case("this", &first);
+    tell_worst_case("this", first.worst_case.as_ref());
     compare_januaries(api, &market, count).await?;
     let last = live_through(api, &session, &past, market.year(YEAR)).await?;
     if let Some(last) = last {
         println!();
-        tell_worst_case("December's", &last);
+        tell_worst_case("December's", last.worst_case.as_ref());
     }
     Ok(())
 }
@@ -78,7 +80,7 @@ async fn compare_januaries(api: &ApiClient, market: &Returns, count: usize) -> R
     println!("{:<8} {:>8} {:>11}  stocks beyond the bank", "month", "radius", "allocation");
     for month in JANUARIES {
         let past = Past::before(market, month)?;
-        let policy = train(api, &past, 1, count).await?;
+        let policy = train(api, past.record(), 1, count).await?;
         let session = open_session(api, &policy).await?;
         let Advice { radius, allocation, .. } = advice(api, &session, false).await?;
         let (edge, reason) = (past.edge(), reason(past.edge(), radius));
@@ -96,8 +98,8 @@ async fn live_through(api: &ApiClient, session: &str, past: &Past, year: &[Row])
     );
     let (mut all_bank, mut all_stock, mut last) = (INITIAL_WEALTH, INITIAL_WEALTH, None);
     for (index, month) in year.iter().enumerate() {
-        let told = advice(api, session, index + 1 == year.len()).await?;
-        let wealth = observe(api, session, told.period, month.risky_return).await?;
+        let told: Advice = advice(api, session, index + 1 == year.len()).await?;
+        let wealth = observe(api, session, told.period, ("simple_return", json!(month.risky_return))).await?;
         all_bank *= 1.0 + past.rate;
         all_stock *= 1.0 + month.risky_return;
         println!(
@@ -113,8 +115,8 @@ async fn live_through(api: &ApiClient, session: &str, past: &Past, year: &[Row])
 }
 
 /// The worst law behind an advice, in words, and its largest moves.
-fn tell_worst_case(whose: &str, advice: &Advice) {
-    let Some(worst_case) = &advice.worst_case else { return };
+pub fn tell_worst_case(whose: &str, worst_case: Option<&WorstCase>) {
+    let Some(worst_case) = worst_case else { return };
     println!("The worst law for {whose} advice:");
     wrapped(&worst_case.sentence, LINE_WIDTH).iter().for_each(|line| println!("{line}"));
     for Move { atom, moved_to, mass } in largest_moves(&worst_case.transport) {

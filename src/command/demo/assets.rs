@@ -1,0 +1,125 @@
+//! The second act: the same year with four industries, each held by its name.
+
+use std::collections::BTreeMap;
+
+use ballast::control::evaluation::assets::AssetsRecord;
+use ballast::returns::Choices;
+use serde_json::json;
+
+use super::DemoError;
+use super::calls::{AssetsAdvice, WorstMean, advice, observe, open_session, train};
+use super::past::{HISTORY, INITIAL_WEALTH};
+use super::story::{FIRST_MONTH, HORIZON, YEAR, tell_worst_case};
+use crate::command::api_client::ApiClient;
+use crate::command::returns::{AnyReturns, ReturnsError};
+
+const CSV: &str = include_str!("../../../data/us_industries_monthly.csv");
+const INDUSTRIES: [&str; 4] = ["energy", "finance", "health", "utilities"];
+/// Of the design points of the first act, the second has one in so many: its laws start resampled, which takes longer.
+const FEWER: usize = 4;
+const FEWEST: usize = 10;
+/// Of what is traded, in what is told of trading.
+const COST: f64 = 0.001;
+
+/// Trains for the four, tells what they are held for, and lives through the year.
+pub async fn narrate(api: &ApiClient, count: usize) -> Result<(), DemoError> {
+    let record = industries()?;
+    let start = record.dates.partition_point(|date| date.as_str() < FIRST_MONTH);
+    let count = (count / FEWER).max(FEWEST);
+    println!("\nSecond act: the same investor, the same year and four industries of the same {HISTORY} months.");
+    println!(
+        "One policy, of {count} design points a step, says what of wealth is in a fund of them; what the fund is made of is"
+    );
+    println!("chosen anew each month.");
+    let known = json!({
+        "assets": record.assets,
+        "rate_per_step": record.bank[start - 1],
+        "history": record.rows[start - HISTORY..start],
+    });
+    let policy = train(api, known, HORIZON, count).await?;
+    let session = open_session(api, &policy).await?;
+    let first: AssetsAdvice = advice(api, &session, true).await?;
+    tell_first(&first, record.bank[start - 1]);
+    live_through(api, &session, &record, start, &first).await
+}
+
+/// Those of the bundled file.
+fn industries() -> Result<AssetsRecord, ReturnsError> {
+    let columns = INDUSTRIES.map(str::to_owned).to_vec();
+    match AnyReturns::parse(CSV, &Choices { columns, ..Choices::default() }, None, None)? {
+        AnyReturns::Several(several) => Ok(several.record),
+        AnyReturns::One(_) => Err(ReturnsError::Several { found: 1 }),
+    }
+}
+
+fn by_name(shares: &BTreeMap<String, f64>) -> String {
+    let told = |(name, share): (&String, &f64)| format!("{name} {:.1} %", 100.0 * share);
+    shares.iter().map(told).collect::<Vec<String>>().join(", ")
+}
+
+fn tell_first(told: &AssetsAdvice, rate: f64) {
+    println!("\nTold for {FIRST_MONTH}: hold {:.0} % in all, {}.", 100.0 * told.total, by_name(&told.allocation));
+    println!(
+        "That counts as {:.2} for certain at the horizon, where the bank alone pays {:.2}. The radius, {:.4}, holds for all funds",
+        told.certainty_equivalent, told.floor, told.radius
+    );
+    println!(
+        "of the four at once. The average log-return of a month, as seen and under the worst law, with {:.2} % of the bank:",
+        100.0 * rate
+    );
+    for (name, WorstMean { seen, worst }) in &told.one_step.worst_means {
+        println!("  {name:<10} {:>6.2} % {:>6.2} %", 100.0 * seen, 100.0 * worst);
+    }
+    tell_worst_case("this", told.worst_case.as_ref());
+}
+
+/// One line a month, beside equal shares in the four with all wealth; then what it cost.
+async fn live_through(
+    api: &ApiClient,
+    session: &str,
+    record: &AssetsRecord,
+    start: usize,
+    first: &AssetsAdvice,
+) -> Result<(), DemoError> {
+    println!("\nThe year {YEAR}, month by month, with the share of wealth in each:");
+    let names: String = record.assets.iter().map(|name| format!(" {name:>10}")).collect();
+    println!("{:<8}{names} {:>8} {:>9} {:>9}", "month", "in all", "wealth", "1/N");
+    let (mut wealth, mut equal, mut traded) = (INITIAL_WEALTH, INITIAL_WEALTH, 0.0);
+    for month in start..start + HORIZON {
+        let told: AssetsAdvice = advice(api, session, false).await?;
+        let returns: BTreeMap<&String, f64> =
+            record.assets.iter().zip(&record.rows[month]).map(|(name, z)| (name, z.exp_m1())).collect();
+        wealth = observe(api, session, told.period, ("simple_returns", json!(returns))).await?;
+        equal *= 1.0 + returns.values().sum::<f64>() / returns.len() as f64;
+        traded += told.trade.values().map(|share| share.abs()).sum::<f64>();
+        let held: String = told.allocation.values().map(|share| format!(" {share:>10.3}")).collect();
+        println!("{:<8}{held} {:>8.3} {wealth:>9.2} {equal:>9.2}", record.dates[month], told.total);
+    }
+    println!(
+        "\nWhat it cost: {INITIAL_WEALTH} became {wealth:.2}. Equal shares of all wealth became {equal:.2}, and the bank would have paid \
+         {:.2}.",
+        first.floor
+    );
+    println!(
+        "{:.0} % of wealth was bought and sold in the year; at {:.1} % of what is traded that is {:.2} % of wealth.",
+        100.0 * traded,
+        100.0 * COST,
+        100.0 * COST * traded
+    );
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bundled_industries_have_the_year_and_twenty_before() {
+        let record = industries().unwrap();
+        assert_eq!(record.assets, INDUSTRIES);
+        let start = record.dates.partition_point(|date| date.as_str() < FIRST_MONTH);
+        assert_eq!((record.dates[start].as_str(), record.dates[start - HISTORY].as_str()), (FIRST_MONTH, "1988-01"));
+        assert_eq!(record.dates[start + HORIZON - 1], "2008-12");
+        assert_eq!(by_name(&BTreeMap::from([("a".into(), 0.1234), ("b".into(), 0.0)])), "a 12.3 %, b 0.0 %");
+    }
+}
