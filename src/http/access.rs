@@ -1,8 +1,8 @@
 //! Who may call what: one table, and one gate before every handler.
 //!
 //! Open to everybody: `/livez` and `/readyz`, which orchestrators ask without keys and which say one word; the dashboard's
-//! page and files, which are the same for everybody and where a key is typed in; `/openapi.json` and the page `/docs`, which
-//! describe a published program. Everything else tells of somebody's data, so it asks for a key: `/health` and `/metrics`
+//! page and files, which are the same for everybody and where a key is typed in; `/openapi.json`, the page `/docs` and the
+//! guide, which describe a published program. Everything else tells of somebody's data, so it asks for a key: `/health` and `/metrics`
 //! too, whose figures are of all tenants together. An operation that is in no line of the table is for admins alone.
 //!
 //! The gate refuses in this order: not meant for this service, no key, no role. A handler then takes the call off its
@@ -45,9 +45,11 @@ pub enum Access {
 pub fn access(method: &str, route: Option<&str>) -> Access {
     let Some(route) = route else { return Access::AnyKey };
     match (method, route) {
-        (_, "/livez" | "/readyz" | "/" | "/dashboard/{file}" | "/openapi.json" | "/docs" | "/docs/{file}") => {
-            Access::Open
-        }
+        (
+            _,
+            "/livez" | "/readyz" | "/" | "/dashboard/{file}" | "/openapi.json" | "/docs" | "/docs/{file}" | "/guide"
+            | "/guide/{file}",
+        ) => Access::Open,
         ("POST", "/sessions" | "/observe" | "/sessions/{id}/corrections" | "/sessions/{id}/renewals")
         | ("DELETE" | "PATCH", "/sessions/{id}") => Access::Role(KeyRole::Operate),
         ("POST", "/train" | "/evaluate" | "/backtest" | "/frontier" | "/jobs/{id}/cancel" | "/policies/import")

@@ -20,6 +20,7 @@ mod events;
 mod extract;
 mod fault;
 mod frontiers;
+mod guide;
 mod holder;
 mod hosts;
 mod jobs;

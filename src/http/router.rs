@@ -22,8 +22,8 @@ use super::hosts::Hosts;
 use super::problem::{Problem, ProblemKind};
 use super::{
     access, advise, audit, backtests, bounds, dashboard, defaults, described, documentation, evaluations, events,
-    frontiers, holder, jobs, labels, operations, overview, policies, reports, returns, sessions, telemetry, what_if,
-    wire,
+    frontiers, guide, holder, jobs, labels, operations, overview, policies, reports, returns, sessions, telemetry,
+    what_if, wire,
 };
 use crate::service::Service;
 use crate::service::config::Config;
@@ -90,7 +90,11 @@ fn operators() -> OpenApiRouter<Arc<Service>> {
 }
 
 fn pages() -> OpenApiRouter<Arc<Service>> {
-    OpenApiRouter::new().routes(routes!(dashboard::root)).routes(routes!(dashboard::file))
+    OpenApiRouter::new()
+        .routes(routes!(dashboard::root))
+        .routes(routes!(dashboard::file))
+        .routes(routes!(guide::start))
+        .routes(routes!(guide::file))
 }
 
 /// The OpenAPI description.

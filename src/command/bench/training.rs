@@ -19,6 +19,9 @@ pub struct TrainingBench {
     /// Design points per step
     #[arg(long, default_value_t = 1000)]
     count: usize,
+    /// Basis points to be reached, with at most so many design points
+    #[arg(long)]
+    accuracy: Option<f64>,
     #[arg(long, default_value_t = 10)]
     horizon: usize,
     /// Returns of the history
@@ -48,6 +51,7 @@ pub fn run(bench: &TrainingBench) -> Result<(), Box<dyn Error>> {
     let initial_laws = if bench.resampled { InitialLaws::Resampled } else { InitialLaws::Given };
     let mut specification = paper::specification(bench.sample_size, bench.horizon, bench.count, initial_laws);
     specification.surrogate.moment_count = bench.moments;
+    specification.design.accuracy = bench.accuracy;
     println!("threads  run  total s  solving s  fitting s  peak MB");
     for &threads in &bench.threads {
         let pool = TrainingPool::new(threads)?;

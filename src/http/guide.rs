@@ -1,0 +1,106 @@
+//! The documents of this project as a site, embedded, at `/guide` and below `/guide/`.
+//!
+//! The pages are the Markdown files as they stand in the repository, turned into HTML when the first of them is asked for: what is
+//! read here is of the version that runs, and works where the network ends at this machine.
+
+use std::sync::LazyLock;
+
+use axum::http::HeaderMap;
+use axum::response::Response;
+
+use super::asset::{Asset, HTML, STYLE};
+use super::extract::Id;
+use super::problem::Problem;
+
+mod page;
+
+/// No script at all.
+const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; style-src 'self'; img-src 'self'; font-src 'self'; \
+    base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+/// One page: its name in the address, its title in the list of pages, where it stands in the repository, and its text.
+struct Document {
+    name: &'static str,
+    title: &'static str,
+    path: &'static str,
+    text: &'static str,
+}
+
+macro_rules! documents {
+    ($($part:literal: [$($name:literal $title:literal $path:literal),+ $(,)?]),+ $(,)?) => {
+        &[$(($part, &[$(Document {
+            name: $name,
+            title: $title,
+            path: $path,
+            text: include_str!(concat!("../../", $path)),
+        }),+])),+]
+    };
+}
+
+/// By part, in the order in which they are listed; the first is the start.
+const PARTS: &[(&str, &[Document])] = documents! {
+    "Start": [
+        "start" "First advice in five minutes" "README.md",
+        "walk-through" "A year with a policy" "docs/walk-through.md",
+    ],
+    "Concepts": [
+        "choosing" "Choosing what to ask" "docs/choosing.md",
+        "glossary" "Words" "docs/glossary.md",
+        "results" "What it earned and cost" "docs/results.md",
+    ],
+    "How to": [
+        "backtest" "Walk a record forward" "docs/backtest.md",
+        "evaluation" "Evaluate a policy" "docs/evaluation.md",
+        "python" "Use it from Python" "clients/python/README.md",
+        "keys" "Give out keys" "docs/keys.md",
+        "operating" "Operate it" "docs/operating.md",
+        "replicas" "Run replicas" "docs/replicas.md",
+        "capacity" "Plan the capacity" "docs/capacity.md",
+    ],
+    "Reference": [
+        "requests" "Every request and field" "docs/requests.md",
+        "policy-format" "The format of a policy" "docs/policy-format.md",
+        "paper-to-code" "From the paper to the code" "docs/paper-to-code.md",
+        "measurements" "Measurements" "docs/measurements.md",
+        "threat-model" "Threat model" "docs/threat-model.md",
+        "extending" "Extending it" "docs/extending.md",
+        "contributing" "Changing it" "CONTRIBUTING.md",
+    ],
+};
+
+fn documents() -> impl Iterator<Item = &'static Document> {
+    PARTS.iter().flat_map(|(_, documents)| documents.iter())
+}
+
+static PAGES: LazyLock<Vec<Asset>> =
+    LazyLock::new(|| documents().map(|document| Asset::new((document.name, HTML, page::made(document)))).collect());
+
+macro_rules! pictures {
+    ($($name:literal),+) => { [$(($name, "image/png", include_bytes!(concat!("../../docs/images/", $name)).as_slice())),+] };
+}
+
+static FILES: LazyLock<Vec<Asset>> = LazyLock::new(|| {
+    let pictures = pictures!["backtest.png", "industries.png", "policy.png", "reproduction.png", "session.png"];
+    let style = ("guide.css", STYLE, include_bytes!("guide/guide.css").as_slice());
+    pictures.into_iter().chain([style]).map(Asset::new).collect()
+});
+
+/// The guide: first advice in five minutes, and the list of all pages.
+#[utoipa::path(get, path = "/guide", tag = "operations",
+    responses(
+        (status = 200, description = "A page.", body = String, content_type = "text/html"),
+        (status = 304, description = "The page is the one that `If-None-Match` names.")))]
+pub async fn start(headers: HeaderMap) -> Response {
+    PAGES[0].served(CONTENT_SECURITY_POLICY, &headers)
+}
+
+/// A page of the guide, or a picture.
+#[utoipa::path(get, path = "/guide/{file}", tag = "operations", params(("file" = String, Path, description = "Its name.")),
+    responses(
+        (status = 200, description = "The page or the picture.", body = String, content_type = "text/html"),
+        (status = 304, description = "It is the one that `If-None-Match` names."),
+        (status = 404, description = "There is no such page.", body = Problem, content_type = "application/problem+json")))]
+pub async fn file(Id(name): Id, headers: HeaderMap) -> Result<Response, Problem> {
+    let files: &[Asset] = if name.contains('.') { &FILES } else { &PAGES };
+    Ok(Asset::find(files, &name, "the guide")?.served(CONTENT_SECURITY_POLICY, &headers))
+}
