@@ -18,7 +18,7 @@ const BEHIND_THE_FACE: [&str; 3] = ["bellman", "surrogate", "uncertainty"];
 /// Files of `control` whose types users send or read as they are, and which therefore describe themselves to the API. A
 /// copy of each for the API alone would be a second place for every field and every sentence about it. What computes is not
 /// among them: nothing of `numerics`, and of `control` neither the method nor the problem.
-const DOCUMENTS: [&str; 23] = [
+const DOCUMENTS: [&str; 25] = [
     "control/assets/advice.rs",
     "control/evaluation/backtest_report.rs",
     "control/evaluation/frontier/report.rs",
@@ -31,12 +31,14 @@ const DOCUMENTS: [&str; 23] = [
     "control/request/annualised.rs",
     "control/request/assets.rs",
     "control/request/backtest.rs",
+    "control/request/centre.rs",
     "control/request/contributions.rs",
     "control/request/evaluation.rs",
     "control/request/framework.rs",
     "control/request/frontier.rs",
     "control/request/learning.rs",
     "control/request/radius_rule.rs",
+    "control/request/sampling_law.rs",
     "control/request/fund.rs",
     "control/request/specification.rs",
     "control/request/terms.rs",

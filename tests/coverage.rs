@@ -8,6 +8,7 @@ use ballast::control::evaluation::coverage::{CoverageQuestion, DrawnLaw, coverag
 use ballast::control::kept::Kept;
 use ballast::control::policy::Policy;
 use ballast::control::policy::advisor::Advisor;
+use ballast::control::request::centre::CentreSpecification;
 use ballast::control::request::radius_rule::RadiusRule;
 use ballast::control::request::specification::{Specification, UtilitySpecification};
 use ballast::control::uncertainty::radius::RadiusEstimator;
@@ -25,6 +26,7 @@ fn question(rules: Vec<RadiusRule>) -> CoverageQuestion {
         records: 4000,
         rate_per_step: 0.002,
         utility: UtilitySpecification::Log {},
+        centres: vec![CentreSpecification::Empirical {}],
         rules,
         seed: 1,
         level: 0.9,
@@ -51,6 +53,24 @@ fn two_returns_are_held_as_often_as_the_binomial_law_says() {
     assert_eq!(found[1].allocation, 0.0);
     // The best allocation is searched to 1e-6, where growth is flat.
     assert!((found[1].lost.value - 1e4 * gained).abs() < 1e-6, "{} {}", found[1].lost.value, 1e4 * gained);
+}
+
+#[test]
+fn a_centre_mixed_with_the_law_itself_is_nearer_by_the_share_that_was_seen() {
+    // Mixed with twenty returns of the law, twenty draws are half as far from it: at most 0.034 where 6 <= k <= 14.
+    let held =
+        (6..=14).map(|k| (1..=k).map(|i| f64::from(21 - i) / f64::from(i)).product::<f64>()).sum::<f64>() / 1_048_576.0;
+    let law = DrawnLaw::Blocks { returns: TWO.to_vec(), length: 1 };
+    let itself = CentreSpecification::Mixed { law: None, history: Some(TWO.to_vec()), weight: 20.0 };
+    let rules = vec![RadiusRule::Fixed { radius: 0.034 }];
+    let centres = vec![CentreSpecification::Empirical {}, itself];
+    let found = coverage(&law, &CoverageQuestion { centres, ..question(rules) }).unwrap();
+    // Four standard errors of a share of 4000 records.
+    assert!(
+        (found[1].covered.value - held).abs() < 4.0 * (held * (1.0 - held) / 4000.0_f64).sqrt(),
+        "{found:?} {held}"
+    );
+    assert!(found[0].covered.value < 0.8 && held > 0.95, "{found:?} {held}");
 }
 
 #[test]
@@ -94,16 +114,19 @@ async fn a_calibrated_policy_keeps_its_factor_wherever_it_goes() {
 }
 
 #[test]
-fn the_command_tells_a_line_for_each_law_size_and_rule_and_names_the_option_it_refuses() {
+fn the_command_tells_a_line_for_each_law_size_centre_and_rule_and_names_the_option_it_refuses() {
     let run = |arguments: &[&str]| {
         let command = Command::new(env!("CARGO_BIN_EXE_ballast")).arg("coverage").args(arguments).output().unwrap();
         (String::from_utf8(command.stdout).unwrap(), String::from_utf8(command.stderr).unwrap())
     };
     let (told, _) = run(&["--records", "20", "--sizes", "5,8"]);
     let lines: Vec<&str> = told.lines().collect();
-    assert_eq!(lines.len(), 1 + 4 * 2 * 4, "{told}");
+    assert_eq!(lines.len(), 1 + 4 * 2 * 3 * 4, "{told}");
     for name in ["normal", "the paper's mixture", "Student, 4 degrees", "market, in blocks"] {
-        assert_eq!(lines.iter().filter(|line| line.starts_with(name)).count(), 8, "{told}");
+        assert_eq!(lines.iter().filter(|line| line.starts_with(name)).count(), 24, "{told}");
+    }
+    for centre in [" empirical ", " smoothed ", " mixed "] {
+        assert_eq!(lines.iter().filter(|line| line.contains(centre)).count(), 32, "{told}");
     }
     for (arguments, option) in [
         (["--alpha", "0"], "--alpha"),

@@ -39,17 +39,23 @@ def cap(returns, w, radius, lowest):
     return max(high, lowest)
 
 
+def share_seen(problem, size):
+    """Of the centre of the ball, where it is not made of the returns seen alone."""
+    centre = problem.get("centre", {"kind": "empirical"})
+    return size / (size + centre["weight"]) if centre["kind"] == "mixed" else 1.0
+
+
 def radius_of(problem, size):
     """The rules of docs/requests.md that look at the effective number of returns alone."""
-    rule = problem["radius"]
+    rule, share = problem["radius"], share_seen(problem, size)
     if problem["framework"] == "plug_in":
         return 0.0
     if rule["rule"] == "fixed":
         return rule["radius"]
     if rule["rule"] == "root_n":
-        return rule["kappa"] / math.sqrt(size)
+        return share * rule["kappa"] / math.sqrt(size)
     if rule["rule"] == "concentration":
-        return math.sqrt(math.log(rule["C"] / rule["alpha"]) / (rule["c"] * size))
+        return share * math.sqrt(math.log(rule["C"] / rule["alpha"]) / (rule["c"] * size))
     raise ValueError(f"{rule['rule']} must be asked for with its radius")
 
 
@@ -120,10 +126,11 @@ def features(specification, question):
     found += moment_features(returns, w, count)
     if framework == "parametric_adaptive":
         return found
-    radius = question["radius"] if "radius" in question else radius_of(problem, 1 / sum(mass * mass for mass in w))
+    size = 1 / sum(mass * mass for mass in w)
+    radius = question["radius"] if "radius" in question else radius_of(problem, size)
     if problem["radius"]["rule"] == "bridge" and framework == "adaptive":
         found += [math.log(radius), math.log(question["radius_ahead"] / radius)]
-    return found + merton_features(problem, returns, w, radius)
+    return found + merton_features(problem, returns, w, radius / share_seen(problem, size))
 
 
 def kernel(hyper, left, right):

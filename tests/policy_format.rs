@@ -65,7 +65,15 @@ fn policies() -> Vec<Value> {
         of["problem"]["learning"] = json!({ "kind": "decay", "half_life": 3.5 });
         of
     };
+    let centred = |mut of: Value, centre: Value| {
+        of["problem"]["centre"] = centre;
+        of
+    };
+    let mixed = || json!({ "kind": "mixed", "history": [0.03, -0.05], "weight": 6.0 });
     vec![
+        centred(policy("adaptive", power(), bridge(), six()), mixed()),
+        centred(policy("adaptive", power(), json!({ "rule": "root_n", "kappa": 0.02 }), json!({})), mixed()),
+        centred(policy("adaptive", power(), bridge(), json!({})), json!({ "kind": "smoothed", "bandwidth": 0.02 })),
         decaying(policy("adaptive", power(), bridge(), six())),
         decaying(policy("adaptive", exponential(), json!({ "rule": "root_n", "kappa": 0.02 }), raw_value.clone())),
         decaying(policy("plug_in", power(), bridge(), json!({}))),

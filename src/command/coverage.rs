@@ -4,10 +4,13 @@
 use std::error::Error;
 
 use ballast::control::error::FieldError;
-use ballast::control::evaluation::coverage::{CoverageQuestion, DrawnLaw, RuleCoverage, coverage};
+use ballast::control::evaluation::coverage::{BallCoverage, CoverageQuestion, DrawnLaw, coverage};
 use ballast::control::problem::sampling_law::continuous_law;
+use ballast::control::request::centre::CentreSpecification;
+use ballast::control::request::learning::Learning;
 use ballast::control::request::radius_rule::RadiusRule;
 use ballast::control::request::rules::HISTORY_LENGTH;
+use ballast::control::request::sampling_law::{MixtureComponent, SamplingLaw};
 use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification};
 use ballast::numerics::law::ContinuousLaw;
 use clap::Args;
@@ -24,6 +27,10 @@ const BLOCK: usize = 12;
 const LEVEL: f64 = 0.9;
 /// Behind the quantiles of the bridge.
 const PATHS: usize = 2000;
+/// Deviation of the error that smooths, in that of the law.
+const SMOOTHED: f64 = 0.25;
+/// Returns that a law without premium counts as.
+const ASSUMED: f64 = 60.0;
 
 #[derive(Debug, Clone, Args)]
 pub struct CoverageArgs {
@@ -47,7 +54,25 @@ pub struct CoverageArgs {
 struct Named {
     name: &'static str,
     law: DrawnLaw,
+    /// Of its log-returns.
+    deviation: f64,
     rate_per_step: f64,
+}
+
+impl Named {
+    /// Centres to compare: the returns seen, those smoothed, and those beside a normal law of the right spread by which the asset
+    /// pays on average what the bank does, which it does not.
+    fn centres(&self) -> Vec<CentreSpecification> {
+        let variance = self.deviation * self.deviation;
+        let without_premium =
+            MixtureComponent { weight: 1.0, mean: self.rate_per_step.ln_1p() - 0.5 * variance, variance };
+        let law = Some(SamplingLaw::GaussianMixture { components: vec![without_premium] });
+        vec![
+            CentreSpecification::Empirical {},
+            CentreSpecification::Smoothed { bandwidth: SMOOTHED * self.deviation },
+            CentreSpecification::Mixed { law, history: None, weight: ASSUMED },
+        ]
+    }
 }
 
 pub fn run(arguments: &CoverageArgs) -> Result<(), Box<dyn Error>> {
@@ -62,33 +87,42 @@ pub fn run(arguments: &CoverageArgs) -> Result<(), Box<dyn Error>> {
     let bridge = |scale: f64| RadiusRule::Bridge { alpha, paths: PATHS, scale };
     let rules = [bridge(0.0), bridge(0.5), bridge(1.0), RadiusRule::Calibrated { alpha, paths: PATHS, scale: 1.0 }];
     println!(
-        "{:<22}{:>6}{:>14}{:>24}{:>10}{:>28}{:>8}",
-        "law", "n", "rule", "holds the law [90 %]", "radius", "lost a period, bp [90 %]", "held"
+        "{:<22}{:>6}{:>20}{:>14}{:>24}{:>10}{:>28}{:>8}",
+        "law", "n", "centre", "rule", "holds the law [90 %]", "radius", "lost a period, bp [90 %]", "held"
     );
-    for Named { name, law, rate_per_step } in laws()? {
+    let utility = UtilitySpecification::relative(arguments.risk_aversion);
+    for named in laws()? {
+        let (rate_per_step, centres, rules) = (named.rate_per_step, named.centres(), rules.to_vec());
+        let mut question =
+            CoverageQuestion { size: 0, records, rate_per_step, utility, centres, rules, seed, level: LEVEL };
         for &size in &arguments.sizes {
-            let utility = UtilitySpecification::relative(arguments.risk_aversion);
-            let rules = rules.to_vec();
-            let question = CoverageQuestion { size, records, rate_per_step, utility, rules, seed, level: LEVEL };
-            let found = coverage(&law, &question).map_err(by_option)?;
-            question.rules.iter().zip(found).for_each(|(rule, found)| println!("{}", line(name, size, rule, &found)));
+            question.size = size;
+            let found = coverage(&named.law, &question).map_err(by_option)?;
+            let balls =
+                question.centres.iter().flat_map(|centre| question.rules.iter().map(move |rule| (centre, rule)));
+            balls.zip(found).for_each(|(ball, found)| println!("{}", line(named.name, size, ball, &found)));
         }
     }
     Ok(())
 }
 
-fn line(name: &str, size: usize, rule: &RadiusRule, found: &RuleCoverage) -> String {
+fn line(name: &str, size: usize, (centre, rule): (&CentreSpecification, &RadiusRule), found: &BallCoverage) -> String {
     let rule = match *rule {
         RadiusRule::Bridge { scale: 0.0, .. } => "none".to_owned(),
         RadiusRule::Bridge { scale, .. } if scale != 1.0 => format!("{scale} bridge"),
         rule => rule.name().to_owned(),
     };
-    let RuleCoverage { covered, radius, lost, allocation } = found;
+    let BallCoverage { covered, radius, lost, allocation } = found;
     let percent = |share: f64| 100.0 * share;
     let covered =
         format!("{:.1} [{:.1}, {:.1}] %", percent(covered.value), percent(covered.low), percent(covered.high));
     let lost = format!("{:.2} [{:.2}, {:.2}]", lost.value, lost.low, lost.high);
-    format!("{name:<22}{size:>6}{rule:>14}{covered:>24}{:>10.5}{lost:>28}{:>6.0} %", radius.value, percent(*allocation))
+    let centre = centre.name();
+    format!(
+        "{name:<22}{size:>6}{centre:>20}{rule:>14}{covered:>24}{:>10.5}{lost:>28}{:>6.0} %",
+        radius.value,
+        percent(*allocation)
+    )
 }
 
 fn laws() -> Result<Vec<Named>, ReturnsError> {
@@ -96,18 +130,25 @@ fn laws() -> Result<Vec<Named>, ReturnsError> {
     let (atoms, masses) = mixture.quadrature();
     let mean = mixture.mean();
     let variance: f64 = atoms.iter().zip(&masses).map(|(z, mass)| mass * (z - mean).powi(2)).sum();
+    let deviation = variance.sqrt();
     let scale = (variance * (DEGREES_OF_FREEDOM - 2.0) / DEGREES_OF_FREEDOM).sqrt();
-    let normal = ContinuousLaw::GaussianMixture(vec![(1.0, mean, variance.sqrt())]);
+    let normal = ContinuousLaw::GaussianMixture(vec![(1.0, mean, deviation)]);
     let student = ContinuousLaw::StudentT { location: mean, scale, degrees_of_freedom: DEGREES_OF_FREEDOM };
     let market = Returns::bundled()?;
-    let returns = market.rows().iter().map(|row| row.period().log_return).collect();
+    let returns: Vec<f64> = market.rows().iter().map(|row| row.period().log_return).collect();
+    let market_deviation = Learning::Equal {}.deviation(&returns);
     let bank = market.rows().iter().map(|row| row.risk_free_return).sum::<f64>() / market.rows().len() as f64;
-    let of = |name, law| Named { name, law: DrawnLaw::Continuous(law), rate_per_step: RATE };
+    let of = |name, law| Named { name, law: DrawnLaw::Continuous(law), deviation, rate_per_step: RATE };
     Ok(vec![
         of("normal", normal),
         of("the paper's mixture", mixture),
         of("Student, 4 degrees", student),
-        Named { name: "market, in blocks", law: DrawnLaw::Blocks { returns, length: BLOCK }, rate_per_step: bank },
+        Named {
+            name: "market, in blocks",
+            law: DrawnLaw::Blocks { returns, length: BLOCK },
+            deviation: market_deviation,
+            rate_per_step: bank,
+        },
     ])
 }
 

@@ -12,9 +12,8 @@ use crate::control::problem::sampling_law::{admissible, continuous_law};
 use crate::control::progress::Watch;
 use crate::control::request::completion::DEFAULT_COUNT;
 use crate::control::request::contributions::Contributions;
-use crate::control::request::specification::{
-    InitialLaws, SamplingLaw, Specification, SurrogateTarget, UtilitySpecification,
-};
+use crate::control::request::sampling_law::SamplingLaw;
+use crate::control::request::specification::{InitialLaws, Specification, SurrogateTarget, UtilitySpecification};
 use crate::control::surrogate::design::GUARDS;
 use crate::control::surrogate::features::Features;
 use crate::control::surrogate::fitted::ValueSurrogate;

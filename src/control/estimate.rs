@@ -96,6 +96,8 @@ impl Footprint {
 struct Sizes {
     horizon: usize,
     history: usize,
+    /// Atoms of the largest centre.
+    atoms: usize,
     count: usize,
     inputs: usize,
     /// Functions that the surrogates of a step predict.
@@ -118,7 +120,8 @@ impl Sizes {
         let holdings = framed.holdings(if single { HOLDINGS_OF_ONE_LAW } else { HOLDINGS });
         let functions = holdings.count() + framed.dynamics(0).sides().len();
         let inputs = framed.selection.names().len();
-        Sizes { horizon, history, count, inputs, functions, paths, bridges }
+        let atoms = framed.centring.atom_count(history + horizon);
+        Sizes { horizon, history, atoms, count, inputs, functions, paths, bridges }
     }
 
     fn factor(&self) -> usize {
@@ -145,8 +148,8 @@ impl Sizes {
     /// Bytes that threads hold while they solve robust steps.
     fn solving(&self, threads: usize) -> usize {
         let tabulated = TABLES * self.functions.saturating_sub(FUNCTIONS_WITHOUT_COST);
-        let values = self.history + self.horizon;
-        product(&[threads, values, (STEP_NUMBERS + tabulated) * NUMBER + self.together() * LAW_BYTES])
+        let solved = product(&[threads, self.atoms, (STEP_NUMBERS + tabulated) * NUMBER]);
+        solved.saturating_add(product(&[threads, self.history + self.horizon, self.together(), LAW_BYTES]))
     }
 
     fn statistics(&self, threads: usize) -> usize {

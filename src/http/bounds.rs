@@ -8,6 +8,7 @@ use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
 use crate::control::request::assets::{ASSETS, DATES, LARGEST_FACTOR, NAME_LENGTH};
 use crate::control::request::backtest;
+use crate::control::request::centre_rules::{ASSUMED_WEIGHT, BANDWIDTH};
 use crate::control::request::evaluation::{self, HISTORIES, LEVEL, MOST_MIXES};
 use crate::control::request::frontier::{LARGEST_SCALE, RESAMPLES, SCALES};
 use crate::control::request::learning::HALF_LIFE;
@@ -49,7 +50,10 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
     let rules = [
         ("ProblemSpecification", "horizon", whole(&HORIZON)),
         ("ProblemSpecification", "trading_cost", within(TRADING_COST)),
-        ("ProblemSpecification", "history", history),
+        ("ProblemSpecification", "history", history.clone()),
+        ("CentreSpecification smoothed", "bandwidth", within(BANDWIDTH)),
+        ("CentreSpecification mixed", "history", history),
+        ("CentreSpecification mixed", "weight", within(ASSUMED_WEIGHT)),
         ("Learning", "half_life", within(HALF_LIFE)),
         ("UtilitySpecification exponential", "risk_aversion", within(RISK_AVERSION)),
         ("UtilitySpecification exponential", "risk_aversion_relative", within(RISK_AVERSION_RELATIVE)),

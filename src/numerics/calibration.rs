@@ -177,7 +177,7 @@ mod tests {
         for index in 0..5 {
             let places = law.draw(&mut stream(5, "draws", 0, index));
             let mut sample = Vec::new();
-            places.iter().for_each(|&place| mixture.learn(&mut sample, mixture.place(law.atoms[place])));
+            places.iter().for_each(|&place| mixture.learn(&mut sample, [mixture.place(law.atoms[place], 1.0)]));
             let (found, expected) = (law.distance(&places), mixture.distance(&sample));
             // Sixteen atoms in the place of a normal law of half a deviation.
             assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");

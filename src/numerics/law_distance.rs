@@ -32,7 +32,7 @@ pub struct Placed {
     share: f64,
     /// E[Z; Z <= value].
     partial_mean: f64,
-    /// In the sample; 1 where it is the newest.
+    /// In the sample; that of one return is 1 while it is the newest.
     weight: f64,
 }
 
@@ -53,7 +53,8 @@ pub struct LawDistance {
 }
 
 impl LawDistance {
-    /// Of samples that are learned at a retention. Cost, where that is 1: a quantile of the law for each value of each sample size.
+    /// Of samples that are learned at a retention. Cost, where that is 1: a quantile of the law for each value of each sample size. Where
+    /// no size is prepared, or it is less than 1, values may have any weight.
     pub fn new(law: ContinuousLaw, retention: f64, sample_sizes: impl IntoIterator<Item = usize>) -> Self {
         let ends = |size: usize| {
             let inner = (1..size).map(|cell| law.cumulative(law.quantile(cell as f64 / size as f64)).1);
@@ -64,23 +65,25 @@ impl LawDistance {
         LawDistance { law, retention, ends }
     }
 
-    /// The value with what the distance needs to know of it.
-    pub fn place(&self, value: f64) -> Placed {
+    /// A value of this weight with what the distance needs to know of it.
+    pub fn place(&self, value: f64, weight: f64) -> Placed {
         let (share, partial_mean) = self.law.cumulative(value);
-        Placed { value, share, partial_mean, weight: 1.0 }
+        Placed { value, share, partial_mean, weight }
     }
 
-    /// Puts one more value in its place in `sample`, ascending by value. Cost O(n).
-    pub fn learn(&self, sample: &mut Vec<Placed>, placed: Placed) {
+    /// Puts what one more return is made of in its place in `sample`, ascending by value. Cost O(n) a value.
+    pub fn learn(&self, sample: &mut Vec<Placed>, placed: impl IntoIterator<Item = Placed>) {
         sample.iter_mut().for_each(|other| other.weight *= self.retention);
-        let position = sample.partition_point(|other| other.value.total_cmp(&placed.value).is_le());
-        sample.insert(position, placed);
+        for placed in placed {
+            let position = sample.partition_point(|other| other.value.total_cmp(&placed.value).is_le());
+            sample.insert(position, placed);
+        }
     }
 
     /// The distance of the empirical law of `sample`, ascending by value; not a number where its size was not prepared.
-    /// Cost O(n), and where weights decay some sqrt(n) values of F and B.
+    /// Cost O(n), and where weights differ some sqrt(n) values of F and B.
     pub fn distance(&self, sample: &[Placed]) -> f64 {
-        if self.retention < 1.0 {
+        if self.ends.is_empty() {
             return self.weighted(sample);
         }
         let Some(ends) = self.ends.get(&sample.len()) else { return f64::NAN };
@@ -162,7 +165,7 @@ mod tests {
     fn distance(law: ContinuousLaw, sample: &[f64]) -> f64 {
         let distances = LawDistance::new(law, 1.0, [sample.len()]);
         let mut placed = Vec::new();
-        sample.iter().for_each(|&value| distances.learn(&mut placed, distances.place(value)));
+        sample.iter().for_each(|&value| distances.learn(&mut placed, [distances.place(value, 1.0)]));
         let found = distances.distance(&placed);
         let other_way = distances.weighted(&placed);
         // Some dozen roundings of numbers up to 9.
@@ -175,8 +178,20 @@ mod tests {
         // Seen in this order at a retention of 1/2: weights 1/4, 1/2 and 1 are one, two and four values alike.
         let distances = LawDistance::new(normal(), 0.5, []);
         let mut placed = Vec::new();
-        [0.7, -0.4, 1.3].into_iter().for_each(|value| distances.learn(&mut placed, distances.place(value)));
+        [0.7, -0.4, 1.3].into_iter().for_each(|value| distances.learn(&mut placed, [distances.place(value, 1.0)]));
         let expected = distance(normal(), &[0.7, -0.4, -0.4, 1.3, 1.3, 1.3, 1.3]);
+        let found = distances.distance(&placed);
+        assert!((found - expected).abs() < 1e-12, "{found} against {expected}");
+    }
+
+    #[test]
+    fn a_value_in_parts_weighs_what_its_parts_do() {
+        let distances = LawDistance::new(normal(), 1.0, []);
+        let mut placed = Vec::new();
+        let parts = |low: f64, high: f64| [distances.place(high, 0.75), distances.place(low, 0.25)];
+        distances.learn(&mut placed, parts(-0.4, 1.3));
+        distances.learn(&mut placed, parts(0.7, 0.2));
+        let expected = distance(normal(), &[-0.4, 1.3, 1.3, 1.3, 0.7, 0.2, 0.2, 0.2]);
         let found = distances.distance(&placed);
         assert!((found - expected).abs() < 1e-12, "{found} against {expected}");
     }

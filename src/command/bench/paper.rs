@@ -1,8 +1,9 @@
 //! The paper's configuration: its mixture, 20 returns drawn from it, ten steps.
 
 use ballast::control::problem::sampling_law::continuous_law;
+use ballast::control::request::sampling_law::{MixtureComponent, SamplingLaw};
 use ballast::control::request::specification::{
-    InitialLaws, MixtureComponent, ProblemSpecification, SamplingLaw, Specification, UtilitySpecification,
+    InitialLaws, ProblemSpecification, Specification, UtilitySpecification,
 };
 use ballast::numerics::law::ContinuousLaw;
 use ballast::numerics::streams::stream;

@@ -14,7 +14,7 @@ use crate::control::request::specification::{ProblemSpecification, Specification
 use crate::control::request::withdrawals::check_bank;
 use crate::control::surrogate::features::{FeatureSelection, Features, LawSummary};
 use crate::control::uncertainty::UncertaintySet;
-use crate::control::uncertainty::centre::Centre;
+use crate::control::uncertainty::centre::{Centre, Centring};
 use crate::control::uncertainty::radius::{Measure, Radii, RadiusEstimator};
 use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
 use crate::numerics::empirical::EmpiricalDistribution;
@@ -32,6 +32,8 @@ pub struct Problem {
     pub specification: Specification,
     /// Radii of its uncertainty sets.
     pub sets: RadiusEstimator,
+    /// Their centres.
+    pub centring: Centring,
     /// What of a state the surrogates see.
     pub selection: FeatureSelection,
     /// Of every period, and of the time after the last.
@@ -56,7 +58,8 @@ impl Problem {
         let sets = RadiusEstimator::new(specification, kept);
         let selection = FeatureSelection::new(specification, sets.varies());
         let periods = Dynamics::of(&specification.problem);
-        Problem { specification: specification.clone(), sets, selection, periods, frozen: OnceLock::new() }
+        let centring = Centring::of(&specification.problem);
+        Problem { specification: specification.clone(), sets, centring, selection, periods, frozen: OnceLock::new() }
     }
 
     /// So many holdings where trading costs; else the holding does not matter, and one is enough.
@@ -104,7 +107,7 @@ impl Problem {
         let best = match (self.learns(), problem.framework.is_parametric()) {
             (false, _) => self.frozen().set.best_return(),
             (true, true) => LOG_RETURN,
-            (true, false) => state.law.atoms().last().copied().unwrap_or(LOG_RETURN),
+            (true, false) => self.centring.highest(&state.law, problem.horizon - step),
         };
         let [all, unsold] = [state.holding, 0.0].map(|holding| self.dynamics(step).total(state.wealth, holding));
         largest_gain(problem, step, best) + (unsold / all).ln()
@@ -170,7 +173,7 @@ impl Problem {
     fn learned_set(&self, law: &EmpiricalDistribution, radius: f64) -> UncertaintySet {
         let problem = &self.specification.problem;
         if !problem.framework.is_parametric() {
-            return UncertaintySet::around(Centre::empirical(law), radius, problem.support);
+            return UncertaintySet::around(self.centring.centre(law), radius, problem.support);
         }
         let moments = CentralMoments::of(law);
         let estimate = NormalLaw { mean: moments.mean(), variance: moments.variance().max(SMALLEST_VARIANCE) };
@@ -210,7 +213,8 @@ impl Problem {
     /// The same of one law within each of `radii`.
     fn summaries(&self, law: &EmpiricalDistribution, radii: &[Radii]) -> Vec<LawSummary> {
         let (moments, mean) = (CentralMoments::of(law), ExponentialMean::of(law, self.lowest_return()));
-        radii.iter().map(|&radii| self.summary(moments, radii, mean.worst(radii.radius))).collect()
+        let of_returns = |radius: f64| self.sets.of_returns(radius, law.effective_size());
+        radii.iter().map(|&radii| self.summary(moments, radii, mean.worst(of_returns(radii.radius)))).collect()
     }
 
     /// Features of the laws that follow from `law` when each of `returns` (ascending) is learned, for one total wealth.
@@ -223,9 +227,9 @@ impl Problem {
             let features = |&log_return: &f64| self.selection.of(total, &without_ball(before.with(log_return)));
             return returns.iter().map(features).collect();
         }
-        let mean = ExponentialMean::of(law, self.lowest_return());
+        let (mean, [size, _]) = (ExponentialMean::of(law, self.lowest_return()), law.effective_sizes_ahead());
         let features = |(&log_return, radii): (&f64, Radii)| {
-            let worst = mean.worst_with(log_return, radii.radius);
+            let worst = mean.worst_with(log_return, self.sets.of_returns(radii.radius, size));
             self.selection.of(total, &self.summary(before.with(log_return), radii, worst))
         };
         returns.iter().zip(self.sets.radii_with(law, returns)).map(features).collect()

@@ -1,29 +1,27 @@
 //! How often a ball holds the law that a record was drawn from, how wide it is, and what advice that fears it loses.
 //!
-//! Records of n log-returns are drawn from a law that is known. Each is a history of its own: the rule gives the radius, the
-//! ball around the record holds the law where their Wasserstein distance is at most that, and the one-step advice in the ball
-//! is scored by the law,
+//! Records of n log-returns are drawn from a law that is known. Each is a history of its own: it gives the centre, the rule gives
+//! the radius, the ball holds the law where the centre's Wasserstein distance to it is at most that, and the one-step advice in the
+//! ball is scored by the law,
 //!
 //!   lost(a) = 1e4 (ln CE(a*) - ln CE(a)),   CE(a) = U^-1( E[ U(w(a, Z)) ] ),   a* the best for the law itself,
 //!
-//! in basis points a period. All rules see the same records.
+//! in basis points a period. All centres and rules see the same records.
 
 use rayon::prelude::*;
 
-use crate::control::assets::{AssetsLaw, AssetsStep};
 use crate::control::error::FieldError;
 use crate::control::kept::Kept;
-use crate::control::problem::actions::ActionInterval;
+use crate::control::policy::one_period::OnePeriod;
 use crate::control::problem::utility::RelativeUtility;
+use crate::control::request::centre::CentreSpecification;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules::LOG_RETURN;
 use crate::control::request::specification::{ProblemSpecification, Specification, UtilitySpecification};
-use crate::control::uncertainty::radius::RadiusEstimator;
+use crate::control::uncertainty::centre::Centre;
 use crate::numerics::block_bootstrap::circular_blocks;
-use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::law::ContinuousLaw;
-use crate::numerics::law_distance::{LawDistance, distance_of_masses};
-use crate::numerics::levelling::Ground;
+use crate::numerics::law_distance::{LawDistance, Placed, distance_of_masses};
 use crate::numerics::minimise::maximise_concave_scalar;
 use crate::numerics::streams::stream;
 use crate::numerics::summary::{Clustered, Estimate};
@@ -61,6 +59,8 @@ pub struct CoverageQuestion {
     /// Of the investor, who starts with 100.
     pub utility: UtilitySpecification,
     /// Of the balls; none looks at the law.
+    pub centres: Vec<CentreSpecification>,
+    /// Of their radii.
     pub rules: Vec<RadiusRule>,
     /// Of all draws.
     pub seed: u64,
@@ -68,9 +68,9 @@ pub struct CoverageQuestion {
     pub level: f64,
 }
 
-/// What a rule does under a law.
+/// What a centre and a rule do under a law.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RuleCoverage {
+pub struct BallCoverage {
     /// Share of records whose ball holds the law.
     pub covered: Estimate,
     /// The mean radius, in log-return.
@@ -81,7 +81,7 @@ pub struct RuleCoverage {
     pub allocation: f64,
 }
 
-/// A law prepared for records of one size.
+/// A law prepared for records of it.
 struct Prepared<'a> {
     law: &'a DrawnLaw,
     distance: Option<LawDistance>,
@@ -91,12 +91,12 @@ struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    fn of(law: &'a DrawnLaw, size: usize) -> Self {
+    fn of(law: &'a DrawnLaw) -> Self {
         match law {
             DrawnLaw::Continuous(continuous) => {
                 let (mut atoms, masses) = continuous.quadrature();
                 atoms.iter_mut().for_each(|atom| *atom = accepted(*atom));
-                Prepared { law, distance: Some(LawDistance::new(continuous.clone(), 1.0, [size])), atoms, masses }
+                Prepared { law, distance: Some(LawDistance::new(continuous.clone(), 1.0, [])), atoms, masses }
             }
             DrawnLaw::Blocks { returns, .. } => {
                 let mut atoms = returns.clone();
@@ -128,18 +128,18 @@ impl<'a> Prepared<'a> {
         (0..DRAWS).map(|_| draw()).find(varies).unwrap_or_default()
     }
 
-    /// From the record's law to the law itself.
-    fn distance(&self, record: &[f64]) -> f64 {
+    /// From a centre to the law itself.
+    fn distance(&self, centre: &Centre) -> f64 {
+        let weighed = centre.atoms.iter().copied().zip(centre.masses.iter().copied());
         if let Some(distance) = &self.distance {
-            let mut sample = Vec::with_capacity(record.len());
-            record.iter().for_each(|&value| distance.learn(&mut sample, distance.place(value)));
-            return distance.distance(&sample);
+            let placed: Vec<Placed> = weighed.map(|(atom, mass)| distance.place(atom, mass)).collect();
+            return distance.distance(&placed);
         }
-        let mut apart: Vec<f64> = self.masses.iter().map(|mass| -mass).collect();
-        for value in record {
-            apart[self.atoms.partition_point(|atom| atom < value)] += 1.0 / record.len() as f64;
-        }
-        distance_of_masses(&self.atoms, &apart)
+        let own = self.atoms.iter().copied().zip(self.masses.iter().map(|mass| -mass));
+        let mut apart: Vec<(f64, f64)> = weighed.chain(own).collect();
+        apart.sort_by(|left, right| left.0.total_cmp(&right.0));
+        let (atoms, apart): (Vec<f64>, Vec<f64>) = apart.into_iter().unzip();
+        distance_of_masses(&atoms, &apart)
     }
 
     /// Log certainty equivalent of an allocation over the bank.
@@ -154,14 +154,15 @@ fn accepted(log_return: f64) -> f64 {
     log_return.clamp(-LOG_RETURN, LOG_RETURN)
 }
 
-/// What each rule of the question does under `law`, in the order of the rules. Cost: a robust step for each record and rule.
+/// What each ball of the question does under `law`: centre by centre, and of each rule by rule. Cost: a robust step for each record
+/// and ball.
 ///
 /// Checked by: `tests/coverage.rs`.
 ///
 /// # Errors
-/// A rule that a training would not take either.
-pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<RuleCoverage>, FieldError> {
-    let prepared = Prepared::of(law, question.size);
+/// A centre or a rule that a training would not take either.
+pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<BallCoverage>, FieldError> {
+    let prepared = Prepared::of(law);
     let utility = RelativeUtility::new(question.utility, 100.0 * (1.0 + question.rate_per_step));
     let bank = 1.0 + question.rate_per_step;
     let worth = |allocation: f64| prepared.worth(allocation, bank, utility);
@@ -169,36 +170,36 @@ pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<RuleC
     let kept = Kept::default();
     let of_record = |index: usize| -> Result<Vec<[f64; 4]>, FieldError> {
         let record = prepared.record(question, index);
-        let (seen, distance) = (EmpiricalDistribution::new(&record), prepared.distance(&record));
-        let rows: Vec<Vec<f64>> = record.iter().map(|value| vec![*value]).collect();
-        let of_rule = |rule: &RadiusRule| {
+        let of_centre = |centre: &CentreSpecification| {
             let problem = ProblemSpecification {
                 horizon: 1,
                 utility: question.utility,
-                radius: Some(*rule),
+                centre: centre.clone(),
                 ..ProblemSpecification::of(record.clone(), question.rate_per_step)
             };
-            let specification = Specification::of(problem, question.seed).completed()?;
-            let radius = RadiusEstimator::new(&specification, kept.clone()).radius(&seen);
-            let law = AssetsLaw { returns: &rows, radius, floor: f64::NEG_INFINITY };
-            let total = ActionInterval { lowest: 0.0, highest: 1.0 };
-            let step = AssetsStep::new(law, Ground::Sup, utility, question.rate_per_step, total);
-            let allocation = step.solve(None).allocation[0];
-            let lost = BASIS_POINTS * (best - worth(allocation));
-            Ok([f64::from(u8::from(distance <= radius)), radius, lost, allocation])
+            let distance = prepared.distance(&Centre::frozen(&problem));
+            let of_rule = |rule: &RadiusRule| {
+                let problem = ProblemSpecification { radius: Some(*rule), ..problem.clone() };
+                let specification = Specification::of(problem, question.seed).completed()?;
+                let (advice, _) = OnePeriod::new(&specification, kept.clone()).advise(0.0)?;
+                let lost = BASIS_POINTS * (best - worth(advice.allocation));
+                Ok([f64::from(u8::from(distance <= advice.radius)), advice.radius, lost, advice.allocation])
+            };
+            question.rules.iter().map(of_rule).collect::<Result<Vec<_>, FieldError>>()
         };
-        question.rules.iter().map(of_rule).collect()
+        let balls: Result<Vec<_>, FieldError> = question.centres.iter().map(of_centre).collect();
+        Ok(balls?.concat())
     };
     let found = (0..question.records).into_par_iter().map(of_record).collect::<Result<Vec<_>, FieldError>>()?;
     let sample = Clustered::new(question.records, 1, question.level);
-    let of_rule = |rule: usize| {
-        let figure = |figure: usize| found.iter().map(|record| record[rule][figure]).collect::<Vec<f64>>();
-        RuleCoverage {
+    let of_ball = |ball: usize| {
+        let figure = |figure: usize| found.iter().map(|record| record[ball][figure]).collect::<Vec<f64>>();
+        BallCoverage {
             covered: sample.share(&figure(0), |covered| *covered > 0.0),
             radius: sample.mean(&figure(1)),
             lost: sample.mean(&figure(2)),
             allocation: sample.mean(&figure(3)).value,
         }
     };
-    Ok((0..question.rules.len()).map(of_rule).collect())
+    Ok((0..question.centres.len() * question.rules.len()).map(of_ball).collect())
 }

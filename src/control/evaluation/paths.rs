@@ -18,8 +18,10 @@ use crate::control::progress::{Phase, StepProgress, Watch};
 use crate::control::request::evaluation::{EvaluationRequest, InitialHistories};
 use crate::control::request::framework::Framework;
 use crate::control::request::rules;
-use crate::control::request::specification::{SamplingLaw, Specification};
+use crate::control::request::sampling_law::SamplingLaw;
+use crate::control::request::specification::Specification;
 use crate::control::training::Training;
+use crate::control::uncertainty::centre::Centring;
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::law_distance::{LawDistance, Placed};
 use crate::numerics::streams::stream;
@@ -120,11 +122,8 @@ impl Evaluation {
             rules::history(&format!("histories[{index}]"), history, request.problem.learning)?;
             if history.len() != request.problem.history.len() {
                 let value = format!("{} values", history.len());
-                return Err(FieldError::new(
-                    format!("histories[{index}]"),
-                    value,
-                    "must be as long as problem.history",
-                ));
+                let rule = "must be as long as problem.history";
+                return Err(FieldError::new(format!("histories[{index}]"), value, rule));
             }
         }
         Ok(Evaluation { law: true_law(&request), request, histories, kept: Kept::default() })
@@ -167,10 +166,11 @@ impl Evaluation {
     ) -> Result<Outcomes, TrainError> {
         let problem = &self.request.problem;
         let first = problem.history.len();
-        let sizes = first..first + problem.horizon;
+        let centring = Centring::of(problem);
+        let sizes = (first..first + problem.horizon).filter(|_| centring.is_empirical());
         let distances = LawDistance::new(self.law.clone(), problem.learning.retention(), sizes);
         let (periods, done) = (Dynamics::of(&self.request.problem), AtomicUsize::new(0));
-        let simulator = Simulator { evaluation: self, followers, watch, clock, periods, distances, done };
+        let simulator = Simulator { evaluation: self, followers, watch, clock, periods, centring, distances, done };
         let found: Result<Vec<_>, TrainError> =
             (0..self.histories.len()).into_par_iter().map(|history| simulator.history(history)).collect();
         let mut all = Outcomes { starts: Vec::new(), outcomes: Vec::new(), resolve_seconds: 0.0 };
@@ -211,6 +211,7 @@ struct Simulator<'a> {
     watch: &'a Watch<'a>,
     clock: &'a (dyn Fn() -> f64 + Sync),
     periods: Vec<Dynamics>,
+    centring: Centring,
     distances: LawDistance,
     done: AtomicUsize,
 }
@@ -228,8 +229,9 @@ impl Simulator<'_> {
             .zip(&own)
             .filter_map(|(follower, own)| follower.advisor.as_ref().or(own.as_ref()))
             .collect();
-        let mut sample = Vec::with_capacity(history.len() + self.evaluation.request.problem.horizon);
-        history.iter().for_each(|&value| self.distances.learn(&mut sample, self.distances.place(value)));
+        let assumed = self.centring.assumed().iter().map(|&(atom, weight)| self.distances.place(atom, weight));
+        let mut sample: Vec<Placed> = assumed.collect();
+        history.iter().for_each(|&value| self.learn(&mut sample, value));
         let paths = 0..self.evaluation.request.paths;
         let outcomes: Result<Paths, TrainError> =
             paths.into_par_iter().map(|path| self.path(index, path, &advisors, &sample)).collect();
@@ -279,12 +281,18 @@ impl Simulator<'_> {
         Ok((outcome, seconds))
     }
 
-    /// Distances of the empirical law to the true one before each return.
+    /// Adds a return to what the distance of the centre is found from.
+    fn learn(&self, sample: &mut Vec<Placed>, log_return: f64) {
+        let spread = self.centring.spread(log_return).map(|(atom, mass)| self.distances.place(atom, mass));
+        self.distances.learn(sample, spread);
+    }
+
+    /// Distances of the centre to the true law before each return.
     fn distances_along(&self, sample: &[Placed], returns: &[f64]) -> Vec<f64> {
         let mut sample = sample.to_vec();
         let before = |&log_return: &f64| {
             let distance = self.distances.distance(&sample);
-            self.distances.learn(&mut sample, self.distances.place(log_return));
+            self.learn(&mut sample, log_return);
             distance
         };
         returns.iter().map(before).collect()

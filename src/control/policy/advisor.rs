@@ -214,10 +214,9 @@ impl Advisor {
         let source = if radius == own { AdviceSource::Resolved } else { AdviceSource::ResolvedOtherRadius };
         let predicted = self.predict(step, state, own);
         let (advice, solution) = self.resolved(&Asked { step, state, radius, source }, &predicted);
-        let worst = match solution {
-            Some(solution) => WorstCase::of(&solution, &advice, self.utility_per_radius(step, state)),
-            None => WorstCase::unknown(),
-        };
+        let (centre, scale) = (&self.specification().problem.centre, self.utility_per_radius(step, state));
+        let worst =
+            solution.map_or_else(WorstCase::unknown, |solution| WorstCase::of(&solution, &advice, centre, scale));
         (advice, worst)
     }
 

@@ -5,13 +5,14 @@ use utoipa::ToSchema;
 
 use crate::control::bellman::solution::{Adversary, RobustSolution};
 use crate::control::policy::advice::Advice;
+use crate::control::request::centre::CentreSpecification;
 use crate::numerics::confidence_region::NormalLaw;
 use crate::numerics::wasserstein::Move;
 
 /// Radius, in log-return, whose price the sentence tells.
 const RADIUS_UNIT: f64 = 0.001;
 
-/// The law that is worst for the advised allocation: a transport of the empirical law, or, in the parametric frameworks, a
+/// The law that is worst for the advised allocation: a transport of the ball's centre, or, in the parametric frameworks, a
 /// normal law.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WorstCase {
@@ -46,7 +47,7 @@ pub struct WorstNormalLaw {
 /// Mass of one atom and where the adversary puts it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TransportedMass {
-    /// Observed log-return.
+    /// Log-return of the centre; an observed one, unless `problem.centre` says otherwise.
     pub atom: f64,
     /// Log-return in the worst case; equal to `atom` where the mass stays.
     pub moved_to: f64,
@@ -97,12 +98,17 @@ impl WorstCase {
     }
 
     /// The worst law of a solved step. `utility_scale` turns relative utility into utility.
-    pub fn of(solution: &RobustSolution, advice: &Advice, utility_scale: f64) -> WorstCase {
+    pub fn of(
+        solution: &RobustSolution,
+        advice: &Advice,
+        centre: &CentreSpecification,
+        utility_scale: f64,
+    ) -> WorstCase {
         let (transport, normal, sentence) = match &solution.adversary {
             Adversary::Transport { support, moves } => {
                 let mass = |m: &Move| TransportedMass { atom: support[m.from], moved_to: support[m.to], mass: m.mass };
                 let transport: Vec<TransportedMass> = moves.iter().map(mass).collect();
-                let sentence = transport_sentence(&transport, advice, solution.radius_cost);
+                let sentence = transport_sentence(&transport, advice, centre, solution.radius_cost);
                 (transport, None, sentence)
             }
             Adversary::Normal { worst, estimate } => {
@@ -127,18 +133,23 @@ fn moved(transport: &[TransportedMass]) -> (f64, Option<f64>) {
     (moved().map(|mass| mass.mass).sum(), moved().map(|mass| mass.moved_to).reduce(f64::min))
 }
 
-fn transport_sentence(transport: &[TransportedMass], advice: &Advice, radius_cost: f64) -> String {
+fn transport_sentence(
+    transport: &[TransportedMass],
+    advice: &Advice,
+    centre: &CentreSpecification,
+    radius_cost: f64,
+) -> String {
+    let middle = centre.in_words(advice.sample_size);
     if let (share, Some(lowest)) = moved(transport)
         && share > 0.0
     {
         format!(
-            "Against an allocation of {:.1} %, the worst law within distance {:.4} of the {} returns seen moves {:.1} % of \
+            "Against an allocation of {:.1} %, the worst law within distance {:.4} of {middle} moves {:.1} % of \
              the probability, down to a return of {:.1} % in one period; against that law the allocation is still worth \
              {:.2} for certain at the horizon, and all-bank {:.2}. A radius wider by {RADIUS_UNIT} would cost {:.1} basis \
              points of that.",
             100.0 * advice.allocation,
             advice.radius,
-            advice.sample_size,
             100.0 * share,
             100.0 * lowest.exp_m1(),
             advice.certainty_equivalent,
@@ -147,10 +158,9 @@ fn transport_sentence(transport: &[TransportedMass], advice: &Advice, radius_cos
         )
     } else {
         format!(
-            "At an allocation of {:.1} % no law within distance {:.4} of the {} returns seen does worse than the empirical one.",
+            "At an allocation of {:.1} % no law within distance {:.4} of {middle} does worse than the one in the middle.",
             100.0 * advice.allocation,
-            advice.radius,
-            advice.sample_size
+            advice.radius
         )
     }
 }

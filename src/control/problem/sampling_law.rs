@@ -1,7 +1,8 @@
 //! The laws that returns are drawn from.
 
 use crate::control::request::rules::LOG_RETURN;
-use crate::control::request::specification::{Interval, MixtureComponent, ProblemSpecification, SamplingLaw};
+use crate::control::request::sampling_law::{MixtureComponent, SamplingLaw};
+use crate::control::request::specification::{Interval, ProblemSpecification};
 use crate::numerics::law::ContinuousLaw;
 
 /// The law behind a problem's name for it.

@@ -226,6 +226,10 @@ pub(super) fn check_fund(
         let rule = "must be equal for a fund of several assets";
         return Err(FieldError::new("problem.learning", "decay", rule));
     }
+    if !problem.centre.is_empirical() {
+        let rule = "must be empirical for a fund of several assets";
+        return Err(FieldError::new("problem.centre.kind", problem.centre.name(), rule));
+    }
     check_names("fund.assets", &fund.assets)?;
     check_rows("fund.history", &fund.history, &fund.assets, fund.support)?;
     check_composition("fund.composition", &fund.composition, fund.assets.len())?;

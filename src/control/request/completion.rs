@@ -2,8 +2,10 @@
 
 use crate::control::error::FieldError;
 use crate::control::request::assets::check_fund;
+use crate::control::request::centre_rules::check_centre;
 use crate::control::request::rules;
-use crate::control::request::specification::{Interval, SamplingLaw, Specification};
+use crate::control::request::sampling_law::SamplingLaw;
+use crate::control::request::specification::{Interval, Specification};
 
 /// Design points per step where the law is part of the state, at most: the paper's count.
 pub const DEFAULT_COUNT: usize = 1000;
@@ -19,6 +21,7 @@ impl Specification {
     /// The first field, in the order of the request, that breaks its rule.
     pub fn completed(mut self) -> Result<Self, FieldError> {
         rules::check(&self)?;
+        check_centre(&self.problem)?;
         self.fund.as_ref().map_or(Ok(()), |fund| check_fund(fund, &self.problem, self.design.initial_laws))?;
         let learns = self.problem.framework.learns();
         let wealth = self.problem.initial_wealth;

@@ -6,13 +6,14 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
+use crate::control::request::centre::CentreSpecification;
 use crate::control::request::completion::DEFAULT_COUNT_WEALTH_ALONE;
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules::{self, within};
+use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{
-    DesignSpecification, InitialLaws, ProblemSpecification, SamplingLaw, Specification, SurrogateSpecification,
-    default_seed,
+    DesignSpecification, InitialLaws, ProblemSpecification, Specification, SurrogateSpecification, default_seed,
 };
 
 /// Simulated paths of one history.
@@ -205,6 +206,9 @@ impl EvaluationRequest {
         let mut design = self.design.clone();
         if framework != Framework::KnownLaw {
             problem.law = None;
+        }
+        if framework.is_parametric() || framework == Framework::KnownLaw {
+            problem.centre = CentreSpecification::default();
         }
         if framework.is_parametric() {
             // The region of the same level.

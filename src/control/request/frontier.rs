@@ -190,6 +190,10 @@ fn check_static(problem: &ProblemSpecification) -> Result<(), FieldError> {
             "must be `equal`: records are drawn without an order",
         ));
     }
+    if !problem.centre.is_empirical() {
+        let rule = "must be empirical: radii are tried around the law of a record alone";
+        return Err(FieldError::new("problem.centre.kind", problem.centre.name(), rule));
+    }
     if !problem.contributions.are_none() {
         return Err(FieldError::new("problem.contributions", "not 0", "must be left out"));
     }

@@ -3,6 +3,8 @@
 pub mod annualised;
 pub mod assets;
 pub mod backtest;
+pub mod centre;
+pub mod centre_rules;
 pub mod completion;
 pub mod contributions;
 pub mod dates;
@@ -14,6 +16,7 @@ pub mod fund;
 pub mod learning;
 pub mod radius_rule;
 pub mod rules;
+pub mod sampling_law;
 pub mod specification;
 pub mod terms;
 pub mod warnings;

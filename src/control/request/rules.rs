@@ -5,9 +5,9 @@ use crate::control::request::contributions::Contributions;
 use crate::control::request::framework::Framework;
 use crate::control::request::learning::Learning;
 use crate::control::request::radius_rule::RadiusRule;
+use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{
-    InitialLaws, Interval, ProblemSpecification, SamplingLaw, Specification, SurrogateSpecification,
-    UtilitySpecification,
+    InitialLaws, Interval, ProblemSpecification, Specification, SurrogateSpecification, UtilitySpecification,
 };
 use crate::control::request::withdrawals;
 
@@ -274,7 +274,8 @@ fn design(specification: &Specification) -> Result<(), FieldError> {
     Ok(())
 }
 
-fn sampling_law(field: &str, law: &SamplingLaw) -> Result<(), FieldError> {
+/// Checks a law, named `field` in messages.
+pub fn sampling_law(field: &str, law: &SamplingLaw) -> Result<(), FieldError> {
     match law {
         SamplingLaw::Bootstrap {} => Ok(()),
         SamplingLaw::StudentT { location, scale, degrees_of_freedom } => {

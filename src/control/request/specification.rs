@@ -6,11 +6,13 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::request::centre::CentreSpecification;
 use crate::control::request::contributions::Contributions;
 use crate::control::request::framework::Framework;
 use crate::control::request::fund::FundSpecification;
 use crate::control::request::learning::Learning;
 use crate::control::request::radius_rule::RadiusRule;
+use crate::control::request::sampling_law::SamplingLaw;
 
 /// A whole training job.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -72,6 +74,9 @@ pub struct ProblemSpecification {
     /// What older returns weigh in the law that is learned.
     #[serde(default)]
     pub learning: Learning,
+    /// What the ball is centred on. `known_law` and the parametric frameworks, which have no ball, take no other than the default.
+    #[serde(default)]
+    pub centre: CentreSpecification,
     /// Default: `bridge`; `chi_square` in the parametric frameworks, which take no other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radius: Option<RadiusRule>,
@@ -158,6 +163,7 @@ impl ProblemSpecification {
             contributions: Contributions::default(),
             utility: UtilitySpecification::default(),
             learning: Learning::default(),
+            centre: CentreSpecification::default(),
             radius: None,
             support: None,
             law: None,
@@ -184,40 +190,6 @@ pub struct Interval {
     pub min: f64,
     /// The upper end.
     pub max: f64,
-}
-
-/// A law of log-returns that can be drawn from.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum SamplingLaw {
-    /// A mixture of normal laws.
-    GaussianMixture {
-        /// At least one; their weights sum to 1.
-        components: Vec<MixtureComponent>,
-    },
-    /// Smoothed bootstrap of the history, each return with its weight, with the mean and variance that gives.
-    Bootstrap {},
-    /// A Student t law, moved and stretched.
-    StudentT {
-        /// Its mean, in log-return per step.
-        location: f64,
-        /// What a standard t variable is multiplied by, in log-return.
-        scale: f64,
-        /// Above 2: its variance is finite.
-        degrees_of_freedom: f64,
-    },
-}
-
-/// One normal law of a mixture, of log-returns per step.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct MixtureComponent {
-    /// Its probability.
-    pub weight: f64,
-    /// In log-return.
-    pub mean: f64,
-    /// In squared log-return.
-    pub variance: f64,
 }
 
 /// Which states the surrogates are trained on.

@@ -46,8 +46,8 @@ pub struct LawSummary {
     pub moments: CentralMoments,
     /// Of its uncertainty set.
     pub radii: Radii,
-    /// `min_F E_F[e^Z] / (1 + r) - 1` over the ball: the first unit of allocation earns this against the worst law,
-    /// and its sign decides whether anything is held at the last step.
+    /// `min_F E_F[e^Z] / (1 + r) - 1` over the ball around the law of the returns seen: the first unit of allocation earns this
+    /// against the worst law, and where that law is the centre its sign decides whether anything is held at the last step.
     pub robust_excess: f64,
     /// The variance of `e^Z / (1 + r)` under that law.
     pub robust_variance: f64,

@@ -1,12 +1,24 @@
 //! The discrete law that a Wasserstein ball is centred on.
 
 use crate::control::problem::sampling_law::{admissible, continuous_law};
+use crate::control::request::centre::CentreSpecification;
 use crate::control::request::framework::Framework;
-use crate::control::request::specification::{ProblemSpecification, SamplingLaw};
+use crate::control::request::sampling_law::SamplingLaw;
+use crate::control::request::specification::{Interval, ProblemSpecification};
 use crate::numerics::empirical::EmpiricalDistribution;
 
 /// Less than this of a law is lost in rounding; what decayed to it is left out.
 const NO_MASS: f64 = 1e-18;
+
+/// The Gauss-Hermite rule of five nodes for a standard normal error, exact for polynomials up to the ninth order: nodes 0 and
+/// +-sqrt(5 -+ sqrt(10)), masses 8/15 and (7 +- 2 sqrt(10)) / 60. A record has many returns, and five nodes around each are dense.
+const HERMITE: [(f64, f64); 5] = [
+    (-2.856_970_013_872_805_6, 0.011_257_411_327_720_688),
+    (-1.355_626_179_974_265_9, 0.222_075_922_005_612_65),
+    (0.0, 0.533_333_333_333_333_3),
+    (1.355_626_179_974_265_9, 0.222_075_922_005_612_65),
+    (2.856_970_013_872_805_6, 0.011_257_411_327_720_688),
+];
 
 /// A discrete law of log-returns: ascending distinct atoms, and their masses, which sum to 1.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,15 +29,99 @@ pub struct Centre {
     pub masses: Vec<f64>,
 }
 
-impl Centre {
-    /// The empirical law, each distinct value with its mass.
-    pub fn empirical(law: &EmpiricalDistribution) -> Self {
-        let weighted = law.atoms().iter().zip(law.weights());
-        let masses = weighted.map(|(&atom, weight)| (atom, weight / law.total_weight()));
+/// How the law of the returns seen becomes the centre of the ball: every return seen is spread over some nodes around it, and atoms
+/// that are assumed stand beside.
+///
+///   centre = ( sum_j w_j sum_k m_k delta_(z_j + h x_k) + sum_i v_i delta_(y_i) ) / ( sum_j w_j + sum_i v_i )
+///
+/// with x and m the nodes and masses of the Gauss-Hermite rule and h the bandwidth. What lies beyond the returns accepted is put at
+/// their bounds. Checked by: `tests/centre.rs` against draws.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Centring {
+    /// Steps h x_k away from a return, ascending, and m_k.
+    nodes: Vec<(f64, f64)>,
+    /// Log-returns y_i and v_i, in returns.
+    assumed: Vec<(f64, f64)>,
+    /// The returns accepted.
+    accepted: Interval,
+}
+
+impl Centring {
+    /// Of a problem, which has been completed.
+    pub fn of(problem: &ProblemSpecification) -> Self {
+        let (mut nodes, mut assumed) = (vec![(0.0, 1.0)], Vec::new());
+        match &problem.centre {
+            CentreSpecification::Smoothed { bandwidth } if *bandwidth > 0.0 => {
+                nodes = HERMITE.map(|(node, mass)| (bandwidth * node, mass)).to_vec();
+            }
+            CentreSpecification::Mixed { law, history, weight } if *weight > 0.0 => {
+                let (atoms, masses) = match law {
+                    Some(law) => continuous_law(law, problem).quadrature(),
+                    None => {
+                        let record = history.clone().unwrap_or_default();
+                        let mass = 1.0 / record.len() as f64;
+                        let masses = vec![mass; record.len()];
+                        (record, masses)
+                    }
+                };
+                let weighed = |(atom, mass): (f64, f64)| (admissible(atom, problem), weight * mass);
+                assumed = atoms.into_iter().zip(masses).map(weighed).collect();
+            }
+            _ => {}
+        }
+        let [min, max] = [f64::NEG_INFINITY, f64::INFINITY].map(|end| admissible(end, problem));
+        Centring { nodes, assumed, accepted: Interval { min, max } }
+    }
+
+    /// A return seen as the centre has it: log-returns and their masses, which sum to 1.
+    pub fn spread(&self, log_return: f64) -> impl Iterator<Item = (f64, f64)> {
+        let Interval { min, max } = self.accepted;
+        self.nodes.iter().map(move |&(step, mass)| {
+            (if step == 0.0 { log_return } else { (log_return + step).clamp(min, max) }, mass)
+        })
+    }
+
+    /// What stands in the centre beside the returns seen: log-returns, and what they weigh in returns.
+    pub fn assumed(&self) -> &[(f64, f64)] {
+        &self.assumed
+    }
+
+    /// Whether the centre is the law of the returns seen.
+    pub fn is_empirical(&self) -> bool {
+        self.nodes.len() == 1 && self.assumed.is_empty()
+    }
+
+    /// Atoms of the centre of so many returns, at most.
+    pub fn atom_count(&self, returns: usize) -> usize {
+        returns.saturating_mul(self.nodes.len()).saturating_add(self.assumed.len())
+    }
+
+    /// The centre where these returns were seen.
+    pub fn centre(&self, law: &EmpiricalDistribution) -> Centre {
+        let assumed: f64 = self.assumed.iter().map(|(_, weight)| weight).sum();
+        let total = law.total_weight() + assumed;
+        let spread = |(&atom, weight): (&f64, &f64)| {
+            let weight = *weight;
+            self.spread(atom).map(move |(node, mass)| (node, weight * mass))
+        };
+        let seen = law.atoms().iter().zip(law.weights()).flat_map(spread);
+        let mut weighted: Vec<(f64, f64)> = seen.chain(self.assumed.iter().copied()).collect();
+        weighted.sort_by(|left, right| left.0.total_cmp(&right.0));
+        let masses = weighted.into_iter().map(|(atom, weight)| (atom, weight / total));
         Centre::gathered(masses.filter(|(_, mass)| *mass > NO_MASS))
     }
 
-    /// Where nothing is learned: the known law by its quadrature, or the empirical law of the history. What of a known law
+    /// No return of the centre is above this, though `periods` more are learned of which none is above it before its turn.
+    pub fn highest(&self, law: &EmpiricalDistribution, periods: usize) -> f64 {
+        let seen = law.atoms().last().copied().unwrap_or(self.accepted.max);
+        let step = self.nodes.last().map_or(0.0, |node| node.0);
+        let spread = if step > 0.0 { (seen + periods as f64 * step).min(self.accepted.max).max(seen) } else { seen };
+        self.assumed.iter().fold(spread, |highest, (atom, _)| highest.max(*atom))
+    }
+}
+
+impl Centre {
+    /// Where nothing is learned: the known law by its quadrature, or the centre of the history. What of a known law
     /// lies beyond the returns accepted is put at their bounds, as the simulated returns of the same law are: an exponential
     /// of a heavy tail has no mean.
     pub fn frozen(problem: &ProblemSpecification) -> Self {
@@ -34,7 +130,7 @@ impl Centre {
             let (atoms, masses) = continuous_law(law, problem).quadrature();
             return Centre::gathered(atoms.into_iter().map(|atom| admissible(atom, problem)).zip(masses));
         }
-        Centre::empirical(&problem.learning.law(&problem.history))
+        Centring::of(problem).centre(&problem.learning.law(&problem.history))
     }
 
     /// The masses of equal neighbours added up.

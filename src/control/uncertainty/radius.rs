@@ -4,6 +4,7 @@
 use std::sync::{Arc, OnceLock};
 
 use crate::control::kept::{Kept, Key};
+use crate::control::request::centre::CentreSpecification;
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::Specification;
@@ -33,6 +34,8 @@ pub struct RadiusEstimator {
     last_size: usize,
     /// Whether weights decay, more than a little.
     decays: bool,
+    /// What the balls are centred on.
+    centre: CentreSpecification,
     /// The history, ascending: the values that most laws of a design share.
     base: Vec<f64>,
     /// Where the common random numbers are kept.
@@ -86,7 +89,8 @@ impl RadiusEstimator {
         let decays = learning.retention().powf(last_size as f64) < ALL_BUT_EQUAL;
         let mut base = specification.problem.history.clone();
         base.sort_by(f64::total_cmp);
-        RadiusEstimator { rule, calibration, seed: specification.seed, last_size, decays, base, kept }
+        let (seed, centre) = (specification.seed, specification.problem.centre.clone());
+        RadiusEstimator { rule, calibration, seed, last_size, decays, centre, base, kept }
     }
 
     /// True where laws of one sample size have different radii.
@@ -163,7 +167,7 @@ impl RadiusEstimator {
             RadiusRule::Bridge { alpha, paths, scale } => {
                 let bridges = self.bridges(law.sample_size(), paths);
                 let scale = self.factor(scale, alpha, paths);
-                radius(scale, bridges.bridge_quantile(law, Statistic::Now, alpha), law.effective_size())
+                self.bridged_radius(scale, bridges.bridge_quantile(law, Statistic::Now, alpha), law.effective_size())
             }
             _ => self.radius_of_size(law.effective_size()),
         }
@@ -195,7 +199,7 @@ impl RadiusEstimator {
             RadiusRule::Bridge { alpha, paths, scale } => {
                 let quantile = self.bridges(law.sample_size(), paths).bridge_quantile_with_error(law, alpha);
                 let scale = self.factor(scale, alpha, paths);
-                Measure { radius: radius(scale, quantile.value, size), quantile: Some(quantile) }
+                Measure { radius: self.bridged_radius(scale, quantile.value, size), quantile: Some(quantile) }
             }
             _ => Measure { radius: self.radius_of_size(size), quantile: None },
         }
@@ -209,7 +213,11 @@ impl RadiusEstimator {
             RadiusRule::Bridge { alpha, paths, scale } => {
                 let bridges = self.bridges(size + 1, paths);
                 let scale = self.factor(scale, alpha, paths);
-                radius(scale, bridges.bridge_quantile(law, Statistic::OneLater, alpha), law.effective_sizes_ahead()[0])
+                self.bridged_radius(
+                    scale,
+                    bridges.bridge_quantile(law, Statistic::OneLater, alpha),
+                    law.effective_sizes_ahead()[0],
+                )
             }
             _ => self.radius_of_size(law.effective_size()),
         };
@@ -234,8 +242,9 @@ impl RadiusEstimator {
         let effective_size_ahead = first.effective_sizes_ahead()[0];
         let of_law = |(index, now): (usize, Vec<f64>)| {
             let of_level = |(level, now): (usize, f64)| {
-                let known = radius(scale, now, effective_size);
-                let later = ahead.as_ref().map(|ahead| radius(scale, ahead[index][level], effective_size_ahead));
+                let known = self.bridged_radius(scale, now, effective_size);
+                let later =
+                    ahead.as_ref().map(|ahead| self.bridged_radius(scale, ahead[index][level], effective_size_ahead));
                 Radii { radius: known, radius_ahead: later.unwrap_or(known) }
             };
             now.into_iter().enumerate().map(of_level).collect()
@@ -260,7 +269,10 @@ impl RadiusEstimator {
                 let scale = self.factor(scale, alpha, paths);
                 let radii = |values: &[f64], which, size, effective_size| {
                     let found = self.bridges(size, paths).bridge_quantiles_with(law, values, which, alpha);
-                    found.into_iter().map(|quantile| radius(scale, quantile, effective_size)).collect::<Vec<f64>>()
+                    found
+                        .into_iter()
+                        .map(|quantile| self.bridged_radius(scale, quantile, effective_size))
+                        .collect::<Vec<f64>>()
                 };
                 let now = radii(values, Statistic::Now, size, next_size);
                 if !self.looks_ahead(size) {
@@ -286,13 +298,23 @@ impl RadiusEstimator {
 
     /// The radius under the rules that look at the effective sample size alone.
     fn radius_of_size(&self, size: f64) -> f64 {
-        match self.rule {
+        let of_returns = match self.rule {
             RadiusRule::Bridge { .. } | RadiusRule::Calibrated { .. } => 0.0,
             RadiusRule::Concentration { alpha, numerator, rate } => ((numerator / alpha).ln() / (rate * size)).sqrt(),
             RadiusRule::RootN { kappa } => kappa / size.sqrt(),
-            RadiusRule::Fixed { radius } => radius,
+            RadiusRule::Fixed { radius } => return radius,
             RadiusRule::ChiSquare { alpha } => confidence_region::radius(alpha, size),
-        }
+        };
+        of_returns * self.centre.share_seen(size)
+    }
+
+    fn bridged_radius(&self, scale: f64, quantile: f64, effective_size: f64) -> f64 {
+        scale * quantile / effective_size.sqrt() * self.centre.share_seen(effective_size)
+    }
+
+    /// The radius of the ball around the law of `size` returns seen, of which `radius` is the share of a ball around the centre.
+    pub fn of_returns(&self, radius: f64, size: f64) -> f64 {
+        radius / self.centre.share_seen(size)
     }
 }
 
@@ -302,10 +324,6 @@ fn thinned(count: usize) -> Vec<usize> {
     let every = (last / LEAST_THINNED).max(1);
     let before = (0..last).step_by(every);
     before.chain((count > 0).then_some(last)).collect()
-}
-
-fn radius(scale: f64, quantile: f64, effective_size: f64) -> f64 {
-    scale * quantile / effective_size.sqrt()
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ import { h, section } from "./dom.js";
 import { inWords as flowsInWords } from "./flows.js";
 import { count, counted, percent, percentTick, points, significant, wealth } from "./format.js";
 import { unitOf } from "./periods.js";
-import { caution, FRAMEWORKS, moments, utility } from "./specification.js";
+import { caution, centreInWords, FRAMEWORKS, moments, utility } from "./specification.js";
 import { surfaceCurve } from "./surface_view.js";
 
 /** Places at which the two are read. */
@@ -55,6 +55,7 @@ function rows(asked) {
     row("Money added", (problem) => flowsInWords(problem) || "None"),
     row("Most in stocks", ({ action_interval }) => percent(action_interval[1], 0)),
     row("Older returns", ({ learning }) => (learning.kind === "decay" ? `half after ${significant(learning.half_life)}` : "count like newer ones")),
+    row("Centre", ({ centre }) => centreInWords(centre) || "The returns seen"),
     { name: "Record", cells: [record(one), same ? record(one) : `${record(other)}${record(other) === record(one) ? " (other returns)" : ""}`], apart: `mean ${signed(records[1].mean - records[0].mean, (value) => points(value, 2))}` },
     row("Precision", (_, { design, seed }) => `${counted(design.count, "situation")}, seed ${count(seed)}`),
   ];

@@ -13,6 +13,9 @@ export function effectiveSize(learning, count) {
   return Math.tanh(count * half) / Math.tanh(half);
 }
 
+/** The share that so many returns seen have of the centre of the ball. */
+export const shareSeen = ({ kind, weight } = {}, count) => (kind === "mixed" ? count / (count + weight) : 1);
+
 /** Atoms of mean 0 and variance 1, largest first, with what all laws of this shape have in common. Of returns, the oldest first. */
 export class Shape {
   constructor(returns, kept = 1) {

@@ -134,6 +134,18 @@ export function caution(problem) {
   return scale === 1 ? confidence : `${confidence}, \u00d7 ${significant(scale)}`;
 }
 
+/** What the ball is centred on, where that is not the law of the returns seen. */
+export function centreInWords({ kind, bandwidth, weight } = {}) {
+  switch (kind) {
+    case "smoothed":
+      return `Every return seen stands for a normal law around it, of deviation ${percent(bandwidth, 2)}.`;
+    case "mixed":
+      return `Beside the returns seen it counts a law that is assumed to tell as much as ${significant(weight)} more.`;
+    default:
+      return "";
+  }
+}
+
 /** What was asked for, a sentence a choice; `annualised` is what the service says by the year, where it does. */
 export function inWords({ problem }, annualised) {
   const { mean, deviation } = moments(problem.history);
@@ -143,9 +155,10 @@ export function inWords({ problem }, annualised) {
   const { learning } = problem;
   const forgets =
     learning.kind === "decay" ? ` Returns count less the older they are: half after ${counted(learning.half_life, unit)}.` : "";
+  const centred = centreInWords(problem.centre);
   const all = limit === 1 ? "all" : `up to ${percent(limit, 0)}`;
   return [
-    `${MEANINGS[problem.framework]}${guarded}${forgets}`,
+    `${MEANINGS[problem.framework]}${guarded}${forgets}${centred && ` ${centred}`}`,
     `It looks ${counted(problem.horizon, unit)} ahead for ${investorWords(problem.utility)}; the bank pays ${percent(problem.rate_per_step, 2)} a ${unit}${annualised ? ` (${percent(annualised.rate, 2)} a year)` : ""}, and ${all} of wealth may be in stocks. It starts with ${wealth(problem.initial_wealth)}. ${trading(problem)} ${flows.inWords(problem)}`.trim(),
     `The record holds ${counted(problem.history.length, "return")}: mean ${percent(mean, 2)}, standard deviation ${percent(deviation, 2)} a ${unit}.${annualised ? ` By the year stocks returned ${percent(annualised.mean_return)} on average, with a standard deviation of ${percent(annualised.deviation)}.` : ""}`,
   ];

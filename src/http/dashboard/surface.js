@@ -5,10 +5,11 @@
 // history's shape does not settle (skewness, kurtosis, the level of the rest) stays at the centre of the step's design.
 
 import { flowsAfter } from "./flows.js";
-import { effectiveSize } from "./laws.js";
+import { effectiveSize, shareSeen } from "./laws.js";
 
-/** One named feature of a state `{wealth, law, radius, rate, riskAversion}`: total wealth, and the last relative. */
-export function feature(name, { wealth, law, radius, rate, riskAversion }) {
+/** One named feature of a state `{wealth, law, radius, share, rate, riskAversion}`: total wealth, the radius with the share of it
+ * that the centre has, and the last relative. */
+export function feature(name, { wealth, law, radius, share = 1, rate, riskAversion }) {
   const mertonRatio = (excess, variance) => Math.asinh(excess / (riskAversion * variance));
   switch (name) {
     case "wealth":
@@ -26,9 +27,9 @@ export function feature(name, { wealth, law, radius, rate, riskAversion }) {
     case "log_radius":
       return Math.log(Math.max(radius, 1e-12));
     case "robust_merton_ratio":
-      return mertonRatio(law.worst(radius, rate).mean - 1, Math.max(law.variance, 1e-16));
+      return mertonRatio(law.worst(radius / share, rate).mean - 1, Math.max(law.variance, 1e-16));
     case "worst_law_merton_ratio": {
-      const { mean, variance } = law.worst(radius, rate);
+      const { mean, variance } = law.worst(radius / share, rate);
       return mertonRatio(mean - 1, Math.max(variance, law.variance / 100, 1e-18));
     }
     case "radius_trend":
@@ -76,6 +77,7 @@ export function stepSurface(policy, shape, step) {
   const state = ({ wealth, mean, deviation, radius }) => ({
     wealth: wealth + toCome,
     radius,
+    share: shareSeen(problem.centre, problem.history.length + step),
     rate: problem.rate_per_step,
     riskAversion: relativeRiskAversion(problem),
     law: shape.law(mean, deviation),
@@ -125,18 +127,19 @@ function centres(level, problem, step, own) {
 }
 
 /** Radius where it follows from the effective sample size alone. */
-function ruledRadius({ framework, learning, radius, history }, step) {
+function ruledRadius({ framework, learning, centre, radius, history }, step) {
   const n = effectiveSize(learning, history.length + step);
+  const share = shareSeen(centre, n);
   if (framework === "plug_in" || framework === "known_law") return 0;
   switch (radius.rule) {
     case "fixed":
       return radius.radius;
     case "root_n":
-      return radius.kappa / Math.sqrt(n);
+      return (share * radius.kappa) / Math.sqrt(n);
     case "chi_square":
       return Math.sqrt((-2 * Math.log(radius.alpha)) / n);
     case "concentration":
-      return Math.sqrt(Math.log(radius.C / radius.alpha) / (radius.c * n));
+      return share * Math.sqrt(Math.log(radius.C / radius.alpha) / (radius.c * n));
     default:
       return 0;
   }

@@ -175,6 +175,26 @@ CautionCode: TypeAlias = Literal["short_record", "one_return"]
 """The reasons."""
 
 
+class CentreSpecification1(TypedDict):
+    """The law of the returns seen."""
+
+    kind: Literal["empirical"]
+
+
+class CentreSpecification2(TypedDict):
+    """
+    The perturbed empirical law: that of a return seen plus a normal error. Its radius is that of the returns seen, of which
+    smoothing makes no more.
+    """
+
+    bandwidth: float
+    """Standard deviation of the error, in log-return. 0 is `empirical`."""
+    kind: Literal["smoothed"]
+
+
+HistoryItem1: TypeAlias = float
+
+
 class CompositionRule1(TypedDict):
     """These shares, in the order of the assets, which sum to 1."""
 
@@ -306,10 +326,10 @@ class FrontierPoint(TypedDict):
 Scale: TypeAlias = float
 
 
-HistoryItem1Item: TypeAlias = float
+HistoryItem2Item: TypeAlias = float
 
 
-HistoryItem1: TypeAlias = list[HistoryItem1Item]
+HistoryItem2: TypeAlias = list[HistoryItem2Item]
 
 
 GroundNorm: TypeAlias = Literal["scaled_one", "sup"]
@@ -619,7 +639,7 @@ class Problem(TypedDict):
     """What the field must be."""
 
 
-HistoryItem2: TypeAlias = float
+HistoryItem3: TypeAlias = float
 
 
 class RadiusRule1(TypedDict):
@@ -913,7 +933,7 @@ class TransportedMass(TypedDict):
     """Mass of one atom and where the adversary puts it."""
 
     atom: float
-    """Observed log-return."""
+    """Log-return of the centre; an observed one, unless `problem.centre` says otherwise."""
     moved_to: float
     """Log-return in the worst case; equal to `atom` where the mass stays."""
     mass: float
@@ -1209,6 +1229,25 @@ class Caution(TypedDict):
     """For people."""
 
 
+class CentreSpecification3(TypedDict):
+    """
+    The law of the returns seen, mixed with one that counts as so many more. Exactly one of `law` and `history` is given. With n
+    returns seen the radius is theirs times n / (n + weight): the ball allows for what they may miss. That returns are drawn from
+    the law given is the user's assumption, and the ball does not allow for its error.
+    """
+
+    law: NotRequired[SamplingLaw | None]
+    history: NotRequired[list[HistoryItem1] | None]
+    """As log-returns, all of the same weight: of another market, or of a longer record."""
+    weight: float
+    """Returns that the law given counts as. 0 is `empirical`."""
+    kind: Literal["mixed"]
+
+
+CentreSpecification: TypeAlias = CentreSpecification1 | CentreSpecification2 | CentreSpecification3
+"""The law in the middle of the ball, made of the law of the returns seen: those of the history and those seen after it alike."""
+
+
 class Choices(TypedDict):
     """What is said of a text; what is left out follows from it, or is asked."""
 
@@ -1309,7 +1348,7 @@ class FundSpecification(TypedDict):
     What the radius of one fund was multiplied by, for laws of all funds to lie in their balls at once: the scale of the
     problem's radius holds it. 1 under rules that look at the sample size alone.
     """
-    history: list[HistoryItem1]
+    history: list[HistoryItem2]
     """Log-returns, date by date, oldest first; each date has one for each asset."""
 
 
@@ -1438,10 +1477,12 @@ class ProblemSpecification(TypedDict):
     """Of terminal wealth."""
     learning: NotRequired[Learning]
     """What older returns weigh in the law that is learned."""
+    centre: NotRequired[CentreSpecification]
+    """What the ball is centred on. `known_law` and the parametric frameworks, which have no ball, take no other than the default."""
     radius: NotRequired[RadiusRule | None]
     support: NotRequired[Interval | None]
     law: NotRequired[SamplingLaw | None]
-    history: list[HistoryItem2]
+    history: list[HistoryItem3]
     """The log-returns observed before the start, at least two of them distinct."""
 
 
@@ -1661,7 +1702,7 @@ class WhatIf(TypedDict):
 
 class WorstCase(TypedDict):
     """
-    The law that is worst for the advised allocation: a transport of the empirical law, or, in the parametric frameworks, a
+    The law that is worst for the advised allocation: a transport of the ball's centre, or, in the parametric frameworks, a
     normal law.
     """
 

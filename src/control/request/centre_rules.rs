@@ -1,0 +1,66 @@
+//! The rules of a centre.
+
+use crate::control::error::FieldError;
+use crate::control::request::centre::CentreSpecification;
+use crate::control::request::framework::Framework;
+use crate::control::request::rules::{HISTORY_LENGTH, LOG_RETURN, sampling_law, within};
+use crate::control::request::sampling_law::SamplingLaw;
+use crate::control::request::specification::{Interval, ProblemSpecification};
+
+/// Standard deviations of the error that smooths.
+pub const BANDWIDTH: (f64, f64) = (0.0, 1.0);
+/// Returns that an assumed law counts as: beside more, no record is felt.
+pub const ASSUMED_WEIGHT: (f64, f64) = (0.0, 1e6);
+
+/// Checks the centre of a problem whose other fields keep their rules.
+///
+/// # Errors
+/// The first field that breaks its rule.
+pub(super) fn check_centre(problem: &ProblemSpecification) -> Result<(), FieldError> {
+    let ProblemSpecification { centre, framework, learning, .. } = problem;
+    if !centre.is_empirical() && (framework.is_parametric() || *framework == Framework::KnownLaw) {
+        let rule = format!("must be empirical in the framework {}, which has no ball around returns", framework.name());
+        return Err(FieldError::new("problem.centre.kind", centre.name(), rule));
+    }
+    match centre {
+        CentreSpecification::Empirical {} => Ok(()),
+        CentreSpecification::Smoothed { bandwidth } => {
+            within("problem.centre.bandwidth", *bandwidth, BANDWIDTH.0, BANDWIDTH.1)
+        }
+        CentreSpecification::Mixed { .. } if learning.decays() => {
+            let rule = "must be equal where the centre is mixed: a law that counts as so many returns has no age";
+            Err(FieldError::new("problem.learning.kind", "decay", rule))
+        }
+        CentreSpecification::Mixed { law, history, weight } => {
+            within("problem.centre.weight", *weight, ASSUMED_WEIGHT.0, ASSUMED_WEIGHT.1)?;
+            match (law, history) {
+                (Some(law), None) => assumed_law(law),
+                (None, Some(history)) => assumed_history(history, problem.support),
+                (law, _) => {
+                    let value = if law.is_some() { "given with history" } else { "null" };
+                    let rule = "must be given, or history in its place: exactly one of them";
+                    Err(FieldError::new("problem.centre.law", value, rule))
+                }
+            }
+        }
+    }
+}
+
+fn assumed_law(law: &SamplingLaw) -> Result<(), FieldError> {
+    if *law == (SamplingLaw::Bootstrap {}) {
+        let rule = "must be a law of its own: what the returns seen say is counted already";
+        return Err(FieldError::new("problem.centre.law.kind", "bootstrap", rule));
+    }
+    sampling_law("problem.centre.law", law)
+}
+
+fn assumed_history(history: &[f64], support: Option<Interval>) -> Result<(), FieldError> {
+    const FIELD: &str = "problem.centre.history";
+    if !HISTORY_LENGTH.contains(&history.len()) {
+        let rule = format!("must hold {} to {} log-returns", HISTORY_LENGTH.start(), HISTORY_LENGTH.end());
+        return Err(FieldError::new(FIELD, format!("{} values", history.len()), rule));
+    }
+    let bounds = support.unwrap_or(Interval { min: -LOG_RETURN, max: LOG_RETURN });
+    let (low, high) = (bounds.min.max(-LOG_RETURN), bounds.max.min(LOG_RETURN));
+    history.iter().enumerate().try_for_each(|(index, &value)| within(&format!("{FIELD}[{index}]"), value, low, high))
+}
