@@ -78,6 +78,8 @@ fn faults() -> Vec<(&'static str, Value, &'static str)> {
             "problem.centre.law.kind",
         ),
         ("/problem/centre", json!({"kind": "mixed", "weight": 9.0}), "problem.centre.law"),
+        ("/problem/centre", json!({"kind": "volatility_scaled", "half_life": 12.0}), "problem.centre.kind"),
+        ("/problem/centre", json!({"kind": "volatility_scaled"}), "problem.centre.half_life"),
         (
             "/problem/centre",
             json!({"kind": "mixed", "law": student(0.0, 0.1, 5.0), "history": [0.1, 0.2], "weight": 9.0}),

@@ -13,6 +13,7 @@ use ballast::control::problem::state::State;
 use ballast::control::request::centre::CentreSpecification;
 use ballast::numerics::empirical::EmpiricalDistribution;
 use ballast::numerics::streams::stream;
+use ballast::numerics::volatility::rescaled;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 use serde_json::{Value, json};
@@ -39,6 +40,10 @@ fn smoothed(bandwidth: f64) -> Value {
 /// Another market, of which two returns are known.
 fn mixed(weight: f64) -> Value {
     json!({ "kind": "mixed", "history": [0.07, 0.01], "weight": weight })
+}
+
+fn volatility_scaled(half_life: f64) -> Value {
+    json!({ "kind": "volatility_scaled", "half_life": half_life })
 }
 
 /// The last step, solved at the history.
@@ -236,6 +241,71 @@ async fn a_session_of_any_centre_equals_the_simulator_through_a_correction_and_a
     }
 }
 
+/// A static ball, and one for a single period, are those of the record that was brought to one volatility beforehand.
+#[test]
+fn a_volatility_scaled_centre_is_that_of_the_record_brought_to_one_volatility() {
+    for rule in [bridge(0.2), json!({ "rule": "calibrated", "alpha": 0.5, "paths": 200, "scale": 0.2 })] {
+        for (framework, horizon) in [("static", 3), ("adaptive", 1), ("plug_in", 1)] {
+            let solved = |history: &[f64], centre: Value| {
+                let mut asked = request(horizon, rule.clone(), centre);
+                asked["problem"]["framework"] = json!(framework);
+                asked["problem"]["history"] = json!(history);
+                let solved = advisor(asked);
+                let start = solved.initial_state(None, None).unwrap();
+                let (advice, worst) = solved.explain(0, &start);
+                (advice.allocation, advice.certainty_equivalent, advice.radius, worst.sentence)
+            };
+            let found = solved(&HISTORY, volatility_scaled(4.0));
+            let expected = solved(&rescaled(&HISTORY, 4.0), json!({ "kind": "empirical" }));
+            assert_eq!((found.0, found.1, found.2), (expected.0, expected.1, expected.2), "{framework} {rule}");
+            let plain = solved(&HISTORY, json!({ "kind": "empirical" }));
+            assert!(found.0 > 0.0 && found.1 != plain.1, "{framework} {found:?} {plain:?}");
+            assert!(
+                framework != "static" || found.3.contains("returns seen, each at the volatility of now, moves"),
+                "{}",
+                found.3
+            );
+        }
+    }
+}
+
+/// The service advises at once by such a centre, and a session of a static ball goes by it through a correction: the returns
+/// recorded are those reported.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_volatility_scaled_centre_advises_at_once_and_in_a_static_session() {
+    let mut app = App::start().await;
+    let mut asked = request(1, bridge(0.2), volatility_scaled(4.0));
+    asked.as_object_mut().unwrap().remove("design");
+    let (status, advice) = app.post("/advise", &asked).await;
+    assert_eq!(status, 200, "{advice}");
+    let scaled = rescaled(&HISTORY, 4.0);
+    asked["problem"]["history"] = json!(scaled);
+    asked["problem"]["centre"] = json!({ "kind": "empirical" });
+    let (_, expected) = app.post("/advise", &asked).await;
+    assert_eq!(advice["allocation"], expected["allocation"]);
+    assert_eq!(advice["radius"], expected["radius"]);
+
+    let mut fixed = request(3, bridge(0.2), volatility_scaled(4.0));
+    fixed["problem"]["framework"] = json!("static");
+    app.train(&fixed).await;
+    app.open().await;
+    let (_, first) = app.action().await;
+    assert_eq!(app.observe(1, 0.03).await.0, 200);
+    let correction = json!({ "correction": 1, "period": 1, "log_return": -0.02, "reason": "the index was revised" });
+    assert_eq!(app.post(&format!("/sessions/{}/corrections", app.session), &correction).await.0, 200);
+    let (_, second) = app.action().await;
+    assert_eq!(second["radius"], first["radius"]);
+    // One period less to come changes nothing under power utility, to what the search leaves.
+    let [held, before] = [&second, &first].map(|action| action["allocation"].as_f64().unwrap());
+    assert!((held - before).abs() < 1e-7 && held > 0.05, "{held} {before}");
+    assert_eq!(second["sample_size"], json!(HISTORY.len() + 1));
+    let mut other = json!({ "policy": app.policy, "history": HISTORY.map(|value| 0.5 * value) });
+    let (status, refused) = app.post("/sessions", &other).await;
+    assert_eq!((status.as_u16(), refused["field"].as_str()), (422, Some("history")), "{refused}");
+    other["history"] = json!(HISTORY);
+    assert_eq!(app.post("/sessions", &other).await.0, 201);
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_centre_is_refused_by_name_where_it_has_no_meaning() {
     let app = App::start().await;
@@ -247,6 +317,11 @@ async fn a_centre_is_refused_by_name_where_it_has_no_meaning() {
     parametric["problem"]["framework"] = json!("parametric_adaptive");
     let mut decaying = request(2, bridge(0.2), mixed(5.0));
     decaying["problem"]["learning"] = json!({ "kind": "decay", "half_life": 6.0 });
+    let learning = request(2, bridge(0.2), volatility_scaled(6.0));
+    let mut resampled = request(1, bridge(0.2), volatility_scaled(6.0));
+    resampled["design"]["initial_laws"] = json!("resampled");
+    let mut half = request(1, bridge(0.2), volatility_scaled(0.5));
+    half["problem"]["framework"] = json!("static");
     let several = json!({ "problem": { "assets": ["a", "b"], "rate_per_step": RATE, "centre": smoothed(0.01),
         "history": [[0.01, 0.02], [-0.01, 0.0], [0.02, -0.01]] } });
     let history = [HISTORY, HISTORY].concat();
@@ -255,6 +330,9 @@ async fn a_centre_is_refused_by_name_where_it_has_no_meaning() {
         ("/train", &known, "problem.centre.kind"),
         ("/train", &parametric, "problem.centre.kind"),
         ("/train", &decaying, "problem.learning.kind"),
+        ("/train", &learning, "problem.centre.kind"),
+        ("/train", &resampled, "problem.centre.kind"),
+        ("/train", &half, "problem.centre.half_life"),
         ("/train", &several, "problem.centre"),
         ("/advise", &several, "problem.centre"),
         ("/frontier", &record, "problem.centre.kind"),

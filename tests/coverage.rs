@@ -121,11 +121,11 @@ fn the_command_tells_a_line_for_each_law_size_centre_and_rule_and_names_the_opti
     };
     let (told, _) = run(&["--records", "20", "--sizes", "5,8"]);
     let lines: Vec<&str> = told.lines().collect();
-    assert_eq!(lines.len(), 1 + 4 * 2 * 3 * 4, "{told}");
+    assert_eq!(lines.len(), 1 + 4 * 2 * 4 * 4, "{told}");
     for name in ["normal", "the paper's mixture", "Student, 4 degrees", "market, in blocks"] {
-        assert_eq!(lines.iter().filter(|line| line.starts_with(name)).count(), 24, "{told}");
+        assert_eq!(lines.iter().filter(|line| line.starts_with(name)).count(), 32, "{told}");
     }
-    for centre in [" empirical ", " smoothed ", " mixed "] {
+    for centre in [" empirical ", " smoothed ", " volatility_scaled ", " mixed "] {
         assert_eq!(lines.iter().filter(|line| line.contains(centre)).count(), 32, "{told}");
     }
     for (arguments, option) in [

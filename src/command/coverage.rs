@@ -29,6 +29,8 @@ const LEVEL: f64 = 0.9;
 const PATHS: usize = 2000;
 /// Deviation of the error that smooths, in that of the law.
 const SMOOTHED: f64 = 0.25;
+/// Periods in which the weight of a return in the volatility halves.
+const HALF_LIFE: f64 = 12.0;
 /// Returns that a law without premium counts as.
 const ASSUMED: f64 = 60.0;
 
@@ -60,7 +62,7 @@ struct Named {
 }
 
 impl Named {
-    /// Centres to compare: the returns seen, those smoothed, and those beside a normal law of the right spread by which the asset
+    /// Centres to compare: the returns seen, those smoothed, those at the volatility of now, and those beside a normal law of the right spread by which the asset
     /// pays on average what the bank does, which it does not.
     fn centres(&self) -> Vec<CentreSpecification> {
         let variance = self.deviation * self.deviation;
@@ -70,6 +72,7 @@ impl Named {
         vec![
             CentreSpecification::Empirical {},
             CentreSpecification::Smoothed { bandwidth: SMOOTHED * self.deviation },
+            CentreSpecification::VolatilityScaled { half_life: HALF_LIFE },
             CentreSpecification::Mixed { law, history: None, weight: ASSUMED },
         ]
     }

@@ -52,6 +52,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("ProblemSpecification", "trading_cost", within(TRADING_COST)),
         ("ProblemSpecification", "history", history.clone()),
         ("CentreSpecification smoothed", "bandwidth", within(BANDWIDTH)),
+        ("CentreSpecification volatility_scaled", "half_life", within(HALF_LIFE)),
         ("CentreSpecification mixed", "history", history),
         ("CentreSpecification mixed", "weight", within(ASSUMED_WEIGHT)),
         ("Learning", "half_life", within(HALF_LIFE)),

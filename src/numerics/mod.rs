@@ -30,4 +30,5 @@ pub mod scale_mixture;
 pub mod streams;
 pub mod student;
 pub mod summary;
+pub mod volatility;
 pub mod wasserstein;

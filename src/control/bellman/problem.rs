@@ -14,7 +14,7 @@ use crate::control::request::specification::{ProblemSpecification, Specification
 use crate::control::request::withdrawals::check_bank;
 use crate::control::surrogate::features::{FeatureSelection, Features, LawSummary};
 use crate::control::uncertainty::UncertaintySet;
-use crate::control::uncertainty::centre::{Centre, Centring};
+use crate::control::uncertainty::centre::{Centre, Centring, record};
 use crate::control::uncertainty::radius::{Measure, Radii, RadiusEstimator};
 use crate::numerics::confidence_region::{ConfidenceRegion, NormalLaw};
 use crate::numerics::empirical::EmpiricalDistribution;
@@ -153,13 +153,14 @@ impl Problem {
     }
 
     fn learns(&self) -> bool {
-        self.specification.problem.framework.learns()
+        let ProblemSpecification { framework, centre, .. } = &self.specification.problem;
+        framework.learns() && !centre.takes_order()
     }
 
     fn frozen(&self) -> &Frozen {
         self.frozen.get_or_init(|| {
             let problem = &self.specification.problem;
-            let history = problem.learning.law(&problem.history);
+            let history = problem.learning.law(&record(&problem.history, problem));
             let measure = self.sets.measure(&history);
             let set = match problem.framework.is_parametric() {
                 true => self.learned_set(&history, measure.radius),

@@ -21,7 +21,7 @@ use crate::control::request::rules;
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::Specification;
 use crate::control::training::Training;
-use crate::control::uncertainty::centre::Centring;
+use crate::control::uncertainty::centre::{Centring, record};
 use crate::numerics::law::ContinuousLaw;
 use crate::numerics::law_distance::{LawDistance, Placed};
 use crate::numerics::streams::stream;
@@ -231,7 +231,8 @@ impl Simulator<'_> {
             .collect();
         let assumed = self.centring.assumed().iter().map(|&(atom, weight)| self.distances.place(atom, weight));
         let mut sample: Vec<Placed> = assumed.collect();
-        history.iter().for_each(|&value| self.learn(&mut sample, value));
+        let seen = record(history, &self.evaluation.request.problem);
+        seen.into_iter().for_each(|value| self.learn(&mut sample, value));
         let paths = 0..self.evaluation.request.paths;
         let outcomes: Result<Paths, TrainError> =
             paths.into_par_iter().map(|path| self.path(index, path, &advisors, &sample)).collect();

@@ -107,14 +107,14 @@ impl Advisor {
     /// in the bank.
     ///
     /// # Errors
-    /// A history or a wealth that breaks a rule; a history other than the policy's own under a static framework, whose
-    /// uncertainty set is frozen at it.
+    /// A history or a wealth that breaks a rule; a history other than the policy's own where the uncertainty set is frozen
+    /// at it.
     pub fn initial_state(&self, history: Option<&[f64]>, wealth: Option<f64>) -> Result<State, FieldError> {
         let problem = &self.specification().problem;
         let history = history.unwrap_or(&problem.history);
-        if problem.framework.is_frozen() && history != problem.history {
+        if (problem.framework.is_frozen() || problem.centre.takes_order()) && history != problem.history {
             let value = format!("{} values", history.len());
-            return Err(FieldError::new("history", value, "must be the policy's own under a static framework"));
+            return Err(FieldError::new("history", value, "must be the policy's own, at which its ball stands"));
         }
         State::new(history, wealth.unwrap_or(problem.initial_wealth), problem.learning)
     }

@@ -17,6 +17,13 @@ pub enum CentreSpecification {
         /// Standard deviation of the error, in log-return. 0 is `empirical`.
         bandwidth: f64,
     },
+    /// The law of the returns seen, each brought to the volatility that is expected for the coming period: of an exponentially
+    /// weighted mean of squares. Of a static ball, or for one period: what a return yet to come does to the volatility is no part of
+    /// a state.
+    VolatilityScaled {
+        /// Periods in which the weight of a square halves.
+        half_life: f64,
+    },
     /// The law of the returns seen, mixed with one that counts as so many more. Exactly one of `law` and `history` is given. With n
     /// returns seen the radius is theirs times n / (n + weight): the ball allows for what they may miss. That returns are drawn from
     /// the law given is the user's assumption, and the ball does not allow for its error.
@@ -44,6 +51,7 @@ impl CentreSpecification {
         match self {
             CentreSpecification::Empirical {} => "empirical",
             CentreSpecification::Smoothed { .. } => "smoothed",
+            CentreSpecification::VolatilityScaled { .. } => "volatility_scaled",
             CentreSpecification::Mixed { .. } => "mixed",
         }
     }
@@ -51,6 +59,11 @@ impl CentreSpecification {
     /// Whether it is named `empirical`.
     pub fn is_empirical(&self) -> bool {
         *self == CentreSpecification::Empirical {}
+    }
+
+    /// Whether it takes the order of returns, which the law of those seen does not keep.
+    pub fn takes_order(&self) -> bool {
+        matches!(self, CentreSpecification::VolatilityScaled { .. })
     }
 
     /// Returns that a law counts as which nobody has seen.
@@ -74,6 +87,7 @@ impl CentreSpecification {
             CentreSpecification::Smoothed { bandwidth } => {
                 format!(", each with a normal error of deviation {bandwidth},")
             }
+            CentreSpecification::VolatilityScaled { .. } => ", each at the volatility of now,".to_owned(),
             CentreSpecification::Mixed { weight, .. } => {
                 format!(" and the law that is assumed to tell as much as {weight} more")
             }

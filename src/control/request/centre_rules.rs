@@ -3,9 +3,10 @@
 use crate::control::error::FieldError;
 use crate::control::request::centre::CentreSpecification;
 use crate::control::request::framework::Framework;
+use crate::control::request::learning::HALF_LIFE;
 use crate::control::request::rules::{HISTORY_LENGTH, LOG_RETURN, sampling_law, within};
 use crate::control::request::sampling_law::SamplingLaw;
-use crate::control::request::specification::{Interval, ProblemSpecification};
+use crate::control::request::specification::{InitialLaws, Interval, ProblemSpecification};
 
 /// Standard deviations of the error that smooths.
 pub const BANDWIDTH: (f64, f64) = (0.0, 1.0);
@@ -16,14 +17,28 @@ pub const ASSUMED_WEIGHT: (f64, f64) = (0.0, 1e6);
 ///
 /// # Errors
 /// The first field that breaks its rule.
-pub(super) fn check_centre(problem: &ProblemSpecification) -> Result<(), FieldError> {
+pub(super) fn check_centre(problem: &ProblemSpecification, laws: InitialLaws) -> Result<(), FieldError> {
     let ProblemSpecification { centre, framework, learning, .. } = problem;
     if !centre.is_empirical() && (framework.is_parametric() || *framework == Framework::KnownLaw) {
         let rule = format!("must be empirical in the framework {}, which has no ball around returns", framework.name());
         return Err(FieldError::new("problem.centre.kind", centre.name(), rule));
     }
+    if centre.takes_order() && !framework.is_frozen() {
+        let refused = |rule: &str| Err(FieldError::new("problem.centre.kind", centre.name(), rule));
+        if problem.horizon > 1 {
+            return refused(
+                "must be another where the horizon exceeds 1, unless the framework is static: what returns to come do to the volatility is no part of a state",
+            );
+        }
+        if laws == InitialLaws::Resampled {
+            return refused("must be another where design.initial_laws is resampled: a law that is drawn has no order");
+        }
+    }
     match centre {
         CentreSpecification::Empirical {} => Ok(()),
+        CentreSpecification::VolatilityScaled { half_life } => {
+            within("problem.centre.half_life", *half_life, HALF_LIFE.0, HALF_LIFE.1)
+        }
         CentreSpecification::Smoothed { bandwidth } => {
             within("problem.centre.bandwidth", *bandwidth, BANDWIDTH.0, BANDWIDTH.1)
         }

@@ -21,7 +21,7 @@ impl Specification {
     /// The first field, in the order of the request, that breaks its rule.
     pub fn completed(mut self) -> Result<Self, FieldError> {
         rules::check(&self)?;
-        check_centre(&self.problem)?;
+        check_centre(&self.problem, self.design.initial_laws)?;
         self.fund.as_ref().map_or(Ok(()), |fund| check_fund(fund, &self.problem, self.design.initial_laws))?;
         let learns = self.problem.framework.learns();
         let wealth = self.problem.initial_wealth;

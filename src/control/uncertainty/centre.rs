@@ -6,6 +6,7 @@ use crate::control::request::framework::Framework;
 use crate::control::request::sampling_law::SamplingLaw;
 use crate::control::request::specification::{Interval, ProblemSpecification};
 use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::volatility::rescaled;
 
 /// Less than this of a law is lost in rounding; what decayed to it is left out.
 const NO_MASS: f64 = 1e-18;
@@ -44,6 +45,16 @@ pub struct Centring {
     assumed: Vec<(f64, f64)>,
     /// The returns accepted.
     accepted: Interval,
+}
+
+/// A history, oldest first, as the centre of a problem takes it.
+pub fn record(history: &[f64], problem: &ProblemSpecification) -> Vec<f64> {
+    match problem.centre {
+        CentreSpecification::VolatilityScaled { half_life } => {
+            rescaled(history, half_life).into_iter().map(|log_return| admissible(log_return, problem)).collect()
+        }
+        _ => history.to_vec(),
+    }
 }
 
 impl Centring {
@@ -130,7 +141,7 @@ impl Centre {
             let (atoms, masses) = continuous_law(law, problem).quadrature();
             return Centre::gathered(atoms.into_iter().map(|atom| admissible(atom, problem)).zip(masses));
         }
-        Centring::of(problem).centre(&problem.learning.law(&problem.history))
+        Centring::of(problem).centre(&problem.learning.law(&record(&problem.history, problem)))
     }
 
     /// The masses of equal neighbours added up.

@@ -8,6 +8,7 @@ use crate::control::request::centre::CentreSpecification;
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::Specification;
+use crate::control::uncertainty::centre::record;
 use crate::numerics::bridge::{Quantile, Statistic};
 use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
 use crate::numerics::calibration::calibration_factor;
@@ -81,13 +82,14 @@ impl RadiusEstimator {
         };
         let last_size = specification.problem.history.len() + specification.problem.horizon - 1;
         let learning = specification.problem.learning;
+        let history = record(&specification.problem.history, &specification.problem);
         let calibration = calibrated.then(|| Calibration {
-            history: specification.problem.history.clone(),
+            history: history.clone(),
             retention: learning.retention(),
             factor: OnceLock::new(),
         });
         let decays = learning.retention().powf(last_size as f64) < ALL_BUT_EQUAL;
-        let mut base = specification.problem.history.clone();
+        let mut base = history;
         base.sort_by(f64::total_cmp);
         let (seed, centre) = (specification.seed, specification.problem.centre.clone());
         RadiusEstimator { rule, calibration, seed, last_size, decays, centre, base, kept }

@@ -135,10 +135,12 @@ export function caution(problem) {
 }
 
 /** What the ball is centred on, where that is not the law of the returns seen. */
-export function centreInWords({ kind, bandwidth, weight } = {}) {
+export function centreInWords({ kind, bandwidth, half_life, weight } = {}, unit = "period") {
   switch (kind) {
     case "smoothed":
       return `Every return seen stands for a normal law around it, of deviation ${percent(bandwidth, 2)}.`;
+    case "volatility_scaled":
+      return `Every return seen is brought to the volatility of now, in which squares count half after ${counted(half_life, unit)}.`;
     case "mixed":
       return `Beside the returns seen it counts a law that is assumed to tell as much as ${significant(weight)} more.`;
     default:
@@ -155,7 +157,7 @@ export function inWords({ problem }, annualised) {
   const { learning } = problem;
   const forgets =
     learning.kind === "decay" ? ` Returns count less the older they are: half after ${counted(learning.half_life, unit)}.` : "";
-  const centred = centreInWords(problem.centre);
+  const centred = centreInWords(problem.centre, unit);
   const all = limit === 1 ? "all" : `up to ${percent(limit, 0)}`;
   return [
     `${MEANINGS[problem.framework]}${guarded}${forgets}${centred && ` ${centred}`}`,

@@ -192,6 +192,18 @@ class CentreSpecification2(TypedDict):
     kind: Literal["smoothed"]
 
 
+class CentreSpecification3(TypedDict):
+    """
+    The law of the returns seen, each brought to the volatility that is expected for the coming period: of an exponentially
+    weighted mean of squares. Of a static ball, or for one period: what a return yet to come does to the volatility is no part of
+    a state.
+    """
+
+    half_life: float
+    """Periods in which the weight of a square halves."""
+    kind: Literal["volatility_scaled"]
+
+
 HistoryItem1: TypeAlias = float
 
 
@@ -1229,7 +1241,7 @@ class Caution(TypedDict):
     """For people."""
 
 
-class CentreSpecification3(TypedDict):
+class CentreSpecification4(TypedDict):
     """
     The law of the returns seen, mixed with one that counts as so many more. Exactly one of `law` and `history` is given. With n
     returns seen the radius is theirs times n / (n + weight): the ball allows for what they may miss. That returns are drawn from
@@ -1244,7 +1256,7 @@ class CentreSpecification3(TypedDict):
     kind: Literal["mixed"]
 
 
-CentreSpecification: TypeAlias = CentreSpecification1 | CentreSpecification2 | CentreSpecification3
+CentreSpecification: TypeAlias = CentreSpecification1 | CentreSpecification2 | CentreSpecification3 | CentreSpecification4
 """The law in the middle of the ball, made of the law of the returns seen: those of the history and those seen after it alike."""
 
 
