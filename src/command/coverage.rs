@@ -62,8 +62,8 @@ struct Named {
 }
 
 impl Named {
-    /// Centres to compare: the returns seen, those smoothed, those at the volatility of now, and those beside a normal law of the right spread by which the asset
-    /// pays on average what the bank does, which it does not.
+    /// Centres to compare: the returns seen, those smoothed, those at the volatility of now, and those beside a normal law of the
+    /// right spread by which the asset pays on average what the bank does, which it does not.
     fn centres(&self) -> Vec<CentreSpecification> {
         let variance = self.deviation * self.deviation;
         let without_premium =

@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::problem::actions::Band;
-use crate::control::surrogate::accuracy::ExpectedError;
 use crate::control::surrogate::stored::{SingleSolution, Solution};
 
 /// Name and version of the portable form, which fixes the features and the radii that a policy was trained with.
@@ -44,6 +43,17 @@ pub struct StepDiagnostics {
     pub value: Option<SurrogateDiagnostics>,
     /// Diagnostics of the policy surrogate; absent where the step stores a single state's solution.
     pub policy: Option<SurrogateDiagnostics>,
+}
+
+/// Root mean square errors of the value that a step serves, over the design's own law of its states, in basis points of the
+/// certainty equivalent.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ExpectedError {
+    /// Of the surrogate of the step alone.
+    pub own: f64,
+    /// With those of the steps after it, as errors that are independent of each other add up.
+    pub total: f64,
 }
 
 /// A fitted surrogate in figures.

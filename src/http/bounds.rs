@@ -76,8 +76,6 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("MixtureComponent", "weight", json!({ "exclusiveMinimum": 0, "maximum": 1 })),
         ("MixtureComponent", "mean", within((-1.0, 1.0))),
         ("MixtureComponent", "variance", within((1e-12, 1.0))),
-        ("DesignSpecification", "accuracy", within(ACCURACY)),
-        ("DesignSpecification", "count", whole(&COUNT)),
         ("SurrogateSpecification", "moment_count", whole(&MOMENTS)),
         ("HyperparameterBounds", "lengthscale", pair.clone()),
         ("HyperparameterBounds", "signal_variance", pair.clone()),
@@ -106,12 +104,18 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
     rules
         .into_iter()
         .chain(investors)
+        .chain(of_designs())
         .chain(of_assets())
         .chain(of_sessions())
         .chain(of_labels())
         .chain(walked())
         .chain(reported())
         .collect()
+}
+
+/// Of the states that surrogates are trained on.
+fn of_designs() -> [(&'static str, &'static str, Value); 2] {
+    [("accuracy", within(ACCURACY)), ("count", whole(&COUNT))].map(|(field, rule)| ("DesignSpecification", field, rule))
 }
 
 /// Of the problems that have an investor and a bank.

@@ -196,7 +196,7 @@ fn check_surrogates(field: &str, stored: &StepSurrogates, feature_count: usize) 
         ("inputs", stored.inputs.len(), inputs),
         ("value.hyperparameters.lengthscales", stored.value.hyperparameters.lengthscales.len(), inputs),
         ("policy.hyperparameters.lengthscales", stored.policy.hyperparameters.lengthscales.len(), inputs),
-        ("inputs[0]", points, points.clamp(2, rules::LARGEST_COUNT)),
+        ("inputs[0]", points, points.clamp(2, *rules::COUNT.end())),
     ];
     let weights = || stored.value.weights.iter().chain(&stored.policy.weights);
     let columns = stored.inputs.iter().map(|column| ("inputs", column.len(), points));

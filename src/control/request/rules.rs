@@ -11,12 +11,10 @@ use crate::control::request::specification::{
 };
 use crate::control::request::withdrawals;
 
-/// The covariance matrix of 10,000 points takes 800 MB.
-pub const LARGEST_COUNT: usize = 10_000;
 /// Ends of `design.accuracy`, in basis points.
 pub const ACCURACY: (f64, f64) = (0.01, 100.0);
-/// Design points of a step.
-pub const COUNT: std::ops::RangeInclusive<usize> = 10..=LARGEST_COUNT;
+/// Design points of a step: the covariance matrix of 10,000 takes 800 MB.
+pub const COUNT: std::ops::RangeInclusive<usize> = 10..=10_000;
 /// Ten years of weeks.
 pub const HORIZON: std::ops::RangeInclusive<usize> = 1..=520;
 /// Log-returns of a history.
@@ -51,7 +49,6 @@ pub const RATE: (f64, f64) = (-0.5, 0.5);
 pub const WEALTH: (f64, f64) = (1e-6, 1e15);
 /// Moments of the law among the features.
 pub const MOMENTS: std::ops::RangeInclusive<usize> = 1..=6;
-
 /// Factors on a bridge radius.
 pub const RADIUS_SCALE: (f64, f64) = (0.0, 100.0);
 /// Fixed radii, in log-return.
@@ -248,9 +245,8 @@ pub fn log_return(field: &str, value: f64) -> Result<(), FieldError> {
 
 fn design(specification: &Specification) -> Result<(), FieldError> {
     let design = &specification.design;
-    if let Some(accuracy) = design.accuracy {
-        within("design.accuracy", accuracy, ACCURACY.0, ACCURACY.1)?;
-    }
+    let (least, most) = ACCURACY;
+    design.accuracy.map_or(Ok(()), |accuracy| within("design.accuracy", accuracy, least, most))?;
     if let Some(count) = design.count {
         whole("design.count", count, &COUNT)?;
         let numbers = count.saturating_mul(specification.problem.history.len() + specification.problem.horizon);

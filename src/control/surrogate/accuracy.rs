@@ -13,7 +13,7 @@ use super::fitted::ValueSurrogate;
 use super::fitting::DesignPoint;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::request::specification::{DesignSpecification, Specification};
-use crate::control::solved_step::StepDiagnostics;
+use crate::control::solved_step::{ExpectedError, StepDiagnostics};
 use crate::numerics::streams::stream;
 
 /// Fresh states that are solved to judge a fit.
@@ -27,17 +27,6 @@ const GROWTH: [f64; 2] = [1.25, 2.0];
 /// Of what every step may err by, the least that one is asked for where others erred by more.
 const LEAST_SHARE: f64 = 0.5;
 const BASIS_POINTS: f64 = 1e4;
-
-/// Root mean square errors of the value that a step serves, over the design's own law of its states, in basis points of the
-/// certainty equivalent.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ExpectedError {
-    /// Of the surrogate of the step alone.
-    pub own: f64,
-    /// With those of the steps after it, as errors that are independent of each other add up.
-    pub total: f64,
-}
 
 /// What one step may err by, and how many design points to begin with.
 #[derive(Debug, Clone, PartialEq)]
