@@ -14,7 +14,7 @@ pub fn made(document: &Document) -> &'static [u8] {
     push_html(&mut body, events.into_iter().filter_map(|event| led(event, document)));
     // Wide tables scroll by themselves, also by the keyboard.
     let body = body
-        .replace("<table>", "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Table\"><table>")
+        .replace("<table>", "<div class=\"wide\" tabindex=\"0\" role=\"group\" aria-label=\"Table\"><table>")
         .replace("</table>", "</table></div>")
         .replace("<pre>", "<pre tabindex=\"0\">");
     let title = document.title;

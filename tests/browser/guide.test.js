@@ -1,0 +1,33 @@
+// The documents as a site: a wide table, long code and pictures on every screen, and the way there and back.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { browser, service } from "./ballast.js";
+import { usable, visit } from "./page.js";
+
+let ballast, chromium, page;
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await (await chromium.newContext({ bypassCSP: true })).newPage();
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+test("the guide can be read by everybody on every screen", async () => {
+  await usable(page, (place) => visit(page, `${ballast.url}${place}`), ["/guide", "/guide/results", "/guide/requests"]);
+});
+
+test("the guide is a click from the overview, and the overview from the guide", async () => {
+  await page.goto(ballast.url);
+  await page.getByRole("link", { name: "Guide" }).click();
+  await page.getByRole("link", { name: "What it earned and cost" }).click();
+  await page.getByRole("heading", { level: 1, name: "What robustness earned and cost" }).waitFor();
+  const drawn = await page.getByRole("img").evaluateAll((pictures) => pictures.map(({ complete, naturalWidth }) => complete && naturalWidth > 0));
+  assert.ok(drawn.length >= 3 && drawn.every(Boolean), String(drawn));
+  await page.getByRole("link", { name: "Overview" }).click();
+  await page.getByRole("heading", { level: 1, name: "Overview" }).waitFor();
+});
