@@ -13,7 +13,17 @@ use support::patience::{self, patience};
 use support::{App, issue_key, postgres, process, read, specification};
 
 /// What a service with keys answers without one.
-const OPEN: [&str; 7] = ["/", "/dashboard/{file}", "/docs", "/docs/{file}", "/livez", "/openapi.json", "/readyz"];
+const OPEN: [&str; 9] = [
+    "/",
+    "/dashboard/{file}",
+    "/docs",
+    "/docs/{file}",
+    "/guide",
+    "/guide/{file}",
+    "/livez",
+    "/openapi.json",
+    "/readyz",
+];
 
 /// A service over one of the stores, and keys of it.
 struct Guarded {

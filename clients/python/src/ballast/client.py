@@ -59,6 +59,7 @@ class _Ballast:
         radius: wire.RadiusRule | None = None,
         support: wire.Interval | None = None,
         law: wire.SamplingLaw | None = None,
+        centre: wire.CentreSpecification | None = None,
         design: wire.DesignSpecification | None = None,
         surrogate: wire.SurrogateSpecification | None = None,
         seed: int | None = None,
@@ -92,6 +93,7 @@ class _Ballast:
             "radius": radius,
             "support": support,
             "law": law,
+            "centre": centre,
         }
         whole = {"problem": _given(problem), "design": design, "surrogate": surrogate, "seed": seed}
         specification = cast(wire.Specification, _given(whole))
