@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { browser, service } from "./ballast.js";
-import { usable, visit } from "./page.js";
+import { usable } from "./page.js";
 
 let ballast, chromium, page;
 
@@ -18,7 +18,7 @@ after(async () => {
 });
 
 test("the guide can be read by everybody on every screen", async () => {
-  await usable(page, (place) => visit(page, `${ballast.url}${place}`), ["/guide", "/guide/results", "/guide/requests"]);
+  await usable(page, (place) => page.goto(`${ballast.url}${place}`), ["/guide", "/guide/results", "/guide/requests"]);
 });
 
 test("the guide is a click from the overview, and the overview from the guide", async () => {
