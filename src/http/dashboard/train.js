@@ -34,11 +34,11 @@ async function like(policy, leaving) {
   const { specification } = await get(`/policies/${policy}`, leaving);
   if (!specification.fund) return structuredClone(specification);
   const { radius_factor, support, ...named } = specification.fund;
-  const { framework, learning, radius, support: ofFund, ...problem } = specification.problem;
+  const { framework, learning, centre, radius, support: ofFund, ...problem } = specification.problem;
   const scale = radius.scale === undefined ? {} : { scale: Number((radius.scale / radius_factor).toPrecision(12)) };
-  const { count } = specification.design;
+  const { accuracy, count } = specification.design;
   const bounded = support ? { support } : {};
-  return structuredClone({ problem: { ...problem, ...named, ...bounded, radius: { ...radius, ...scale } }, design: { count }, seed: specification.seed });
+  return structuredClone({ problem: { ...problem, ...named, ...bounded, radius: { ...radius, ...scale } }, design: { accuracy, count }, seed: specification.seed });
 }
 
 /** Takes returns into a request: those of several columns are of assets by these names. None are there yet where nothing is read. */
@@ -54,7 +54,7 @@ function taken({ problem }, series) {
   }
   problem.assets = series.map(({ column }) => column);
   problem.history = series[0].log_returns.map((_, date) => series.map(({ log_returns }) => log_returns[date]));
-  for (const name of ["framework", "learning"]) delete problem[name];
+  for (const name of ["framework", "learning", "centre"]) delete problem[name];
   problem.composition ??= "one_step";
   if (problem.radius?.rule === "chi_square") problem.radius = radiusFor("adaptive", problem.radius);
 }
