@@ -292,7 +292,7 @@ mod tests {
         assert_eq!(dates.as_ref().unwrap()[0], "2006-03");
         let stock = strategies.iter().find(|figures| figures.strategy == "all-stock").unwrap();
         let mean = (24..28).map(risky_return).sum::<f64>() / 4.0;
-        assert!((stock.annual_mean.value - 4.0 * mean).abs() < 1e-12, "{stock:?}");
+        assert!((stock.performance.annual_mean.value - 4.0 * mean).abs() < 1e-12, "{stock:?}");
         assert_eq!(files::periods(&shown).lines().nth(1).unwrap().split(',').next(), Some("2006-03"));
         let page = page::page(&shown).html().unwrap();
         assert!(page.contains("Every 2 quarters a policy is trained on the 24 quarters before"), "{page}");

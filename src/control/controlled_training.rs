@@ -18,7 +18,7 @@ use crate::control::surrogate::design::GUARDS;
 use crate::control::surrogate::features::Features;
 use crate::control::surrogate::fitted::ValueSurrogate;
 use crate::control::surrogate::fitting::DesignPoint;
-use crate::control::surrogate::learning::{CANDIDATES_PER_POINT, Candidates, Counts, Learning};
+use crate::control::surrogate::learning::{Candidates, Counts, Learning};
 use crate::control::surrogate::stored::Solution;
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::law::ContinuousLaw;
@@ -66,8 +66,7 @@ impl<'a, P: Controlled> ControlledPolicy<'a, P> {
         let mut names: Vec<String> = (0..described).map(|index| format!("state_{index}")).collect();
         names.extend(laws.selection.names());
         let design = specification.design.count.unwrap_or(DEFAULT_COUNT);
-        let candidates = CANDIDATES_PER_POINT * design;
-        let counts = Counts { design, chosen: true, guards: candidates..candidates + GUARDS };
+        let counts = Counts::new(design, true, GUARDS);
         let (mut values, mut after): (Vec<ControlledValue>, Option<Solution>) = (Vec::new(), None);
         for step in (1..specification.problem.horizon).rev() {
             let bellman = ControlledStep { problem, laws: &laws, step, next: values.last() };

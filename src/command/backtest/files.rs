@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::path::Path;
 
-use ballast::control::evaluation::backtest_report::{BacktestFigures, BootstrapEstimate};
+use ballast::control::evaluation::backtest_report::{BacktestFigures, BootstrapEstimate, Performance};
 use ballast::report::{Csv, Page};
 use serde::Serialize;
 
@@ -50,23 +50,35 @@ pub fn figures(strategies: impl IntoIterator<Item = (String, Vec<Figure>)>) -> S
     csv.into_text()
 }
 
+/// How a strategy varied, and what it traded.
+pub fn of_returns(performance: &Performance) -> [Figure; 4] {
+    [
+        estimated("annual_mean", performance.annual_mean),
+        estimated("annual_volatility", performance.annual_volatility),
+        estimated("sharpe_ratio", performance.sharpe_ratio),
+        estimated("annual_turnover", performance.annual_turnover),
+    ]
+}
+
+/// What it came to, and what it held.
+pub fn of_wealth(performance: &Performance) -> [Figure; 3] {
+    [
+        plain("max_drawdown", performance.max_drawdown),
+        plain("final_wealth", performance.final_wealth),
+        plain("mean_allocation", performance.mean_allocation),
+    ]
+}
+
 pub fn strategies(strategies: &[BacktestFigures]) -> String {
     let of = |figures: &BacktestFigures| {
         let mut all = vec![
-            estimated("yearly_certainty_equivalent", figures.yearly_certainty_equivalent),
+            estimated("yearly_certainty_equivalent", figures.performance.yearly_certainty_equivalent),
             estimated("adaptive_ahead", figures.adaptive_ahead),
-            estimated("annual_mean", figures.annual_mean),
-            estimated("annual_volatility", figures.annual_volatility),
-            estimated("sharpe_ratio", figures.sharpe_ratio),
-            estimated("annual_turnover", figures.annual_turnover),
         ];
-        all.extend(figures.beyond_own_mix.map(|beyond| estimated("beyond_own_mix", beyond)));
-        all.extend([
-            plain("max_drawdown", figures.max_drawdown),
-            plain("final_wealth", figures.final_wealth),
-            plain("mean_allocation", figures.mean_allocation),
-            plain("all_bank_share", figures.all_bank_share),
-        ]);
+        all.extend(of_returns(&figures.performance));
+        all.extend(figures.performance.beyond_own_mix.map(|beyond| estimated("beyond_own_mix", beyond)));
+        all.extend(of_wealth(&figures.performance));
+        all.push(plain("all_bank_share", figures.all_bank_share));
         (figures.strategy.clone(), all)
     };
     figures(strategies.iter().map(of))

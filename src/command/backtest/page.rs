@@ -1,7 +1,7 @@
 //! The report as a page.
 
 use ballast::control::evaluation::analysis::Line;
-use ballast::control::evaluation::backtest_report::{BacktestFigures, BootstrapEstimate};
+use ballast::control::evaluation::backtest_report::{BootstrapEstimate, Performance};
 use ballast::control::evaluation::resampling::{CONFIDENCE, RESAMPLES, YEAR_BLOCK};
 use ballast::report::{Axis, BarChart, Chart, Page, Table, interval, number};
 
@@ -11,6 +11,7 @@ pub fn page(shown: &Shown) -> Page {
     let date = |row: Option<&Row>| row.map_or(String::new(), |row| row.date.clone());
     let (first, last) = (date(shown.rows().first()), date(shown.rows().last()));
     let noun = noun(shown);
+    let performances = shown.report.strategies.iter().map(|figures| (figures.strategy.as_str(), &figures.performance));
     Page::new(&format!("Walk-forward, {first} to {last}"))
         .paragraph(method(shown))
         .section("What it shows")
@@ -20,7 +21,7 @@ pub fn page(shown: &Shown) -> Page {
         .section("Wealth")
         .figure(wealth(shown), "Equal ratios take equal room. The start is 100, all in the bank.")
         .figure(drawdowns(shown), "How far wealth is below its highest so far.")
-        .table(performance_table(shown))
+        .table(performance_table(performances))
         .section("What was held")
         .figure(allocations(shown), &format!("Share of wealth in the risky asset at the start of each {noun}."))
         .figure(
@@ -172,7 +173,7 @@ fn trained(shown: &Shown) -> impl Iterator<Item = &Line> {
 
 fn certainty_equivalents(shown: &Shown) -> BarChart {
     let figures = shown.report.strategies.iter();
-    beyond_100(figures.map(|figures| (figures.strategy.as_str(), figures.yearly_certainty_equivalent)))
+    beyond_100(figures.map(|figures| (figures.strategy.as_str(), figures.performance.yearly_certainty_equivalent)))
 }
 
 /// From 100 on, what a year adds: bars from zero would all look alike.
@@ -199,29 +200,30 @@ fn utility_table(shown: &Shown) -> Table {
     shown.report.strategies.iter().fold(table, |table, figures| {
         table.row([
             figures.strategy.as_str().into(),
-            estimate(figures.yearly_certainty_equivalent, 1.0, 2),
+            estimate(figures.performance.yearly_certainty_equivalent, 1.0, 2),
             if figures.strategy == *main { number(f64::NAN, 2) } else { estimate(figures.adaptive_ahead, 1.0, 2) },
-            figures.beyond_own_mix.map_or_else(|| number(f64::NAN, 2), |beyond| estimate(beyond, 1.0, 2)),
-            number(100.0 * figures.mean_allocation, 1),
+            figures.performance.beyond_own_mix.map_or_else(|| number(f64::NAN, 2), |beyond| estimate(beyond, 1.0, 2)),
+            number(100.0 * figures.performance.mean_allocation, 1),
             number(100.0 * figures.all_bank_share, 0),
         ])
     })
 }
 
-fn performance_table(shown: &Shown) -> Table {
+/// Of strategies by name.
+pub fn performance_table<'a>(strategies: impl Iterator<Item = (&'a str, &'a Performance)>) -> Table {
     let table = Table::new(
         "Performance, a year",
         &["strategy", "mean, %", "volatility, %", "Sharpe ratio", "turnover, %", "max drawdown, %", "final wealth"],
     );
-    shown.report.strategies.iter().fold(table, |table, figures: &BacktestFigures| {
+    strategies.fold(table, |table, (strategy, performance)| {
         table.row([
-            figures.strategy.as_str().into(),
-            estimate(figures.annual_mean, 100.0, 2),
-            estimate(figures.annual_volatility, 100.0, 2),
-            estimate(figures.sharpe_ratio, 1.0, 2),
-            estimate(figures.annual_turnover, 100.0, 0),
-            number(100.0 * figures.max_drawdown, 1),
-            number(figures.final_wealth, 0),
+            strategy.into(),
+            estimate(performance.annual_mean, 100.0, 2),
+            estimate(performance.annual_volatility, 100.0, 2),
+            estimate(performance.sharpe_ratio, 1.0, 2),
+            estimate(performance.annual_turnover, 100.0, 0),
+            number(100.0 * performance.max_drawdown, 1),
+            number(performance.final_wealth, 0),
         ])
     })
 }

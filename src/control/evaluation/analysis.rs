@@ -65,19 +65,9 @@ impl Analysis {
             BacktestFigures {
                 strategy: line.name.clone(),
                 hindsight: line.hindsight,
-                yearly_certainty_equivalent: resampled.estimate(|all| all[index].certainty_equivalent),
+                performance: resampled.performance(index, &line.account, mix.is_some()),
                 adaptive_ahead: resampled
                     .estimate(|all| all[main].certainty_equivalent - all[index].certainty_equivalent),
-                beyond_own_mix: mix
-                    .is_some()
-                    .then(|| resampled.estimate(|all| all[index].certainty_equivalent - all[index].of_own_mix)),
-                annual_mean: resampled.estimate(|all| all[index].annual.mean),
-                annual_volatility: resampled.estimate(|all| all[index].annual.volatility),
-                sharpe_ratio: resampled.estimate(|all| all[index].annual.sharpe_ratio),
-                annual_turnover: resampled.estimate(|all| all[index].turnover),
-                max_drawdown: line.account.max_drawdown(),
-                final_wealth: line.account.final_wealth(),
-                mean_allocation: line.account.mean_allocation(),
                 all_bank_share: zero as f64 / line.decisions.len() as f64,
             }
         });

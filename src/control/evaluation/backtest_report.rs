@@ -77,19 +77,13 @@ pub struct BootstrapEstimate {
     pub interval: [f64; 2],
 }
 
-/// One strategy in figures; returns as fractions.
+/// What a strategy was worth and how it varied; returns as fractions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct BacktestFigures {
-    /// Its name.
-    pub strategy: String,
-    /// Whether it was chosen with what only the end could tell.
-    pub hindsight: bool,
+pub struct Performance {
     /// Of mean utility over the whole years, each from wealth 100.
     pub yearly_certainty_equivalent: BootstrapEstimate,
-    /// That of the main adaptive strategy less this one.
-    pub adaptive_ahead: BootstrapEstimate,
-    /// Its own less that of a constant mix of its average allocation, which nobody could have chosen beforehand: what changing the
-    /// allocation earned. Null for constant mixes.
+    /// Its own less that of the mix of its own average, which nobody could have chosen beforehand: what changing the allocation
+    /// earned. Null of strategies that are such a mix.
     pub beyond_own_mix: Option<BootstrapEstimate>,
     /// Of simple returns.
     pub annual_mean: BootstrapEstimate,
@@ -97,14 +91,28 @@ pub struct BacktestFigures {
     pub annual_volatility: BootstrapEstimate,
     /// Mean excess over the bank by its deviation.
     pub sharpe_ratio: BootstrapEstimate,
-    /// Share of wealth that changes between bank and asset in a year.
+    /// Share of wealth that is bought and sold in a year.
     pub annual_turnover: BootstrapEstimate,
     /// Largest fall below the highest wealth so far, as a share of it.
     pub max_drawdown: f64,
     /// From 100.
     pub final_wealth: f64,
-    /// Share of wealth in the risky asset.
+    /// Share of wealth at risk.
     pub mean_allocation: f64,
+}
+
+/// One strategy in figures.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct BacktestFigures {
+    /// Its name.
+    pub strategy: String,
+    /// Whether it was chosen with what only the end could tell.
+    pub hindsight: bool,
+    /// As of every strategy; its own mix is a constant one.
+    #[serde(flatten)]
+    pub performance: Performance,
+    /// The certainty equivalent of the main adaptive strategy less that of this one.
+    pub adaptive_ahead: BootstrapEstimate,
     /// Share of the periods with nothing in the risky asset.
     pub all_bank_share: f64,
 }

@@ -2,7 +2,7 @@
 //! worlds.
 
 use crate::control::evaluation::account::{Account, Annual, yearly_certainty_equivalent};
-use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEstimate};
+use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEstimate, Performance};
 use crate::control::request::specification::UtilitySpecification;
 use crate::numerics::block_bootstrap::circular_blocks;
 use crate::numerics::streams::stream;
@@ -108,6 +108,22 @@ impl Resampled {
             )
         };
         Resampled { whole, resampled: (0..RESAMPLES).map(resample).collect() }
+    }
+
+    /// What the strategy of this number was worth and how it varied, whose books are `account`.
+    pub fn performance(&self, index: usize, account: &Account, has_own_mix: bool) -> Performance {
+        Performance {
+            yearly_certainty_equivalent: self.estimate(|all| all[index].certainty_equivalent),
+            beyond_own_mix: has_own_mix
+                .then(|| self.estimate(|all| all[index].certainty_equivalent - all[index].of_own_mix)),
+            annual_mean: self.estimate(|all| all[index].annual.mean),
+            annual_volatility: self.estimate(|all| all[index].annual.volatility),
+            sharpe_ratio: self.estimate(|all| all[index].annual.sharpe_ratio),
+            annual_turnover: self.estimate(|all| all[index].turnover),
+            max_drawdown: account.max_drawdown(),
+            final_wealth: account.final_wealth(),
+            mean_allocation: account.mean_allocation(),
+        }
     }
 
     /// A figure of what was lived, with its interval.

@@ -48,7 +48,7 @@ pub fn few_years(years: usize) -> Option<String> {
 }
 
 fn ranking(figures: &[BacktestFigures], main: usize) -> String {
-    let value = |figures: &BacktestFigures| figures.yearly_certainty_equivalent.value;
+    let value = |figures: &BacktestFigures| figures.performance.yearly_certainty_equivalent.value;
     let real: Vec<&BacktestFigures> = figures.iter().filter(|figures| !figures.hindsight).collect();
     let ahead = real.iter().filter(|other| value(other) > value(&figures[main])).count();
     let best = real.iter().max_by(|a, b| value(a).total_cmp(&value(b)));
@@ -108,15 +108,15 @@ pub fn beside_own_mix(strategy: &str, allocation: f64, value: f64, [low, high]: 
 /// Whether moving in and out did anything that its average would not have done.
 fn timing(figures: &[BacktestFigures], main: usize) -> Option<String> {
     let main = &figures[main];
-    let BootstrapEstimate { value, interval } = main.beyond_own_mix?;
-    Some(beside_own_mix(&main.strategy, main.mean_allocation, value, interval, "the record does"))
+    let BootstrapEstimate { value, interval } = main.performance.beyond_own_mix?;
+    Some(beside_own_mix(&main.strategy, main.performance.mean_allocation, value, interval, "the record does"))
 }
 
 /// The same of every other strategy that changes its allocation.
 fn timing_of_others(figures: &[BacktestFigures], main: usize) -> String {
     let others = figures.iter().enumerate().filter(|(index, _)| *index != main);
     let [paid, cost, unclear] =
-        grouped(others.filter_map(|(_, other)| Some((other.strategy.as_str(), other.beyond_own_mix?))))
+        grouped(others.filter_map(|(_, other)| Some((other.strategy.as_str(), other.performance.beyond_own_mix?))))
             .map(|names| listed(&names));
     format!(
         "Against such mixes of their own, changing the allocation paid for: {paid}. It cost: {cost}. The record shows neither for: {unclear}."
@@ -124,10 +124,10 @@ fn timing_of_others(figures: &[BacktestFigures], main: usize) -> String {
 }
 
 fn holding(figures: &BacktestFigures, backtest: &Backtest) -> String {
-    let held = if figures.mean_allocation <= 0.0 {
+    let held = if figures.performance.mean_allocation <= 0.0 {
         "it never held stocks, so its returns are the bank's".into()
     } else {
-        format!("on average {:.1} % in the risky asset", 100.0 * figures.mean_allocation)
+        format!("on average {:.1} % in the risky asset", 100.0 * figures.performance.mean_allocation)
     };
     format!(
         "It held nothing but the bank in {:.0} % of {} {}s; {held}.",
@@ -141,10 +141,10 @@ fn drawdown(figures: &[BacktestFigures], main: usize) -> Option<String> {
     let stock = figures.iter().find(|figures| figures.strategy == "all-stock")?;
     Some(format!(
         "Its largest fall from a peak was {:.1} %, where all-stock fell {:.1} %; 100 became {:.0}, with all-stock {:.0}.",
-        100.0 * figures[main].max_drawdown,
-        100.0 * stock.max_drawdown,
-        figures[main].final_wealth,
-        stock.final_wealth
+        100.0 * figures[main].performance.max_drawdown,
+        100.0 * stock.performance.max_drawdown,
+        figures[main].performance.final_wealth,
+        stock.performance.final_wealth
     ))
 }
 
@@ -217,6 +217,7 @@ impl BacktestPeriods {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::evaluation::backtest_report::Performance;
 
     fn figures(strategy: &str, value: f64, ahead: [f64; 2], hindsight: bool) -> BacktestFigures {
         let at = |value: f64, interval| BootstrapEstimate { value, interval };
@@ -224,16 +225,18 @@ mod tests {
         BacktestFigures {
             strategy: strategy.into(),
             hindsight,
-            yearly_certainty_equivalent: at(value, [value - 1.0, value + 1.0]),
+            performance: Performance {
+                yearly_certainty_equivalent: at(value, [value - 1.0, value + 1.0]),
+                beyond_own_mix: None,
+                annual_mean: none,
+                annual_volatility: none,
+                sharpe_ratio: none,
+                annual_turnover: none,
+                max_drawdown: 0.2,
+                final_wealth: 120.0,
+                mean_allocation: 0.25,
+            },
             adaptive_ahead: at(0.5 * (ahead[0] + ahead[1]), ahead),
-            beyond_own_mix: None,
-            annual_mean: none,
-            annual_volatility: none,
-            sharpe_ratio: none,
-            annual_turnover: none,
-            max_drawdown: 0.2,
-            final_wealth: 120.0,
-            mean_allocation: 0.25,
             all_bank_share: 0.5,
         }
     }
@@ -258,7 +261,8 @@ mod tests {
         assert_eq!(timing(&all, 0), None);
         let timed = |low: f64, high: f64| {
             let beyond = BootstrapEstimate { value: 0.5 * (low + high), interval: [low, high] };
-            BacktestFigures { beyond_own_mix: Some(beyond), ..all[0].clone() }
+            let performance = Performance { beyond_own_mix: Some(beyond), ..all[0].performance.clone() };
+            BacktestFigures { performance, ..all[0].clone() }
         };
         for (beyond, verdict) in [
             ([-3.0, -1.0], "-2.00 [-3.00, -1.00]: changing the allocation cost."),

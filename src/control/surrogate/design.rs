@@ -82,9 +82,8 @@ impl Design {
     pub fn counts(&self, step: usize) -> Counts {
         let design = self.count(step);
         let chosen = design > 1 && self.ladder.is_empty();
-        let first = Counts { design, chosen, guards: 0..0 }.candidates(design);
         let guards = if self.ladder.is_empty() { GUARDS.min(GUARDS_PER_POINT * design) } else { 0 };
-        Counts { design, chosen, guards: first..first + guards }
+        Counts::new(design, chosen, guards)
     }
 
     /// State `index` of `step`; those beyond the candidates are independent draws of the same law. Streams:

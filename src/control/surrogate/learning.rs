@@ -62,6 +62,13 @@ pub struct Counts {
 }
 
 impl Counts {
+    /// With so many fresh states, which come after the candidates.
+    pub fn new(design: usize, chosen: bool, guards: usize) -> Self {
+        let counts = Counts { design, chosen, guards: 0..0 };
+        let first = counts.candidates(design);
+        Counts { guards: first..first + guards, ..counts }
+    }
+
     /// Of `design` points so many are the first candidates as they are.
     pub fn as_drawn(&self, design: usize) -> usize {
         if self.chosen { design.div_ceil(AS_DRAWN) } else { design }

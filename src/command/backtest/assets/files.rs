@@ -4,22 +4,15 @@ use ballast::control::evaluation::assets::report::{AssetsBacktestReport, AssetsF
 use ballast::report::Csv;
 
 use super::Shown;
-use crate::command::backtest::files::{estimated, figures, plain};
+use crate::command::backtest::files::{estimated, figures, of_returns, of_wealth, plain};
 
 pub fn strategies(report: &AssetsBacktestReport) -> String {
     let of = |one: &AssetsFigures| {
-        let mut all = vec![estimated("yearly_certainty_equivalent", one.yearly_certainty_equivalent)];
+        let mut all = vec![estimated("yearly_certainty_equivalent", one.performance.yearly_certainty_equivalent)];
         all.extend(one.beyond_equal.map(|beyond| estimated("beyond_equal", beyond)));
-        all.extend(one.beyond_own_mix.map(|beyond| estimated("beyond_own_mix", beyond)));
-        all.extend([
-            estimated("annual_mean", one.annual_mean),
-            estimated("annual_volatility", one.annual_volatility),
-            estimated("sharpe_ratio", one.sharpe_ratio),
-            estimated("annual_turnover", one.annual_turnover),
-            plain("max_drawdown", one.max_drawdown),
-            plain("final_wealth", one.final_wealth),
-            plain("mean_allocation", one.mean_allocation),
-        ]);
+        all.extend(one.performance.beyond_own_mix.map(|beyond| estimated("beyond_own_mix", beyond)));
+        all.extend(of_returns(&one.performance));
+        all.extend(of_wealth(&one.performance));
         all.extend(one.effective_assets.map(|number| plain("effective_assets", number)));
         (one.strategy.clone(), all)
     };

@@ -7,13 +7,15 @@ use ballast::control::evaluation::backtest_report::BootstrapEstimate;
 use ballast::report::{Axis, Cell, Chart, Page, Table, number};
 
 use super::Shown;
-use crate::command::backtest::page::{beyond_100, counted, ends, estimate, intervals, of_years, time};
+use crate::command::backtest::page::{
+    beyond_100, counted, ends, estimate, intervals, of_years, performance_table, time,
+};
 
 pub fn page(shown: &Shown) -> Page {
     let date = |date: Option<&String>| date.cloned().unwrap_or_default();
     let (first, last) = (date(shown.report.dates.first()), date(shown.report.dates.last()));
     let strategies = shown.report.strategies.iter();
-    let values = strategies.map(|figures| (figures.strategy.as_str(), figures.yearly_certainty_equivalent));
+    let values = strategies.map(|figures| (figures.strategy.as_str(), figures.performance.yearly_certainty_equivalent));
     let page = Page::new(&format!("Walk-forward of {} assets, {first} to {last}", shown.report.assets.len()))
         .paragraph(method(shown))
         .section("What it shows")
@@ -30,7 +32,8 @@ pub fn page(shown: &Shown) -> Page {
         );
         page.figure(wealth(shown, window), &caption)
     });
-    let page = page.table(performance_table(shown)).section("What was held");
+    let performances = shown.report.strategies.iter().map(|figures| (figures.strategy.as_str(), &figures.performance));
+    let page = page.table(performance_table(performances)).section("What was held");
     let page = windows().fold(page, |page, window| {
         let caption = format!("Share of wealth in all assets, of strategies that know {} of the past.", known(window));
         page.figure(totals(shown, window), &caption)
@@ -131,26 +134,11 @@ fn utility_table(shown: &Shown) -> Table {
     };
     rows(shown, table, |figures| {
         vec![
-            estimate(figures.yearly_certainty_equivalent, 1.0, 2),
+            estimate(figures.performance.yearly_certainty_equivalent, 1.0, 2),
             or_dash(figures.beyond_equal),
-            or_dash(figures.beyond_own_mix),
-            number(100.0 * figures.mean_allocation, 1),
+            or_dash(figures.performance.beyond_own_mix),
+            number(100.0 * figures.performance.mean_allocation, 1),
             number(figures.effective_assets.unwrap_or(f64::NAN), 1),
-        ]
-    })
-}
-
-fn performance_table(shown: &Shown) -> Table {
-    let header =
-        ["strategy", "mean, %", "volatility, %", "Sharpe ratio", "turnover, %", "max drawdown, %", "final wealth"];
-    rows(shown, Table::new("Performance, a year", &header), |figures| {
-        vec![
-            estimate(figures.annual_mean, 100.0, 2),
-            estimate(figures.annual_volatility, 100.0, 2),
-            estimate(figures.sharpe_ratio, 1.0, 2),
-            estimate(figures.annual_turnover, 100.0, 0),
-            number(100.0 * figures.max_drawdown, 1),
-            number(figures.final_wealth, 0),
         ]
     })
 }

@@ -46,20 +46,9 @@ fn figures(walked: &AssetsWalked, index: usize, resampled: &Resampled) -> Assets
     let mean = |asset: usize| line.held.iter().map(|shares| shares[asset]).sum::<f64>() / line.held.len() as f64;
     AssetsFigures {
         strategy: line.name.clone(),
-        yearly_certainty_equivalent: resampled.estimate(|all| all[index].certainty_equivalent),
+        performance: resampled.performance(index, &line.account, line.own_mix.is_some()),
         beyond_equal: (index != equal)
             .then(|| resampled.estimate(|all| all[index].certainty_equivalent - all[equal].certainty_equivalent)),
-        beyond_own_mix: line
-            .own_mix
-            .is_some()
-            .then(|| resampled.estimate(|all| all[index].certainty_equivalent - all[index].of_own_mix)),
-        annual_mean: resampled.estimate(|all| all[index].annual.mean),
-        annual_volatility: resampled.estimate(|all| all[index].annual.volatility),
-        sharpe_ratio: resampled.estimate(|all| all[index].annual.sharpe_ratio),
-        annual_turnover: resampled.estimate(|all| all[index].turnover),
-        max_drawdown: line.account.max_drawdown(),
-        final_wealth: line.account.final_wealth(),
-        mean_allocation: line.account.mean_allocation(),
         effective_assets: effective_assets(&line.held),
         mean_allocations: named(assets, &(0..assets.len()).map(mean).collect::<Vec<f64>>()),
     }

@@ -310,18 +310,19 @@ mod tests {
             Scale { periods_per_year: 4, utility: walked.backtest.utility(), seed: walked.backtest.choices.seed };
         let expected = Analysis::of(&lines, 0, &lived, COST, &scale).figures;
         let report = AssetsBacktestReport::new(&walked);
-        for BacktestFigures { strategy, beyond_own_mix, .. } in &expected {
+        for BacktestFigures { strategy, performance, .. } in &expected {
+            let beyond_own_mix = &performance.beyond_own_mix;
             let found = report.strategies.iter().find(|figures| figures.strategy == *strategy).unwrap();
             let one = expected.iter().find(|figures| figures.strategy == *strategy).unwrap();
             let estimates = [
-                (found.yearly_certainty_equivalent, one.yearly_certainty_equivalent),
-                (found.annual_mean, one.annual_mean),
-                (found.annual_volatility, one.annual_volatility),
-                (found.annual_turnover, one.annual_turnover),
+                (found.performance.yearly_certainty_equivalent, one.performance.yearly_certainty_equivalent),
+                (found.performance.annual_mean, one.performance.annual_mean),
+                (found.performance.annual_volatility, one.performance.annual_volatility),
+                (found.performance.annual_turnover, one.performance.annual_turnover),
             ];
-            let beyond = found.beyond_own_mix.zip(*beyond_own_mix);
+            let beyond = found.performance.beyond_own_mix.zip(*beyond_own_mix);
             assert_eq!(
-                (beyond.is_some(), found.beyond_own_mix.is_some()),
+                (beyond.is_some(), found.performance.beyond_own_mix.is_some()),
                 (strategy.starts_with("robust"), beyond_own_mix.is_some())
             );
             for (found, one) in estimates.into_iter().chain(beyond) {
@@ -330,7 +331,10 @@ mod tests {
                     ends.map(|(found, one)| (found - one).abs()).fold((found.value - one.value).abs(), f64::max);
                 assert!(apart < 1e-4, "{strategy}: {found:?} {one:?}");
             }
-            assert!((found.max_drawdown - one.max_drawdown).abs() < 1e-6 && found.effective_assets.unwrap() > 2.99);
+            assert!(
+                (found.performance.max_drawdown - one.performance.max_drawdown).abs() < 1e-6
+                    && found.effective_assets.unwrap() > 2.99
+            );
         }
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::AssetsChoices;
-use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEstimate};
+use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEstimate, Performance};
 
 /// Name and version of the report's form.
 pub const FORMAT: &str = "ballast-backtest-assets-1";
@@ -37,31 +37,16 @@ pub struct AssetsBacktestReport {
     pub sentences: Vec<String>,
 }
 
-/// One strategy in figures; returns as fractions.
+/// One strategy in figures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AssetsFigures {
     /// Its name.
     pub strategy: String,
-    /// Of mean utility over the whole years, each from wealth 100.
-    pub yearly_certainty_equivalent: BootstrapEstimate,
-    /// Its own less that of equal shares in all assets; null of those.
+    /// As of every strategy; its own mix is equal shares at its own average total, and an allocation that in all assets together.
+    #[serde(flatten)]
+    pub performance: Performance,
+    /// Its certainty equivalent less that of equal shares in all assets; null of those.
     pub beyond_equal: Option<BootstrapEstimate>,
-    /// Its own less that of equal shares at its own average total, which nobody could have chosen beforehand; null of equal shares.
-    pub beyond_own_mix: Option<BootstrapEstimate>,
-    /// Of simple returns.
-    pub annual_mean: BootstrapEstimate,
-    /// Standard deviation of simple returns.
-    pub annual_volatility: BootstrapEstimate,
-    /// Mean excess over the bank by its deviation.
-    pub sharpe_ratio: BootstrapEstimate,
-    /// Share of wealth that is bought and sold in a year.
-    pub annual_turnover: BootstrapEstimate,
-    /// Largest fall below the highest wealth so far, as a share of it.
-    pub max_drawdown: f64,
-    /// From 100.
-    pub final_wealth: f64,
-    /// Share of wealth in all assets together.
-    pub mean_allocation: f64,
     /// `(sum a)^2 / sum a^2`, the mean over the periods in which anything is held; null where nothing ever is.
     pub effective_assets: Option<f64>,
     /// Share of wealth in each asset, by its name.

@@ -23,8 +23,8 @@ pub fn sentences(walked: &AssetsWalked, figures: &[AssetsFigures], whole_years: 
         None => sentences.extend([against_equal(figures), against_own_mix(figures)]),
     }
     let number = |figures: &AssetsFigures| figures.effective_assets;
-    let fall = |figures: &AssetsFigures| Some(100.0 * figures.max_drawdown);
-    let share = |figures: &AssetsFigures| Some(100.0 * figures.mean_allocation);
+    let fall = |figures: &AssetsFigures| Some(100.0 * figures.performance.max_drawdown);
+    let share = |figures: &AssetsFigures| Some(100.0 * figures.performance.mean_allocation);
     sentences.extend([
         format!("Effective number of assets held: {}.", ranges(&walked.lines, figures, number, 1, "")),
         format!("On average held of wealth: {}.", ranges(&walked.lines, figures, share, 0, " %")),
@@ -35,7 +35,7 @@ pub fn sentences(walked: &AssetsWalked, figures: &[AssetsFigures], whole_years: 
 }
 
 fn ranking(figures: &[AssetsFigures]) -> String {
-    let value = |figures: &AssetsFigures| figures.yearly_certainty_equivalent.value;
+    let value = |figures: &AssetsFigures| figures.performance.yearly_certainty_equivalent.value;
     let equal = figures.iter().find(|figures| figures.beyond_equal.is_none());
     let best = figures.iter().max_by(|a, b| value(a).total_cmp(&value(b)));
     let Some((equal, best)) = equal.zip(best) else { return String::new() };
@@ -58,7 +58,7 @@ fn against_equal(figures: &[AssetsFigures]) -> String {
 }
 
 fn against_own_mix(figures: &[AssetsFigures]) -> String {
-    let [paid, cost, unclear] = of_each(figures, |figures| figures.beyond_own_mix);
+    let [paid, cost, unclear] = of_each(figures, |figures| figures.performance.beyond_own_mix);
     format!(
         "Against equal shares at their own average total, which nobody knew beforehand, choosing among assets and times paid for: \
          {paid}. It cost: {cost}. The record shows neither for {unclear}."
