@@ -582,6 +582,28 @@ class OwnMix(TypedDict):
     """Certainty equivalent of the strategy less that of the mix, in terminal wealth: what changing the allocation earned."""
 
 
+class Performance(TypedDict):
+    """What a strategy was worth and how it varied; returns as fractions."""
+
+    yearly_certainty_equivalent: BootstrapEstimate
+    """Of mean utility over the whole years, each from wealth 100."""
+    beyond_own_mix: NotRequired[BootstrapEstimate | None]
+    annual_mean: BootstrapEstimate
+    """Of simple returns."""
+    annual_volatility: BootstrapEstimate
+    """Standard deviation of simple returns."""
+    sharpe_ratio: BootstrapEstimate
+    """Mean excess over the bank by its deviation."""
+    annual_turnover: BootstrapEstimate
+    """Share of wealth that is bought and sold in a year."""
+    max_drawdown: float
+    """Largest fall below the highest wealth so far, as a share of it."""
+    final_wealth: float
+    """From 100."""
+    mean_allocation: float
+    """Share of wealth at risk."""
+
+
 Phase: TypeAlias = Literal["solving", "fitting", "simulating"]
 """What a job is doing."""
 
@@ -1141,32 +1163,15 @@ class AssetsProblem(TypedDict):
     """Log-returns, date by date, oldest first; each date has one for each asset."""
 
 
-class BacktestFigures(TypedDict):
-    """One strategy in figures; returns as fractions."""
+class BacktestFigures(Performance):
+    """One strategy in figures."""
 
     strategy: str
     """Its name."""
     hindsight: bool
     """Whether it was chosen with what only the end could tell."""
-    yearly_certainty_equivalent: BootstrapEstimate
-    """Of mean utility over the whole years, each from wealth 100."""
     adaptive_ahead: BootstrapEstimate
-    """That of the main adaptive strategy less this one."""
-    beyond_own_mix: NotRequired[BootstrapEstimate | None]
-    annual_mean: BootstrapEstimate
-    """Of simple returns."""
-    annual_volatility: BootstrapEstimate
-    """Standard deviation of simple returns."""
-    sharpe_ratio: BootstrapEstimate
-    """Mean excess over the bank by its deviation."""
-    annual_turnover: BootstrapEstimate
-    """Share of wealth that changes between bank and asset in a year."""
-    max_drawdown: float
-    """Largest fall below the highest wealth so far, as a share of it."""
-    final_wealth: float
-    """From 100."""
-    mean_allocation: float
-    """Share of wealth in the risky asset."""
+    """The certainty equivalent of the main adaptive strategy less that of this one."""
     all_bank_share: float
     """Share of the periods with nothing in the risky asset."""
 
