@@ -38,8 +38,13 @@ impl ProblemSpecification {
 
     /// Standard deviation of the history's log-returns, of one period, with the divisor n.
     pub fn deviation(&self) -> f64 {
-        CentralMoments::of(&EmpiricalDistribution::new(&self.history)).variance().sqrt()
+        deviation(&self.history)
     }
+}
+
+/// Standard deviation of log-returns, with the divisor n.
+pub fn deviation(log_returns: &[f64]) -> f64 {
+    CentralMoments::of(&EmpiricalDistribution::new(log_returns)).variance().sqrt()
 }
 
 /// A simple return earned `periods` times over.

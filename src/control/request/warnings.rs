@@ -6,7 +6,8 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::control::request::annualised::compounded;
+use crate::control::request::annualised::{self, compounded};
+use crate::control::request::centre::CentreSpecification;
 use crate::control::request::specification::ProblemSpecification;
 
 /// Rates a year beyond it are rarely paid in a currency that keeps its worth.
@@ -51,7 +52,7 @@ impl ProblemSpecification {
     /// Checked by: `what_is_mistaken_is_warned_of_and_what_is_usual_is_not`.
     pub fn warnings(&self) -> Vec<Warning> {
         let (rate, cost, periods) = (self.rate_per_step, self.trading_cost, self.periods_per_year);
-        let (mean, deviation) = (self.mean_return(), self.deviation());
+        let mean = self.mean_return();
         let a_year = compounded(rate, periods.unwrap_or(1.0));
         let year =
             periods.map_or("if a period is a year, and more if it is less".into(), |p| format!("of {p} periods"));
@@ -68,11 +69,18 @@ impl ProblemSpecification {
                  more than the asset. It is meant as a fraction of one period, not of a year"
             )
         };
-        let in_percent = || {
-            format!(
-                "has log-returns of the standard deviation {deviation:.4} a period: are they in percent? They are meant \
-                 as fractions, 0.012 for a rise of 1.2 %"
-            )
+        let in_percent = |field, deviation: f64| {
+            let said = || {
+                format!(
+                    "has log-returns of the standard deviation {deviation:.4} a period: are they in percent? They are \
+                     meant as fractions, 0.012 for a rise of 1.2 %"
+                )
+            };
+            (deviation > large).then(|| warning(WarningCode::RecordInPercent, field, said()))
+        };
+        let assumed = match &self.centre {
+            CentreSpecification::Mixed { history: Some(history), .. } => Some(annualised::deviation(history)),
+            _ => None,
         };
         let cost_high = || {
             let share = percent(cost);
@@ -83,7 +91,8 @@ impl ProblemSpecification {
             (rate > mean).then(|| warning(WarningCode::RateAboveRecord, "problem.rate_per_step", rate_above())),
             (cost > HIGH_TRADING_COST)
                 .then(|| warning(WarningCode::TradingCostHigh, "problem.trading_cost", cost_high())),
-            (deviation > large).then(|| warning(WarningCode::RecordInPercent, "problem.history", in_percent())),
+            in_percent("problem.history", self.deviation()),
+            assumed.and_then(|deviation| in_percent("problem.centre.history", deviation)),
         ]
         .into_iter()
         .flatten()
@@ -137,6 +146,20 @@ mod tests {
         assert_eq!(warned(0.0001, None, 0.0, 1.1), [RecordInPercent]);
         assert_eq!(warned(0.0025, months, 0.05, 0.045), [TradingCostHigh]);
         assert_eq!(warned(0.2, months, 0.05, 1.5), [RateHigh, RateAboveRecord, TradingCostHigh, RecordInPercent]);
+    }
+
+    #[test]
+    fn an_assumed_record_in_percent_is_warned_of_by_its_own_name() {
+        let mixed = |history: Vec<f64>| CentreSpecification::Mixed { law: None, history: Some(history), weight: 20.0 };
+        let warned = |history: Vec<f64>| {
+            let problem = ProblemSpecification {
+                centre: mixed(history),
+                ..ProblemSpecification::of(vec![0.08, -0.01, 0.05], 0.002)
+            };
+            problem.warnings().iter().map(|warning| (warning.code, warning.field)).collect::<Vec<_>>()
+        };
+        assert_eq!(warned(vec![0.041, -0.014, 0.032]), []);
+        assert_eq!(warned(vec![4.1, -1.4, 3.2]), [(WarningCode::RecordInPercent, "problem.centre.history")]);
     }
 
     /// 1.03^12 is 1.4258 by hand.
