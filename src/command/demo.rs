@@ -25,6 +25,9 @@ pub struct DemoArgs {
     /// Leave the service up afterwards, until Ctrl-C
     #[arg(long)]
     stay: bool,
+    /// Leave it up, and open its page in the browser of this desktop
+    #[arg(long)]
+    open: bool,
     /// Design points per step: more is more accurate and slower
     #[arg(long, default_value_t = 500)]
     count: usize,
@@ -65,7 +68,14 @@ async fn whole(address: SocketAddr, args: &DemoArgs, started: Instant) -> Result
     story::narrate(&api, args.count).await?;
     assets::narrate(&api, args.count).await?;
     println!("\nDone in {:.0} s.", started.elapsed().as_secs_f64());
-    if args.stay {
+    if args.open {
+        let page = format!("http://{address}/");
+        let opened = tokio::task::spawn_blocking(|| open::that(page)).await;
+        if !matches!(opened, Ok(Ok(()))) {
+            println!("No browser could be opened on this machine.");
+        }
+    }
+    if args.stay || args.open {
         println!("The service stays up on http://{address} until Ctrl-C.");
         std::future::pending::<()>().await;
     }

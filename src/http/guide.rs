@@ -41,7 +41,6 @@ macro_rules! documents {
 const PARTS: &[(&str, &[Document])] = documents! {
     "Start": [
         "start" "First advice in five minutes" "README.md",
-        "walk-through" "A year with a policy" "docs/walk-through.md",
     ],
     "Concepts": [
         "choosing" "Choosing what to ask" "docs/choosing.md",
@@ -60,6 +59,7 @@ const PARTS: &[(&str, &[Document])] = documents! {
     "Reference": [
         "requests" "Every request and field" "docs/requests.md",
         "policy-format" "The format of a policy" "docs/policy-format.md",
+        "walk-through" "From a call to the code" "docs/walk-through.md",
         "paper-to-code" "From the paper to the code" "docs/paper-to-code.md",
         "measurements" "Measurements" "docs/measurements.md",
         "threat-model" "Threat model" "docs/threat-model.md",

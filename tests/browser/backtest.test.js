@@ -49,7 +49,7 @@ test("what is asked for is the record as it was read, and few choices", async ()
   await page.getByLabel("Periods a year").waitFor();
   await page.getByLabel("Returns or prices").fill(TEXT);
   await page.getByText("Blank: what rf says, quarter by quarter.").waitFor();
-  assert.equal(await page.getByLabel("Periods a year").isVisible(), false);
+  await page.getByLabel("Periods a year").waitFor({ state: "hidden" });
   await page.getByText("How it walks, and for the quant").click();
   await page.getByLabel("Trained on").fill("600");
   await page.getByRole("button", { name: "Backtest", exact: true }).click();

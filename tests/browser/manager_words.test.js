@@ -95,7 +95,7 @@ test("a key that may not train is told so without an editor springing open", asy
   await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
   await page.getByRole("button", { name: "Train", exact: true }).click();
   await page.getByText("the call needs the role train").waitFor();
-  assert.equal(await page.getByLabel("Training request as JSON").isVisible(), false);
+  await page.getByLabel("Training request as JSON").waitFor({ state: "hidden" });
   await page.unrouteAll();
 });
 

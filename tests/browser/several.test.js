@@ -200,7 +200,7 @@ test("a policy of several is trained from a table that is pasted, and its column
   await page.getByLabel(/^Percent/).check();
   await page.getByRole("button", { name: "Read it so" }).click();
   await page.getByText("as in columns World, Bonds A/B, Gold").waitFor();
-  assert.equal(await page.getByLabel("Kind of policy").isVisible(), false);
+  await page.getByLabel("Kind of policy").waitFor({ state: "hidden" });
   await page.getByLabel("How the assets are mixed").selectOption("Less of what varies more");
   await page.getByRole("button", { name: /Take the bank.s rate from rf/ }).click();
   await page.getByRole("group", { name: "Columns" }).getByLabel("Gold").click();
@@ -223,7 +223,7 @@ test("a session of it is opened with what is held of each", async () => {
   await page.getByRole("link", { name: "Open a session" }).first().click();
   await page.getByLabel("World held already, %").fill("30");
   await page.getByLabel("Gold held already, %").fill("12,5");
-  assert.equal(await page.getByLabel("Share of it held already, %").isVisible(), false);
+  await page.getByLabel("Share of it held already, %").waitFor({ state: "hidden" });
   await page.getByText("Other returns are known").click();
   await page.getByLabel("Returns or prices known").fill(["Gold,World,Bonds A/B", ...HISTORY.slice(0, 8).map(([world, bonds, gold]) => [gold, world, bonds].join())].join("\n"));
   const columns = page.getByRole("group", { name: /^Which column/ });

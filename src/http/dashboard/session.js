@@ -173,7 +173,7 @@ function completed({ session, history }) {
 /** That the next policy is to come, and what keeps it. */
 function due({ session: { renewal } }) {
   if (!renewal) return "";
-  const job = renewal.job ? h("a", { href: `#/jobs/${renewal.job}` }, "its training") : "its training";
+  const job = renewal.job ? h("a", { href: "#/jobs" }, "its training") : "its training";
   const states = {
     due: ["The next policy is about to be trained: ", job, "."],
     training: ["The next policy is being trained: ", job, ". Until then this one goes on."],
