@@ -3,7 +3,7 @@
 import { execFile, spawn } from "node:child_process";
 import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
-import { join } from "node:path";
+import { basename, join } from "node:path";
 import { createInterface } from "node:readline";
 import { fileURLToPath } from "node:url";
 import { promisify } from "node:util";
@@ -11,6 +11,8 @@ import { chromium } from "playwright-core";
 
 const run = promisify(execFile);
 const BINARY = process.env.BALLAST_BINARY ?? fileURLToPath(new URL("../../target/release/ballast", import.meta.url));
+/** Where the page's files are read from, in the place of those in the binary: a change of them needs no build to be looked at. */
+const FILES = process.env.BALLAST_DASHBOARD;
 const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 
 /** Starts the service; `url` is where it listens, `key(...roles)` makes a key, `stop()` ends it and takes its data away. */
@@ -41,11 +43,19 @@ export async function service() {
   return { url, stop, key };
 }
 
-export function browser() {
-  return chromium.launch({
+export async function browser() {
+  const launched = await chromium.launch({
     executablePath: CHROMIUM,
     args: ["--no-sandbox", "--disable-gpu", "--disable-background-networking"],
   });
+  if (FILES === undefined) return launched;
+  const newContext = launched.newContext.bind(launched);
+  launched.newContext = async (options) => {
+    const context = await newContext(options);
+    await context.route("**/dashboard/*", (route) => route.fulfill({ path: join(FILES, basename(new URL(route.request().url()).pathname)) }));
+    return context;
+  };
+  return launched;
 }
 
 /** The policy of a training, once it is trained. */

@@ -287,7 +287,9 @@ test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and noth
 test("a policy in use is not deleted, a session is", async () => {
   await go(`#/policies/${policy}`);
   await page.getByRole("button", { name: "Delete" }).click();
-  await page.getByText("live by", { exact: false }).first().waitFor();
+  await page.getByText("Sessions live by this policy. Delete those first.", { exact: false }).first().waitFor();
+  await page.getByRole("link", { name: "Show them" }).click();
+  await page.locator(`main a[href="#/sessions/${session}"]`).first().waitFor();
   await go(`#/sessions/${session}`);
   await page.getByRole("button", { name: "Delete" }).click();
   await heading("Overview").waitFor();

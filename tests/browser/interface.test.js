@@ -45,6 +45,14 @@ test("a call shows its example, its fields and their defaults", async () => {
   await walk.getByText("100", { exact: true }).first().waitFor();
 });
 
+test("it is dark where the reader's screen is", async () => {
+  const ground = () => page.evaluate(() => getComputedStyle(document.documentElement).backgroundColor);
+  await page.emulateMedia({ colorScheme: "dark" });
+  const dark = await ground();
+  await page.emulateMedia({ colorScheme: "light" });
+  assert.notEqual(dark, await ground());
+});
+
 test("a call is tried", async () => {
   const live = page.locator("#operations-operations-livez");
   await live.getByRole("button").first().click();

@@ -60,6 +60,10 @@ test("its newest periods stand, and all where they are asked for, with no chart 
   assert.equal(await rows.count(), PERIODS);
 });
 
+test("of a long record it is said that no single return makes a difference", async () => {
+  await page.getByText("It is steady: it rests on 540 returns, of which no single one makes a difference.").waitFor();
+});
+
 test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {
   await usable(page, () => visitQuiet(page, address()));
 });

@@ -28,7 +28,7 @@ const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
 
 test("no page says the paper's words outside a fold", async () => {
   const { session } = await call(ballast.url, "/sessions", { policy });
-  for (const hash of ["#/jobs", "#/train", "#/policies", `#/policies/${policy}`, "#/sessions", "#/sessions/new", `#/sessions/${session}`, "#/evaluations/new"]) {
+  for (const hash of ["#/jobs", "#/train", "#/policies", `#/policies/${policy}`, "#/sessions", "#/sessions/new", `#/sessions/${session}`, "#/report", "#/compare", "#/evaluations", "#/evaluations/new", "#/backtests/new"]) {
     await go(hash);
     const words = await page.locator("main").innerText();
     assert.doesNotMatch(words, PAPER, hash);
@@ -60,6 +60,22 @@ test("the form takes percent and presets, and sends what the service counts in",
   const { problem } = (await sent).postDataJSON();
   assert.deepEqual([problem.rate_per_step, problem.trading_cost, problem.radius.alpha, problem.horizon], [0.0025, 0.002, 0.05, 2]);
   assert.deepEqual(problem.utility, { kind: "power", risk_aversion: 6 });
+});
+
+test("what may be a mistake is asked about in percent", async () => {
+  await go("#/train");
+  await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
+  await page.getByLabel("Periods a year").fill("12");
+  await page.getByLabel("Months ahead").fill("2");
+  await page.getByLabel("Bank return per month, %").fill("3");
+  await page.getByLabel("Trading cost, %").fill("5");
+  await page.getByRole("button", { name: "Train", exact: true }).click();
+  await page.getByText("The training is queued. Is this meant?").waitFor();
+  const words = plain(await page.locator("main").innerText());
+  assert.match(words, /The bank pays 3\.00 % a month, 42\.6 % a year, more than banks do\. Is that what it pays in one month, or in a year\?/);
+  assert.match(words, /The bank pays 3\.00 % a month, 42\.6 % a year, more than the record returned on average\./);
+  assert.match(words, /Trading costs 5\.00 % of all that is traded\. Is that meant\?/);
+  assert.doesNotMatch(words, /problem\./);
 });
 
 test("a refusal is the page's own sentence, in the unit of its field and beside it", async () => {

@@ -70,7 +70,7 @@ test("who gets what is shown before, and what came of it after", async () => {
   await page.getByRole("heading", { name: "What came of it" }).waitFor();
   const told = await rows("Outcomes");
   assert.match(told[0], /^Ada \w+ 1\.20 % recorded as period 1$/);
-  assert.match(told[1], /^Grace Hopper \w+ 90\.00 % .*standard deviations/);
+  assert.match(told[1], /^Grace Hopper \w+ 90\.00 % A return of 90\.0 % lies [\d.]+ standard deviations from the record\.$/);
   await page.getByText("2 returns are recorded, and 3 left above for another try.").first().waitFor();
   assert.equal(await lines().inputValue(), "Grace Hopper 90\nTwin 1\nNobody 2");
   const [ada] = await observed(0);
@@ -88,6 +88,20 @@ test("an unusual return is recorded once it is said to be meant, and no other wi
   assert.equal((await observed(1))[0].reported.simple_return, 0.9);
   assert.equal((await observed(4)).length, 1);
   assert.equal(await lines().inputValue(), `${short(sessions[4])} 120`);
+});
+
+test("a return that cannot be is refused in percent", async () => {
+  await page.getByLabel("Last day").fill("");
+  await lines().fill("Ada 50000");
+  await page.getByRole("button", { name: "Report for 1" }).click();
+  await page.getByText("1 left above for another try", { exact: false }).first().waitFor();
+  const [told] = await rows("Outcomes");
+  assert.match(told, /The return is 50,000 %; it must be from -99\.32 % to 14,741\.31 %\.$/);
+  await page.getByLabel("Last day").fill("2026-10-31");
+  await lines().fill("Ada 1");
+  await page.getByRole("button", { name: "Report for 1" }).click();
+  await page.getByText("The last day is \u201c2026-10-31\u201d; it must be later than 2026-10-31, that of a period before.").waitFor();
+  await page.getByLabel("Last day").fill("");
 });
 
 test("those ticked get one return, and an answer that is lost is asked for again without harm", async () => {

@@ -1,6 +1,7 @@
 // A session of several assets: what to hold of each, a return reported for each, and what the worst market makes of each.
 
 import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { browser, call, service, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
@@ -142,6 +143,12 @@ test("a period that passed is put right by name, and what was reported stays on 
   const chart = page.getByRole("slider", { name: "Share of wealth in each asset" });
   await chart.press("Home");
   assert.equal(plain(await chart.getAttribute("aria-valuetext")), "October 2026: World 30.0 %, Bonds A/B 10.0 %, Gold 5.0 %, Bank 55.0 %");
+  const [file] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Save as CSV" }).click()]);
+  const [head, , october] = (await readFile(await file.path(), "utf8")).trim().split("\r\n");
+  assert.ok(head.includes('"Return, %","Return told first, %","Advised, %","Held, %","World returned, %","World held, %","Bonds A/B returned, %"'), head);
+  // Of wealth 45 % was held: 30 of the first, 10 of the second and 5 of the third.
+  const shown = october.split(",");
+  for (const [column, value] of [[3, (0.3 * 0.5 + 0.1 * 0.2 - 0.05) / 0.45], [6, 45], [7, 0.5], [8, 30], [9, 0.2], [10, 10], [11, -1], [12, 5]]) near(Number(shown[column]), value, 1e-9);
   await page.getByRole("button", { name: "Undo", exact: true }).click();
   await page.getByText(/: Correction 1 was undone/).waitFor();
   const undone = (await call(ballast.url, `/sessions/${session}/history`)).observations[0].now;

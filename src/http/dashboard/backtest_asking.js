@@ -88,10 +88,11 @@ function asking() {
     if (text(rate) === "" && !record.rate) return showProblem(form, message, { field: "rate", message: "What the bank paid is needed: a number here, or a column of the record." });
     send.disabled = true;
     try {
-      const { job, warnings } = await post("/backtest", compose());
+      const request = compose();
+      const { job, warnings } = await post("/backtest", request);
       announce("The backtest is queued.");
       const at = `#/backtests/${job}`;
-      if (warnings.length > 0) form.replaceWith(queued("backtest", at, warnings));
+      if (warnings.length > 0) form.replaceWith(queued("backtest", at, warnings, { ...request, rate_per_step: request.rate }));
       else location.hash = at;
     } catch (error) {
       showProblem(form, message, error);

@@ -72,19 +72,29 @@ export function observed(shown) {
   );
 }
 
-/** The periods as a file: numbers plain, shares and returns in percent. */
+/** The periods as a file: numbers plain, shares and returns in percent; what was put right as it stands, with what was told first. */
 export function csv({ history, calendar }) {
   const own = wealths(history);
   const beside = besides(history).map(({ name, share }) => [name, mixed(history, share)]);
   const deep = falls(history);
-  const head = ["Period", "Name", "Last day", "Return, %", "Advised, %", "Held, %", "Wealth", ...beside.map(([name]) => name), "Below the highest, %"];
-  const start = [0, "Start", "", "", "", "", own[0], ...beside.map(() => own[0]), 0];
+  const assets = history.assets ?? [];
+  const corrected = history.observations.some(({ now }) => now);
+  const simple = (log_return) => hundred(Number.isFinite(log_return ?? Number.NaN) ? Math.expm1(log_return) : null);
+  const head = ["Period", "Name", "Last day", "Return, %"];
+  if (corrected) head.push("Return told first, %");
+  head.push("Advised, %", "Held, %", ...assets.flatMap((name) => [`${name} returned, %`, `${name} held, %`]));
+  head.push("Wealth", ...beside.map(([name]) => name), "Below the highest, %");
+  const start = [0, "Start", ...head.slice(2, -2 - beside.length).map(() => ""), own[0], ...beside.map(() => own[0]), 0];
   const lines = history.observations.map((row, index) => {
     const stands = row.now ?? row;
-    const back = stands.log_return === null ? null : Math.expm1(stands.log_return);
-    const shares = [back, stands.advised_allocation, stands.executed_allocation].map(hundred);
-    const others = beside.map(([, wealths]) => wealths[index + 1]);
-    return [row.period, calendar.name(row.period), standing(row).date ?? "", ...shares, stands.wealth, ...others, hundred(deep[index + 1])];
+    const [returned, holds] = assets.length > 0 ? [assetReturns(history, index), assetsHeld(row)] : [];
+    return [
+      ...[row.period, calendar.name(row.period), standing(row).date ?? "", simple(stands.log_return)],
+      ...(corrected ? [simple(row.log_return)] : []),
+      ...[stands.advised_allocation, stands.executed_allocation].map(hundred),
+      ...assets.flatMap((name) => [simple(returned?.[name]), hundred(holds[name])]),
+      ...[stands.wealth, ...beside.map(([, wealths]) => wealths[index + 1]), hundred(deep[index + 1])],
+    ];
   });
   return csvText([head, start, ...lines]);
 }

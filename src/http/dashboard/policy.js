@@ -27,7 +27,7 @@ export async function view(id, leaving) {
       ofSeveral(specification),
       inWords(specification, annualised).map((sentence) => h("p", {}, sentence)),
       h("p", {}, often(specification.problem, diagnostics)),
-      warningList(warnings),
+      warningList(warnings, specification.problem),
     ),
     again(id),
     surface(policy, leaving),
@@ -70,8 +70,10 @@ function deletion(id) {
       await remove(`/policies/${id}`);
       location.hash = "#/policies";
     } catch (error) {
-      announce(error.message);
-      button.after(h("p", { class: "error" }, error.message));
+      const used = error.type === "/problems/in-use";
+      const words = used ? "Sessions live by this policy. Delete those first." : error.message;
+      announce(words);
+      button.after(h("p", { class: "error" }, words, used ? [" ", h("a", { href: `#/?search=${id}` }, "Show them")] : ""));
     }
   });
   return button;

@@ -10,10 +10,13 @@ const LEARN = ["adaptive", "plug_in", "parametric_adaptive"];
 /** Of longer records the service does not tell it: no one return of so many makes a difference. */
 const LONGEST = 360;
 
+const HEADING = "How near it is to changing";
+
 /** `{element, ask()}`: the section, and what fills it from `/action`. */
 export function nearness({ id, session, policy, leaving, unit }) {
-  const learns = LEARN.includes(policy.specification.problem.framework);
-  if (!learns || session.sample_size > LONGEST) return { element: "", ask: async () => {} };
+  const said = (words) => ({ element: section(HEADING, h("p", { class: "sentence" }, words)), ask: async () => {} });
+  if (!LEARN.includes(policy.specification.problem.framework)) return said("No return changes it: the policy does not learn from what comes.");
+  if (session.sample_size > LONGEST) return said(`It is steady: it rests on ${count(session.sample_size)} returns, of which no single one makes a difference.`);
   const holder = h("div", { "aria-live": "polite" }, h("p", { class: "note" }, "Asking for the advice of some hundred other records\u2026"));
   const ask = async () => {
     try {
@@ -24,7 +27,7 @@ export function nearness({ id, session, policy, leaving, unit }) {
       if (!leaving.aborted) holder.replaceChildren(h("p", { class: "error" }, error.message));
     }
   };
-  return { element: section("How near it is to changing", holder), ask };
+  return { element: section(HEADING, holder), ask };
 }
 
 /** An advice that an ordinary coming return moves by less than this stays; by more than the second it is near to changing. */

@@ -109,18 +109,33 @@ export const isParametric = (framework) => framework.startsWith("parametric");
 /** True where a policy guards against markets worse than the record. */
 export const isCautious = (problem) => hasBall(problem) || isParametric(problem.framework);
 
-/** What may be a mistake in a request. */
-export function warningList(warnings) {
-  return warnings.map(({ message }) => h("p", { class: "note wrong" }, minus(message)));
+/** What the bank pays in a problem; where that is not one number, without it. */
+function banks({ rate_per_step, periods_per_year }) {
+  if (typeof rate_per_step !== "number") return "The bank pays";
+  const a_year = periods_per_year > 1 ? `, ${percent(Math.expm1(periods_per_year * Math.log1p(rate_per_step)), 1)} a year` : "";
+  return `The bank pays ${percent(rate_per_step, 2)} a ${unitOf(periods_per_year)}${a_year},`;
 }
 
-/** What stands in the place of a form once a job is queued, on the page `at`, whose request may be a mistake. */
-export function queued(noun, at, warnings) {
+/** What may be a mistake in a problem, by the code of its warning, in the words and the units of the form. */
+const WARNED = {
+  rate_high: (problem) => `${banks(problem)} more than banks do. Is that what it pays in one ${unitOf(problem.periods_per_year)}, or in a year?`,
+  rate_above_record: (problem) => `${banks(problem)} more than the record returned on average. Is that what it pays in one ${unitOf(problem.periods_per_year)}?`,
+  record_in_percent: () => "The returns vary more than those of any market. Are they in percent, and were read as fractions?",
+  trading_cost_high: ({ trading_cost }) => `Trading costs ${percent(trading_cost, 2)} of all that is traded. Is that meant?`,
+};
+
+/** What may be a mistake in a problem. */
+export function warningList(warnings, problem) {
+  return warnings.map(({ code }) => h("p", { class: "note wrong" }, WARNED[code](problem)));
+}
+
+/** What stands in the place of a form once a job is queued, on the page `at`, whose problem may be a mistake. */
+export function queued(noun, at, warnings, problem) {
   return h(
     "div",
     { class: "words", role: "status" },
     h("p", {}, `The ${noun} is queued. Is this meant?`),
-    warningList(warnings),
+    warningList(warnings, problem),
     h("p", {}, "If not, cancel it ", h("a", { href: at }, "where it is listed"), " and ask anew."),
   );
 }

@@ -153,7 +153,7 @@ export async function view(query, leaving) {
     try {
       const job = await post("/train", json.value);
       announce(`Training ${job.job} is queued.`);
-      if (job.warnings.length > 0) form.replaceWith(queued("training", "#/jobs", job.warnings));
+      if (job.warnings.length > 0) form.replaceWith(queued("training", "#/jobs", job.warnings, request.problem));
       else location.hash = "#/jobs";
     } catch (error) {
       if (error.field === "body") advanced.open = true;
