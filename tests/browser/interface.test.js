@@ -48,8 +48,10 @@ test("a call shows its example, its fields and their defaults", async () => {
 test("it is dark where the reader's screen is", async () => {
   const ground = () => page.evaluate(() => getComputedStyle(document.documentElement).backgroundColor);
   await page.emulateMedia({ colorScheme: "dark" });
+  await page.locator("html.dark-mode").waitFor();
   const dark = await ground();
   await page.emulateMedia({ colorScheme: "light" });
+  await page.locator("html:not(.dark-mode)").waitFor();
   assert.notEqual(dark, await ground());
 });
 
