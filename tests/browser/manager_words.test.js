@@ -26,6 +26,16 @@ after(async () => {
 
 const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
 
+/** Fills the form for a policy of two months. */
+async function askFor({ rate, cost }) {
+  await go("#/train");
+  await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
+  await page.getByLabel("Periods a year").fill("12");
+  await page.getByLabel("Months ahead").fill("2");
+  await page.getByLabel("Bank return per month, %").fill(rate);
+  await page.getByLabel("Trading cost, %").fill(cost);
+}
+
 test("no page says the paper's words outside a fold", async () => {
   const { session } = await call(ballast.url, "/sessions", { policy });
   for (const hash of ["#/jobs", "#/train", "#/policies", `#/policies/${policy}`, "#/sessions", "#/sessions/new", `#/sessions/${session}`, "#/report", "#/compare", "#/evaluations", "#/evaluations/new", "#/backtests/new"]) {
@@ -47,12 +57,7 @@ test("a policy says whom it is for and how cautious it is, and the paper's words
 });
 
 test("the form takes percent and presets, and sends what the service counts in", async () => {
-  await go("#/train");
-  await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
-  await page.getByLabel("Periods a year").fill("12");
-  await page.getByLabel("Months ahead").fill("2");
-  await page.getByLabel("Bank return per month, %").fill("0.25");
-  await page.getByLabel("Trading cost, %").fill("0,2 %");
+  await askFor({ rate: "0.25", cost: "0,2 %" });
   await page.getByLabel("Confidence, %").fill("95");
   await page.getByLabel("Investor").selectOption({ label: "Cautious" });
   const sent = page.waitForRequest((request) => request.url().endsWith("/train"));
@@ -63,12 +68,7 @@ test("the form takes percent and presets, and sends what the service counts in",
 });
 
 test("what may be a mistake is asked about in percent", async () => {
-  await go("#/train");
-  await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
-  await page.getByLabel("Periods a year").fill("12");
-  await page.getByLabel("Months ahead").fill("2");
-  await page.getByLabel("Bank return per month, %").fill("3");
-  await page.getByLabel("Trading cost, %").fill("5");
+  await askFor({ rate: "3", cost: "5" });
   await page.getByRole("button", { name: "Train", exact: true }).click();
   await page.getByText("The training is queued. Is this meant?").waitFor();
   const words = plain(await page.locator("main").innerText());

@@ -9,7 +9,8 @@ import { plain } from "./page.js";
 const { figures, minus, tick } = await dashboardModule("format.js");
 const { typed } = await dashboardModule("number_text.js");
 const { SOURCES } = await dashboardModule("advice.js");
-const { problemWords } = await dashboardModule("problem_words.js");
+const { problemWords, unusualWords } = await dashboardModule("problem_words.js");
+const { WARNED } = await dashboardModule("specification.js");
 
 test("neighbours on an axis have different labels", () => {
   for (const [start, step] of [[0.000266, 2e-7], [0.00495, 0.00005], [2.66e-5, 1e-7], [1e7, 1e6], [0, 20]]) {
@@ -24,6 +25,21 @@ test("a number typed is one number or none", () => {
   for (const [text, value] of cases) assert.equal(typed(text), value, text);
   assert.equal(typed("0.2 %", { shares: true }), 0.002);
   assert.equal(typed("0.07%", { shares: true }), 0.0007);
+});
+
+test("every warning of the service has words here, and names the record it is about", async () => {
+  const description = JSON.parse(await readFile(new URL("../../api/openapi.json", import.meta.url), "utf8"));
+  const codes = description.components.schemas.WarningCode;
+  assert.deepEqual(Object.keys(WARNED).sort(), (codes.enum ?? codes.oneOf.flatMap((one) => one.enum)).sort());
+  assert.match(WARNED.record_in_percent({}, "problem.history"), /^The returns vary/);
+  assert.match(WARNED.record_in_percent({}, "problem.centre.history"), /^The assumed returns vary/);
+  assert.equal(WARNED.rate_high({ rate_per_step: [0.03, 0.04], periods_per_year: 12 }), "The bank pays more than banks do. Is that what it pays in one month, or in a year?");
+});
+
+test("an unusual return is told in percent, with its asset where there are several", () => {
+  const rule = 'must come with "confirm": true where it is meant: a return of 90.0 % lies 24.8 standard deviations from the record';
+  assert.equal(unusualWords({ field: "simple_return", rule }), "A return of 90.0 % lies 24.8 standard deviations from the record.");
+  assert.equal(unusualWords({ field: "simple_returns.Bonds A/B", rule }), "Bonds A/B: a return of 90.0 % lies 24.8 standard deviations from the record.");
 });
 
 test("a refusal names the field, the value and the rule in the unit of the field", () => {

@@ -18,6 +18,13 @@ export function problemWords({ value, rule }, label, unit) {
   return `${name} ${given(value, unit)}; it ${ruled(rule, unit)}.`;
 }
 
+/** What is unusual about a return, and of which asset where there are several; the rule ends with that, in percent. */
+export function unusualWords({ field, rule }) {
+  const words = rule.split(": ").at(-1);
+  const asset = field.slice(field.indexOf(".") + 1);
+  return asset === field ? `A${words.slice(1)}.` : `${asset}: ${words}.`;
+}
+
 function given(value, unit) {
   if (value === null || value === undefined || value === "") return "is blank";
   if (typeof value === "object") return "is not as it must be";

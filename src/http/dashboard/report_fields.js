@@ -5,6 +5,7 @@ import { h } from "./dom.js";
 import { clear, input, select, showProblem } from "./form.js";
 import { allocation, percent, wealth } from "./format.js";
 import { fraction, typed } from "./number_text.js";
+import { unusualWords } from "./problem_words.js";
 
 const KINDS = { simple_return: "Gain or loss", log_return: "Log-return", missing: "None is known" };
 
@@ -150,7 +151,7 @@ export function sendReports(form, { button, message, fields, path, compose, once
         return refresh("Somebody else reported meanwhile.");
     }
     if (error.type === "/problems/unusual-return") {
-      if (!window.confirm(`${error.message}\n\nIs it meant?`)) return;
+      if (!window.confirm(`${unusualWords(error)}\n\nIs it meant?`)) return;
       request = { ...refusal, confirm: true };
       return send();
     }

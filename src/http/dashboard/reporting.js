@@ -7,7 +7,7 @@ import { count, counted, percent, short } from "./format.js";
 import { headed } from "./naming.js";
 import { fraction } from "./number_text.js";
 import { all } from "./pages.js";
-import { problemWords } from "./problem_words.js";
+import { problemWords, unusualWords } from "./problem_words.js";
 
 /** The service takes so many reports in one call. */
 const AT_ONCE = 1000;
@@ -194,7 +194,6 @@ const FIELDS = { simple_return: ["The return", "percent"], date: ["The last day"
 
 /** Why a report was refused, in the words and the unit of the form. */
 function refused({ type, title, detail, field, value, rule }) {
-  // The rule ends with what is unusual, in percent; the form asks whether it is meant.
-  if (type === "/problems/unusual-return") return `${rule.split(": ").at(-1).replace(/^a/, "A")}.`;
+  if (type === "/problems/unusual-return") return unusualWords({ field, rule });
   return field in FIELDS && rule ? problemWords({ value, rule }, ...FIELDS[field]) : (detail ?? title);
 }

@@ -2,7 +2,7 @@
 
 import { h } from "./dom.js";
 import * as flows from "./flows.js";
-import { count, counted, minus, percent, significant, wealth } from "./format.js";
+import { count, counted, percent, significant, wealth } from "./format.js";
 import { unitOf } from "./periods.js";
 
 /** The kinds of policy in a manager's words; `PAPER` has the paper's. */
@@ -116,17 +116,18 @@ function banks({ rate_per_step, periods_per_year }) {
   return `The bank pays ${percent(rate_per_step, 2)} a ${unitOf(periods_per_year)}${a_year},`;
 }
 
-/** What may be a mistake in a problem, by the code of its warning, in the words and the units of the form. */
-const WARNED = {
+/** What may be a mistake in a problem, by the code of its warning, in the words and the units of the form; `field` is what it is in. */
+export const WARNED = {
   rate_high: (problem) => `${banks(problem)} more than banks do. Is that what it pays in one ${unitOf(problem.periods_per_year)}, or in a year?`,
   rate_above_record: (problem) => `${banks(problem)} more than the record returned on average. Is that what it pays in one ${unitOf(problem.periods_per_year)}?`,
-  record_in_percent: () => "The returns vary more than those of any market. Are they in percent, and were read as fractions?",
+  record_in_percent: (_, field) =>
+    `The ${field.includes("centre") ? "assumed " : ""}returns vary more than those of any market. Are they in percent, and were read as fractions?`,
   trading_cost_high: ({ trading_cost }) => `Trading costs ${percent(trading_cost, 2)} of all that is traded. Is that meant?`,
 };
 
 /** What may be a mistake in a problem. */
 export function warningList(warnings, problem) {
-  return warnings.map(({ code }) => h("p", { class: "note wrong" }, WARNED[code](problem)));
+  return warnings.map(({ code, field }) => h("p", { class: "note wrong" }, WARNED[code](problem, field)));
 }
 
 /** What stands in the place of a form once a job is queued, on the page `at`, whose problem may be a mistake. */
