@@ -112,3 +112,32 @@ fn the_readme_shows_what_it_prints() {
     let printed = text(&output.stdout);
     assert!(readme.contains(&format!("```text\n{printed}```")), "the README does not show\n{printed}");
 }
+
+/// Runs what a page shows after `$ ` where its commands are those of `ballast advise`, in a folder with `data/` of its own.
+#[cfg(unix)]
+#[test]
+fn the_pages_show_what_it_prints() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let binaries = std::path::Path::new(env!("CARGO_BIN_EXE_ballast")).parent().unwrap().to_str().unwrap();
+    let path = format!("{binaries}:{}", std::env::var("PATH").unwrap());
+    let mut shown = 0;
+    for page in ["docs/concepts.md", "docs/first-advice.md"] {
+        let page = std::fs::read_to_string(root.join(page)).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        std::os::unix::fs::symlink(root.join("data"), folder.path().join("data")).unwrap();
+        let run = |line: &str| {
+            let mut shell = Command::new("sh");
+            shell.args(["-c", &format!("exec 2>&1\n{line}")]).current_dir(folder.path()).env("PATH", &path);
+            text(&shell.output().unwrap().stdout)
+        };
+        page.lines().filter(|line| line.starts_with("cut ")).for_each(|line| drop(run(line)));
+        for block in page.split("```text\n$ ").skip(1) {
+            let block = format!("$ {}", block.split("```").next().unwrap());
+            let (commands, printed): (Vec<&str>, Vec<&str>) = block.lines().partition(|line| line.starts_with("$ "));
+            let found: String = commands.iter().map(|command| run(&command[2..])).collect();
+            assert_eq!(found.lines().collect::<Vec<&str>>(), printed, "{commands:?}");
+            shown += 1;
+        }
+    }
+    assert_eq!(shown, 5);
+}

@@ -40,9 +40,11 @@ macro_rules! documents {
 /// By part, in the order in which they are listed; the first is the start.
 const PARTS: &[(&str, &[Document])] = documents! {
     "Start": [
-        "start" "First advice in five minutes" "README.md",
+        "start" "What it is" "README.md",
+        "first-advice" "First advice on your own data" "docs/first-advice.md",
     ],
     "Concepts": [
+        "concepts" "What it does, in four pictures" "docs/concepts.md",
         "choosing" "Choosing what to ask" "docs/choosing.md",
         "glossary" "Words" "docs/glossary.md",
         "results" "What it earned and cost" "docs/results.md",
@@ -75,17 +77,24 @@ fn documents() -> impl Iterator<Item = &'static Document> {
 static PAGES: LazyLock<Vec<Asset>> =
     LazyLock::new(|| documents().map(|document| Asset::new((document.name, HTML, page::made(document)))).collect());
 
+/// Of a picture that has its own colours for light and dark.
+const DRAWING_SECURITY_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'";
+
 macro_rules! pictures {
-    ($($name:literal),+) => { [$(($name, "image/png", include_bytes!(concat!("../../docs/images/", $name)).as_slice())),+] };
+    ($media:literal: $($name:literal),+) => {
+        [$(($name, $media, include_bytes!(concat!("../../docs/images/", $name)).as_slice())),+]
+    };
 }
 
 static FILES: LazyLock<Vec<Asset>> = LazyLock::new(|| {
-    let pictures = pictures!["backtest.png", "industries.png", "policy.png", "reproduction.png", "session.png"];
+    let pictures =
+        pictures!["image/png": "backtest.png", "industries.png", "policy.png", "reproduction.png", "session.png"];
+    let drawings = pictures!["image/svg+xml": "ball.svg", "band.svg", "worst-law.svg", "worst-moves.svg"];
     let style = ("guide.css", STYLE, include_bytes!("guide/guide.css").as_slice());
-    pictures.into_iter().chain([style]).map(Asset::new).collect()
+    pictures.into_iter().chain(drawings).chain([style]).map(Asset::new).collect()
 });
 
-/// The guide: first advice in five minutes, and the list of all pages.
+/// The guide: its first page, and the list of all pages.
 #[utoipa::path(get, path = "/guide", tag = "operations",
     responses(
         (status = 200, description = "A page.", body = String, content_type = "text/html"),
@@ -102,5 +111,6 @@ pub async fn start(headers: HeaderMap) -> Response {
         (status = 404, description = "There is no such page.", body = Problem, content_type = "application/problem+json")))]
 pub async fn file(Id(name): Id, headers: HeaderMap) -> Result<Response, Problem> {
     let files: &[Asset] = if name.contains('.') { &FILES } else { &PAGES };
-    Ok(Asset::find(files, &name, "the guide")?.served(CONTENT_SECURITY_POLICY, &headers))
+    let policy = if name.ends_with(".svg") { DRAWING_SECURITY_POLICY } else { CONTENT_SECURITY_POLICY };
+    Ok(Asset::find(files, &name, "the guide")?.served(policy, &headers))
 }

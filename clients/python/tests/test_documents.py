@@ -18,10 +18,10 @@ def blocks(text: str) -> list[str]:
     return re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
 
 
-def run(code: str, service: Service) -> subprocess.CompletedProcess[str]:
+def run(code: str, service: Service, folder: Path = HERE) -> subprocess.CompletedProcess[str]:
     assert URL in code
     command = [sys.executable, "-W", "error", "-c", code.replace(URL, service.url)]
-    return subprocess.run(command, text=True, capture_output=True, check=True)
+    return subprocess.run(command, text=True, capture_output=True, check=True, cwd=folder)
 
 
 def test_the_readme_of_the_client_runs(service: Service) -> None:
@@ -49,6 +49,30 @@ def test_the_example_prints_the_table_of_the_demo(service: Service) -> None:
     told = subprocess.run(example, text=True, capture_output=True, check=True).stdout
     demo = subprocess.run([str(BINARY), "demo", *count], text=True, capture_output=True, check=True).stdout
     assert table(told) == table(demo)
+
+
+def test_the_pictures_of_the_concepts_are_those_that_are_drawn(service: Service, tmp_path: Path) -> None:
+    command = [sys.executable, "-W", "error", str(HERE / "examples/concepts.py")]
+    arguments = ["--url", service.url, "--out", str(tmp_path)]
+    told = subprocess.run(command + arguments, text=True, capture_output=True, check=True).stdout
+    assert f"```text\n{told}```" in (REPOSITORY / "docs/concepts.md").read_text()
+    drawn = {path.name: path.read_text() for path in tmp_path.iterdir()}
+    assert len(drawn) == 4
+    assert drawn == {path.name: path.read_text() for path in (REPOSITORY / "docs/images").glob("*.svg")}
+
+
+def test_the_first_advice_runs(service: Service, tmp_path: Path) -> None:
+    page = (REPOSITORY / "docs/first-advice.md").read_text()
+    (cut,) = (line for line in page.splitlines() if line.startswith("cut "))
+    (tmp_path / "data").symlink_to(REPOSITORY / "data")
+    subprocess.run(cut, shell=True, cwd=tmp_path, check=True)
+    (code,) = blocks(page)
+    told = run(code, service, tmp_path).stdout.splitlines()
+    assert told[0].startswith("1109 monthly simple returns as fractions, ")
+    said = re.search(r"band +(\S+) % to (\S+) %", page)
+    assert said is not None
+    allocation, low, high = (float(number) for number in re.findall(r"[\d.]+", told[1]))
+    assert (round(100 * low, 1), round(100 * high, 1)) == (float(said[1]), float(said[2])) and allocation == high
 
 
 def table(text: str) -> list[str]:
