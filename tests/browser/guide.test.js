@@ -18,7 +18,7 @@ after(async () => {
 });
 
 test("the guide can be read by everybody on every screen", async () => {
-  await usable(page, (place) => page.goto(`${ballast.url}${place}`), ["/guide", "/guide/results", "/guide/requests"]);
+  await usable(page, (place) => page.goto(`${ballast.url}${place}`), ["/guide", "/guide/concepts", "/guide/results", "/guide/requests"]);
 });
 
 test("the guide is a click from the overview, and the overview from the guide", async () => {
