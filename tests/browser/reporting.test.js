@@ -31,12 +31,18 @@ const rows = async (name) => (await page.getByRole("table", { name }).locator("t
 const lines = () => page.getByLabel("Sessions and their returns, %");
 const observed = async (index) => (await call(ballast.url, `/sessions/${sessions[index]}/history`)).observations;
 
+/** What the module makes of a text: the sessions, what is said of each, and what is wrong. */
+async function readBy(known, { assets = () => null, all = {}, lately = () => false } = {}) {
+  const { finder, readLines } = await dashboardModule("report_lines.js");
+  return (text, terms = all) => readLines(text, finder(known), terms, { assetsOf: assets, lately });
+}
+
 test("a line is a name and a number however they stand apart", async () => {
-  const { readLine } = await dashboardModule("reporting.js");
   const known = [{ session: "session_00aa11bb22cc33", name: "Fund 60", state: "active" }, { session: "session_ffaa11bb22cc33", name: "Ada Lovelace", state: "active" }];
-  const read = (line, common = null) => {
-    const { entry, back, trouble } = readLine(line, known, common);
-    return [entry?.name, back, trouble];
+  const readAll = await readBy(known);
+  const read = (line, common) => {
+    const [{ entry, report, trouble }] = readAll(line, { simple_return: common }).rows;
+    return [entry?.name, report.simple_return ?? null, trouble];
   };
   assert.deepEqual(read("ada lovelace 1.2"), ["Ada Lovelace", 0.012, null]);
   assert.deepEqual(read("Ada Lovelace\t1,2 %"), ["Ada Lovelace", 0.012, null]);
@@ -48,6 +54,38 @@ test("a line is a name and a number however they stand apart", async () => {
   assert.deepEqual(read("ffaa11bb22 3"), ["Ada Lovelace", 0.03, null]);
   assert.deepEqual(read("Ada Lovelace much"), ["Ada Lovelace", null, "\u201cmuch\u201d is not a number of percent"]);
   assert.equal(read("Nobody 1")[2], "no session is called \u201cNobody\u201d");
+});
+
+test("a header puts the columns in any order, and a column that means nothing is named", async () => {
+  const known = ["Ada", "Smith, John", "Trust"].map((name, index) => ({ session: `session_${index}${"0123456789".repeat(3)}`, name, policy: name, state: "active", period: 1 }));
+  const read = await readBy(known, { assets: (policy) => (policy === "Trust" ? ["World", "Bonds A/B"] : null) });
+  const one = read('Flow,Return %,"Last day",Client,Held\r\n-100,1.5,2026-10-31,"Smith, John",30\r\n\r\n,-2,,Ada,\r\n', { date: "2026-11-30" });
+  assert.deepEqual(one.rows.map(({ line, entry, report, trouble }) => [line, entry.name, report, trouble]), [
+    [2, "Smith, John", { flow: -100, simple_return: 0.015, date: "2026-10-31", executed_allocation: 0.3 }, null],
+    [4, "Ada", { simple_return: -0.02, date: "2026-11-30" }, null],
+  ]);
+  assert.deepEqual([one.header, one.unread], ['Flow,Return %,"Last day",Client,Held', []]);
+  const two = read("adviser;Bonds A/B;client;world;World held;Bonds A/B held;return\nEve;0,2;Trust;1,5;40;10;\nEve;;Ada;;;;1\nEve;;Ada;1;;;1");
+  assert.deepEqual(two.rows[0].report, { simple_returns: { "Bonds A/B": 0.002, World: 0.015 }, executed_allocations: { World: 0.4, "Bonds A/B": 0.1 } });
+  assert.deepEqual([two.rows[0].trouble, two.unread], [null, ["adviser"]]);
+  const wrong = (text) => read(text).rows.map(({ trouble }) => trouble);
+  assert.deepEqual(wrong("client;return;world\nAda;1;2\nTrust;;1"), ["has no asset called \u201cworld\u201d", "holds several assets: it needs a header, and a return in each of the columns \u201cWorld\u201d, \u201cBonds A/B\u201d"]);
+  assert.deepEqual(wrong("client;return;date\nAda;much;\nSmith, John;1;31/10/2026"), ["\u201cmuch\u201d in the column \u201creturn\u201d is not a number of percent", "\u201c31/10/2026\u201d in the column \u201cdate\u201d is not a day such as 2008-09-30"]);
+  assert.deepEqual(wrong("client,return\nAda,1,2"), ["has 3 cells, and the header 2"]);
+  assert.deepEqual(wrong("client;world;bonds a/b;world held\nTrust;1;1;30"), ["says what is held of some assets, and not of Bonds A/B"]);
+  // Of two columns of one meaning the second is not read.
+  assert.deepEqual(read("client,return,return\nAda,1,2").unread, ["return"]);
+});
+
+test("what is reported up to a day already, or was within the hour, is not reported again by mistake", async () => {
+  const known = [{ session: "session_00aa11bb22cc33", name: "Ada", state: "active", period: 2, date: "2026-10-31", last_report_ms: 1 }];
+  const read = await readBy(known, { lately: () => true });
+  const trouble = (text) => read(text).rows[0].trouble;
+  assert.equal(trouble("client,return,date\nAda,1,2026-10-31"), "is reported up to 31 Oct 2026 already");
+  assert.equal(trouble("client,return,date\nAda,1,2026-11-30"), null);
+  assert.match(trouble("Ada 1"), /^was reported within the hour/);
+  // Whoever says the period cannot count it twice.
+  assert.equal(trouble("client,return,period\nAda,1,1"), null);
 });
 
 test("who gets what is shown before, and what came of it after", async () => {
@@ -62,15 +100,15 @@ test("who gets what is shown before, and what came of it after", async () => {
   await page.getByLabel("Return of the others, %").fill("-0,5");
   await page.getByLabel("Last day").fill("2026-10-31");
   const before = await rows("Returns to report");
-  assert.match(before[0], /^Ada \w+ 1 1\.20 % yes$/);
-  assert.match(before[2], /^Twin 1 – 1\.00 % 2 sessions are called so/);
-  assert.match(before[3], /no session is called “Nobody”/);
-  assert.match(before[4], new RegExp(`^${short(sessions[4])} 1 -0\\.50 % yes$`));
+  assert.match(before[0], /^Ada \w+ 1 1\.20 % to 2026-10-31 yes$/);
+  assert.match(before[2], /^Twin 1 – 1\.00 % to 2026-10-31 Line 3: 2 sessions are called so/);
+  assert.match(before[3], /Line 4: no session is called “Nobody”/);
+  assert.match(before[4], new RegExp(`^${short(sessions[4])} 1 -0\\.50 % to 2026-10-31 yes$`));
   await page.getByRole("button", { name: "Report for 3" }).click();
   await page.getByRole("heading", { name: "What came of it" }).waitFor();
   const told = await rows("Outcomes");
   assert.match(told[0], /^Ada \w+ 1\.20 % recorded as period 1$/);
-  assert.match(told[1], /^Grace Hopper \w+ 90\.00 % A return of 90\.0 % lies [\d.]+ standard deviations from the record\.$/);
+  assert.match(told[1], /^Grace Hopper \w+ 90\.00 % Line 2: A return of 90\.0 % lies [\d.]+ standard deviations from the record\.$/);
   await page.getByText("2 returns are recorded, and 3 left above for another try.").first().waitFor();
   assert.equal(await lines().inputValue(), "Grace Hopper 90\nTwin 1\nNobody 2");
   const [ada] = await observed(0);
@@ -80,6 +118,7 @@ test("who gets what is shown before, and what came of it after", async () => {
 });
 
 test("an unusual return is recorded once it is said to be meant, and no other with it", async () => {
+  await page.getByLabel("Last day").fill("2026-11-30");
   // Another that is as unusual was not asked about yet.
   await lines().fill(`Grace Hopper 90\n${short(sessions[4])} 120`);
   await page.getByLabel("The returns are meant").check();
@@ -93,15 +132,17 @@ test("an unusual return is recorded once it is said to be meant, and no other wi
 test("a return that cannot be is refused in percent", async () => {
   await page.getByLabel("Last day").fill("");
   await lines().fill("Ada 50000");
+  assert.equal(await page.getByRole("button", { name: "Report" }).isDisabled(), true);
+  await page.getByLabel("the next period is meant", { exact: false }).check();
   await page.getByRole("button", { name: "Report for 1" }).click();
   await page.getByText("1 left above for another try", { exact: false }).first().waitFor();
   const [told] = await rows("Outcomes");
-  assert.match(told, /The return is 50,000 %; it must be from -99\.32 % to 14,741\.31 %\.$/);
+  assert.match(told, /Line 1: The return is 50,000 %; it must be from -99\.32 % to 14,741\.31 %\.$/);
   await page.getByLabel("Last day").fill("2026-10-31");
   await lines().fill("Ada 1");
-  await page.getByRole("button", { name: "Report for 1" }).click();
-  await page.getByText("The last day is \u201c2026-10-31\u201d; it must be later than 2026-10-31, that of a period before.").waitFor();
+  await page.getByText("Line 1: is reported up to 31 Oct 2026 already").waitFor();
   await page.getByLabel("Last day").fill("");
+  await page.getByText("Line 1: was reported within the hour", { exact: false }).waitFor();
 });
 
 test("those ticked get one return, and an answer that is lost is asked for again without harm", async () => {
@@ -124,10 +165,65 @@ test("those ticked get one return, and an answer that is lost is asked for again
   for (const index of [2, 3]) assert.equal((await observed(index)).length, 1);
 });
 
+test("forty clients are reported by one file, a bad row is named by its line, and nothing is lost or counted twice", async () => {
+  const { policy } = await call(ballast.url, `/sessions/${sessions[0]}`);
+  const several = await trained(ballast.url, {
+    problem: { assets: ["World", "Gold"], horizon: 3, rate_per_step: 0.001, history: HISTORY.map((value, k) => [value, HISTORY[HISTORY.length - 1 - k] / 2]) },
+    design: { count: 20 },
+  });
+  const clients = [];
+  for (let k = 0; k < 40; k++) clients.push((await call(ballast.url, "/sessions", { policy: k < 36 ? policy : several, name: `Client ${k + 1}`, wealth: 100 })).session);
+  const back = (k) => (k - 20) / 10;
+  const row = (k, name = `Client ${k + 1}`) => (k < 36 ? `${back(k)};;${name};;${k === 0 ? 50 : ""}` : `;${back(k)};${name};0,5;`);
+  const csv = (names) => ["Return, %;World;Client;Gold;Money added", ...clients.map((_, k) => row(k, names(k)))].join("\r\n");
+  await go("#/report");
+  // One row of the file names nobody; it is chosen first, and dropped once it is mended.
+  await page.locator("input[type=file]").setInputFiles({ name: "october.csv", mimeType: "text/csv", buffer: Buffer.from(csv((k) => (k === 16 ? "Cleint 17" : `Client ${k + 1}`))) });
+  await page.getByText("39 returns are ready, and 1 line is not.").waitFor();
+  await page.getByText("Line 18: no session is called \u201cCleint 17\u201d").waitFor();
+  assert.match((await rows("Returns to report"))[39], /^Client 40 \w+ 1 World 1\.90 % Gold 0\.50 % yes$/);
+  let lost = 0;
+  await page.route("**/observe", async (route) => {
+    if (lost++ > 0) return route.continue();
+    await route.fetch();
+    await route.abort();
+  });
+  await page.getByRole("button", { name: "Report for 39" }).click();
+  await page.getByText("Sending it again is safe: a period counts once.", { exact: false }).waitFor();
+  await page.getByRole("button", { name: "Report for 39" }).click();
+  await page.getByText("39 returns are recorded, and 1 left above for another try.").first().waitFor();
+  await page.unrouteAll();
+  assert.equal((await lines().inputValue()).split("\n").length, 2);
+  // The whole file again, on a page that has forgotten the first: the one row that was bad is all that is ready.
+  await go("#/report");
+  await page.locator(".drop").dispatchEvent("drop", { dataTransfer: await page.evaluateHandle((text) => {
+    const files = new DataTransfer();
+    files.items.add(new File([text], "october.csv", { type: "text/csv" }));
+    return files;
+  }, csv((k) => `Client ${k + 1}`)) });
+  await page.getByText("1 return is ready, and 39 lines are not.").waitFor();
+  await page.getByRole("button", { name: "Report for 1" }).click();
+  await page.getByText("1 return is recorded, and 39 left above for another try.").first().waitFor();
+  for (const [k, session] of clients.entries()) {
+    const { observations } = await call(ballast.url, `/sessions/${session}/history`);
+    assert.equal(observations.length, 1, `client ${k + 1}`);
+    const [{ reported }] = observations;
+    if (k < 36) assert.ok(Math.abs(reported.simple_return - back(k) / 100) < 1e-15, `client ${k + 1}`);
+    else assert.deepEqual(reported.simple_returns, { World: Number((back(k) / 100).toPrecision(12)), Gold: 0.005 });
+    assert.equal(reported.flow ?? null, k === 0 ? 50 : null);
+  }
+});
+
+test("a column that is not understood is named, with those that are", async () => {
+  await lines().fill("client,return,colour\nAda,1,red");
+  await page.getByText(/^Nothing is read from the column “colour”\. A column is called client, return, held, rate, flow, wealth, date, period or like an asset/).waitFor();
+});
+
 test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {
   await usable(page, async () => {
     await go("#/report");
     await lines().fill("Ada 500\nNobody 2");
+    await page.getByLabel("the next period is meant", { exact: false }).check();
     await page.getByRole("button", { name: "Report for 1" }).click();
     await page.getByRole("heading", { name: "What came of it" }).waitFor();
   });

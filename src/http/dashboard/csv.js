@@ -1,4 +1,4 @@
-// Rows as a file for spreadsheets: numbers plain, shares in percent.
+// Rows as a file for spreadsheets, numbers plain and shares in percent; and the rows of such a file.
 
 /** A share in percent, as it is written into a file. */
 export const hundred = (share) => (share === null || share === undefined ? null : 100 * share);
@@ -11,4 +11,27 @@ function cell(value) {
   // Beyond twelve digits are those of binary fractions.
   const text = typeof value === "number" ? String(Number(value.toPrecision(12))) : value;
   return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+}
+
+/** The cells of a text in which `mark` stands between them, and the lines where its rows begin, from 1: `[{line, text, cells}]`. What
+ * stands in quotes is one cell, a quote in it doubled; blank rows are passed over. */
+export function csvRows(text, mark) {
+  const rows = [];
+  let [cells, cell, line, first, from, quoted] = [[], "", 1, 1, 0, false];
+  const end = (index) => {
+    const whole = text.slice(from, index).trim();
+    if (whole !== "") rows.push({ line: first, text: whole, cells: [...cells, cell].map((cell) => cell.trim()) });
+    [cells, cell, first, from] = [[], "", line, index + 1];
+  };
+  for (let index = 0; index < text.length; index++) {
+    const letter = text[index];
+    if (letter === "\n") line++;
+    if (quoted && letter === '"' && text[index + 1] === '"') cell += text[++index];
+    else if (letter === '"' && (quoted || cell.trim() === "")) [quoted, cell] = [!quoted, quoted ? cell : ""];
+    else if (quoted || (letter !== mark && letter !== "\n")) cell += letter;
+    else if (letter === mark) [cells, cell] = [[...cells, cell], ""];
+    else end(index);
+  }
+  end(text.length);
+  return rows;
 }

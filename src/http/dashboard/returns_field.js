@@ -4,6 +4,7 @@
 import { post, text } from "./api.js";
 import { lineChart } from "./chart.js";
 import { announce, h } from "./dom.js";
+import { fileDrop } from "./file_drop.js";
 import { count, percent, percentTick } from "./format.js";
 
 const KINDS = { simple: "Simple returns", log: "Log-returns", price: "Prices" };
@@ -129,44 +130,13 @@ const words = ({ sentence, questions }) => {
 /** What is typed is mended word by word and keeps what was said of it; what is pasted is another text. */
 const isTyping = ({ inputType = "" }) => /^(insertText|insertLineBreak|deleteContent|deleteWord)/.test(inputType);
 
-/** The text of a file: UTF-16 where its first bytes say so. */
-async function content(file) {
-  const bytes = await file.arrayBuffer();
-  const [first, second] = new Uint8Array(bytes);
-  const wide = { "255 254": "utf-16le", "254 255": "utf-16be" }[`${first} ${second}`];
-  return new TextDecoder(wide ?? "utf-8").decode(bytes);
-}
-
-/** Where a file is chosen or dropped. */
+/** Where a file is chosen or dropped, and where the example is offered if there is one: what is known of that. */
 function drop(id, open, example) {
-  const fail = (error) => announce(error.message);
-  const file = h("input", {
-    type: "file",
-    id: `${id}-file`,
-    accept: ".csv,.tsv,.txt,text/csv,text/plain",
-    class: "unseen",
-  });
-  const opened = async (chosen) => chosen && open(await content(chosen));
-  file.addEventListener("change", () => opened(file.files[0]));
-  const chosen = h("label", { class: "button quiet", for: file.id }, "Choose a CSV file");
-  const zone = h("div", { class: "drop" }, h("p", {}, file, chosen, " or drop one here, or paste below."));
-  const load = () => text(EXAMPLE).then((content) => open(content, example), fail);
-  const offer = h(
-    "button",
-    { type: "button", class: "link", onclick: load },
-    "Use the example: US stock market, monthly",
-  );
-  if (example) zone.append(h("p", {}, offer));
-  zone.addEventListener("dragover", (event) => {
-    event.preventDefault();
-    zone.classList.add("over");
-  });
-  zone.addEventListener("dragleave", () => zone.classList.remove("over"));
-  zone.addEventListener("drop", (event) => {
-    event.preventDefault();
-    zone.classList.remove("over");
-    opened(event.dataTransfer.files[0]);
-  });
+  const zone = fileDrop(id, open);
+  if (!example) return zone;
+  const load = () => text(EXAMPLE).then((content) => open(content, example), (error) => announce(error.message));
+  const offer = h("button", { type: "button", class: "link", onclick: load }, "Use the example: US stock market, monthly");
+  zone.append(h("p", {}, offer));
   return zone;
 }
 

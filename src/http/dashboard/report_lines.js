@@ -1,0 +1,168 @@
+// What is said of many sessions at once, line by line: a name and a return, or a table below a header, its columns in any order.
+
+import { csvRows } from "./csv.js";
+import { short } from "./format.js";
+import { fraction, typed } from "./number_text.js";
+import { day } from "./periods.js";
+
+/** So much of an identifier tells whose it is. */
+const LEAST = 6;
+/** A session that reported so lately, in milliseconds, may be in the list twice. */
+export const LATELY = 3_600_000;
+
+/** What heads a column, by what it says. */
+const COLUMNS = {
+  client: ["client", "session", "name", "investor", "account", "identifier", "id"],
+  simple_return: ["return", "gain", "gain or loss", "performance"],
+  executed_allocation: ["held", "share held", "allocation"],
+  rate: ["rate", "bank", "bank paid", "the bank paid"],
+  flow: ["flow", "added", "money added", "contribution"],
+  wealth: ["wealth", "wealth reached"],
+  date: ["date", "last day", "day"],
+  period: ["period"],
+};
+/** The first word of each, for people. */
+export const HEADS = Object.values(COLUMNS).map(([head]) => head);
+const SHARES = ["simple_return", "executed_allocation", "rate"];
+
+const folded = (text) => text.trim().toLowerCase();
+/** What a column is called, without its unit. */
+const headOf = (cell) => folded(cell).replace(/[,\s]*(?:%|\(%\)|in percent)$/, "").replaceAll("_", " ");
+const columnOf = (head) => Object.keys(COLUMNS).find((name) => COLUMNS[name].includes(head));
+
+/** `find(text)`: the sessions that a text names, by their names, or else by their identifiers. */
+export function finder(sessions) {
+  const index = (keyOf) => {
+    const found = new Map();
+    for (const entry of sessions) {
+      const key = keyOf(entry);
+      if (found.has(key)) found.get(key).push(entry);
+      else found.set(key, [entry]);
+    }
+    return found;
+  };
+  const bare = (id) => id.replace(/^session_/, "");
+  const byName = index(({ name }) => folded(name ?? ""));
+  const byId = index(({ session }) => bare(session).slice(0, LEAST));
+  return (text) => {
+    const wanted = folded(text);
+    if (wanted !== "" && byName.has(wanted)) return byName.get(wanted);
+    const id = bare(wanted);
+    return id.length < LEAST ? [] : (byId.get(id.slice(0, LEAST)) ?? []).filter(({ session }) => bare(session).startsWith(id));
+  };
+}
+
+/** What a session is written as: its name, where no other has it. */
+export const written = (find, { session, name }) => (name && find(name).length === 1 ? name : short(session));
+
+/** The ways in which a line may be a name and a number, the likeliest first. */
+const SPLITS = [/^(.*)[\t;]\s*([^\t;]*)$/, /^(.*)\s([^\s]+(?:\s*%)?)$/, /^([^,]*),(.*)$/];
+
+/** A line as its sessions, `found`, what it says of the period, `report`, and what is wrong with it, or null. */
+function readLine(line, find) {
+  const whole = find(line);
+  if (whole.length > 0) return { found: whole, report: {}, trouble: null };
+  const parts = SPLITS.map((split) => split.exec(line)).filter(Boolean).map(([, name, number]) => [name.replace(/[,;:\s]+$/, ""), number.trim()]);
+  const numbered = parts.find(([, number]) => number !== "" && fraction(number) !== null);
+  const known = parts.find(([name]) => find(name).length > 0);
+  if (numbered) return { found: find(numbered[0]), name: numbered[0], report: { simple_return: fraction(numbered[1]) }, trouble: null };
+  if (!known) return { found: [], name: line, report: {}, trouble: null };
+  const [name, number] = known;
+  return { found: find(name), report: {}, trouble: number === "" ? null : `\u201c${number}\u201d is not a number of percent` };
+}
+
+/** The header of a table and the rows below it; null where the first line heads none. */
+function tableOf(text) {
+  const first = text.split("\n").find((line) => line.trim() !== "") ?? "";
+  const mark = ["\t", ";"].find((mark) => first.includes(mark)) ?? ",";
+  const [header, ...rows] = csvRows(text, mark);
+  // Of what is said by two columns, which may be two ways to name the client, the first alone is read.
+  const heads = (header?.cells ?? []).map(headOf).map((head, index, all) => (columnOf(head) !== "client" && all.indexOf(head) < index ? null : head));
+  return heads.some((head) => columnOf(head) === "client") ? { header, heads, rows } : null;
+}
+
+/** A cell of a share, an amount, a day or a period; null where it is none. */
+function cellValue(name, text) {
+  if (name === "date") return /^\d{4}-\d\d-\d\d$/.test(text) ? text : null;
+  const value = SHARES.includes(name) ? fraction(text) : typed(text);
+  return typeof value !== "number" || (name === "period" && !(Number.isInteger(value) && value > 0)) ? null : value;
+}
+
+const WANTED = { date: "a day such as 2008-09-30", period: "the number of a period", flow: "a number", wealth: "a number" };
+
+/** What a column says of a session of `assets`, none where it has one: `[list, asset]`, `[field]` or null. */
+function meant(head, assets) {
+  for (const name of assets ?? []) {
+    if (head === folded(name)) return ["simple_returns", name];
+    if (head === `${folded(name)} held`) return ["executed_allocations", name];
+  }
+  return columnOf(head) ? [columnOf(head)] : null;
+}
+
+function readRow({ cells }, { header, heads }, find, assetsOf) {
+  const named = heads.flatMap((head, index) => (columnOf(head) === "client" && cells[index] ? [cells[index]] : []));
+  const found = named.map(find).find((sessions) => sessions.length > 0) ?? [];
+  const read = { found, name: named.join(", "), report: {}, unsaid: [], trouble: null };
+  if (cells.length > heads.length) read.trouble = `has ${cells.length} cells, and the header ${heads.length}`;
+  if (found.length !== 1) return read;
+  const assets = assetsOf(found[0].policy);
+  for (const [index, head] of heads.entries()) {
+    const text = cells[index] ?? "";
+    const [name, asset] = meant(head, assets) ?? [];
+    if (text === "" || name === "client") continue;
+    const value = name && cellValue(asset ? "simple_return" : name, text);
+    if (name === undefined) read.unsaid.push(header.cells[index]);
+    else if (value === null) read.trouble ??= `\u201c${text}\u201d in the column \u201c${header.cells[index]}\u201d is not ${WANTED[name] ?? "a number of percent"}`;
+    else read.report[name] = asset ? { ...read.report[name], [asset]: value } : value;
+  }
+  return read;
+}
+
+/** What keeps a report from being sent, or null. */
+function wrong({ found, name }, { period, ...report }, { assetsOf, lately }) {
+  if (found.length > 1) return `${found.length} sessions are called so: write the identifier`;
+  const [entry] = found;
+  if (!entry) return `no session is called \u201c${name}\u201d`;
+  const assets = assetsOf(entry.policy);
+  if (assets === undefined) return "its policy is being read";
+  if (entry.state === "completed" && period === undefined) return "has reached its end";
+  const { simple_return, simple_returns = {}, executed_allocations: held } = report;
+  const without = (list) => (assets ?? []).filter((asset) => !(asset in list));
+  if (assets && (simple_return !== undefined || without(simple_returns).length > 0))
+    return `holds several assets: it needs a header, and a return in each of the columns ${assets.map((asset) => `\u201c${asset}\u201d`).join(", ")}`;
+  if (held && without(held).length > 0) return `says what is held of some assets, and not of ${without(held).join(", ")}`;
+  if (!assets && simple_return === undefined) return "has no return";
+  if (period !== undefined) return null;
+  if (report.date && entry.date && report.date <= entry.date) return `is reported up to ${day(entry.date)} already`;
+  return !report.date && lately(entry) ? "was reported within the hour: say its last day, or below that the next period is meant" : null;
+}
+
+/**
+ * The rows of a text as `{rows, header, unread}`: each row `{line, text, entry, report, trouble}` with the line it stands in, the session
+ * it names, what it says of the period, and what is wrong with it, or null. `header` is the first line where it heads columns, and
+ * `unread` the columns that nothing is read from. `all` says what holds for the rows that say nothing of their own: `{simple_return, date}`.
+ * `assetsOf(policy)` are the names of its assets, null where it has one, undefined while that is not known; `lately(entry)` whether a
+ * session reported so lately that it may be in the text by mistake. Of a session that is named twice neither row is taken: nobody can
+ * know which is meant.
+ */
+export function readLines(text, find, all, { assetsOf, lately }) {
+  const table = tableOf(text);
+  const lines = text.split("\n").map((text, index) => ({ line: index + 1, text: text.trim() })).filter(({ text }) => text !== "");
+  const rows = (table?.rows ?? lines).map((row) => {
+    const read = table ? readRow(row, table, find, assetsOf) : readLine(row.text, find);
+    const entry = read.found.length === 1 ? read.found[0] : undefined;
+    const common = entry && assetsOf(entry.policy) ? { date: all.date } : all;
+    const report = Object.fromEntries(Object.entries({ ...common, ...read.report }).filter(([, value]) => value !== undefined));
+    return { ...row, entry, report, unsaid: read.unsaid ?? [], trouble: read.trouble ?? wrong(read, report, { assetsOf, lately }) };
+  });
+  const assets = new Set(rows.flatMap(({ entry }) => (entry && assetsOf(entry.policy)) ?? []));
+  const unread = table ? table.header.cells.filter((_, index) => meant(table.heads[index], assets) === null) : [];
+  const times = new Map();
+  for (const { entry } of rows) if (entry) times.set(entry.session, (times.get(entry.session) ?? 0) + 1);
+  const trouble = ({ entry, unsaid, trouble }) => {
+    if (entry && times.get(entry.session) > 1) return "is named twice";
+    const other = unsaid.find((column) => !unread.includes(column));
+    return trouble ?? (other === undefined ? null : `has no asset called \u201c${other}\u201d`);
+  };
+  return { rows: rows.map((row) => ({ ...row, trouble: trouble(row) })), header: table?.header.text ?? null, unread };
+}
