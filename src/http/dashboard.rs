@@ -41,6 +41,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "backtest.js": SCRIPT,
         "backtest_asking.js": SCRIPT,
         "beside.js": SCRIPT,
+        "care.js": SCRIPT,
         "chart.js": SCRIPT,
         "comparators.js": SCRIPT,
         "compare.js": SCRIPT,

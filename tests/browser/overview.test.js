@@ -68,7 +68,7 @@ test("a row tells wealth, holding, the last period, how late the report is, the 
   assert.match(state, /active\s+1 of 2/);
   assert.match(opened, /by World, weekly/);
   assert.match((await cells("Grace"))[3], /next \d/);
-  assert.equal((await cells("Emmy"))[3], "None yet");
+  assert.match((await cells("Emmy"))[3], /^None yet\s+next about \d/);
   assert.equal((await cells("Emmy"))[2], "\u2013");
 });
 
@@ -132,7 +132,7 @@ test("what needs care is told where it is so", async () => {
   await page.route("**/sessions?*", async (route) => {
     const response = await route.fetch();
     const answer = await response.json();
-    for (const row of answer.sessions) Object.assign(row, { Ada: { drift: "alarm" }, Grace: { drift: "warning" }, Emmy: { due: true } }[row.name]);
+    for (const row of answer.sessions) Object.assign(row, { Ada: { drift: "alarm" }, Grace: { drift: "warning" }, Emmy: { due: true, created_ms: Date.now() - 2 * 3_600_000 } }[row.name]);
     await route.fulfill({ response, json: answer });
   });
   await go("");
@@ -140,9 +140,49 @@ test("what needs care is told where it is so", async () => {
   assert.match(told[0], /Returns have changed$/);
   assert.match(told[1], /Returns may have changed$/);
   assert.match(told[2], /Due for renewal$/);
+  await page.getByText("2 of 3 active sessions need care: 1 is overdue, 1 waits for its next policy, 1 has returns that have changed.").waitFor();
+  await page.getByRole("button", { name: "Show them" }).click();
+  await shown("2 of 2");
+  assert.deepEqual(await names(), ["Emmy", "Ada"]);
+  await page.getByRole("button", { name: "Session" }).click();
+  await page.waitForFunction(() => document.querySelector("tbody th a").textContent === "Ada");
+  await page.getByLabel("Search").fill("emm");
+  await shown("1 of 1");
+  assert.match(page.url(), /state=care/);
   await page.unrouteAll();
   await go("");
   for (const name of NAMES) assert.doesNotMatch((await cells(name))[6], /changed|Due/);
+});
+
+test("a session where its policy was not trained for says so, and how many do", async () => {
+  await page.route("**/action?session=*", async (route) => {
+    const response = await route.fetch();
+    await route.fulfill({ response, json: { ...(await response.json()), in_design: !route.request().url().endsWith(sessions[1]) } });
+  });
+  await go("");
+  await page.getByText("Of those shown, 1 lies outside what its policy was trained for.").waitFor();
+  assert.match((await cells("Grace"))[4], /Outside its training$/);
+  assert.doesNotMatch((await cells("Ada"))[4], /Outside/);
+  await page.unrouteAll();
+});
+
+test("what is due and needs care follows from each session's own day and calendar", async () => {
+  const { care, careWords } = await dashboardModule("care.js");
+  const now = care(Date.parse("2026-11-24T12:00:00Z"));
+  const at = (date) => Date.parse(`${date}T12:00:00Z`);
+  const entry = { state: "active", date: null, last_report_ms: null, created_ms: at("2026-11-20"), periods_per_year: 12, due: false, drift: "none" };
+  const next = (more) => [now.of({ ...entry, ...more }).next, now.of({ ...entry, ...more }).late];
+  assert.deepEqual(next({ date: "2026-09-30" }), ["2026-10-31", 24]);
+  assert.deepEqual(next({ date: "2026-09-30", periods_per_year: 4 }), ["2026-12-31", 0]);
+  assert.deepEqual(next({ date: "2026-11-20", periods_per_year: 252 }), ["2026-11-23", 1]);
+  // Without a day it is the one of the report, and before the first the one it was opened on.
+  assert.deepEqual(next({ last_report_ms: at("2026-10-05") }), ["2026-11-05", 19]);
+  assert.deepEqual(next({}), ["2026-12-20", 0]);
+  assert.deepEqual(next({ date: "2026-09-30", periods_per_year: null }), [null, 0]);
+  assert.deepEqual(next({ date: "2020-09-30", state: "completed" }), [null, 0]);
+  const entries = [{ date: "2026-09-30", drift: "alarm" }, { date: "2026-10-31" }, { due: true, last_report_ms: at("2026-11-23") }, { state: "completed", drift: "alarm" }].map((more) => ({ ...entry, ...more }));
+  assert.equal(careWords(entries, now), "2 of 3 active sessions need care: 1 is overdue, 1 waits for its next policy, 1 has returns that have changed.");
+  assert.equal(careWords(entries.slice(1, 2), now), "None of 1 active session needs care.");
 });
 
 test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {

@@ -11,11 +11,13 @@ const AT_ONCE = 4;
 /** A trade of a smaller share of wealth is none, as the advice is told to a tenth of a percent. */
 const LITTLE = 0.0005;
 
-/** `{of(entry), forget()}`: `of` gives the elements `{hold, trade}` of a session's row, asked for once; what still waits is
- * not asked for after `forget()`, until its row is shown again. */
-export function advised(leaving) {
+/** `{of(entry), isOutside(entry), forget()}`: `of` gives the elements `{hold, trade}` of a session's row, asked for once; what still waits is
+ * not asked for after `forget()`, until its row is shown again. `isOutside(entry)` says of what was told so far whether the session
+ * stands where its policy was not trained for; `changed()` hears of every such. */
+export function advised(leaving, changed = () => {}) {
   const cells = new Map();
   const costs = new Map();
+  const outside = new Set();
   let [waiting, busy] = [[], 0];
   const costOf = (policy) => {
     if (!costs.has(policy)) costs.set(policy, get(`/policies/${policy}`, leaving).then(({ specification }) => specification.problem.trading_cost));
@@ -25,6 +27,9 @@ export function advised(leaving) {
     const [action, cost] = await Promise.all([get(`/action?session=${entry.session}`, leaving), costOf(entry.policy)]);
     hold.replaceChildren(...held(action));
     trade.replaceChildren(...traded(action, entry.wealth, cost));
+    if (action.in_design) return;
+    outside.add(state(entry));
+    changed();
   };
   const turn = async () => {
     const row = waiting.shift();
@@ -54,7 +59,7 @@ export function advised(leaving) {
     for (const { entry } of waiting) cells.delete(state(entry));
     waiting = [];
   };
-  return { of, forget };
+  return { of, isOutside: (entry) => outside.has(state(entry)), forget };
 }
 
 /** What the advice of a row rests on: another report or another policy asks anew. */
@@ -66,9 +71,10 @@ const none = (reason) => h("span", {}, "\u2013 ", h("span", { class: "under" }, 
 const isOfSeveral = (action) => typeof action.allocation === "object";
 
 function held(action) {
-  if (!isOfSeveral(action)) return [allocation(action.allocation)];
+  const beyond = action.in_design ? "" : h("span", { class: "under wrong" }, "Outside its training");
+  if (!isOfSeveral(action)) return [allocation(action.allocation), beyond];
   const names = Object.keys(action.allocation).filter((name) => action.allocation[name] >= LITTLE);
-  return [allocation(heldInAll(action)), h("span", { class: "under" }, `in ${names.length} of ${Object.keys(action.allocation).length} assets`)];
+  return [allocation(heldInAll(action)), h("span", { class: "under" }, `in ${names.length} of ${Object.keys(action.allocation).length} assets`), beyond];
 }
 
 /** The share of wealth to hold, in one asset or in all of several together. */

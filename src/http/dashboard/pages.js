@@ -9,7 +9,7 @@ const PAGE = 100;
 /** The most that the service gives at a time, for lists to choose from. */
 const LARGEST = 1000;
 
-/** A list at `path`, page by page: `next()` gives the entries of the coming one, `more` says whether there may be one. */
+/** A list at `path`, which may have a query, page by page: `next()` gives the entries of the coming one, `more` says whether there may be one. */
 export class Pages {
   constructor(path, name, signal, { limit = PAGE, keep = () => true } = {}) {
     Object.assign(this, { path, name, signal, limit, keep, after: null, more: true });
@@ -20,7 +20,7 @@ export class Pages {
     const found = [];
     while (this.more && found.length === 0) {
       const after = this.after === null ? "" : `&after=${encodeURIComponent(this.after)}`;
-      const page = await get(`${this.path}?limit=${this.limit}${after}`, this.signal);
+      const page = await get(`${this.path}${this.path.includes("?") ? "&" : "?"}limit=${this.limit}${after}`, this.signal);
       found.push(...page[this.name].filter(this.keep));
       this.after = page.next;
       this.more = page.next !== null;

@@ -2,13 +2,15 @@
 
 import { advised } from "./advised.js";
 import { get } from "./api.js";
+import { care, careWords } from "./care.js";
 import { h, table } from "./dom.js";
 import { input, select } from "./form.js";
 import { allocation, count, counted, moment, percent, wealth } from "./format.js";
 import { holderWords } from "./holder.js";
 import { jobList } from "./jobs.js";
 import { called, headed, tagList } from "./naming.js";
-import { day, daysLate, isoDay, nextDay } from "./periods.js";
+import { all } from "./pages.js";
+import { day } from "./periods.js";
 import { ticking } from "./ticking.js";
 import { welcome } from "./welcome.js";
 
@@ -16,7 +18,7 @@ import { welcome } from "./welcome.js";
 const PAGE = 50;
 /** Nothing is asked for while a word is being typed, for so long, in milliseconds. */
 const PAUSE = 250;
-const STATES = { "": "All", active: "Active", completed: "Completed", due: "Due for renewal" };
+const STATES = { "": "All", active: "Active", completed: "Completed", due: "Due for renewal", care: "Needs care" };
 const NEWEST = "-created";
 /** What is asked for, as it stands in the address, and what it is where nothing is said. */
 const CHOICES = { search: "", tag: "", state: "", sort: NEWEST };
@@ -27,7 +29,8 @@ export async function view(_, leaving) {
   if (!(chosen.state in STATES)) chosen.state = "";
   const several = h("a", { class: "button quiet", href: "#/report" }, "Report for several");
   const actions = h("div", { class: "actions" }, several, h("a", { class: "button", href: "#/sessions/new" }, "Open a session"));
-  const first = await read(chosen, null, leaving);
+  const list = lists(leaving);
+  const first = await list.read(chosen, null, leaving);
   const title = "Overview";
   if (first.total === 0 && !filtered(chosen)) {
     const [{ policies }, { jobs }] = await Promise.all(["/policies?limit=1", "/jobs?limit=1"].map((path) => get(path, leaving)));
@@ -35,7 +38,7 @@ export async function view(_, leaving) {
     if (policies.length > 0) return { title, actions, body: [lead(), who] };
     return { title, body: [...(jobs.length > 0 ? [lead(), jobList(jobs, leaving).element] : [welcome()]), who] };
   }
-  return { title, actions, body: overview(chosen, first, leaving) };
+  return { title, actions, body: overview(chosen, first, list, leaving) };
 }
 
 const lead = () =>
@@ -50,13 +53,36 @@ const filtered = ({ search, tag, state }) => Boolean(search || tag || state);
 /** What of `chosen` is other than where nothing is said. */
 const differing = (chosen) => Object.entries(chosen).filter(([name, value]) => value !== CHOICES[name]);
 
-function read(chosen, after, signal) {
-  const query = new URLSearchParams([["limit", PAGE], ...differing(chosen), ...(after === null ? [] : [["after", after]])]);
-  return get(`/sessions?${query}`, signal);
+/** `{read(chosen, after, signal), every(chosen)}`: a page of those that match, and all of them. Which need care the service does not tell: for
+ * that all are read, once for each search. */
+function lists(leaving) {
+  const whole = new Map();
+  const every = (chosen) => {
+    const query = new URLSearchParams(differing({ ...chosen, state: "" })).toString();
+    if (!whole.has(query)) {
+      const asked = all(query ? `/sessions?${query}` : "/sessions", "sessions", leaving);
+      whole.set(query, asked);
+      asked.catch(() => whole.delete(query));
+    }
+    return whole.get(query);
+  };
+  const read = async (chosen, after, signal) => {
+    if (chosen.state !== "care") {
+      const query = new URLSearchParams([["limit", PAGE], ...differing(chosen), ...(after === null ? [] : [["after", after]])]);
+      return get(`/sessions?${query}`, signal);
+    }
+    const found = (await every(chosen)).filter(care(Date.now()).needs);
+    signal.throwIfAborted();
+    const end = (after ?? 0) + PAGE;
+    return { sessions: found.slice(after ?? 0, end), total: found.length, next: end < found.length ? end : null };
+  };
+  return { read, every };
 }
 
-function overview(chosen, first, leaving) {
-  const advice = advised(leaving);
+function overview(chosen, first, list, leaving) {
+  const needs = h("p", { class: "note needs", role: "status" });
+  const beyond = h("span", {});
+  const advice = advised(leaving, () => tellBeyond());
   const ticks = ticking("sessions", { at: "#/report", words: (ticked) => `Report for the ${count(ticked)}` });
   const tags = h("datalist", { id: "tags" });
   const known = new Set();
@@ -65,6 +91,7 @@ function overview(chosen, first, leaving) {
   const more = h("button", { class: "quiet" }, "Show more");
   let [entries, page, asking] = [[], first, new AbortController()];
   leaving.addEventListener("abort", () => asking.abort());
+  const tellBeyond = () => (beyond.textContent = outsideWords(entries.filter(advice.isOutside).length));
   const sort = (column) => {
     const kept = holder.contains(document.activeElement);
     const down = column !== "name";
@@ -78,6 +105,7 @@ function overview(chosen, first, leaving) {
     tags.replaceChildren(...[...known].sort().map((value) => h("option", { value })));
     holder.replaceChildren(entries.length > 0 ? listed(entries, { ticks, advice, sorted: chosen.sort, sort }) : h("p", {}, "No session matches."));
     more.hidden = entries.length >= page.total || page.next === null;
+    tellBeyond();
     line.textContent = `${count(entries.length)} of ${count(page.total)}`;
   };
   const failed = (error) => {
@@ -92,7 +120,7 @@ function overview(chosen, first, leaving) {
     const query = new URLSearchParams(differing(chosen)).toString();
     history.replaceState(null, "", query ? `#/sessions?${query}` : "#/");
     try {
-      const now = await read(chosen, null, signal);
+      const now = await list.read(chosen, null, signal);
       advice.forget();
       entries = [];
       add(now);
@@ -103,14 +131,28 @@ function overview(chosen, first, leaving) {
   more.addEventListener("click", async () => {
     more.disabled = true;
     const { signal } = asking;
-    await read(chosen, page.next, signal).then((now) => signal.aborted || add(now), failed);
+    await list.read(chosen, page.next, signal).then((now) => signal.aborted || add(now), failed);
     more.disabled = false;
   });
   add(first);
-  return [filters(chosen, ask, tags), ticks.link, holder, h("div", { class: "foot" }, line, more)];
+  const { element, state } = filters(chosen, ask, tags);
+  const show = () => {
+    state.control.value = "care";
+    ask({ state: "care" });
+  };
+  const judge = (entries) => {
+    const now = care(Date.now());
+    const all = entries.some(now.needs) ? h("button", { class: "link", onclick: show }, "Show them") : "";
+    needs.replaceChildren(careWords(entries, now), " ", all, " ", beyond);
+  };
+  list.every(CHOICES).then(judge, failed);
+  return [needs, element, ticks.link, holder, h("div", { class: "foot" }, line, more)];
 }
 
-/** The search and the filters; `ask(changed)` at every change. */
+/** Of how many sessions shown the advice was not trained for; the list itself does not tell. */
+const outsideWords = (count) => (count === 0 ? "" : `Of those shown, ${counted(count, "lies outside what its policy was", "lie outside what their policies were")} trained for.`);
+
+/** `{element, state}`: the search and the filters, that by state for itself; `ask(changed)` at every change. */
 function filters(chosen, ask, tags) {
   let typing = 0;
   const soon = (changed) => {
@@ -123,11 +165,12 @@ function filters(chosen, ask, tags) {
   const state = select({ name: "state", label: "State", choices: STATES, changed: (value) => ask({ state: value }) });
   state.control.value = chosen.state;
   const fields = h("div", { class: "fields" }, search.element, tag.element, tags, state.element);
-  return h("form", { role: "search", class: "filters", onsubmit: (event) => event.preventDefault() }, fields);
+  const element = h("form", { role: "search", class: "filters", onsubmit: (event) => event.preventDefault() }, fields);
+  return { element, state };
 }
 
 function listed(entries, { ticks, advice, sorted, sort }) {
-  const today = isoDay(new Date());
+  const { of } = care(Date.now());
   const by = (words, column) => {
     const [up, down] = [sorted === column, sorted === `-${column}`];
     const mark = up ? "\u2191" : down ? "\u2193" : "";
@@ -148,10 +191,10 @@ function listed(entries, { ticks, advice, sorted, sort }) {
     { ...by("Wealth", "wealth"), numeric: true, cell: ({ wealth: now }) => wealth(now) },
     { name: "Held now", numeric: true, cell: ({ holding }) => allocation(holding) },
     { name: "Last period", numeric: true, cell: change },
-    { ...by("Last report", "last_report"), cell: (entry) => lastReport(entry, today) },
+    { ...by("Last report", "last_report"), cell: (entry) => lastReport(entry, of(entry)) },
     { name: "To hold", numeric: true, cell: (entry) => advice.of(entry).hold },
     { name: "To trade", numeric: true, cell: (entry) => advice.of(entry).trade },
-    { name: "State", cell: standing },
+    { name: "State", cell: (entry) => standing(entry, of(entry)) },
     { ...by("Opened", "created"), cell: ({ created_ms, policy, policy_name }) => [moment(created_ms).split(",")[0], h("span", { class: "under" }, "by ", h("a", { href: `#/policies/${policy}` }, called(policy, policy_name)))] },
   ], entries);
 }
@@ -164,23 +207,20 @@ function change({ wealth: now, wealth_change }) {
 }
 
 /** The last day reported, and when the next report is due or how late it is. */
-function lastReport({ date, last_report_ms, periods_per_year, state }, today) {
-  if (!last_report_ms) return "None yet";
+function lastReport({ date, last_report_ms }, { next, late }) {
   const under = (words, wrong) => h("span", { class: wrong ? "under wrong" : "under" }, words);
-  if (!date) return [moment(last_report_ms).split(",")[0], under("without a day")];
-  const next = state === "completed" ? null : nextDay(date, periods_per_year);
-  if (next === null) return day(date);
-  const late = daysLate(next, today);
-  return [day(date), late > 0 ? under(`overdue by ${counted(late, "day")}`, true) : under(`next ${day(next)}`)];
+  const reported = date ? day(date) : last_report_ms ? moment(last_report_ms).split(",")[0] : "None yet";
+  const coming = late > 0 ? under(`overdue by ${counted(late, "day")}`, true) : next === null ? null : under(`next ${date ? "" : "about "}${day(next)}`);
+  return [reported, last_report_ms && !date ? under("without a day") : null, coming];
 }
 
 /** Its state, how far it is, and what needs care. */
-function standing({ state, period, horizon, due, drift }) {
+function standing({ state, period, horizon, due, drift }, { stuck }) {
   const drifting = { warning: "Returns may have changed", alarm: "Returns have changed" }[drift];
   return [
     h("span", { class: `state ${state}` }, state),
     h("span", { class: "under" }, `${count(period - 1)} of ${count(horizon)}`),
-    due ? h("span", { class: "under wrong" }, "Due for renewal") : null,
+    due ? h("span", { class: stuck ? "under wrong" : "under" }, "Due for renewal") : null,
     drifting ? h("span", { class: "under wrong" }, drifting) : null,
   ];
 }

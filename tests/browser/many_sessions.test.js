@@ -1,0 +1,73 @@
+// Ten thousand sessions: the overview stands as soon as that of a few, and whoever needs care is found among all.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { browser, call, service, trained } from "./ballast.js";
+import { visitQuiet } from "./page.js";
+
+const SESSIONS = 10_000;
+/** The service takes so many reports in one call. */
+const AT_ONCE = 1000;
+const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
+/** Within this many milliseconds a change of the page is seen without a wait. */
+const SOON = 300;
+const DAY = 86_400_000;
+
+let ballast, chromium, page;
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  page.setDefaultTimeout(20_000);
+  const policy = await trained(ballast.url, { problem: { horizon: 3, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY }, design: { count: 20 } });
+  const sessions = [];
+  const open = async () => {
+    while (sessions.length < SESSIONS) {
+      const index = sessions.push(null) - 1;
+      sessions[index] = (await call(ballast.url, "/sessions", { policy, name: `Client ${index + 1}` })).session;
+    }
+  };
+  await Promise.all(Array.from({ length: 16 }, open));
+  const day = (ago) => new Date(Date.now() - ago * DAY).toISOString().slice(0, 10);
+  for (let start = 0; start < SESSIONS; start += AT_ONCE) {
+    // Every hundredth last reported half a year ago, the others this week.
+    const reports = sessions.slice(start, start + AT_ONCE).map((session, index) => ({ session, period: 1, simple_return: 0.01, date: day(index % 100 === 0 ? 180 : 5) }));
+    await call(ballast.url, "/observe", reports);
+  }
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+/** How long it takes, in milliseconds, from `act` until `seen` holds, both looked at within the page. */
+const taking = (act, seen) =>
+  page.evaluate(
+    ([act, seen]) =>
+      new Promise((resolve) => {
+        const start = performance.now();
+        const holds = new Function(`return ${seen}`);
+        const look = () => holds() && requestAnimationFrame(() => resolve(performance.now() - start));
+        new MutationObserver(look).observe(document.querySelector("main"), { childList: true, subtree: true, characterData: true });
+        new Function(act)();
+      }),
+    [act, seen],
+  );
+
+test("the overview of ten thousand stands at once", async () => {
+  await visitQuiet(page, `${ballast.url}/#/jobs`);
+  const took = await taking('location.hash = "#/"', 'document.querySelectorAll("tbody tr").length === 50');
+  assert.ok(took < SOON, `${took} ms`);
+});
+
+test("those that need care are counted among all, and shown without a wait", async () => {
+  await page.getByText("100 of 10,000 active sessions need care: 100 are overdue.").waitFor();
+  const took = await taking('[...document.querySelectorAll("button")].find(({ textContent }) => textContent === "Show them").click()', 'document.querySelector(".foot .note").textContent === "50 of 100"');
+  assert.ok(took < SOON, `${took} ms`);
+  assert.match(page.url(), /state=care/);
+  await page.getByRole("button", { name: "Show more" }).click();
+  await page.getByText("100 of 100", { exact: true }).waitFor();
+  assert.equal(await page.getByText(/^overdue by \d+ days$/).count(), 100);
+  assert.equal(await page.getByLabel("State").inputValue(), "care");
+});
