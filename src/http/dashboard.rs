@@ -88,6 +88,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "session.js": SCRIPT,
         "session_opening.js": SCRIPT,
         "sessions.js": SCRIPT,
+        "share_prices.js": SCRIPT,
         "specification.js": SCRIPT,
         "spread.js": SCRIPT,
         "stacked.js": SCRIPT,

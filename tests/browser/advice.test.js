@@ -102,6 +102,27 @@ test("an advice that nothing was changed in is the service's own, in money too",
   } else assert.match(order, /Nothing to trade/);
 });
 
+test("the advice is told in shares by a price that is typed, and nothing of it is sent", async () => {
+  await shown(0.5, 0.5);
+  const { wealth } = await call(ballast.url, `/sessions/${session}`);
+  const order = async () => plain(await page.locator(".order").innerText());
+  assert.doesNotMatch(await order(), /shares/);
+  const asked = [];
+  page.on("request", (request) => asked.push(request.url()));
+  await page.getByText("In shares, at a price of today").click();
+  await page.getByLabel("Price of one share").fill("2,5");
+  const [, held] = /, ([\d.,]+) shares\./.exec(await order());
+  // To three digits.
+  assert.ok(Math.abs(Number(held) - (0.5 * wealth) / 2.5) <= 0.05, `${held} of ${wealth}`);
+  await page.getByLabel("Price of one share").fill("nothing");
+  await page.getByText("\u201cnothing\u201d is no price.").waitFor();
+  assert.doesNotMatch(await order(), /shares/);
+  assert.deepEqual(asked, []);
+  page.removeAllListeners("request");
+  await page.unrouteAll({ behavior: "ignoreErrors" });
+  await page.reload();
+});
+
 test("a return that cannot be read is refused in its own words", async () => {
   const field = page.getByLabel("Return in period 3");
   await page.getByRole("button", { name: "Report period 3" }).click();

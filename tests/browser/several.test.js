@@ -62,6 +62,24 @@ test("the advice is told by asset, in percent and in money, and comes to the who
   assert.doesNotMatch(plain(await page.locator("main").innerText()), /undefined|NaN|in stocks|certainty equivalent/);
 });
 
+test("each asset is told in shares where its price is typed, and the others are not", async () => {
+  await go();
+  const action = await call(ballast.url, `/action?session=${session}`);
+  const all = 250_000 * (1 - COST * action.total);
+  const most = ASSETS.reduce((one, other) => (action.allocation[other] > action.allocation[one] ? other : one));
+  assert.ok(action.allocation[most] > 0.01);
+  await page.getByText("In shares, at a price of today").click();
+  await page.getByLabel(`Price of ${most}`).fill("80");
+  const shares = (/about ([\d,.]+) shares/g);
+  const row = plain(await page.getByRole("table", { name: "What to hold of each asset" }).getByRole("row", { name: most }).innerText());
+  const told = [...row.matchAll(shares)].map(([, number]) => Number(number.replaceAll(",", "")));
+  // Held and bought: nothing is held now.
+  assert.equal(told.length, 2, row);
+  for (const number of told) near(number, (action.allocation[most] * all) / 80, 0.5);
+  const table = plain(await page.getByRole("table", { name: "What to hold of each asset" }).innerText());
+  assert.equal([...table.matchAll(shares)].length, 2, table);
+});
+
 test("the worst market is told of each asset by its average return", async () => {
   const { one_step } = await call(ballast.url, `/action?session=${session}`);
   const told = await rows("Average return of each asset a month");

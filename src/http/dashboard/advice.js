@@ -3,6 +3,7 @@
 import { h, section } from "./dom.js";
 import { endWords } from "./flows.js";
 import { allocation, figures, minus, percent, points, significant, wealth } from "./format.js";
+import { priceFields, shareCount } from "./share_prices.js";
 
 /** The advice is told to a tenth of a percent, so this far the policy and the step solved anew say the same. */
 const TOLERANCE = 0.001;
@@ -27,16 +28,20 @@ const agrees = (one, other) => Math.abs(one - other) <= TOLERANCE;
  */
 export function adviceView(action, place, rest) {
   const note = h("p", { class: "note", id: "check" }, `${exactly(action)}. The step is being solved anew, as a check\u2026`);
+  const sentence = h("p", { class: "sentence order" });
+  const tell = (price) => sentence.replaceChildren(...order(action, { ...place, price }));
+  tell(place.price);
   const element = section(
     place.heading,
     h(
       "div",
       { class: "advice", id: "advice", tabindex: -1 },
       h("p", { class: "big" }, h("span", {}, "Hold "), h("strong", {}, allocation(action.allocation)), h("span", {}, " in stocks")),
-      h("p", { class: "sentence order" }, order(action, place)),
+      sentence,
       action.caution.map(({ sentence }) => h("p", { class: "note wrong caution" }, minus(sentence))),
       h("p", { class: "sentence" }, why(action, place)),
       action.contribution === 0 ? "" : h("p", { class: "sentence" }, endWords(action.contribution)),
+      priceFields([""], { "": place.price }, (prices) => tell(prices[""] ?? null)),
     ),
     rest,
   );
@@ -67,17 +72,14 @@ function order(action, place) {
   const [low, high] = action.band;
   const still = Math.abs(action.trade) < TOLERANCE / 2;
   const stocks = `${wealth(held)} of ${wealth(all)} in stocks, ${wealth(bank)} in the bank`;
-  const sized = traded === undefined ? "" : ` (about ${number(Math.abs(traded))} shares at ${wealth(place.price)})`;
+  const sized = traded === undefined ? "" : ` (about ${shareCount(Math.abs(traded))} shares at ${wealth(place.price)})`;
   const paid = cost > 0 && !still ? `, which costs ${wealth(cost)}` : "";
   const act = still
     ? [h("b", {}, "Nothing to trade"), `: ${wealth(now)} is held now.`]
     : [h("b", {}, `${trade > 0 ? "Buy" : "Sell"} ${wealth(Math.abs(trade))}`), `${sized}${paid}: ${wealth(now)} is held now, ${allocation(action.holding)}.`];
   const kept = low < high ? ` Anything from ${allocation(low)} to ${allocation(high)} is best kept as it is.` : "";
-  return [`${stocks}${shares === undefined || shares === 0 ? "" : `, ${number(shares)} shares`}. `, ...act, kept];
+  return [`${stocks}${shares === undefined || shares === 0 ? "" : `, ${shareCount(shares)} shares`}. `, ...act, kept];
 }
-
-/** So many shares. */
-const number = (shares) => (shares >= 100 ? wealth(Math.round(shares)).replace(/\.00$/, "") : figures(shares, 3));
 
 /** What the advice is worth even then, as the parts of a sentence. */
 export function why({ allocation, certainty_equivalent, floor }, { end, cautious }) {

@@ -117,6 +117,7 @@ function place({ session, history, policy, calendar }, { period }) {
     end: session.rolling ? `${counted(horizon, calendar.unit)} from now` : `at the end of ${calendar.inText(session.horizon)}`,
     cautious: isCautious(policy.specification.problem),
     price: last.price ?? null,
+    prices: last.prices ?? {},
     cost: trading_cost,
     wealth: session.wealth,
   };

@@ -6,6 +6,7 @@ import { endWords } from "./flows.js";
 import { allocation, figures, minus, percent, points, wealth } from "./format.js";
 import { sendReports } from "./report_fields.js";
 import { assetsHeld, severalFields } from "./several_fields.js";
+import { priceFields, shareCount } from "./share_prices.js";
 import { stackedChart } from "./stacked.js";
 
 /** A trade of a smaller share of wealth is none. */
@@ -30,16 +31,22 @@ export function inMoneyByName(action, assets, { wealth: whole, cost }) {
 /** The advice, with what follows it, `rest`. */
 export function severalAdvice(action, place, assets, rest) {
   const { rows, total, bank, cost } = inMoneyByName(action, assets, place);
-  const money = (share, size) => [allocation(share), h("span", { class: "under" }, wealth(size))];
+  const under = (words) => h("span", { class: "under" }, words);
+  const money = (share, size) => [allocation(share), under(wealth(size))];
   const number = (name, cell) => ({ name, numeric: true, cell });
   const traded = (size) => (size === null ? "" : size === 0 ? "Nothing" : `${size > 0 ? "Buy" : "Sell"} ${wealth(Math.abs(size))}`);
-  const orders = table("What to hold of each asset", [
-    { name: "Asset", cell: ({ name }) => name },
-    number("To hold", ({ share, held }) => money(share, held)),
-    number("Held now", ({ holding, now }) => money(holding, now)),
-    number("To trade", ({ trade }) => traded(trade)),
-  ], [...rows, total, bank]);
-  orders.classList.add("by-asset");
+  const ordersAt = (prices) => {
+    const shares = (name, size) => (name in prices && size !== 0 ? under(`about ${shareCount(Math.abs(size) / prices[name])} shares`) : null);
+    const orders = table("What to hold of each asset", [
+      { name: "Asset", cell: ({ name }) => name },
+      number("To hold", ({ name, share, held }) => [...money(share, held), shares(name, held)]),
+      number("Held now", ({ name, holding, now }) => [...money(holding, now), shares(name, now)]),
+      number("To trade", ({ name, trade }) => [traded(trade), shares(name, trade ?? 0)]),
+    ], [...rows, total, bank]);
+    orders.classList.add("by-asset");
+    return orders;
+  };
+  const orders = h("div", {}, ordersAt(place.prices));
   return section(
     place.heading,
     h(
@@ -51,6 +58,7 @@ export function severalAdvice(action, place, assets, rest) {
       action.caution.map(({ sentence }) => h("p", { class: "note wrong caution" }, minus(sentence))),
       h("p", { class: "sentence" }, why({ ...action, allocation: action.total }, place)),
       action.contribution === 0 ? "" : h("p", { class: "sentence" }, endWords(action.contribution)),
+      priceFields(assets, place.prices, (prices) => orders.replaceChildren(ordersAt(prices))),
     ),
     rest,
   );
