@@ -38,6 +38,19 @@ test("a training is named, and so is what it gives", async () => {
   assert.deepEqual([name, tags, notes], ["World & bills", ["equity", "monthly"], undefined]);
 });
 
+test("a training is listed by the name of its policy, and says where that is gone", async () => {
+  await go("#/jobs");
+  await page.getByRole("heading", { level: 2, name: /^Training of World & bills \w+$/ }).waitFor();
+  await page.getByRole("heading", { level: 2, name: /^Training \w+$/ }).waitFor();
+  const other = await trained(ballast.url, { problem: { horizon: 1, rate_per_step: 0.003, history: HISTORY }, design: { count: 20 }, name: "Short-lived" });
+  await go("#/jobs");
+  await page.getByRole("heading", { level: 2, name: /^Training of Short-lived/ }).waitFor();
+  await fetch(`${ballast.url}/policies/${other}`, { method: "DELETE" });
+  await go("#/jobs");
+  await page.getByText("Its policy was deleted.").waitFor();
+  assert.equal(await page.getByRole("link", { name: "See the policy" }).count(), 2);
+});
+
 test("a policy is named in place, and a session by it is opened under a name", async () => {
   await go(`#/policies/${policy}`);
   await heading(`Policy ${short(policy)}`);

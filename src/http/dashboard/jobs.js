@@ -3,7 +3,7 @@
 import { follow, get, isOver, post, Problem } from "./api.js";
 import { announce, h } from "./dom.js";
 import { count, counted, duration, moment, short } from "./format.js";
-import { foot, Pages } from "./pages.js";
+import { all, foot, Pages } from "./pages.js";
 import { welcome } from "./welcome.js";
 
 /** Browsers keep six connections to one address: following two jobs leaves room for everything else. */
@@ -52,9 +52,10 @@ export function jobList(entries, leaving, changed = () => {}) {
   const silent = silence();
   const element = h("div", {}, silent.element, list);
   const cards = [];
+  const names = policyNames(leaving);
   const wake = watch(cards, leaving, silent.hear);
   const add = (more) => {
-    const added = more.map((job) => card(job, changed));
+    const added = more.map((job) => card(job, changed, names));
     cards.push(...added);
     list.append(...added.map((card) => card.element));
     wake();
@@ -63,10 +64,25 @@ export function jobList(entries, leaving, changed = () => {}) {
   return { element, add };
 }
 
-/** A job on the page, and how to bring it up to date. */
-function card(job, changed) {
+/** `tell(policy, then)`: `then(name)` hears what a policy is called, once that is read for all of them together; "" of one
+ * without a name, null of one that is gone. */
+function policyNames(leaving) {
+  const names = new Map();
+  let asked = null;
+  const read = async () => {
+    for (const { policy, name } of await all("/policies", "policies", leaving)) names.set(policy, name);
+  };
+  return async (policy, then) => {
+    if (!names.has(policy)) await (asked ??= read().finally(() => (asked = null)));
+    if (!names.has(policy)) names.set(policy, null);
+    then(names.get(policy));
+  };
+}
+
+/** A job on the page, and how to bring it up to date; `names` tells what its policy is called. */
+function card(job, changed, names) {
   const element = h("li", { class: "card job" });
-  const card = { element, job };
+  const card = { element, job, names };
   card.update = (now) => {
     // The answer to a cancellation may come after the event that it has ended.
     if (isOver(card.job) && !isOver(now)) return;
@@ -98,7 +114,14 @@ function advanced(element, job) {
 
 function contents(card) {
   const { job } = card;
-  const title = h("h2", {}, named(job.kind), " ", h("code", {}, short(job.job)));
+  const about = h("span", {});
+  const title = h("h2", {}, named(job.kind), " ", about, h("code", {}, short(job.job)));
+  const open = links(card);
+  if (job.policy)
+    card.names(job.policy, (name) => {
+      if (name === null) open.replaceWith(h("p", { class: "note" }, "Its policy was deleted."));
+      else if (name) about.textContent = `of ${name} `;
+    }).catch(() => {});
   const state = h(
     "span",
     { class: `state ${job.state}` },
@@ -108,7 +131,7 @@ function contents(card) {
     h("div", { class: "row" }, title, state),
     h("p", { class: "summary" }, summary(job)),
     bar(job),
-    h("div", { class: "row" }, times(job), links(card)),
+    h("div", { class: "row" }, times(job), open),
   ].filter(Boolean);
 }
 
