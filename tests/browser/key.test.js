@@ -68,6 +68,56 @@ test("the page says who the key is, and what it may do", async () => {
   await page.getByText("and not open sessions and report their returns, nor train policies and compare strategies").waitFor();
 });
 
+/** Signs in with a key of these roles, once it is in force. */
+async function withKey(...roles) {
+  const other = await ballast.key(...roles);
+  while ((await fetch(`${ballast.url}/key`, { headers: { authorization: `Bearer ${other}` } })).status !== 200) await new Promise((resolve) => setTimeout(resolve, 50));
+  await visitQuiet(page, `${ballast.url}/#/key`);
+  await page.getByLabel("Key", { exact: true }).fill(other);
+  await page.getByRole("button", { name: "Use this key" }).click();
+  await page.getByRole("heading", { level: 1, name: "Overview" }).waitFor();
+}
+
+test("what a key may not do is not there to be pressed, and the page says why", async () => {
+  const headers = { authorization: `Bearer ${key}`, "content-type": "application/json" };
+  const { policies: [{ policy }] } = await (await fetch(`${ballast.url}/policies`, { headers })).json();
+  const post = async (path, body) => (await fetch(ballast.url + path, { method: "POST", headers, body: JSON.stringify(body) })).json();
+  const { session } = await post("/sessions", { policy });
+  await post("/observe", { session, period: 1, simple_return: 0.01 });
+  const reports = "The key in use may not open sessions or report their returns: it lacks the role operate.";
+  const trains = "The key in use may not train policies or compare strategies: it lacks the role train.";
+  /** What can be pressed and what is said at an address. */
+  const at = async (hash) => {
+    await visitQuiet(page, `${ballast.url}/${hash}`);
+    const text = await page.locator("main").innerText();
+    const pressed = await page.locator("main").locator("button, a.button, label.button").filter({ visible: true }).allInnerTexts();
+    return { reports: text.includes(reports), trains: text.includes(trains), pressed: pressed.map((name) => name.trim()) };
+  };
+  const WRITES = /Delete|Report|Put it right|take it back|Open a session|Give it a name|Train|Import|Evaluate|How much caution|Backtest|Compare out of sample/;
+  const pages = { "#/": [true, false], [`#/sessions/${session}`]: [true, true], [`#/policies/${policy}`]: [true, true], "#/policies": [false, true], "#/jobs": [false, true], "#/evaluations": [false, true], "#/key": [false, false] };
+  // With all that it takes every page has something that a reader lacks, and says nothing.
+  await withKey("read", "operate", "train");
+  for (const [hash, [lacksOperate, lacksTrain]] of Object.entries(pages)) {
+    const { reports, trains, pressed } = await at(hash);
+    assert.deepEqual([reports, trains, pressed.some((name) => WRITES.test(name))], [false, false, lacksOperate || lacksTrain], `${hash}: ${pressed}`);
+  }
+  await withKey("read");
+  for (const [hash, [lacksOperate, lacksTrain]] of Object.entries(pages)) {
+    const { reports, trains, pressed } = await at(hash);
+    assert.deepEqual([reports, trains, pressed.filter((name) => WRITES.test(name))], [lacksOperate, lacksTrain, []], hash);
+  }
+  for (const [hash, words] of [["#/train", trains], ["#/sessions/new", reports], ["#/report", reports], ["#/evaluations/new", trains], ["#/backtests/new", trains]]) {
+    await visitQuiet(page, `${ballast.url}/${hash}`);
+    await page.getByRole("heading", { level: 1, name: "Not with this key" }).waitFor();
+    await page.getByText(words).waitFor();
+    assert.equal(await page.locator("main form").count(), 0);
+  }
+  await usable(page, (place) => visitQuiet(page, `${ballast.url}/${place}`), [`#/sessions/${session}`, "#/train"]);
+  await withKey("read", "operate");
+  const { pressed, trains: told } = await at(`#/sessions/${session}`);
+  assert.ok(told && pressed.includes("Delete") && pressed.includes("Report period 2") && !pressed.some((name) => /caution/.test(name)), `${pressed}`);
+});
+
 test("a key that is given up is gone", async () => {
   await page.getByRole("link", { name: "Key", exact: true }).click();
   await page.getByRole("button", { name: "Forget the key held" }).click();

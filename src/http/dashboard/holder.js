@@ -3,6 +3,7 @@
 import { get } from "./api.js";
 import { h } from "./dom.js";
 import { moment, short } from "./format.js";
+import { held } from "./key.js";
 
 /** What each role may do; an admin all of it. */
 const ROLES = {
@@ -11,6 +12,20 @@ const ROLES = {
   train: "train policies and compare strategies",
   admin: "see the audit, and the service\u2019s figures over all tenants",
 };
+
+/** The roles of the key in use, asked for once while it is in use. */
+let known = { of: undefined };
+
+/** The roles that some of the page needs and the key in use lacks; none where the service does not say. */
+export async function lacking() {
+  if (known.of !== held()) known = { of: held(), holder: get("/key") };
+  const holder = await known.holder.catch(() => (known = { of: undefined }));
+  if (!holder.key || holder.roles.includes("admin")) return [];
+  return ["operate", "train"].filter((role) => !holder.roles.includes(role));
+}
+
+/** That the key may not do what a role may. */
+export const lackWords = (role) => `The key in use may not ${ROLES[role].replace(" and ", " or ")}: it lacks the role ${role}.`;
 
 const listed = (words) => words.join(", ").replace(/, (?=[^,]*$)/, " and ");
 

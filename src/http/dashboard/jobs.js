@@ -194,7 +194,7 @@ function links(card) {
   if (isOver(job)) return null;
   const stop = h(
     "button",
-    { class: "quiet", disabled: job.cancel_requested, "aria-label": `Cancel ${short(job.job)}` },
+    { class: "quiet", "data-needs": "train", disabled: job.cancel_requested, "aria-label": `Cancel ${short(job.job)}` },
     "Cancel",
   );
   stop.addEventListener("click", async () => {

@@ -9,7 +9,7 @@ import * as evaluation from "./evaluation.js";
 import * as evaluationAsking from "./evaluation_asking.js";
 import * as evaluations from "./evaluations.js";
 import * as frontier from "./frontier.js";
-import { holderWords } from "./holder.js";
+import { holderWords, lacking, lackWords } from "./holder.js";
 import * as jobs from "./jobs.js";
 import { held, keyForm } from "./key.js";
 import * as policies from "./policies.js";
@@ -20,20 +20,21 @@ import * as sessionOpening from "./session_opening.js";
 import * as sessions from "./sessions.js";
 import * as train from "./train.js";
 
-/** Address, view, and the entry of the navigation it belongs to. A view is `async (id, leaving) => {title, body}`. */
+/** Address, view, the entry of the navigation it belongs to, and the role it is of no use without, if any. A view is
+ * `async (id, leaving) => {title, body}`. */
 const ROUTES = [
   [/^#\/jobs$/, jobs.view, "jobs"],
-  [/^#\/train(?:\?(.*))?$/, train.view, "jobs"],
+  [/^#\/train(?:\?(.*))?$/, train.view, "jobs", "train"],
   [/^#\/policies$/, policies.view, "policies"],
   [/^#\/policies\/([^/]+)$/, policy.view, "policies"],
   [/^#\/(?:sessions)?(?:\?.*)?$/, sessions.view, "sessions"],
-  [/^#\/report(?:\?(.*))?$/, reporting.view, "sessions"],
-  [/^#\/sessions\/new(?:\?(.*))?$/, sessionOpening.view, "sessions"],
+  [/^#\/report(?:\?(.*))?$/, reporting.view, "sessions", "operate"],
+  [/^#\/sessions\/new(?:\?(.*))?$/, sessionOpening.view, "sessions", "operate"],
   [/^#\/sessions\/([^/]+)$/, session.view, "sessions"],
   [/^#\/evaluations$/, evaluations.view, "evaluations"],
-  [/^#\/evaluations\/new(?:\?(.*))?$/, evaluationAsking.view, "evaluations"],
+  [/^#\/evaluations\/new(?:\?(.*))?$/, evaluationAsking.view, "evaluations", "train"],
   [/^#\/evaluations\/([^/]+)$/, evaluation.view, "evaluations"],
-  [/^#\/backtests\/new$/, backtestAsking.view, "evaluations"],
+  [/^#\/backtests\/new$/, backtestAsking.view, "evaluations", "train"],
   [/^#\/backtests\/([^/]+)$/, backtest.view, "evaluations"],
   [/^#\/compare(?:\?(.*))?$/, compare.view, "compare"],
   [/^#\/frontiers\/([^/]+)$/, frontier.view, "jobs"],
@@ -50,11 +51,15 @@ async function show() {
   leaving = new AbortController();
   const { signal } = leaving;
   main.setAttribute("aria-busy", "true");
-  let [page, route, match] = [];
+  let [page, route, match, lacks] = [, , , []];
   try {
     const hash = location.hash || "#/";
     [route, match] = ROUTES.map((route) => [route, route[0].exec(hash)]).find(([, match]) => match) ?? [];
-    page = route ? await route[1](match[1] && decodeURIComponent(match[1]), signal) : missing(hash);
+    lacks = await lacking();
+    // What hides by style alone stays hidden wherever a view puts it later.
+    document.documentElement.dataset.lacks = lacks.join(" ");
+    if (lacks.includes(route?.[3])) page = { title: "Not with this key", body: "" };
+    else page = route ? await route[1](match[1] && decodeURIComponent(match[1]), signal) : missing(hash);
   } catch (error) {
     if (signal.aborted) return;
     page = failed(error, route?.[2]);
@@ -67,6 +72,7 @@ async function show() {
   const heading = h("h1", { tabindex: -1 }, page.title);
   main.replaceChildren(
     h("header", { class: "page" }, h("div", {}, page.trail ?? null, heading, page.under ?? null), page.actions ?? null),
+    ...lacks.map((role) => h("p", { class: "note lacked", "data-lacked": role, "data-whole": role === route?.[3] }, lackWords(role))),
     ...[page.body].flat(),
   );
   main.removeAttribute("aria-busy");

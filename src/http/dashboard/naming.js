@@ -61,11 +61,14 @@ export function labelFields({ within, changed } = {}) {
   return { name, tags, notes, parts: [name, tags, notes], read, show };
 }
 
+/** The role that it takes to change what a thing is called. */
+const CHANGES = { Session: "operate", Policy: "train" };
+
 /** What stands below the heading of a thing at `path`: what it is called, to be changed in place. */
 export function labelled(noun, path, id, labels) {
   const element = h("div", { class: "labels" });
   const rest = () => {
-    const edit = h("button", { class: "link", onclick: change }, labels.name ? "Edit" : "Give it a name");
+    const edit = h("button", { class: "link", "data-needs": CHANGES[noun], onclick: change }, labels.name ? "Edit" : "Give it a name");
     const line = h("p", { class: "note" }, labels.name ? [`${noun} `, h("code", {}, short(id)), " "] : null, tagList(labels.tags), " ", edit);
     element.replaceChildren(line, labels.notes ? h("p", { class: "note prose" }, labels.notes) : "");
     return edit;

@@ -37,7 +37,7 @@ export function observeForm(action, { id, session, policy, calendar, refresh }) 
   const button = h("button", { type: "submit" }, `Report ${calendar.inText(action.period)}`);
   const form = h(
     "form",
-    { class: "observe", novalidate: true },
+    { class: "observe", novalidate: true, "data-needs": "operate" },
     fields.element,
     preview,
     message,

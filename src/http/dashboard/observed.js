@@ -138,13 +138,16 @@ export function lastReport(shown) {
     "p",
     { class: "note last" },
     `Last report, ${name}: ${said}. `,
-    h("button", { class: "link", onclick: mend }, "Put it right"),
-    log_return === null ? "" : [" or ", h("button", { class: "link", onclick: undo }, "take it back")],
+    h("span", { "data-needs": "operate" }, h("button", { class: "link", onclick: mend }, "Put it right"), log_return === null ? "" : [" or ", h("button", { class: "link", onclick: undo }, "take it back")]),
   );
 }
 
 /** The form for a period put right, in a fold. */
-export const righting = (shown) => disclosure("Put a period right", () => correctionForm(shown));
+export function righting(shown) {
+  const fold = disclosure("Put a period right", () => correctionForm(shown));
+  fold.dataset.needs = "operate";
+  return fold;
+}
 
 /** What was put right, newest first; the newest can be undone. */
 function corrections(shown) {
@@ -162,7 +165,7 @@ function corrections(shown) {
   return h(
     "ul",
     { class: "corrections" },
-    made.map((one, index) => h("li", {}, words(one), index === 0 ? [" ", h("button", { class: "link", onclick: () => undo(one) }, "Undo")] : null)),
+    made.map((one, index) => h("li", {}, words(one), index === 0 ? [" ", h("button", { class: "link", "data-needs": "operate", onclick: () => undo(one) }, "Undo")] : null)),
   );
 }
 

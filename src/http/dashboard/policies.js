@@ -46,7 +46,7 @@ function empty() {
       { class: "lead" },
       "No policy yet. A policy says how much to hold at every wealth and after every history; training gives one.",
     ),
-    h("p", {}, h("a", { href: "#/train" }, "Train one"), ", or import the document another Ballast exported."),
+    h("p", { "data-needs": "train" }, h("a", { href: "#/train" }, "Train one"), ", or import the document another Ballast exported."),
   );
 }
 
@@ -99,5 +99,5 @@ function importer() {
       label.after(h("p", { class: "error" }, error.message));
     }
   });
-  return h("span", {}, file, label);
+  return h("span", { "data-needs": "train" }, file, label);
 }

@@ -63,7 +63,7 @@ export async function view(id, leaving) {
 }
 
 function deletion(id) {
-  const button = h("button", { class: "quiet danger" }, "Delete");
+  const button = h("button", { class: "quiet danger", "data-needs": "train" }, "Delete");
   button.addEventListener("click", async () => {
     if (!confirm("Delete this policy for good?")) return;
     try {
@@ -101,7 +101,7 @@ function often({ horizon, periods_per_year }, diagnostics) {
 function again(id) {
   return h(
     "p",
-    { class: "again" },
+    { class: "again", "data-needs": "train" },
     h("a", { href: `#/train?from=${id}` }, "Clone with one thing changed"),
     " \u00b7 ",
     h("a", { href: `#/train?newer=${id}` }, "Retrain on newer returns"),

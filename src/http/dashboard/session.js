@@ -201,11 +201,12 @@ function frontier({ session, policy, history, canTry }) {
     h("p", {}, asking(problem, [...history.history, ...seen], session.wealth)),
   );
   element.classList.add("asked-for");
+  element.dataset.needs = "train";
   return element;
 }
 
 function deletion(id) {
-  const button = h("button", { class: "quiet danger" }, "Delete");
+  const button = h("button", { class: "quiet danger", "data-needs": "operate" }, "Delete");
   button.addEventListener("click", async () => {
     if (!confirm("Delete this session and all it observed?")) return;
     await remove(`/sessions/${id}`).then(

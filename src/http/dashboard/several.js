@@ -81,7 +81,7 @@ export function severalForm(action, { id, session, history: { assets }, policy, 
   const fields = severalFields(assets, { advised: action.allocation, rate: rate_per_step, added: action.contribution, date: calendar.next, changed: () => foretell() });
   const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
   const button = h("button", { type: "submit" }, `Report ${calendar.inText(action.period)}`);
-  const form = h("form", { class: "observe", novalidate: true }, fields.element, preview, message, h("p", { class: "send" }, button));
+  const form = h("form", { class: "observe", novalidate: true, "data-needs": "operate" }, fields.element, preview, message, h("p", { class: "send" }, button));
   const compose = () => ({ session: id, period: action.period, ...fields.report() });
   sendReports(form, { button, message, fields, path: "/observe", compose, once: "a period counts once.", session, refresh });
   return form;
