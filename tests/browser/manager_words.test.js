@@ -36,6 +36,32 @@ async function askFor({ rate, cost }) {
   await page.getByLabel("Trading cost, %").fill(cost);
 }
 
+test("the first sentence of a policy says what it holds now, as a session of it is advised", async () => {
+  const problem = { horizon: 3, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY.map((value) => value + 0.01), radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } };
+  const first = async (policy) => {
+    await go(`#/policies/${policy}`);
+    const words = page.locator(".words p").first();
+    await words.locator("b").waitFor();
+    return plain(await words.innerText());
+  };
+  const advised = async (policy) => {
+    const { session } = await call(ballast.url, "/sessions", { policy });
+    return call(ballast.url, `/action?session=${session}`);
+  };
+  const one = await trained(ballast.url, { problem, design: { count: 40 } });
+  const told = /^Now it holds ([\d.]+) % in stocks\. It holds nothing in \d+ % of the situations it was trained for in the last month\.$/.exec(await first(one));
+  const { allocation } = await advised(one);
+  assert.ok(allocation > 0.1 && Math.abs(Number(told[1]) - 100 * allocation) <= 0.05, `${told} for ${allocation}`);
+  const costly = await trained(ballast.url, { problem: { ...problem, trading_cost: 0.002 }, design: { count: 40 } });
+  const [, low, high] = /^Now it holds ([\d.]+) % in stocks if all is in the bank, and keeps up to ([\d.]+) %\./.exec(await first(costly));
+  const { band } = await advised(costly);
+  for (const [index, share] of [low, high].entries()) assert.ok(Math.abs(Number(share) - 100 * band[index]) <= 0.05, `${share} for ${band}`);
+  const many = await trained(ballast.url, { problem, design: { count: 80, initial_laws: "resampled" } });
+  const about = /^Now it holds about ([\d.]+) % in stocks\. It holds nothing in \d+ % of the situations it was trained for in the first month, and in \d+ % of those in the last month\.$/.exec(await first(many));
+  const there = (await advised(many)).allocation;
+  assert.ok(Math.abs(Number(about[1]) - 100 * there) <= 3, `${about} for ${there}`);
+});
+
 test("no page says the paper's words outside a fold", async () => {
   const { session } = await call(ballast.url, "/sessions", { policy });
   for (const hash of ["#/jobs", "#/train", "#/policies", `#/policies/${policy}`, "#/sessions", "#/sessions/new", `#/sessions/${session}`, "#/report", "#/compare", "#/evaluations", "#/evaluations/new", "#/backtests/new"]) {

@@ -20,17 +20,18 @@ const FUNCTIONS = { free: 2, costly: 19 };
 export async function view(id, leaving) {
   const policy = await get(`/policies/${id}`, leaving);
   const { specification, diagnostics, annualised, warnings } = policy;
+  const { element, told } = answer(specification, diagnostics);
   const body = [
     h(
       "div",
       { class: "words" },
+      element,
       ofSeveral(specification),
       inWords(specification, annualised).map((sentence) => h("p", {}, sentence)),
-      h("p", {}, often(specification.problem, diagnostics)),
       warningList(warnings, specification.problem),
     ),
     again(id),
-    surface(policy, leaving),
+    surface(policy, told, leaving),
     solved(specification, diagnostics),
   ];
   const evaluate = (await offers("/evaluate"))
@@ -85,16 +86,21 @@ function ofSeveral({ fund }) {
   return h("p", {}, `It is for ${fund.assets.slice(0, -1).join(", ")} and ${fund.assets.at(-1)}; what is said of stocks below is of all of them together.`);
 }
 
-/** How often it holds nothing, by the situations it was solved in; a sentence. */
-function often({ horizon, periods_per_year }, diagnostics) {
+/** `{element, told(now)}`: what it holds now, to the share once its document is read, and how often it holds nothing. */
+function answer({ problem: { horizon, periods_per_year }, fund }, diagnostics) {
   const unit = unitOf(periods_per_year);
+  const assets = fund ? "the assets" : "stocks";
+  const isKnown = diagnostics[0].design_count === 1;
+  const nothing = "Now it holds nothing: all is in the bank.";
+  const now = h("span", {}, !isKnown ? "" : diagnostics[0].all_bank_share === 0 ? `Now it holds ${assets}.` : nothing);
+  const told = ({ band: [low, high], isExact }) => {
+    const kept = low < high ? ` if all is in the bank, and keeps up to ${percent(high)}` : "";
+    now.replaceChildren(...(high === 0 ? [nothing] : [`Now it holds${isExact ? "" : " about"} `, h("b", {}, percent(low)), ` in ${assets}${kept}.`]));
+  };
   const share = (step) => percent(diagnostics[step].all_bank_share, 0);
-  const [first, last] = [share(0), share(horizon - 1)];
-  if (diagnostics[0].design_count === 1) {
-    const now = diagnostics[0].all_bank_share === 0 ? "It holds stocks in the first" : "It holds nothing in the first";
-    return horizon === 1 ? `${now} ${unit}.` : `${now} ${unit}, and nothing in ${last} of the situations it was trained for in the last.`;
-  }
-  return `It holds nothing in ${first} of the situations it was trained for in the first ${unit}${horizon === 1 ? "" : `, and in ${last} in the last`}.`;
+  const steps = [!isKnown && [0, "first"], horizon > 1 && [horizon - 1, "last"]].filter(Boolean);
+  const parts = steps.map(([step, which], index) => `in ${share(step)} of ${index === 0 ? "the situations it was trained for" : "those"} in the ${which} ${unit}`);
+  return { element: h("p", {}, now, parts.length > 0 ? ` It holds nothing ${parts.join(", and ")}.` : ""), told };
 }
 
 /** The ways to another policy like it. */
@@ -108,14 +114,14 @@ function again(id) {
   );
 }
 
-function surface({ policy: id, specification, diagnostics }, leaving) {
+function surface({ policy: id, specification, diagnostics }, told, leaving) {
   const functions = specification.problem.trading_cost > 0 ? FUNCTIONS.costly : FUNCTIONS.free;
   const size = diagnostics.reduce(
     (sum, step) => sum + NUMBER_BYTES * step.design_count * (functions + (step.policy?.features.length ?? 0)),
     0,
   );
   const holder = h("div", {});
-  const load = () => holder.replaceChildren(surfaceView({ id, problem: specification.problem, leaving }));
+  const load = () => holder.replaceChildren(surfaceView({ id, problem: specification.problem, leaving, told }));
   if (size <= READY_BYTES) load();
   else holder.append(h("button", { onclick: load }, `Read the policy (about ${count(size / 1e6)} MB) and draw it`));
   return section("What it holds", holder);

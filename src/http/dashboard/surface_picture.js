@@ -25,6 +25,15 @@ export function picture(policy, shape, surfaces, { step, across, radius }) {
   return over(found, choices, choices.includes(across) ? across : choices[0], radius, itself);
 }
 
+/** What a session holds that starts with the policy's own record and wealth: `{band, isExact}`, exact where the first step knows no other state. */
+export function heldNow(policy, shape) {
+  const { solution } = policy.steps[0];
+  if (solution.kind === "single") return { band: solution.band, isExact: true };
+  const { initial_wealth } = policy.specification.problem;
+  const held = stepSurface(policy, shape, 0).at({ wealth: initial_wealth, mean: shape.mean, deviation: shape.deviation });
+  return { band: [held, held], isExact: false };
+}
+
 /** What is held after `step` periods at each of `means`, everything else at the middle of the design. */
 export function curve(policy, shape, { step, means }) {
   const found = stepSurface(policy, shape, step);

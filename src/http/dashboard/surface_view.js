@@ -32,8 +32,8 @@ function workerAddress() {
   return trusted.createScriptURL(WORKER);
 }
 
-/** The surface of policy `id`, computed in a worker that lives until `leaving`. */
-export function surfaceView({ id, problem, leaving }) {
+/** The surface of policy `id`, computed in a worker that lives until `leaving`; `told({band, isExact})` hears what it holds now. */
+export function surfaceView({ id, problem, leaving, told }) {
   const status = h("p", { role: "status" }, "Reading the policy\u2026");
   const holder = h("div", {}, status);
   const worker = new Worker(workerAddress(), { type: "module" });
@@ -43,7 +43,10 @@ export function surfaceView({ id, problem, leaving }) {
   worker.addEventListener("error", () => fail("The surface could not be computed."));
   worker.addEventListener("message", ({ data }) => {
     if (data.failed) return fail(data.failed);
-    if (data.ready) return next();
+    if (data.ready) {
+      told(data.ready);
+      return next();
+    }
     if (holder.firstChild === status) holder.replaceChildren(element);
     show(data.picture);
   });

@@ -1,10 +1,10 @@
 // A policy's document read, and its surface computed, off the thread that the page lives on.
 //
-// First message: `{address, headers}`, answered by `{ready}`. Each one after it is a wish for a picture, answered by
-// `{picture}`, or with `means` for what is held at them, answered by `{curve}`. A failure of either is `{failed}`, in words.
+// First message: `{address, headers}`, answered by `{ready}`, what is held now. Each one after it is a wish for a picture,
+// answered by `{picture}`, or with `means` for what is held at them, answered by `{curve}`. A failure of either is `{failed}`, in words.
 
 import { Shape, retention } from "./laws.js";
-import { curve, picture } from "./surface_picture.js";
+import { curve, heldNow, picture } from "./surface_picture.js";
 
 let policy;
 let shape;
@@ -19,7 +19,7 @@ async function load({ address, headers }) {
   policy = await response.json();
   const { history, learning } = policy.specification.problem;
   shape = new Shape(history, retention(learning));
-  return { ready: true };
+  return { ready: heldNow(policy, shape) };
 }
 
 addEventListener("message", async ({ data }) => {
