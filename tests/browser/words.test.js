@@ -27,6 +27,17 @@ test("a number typed is one number or none", () => {
   assert.equal(typed("0.07%", { shares: true }), 0.0007);
 });
 
+test("a name in a file is never a formula, and a number stays a number", async () => {
+  const { csvRows, csvText } = await dashboardModule("csv.js");
+  const names = ["=1+1", "+cmd", "-2,5", "@SUM(A1)", "\tx", "\rx", "A=1", "B \"C\"", "two\nlines"];
+  const text = csvText([names, [-0.5, 1e-7, 1e21, 0, null]]);
+  assert.equal(text, '\'=1+1,\'+cmd,"\'-2,5",\'@SUM(A1),\'\tx,"\'\rx",A=1,"B ""C""","two\nlines"\r\n-0.5,1e-7,1e+21,0,\r\n');
+  // What is written is read again cell by cell, and the second row begins in the third line.
+  const [head, numbers] = csvRows(text, ",");
+  assert.deepEqual(head.cells, names.map((name) => (/^[=+@\t\r-]/.test(name) ? `'${name}` : name)));
+  assert.deepEqual([numbers.line, numbers.cells.map(Number)], [3, [-0.5, 1e-7, 1e21, 0, 0]]);
+});
+
 test("every warning of the service has words here, and names the record it is about", async () => {
   const description = JSON.parse(await readFile(new URL("../../api/openapi.json", import.meta.url), "utf8"));
   const codes = description.components.schemas.WarningCode;

@@ -9,9 +9,12 @@ export const csvText = (rows) => `${rows.map((row) => row.map(cell).join(",")).j
 function cell(value) {
   if (value === null || value === undefined) return "";
   // Beyond twelve digits are those of binary fractions.
-  const text = typeof value === "number" ? String(Number(value.toPrecision(12))) : value;
-  return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+  const text = typeof value === "number" ? String(Number(value.toPrecision(12))) : inert(value);
+  return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
+
+/** A text that no spreadsheet takes for a formula to run: an apostrophe before what would begin one. */
+const inert = (text) => (/^[=+\-@\t\r]/.test(text) ? `'${text}` : text);
 
 /** The cells of a text in which `mark` stands between them, and the lines where its rows begin, from 1: `[{line, text, cells}]`. What
  * stands in quotes is one cell, a quote in it doubled; blank rows are passed over. */
