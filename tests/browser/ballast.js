@@ -16,32 +16,38 @@ const BINARY = process.env.BALLAST_BINARY ?? fileURLToPath(new URL("../../target
 const FILES = process.env.BALLAST_DASHBOARD;
 const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 
-/** Starts the service; `url` is where it listens, `key(...roles)` makes a key, `stop()` ends it and takes its data away. */
+/** Starts the service; `url` is where it listens, `key(...roles)` makes a key, of another tenant by `keyOf(tenant, ...roles)`, `kill()` ends
+ * it at once and `start()` starts it again at the same address over the same data; `stop()` ends it and takes its data away. */
 export async function service() {
   const folder = await mkdtemp(join(tmpdir(), "ballast-browser-"));
-  const process_ = spawn(BINARY, ["serve", "--listen", "127.0.0.1:0", "--data", folder], {
-    stdio: ["ignore", "pipe", "ignore"],
-  });
-  const ended = new Promise((resolve) => process_.once("exit", resolve));
-  const failed = new Promise((_, reject) => process_.once("error", reject));
-  const listening = (async () => {
-    for await (const line of createInterface(process_.stdout)) {
-      const address = /listening on (http:\S+)/.exec(line);
-      if (address) return address[1];
-    }
-    throw new Error(`${BINARY} ended before it listened`);
-  })();
-  const url = await Promise.race([listening, failed]);
+  let [process_, ended] = [];
+  const start = async (listen) => {
+    process_ = spawn(BINARY, ["serve", "--listen", listen, "--data", folder], { stdio: ["ignore", "pipe", "ignore"] });
+    ended = new Promise((resolve) => process_.once("exit", resolve));
+    const failed = new Promise((_, reject) => process_.once("error", reject));
+    const listening = (async () => {
+      for await (const line of createInterface(process_.stdout)) {
+        const address = /listening on (http:\S+)/.exec(line);
+        if (address) return address[1];
+      }
+      throw new Error(`${BINARY} ended before it listened`);
+    })();
+    return Promise.race([listening, failed]);
+  };
+  const end = (signal) => {
+    process_.kill(signal);
+    return ended;
+  };
+  const url = await start("127.0.0.1:0");
   const stop = async () => {
-    process_.kill("SIGTERM");
-    await ended;
+    await end("SIGTERM");
     await rm(folder, { recursive: true });
   };
-  const key = async (...roles) => {
+  const keyOf = async (tenant, ...roles) => {
     const given = roles.flatMap((role) => ["--role", role]);
-    return (await run(BINARY, ["keys", "create", "--data", folder, ...given])).stdout.trim();
+    return (await run(BINARY, ["keys", "create", "--data", folder, "--tenant", tenant, ...given])).stdout.trim();
   };
-  return { url, stop, key };
+  return { url, stop, key: (...roles) => keyOf("default", ...roles), keyOf, kill: () => end("SIGKILL"), start: () => start(new URL(url).host) };
 }
 
 export async function browser() {

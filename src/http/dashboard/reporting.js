@@ -48,14 +48,14 @@ function reporting(sessions, chosen, leaving) {
     note: `A line for each: its name or identifier, and its return, as in \u201cAda 1.2\u201d; \u22122.5 is a loss of 2.5 %. Or a table below a header, its columns in any order: ${HEADS.join(", ")}, or the name of an asset for its return, with \u201cheld\u201d behind it for its share.`,
     rows: 8,
     value: chosen.map((entry) => written(find, entry)).join("\n"),
-    changed: () => look(),
+    changed: () => soon(),
   });
   const drop = fileDrop(lines.control.id, (text) => {
     lines.control.value = text;
     look();
   });
-  const common = input({ name: "common", label: "Return of the others, %", note: "Of those that have none of their own. May be blank.", unit: "percent", changed: () => look() });
-  const date = input({ name: "date", label: "Last day", note: "Of all that say none, such as 2008-09-30. May be blank.", inputmode: "text", changed: () => look() });
+  const common = input({ name: "common", label: "Return of the others, %", note: "Of those that have none of their own. May be blank.", unit: "percent", changed: () => soon() });
+  const date = input({ name: "date", label: "Last day", note: "Of all that say none, such as 2008-09-30. May be blank.", inputmode: "text", changed: () => soon() });
   const [meant, sure] = tick("confirm", "The returns are meant, however unusual");
   const [next, again] = tick("next", "Of those reported within the hour, the next period is meant", () => look());
   const preview = h("div", {});
@@ -79,6 +79,12 @@ function reporting(sessions, chosen, leaving) {
     preview.replaceChildren(rows.length > 0 ? section("Who gets what", looked(rows, ready), leftOut(read.unread), previewed(rows)) : "");
     const unknown = [...new Set(rows.flatMap(({ entry }) => (entry && policies.of(entry.policy) === undefined ? [entry.policy] : [])))];
     if (unknown.length > 0) policies.read(unknown).then((found) => found.length > 0 && look(), (error) => leaving.aborted || say(error.message));
+  };
+  // A browser may tell of what is pasted line by line.
+  let waiting = 0;
+  const soon = () => {
+    clearTimeout(waiting);
+    waiting = setTimeout(look);
   };
   const send = async () => {
     message.hidden = true;
