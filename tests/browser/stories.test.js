@@ -36,6 +36,10 @@ test("from an empty service and a file of returns to the first advice takes less
     await page.getByRole("link", { name: "Train the first policy" }).click();
     await page.locator("input[type=file]").first().setInputFiles(RETURNS);
     await page.getByText("1109 monthly simple returns as fractions", { exact: false }).waitFor();
+    // The last twenty years of them.
+    await page.getByLabel("Latest returns used, of 1109").fill("240");
+    await page.getByLabel("Latest returns used, of 1109").blur();
+    await page.getByText("The latest 240 of 1109 monthly simple returns", { exact: false }).waitFor();
     await page.getByRole("button", { name: /^Take the bank.s rate from risk_free_return/ }).click();
     await page.getByRole("button", { name: "Train", exact: true }).click();
     await page.getByRole("link", { name: "See the policy" }).click();
