@@ -31,6 +31,22 @@ const rows = async (name) => (await page.getByRole("table", { name }).locator("t
 const lines = () => page.getByLabel("Sessions and their returns, %");
 const observed = async (index) => (await call(ballast.url, `/sessions/${sessions[index]}/history`)).observations;
 
+/** Presses the button for so many; the service records them, its answer is lost, and the same are sent again until the page says `words`. */
+async function sendTwice(times, words) {
+  let lost = 0;
+  await page.route("**/observe", async (route) => {
+    if (lost++ > 0) return route.continue();
+    await route.fetch();
+    await route.abort();
+  });
+  const button = page.getByRole("button", { name: `Report for ${times}` });
+  await button.click();
+  await page.getByText("Sending it again is safe: a period counts once.", { exact: false }).waitFor();
+  await button.click();
+  await page.getByText(words).first().waitFor();
+  await page.unrouteAll();
+}
+
 /** What the module makes of a text: the sessions, what is said of each, and what is wrong. */
 async function readBy(known, { assets = () => null, all = {}, lately = () => false } = {}) {
   const { finder, readLines } = await dashboardModule("report_lines.js");
@@ -132,10 +148,12 @@ test("an unusual return is recorded once it is said to be meant, and no other wi
 test("a return that cannot be is refused in percent", async () => {
   await page.getByLabel("Last day").fill("");
   await lines().fill("Ada 50000");
-  assert.equal(await page.getByRole("button", { name: "Report" }).isDisabled(), true);
+  // What is typed is looked over a moment later.
+  await page.getByRole("button", { name: "Report", exact: true, disabled: true }).waitFor();
   await page.getByLabel("the next period is meant", { exact: false }).check();
   await page.getByRole("button", { name: "Report for 1" }).click();
   await page.getByText("1 left above for another try", { exact: false }).first().waitFor();
+  await page.getByText("Line 1: The return is 50,000", { exact: false }).waitFor();
   const [told] = await rows("Outcomes");
   assert.match(told, /Line 1: The return is 50,000 %; it must be from -99\.32 % to 14,741\.31 %\.$/);
   await page.getByLabel("Last day").fill("2026-10-31");
@@ -151,17 +169,7 @@ test("those ticked get one return, and an answer that is lost is asked for again
   await page.getByRole("link", { name: "Report for the 2" }).click();
   await page.getByRole("heading", { level: 1, name: "Report for several" }).waitFor();
   await page.getByLabel("Return of the others, %").fill("1");
-  let lost = 0;
-  await page.route("**/observe", async (route) => {
-    if (lost++ > 0) return route.continue();
-    await route.fetch();
-    await route.abort();
-  });
-  await page.getByRole("button", { name: "Report for 2" }).click();
-  await page.getByText("Sending it again is safe: a period counts once.", { exact: false }).waitFor();
-  await page.getByRole("button", { name: "Report for 2" }).click();
-  await page.getByText("2 returns are recorded.").first().waitFor();
-  await page.unrouteAll();
+  await sendTwice(2, "2 returns are recorded.");
   for (const index of [2, 3]) assert.equal((await observed(index)).length, 1);
 });
 
@@ -182,17 +190,7 @@ test("forty clients are reported by one file, a bad row is named by its line, an
   await page.getByText("39 returns are ready, and 1 line is not.").waitFor();
   await page.getByText("Line 18: no session is called \u201cCleint 17\u201d").waitFor();
   assert.match((await rows("Returns to report"))[39], /^Client 40 \w+ 1 World 1\.90 % Gold 0\.50 % yes$/);
-  let lost = 0;
-  await page.route("**/observe", async (route) => {
-    if (lost++ > 0) return route.continue();
-    await route.fetch();
-    await route.abort();
-  });
-  await page.getByRole("button", { name: "Report for 39" }).click();
-  await page.getByText("Sending it again is safe: a period counts once.", { exact: false }).waitFor();
-  await page.getByRole("button", { name: "Report for 39" }).click();
-  await page.getByText("39 returns are recorded, and 1 left above for another try.").first().waitFor();
-  await page.unrouteAll();
+  await sendTwice(39, "39 returns are recorded, and 1 left above for another try.");
   assert.equal((await lines().inputValue()).split("\n").length, 2);
   // The whole file again, on a page that has forgotten the first: the one row that was bad is all that is ready.
   await go("#/report");
