@@ -110,6 +110,7 @@ test("who gets what is shown before, and what came of it after", async () => {
   await page.getByRole("heading", { level: 1, name: "Report for several" }).waitFor();
   // Of a session that is named twice nothing is sent: nobody can know which is meant.
   await lines().fill("Ada 1.2\nAda 3");
+  await page.getByText("Line 2: is named twice").waitFor();
   assert.deepEqual((await rows("Returns to report")).map((row) => /is named twice$/.test(row)), [true, true]);
   assert.equal(await page.getByRole("button", { name: "Report" }).isDisabled(), true);
   await lines().fill(`Ada\t1.2\nGrace Hopper 90\nTwin 1\nNobody 2\n${short(sessions[4])}`);
