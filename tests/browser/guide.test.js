@@ -26,9 +26,12 @@ test("the guide is a click from the overview, and the overview from the guide", 
   await page.getByRole("link", { name: "Guide" }).click();
   await page.getByRole("link", { name: "What it earned and cost" }).click();
   await page.getByRole("heading", { level: 1, name: "What robustness earned and cost" }).waitFor();
-  // `decode` waits for a picture that is still on its way, and refuses one that cannot be drawn.
-  const drawn = await page.getByRole("img").evaluateAll((pictures) => Promise.all(pictures.map((picture) => picture.decode()))).then((all) => all.length);
-  assert.ok(drawn >= 3, String(drawn));
+  const widths = await page.getByRole("img").evaluateAll(async (pictures) => {
+    // Waits for pictures that are still on their way, and refuses one that cannot be drawn.
+    await Promise.all(pictures.map((picture) => picture.decode()));
+    return pictures.map(({ naturalWidth }) => naturalWidth);
+  });
+  assert.ok(widths.length >= 3 && widths.every((width) => width > 0), String(widths));
   await page.getByRole("link", { name: "Overview" }).click();
   await page.getByRole("heading", { level: 1, name: "Overview" }).waitFor();
 });
