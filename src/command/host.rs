@@ -48,12 +48,11 @@ pub struct Host {
 }
 
 impl Host {
-    /// Starts it over a new folder named after `purpose`, training on every core: nobody else is being served.
+    /// Starts it over a new folder named after `purpose`.
     pub async fn start(purpose: &str) -> Result<Self, HostError> {
         let folder = DataFolder::make_in(&std::env::temp_dir(), purpose)?;
         let mut config = Config::new(folder.path());
         config.listen = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-        config.training_threads = std::thread::available_parallelism().map_or(1, usize::from);
         let started = serve(config, Shutdown::new()).await;
         let running = started.map_err(|source| HostError::Start { source: source.into() })?;
         Ok(Host { address: running.address, running, folder })

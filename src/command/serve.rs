@@ -44,7 +44,7 @@ pub struct Serve {
     /// A job whose worker has been silent this long is taken over by another.
     #[arg(long, env = "BALLAST_LEASE_SECONDS", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..=3600))]
     lease_seconds: u16,
-    /// Threads that train. Default: every core but one.
+    /// Threads that train, at the lowest priority. Default: every core.
     #[arg(long, env = "BALLAST_TRAINING_THREADS", value_parser = clap::value_parser!(u16).range(1..=1024))]
     training_threads: Option<u16>,
     /// The most memory to take, as in 4GB or 512MiB. Default: 80 % of the container's limit, of the address space's or of

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use thiserror::Error;
 
-/// A pool of threads; work installed on it is spread over them.
+/// A pool of threads that give way to every other; work installed on it is spread over them.
 pub struct TrainingPool(rayon::ThreadPool);
 
 /// The threads could not be started.
@@ -21,6 +21,7 @@ impl TrainingPool {
         let built = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .thread_name(|index| format!("training-{index}"))
+            .start_handler(|_| give_way())
             .build()
             .map_err(|source| PoolError { threads, source })?;
         Ok(TrainingPool(built))
@@ -32,7 +33,35 @@ impl TrainingPool {
     }
 }
 
+/// The lowest of priorities, 19 by `nice`, for the calling thread: a training takes what others leave of a core, and whoever
+/// waits for an answer waits no longer because of it.
+fn give_way() {
+    // Linux has priorities of threads, elsewhere this would be the whole process. Where it is refused, training is only as
+    // important as all else.
+    #[cfg(target_os = "linux")]
+    let _ = rustix::process::setpriority_process(None, LOWEST_PRIORITY);
+}
+
+#[cfg(target_os = "linux")]
+const LOWEST_PRIORITY: i32 = 19;
+
 /// `work` done on every item, in their order, on the pool this is called from.
 pub fn map<T: Send, R: Send>(items: Vec<T>, work: impl Fn(T) -> R + Sync + Send) -> Vec<R> {
     items.into_par_iter().map(work).collect()
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use rustix::process::getpriority_process;
+
+    use super::*;
+
+    #[test]
+    fn a_pool_gives_way_and_who_waits_for_it_does_not() {
+        let before = getpriority_process(None).unwrap();
+        let pool = TrainingPool::new(2).unwrap();
+        let priorities = pool.0.broadcast(|_| getpriority_process(None).unwrap());
+        assert_eq!(priorities, [LOWEST_PRIORITY; 2]);
+        assert_eq!(getpriority_process(None).unwrap(), before);
+    }
 }

@@ -108,7 +108,7 @@ pub struct Config {
 pub const DAY: Duration = Duration::from_secs(24 * 60 * 60);
 
 impl Config {
-    /// The defaults over a folder: loopback, every core but one for training.
+    /// The defaults over a folder: loopback, every core for training.
     pub fn new(data: impl Into<PathBuf>) -> Self {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Config {
@@ -125,7 +125,7 @@ impl Config {
             store: StoreLocation::Folder(data.into()),
             role: Role::All,
             memory_limit: MemoryLimit::of_the_system(),
-            training_threads: cores.saturating_sub(1).max(1),
+            training_threads: cores,
             connection_limit: 4096,
             connections_of_address: None,
             body_limit_bytes: 64 << 20,
