@@ -83,7 +83,11 @@ async fn story(mut app: App) {
     let mut request = specification(3);
     request["problem"]["periods_per_year"] = json!(12);
     app.train(&request).await;
-    assert_eq!(list(&app, "").await, json!({ "sessions": [], "total": 0, "next": null }));
+    assert_eq!(
+        list(&app, "").await,
+        json!({ "sessions": [], "total": 0, "next": null,
+            "care": { "active": 0, "any": 0, "overdue": 0, "renewal": 0, "alarm": 0 } })
+    );
     let path = format!("/policies/{}", app.policy);
     app.send(Method::PATCH, &path, Some(&json!({ "name": "World" }))).await;
     let mut ids = Vec::new();
@@ -144,6 +148,72 @@ async fn story(mut app: App) {
     a_session_that_is_due(&mut app).await;
 }
 
+/// Each session that needs care is counted by its reasons and found by each of them, and its row tells them.
+async fn who_needs_care(mut app: App, database: Option<&str>) {
+    let mut request = specification(3);
+    request["problem"]["periods_per_year"] = json!(12);
+    app.train(&request).await;
+    let mut ids = Vec::new();
+    for name in ["late", "in time", "undated", "alarmed", "stuck", "ended"] {
+        app.open_with(json!({ "name": name, "tags": [if name == "late" { "x" } else { "y" }] })).await;
+        ids.push(app.session.clone());
+    }
+    let report = async |session: &str, period: usize, date: Value| {
+        let report = json!({ "session": session, "period": period, "log_return": 0.01, "date": date });
+        assert_eq!(app.post("/observe", &report).await.0, 200);
+    };
+    let today = jiff::Timestamp::now().to_zoned(jiff::tz::TimeZone::UTC).date();
+    report(&ids[0], 1, json!("2020-01-31")).await;
+    report(&ids[1], 1, json!(today.to_string())).await;
+    for session in &ids[3..5] {
+        report(session, 1, Value::Null).await;
+    }
+    for period in 1..=3 {
+        report(&ids[5], period, json!(format!("2020-0{period}-28"))).await;
+    }
+    // An alarm and a renewal that waits take long to come about: they are written as they would stand.
+    for statement in [
+        r#"UPDATE entries SET answer_json = replace(answer_json, '"level":"none"', '"level":"alarm"')
+           WHERE session IN (SELECT object FROM labels WHERE name IN ('alarmed', 'ended'))"#,
+        "UPDATE sessions SET due = 1 WHERE session = (SELECT object FROM labels WHERE name = 'stuck')",
+        "UPDATE entries SET created_ms = created_ms - 3700000
+         WHERE session = (SELECT object FROM labels WHERE name = 'stuck')",
+    ] {
+        match database {
+            None => execute(app.folder(), statement).await,
+            Some(url) => assert!(postgres::execute(url, statement).await > 0),
+        }
+    }
+    let page = list(&app, "sort=name").await;
+    let counts = |active: usize, any: usize, overdue: usize, renewal: usize, alarm: usize| json!({ "active": active, "any": any, "overdue": overdue, "renewal": renewal, "alarm": alarm });
+    assert_eq!(page["care"], counts(5, 3, 1, 1, 1));
+    let why = |row: &Value| (row["name"].as_str().unwrap().to_owned(), row["care"].clone(), row["next"].clone());
+    let found: Vec<_> = page["sessions"].as_array().unwrap().iter().map(why).collect();
+    let of = |name: &str| found.iter().find(|(other, ..)| other == name).unwrap();
+    assert_eq!((&of("late").1, &of("late").2), (&json!(["overdue"]), &json!("2020-02-29")));
+    assert_eq!((&of("alarmed").1, &of("stuck").1), (&json!(["alarm"]), &json!(["renewal"])));
+    assert_eq!((&of("ended").1, &of("ended").2), (&json!([]), &Value::Null));
+    assert_eq!((&of("in time").1, &of("undated").1), (&json!([]), &json!([])));
+    for (query, expected, care) in [
+        ("state=care&sort=name", vec!["alarmed", "late", "stuck"], counts(5, 3, 1, 1, 1)),
+        ("state=overdue", vec!["late"], counts(5, 3, 1, 1, 1)),
+        ("state=renewal", vec!["stuck"], counts(5, 3, 1, 1, 1)),
+        ("state=alarm", vec!["alarmed"], counts(5, 3, 1, 1, 1)),
+        ("state=care&tag=x", vec!["late"], counts(1, 1, 1, 0, 0)),
+        ("search=stuck", vec!["stuck"], counts(1, 1, 0, 1, 0)),
+    ] {
+        let page = list(&app, query).await;
+        assert_eq!(
+            (names(&page), &page["total"], &page["care"]),
+            (expected.clone(), &json!(expected.len()), &care),
+            "{query}"
+        );
+    }
+    let page = list(&app, "state=care&sort=name&limit=2").await;
+    let next = list(&app, &format!("state=care&sort=name&limit=2&after={}", page["next"].as_str().unwrap())).await;
+    assert_eq!((names(&next), &next["care"]), (vec!["stuck"], &Value::Null));
+}
+
 /// A session whose wealth changes between two pages changes no other's place.
 async fn a_page_goes_on_where_it_was(app: &App, ids: &[String]) {
     let first = list(app, "sort=-wealth&limit=2").await;
@@ -179,6 +249,18 @@ async fn sessions_are_found_and_in_order_over_a_database() {
     story(App::configured(|config| config.store = location).await).await;
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn who_needs_care_is_counted_and_found_over_a_folder() {
+    who_needs_care(App::start().await, None).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn who_needs_care_is_counted_and_found_over_a_database() {
+    let Some(url) = postgres::database().await else { return };
+    let location = StoreLocation::Postgres(url.parse().unwrap());
+    who_needs_care(App::configured(|config| config.store = location).await, Some(&url)).await;
+}
+
 #[tokio::test]
 async fn what_cannot_be_asked_is_named() {
     let app = App::start().await;
@@ -205,6 +287,8 @@ async fn what_cannot_be_asked_is_named() {
 }
 
 const SESSIONS: usize = 10_000;
+/// Every hundredth said a day of long ago.
+const LATE: usize = 100;
 /// Of an overview of so many sessions.
 const OVERVIEW: Duration = Duration::from_millis(300);
 
@@ -212,7 +296,9 @@ const OVERVIEW: Duration = Duration::from_millis(300);
 #[tokio::test(flavor = "multi_thread")]
 async fn ten_thousand_sessions_are_listed_searched_and_put_in_order_quickly() {
     let mut app = App::start().await;
-    app.train(&specification(2)).await;
+    let mut request = specification(2);
+    request["problem"]["periods_per_year"] = json!(12);
+    app.train(&request).await;
     app.open().await;
     assert_eq!(app.observe(1, 0.01).await.0, 200);
     for statement in [
@@ -222,7 +308,8 @@ async fn ten_thousand_sessions_are_listed_searched_and_put_in_order_quickly() {
          SELECT printf('session_%032d', n), tenant, policy, initial_wealth, initial_holding, initial_history, horizon,
                 plan_json, room, n, seal FROM numbers CROSS JOIN sessions",
         "INSERT INTO entries SELECT sessions.session, entry, kind, number, content_json,
-                json_set(answer_json, '$.wealth', 100.0 + sessions.sequence % 997), entries.created_ms, access_key, entries.seal
+                json_set(answer_json, '$.wealth', 100.0 + sessions.sequence % 997,
+                         '$.date', CASE WHEN sessions.sequence % 100 = 0 THEN '2020-01-31' END), entries.created_ms, access_key, entries.seal
          FROM sessions CROSS JOIN entries WHERE sessions.session LIKE 'session_0000%'",
         "INSERT INTO labels SELECT tenant, session, 'Client ' || sequence, '', char(10) || 'x' || char(10),
                 'client ' || sequence, char(10) || 'x' || char(10) FROM sessions",
@@ -238,6 +325,9 @@ async fn ten_thousand_sessions_are_listed_searched_and_put_in_order_quickly() {
         ("search=client%2099&sort=-wealth", 111),
         ("tag=x&state=active&sort=wealth", SESSIONS),
         ("state=due", 0),
+        ("state=care", LATE),
+        ("state=overdue&sort=name", LATE),
+        ("state=alarm&search=client", 0),
     ] {
         let url = format!("{}/sessions?{query}", app.url);
         let mut quickest = Duration::MAX;
@@ -246,6 +336,8 @@ async fn ten_thousand_sessions_are_listed_searched_and_put_in_order_quickly() {
             let page: Value = app.client.get(&url).send().await.unwrap().json().await.unwrap();
             quickest = quickest.min(started.elapsed());
             assert_eq!(page["total"], json!(total), "{query}");
+            let all = if query.starts_with("search") { total } else { SESSIONS };
+            assert_eq!(page["care"]["active"], json!(all), "{query}");
         }
         println!("{query}: {quickest:?} of {SESSIONS} sessions");
         assert!(quickest < within(OVERVIEW), "{query}: {quickest:?}");

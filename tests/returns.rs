@@ -269,3 +269,35 @@ fn any_text_gets_an_answer() {
     }
     assert_eq!(outcomes.len(), 3, "{outcomes:?}");
 }
+
+/// Records as they are in fractions are read without a question: the bundled ones, and stocks and bonds day by day.
+#[test]
+fn ordinary_records_are_not_asked_about() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
+    let of = |file: &str| std::fs::read_to_string(data.join(file)).unwrap();
+    let industries = of("us_industries_monthly.csv");
+    let header: Vec<&str> = industries.lines().next().unwrap().split(',').skip(1).collect();
+    let names: Vec<&str> = header.iter().copied().filter(|name| *name != "risk_free_return").collect();
+    assert_eq!(names.len(), 12, "{names:?}");
+    let mut texts = vec![(of("us_market_monthly.csv"), Choices::default())];
+    for name in &names {
+        texts.push((industries.clone(), Choices { columns: vec![(*name).to_owned()], ..Choices::default() }));
+    }
+    let all = names.iter().map(|name| (*name).to_owned()).collect();
+    texts.push((industries.clone(), Choices { columns: all, ..Choices::default() }));
+    let mut random = Random(7);
+    // Of a day: the mean and the deviation of stocks, single stocks, bonds and short bonds.
+    for (mean, deviation) in [(0.0004, 0.011), (0.0006, 0.03), (0.0002, 0.003), (0.0001, 0.0007)] {
+        for count in [60, 250, 5000] {
+            let normal = |random: &mut Random| (0..12).map(|_| random.next()).sum::<f64>() - 6.0;
+            let returns = (0..count).map(|_| mean + deviation * normal(&mut random));
+            let text: String = returns.map(|value| format!("{value:.6}\n")).collect();
+            texts.push((text, Choices::default()));
+        }
+    }
+    for (text, said) in texts {
+        let found = read(&text, &said);
+        let Reading::Read(record) = found else { panic!("{said:?}: {found:?}") };
+        assert!(record.sentence.contains("as fractions"), "{}", record.sentence);
+    }
+}

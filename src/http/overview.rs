@@ -18,7 +18,7 @@ use crate::service::Service;
 use crate::service::drift::DriftLevel;
 use crate::service::overview::Listed;
 use crate::store::LONGEST_TAG;
-use crate::store::{Labels, SessionIs, SessionKey, SessionOrder, SessionPlace, SessionQuery};
+use crate::store::{Care, CareCounts, Labels, SessionIs, SessionKey, SessionOrder, SessionPlace, SessionQuery};
 
 /// Letters of what is searched for: more than any name has.
 const LONGEST_SEARCH: usize = 100;
@@ -41,6 +41,10 @@ enum Is {
     Active,
     Completed,
     Due,
+    Care,
+    Overdue,
+    Renewal,
+    Alarm,
 }
 
 /// A session in a list.
@@ -71,6 +75,15 @@ pub struct SessionEntry {
     pub date: Option<Date>,
     /// When it last reported a period, or put one right.
     pub last_report_ms: Option<i64>,
+    /// The last day on which its next report is not overdue, by how many periods a year its policy has: a period after the last day
+    /// reported, else after the day, in UTC, of the last report or of its opening. Null where that is not known, or it is completed.
+    #[schema(value_type = Option<String>, format = Date)]
+    pub next: Option<Date>,
+    /// Why it needs care, where it does.
+    pub care: Vec<CareReason>,
+    /// Standard deviation of the log-returns learned; of several assets, of their fund. Null before the first report, or where the
+    /// policy tells fewer than two moments.
+    pub deviation: Option<f64>,
     /// Whether its next policy is to be trained.
     pub due: bool,
     /// Whether the returns still come as they came.
@@ -79,7 +92,7 @@ pub struct SessionEntry {
 }
 
 impl From<Listed> for SessionEntry {
-    fn from(Listed { row, stands }: Listed) -> Self {
+    fn from(Listed { row, stands, next, care }: Listed) -> Self {
         SessionEntry {
             period: row.observations + 1,
             state: session_state(row.observations, row.horizon),
@@ -96,9 +109,55 @@ impl From<Listed> for SessionEntry {
             periods_per_year: row.periods_per_year,
             horizon: row.horizon,
             initial_wealth: row.initial_wealth,
+            next,
+            care: care.into_iter().map(CareReason::from).collect(),
+            deviation: stands.and_then(|stands| stands.deviation),
             due: row.is_due,
             created_ms: row.created_ms,
         }
+    }
+}
+
+/// Why a session needs care.
+#[derive(Debug, Clone, Copy, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CareReason {
+    /// Its next report is late.
+    Overdue,
+    /// Its next policy failed to be trained, or is not there after an hour.
+    Renewal,
+    /// Its returns have changed.
+    Alarm,
+}
+
+impl From<Care> for CareReason {
+    fn from(care: Care) -> Self {
+        match care {
+            Care::Overdue => CareReason::Overdue,
+            Care::Renewal => CareReason::Renewal,
+            Care::Alarm => CareReason::Alarm,
+        }
+    }
+}
+
+/// How many sessions need care, and why; one may have several reasons.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct CareCount {
+    /// Those that are not completed, of which the others are.
+    pub active: usize,
+    /// In need of care for any of the reasons.
+    pub any: usize,
+    /// Their next report is late.
+    pub overdue: usize,
+    /// Their next policy failed to be trained, or is not there after an hour.
+    pub renewal: usize,
+    /// Their returns have changed.
+    pub alarm: usize,
+}
+
+impl From<CareCounts> for CareCount {
+    fn from(CareCounts { active, any, overdue, renewal, alarm }: CareCounts) -> Self {
+        CareCount { active, any, overdue, renewal, alarm }
     }
 }
 
@@ -108,6 +167,8 @@ pub struct SessionPage {
     pub sessions: Vec<SessionEntry>,
     /// Sessions that match, on all pages together.
     pub total: usize,
+    /// Who needs care among those that `search` and `tag` find, in whatever `state`; null on later pages.
+    pub care: Option<CareCount>,
     /// Give it as `after` for the next page; null on the last.
     pub next: Option<String>,
 }
@@ -116,7 +177,7 @@ pub struct SessionPage {
 #[utoipa::path(get, path = "/sessions", tag = "sessions",
     params(("search" = Option<String>, Query, max_length = 100, description = "Part of a name, of a tag, of the session's or its policy's identifier or of the policy's name, whatever the case."),
            ("tag" = Option<String>, Query, max_length = 50, description = "One that they have."),
-           ("state" = inline(Option<Is>), Query, description = "`due`: to be renewed by itself."),
+           ("state" = inline(Option<Is>), Query, description = "`due`: to be renewed by itself; `care`: in need of care, for any of the reasons `overdue`, `renewal` and `alarm`."),
            ("sort" = Option<String>, Query, description = "`created`, `name`, `wealth` or `last_report`, with `-` before it for descending; default `-created`."),
            ("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
            ("after" = Option<String>, Query, description = "The `next` of the page before, of the same `sort`.")),
@@ -129,11 +190,11 @@ pub async fn list(
     Parameters(asked): Parameters<Asked>,
 ) -> Result<Json<SessionPage>, Problem> {
     let asked = asked.read()?;
-    let found = service.sessions.list(&caller.tenant, &asked).await?;
+    let found = service.sessions.list(&caller.tenant, asked.clone()).await?;
     let last = found.sessions.last().filter(|_| found.sessions.len() == asked.limit);
     let next = last.map(|last| cursor(&asked, &last.row.place));
     let sessions = found.sessions.into_iter().map(SessionEntry::from).collect();
-    Ok(Json(SessionPage { sessions, total: found.total, next }))
+    Ok(Json(SessionPage { sessions, total: found.total, care: found.care.map(CareCount::from), next }))
 }
 
 fn refused(field: &str, value: &str, rule: impl Into<String>) -> Problem {
@@ -164,9 +225,13 @@ impl Asked {
             Is::Active => SessionIs::Active,
             Is::Completed => SessionIs::Completed,
             Is::Due => SessionIs::Due,
+            Is::Care => SessionIs::Needing(None),
+            Is::Overdue => SessionIs::Needing(Some(Care::Overdue)),
+            Is::Renewal => SessionIs::Needing(Some(Care::Renewal)),
+            Is::Alarm => SessionIs::Needing(Some(Care::Alarm)),
         });
         let search = self.search.filter(|search| !search.is_empty());
-        let asked = SessionQuery { search, tag: self.tag, is, order, descending, limit, after: None };
+        let asked = SessionQuery { search, tag: self.tag, is, order, descending, limit, ..SessionQuery::default() };
         let after = self.after.map(|text| {
             let rule = "must be the `next` of the page before, of the same sort";
             place(&asked, &text).ok_or_else(|| refused("after", &text, rule))

@@ -26,6 +26,18 @@ pub enum Unit {
     Percent,
 }
 
+/// What the rates of the bank are counted in, where a column tells them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum RateUnit {
+    /// 0.002 is 0.2 % a period.
+    Fraction,
+    /// 0.2 is 0.2 % a period.
+    Percent,
+    /// They are rates of no period, and left out.
+    Unused,
+}
+
 /// What is said of a text; what is left out follows from it, or is asked.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema, Args)]
 #[serde(deny_unknown_fields, default)]
@@ -42,6 +54,10 @@ pub struct Choices {
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<Unit>,
+    /// What the rates of the bank are counted in, where a column tells them
+    #[arg(long)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate_unit: Option<RateUnit>,
     /// Whether 01/02/2020 is the first of February, and not the second of January
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -84,6 +100,7 @@ impl Choices {
             columns: if more.columns.is_empty() { self.columns.clone() } else { more.columns.clone() },
             kind: more.kind.or(self.kind),
             unit: more.unit.or(self.unit),
+            rate_unit: more.rate_unit.or(self.rate_unit),
             day_first: more.day_first.or(self.day_first),
             newest_first: more.newest_first.or(self.newest_first),
             decimal_comma: more.decimal_comma.or(self.decimal_comma),

@@ -16,6 +16,19 @@ const SURELY_FRACTIONS: f64 = 0.1;
 const SURELY_PERCENT: f64 = 1.0;
 /// Numbers above zero that average more than this, as a return a period, are rather prices.
 const LARGEST_MEAN: f64 = 0.2;
+/// A deviation a year that no asset has, and one that few have, taken as fractions; and one that hardly any has as percent.
+const NO_DEVIATION: f64 = 3.0;
+const LARGE_DEVIATION: f64 = 0.75;
+const SMALL_DEVIATION: f64 = 0.001;
+/// A mean a year that few assets have, taken as fractions, and how far from nothing it must lie, in standard errors.
+const LARGE_YEARLY_MEAN: f64 = 0.35;
+const SURE_ERRORS: f64 = 2.0;
+/// So few numbers may all have two decimals by chance.
+const FEW: usize = 6;
+/// More months are no record of an asset: without dates, so many numbers are rather days.
+const MOST_MONTHS: usize = 1300;
+const MONTHS_A_YEAR: f64 = 12.0;
+const DAYS_A_YEAR: f64 = 252.0;
 /// Words of a heading of returns.
 const RETURNS: [&str; 12] =
     ["ret", "return", "returns", "perf", "performance", "gain", "gains", "change", "chg", "pct", "percent", "yield"];
@@ -29,6 +42,38 @@ pub struct Numbers<'a> {
     pub name: &'a str,
     pub values: Vec<f64>,
     pub cells: Vec<&'a Cell<'a>>,
+}
+
+/// What stands beside numbers and tells what they may be.
+pub struct Beside {
+    /// In a year: as the dates say, or else as most likely.
+    pub periods: f64,
+    /// Whether the dates say so.
+    pub is_dated: bool,
+    /// What the bank would pay a year, taken as fractions, where that is more than banks do.
+    pub bank: Option<f64>,
+}
+
+impl Beside {
+    /// Beside `count` numbers, with the periods of a year where dates say so.
+    pub fn of(dated: Option<usize>, count: usize) -> Self {
+        let likely = if count > MOST_MONTHS { DAYS_A_YEAR } else { MONTHS_A_YEAR };
+        Beside { periods: dated.map_or(likely, |periods| periods as f64), is_dated: dated.is_some(), bank: None }
+    }
+}
+
+/// Whether all of enough numbers are written with two decimals at most: fractions would tell whole percents alone.
+pub fn is_coarse(cells: &[&Cell]) -> bool {
+    let decimals = |cell: &&Cell| {
+        let text = cell.text.trim_end_matches(['%', ' ']);
+        !text.contains(['e', 'E']) && text.rfind(['.', ',']).is_none_or(|mark| text.len() - mark - 1 <= 2)
+    };
+    cells.len() >= FEW && cells.iter().all(decimals)
+}
+
+/// Whether a heading says that what it heads is in percent.
+pub fn names_percent(name: &str) -> bool {
+    ["%", "pct", "percent"].iter().any(|word| name.to_lowercase().contains(word))
 }
 
 /// Returns of a period each, as fractions.
@@ -51,10 +96,10 @@ pub fn moments(values: &[f64]) -> (f64, f64) {
 impl Numbers<'_> {
     /// # Errors
     /// What is asked or refused.
-    pub fn returns(&self, said: &Choices) -> Result<Returns, Stop> {
+    pub fn returns(&self, said: &Choices, beside: &Beside) -> Result<Returns, Stop> {
         let signs = self.percent_signs()?;
         let kind = said.kind.map_or_else(|| self.kind(signs), Ok)?;
-        let unit = if kind == Kind::Price { None } else { Some(self.unit(signs, said)?) };
+        let unit = if kind == Kind::Price { None } else { Some(self.unit(signs, said, beside)?) };
         let returns = self.read_as(kind, unit)?;
         let (_, deviation) = moments(&returns.simple);
         if deviation == 0.0 && returns.simple.len() > 1 {
@@ -107,29 +152,59 @@ impl Numbers<'_> {
         Ok(if as_prices { Kind::Price } else { Kind::Simple })
     }
 
-    /// As said or written, or by how much the numbers vary. A loss of all and more is in percent.
-    fn unit(&self, signs: bool, said: &Choices) -> Result<Unit, Stop> {
-        if signs || ["%", "pct", "percent"].iter().any(|word| self.name.to_lowercase().contains(word)) {
+    /// As said or written, or by how much the numbers vary and average in a year. A loss of all and more is in percent.
+    fn unit(&self, signs: bool, said: &Choices, beside: &Beside) -> Result<Unit, Stop> {
+        if signs || names_percent(self.name) {
             return Ok(said.unit.filter(|_| !signs).unwrap_or(Unit::Percent));
         }
         if let Some(unit) = said.unit {
             return Ok(unit);
         }
         let (mean, deviation) = moments(&self.values);
-        if deviation >= SURELY_PERCENT || mean.abs() > SURELY_NO_MEAN || self.values.iter().any(|value| *value <= -1.0)
-        {
+        let is_percent = deviation >= SURELY_PERCENT
+            || mean.abs() > SURELY_NO_MEAN
+            || (beside.is_dated && deviation * beside.periods.sqrt() > NO_DEVIATION)
+            || self.values.iter().any(|value| *value <= -1.0)
+            || (deviation < SURELY_FRACTIONS && mean.abs() > LARGEST_MEAN);
+        if is_percent {
             return Ok(Unit::Percent);
         }
-        if deviation < SURELY_FRACTIONS {
-            return Ok(if mean.abs() <= LARGEST_MEAN { Unit::Fraction } else { Unit::Percent });
-        }
+        let doubt = if deviation < SURELY_FRACTIONS { self.calm(mean, deviation, beside) } else { Some(String::new()) };
+        let Some(doubt) = doubt else { return Ok(Unit::Fraction) };
         let index = self.values.iter().position(|value| *value != 0.0).unwrap_or_default();
         let (text, value) = (&self.cells[index].text, self.values[index]);
         let options = vec![
             (format!("Fractions: {text} is {}", percent(value)), of_unit(Unit::Fraction)),
             (format!("Percent: {text} is {}", percent(value / 100.0)), of_unit(Unit::Percent)),
         ];
-        Err(Stop::asked("unit", format!("Are the returns fractions or percent? What is {text}?"), options))
+        Err(Stop::asked("unit", format!("Are the returns fractions or percent? What is {text}?{doubt}"), options))
+    }
+
+    /// Why numbers that vary little may be a calm record in percent, as a sentence: what they would come to as fractions is
+    /// more than assets and banks do, or they are written as percents are. `None` where they are what fractions look like.
+    fn calm(&self, mean: f64, deviation: f64, beside: &Beside) -> Option<String> {
+        let Beside { periods, is_dated, bank } = *beside;
+        let (mean_per_year, deviation_per_year) = (mean * periods, deviation * periods.sqrt());
+        let error = deviation / (self.values.len() as f64).sqrt();
+        let is_period = if periods == DAYS_A_YEAR { "day" } else { "month" };
+        let told = |what: String| {
+            let of = if is_dated { String::new() } else { format!(", if each is of a {is_period}") };
+            Some(format!(" As fractions {what}{of}."))
+        };
+        if mean_per_year.abs() > LARGE_YEARLY_MEAN && mean.abs() > SURE_ERRORS * error {
+            return told(format!("they average {} a year", percent(mean_per_year)));
+        }
+        if is_dated && deviation_per_year > LARGE_DEVIATION {
+            return told(format!("their deviation is {} a year", percent(deviation_per_year)));
+        }
+        if deviation_per_year / 100.0 < SMALL_DEVIATION {
+            return None;
+        }
+        match bank {
+            Some(rate) => told(format!("the bank pays {} a year", percent(rate))),
+            None if is_coarse(&self.cells) => told("all of them are whole percents".to_owned()),
+            None => None,
+        }
     }
 
     /// Refuses the cell that cannot be what it is said to be.

@@ -5,6 +5,7 @@
 //! asked; and a cell that cannot be meant is refused by its line, its column and its value. Nothing is passed over in silence:
 //! an investor who is misread gets wrong advice that looks right. Checked by: `tests/returns.rs`.
 
+mod bank;
 mod cells;
 mod choices;
 mod dates;
@@ -16,7 +17,7 @@ mod record;
 mod sheet;
 mod words;
 
-pub use choices::{Choices, Kind, Unit};
+pub use choices::{Choices, Kind, RateUnit, Unit};
 pub use outcome::{Answer, Place, Question};
 pub use reading::{Reading, read};
 pub use record::{BankRate, Record, Series};

@@ -4,13 +4,14 @@ use jiff::civil::Date;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::bank::Bank;
 use super::cells::{Cell, mark};
 use super::choices::{Choices, Unit};
 use super::dates::{are_dates, form};
-use super::kind::{Numbers, Returns};
-use super::number::{Mark, has_percent, number};
+use super::kind::{Beside, Numbers, Returns};
+use super::number::{Mark, number};
 use super::outcome::{Answer, Place, Question, Stop, both};
-use super::record::{BankRate, Found, Order, Record};
+use super::record::{Found, Order, Record};
 use super::sheet::{Column, ColumnFound, Holds, Sheet};
 use super::words::counted;
 use crate::control::request::frequency::Frequency;
@@ -21,8 +22,6 @@ const FEWEST: usize = 2;
 const TRIED: usize = 8_000_000;
 /// Questions that may follow from an answer.
 const ROUNDS: usize = 6;
-/// Of what the bank pays a period; as `problem.rate_per_step`.
-const RATE: std::ops::RangeInclusive<f64> = -0.5..=0.5;
 
 /// What is made of a text.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -98,38 +97,34 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
         return Err(Stop::refused("One number is no record of returns: at least two are needed."));
     }
     let order = order(sheet.column(Holds::Dates), rows.clone(), said);
-    if order.as_ref().is_ok_and(|order| order.is_turned) {
+    let is_turned = order.as_ref().is_ok_and(|order| order.is_turned);
+    if is_turned {
         numbers.iter_mut().for_each(|numbers| {
             numbers.values.reverse();
             numbers.cells.reverse();
         });
     }
-    let returns = numbers.iter().map(|numbers| numbers.returns(said)).collect::<Result<Vec<Returns>, Stop>>();
+    let mut beside = Beside::of(order.as_ref().ok().and_then(Order::periods_per_year), rows.len());
+    let bank = sheet.column(Holds::Rate).map(|column| {
+        let mut cells: Vec<&Cell> = column.cells[rows.clone()].iter().collect();
+        if is_turned {
+            cells.reverse();
+        }
+        Bank { column, cells, mark, periods: beside.periods }
+    });
+    beside.bank = bank.as_ref().filter(|_| said.rate_unit.is_none()).and_then(Bank::beyond);
+    let returns = numbers.iter().map(|numbers| numbers.returns(said, &beside)).collect::<Result<Vec<Returns>, Stop>>();
     let (order, returns) = both(order, returns)?;
     let count = returns[0].simple.len();
-    if returns.iter().any(|other| other.simple.len() != count) {
-        return Err(Stop::refused(
-            "Some of the columns are prices and some are returns: say what they are, of all alike.",
-        ));
-    }
-    if said.unit.is_none() && returns.iter().any(|other| other.unit != returns[0].unit) {
-        return Err(Stop::refused(
-            "Some of the columns look like percent and some like fractions: say the unit, of all alike.",
-        ));
-    }
+    alike(&returns, said)?;
     if count < FEWEST {
         return Err(Stop::refused("Two prices make one return: at least two returns are needed."));
     }
     let used = said.latest.unwrap_or(count).clamp(FEWEST, count);
     let mut remarks = Vec::new();
-    let unit = returns[0].unit;
-    let rate = sheet.column(Holds::Rate).and_then(|column| {
-        let mut cells: Vec<&Cell> = column.cells[rows.clone()].iter().collect();
-        if order.is_turned {
-            cells.reverse();
-        }
-        let found = bank_rate(column, &cells[rows.len() - used..], mark, unit);
-        found.map_err(|reason| remarks.push(format!("Column {} is not used: {reason}.", column.name))).ok()
+    let rate = bank.as_ref().map(|bank| bank.rates(used, returns[0].unit, said)).transpose()?.and_then(|found| {
+        let name = bank.as_ref().map_or("", |bank| bank.column.name.as_str());
+        found.map_err(|reason| remarks.push(format!("Column {name} is not used: {reason}."))).ok()
     });
     if order.is_turned && order.dates.is_some() {
         remarks.push("The rows came newest first and are turned round.".to_owned());
@@ -143,6 +138,25 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
     let found =
         Found { names: chosen.iter().map(|column| column.name.clone()).collect(), order, returns, rate, used, remarks };
     Ok(found.record(sheet.found()))
+}
+
+/// Columns that are read together are of one kind and in one unit.
+fn alike(returns: &[Returns], said: &Choices) -> Result<(), Stop> {
+    if returns.iter().any(|other| other.simple.len() != returns[0].simple.len()) {
+        return Err(Stop::refused(
+            "Some of the columns are prices and some are returns: say what they are, of all alike.",
+        ));
+    }
+    if said.unit.is_some() || returns.iter().all(|other| other.unit == returns[0].unit) {
+        return Ok(());
+    }
+    let option = |label: &str, unit| (label.to_owned(), Choices { unit: Some(unit), ..Choices::default() });
+    let options = vec![option("Percent, all of them", Unit::Percent), option("Fractions, all of them", Unit::Fraction)];
+    Err(Stop::asked(
+        "unit",
+        "Some of the columns look like percent and some like fractions. What are they all?",
+        options,
+    ))
 }
 
 /// The rows from the first number to the last; a blank cell among them is a hole in the record.
@@ -223,16 +237,4 @@ fn order(column: Option<&Column>, rows: std::ops::Range<usize>, said: &Choices) 
         }
     };
     Ok(Order { dates: Some(dates), is_turned, frequency })
-}
-
-/// In the unit of the returns; beside prices as fractions. The reason where a cell cannot be meant so.
-fn bank_rate(column: &Column, cells: &[&Cell], mark: Mark, unit: Option<Unit>) -> Result<BankRate, String> {
-    let rate = |cell: &&Cell| {
-        let divisor = if has_percent(&cell.text) || unit == Some(Unit::Percent) { 100.0 } else { 1.0 };
-        let found = number(&cell.text, mark).map(|value| value / divisor).filter(|rate| RATE.contains(rate));
-        let rule = "must be a fraction a period from -0.5 to 0.5: 0.002 is 0.2 %";
-        found.ok_or_else(|| format!("{}: {rule}", cell.called(&column.name)))
-    };
-    let rates = cells.iter().map(rate).collect::<Result<Vec<f64>, String>>()?;
-    Ok(BankRate { column: column.name.clone(), rates })
 }

@@ -91,6 +91,13 @@ pub struct Order {
     pub frequency: Option<Frequency>,
 }
 
+impl Order {
+    /// Where the dates say so.
+    pub fn periods_per_year(&self) -> Option<usize> {
+        self.frequency.zip(self.dates.as_ref()).map(|(frequency, dates)| frequency.periods_per_year(dates))
+    }
+}
+
 /// What was found in the columns that are read.
 pub struct Found {
     pub names: Vec<String>,
@@ -107,10 +114,9 @@ pub struct Found {
 impl Found {
     /// The last periods, and the sentence that tells what they are.
     pub fn record(self, columns: Vec<ColumnFound>) -> Record {
-        let Found { names, order: Order { dates, is_turned, frequency }, returns, rate, used, remarks } = self;
-        let count = returns[0].simple.len();
-        let periods_per_year =
-            frequency.zip(dates.as_ref()).map(|(frequency, dates)| frequency.periods_per_year(dates));
+        let Found { names, order, returns, rate, used, remarks } = self;
+        let (count, periods_per_year) = (returns[0].simple.len(), order.periods_per_year());
+        let Order { dates, is_turned, frequency } = order;
         let series =
             names.into_iter().zip(returns).map(|(column, returns)| Series::of(column, returns, used, periods_per_year));
         let days = dates.map(|dates| dates[dates.len() - used..].to_vec());

@@ -1,7 +1,7 @@
 //! What is answered to a report and to a correction; kept with them, to be given again.
 
 use jiff::civil::Date;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
 use super::assets::{Composed, ObservedAssets};
@@ -79,4 +79,13 @@ pub struct Stands {
     pub wealth_change: f64,
     pub date: Option<Date>,
     pub drift: Drift,
+    /// Standard deviation of the log-returns learned, where the moments tell it.
+    #[serde(default, rename = "moments", deserialize_with = "deviation")]
+    pub deviation: Option<f64>,
+}
+
+fn deviation<'a, D: Deserializer<'a>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    let moments = Vec::<f64>::deserialize(deserializer)?;
+    let [mean, square, ..] = moments[..] else { return Ok(None) };
+    Ok(Some((square - mean * mean).max(0.0).sqrt()))
 }

@@ -15,6 +15,7 @@ pub mod clock;
 pub mod config;
 mod content;
 pub mod drift;
+mod due;
 pub mod error;
 pub mod history;
 mod idempotency;

@@ -1,10 +1,16 @@
 //! Sessions as an overview shows them.
 
+use jiff::Timestamp;
+use jiff::civil::Date;
+use jiff::tz::TimeZone;
+
 use super::answer::Stands;
 use super::content::read;
+use super::drift::DriftLevel;
+use super::due::{first_day, next_day};
 use super::error::ServiceError;
 use super::sessions::Sessions;
-use crate::store::{SessionList, SessionQuery, SessionSummary, Tenant};
+use crate::store::{Care, CareCounts, SessionList, SessionQuery, SessionSummary, Tenant, Today};
 
 /// A session of a list, and where it stands by its last entry.
 #[derive(Debug)]
@@ -12,6 +18,10 @@ pub struct Listed {
     pub row: SessionSummary,
     /// `None` before the first report.
     pub stands: Option<Stands>,
+    /// The last day that its next report is not late, by the calendar of its policy.
+    pub next: Option<Date>,
+    /// Why it needs care.
+    pub care: Vec<Care>,
 }
 
 /// A page of sessions, and how many match in all.
@@ -19,6 +29,8 @@ pub struct Listed {
 pub struct Overview {
     pub sessions: Vec<Listed>,
     pub total: usize,
+    /// Of those that match in whatever state, on the first page.
+    pub care: Option<CareCounts>,
 }
 
 impl Sessions {
@@ -26,12 +38,37 @@ impl Sessions {
     ///
     /// # Errors
     /// The store does not answer.
-    pub async fn list(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<Overview, ServiceError> {
-        let SessionList { sessions, total } = self.store.sessions(tenant, asked).await?;
-        let listed = |row: SessionSummary| {
-            let stands = row.last.as_ref().map(|(answer, _)| read(answer)).transpose()?;
-            Ok(Listed { row, stands })
+    pub async fn list(&self, tenant: &Tenant, asked: SessionQuery) -> Result<Overview, ServiceError> {
+        let now_ms = self.clock.now_milliseconds();
+        let today = day_of(now_ms);
+        let calendars = self.store.calendars(tenant).await?;
+        let first_days = calendars.into_iter().filter_map(|periods| first_day(today?, periods)).collect();
+        let asked = SessionQuery { today: Today { now_ms, first_days }, ..asked };
+        let SessionList { sessions, total } = self.store.sessions(tenant, &asked).await?;
+        let care = match asked.after {
+            None => Some(self.store.care(tenant, &asked).await?),
+            Some(_) => None,
         };
-        Ok(Overview { sessions: sessions.into_iter().map(listed).collect::<Result<_, ServiceError>>()?, total })
+        let listed = |row: SessionSummary| {
+            let stands: Option<Stands> = row.last.as_ref().map(|(answer, _)| read(answer)).transpose()?;
+            let said = stands.and_then(|stands| stands.date);
+            let from = said.or_else(|| day_of(row.last.as_ref().map_or(row.created_ms, |(_, reported)| *reported)));
+            let is_active = row.observations < row.horizon;
+            let next = row.periods_per_year.filter(|_| is_active).and_then(|periods| next_day(from?, periods));
+            let needs = |care: &Care| match care {
+                Care::Overdue => next.zip(today).is_some_and(|(next, today)| next < today),
+                Care::Renewal => row.is_stuck,
+                Care::Alarm => stands.is_some_and(|stands| stands.drift.level == DriftLevel::Alarm),
+            };
+            let care = Care::ALL.into_iter().filter(|care| is_active && needs(care)).collect();
+            Ok(Listed { row, stands, next, care })
+        };
+        let sessions = sessions.into_iter().map(listed).collect::<Result<_, ServiceError>>()?;
+        Ok(Overview { sessions, total, care })
     }
+}
+
+/// The day in UTC.
+fn day_of(milliseconds: i64) -> Option<Date> {
+    Some(Timestamp::from_millisecond(milliseconds).ok()?.to_zoned(TimeZone::UTC).date())
 }

@@ -25,6 +25,7 @@
 mod audit;
 mod audit_chain;
 mod backup;
+mod care;
 mod check;
 mod codec;
 mod entries;
@@ -48,6 +49,7 @@ mod retention;
 mod seen;
 mod sessions;
 mod sqlite;
+mod statement;
 mod tenant;
 mod turns;
 
@@ -61,6 +63,7 @@ use query::{Connection, Purpose, Query, Row};
 
 pub use audit::{Actor, AuditBounds, AuditFilter, AuditRow, Deed};
 pub use backup::{backup, restore};
+pub use care::{Care, CareCounts, FirstDay, Today};
 pub use check::Inspection;
 pub use entries::{Append, EntryKind, EntryRow};
 pub use error::{OverQuota, Quota, StoreError};

@@ -4,12 +4,12 @@
 //! that a row is never out of step with the entries, and an observation writes no more than its entry. Only what is listed
 //! is read; what pages are put in order by is read of every session that matches.
 
-use std::fmt;
-
+use super::care::{Care, CareCounts, Today, needs, needs_any};
 use super::codec::{from_sql, to_sql};
 use super::error::Failure;
 use super::labels::Labels;
-use super::query::{Query, Row, Value, query};
+use super::query::{Query, Row};
+use super::statement::{HORIZON, OBSERVATIONS, Statement, TABLES};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 
@@ -35,6 +35,8 @@ pub enum SessionIs {
     Completed,
     /// To be renewed by itself.
     Due,
+    /// Active, and in need of care for this reason, or for any.
+    Needing(Option<Care>),
 }
 
 /// What is asked of a list of sessions; all of them, as they were opened, where nothing is given.
@@ -45,6 +47,8 @@ pub struct SessionQuery {
     /// A whole tag.
     pub tag: Option<String>,
     pub is: Option<SessionIs>,
+    /// By which it is told who needs care.
+    pub today: Today,
     pub order: SessionOrder,
     pub descending: bool,
     pub limit: usize,
@@ -89,6 +93,8 @@ pub struct SessionSummary {
     pub observations: usize,
     /// Whether it is to be renewed by itself.
     pub is_due: bool,
+    /// Whether that fails, as [`Care::Renewal`] says.
+    pub is_stuck: bool,
     /// The last observation or correction: what was answered to it, and when.
     pub last: Option<(String, i64)>,
     pub place: SessionPlace,
@@ -101,20 +107,6 @@ pub struct SessionList {
     pub total: usize,
 }
 
-/// The tables of a list: a session, its labels, the policy that advises it, and the last entry that moved it.
-const TABLES: &str = "FROM sessions
-    LEFT JOIN labels ON labels.tenant = sessions.tenant AND labels.object = sessions.session
-    LEFT JOIN renewals ON renewals.session = sessions.session
-         AND renewals.number = (SELECT max(number) FROM renewals AS made WHERE made.session = sessions.session)
-    LEFT JOIN policies ON policies.policy = coalesce(renewals.policy, sessions.policy)
-    LEFT JOIN labels AS called ON called.tenant = sessions.tenant
-         AND called.object = coalesce(renewals.policy, sessions.policy)
-    LEFT JOIN entries AS last ON last.session = sessions.session
-         AND last.entry = (SELECT entry FROM entries AS made WHERE made.session = sessions.session
-                           AND kind <> 'renewal' ORDER BY entry DESC LIMIT 1)";
-const HORIZON: &str = "coalesce(renewals.horizon, sessions.horizon)";
-const OBSERVATIONS: &str = "coalesce((SELECT number FROM entries AS made WHERE made.session = sessions.session
-    AND kind = 'observation' ORDER BY entry DESC LIMIT 1), 0)";
 const WEALTH: &str = "coalesce(CAST(json_extract(last.answer_json, '$.wealth') AS DOUBLE PRECISION),
     sessions.initial_wealth)";
 
@@ -129,39 +121,10 @@ impl Store {
             futures_util::try_join!(self.list(doing, page, decode), self.list(doing, count, counted))?;
         Ok(SessionList { sessions, total: usize::try_from(total).unwrap_or_default() })
     }
-}
 
-/// A statement under way: its text and its values.
-struct Statement {
-    sql: String,
-    values: Vec<Value>,
-}
-
-impl Statement {
-    fn new(sql: String, tenant: &Tenant) -> Self {
-        let mut statement = Statement { sql, values: Vec::new() };
-        statement.and(" WHERE sessions.tenant = ?", [tenant.as_str().into()]);
-        statement
-    }
-
-    /// Adds a part whose `?` stand for the values, in their order.
-    fn and<const N: usize>(&mut self, part: &str, values: [Value; N]) {
-        let mut values = values.into_iter();
-        for (index, piece) in part.split('?').enumerate() {
-            if index > 0 {
-                self.values.extend(values.next());
-                self.write(format_args!("${}", self.values.len()));
-            }
-            self.sql.push_str(piece);
-        }
-    }
-
-    fn write(&mut self, text: fmt::Arguments<'_>) {
-        self.sql += &text.to_string();
-    }
-
-    fn query(self) -> Query {
-        self.values.into_iter().fold(query(self.sql), Query::bind)
+    /// Counts what needs care among the sessions that match, in whatever state.
+    pub async fn care(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<CareCounts, StoreError> {
+        self.list("counting sessions that need care", asked.caring(tenant), CareCounts::from_rows).await
     }
 }
 
@@ -169,13 +132,16 @@ impl SessionQuery {
     fn page(&self, tenant: &Tenant) -> Query {
         let key = self.order.key();
         let columns = format!(
-            "SELECT sessions.sequence, sessions.session, sessions.initial_wealth, sessions.initial_holding,
+            " THEN 1 ELSE 0 END AS BIGINT) AS stuck, sessions.sequence, sessions.session, sessions.initial_wealth, sessions.initial_holding,
                     sessions.created_ms, labels.name, labels.notes, labels.tags,
                     coalesce(renewals.policy, sessions.policy) AS policy, called.name AS policy_name,
                     policies.periods_per_year, {HORIZON} AS horizon, {OBSERVATIONS} AS observations, sessions.due,
                     last.answer_json, last.created_ms AS reported_ms, {key} AS sort_key {TABLES}"
         );
-        let mut statement = Statement::new(columns, tenant);
+        let mut statement = Statement::of("SELECT CAST(CASE WHEN ");
+        needs(&mut statement, Care::Renewal, &self.today);
+        statement.and(&columns, []);
+        statement.and(" WHERE sessions.tenant = ?", [tenant.as_str().into()]);
         self.only_matching(&mut statement);
         let (order, beyond) = if self.descending { ("DESC", '<') } else { ("ASC", '>') };
         if let Some(SessionPlace { key: value, sequence }) = &self.after {
@@ -197,8 +163,32 @@ impl SessionQuery {
     fn count(&self, tenant: &Tenant) -> Query {
         let is_narrowed = self.search.is_some() || self.tag.is_some() || self.is.is_some();
         let tables = if is_narrowed { TABLES } else { "FROM sessions" };
-        let mut statement = Statement::new(format!("SELECT count(*) AS total {tables}"), tenant);
+        let mut statement = Statement::of(&format!("SELECT count(*) AS total {tables}"));
+        statement.and(" WHERE sessions.tenant = ?", [tenant.as_str().into()]);
         self.only_matching(&mut statement);
+        statement.query()
+    }
+
+    fn caring(&self, tenant: &Tenant) -> Query {
+        let mut statement = Statement::of("SELECT count(*) AS active");
+        let sum = |word: &str| format!(", coalesce(sum({word}), 0) AS {word}");
+        for part in ["any_of_them", "overdue", "renewal", "alarm"].map(sum) {
+            statement.and(&part, []);
+        }
+        statement.and(
+            " FROM (SELECT flags.*, CASE WHEN overdue + renewal + alarm > 0 THEN 1 ELSE 0 END AS any_of_them FROM (SELECT ",
+            [],
+        );
+        for (place, care) in Care::ALL.into_iter().enumerate() {
+            statement.and(if place == 0 { "CASE WHEN " } else { ", CASE WHEN " }, []);
+            needs(&mut statement, care, &self.today);
+            statement.and(&format!(" THEN 1 ELSE 0 END AS {}", care.column()), []);
+        }
+        statement.and(&format!(" {TABLES}"), []);
+        let all = SessionQuery { is: None, ..self.clone() };
+        statement.and(" WHERE sessions.tenant = ?", [tenant.as_str().into()]);
+        all.only_matching(&mut statement);
+        statement.and(&format!(" AND {OBSERVATIONS} < {HORIZON}) AS flags) AS counted"), []);
         statement.query()
     }
 
@@ -220,8 +210,16 @@ impl SessionQuery {
             // What has the tag is another text without it.
             statement.and(" AND replace(labels.tags, ?, '') <> labels.tags", [format!("\n{tag}\n").into()]);
         }
+        if let Some(SessionIs::Needing(_)) = self.is {
+            statement.and(&format!(" AND {OBSERVATIONS} < {HORIZON}"), []);
+        }
         match self.is {
             None => {}
+            Some(SessionIs::Needing(None)) => needs_any(statement, &self.today),
+            Some(SessionIs::Needing(Some(care))) => {
+                statement.and(" AND ", []);
+                needs(statement, care, &self.today);
+            }
             Some(SessionIs::Active) => statement.and(&format!(" AND {OBSERVATIONS} < {HORIZON}"), []),
             Some(SessionIs::Completed) => statement.and(&format!(" AND {OBSERVATIONS} >= {HORIZON}"), []),
             Some(SessionIs::Due) => statement.and(&format!(" AND sessions.due <= {OBSERVATIONS}"), []),
@@ -272,6 +270,7 @@ impl SessionSummary {
             created_ms: row.get("created_ms")?,
             observations,
             is_due: due.is_some_and(|due| due <= observations),
+            is_stuck: row.get::<i64>("stuck")? != 0,
             last: answer.zip(reported_ms),
             place: order.place(row)?,
         })

@@ -93,6 +93,29 @@ test("a header puts the columns in any order, and a column that means nothing is
   assert.deepEqual(read("client,return,return\nAda,1,2").unread, ["return"]);
 });
 
+test("a column of fractions, and one a hundred times too large, are told by the records of the sessions", async () => {
+  const { finder, otherUnit, readLines } = await dashboardModule("report_lines.js");
+  const known = ["Ada", "Eve", "Ida"].map((name, index) => ({ session: `session_${index}${"0123456789".repeat(3)}`, name, policy: "P", state: "active", period: 1, deviation: 0.045 }));
+  const terms = { assetsOf: () => null, lately: () => false };
+  const read = (text, unit) => readLines(text, finder(known), {}, { ...terms, unit }).rows;
+  const seems = (text) => otherUnit(read(text), ({ deviation }) => deviation);
+  const table = (returns, head = "return") => `client;${head};held\n${["Ada", "Eve", "Ida"].map((name, index) => `${name};${returns[index]};0.6`).join("\n")}`;
+  assert.equal(seems(table([0.012, -0.031, 0.008])), "fraction");
+  assert.equal(seems("Ada 0.012\nEve -0.02"), "fraction");
+  assert.equal(seems(table([1.2, -3.1, 0.8])), null);
+  // One of a percent and more is enough for the others to be percent too.
+  assert.equal(seems(table([0.01, 0.02, 1.1])), null);
+  assert.equal(seems(table([120, -310, 80])), "hundredth");
+  assert.equal(seems("Ada 120"), null);
+  // Whoever writes percent means it.
+  assert.equal(seems(table(["0.012 %", "-0.031 %", "0.008 %"])), null);
+  assert.equal(seems(table([0.012, -0.031, 0.008], "return, %")), null);
+  assert.equal(otherUnit(read(table([0.012, -0.031, 0.008])), () => undefined), null);
+  const [ada] = read(table([0.012, -0.031, 0.008]), "fraction");
+  assert.deepEqual(ada.report, { simple_return: 0.012, executed_allocation: 0.6 });
+  assert.deepEqual(read("Ada 120", "hundredth")[0].report, { simple_return: 0.012 });
+});
+
 test("what is reported up to a day already, or was within the hour, is not reported again by mistake", async () => {
   const known = [{ session: "session_00aa11bb22cc33", name: "Ada", state: "active", period: 2, date: "2026-10-31", last_report_ms: 1 }];
   const read = await readBy(known, { lately: () => true });
@@ -211,6 +234,30 @@ test("forty clients are reported by one file, a bad row is named by its line, an
     else assert.deepEqual(reported.simple_returns, { World: Number((back(k) / 100).toPrecision(12)), Gold: 0.005 });
     assert.equal(reported.flow ?? null, k === 0 ? 50 : null);
   }
+});
+
+test("returns that seem to be fractions are not recorded before it is said what they are", async () => {
+  const { policy } = await call(ballast.url, `/sessions/${sessions[0]}`);
+  const session = (await call(ballast.url, "/sessions", { policy, name: "Fractions" })).session;
+  const recorded = async () => (await call(ballast.url, `/sessions/${session}/history`)).observations.map(({ reported }) => reported.simple_return);
+  await go("#/report");
+  await lines().fill("Fractions 0.012");
+  await page.getByText("Are they fractions?", { exact: false }).waitFor();
+  assert.equal(await page.getByRole("button", { name: "Report for 1" }).isDisabled(), true);
+  await page.getByLabel("These returns are").selectOption("Fractions: 0.012 is 1.2 %");
+  assert.match((await rows("Returns to report"))[0], /^Fractions \w+ 1 1\.20 % yes$/);
+  await page.getByRole("button", { name: "Report for 1" }).click();
+  await page.getByText("1 return is recorded.").first().waitFor();
+  assert.deepEqual(await recorded(), [0.012]);
+  await page.getByLabel("These returns are").waitFor({ state: "hidden" });
+  // Now the session's own record tells; and a very calm month in percent is taken where that is said.
+  await page.getByLabel("Last day").fill("2026-10-31");
+  await lines().fill("Fractions 0.02");
+  await page.getByText("Are they fractions?", { exact: false }).waitFor();
+  await page.getByLabel("These returns are").selectOption("Percent: 1.2 is 1.2 %");
+  await page.getByRole("button", { name: "Report for 1" }).click();
+  await page.getByText("1 return is recorded.").first().waitFor();
+  assert.deepEqual(await recorded(), [0.012, 0.0002]);
 });
 
 test("a column that is not understood is named, with those that are", async () => {

@@ -2,7 +2,7 @@
 
 import { csvRows } from "./csv.js";
 import { short } from "./format.js";
-import { fraction, typed } from "./number_text.js";
+import { fraction, hundredth, typed } from "./number_text.js";
 import { day } from "./periods.js";
 
 /** So much of an identifier tells whose it is. */
@@ -25,9 +25,15 @@ const COLUMNS = {
 export const HEADS = Object.values(COLUMNS).map(([head]) => head);
 const SHARES = ["simple_return", "executed_allocation", "rate"];
 
+/** Returns that vary so much less, or more, than the records of their sessions are most likely in another unit. */
+const FAR = { less: 0.035, more: 10 };
+/** So few unusual returns are asked about one by one. */
+const FEW = 3;
+
 const folded = (text) => text.trim().toLowerCase();
 /** What a column is called, without its unit. */
-const headOf = (cell) => folded(cell).replace(/[,\s]*(?:%|\(%\)|in percent)$/, "").replaceAll("_", " ");
+const PERCENT = /[,\s]*(?:%|\(%\)|in percent)$/;
+const headOf = (cell) => folded(cell).replace(PERCENT, "").replaceAll("_", " ");
 const columnOf = (head) => Object.keys(COLUMNS).find((name) => COLUMNS[name].includes(head));
 
 /** `find(text)`: the sessions that a text names, by their names, or else by their identifiers. */
@@ -52,20 +58,45 @@ export function finder(sessions) {
   };
 }
 
+/**
+ * What the unit of the returns of rows seems to be where it is not the one they are read in: `"fraction"` where all that say no percent
+ * lie below a hundredth or so of what the records of their sessions vary by, `"hundredth"` where most lie a hundred times above, or
+ * null. `deviationOf(entry)` is the deviation of a session's record, undefined while it is not known.
+ */
+export function otherUnit(rows, deviationOf) {
+  const told = rows.filter(({ trouble, said }) => trouble === null && !said).flatMap(({ entry, report }) => {
+    const deviation = deviationOf(entry);
+    const returns = report.simple_returns ? Object.values(report.simple_returns) : [report.simple_return];
+    return deviation > 0 ? returns.filter((value) => value !== undefined && value !== 0).map((value) => Math.abs(value) / deviation) : [];
+  });
+  if (told.length === 0) return null;
+  if (told.every((times) => times < FAR.less)) return "fraction";
+  return told.length >= FEW && told.sort((a, b) => a - b)[told.length >> 1] > FAR.more ? "hundredth" : null;
+}
+
 /** What a session is written as: its name, where no other has it. */
 export const written = (find, { session, name }) => (name && find(name).length === 1 ? name : short(session));
+
+const saysPercent = (text) => text.endsWith("%");
+
+/** Reads a share in `unit`: `percent`, `fraction` or `hundredth` of a percent; one with a percent sign is that. */
+export const inUnit = (unit) => (text) => {
+  const value = fraction(text);
+  if (value === null || saysPercent(text) || unit === "percent") return value;
+  return unit === "fraction" ? typed(text) : hundredth(value);
+};
 
 /** The ways in which a line may be a name and a number, the likeliest first. */
 const SPLITS = [/^(.*)[\t;]\s*([^\t;]*)$/, /^(.*)\s([^\s]+(?:\s*%)?)$/, /^([^,]*),(.*)$/];
 
 /** A line as its sessions, `found`, what it says of the period, `report`, and what is wrong with it, or null. */
-function readLine(line, find) {
+function readLine(line, find, scaled) {
   const whole = find(line);
   if (whole.length > 0) return { found: whole, report: {}, trouble: null };
   const parts = SPLITS.map((split) => split.exec(line)).filter(Boolean).map(([, name, number]) => [name.replace(/[,;:\s]+$/, ""), number.trim()]);
   const numbered = parts.find(([, number]) => number !== "" && fraction(number) !== null);
   const known = parts.find(([name]) => find(name).length > 0);
-  if (numbered) return { found: find(numbered[0]), name: numbered[0], report: { simple_return: fraction(numbered[1]) }, trouble: null };
+  if (numbered) return { found: find(numbered[0]), name: numbered[0], report: { simple_return: scaled(numbered[1]) }, said: saysPercent(numbered[1]), trouble: null };
   if (!known) return { found: [], name: line, report: {}, trouble: null };
   const [name, number] = known;
   return { found: find(name), report: {}, trouble: number === "" ? null : `\u201c${number}\u201d is not a number of percent` };
@@ -82,9 +113,9 @@ function tableOf(text) {
 }
 
 /** A cell of a share, an amount, a day or a period; null where it is none. */
-function cellValue(name, text) {
+function cellValue(name, text, scaled) {
   if (name === "date") return /^\d{4}-\d\d-\d\d$/.test(text) ? text : null;
-  const value = SHARES.includes(name) ? fraction(text) : typed(text);
+  const value = SHARES.includes(name) ? scaled(text) : typed(text);
   return typeof value !== "number" || (name === "period" && !(Number.isInteger(value) && value > 0)) ? null : value;
 }
 
@@ -99,10 +130,10 @@ function meant(head, assets) {
   return columnOf(head) ? [columnOf(head)] : null;
 }
 
-function readRow({ cells }, { header, heads }, find, assetsOf) {
+function readRow({ cells }, { header, heads }, find, assetsOf, scaled) {
   const named = heads.flatMap((head, index) => (columnOf(head) === "client" && cells[index] ? [cells[index]] : []));
   const found = named.map(find).find((sessions) => sessions.length > 0) ?? [];
-  const read = { found, name: named.join(", "), report: {}, unsaid: [], trouble: null };
+  const read = { found, name: named.join(", "), report: {}, unsaid: [], said: false, trouble: null };
   if (cells.length > heads.length) read.trouble = `has ${cells.length} cells, and the header ${heads.length}`;
   if (found.length !== 1) return read;
   const assets = assetsOf(found[0].policy);
@@ -110,7 +141,9 @@ function readRow({ cells }, { header, heads }, find, assetsOf) {
     const text = cells[index] ?? "";
     const [name, asset] = meant(head, assets) ?? [];
     if (text === "" || name === "client") continue;
-    const value = name && cellValue(asset ? "simple_return" : name, text);
+    const isSaid = saysPercent(text) || PERCENT.test(folded(header.cells[index]));
+    const value = name && cellValue(asset ? "simple_return" : name, text, isSaid ? fraction : scaled);
+    if (isSaid && name?.startsWith("simple_return")) read.said = true;
     if (name === undefined) read.unsaid.push(header.cells[index]);
     else if (value === null) read.trouble ??= `\u201c${text}\u201d in the column \u201c${header.cells[index]}\u201d is not ${WANTED[name] ?? "a number of percent"}`;
     else read.report[name] = asset ? { ...read.report[name], [asset]: value } : value;
@@ -142,18 +175,18 @@ function wrong({ found, name }, { period, ...report }, { assetsOf, lately }) {
  * it names, what it says of the period, and what is wrong with it, or null. `header` is the first line where it heads columns, and
  * `unread` the columns that nothing is read from. `all` says what holds for the rows that say nothing of their own: `{simple_return, date}`.
  * `assetsOf(policy)` are the names of its assets, null where it has one, undefined while that is not known; `lately(entry)` whether a
- * session reported so lately that it may be in the text by mistake. Of a session that is named twice neither row is taken: nobody can
+ * session reported so lately that it may be in the text by mistake; `unit` is what shares without a percent sign are in. Of a session that is named twice neither row is taken: nobody can
  * know which is meant.
  */
-export function readLines(text, find, all, { assetsOf, lately }) {
-  const table = tableOf(text);
+export function readLines(text, find, all, { assetsOf, lately, unit = "percent" }) {
+  const [table, scaled] = [tableOf(text), inUnit(unit)];
   const lines = text.split("\n").map((text, index) => ({ line: index + 1, text: text.trim() })).filter(({ text }) => text !== "");
   const rows = (table?.rows ?? lines).map((row) => {
-    const read = table ? readRow(row, table, find, assetsOf) : readLine(row.text, find);
+    const read = table ? readRow(row, table, find, assetsOf, scaled) : readLine(row.text, find, scaled);
     const entry = read.found.length === 1 ? read.found[0] : undefined;
     const common = entry && assetsOf(entry.policy) ? { date: all.date } : all;
     const report = Object.fromEntries(Object.entries({ ...common, ...read.report }).filter(([, value]) => value !== undefined));
-    return { ...row, entry, report, unsaid: read.unsaid ?? [], trouble: read.trouble ?? wrong(read, report, { assetsOf, lately }) };
+    return { ...row, entry, report, said: read.said ?? false, unsaid: read.unsaid ?? [], trouble: read.trouble ?? wrong(read, report, { assetsOf, lately }) };
   });
   const assets = new Set(rows.flatMap(({ entry }) => (entry && assetsOf(entry.policy)) ?? []));
   const unread = table ? table.header.cells.filter((_, index) => meant(table.heads[index], assets) === null) : [];

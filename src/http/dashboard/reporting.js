@@ -3,13 +3,12 @@
 import { get, post } from "./api.js";
 import { announce, h, section, table } from "./dom.js";
 import { fileDrop } from "./file_drop.js";
-import { area, fieldset, input } from "./form.js";
+import { area, fieldset, input, select } from "./form.js";
 import { count, counted, percent, wealth } from "./format.js";
 import { headed } from "./naming.js";
-import { fraction } from "./number_text.js";
 import { all } from "./pages.js";
 import { problemWords, unusualWords } from "./problem_words.js";
-import { finder, HEADS, LATELY, readLines, written } from "./report_lines.js";
+import { finder, HEADS, inUnit, LATELY, otherUnit, readLines, written } from "./report_lines.js";
 
 /** The service takes so many reports in one call. */
 const AT_ONCE = 1000;
@@ -23,23 +22,33 @@ export async function view(query, leaving) {
   return { title: "Report for several", trail, body: reporting(sessions, chosen, leaving) };
 }
 
-/** `{of(policy), read(policies)}`: the names of a policy's assets, null where it has one, undefined until it is read. */
-function assetsOf(leaving) {
-  const known = new Map();
+/** What the returns without a percent sign are in, where that is asked. */
+const UNITS = { "": "To be said first", percent: "Percent: 1.2 is 1.2 %", fraction: "Fractions: 0.012 is 1.2 %", hundredth: "Hundredths of a percent: 120 is 1.2 %" };
+
+/** `{of(policy), deviation(policy), read(policies)}`: the names of a policy's assets, null where it has one, and the deviation of the
+ * record it was trained on; undefined until it is read. */
+function policiesRead(leaving) {
+  const [known, deviations] = [new Map(), new Map()];
   const asked = new Set();
   const one = async (policy) => {
     asked.add(policy);
     const { specification } = await get(`/policies/${policy}`, leaving);
     known.set(policy, specification.fund?.assets ?? null);
+    deviations.set(policy, deviationOf(specification.problem.history ?? []));
   };
   const read = (policies) => Promise.all(policies.filter((policy) => !asked.has(policy)).map((policy) => one(policy).catch((error) => (asked.delete(policy), Promise.reject(error)))));
-  return { of: (policy) => known.get(policy), read };
+  return { of: (policy) => known.get(policy), deviation: (policy) => deviations.get(policy), read };
+}
+
+function deviationOf(returns) {
+  const mean = returns.reduce((sum, value) => sum + value, 0) / returns.length;
+  return Math.sqrt(returns.reduce((sum, value) => sum + (value - mean) ** 2, 0) / returns.length);
 }
 
 function reporting(sessions, chosen, leaving) {
   const find = finder(sessions);
-  const policies = assetsOf(leaving);
-  let [rows, header] = [[], null];
+  const policies = policiesRead(leaving);
+  let [rows, header, isOpen] = [[], null, false];
   // The returns that were last refused as unusual, by session: those alone can be meant.
   let unusual = new Map();
   const lines = area({
@@ -58,6 +67,9 @@ function reporting(sessions, chosen, leaving) {
   const date = input({ name: "date", label: "Last day", note: "Of all that say none, such as 2008-09-30. May be blank.", inputmode: "text", changed: () => soon() });
   const [meant, sure] = tick("confirm", "The returns are meant, however unusual");
   const [next, again] = tick("next", "Of those reported within the hour, the next period is meant", () => look());
+  const unit = select({ name: "unit", label: "These returns are", choices: UNITS, changed: () => look() });
+  const unitWords = h("p", { class: "note wrong" });
+  const doubt = h("div", { hidden: true, role: "group" }, unitWords, unit.element);
   const preview = h("div", {});
   const outcome = h("div", {});
   const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
@@ -69,12 +81,18 @@ function reporting(sessions, chosen, leaving) {
   };
   const look = () => {
     const of = (control, read) => (control.value.trim() === "" ? undefined : (read(control.value.trim()) ?? undefined));
-    const terms = { simple_return: of(common.control, fraction), date: of(date.control, String) };
-    const read = readLines(lines.control.value, find, terms, { assetsOf: policies.of, lately: (entry) => !next.checked && isLate(entry) });
+    const terms = (unit) => ({ simple_return: of(common.control, inUnit(unit)), date: of(date.control, String) });
+    const as = (unit) => readLines(lines.control.value, find, terms(unit), { assetsOf: policies.of, lately: (entry) => !next.checked && isLate(entry), unit });
+    const seems = otherUnit(as("percent").rows, (entry) => entry.deviation ?? policies.deviation(entry.policy));
+    if (seems === null) unit.control.value = "";
+    doubt.hidden = seems === null;
+    unitWords.textContent = seems === null ? "" : DOUBTS[seems];
+    const read = as(unit.control.value || "percent");
     [rows, header] = [read.rows, read.header];
     again.hidden = !rows.some(({ entry, report }) => entry && isLate(entry) && !report.date && report.period === undefined);
     const ready = rows.filter(({ trouble }) => trouble === null).length;
-    button.disabled = ready === 0;
+    isOpen = seems !== null && unit.control.value === "";
+    button.disabled = ready === 0 || isOpen;
     button.textContent = ready === 0 ? "Report" : `Report for ${count(ready)}`;
     preview.replaceChildren(rows.length > 0 ? section("Who gets what", looked(rows, ready), leftOut(read.unread), previewed(rows)) : "");
     const unknown = [...new Set(rows.flatMap(({ entry }) => (entry && policies.of(entry.policy) === undefined ? [entry.policy] : [])))];
@@ -130,7 +148,7 @@ function reporting(sessions, chosen, leaving) {
     "form",
     { novalidate: true },
     fieldset("The period that ended", [date, common, sure, again]),
-    h("fieldset", {}, h("legend", {}, "Who"), drop, lines.element),
+    h("fieldset", {}, h("legend", {}, "Who"), drop, lines.element, doubt),
     preview,
     message,
     h("p", { class: "send" }, button),
@@ -143,11 +161,17 @@ function reporting(sessions, chosen, leaving) {
       say(error.passing ? `${error.message} Sending it again is safe: a period counts once.` : error.message);
       message.focus();
     });
-    button.disabled = !rows.some(({ trouble }) => trouble === null);
+    button.disabled = isOpen || !rows.some(({ trouble }) => trouble === null);
   });
   look();
   return [form, outcome];
 }
+
+/** Why the unit is asked. */
+const DOUBTS = {
+  fraction: "Read as percent, all of these returns are less than a twentieth of what the records of their sessions vary by. Are they fractions?",
+  hundredth: "Read as percent, most of these returns are more than ten times what the records of their sessions vary by. What are they in?",
+};
 
 /** `[box, element]`: something to be said by a tick, hidden until it may be asked. */
 function tick(name, words, changed) {

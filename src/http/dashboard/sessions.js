@@ -9,7 +9,6 @@ import { allocation, count, counted, moment, percent, wealth } from "./format.js
 import { holderWords } from "./holder.js";
 import { jobList } from "./jobs.js";
 import { called, headed, tagList } from "./naming.js";
-import { all } from "./pages.js";
 import { day } from "./periods.js";
 import { ticking } from "./ticking.js";
 import { welcome } from "./welcome.js";
@@ -18,7 +17,7 @@ import { welcome } from "./welcome.js";
 const PAGE = 50;
 /** Nothing is asked for while a word is being typed, for so long, in milliseconds. */
 const PAUSE = 250;
-const STATES = { "": "All", active: "Active", completed: "Completed", due: "Due for renewal", care: "Needs care" };
+const STATES = { "": "All", active: "Active", completed: "Completed", due: "Due for renewal", care: "Needs care", overdue: "Overdue", renewal: "Waits for its next policy", alarm: "Returns have changed" };
 const NEWEST = "-created";
 /** What is asked for, as it stands in the address, and what it is where nothing is said. */
 const CHOICES = { search: "", tag: "", state: "", sort: NEWEST };
@@ -29,8 +28,7 @@ export async function view(_, leaving) {
   if (!(chosen.state in STATES)) chosen.state = "";
   const several = h("a", { class: "button quiet", href: "#/report" }, "Report for several");
   const actions = h("div", { class: "actions" }, several, h("a", { class: "button", href: "#/sessions/new" }, "Open a session"));
-  const list = lists(leaving);
-  const first = await list.read(chosen, null, leaving);
+  const first = await read(chosen, null, leaving);
   const title = "Overview";
   if (first.total === 0 && !filtered(chosen)) {
     const [{ policies }, { jobs }] = await Promise.all(["/policies?limit=1", "/jobs?limit=1"].map((path) => get(path, leaving)));
@@ -38,7 +36,7 @@ export async function view(_, leaving) {
     if (policies.length > 0) return { title, actions, body: [lead(), who] };
     return { title, body: [...(jobs.length > 0 ? [lead(), jobList(jobs, leaving).element] : [welcome()]), who] };
   }
-  return { title, actions, body: overview(chosen, first, list, leaving) };
+  return { title, actions, body: overview(chosen, first, leaving) };
 }
 
 const lead = () =>
@@ -53,33 +51,13 @@ const filtered = ({ search, tag, state }) => Boolean(search || tag || state);
 /** What of `chosen` is other than where nothing is said. */
 const differing = (chosen) => Object.entries(chosen).filter(([name, value]) => value !== CHOICES[name]);
 
-/** `{read(chosen, after, signal), every(chosen)}`: a page of those that match, and all of them. Which need care the service does not tell: for
- * that all are read, once for each search. */
-function lists(leaving) {
-  const whole = new Map();
-  const every = (chosen) => {
-    const query = new URLSearchParams(differing({ ...chosen, state: "" })).toString();
-    if (!whole.has(query)) {
-      const asked = all(query ? `/sessions?${query}` : "/sessions", "sessions", leaving);
-      whole.set(query, asked);
-      asked.catch(() => whole.delete(query));
-    }
-    return whole.get(query);
-  };
-  const read = async (chosen, after, signal) => {
-    if (chosen.state !== "care") {
-      const query = new URLSearchParams([["limit", PAGE], ...differing(chosen), ...(after === null ? [] : [["after", after]])]);
-      return get(`/sessions?${query}`, signal);
-    }
-    const found = (await every(chosen)).filter(care(Date.now()).needs);
-    signal.throwIfAborted();
-    const end = (after ?? 0) + PAGE;
-    return { sessions: found.slice(after ?? 0, end), total: found.length, next: end < found.length ? end : null };
-  };
-  return { read, every };
+/** A page of those that match. */
+function read(chosen, after, signal) {
+  const query = new URLSearchParams([["limit", PAGE], ...differing(chosen), ...(after === null ? [] : [["after", after]])]);
+  return get(`/sessions?${query}`, signal);
 }
 
-function overview(chosen, first, list, leaving) {
+function overview(chosen, first, leaving) {
   const needs = h("p", { class: "note needs", role: "status" });
   const beyond = h("span", {});
   const advice = advised(leaving, () => tellBeyond());
@@ -120,7 +98,7 @@ function overview(chosen, first, list, leaving) {
     const query = new URLSearchParams(differing(chosen)).toString();
     history.replaceState(null, "", query ? `#/sessions?${query}` : "#/");
     try {
-      const now = await list.read(chosen, null, signal);
+      const now = await read(chosen, null, signal);
       advice.forget();
       entries = [];
       add(now);
@@ -131,7 +109,7 @@ function overview(chosen, first, list, leaving) {
   more.addEventListener("click", async () => {
     more.disabled = true;
     const { signal } = asking;
-    await list.read(chosen, page.next, signal).then((now) => signal.aborted || add(now), failed);
+    await read(chosen, page.next, signal).then((now) => signal.aborted || add(now), failed);
     more.disabled = false;
   });
   add(first);
@@ -140,12 +118,13 @@ function overview(chosen, first, list, leaving) {
     state.control.value = "care";
     ask({ state: "care" });
   };
-  const judge = (entries) => {
-    const now = care(Date.now());
-    const all = entries.some(now.needs) ? h("button", { class: "link", onclick: show }, "Show them") : "";
-    needs.replaceChildren(careWords(entries, now), " ", all, " ", beyond);
+  const judge = (counts) => {
+    const all = counts.any > 0 ? h("button", { class: "link", onclick: show }, "Show them") : "";
+    needs.replaceChildren(careWords(counts), " ", all, " ", beyond);
   };
-  list.every(CHOICES).then(judge, failed);
+  // Those of all sessions, whatever is searched for.
+  if (filtered({ ...chosen, state: "" })) get("/sessions?limit=1", leaving).then(({ care }) => judge(care), failed);
+  else judge(first.care);
   return [needs, element, ticks.link, holder, h("div", { class: "foot" }, line, more)];
 }
 
@@ -170,7 +149,6 @@ function filters(chosen, ask, tags) {
 }
 
 function listed(entries, { ticks, advice, sorted, sort }) {
-  const { of } = care(Date.now());
   const by = (words, column) => {
     const [up, down] = [sorted === column, sorted === `-${column}`];
     const mark = up ? "\u2191" : down ? "\u2193" : "";
@@ -191,10 +169,10 @@ function listed(entries, { ticks, advice, sorted, sort }) {
     { ...by("Wealth", "wealth"), numeric: true, cell: ({ wealth: now }) => wealth(now) },
     { name: "Held now", numeric: true, cell: ({ holding }) => allocation(holding) },
     { name: "Last period", numeric: true, cell: change },
-    { ...by("Last report", "last_report"), cell: (entry) => lastReport(entry, of(entry)) },
+    { ...by("Last report", "last_report"), cell: (entry) => lastReport(entry, care(entry)) },
     { name: "To hold", numeric: true, cell: (entry) => advice.of(entry).hold },
     { name: "To trade", numeric: true, cell: (entry) => advice.of(entry).trade },
-    { name: "State", cell: (entry) => standing(entry, of(entry)) },
+    { name: "State", cell: (entry) => standing(entry, care(entry)) },
     { ...by("Opened", "created"), cell: ({ created_ms, policy, policy_name }) => [moment(created_ms).split(",")[0], h("span", { class: "under" }, "by ", h("a", { href: `#/policies/${policy}` }, called(policy, policy_name)))] },
   ], entries);
 }

@@ -171,6 +171,25 @@ class BootstrapEstimate(TypedDict):
     """Its ends."""
 
 
+class CareCount(TypedDict):
+    """How many sessions need care, and why; one may have several reasons."""
+
+    active: int
+    """Those that are not completed, of which the others are."""
+    any: int
+    """In need of care for any of the reasons."""
+    overdue: int
+    """Their next report is late."""
+    renewal: int
+    """Their next policy failed to be trained, or is not there after an hour."""
+    alarm: int
+    """Their returns have changed."""
+
+
+CareReason: TypeAlias = Literal["overdue", "renewal", "alarm"]
+"""Why a session needs care."""
+
+
 CautionCode: TypeAlias = Literal["short_record", "one_return"]
 """The reasons."""
 
@@ -764,6 +783,10 @@ class RadiusSpread(TypedDict):
     """On the first path."""
 
 
+RateUnit: TypeAlias = Literal["fraction", "percent", "unused"]
+"""What the rates of the bank are counted in, where a column tells them."""
+
+
 Rates: TypeAlias = float | list[float]
 """What the bank pays in each period."""
 
@@ -1272,6 +1295,7 @@ class Choices(TypedDict):
     """A column of returns or prices, by its name or its number from 1; several of them are several assets"""
     kind: NotRequired[Kind | None]
     unit: NotRequired[Unit | None]
+    rate_unit: NotRequired[RateUnit | None]
     day_first: NotRequired[bool | None]
     """Whether 01/02/2020 is the first of February, and not the second of January"""
     newest_first: NotRequired[bool | None]
@@ -1581,6 +1605,18 @@ class SessionEntry(Labels):
     """The last day that was reported."""
     last_report_ms: NotRequired[int | None]
     """When it last reported a period, or put one right."""
+    next: NotRequired[str | None]
+    """
+    The last day on which its next report is not overdue, by how many periods a year its policy has: a period after the last day
+    reported, else after the day, in UTC, of the last report or of its opening. Null where that is not known, or it is completed.
+    """
+    care: list[CareReason]
+    """Why it needs care, where it does."""
+    deviation: NotRequired[float | None]
+    """
+    Standard deviation of the log-returns learned; of several assets, of their fund. Null before the first report, or where the
+    policy tells fewer than two moments.
+    """
     due: bool
     """Whether its next policy is to be trained."""
     drift: DriftLevel
@@ -1594,6 +1630,7 @@ class SessionPage(TypedDict):
     sessions: list[SessionEntry]
     total: int
     """Sessions that match, on all pages together."""
+    care: NotRequired[CareCount | None]
     next: NotRequired[str | None]
     """Give it as `after` for the next page; null on the last."""
 

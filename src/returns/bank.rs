@@ -1,0 +1,102 @@
+//! What the bank pays, in a column beside returns or prices: in which unit, as written, said or told by what it comes to.
+
+use super::cells::Cell;
+use super::choices::{Choices, RateUnit, Unit};
+use super::kind::{is_coarse, names_percent};
+use super::number::{Mark, has_percent, number};
+use super::outcome::Stop;
+use super::record::BankRate;
+use super::sheet::Column;
+use super::words::percent;
+
+/// Of what the bank pays a period; as `problem.rate_per_step`.
+const RATE: std::ops::RangeInclusive<f64> = -0.5..=0.5;
+/// No bank has paid more a year on average of many years.
+pub const LARGEST_RATE: f64 = 0.1;
+
+/// A column of rates, oldest first, and how many of its periods make a year, as far as is known.
+pub struct Bank<'a> {
+    pub column: &'a Column<'a>,
+    pub cells: Vec<&'a Cell<'a>>,
+    pub mark: Mark,
+    pub periods: f64,
+}
+
+impl Bank<'_> {
+    /// The middle one of those that are numbers, as written and without its sign: one odd cell does not move it.
+    fn middle(&self, cells: &[&Cell]) -> f64 {
+        let mut values: Vec<f64> =
+            cells.iter().filter_map(|cell| number(&cell.text, self.mark)).map(f64::abs).collect();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or_default()
+    }
+
+    fn says_percent(&self) -> bool {
+        names_percent(&self.column.name) || self.cells.iter().any(|cell| has_percent(&cell.text))
+    }
+
+    /// What it would pay a year, taken as fractions, where that is more than banks do.
+    pub fn beyond(&self) -> Option<f64> {
+        let yearly = self.middle(&self.cells) * self.periods;
+        (!self.says_percent() && yearly > LARGEST_RATE).then_some(yearly)
+    }
+
+    /// The rates of the last `used` periods, beside returns in `unit`; or why they are not used.
+    ///
+    /// # Errors
+    /// It must be asked what they are counted in.
+    pub fn rates(&self, used: usize, unit: Option<Unit>, said: &Choices) -> Result<Result<BankRate, String>, Stop> {
+        let cells = &self.cells[self.cells.len() - used..];
+        let by_hundred = match said.rate_unit {
+            Some(RateUnit::Unused) => return Ok(Err("it is left out as was said".to_owned())),
+            Some(said) => said == RateUnit::Percent,
+            None if self.says_percent() || unit == Some(Unit::Percent) => true,
+            None if self.may_be_percent(cells) => return Err(self.ask(cells)),
+            None => false,
+        };
+        let rate = |cell: &&Cell| {
+            let divisor = if by_hundred { 100.0 } else { 1.0 };
+            let found = number(&cell.text, self.mark).map(|value| value / divisor).filter(|rate| RATE.contains(rate));
+            let rule = if by_hundred {
+                "must be from -50 to 50 percent a period"
+            } else {
+                "must be a fraction a period from -0.5 to 0.5: 0.002 is 0.2 %"
+            };
+            found.ok_or_else(|| format!("{}: {rule}", cell.called(&self.column.name)))
+        };
+        let rates = cells.iter().map(rate).collect::<Result<Vec<f64>, String>>();
+        Ok(rates.map(|rates| BankRate { column: self.column.name.clone(), rates }))
+    }
+
+    /// Whether the rates are more than banks pay as fractions, or coarser than fractions are written, and could be percent.
+    fn may_be_percent(&self, cells: &[&Cell]) -> bool {
+        let values: Option<Vec<f64>> = cells.iter().map(|cell| number(&cell.text, self.mark)).collect();
+        let Some(values) = values else { return false };
+        let yearly = self.middle(cells) * self.periods;
+        let is_coarse = is_coarse(cells) && values.iter().any(|value| *value != 0.0);
+        let is_percent = yearly / 100.0 <= LARGEST_RATE && values.iter().all(|value| RATE.contains(&(value / 100.0)));
+        let is_fraction = values.iter().all(|value| RATE.contains(value));
+        (yearly > LARGEST_RATE && (is_percent || is_fraction)) || (is_coarse && self.periods > 1.0)
+    }
+
+    fn ask(&self, cells: &[&Cell]) -> Stop {
+        let last = cells.iter().rev().find(|cell| number(&cell.text, self.mark).is_some_and(|value| value != 0.0));
+        let (text, middle) = (last.map_or("", |cell| cell.text.as_ref()), self.middle(cells));
+        let value = number(text, self.mark).unwrap_or_default();
+        let option = |word: &str, divisor: f64, rate_unit| {
+            let (one, yearly) = (percent(value / divisor), percent(middle * self.periods / divisor));
+            let choices = Choices { rate_unit: Some(rate_unit), ..Choices::default() };
+            (format!("{word}: {text} is {one} a period, and the bank pays about {yearly} a year"), choices)
+        };
+        let unused = Choices { rate_unit: Some(RateUnit::Unused), ..Choices::default() };
+        let mut options = vec![option("Percent", 100.0, RateUnit::Percent)];
+        let fits = |cell: &&Cell| number(&cell.text, self.mark).is_some_and(|value| RATE.contains(&value));
+        if cells.iter().all(fits) {
+            options.push(option("Fractions", 1.0, RateUnit::Fraction));
+        }
+        options.push(("Neither: leave the column out".to_owned(), unused));
+        let question =
+            format!("What is {text} in column {}, which says what the bank pays a period?", self.column.name);
+        Stop::asked("rate_unit", question, options)
+    }
+}

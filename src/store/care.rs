@@ -1,0 +1,132 @@
+//! Which sessions need care, as conditions of a list's statement: counted over all that match, and listed by reason.
+
+use super::codec::from_sql;
+use super::error::Failure;
+use super::query::{Row, query};
+use super::statement::{OBSERVATIONS, Statement};
+use super::tenant::Tenant;
+use super::{Store, StoreError};
+
+/// A policy that is to follow is there within this, in milliseconds, unless something keeps it.
+const TRAINED_MS: i64 = 3_600_000;
+
+/// Why a session needs care.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Care {
+    /// Its next report is late, by the calendar of its policy.
+    Overdue,
+    /// Its next policy fails to come.
+    Renewal,
+    /// Its returns have changed.
+    Alarm,
+}
+
+impl Care {
+    pub const ALL: [Care; 3] = [Care::Overdue, Care::Renewal, Care::Alarm];
+}
+
+/// The moment at which care is judged, and what is late at it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Today {
+    pub now_ms: i64,
+    pub first_days: Vec<FirstDay>,
+}
+
+/// The first day after which nothing is late yet, for sessions by policies of so many periods a year.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FirstDay {
+    pub periods_per_year: f64,
+    /// As 2008-09-30.
+    pub date: String,
+    /// Its beginning.
+    pub begin_ms: i64,
+}
+
+/// How many of the sessions that match are active, need care, and why; one may have several reasons.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct CareCounts {
+    pub active: usize,
+    pub any: usize,
+    pub overdue: usize,
+    pub renewal: usize,
+    pub alarm: usize,
+}
+
+impl Store {
+    /// How many periods a year the policies of a tenant have, each number once.
+    pub async fn calendars(&self, tenant: &Tenant) -> Result<Vec<f64>, StoreError> {
+        let found = query(
+            "SELECT DISTINCT periods_per_year FROM policies
+             JOIN policy_owners ON policy_owners.policy = policies.policy
+             WHERE policy_owners.tenant = $1 AND periods_per_year IS NOT NULL",
+        );
+        let decode = |rows: &[Row]| rows.iter().map(|row| row.get("periods_per_year")).collect();
+        self.list("listing calendars", found.bind(tenant.as_str()), decode).await
+    }
+}
+
+impl Care {
+    pub(super) fn column(self) -> &'static str {
+        match self {
+            Care::Overdue => "overdue",
+            Care::Renewal => "renewal",
+            Care::Alarm => "alarm",
+        }
+    }
+}
+
+/// Adds the condition that an active session needs this care.
+pub(super) fn needs(statement: &mut Statement, care: Care, today: &Today) {
+    match care {
+        Care::Alarm => statement
+            .and("coalesce(json_extract(json_extract(last.answer_json, '$.drift'), '$.level') = 'alarm', 1 = 0)", []),
+        // The first attempt's job is found by its key, as `service::renewer` makes it.
+        Care::Renewal => statement.and(
+            &format!(
+                "coalesce(sessions.due <= {OBSERVATIONS}, 1 = 0) AND (coalesce(last.created_ms, sessions.created_ms) < ?
+                 OR EXISTS (SELECT 1 FROM idempotency_keys JOIN jobs ON jobs.job = idempotency_keys.job
+                    WHERE idempotency_keys.tenant = sessions.tenant AND jobs.state IN ('failed', 'cancelled')
+                    AND idempotency_keys.idempotency_key = ? || sessions.session || ?
+                        || CAST(coalesce(renewals.number, 0) + 1 AS TEXT) || ?))"
+            ),
+            [(today.now_ms - TRAINED_MS).into(), "renewal\n".into(), "\n".into(), "\n0".into()],
+        ),
+        Care::Overdue if today.first_days.is_empty() => statement.and("1 = 0", []),
+        Care::Overdue => {
+            statement.and("coalesce(CASE", []);
+            for FirstDay { periods_per_year, date, begin_ms } in &today.first_days {
+                statement.and(
+                    " WHEN policies.periods_per_year = ? THEN coalesce(json_extract(last.answer_json, '$.date') < ?,
+                      coalesce(last.created_ms, sessions.created_ms) < ?)",
+                    [(*periods_per_year).into(), date.as_str().into(), (*begin_ms).into()],
+                );
+            }
+            statement.and(" END, 1 = 0)", []);
+        }
+    }
+}
+
+/// Adds the condition that an active session needs care for any reason.
+pub(super) fn needs_any(statement: &mut Statement, today: &Today) {
+    statement.and(" AND (", []);
+    for (place, care) in Care::ALL.into_iter().enumerate() {
+        statement.and(if place == 0 { "(" } else { " OR (" }, []);
+        needs(statement, care, today);
+        statement.and(")", []);
+    }
+    statement.and(")", []);
+}
+
+impl CareCounts {
+    pub(super) fn from_rows(rows: &[Row]) -> Result<Self, Failure> {
+        let Some(row) = rows.first() else { return Ok(CareCounts::default()) };
+        let count = |column: &str| from_sql(row.get::<i64>(column)?);
+        Ok(CareCounts {
+            active: count("active")?,
+            any: count("any_of_them")?,
+            overdue: count("overdue")?,
+            renewal: count("renewal")?,
+            alarm: count("alarm")?,
+        })
+    }
+}
