@@ -60,6 +60,7 @@ def test_the_worst_case_is_a_transport(ballast: Ballast, session: Session) -> No
         assert sorted(seen.index) == sorted(RETURNS) and seen.tolist() == pytest.approx([0.1] * 10)
         distance = (moves["mass"] * (moves["atom"] - moves["moved_to"]).abs()).sum()
         assert 0.0 < distance <= advice["radius"] * (1 + 1e-9)
+    pd.testing.assert_frame_equal(session.worst_case(), frames.worst_case(session.action(explain="worst_case")))
     with pytest.raises(ValueError, match="ask for it with explain='worst_case'"):
         frames.worst_case(session.action())
     normal = ballast.advise(RETURNS, kind="log", rate_per_step=0.002, framework="parametric_static")
@@ -187,3 +188,21 @@ def test_every_frame_says_what_it_needs() -> None:
     assert len(public) >= 11
     for made in public:
         assert made.__doc__, made
+
+
+def test_a_session_and_an_evaluation_are_drawn(ballast: Ballast, session: Session) -> None:
+    session.observe(simple_return=0.05, executed_allocation=0.5)
+    session.observe(log_return=-0.02)
+    axes = session.plot()
+    rows = session.history()["observations"]
+    wealth, _ = axes.get_lines()
+    assert np.asarray(wealth.get_ydata()).tolist() == [row["wealth"] for row in rows] and np.asarray(
+        wealth.get_xdata()
+    ).tolist() == [1, 2]
+    (held,) = axes.figure.axes[1].get_lines()
+    assert np.asarray(held.get_ydata()).tolist() == [row["executed_allocation"] for row in rows]
+    evaluation = compare(ballast)
+    drawn = evaluation.plot()
+    table = evaluation.frame().sort_values("certainty_equivalent")
+    assert [label.get_text() for label in drawn.get_yticklabels()] == list(table.index)
+    assert np.asarray(drawn.get_lines()[0].get_xdata()).tolist() == table["certainty_equivalent"].tolist()

@@ -10,7 +10,7 @@ import httpx
 import pytest
 from conftest import Network, Service, train
 
-from ballast import Ballast, JobEnded, JobNotEnded, ProgressPrinter, Unreachable, wire
+from ballast import Ballast, JobEnded, JobNotEnded, ProgressBar, ProgressPrinter, Unreachable, wire
 from ballast.events import Event, Parser
 
 #: Steps of a training that outlasts a restart.
@@ -115,3 +115,9 @@ def test_events_are_parsed_however_they_are_cut() -> None:
     for size in range(1, len(stream) + 1):
         parser, chunks = Parser(), [stream[at : at + size] for at in range(0, len(stream), size)]
         assert [event for chunk in chunks for event in parser.feed(chunk)] == whole
+
+
+def test_a_bar_ends_with_its_job(ballast: Ballast) -> None:
+    drawn = io.StringIO()
+    train(ballast, seed=39).policy(watch=ProgressBar(file=drawn))
+    assert drawn.getvalue().rstrip().rpartition("\r")[2].startswith("succeeded: 100%|") and "3/3" in drawn.getvalue()

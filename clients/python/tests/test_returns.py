@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
-from conftest import RETURNS, train
+from conftest import RETURNS, Service, train
 
-from ballast import Ballast
+from ballast import AsyncBallast, Ballast, UnclearReturns
 from ballast.returns import Kind, dates_of, log_returns, log_returns_of_assets
 
 SIMPLE = [0.02, -0.05, 0.0]
@@ -145,6 +147,81 @@ def test_a_text_a_file_and_a_table_are_read_alike(ballast: Ballast, tmp_path: Pa
     assert percent["series"][0]["log_returns"][0] == pytest.approx(math.log(1.002), abs=1e-15)
     asked: Any = ballast.read_returns("0.2 -0.15 0.3")
     assert [question["asks"] for question in asked["questions"]] == ["unit"]
+
+
+MONTHS = pd.period_range("2005-01", periods=24, freq="M")
+RECORD = [0.01 + 0.04 * math.sin(1.7 * month) for month in range(24)]
+BANK = [0.002 + 0.0001 * month for month in range(24)]
+ONCE: dict[str, Any] = {"radius": {"rule": "fixed", "radius": 0.004}}
+
+
+def test_what_a_quant_has_is_read_by_the_service(ballast: Ballast, tmp_path: Path) -> None:
+    prices = [100.0]
+    for value in RECORD:
+        prices.append(prices[-1] * (1.0 + value))
+    table = pd.DataFrame({"fund": RECORD, "rf": BANK}, index=MONTHS)
+    path = tmp_path / "fund.csv"
+    table.to_csv(path)
+    said = {"rate_per_step": BANK[-1], **ONCE}
+    plain = ballast.advise(RECORD, kind="simple", **said)
+    held = [RECORD, tuple(RECORD), np.array(RECORD), np.array(RECORD)[:, None], pd.Series(RECORD)]
+    held += [pd.Series(RECORD, MONTHS), table["fund"], pd.Series(RECORD, MONTHS.to_timestamp(), name="fund")]
+    for returns in held:
+        found = ballast.advise(returns, **said)
+        assert found["allocation"] == pytest.approx(plain["allocation"], abs=1e-9), returns
+    days = pd.period_range("2004-12", periods=25, freq="M")
+    for priced in (prices, pd.Series(prices, days, name="close")):
+        found = ballast.advise(priced, choices={"kind": "price"}, **said)
+        assert found["allocation"] == pytest.approx(plain["allocation"], abs=1e-9)
+    # The column of the bank says what it pays.
+    for source in (table, path, path.read_text()):
+        assert ballast.advise(source, **ONCE)["allocation"] == pytest.approx(plain["allocation"], abs=1e-9)
+    specification = ballast.train(path, horizon=2, design={"count": 20}, **ONCE).policy().detail()["specification"]
+    assert specification["problem"]["rate_per_step"] == BANK[-1]
+    assert specification["problem"].get("periods_per_year") == 12
+    report = ballast.backtest(table, window=12, count=10, alpha=[0.5]).report()
+    assert report["dates"] == [str(month) for month in MONTHS[12:]]
+    same = ballast.backtest(table["fund"], kind="simple", rate=table["rf"], window=12, count=10, alpha=[0.5]).report()
+    assert report["strategies"] == same["strategies"]
+
+
+def test_what_can_be_read_in_two_ways_is_asked_by_name(ballast: Ballast) -> None:
+    calm = pd.DataFrame({"fund": [0.022 + value for value in RECORD]}, index=MONTHS)
+    for call in (ballast.advise, ballast.train):
+        with pytest.raises(UnclearReturns) as caught:
+            call(calm, rate_per_step=0.001)
+        assert caught.value.argument == "returns"
+        assert [question["asks"] for question in caught.value.questions] == ["unit"]
+        told = str(caught.value)
+        assert told.startswith("returns can be read in more than one way: say which by choices.")
+        assert "choices={'unit': 'fraction'}: 24 monthly simple returns as fractions" in told
+        assert "choices={'unit': 'percent'}: 24 monthly simple returns in percent" in told
+    taken = ballast.advise(calm, choices={"unit": "percent"}, rate_per_step=0.0, **ONCE)
+    assert taken["sample_size"] == 24
+    refused: dict[str, Any] = {
+        r"returns: line 1: column 2 is \"x\": must be a number": "0.1 x 0.3",
+        "returns: The numbers do not vary": [-0.01, -0.01, -0.01],
+    }
+    for message, wrong in refused.items():
+        with pytest.raises(ValueError, match=message):
+            ballast.advise(wrong, rate_per_step=0.0)
+    with pytest.raises(ValueError, match="rate_per_step is missing: must be given"):
+        ballast.advise(RECORD)
+    with pytest.raises(ValueError, match="rate is missing: must be given"):
+        ballast.backtest(RECORD)
+    with pytest.raises(ValueError, match="kind is 'log': must be left out where returns are read"):
+        ballast.advise("0.01 0.02", kind="log", rate_per_step=0.0)
+
+
+def test_it_is_read_alike_where_it_is_awaited(service: Service) -> None:
+    async def asked() -> None:
+        async with AsyncBallast(service.url) as ballast:
+            table = pd.DataFrame({"fund": RECORD, "rf": BANK}, index=MONTHS)
+            assert (await ballast.advise(table, **ONCE))["sample_size"] == 24
+            with pytest.raises(UnclearReturns):
+                await ballast.advise(0.022 + table[["fund"]], rate_per_step=0.0)
+
+    asyncio.run(asked())
 
 
 def test_the_history_of_a_session_is_named(ballast: Ballast) -> None:

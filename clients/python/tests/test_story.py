@@ -322,7 +322,9 @@ def test_a_frontier_tells_what_caution_costs(ballast: Ballast) -> None:
 
 def test_every_field_of_a_walk_forward_is_an_argument() -> None:
     arguments = set(inspect.signature(Ballast.backtest).parameters)
-    assert arguments - {"self", "returns", "kind", "idempotency_key"} == set(wire.BacktestRequest.__annotations__) - {
+    assert arguments - {"self", "returns", "kind", "choices", "idempotency_key"} == set(
+        wire.BacktestRequest.__annotations__
+    ) - {
         "log_returns",
         "simple_returns",
     }
@@ -338,7 +340,13 @@ def for_clients(item: dict[str, dict[str, list[str]]]) -> bool:
 
 
 def test_every_field_of_a_specification_is_an_argument() -> None:
-    arguments = set(inspect.signature(Ballast.train).parameters) - {"self", "returns", "kind", "idempotency_key"}
+    arguments = set(inspect.signature(Ballast.train).parameters) - {
+        "self",
+        "returns",
+        "kind",
+        "choices",
+        "idempotency_key",
+    }
     problem, whole = wire.ProblemSpecification.__annotations__, wire.Specification.__annotations__
     of_whole = set(whole) - {"problem", "fund"}
     assert arguments == (set(problem) - {"history"}) | of_whole | set(wire.Relabel.__annotations__)

@@ -16,7 +16,19 @@ from . import wire
 from .driving import Answering, awaiting_into, blocking, blocking_into
 from .labels import relabelled
 from .policy import AsyncPolicy, Policy
-from .returns import Kind, Returns, Table, dates_of, day, log_returns, log_returns_of_assets, per_period, text_of
+from .returns import (
+    Kind,
+    Read,
+    Returns,
+    Table,
+    dates_of,
+    day,
+    log_returns,
+    log_returns_of_assets,
+    one_record,
+    per_period,
+    text_of,
+)
 from .session import AsyncSession, Session
 from .training import (
     AsyncEvaluation,
@@ -45,8 +57,9 @@ class _Ballast:
         self,
         returns: Returns,
         *,
-        kind: Kind,
-        rate_per_step: float,
+        kind: Kind | None = None,
+        choices: wire.Choices | None = None,
+        rate_per_step: float | None = None,
         periods_per_year: float | None = None,
         framework: wire.Framework | None = None,
         horizon: int | None = None,
@@ -70,20 +83,26 @@ class _Ballast:
     ) -> wire.Job:
         """Queues a training on the returns seen so far, and does not wait for it.
 
-        ``returns`` is a list, an array, a Series or a DataFrame of one column, and ``kind`` says of what:
-        ``"simple"`` or ``"log"`` returns or ``"price"``, oldest first. ``rate_per_step`` is what the bank pays per
-        period of the returns, as a fraction: 0.00247 a month for 3 % a year. What is left out the service chooses,
-        and ``Policy.detail`` tells. ``name``, ``notes`` and ``tags`` are what the policy is to be called, and no part
-        of what it is. The same ``idempotency_key`` and arguments again, even from another process, give the same job.
-        Raises ``ValueError`` where ``returns`` cannot be meant (a number that is missing, dates of an
-        index that do not increase, percents), before anything is sent.
+        ``returns`` is a list, an array, a Series, a DataFrame, the ``Path`` of a CSV or its text: returns of any kind,
+        in any unit, or prices. The service reads it (:meth:`read_returns`), with its dates and the column of
+        the bank. Where it can be read in two ways, :class:`UnclearReturns` says which they are, and ``choices``
+        which is meant. With ``kind`` (``"simple"``, ``"log"`` or ``"price"``) numbers are taken as they are:
+        fractions, oldest first.
+
+        ``rate_per_step`` is what the bank pays per period of the returns, as a fraction: 0.00247 a month for 3 % a
+        year; by default what it paid last, where ``returns`` say so. What is left out the service chooses, and
+        ``Policy.detail`` tells. ``name``, ``notes`` and ``tags`` are what the policy is to be called, and no
+        part of what it is. The same ``idempotency_key`` and arguments again, even from another process, give
+        the same job. Raises ``ValueError`` where ``returns`` cannot be meant (a number that is missing, dates
+        of an index that do not increase, percents), before anything is sent.
         """
+        read = await self._one(returns, kind, choices)
         problem = {
-            "history": log_returns(returns, kind),
+            "history": read.log_returns,
             "framework": framework,
             "horizon": horizon,
-            "rate_per_step": rate_per_step,
-            "periods_per_year": periods_per_year,
+            "rate_per_step": _last_rate(read, rate_per_step),
+            "periods_per_year": read.periods_per_year if periods_per_year is None else periods_per_year,
             "initial_wealth": initial_wealth,
             "action_interval": None if action_interval is None else list(action_interval),
             "trading_cost": trading_cost,
@@ -104,8 +123,9 @@ class _Ballast:
         /,
         returns: Returns,
         *,
-        kind: Kind,
-        rate_per_step: float,
+        kind: Kind | None = None,
+        choices: wire.Choices | None = None,
+        rate_per_step: float | None = None,
         wealth: float | None = None,
         holding: float | None = None,
         sensitivity: bool | None = None,
@@ -113,12 +133,15 @@ class _Ballast:
     ) -> wire.Advised:
         """What to hold through one period, given the returns seen so far. Nothing is trained or stored.
 
-        ``returns``, ``kind`` and ``rate_per_step`` are as in ``train``, and so is every other field of the problem that
-        is given by name, such as ``utility`` or ``trading_cost``. ``wealth`` and ``holding`` are what the investor has,
-        and what share of it is in the asset already. ``sensitivity=True`` also says how near the advice is to changing.
+        ``returns``, ``kind``, ``choices`` and ``rate_per_step`` are as in ``train``, and so is every other field of the
+        problem that is given by name, such as ``utility`` or ``trading_cost``. ``wealth`` and ``holding`` are
+        what the investor has, and what share of it is in the asset already. ``sensitivity=True`` also says how
+        near the advice is to changing.
         """
+        read = await self._one(returns, kind, choices)
+        told = {"rate_per_step": _last_rate(read, rate_per_step), "periods_per_year": read.periods_per_year}
         question = {
-            "problem": {"history": log_returns(returns, kind), "rate_per_step": rate_per_step, **_given(problem)},
+            "problem": {"history": read.log_returns, **_given(told), **_given(problem)},
             "wealth": wealth,
             "holding": holding,
             "sensitivity": sensitivity,
@@ -175,12 +198,23 @@ class _Ballast:
         whole = {"problem": of_assets, "design": design, "surrogate": surrogate, "seed": seed}
         return await self._queued("/train", {**_given(whole), **relabelled(name, notes, tags)}, idempotency_key)
 
+    async def _one(self, returns: Returns, kind: Kind | None, choices: wire.Choices | None) -> Read:
+        """Returns of one asset: by the service's reader, or as they are said to be."""
+        if kind is None:
+            return one_record(await self._read_returns(returns, **(choices or {})))
+        if choices is not None or isinstance(returns, str | os.PathLike):
+            raise ValueError(f"kind is {kind!r}: must be left out where returns are read; choices says what they are")
+        record, days = log_returns(returns, kind), dates_of(returns)
+        dates = None if days is None else per_period("dates", days, returns, len(record), kind)
+        return Read(record, dates, None, None)
+
     async def _read_returns(self, source: str | os.PathLike[str] | Table, /, **choices: Any) -> wire.Reading:
         """What a text of returns or prices says: one record, or what must be asked, or where it is wrong.
 
-        ``source`` is a text, the ``Path`` of a file, or a Series or DataFrame of pandas. ``choices`` say what the text
-        does not, or answer what was asked: ``unit="percent"``, ``columns=["fund"]`` (several are several assets).
-        Look at ``reading["outcome"]``: ``"read"`` has a ``sentence`` to check it by, and ``series``.
+        ``source`` is a text, the ``Path`` of a file, a Series or DataFrame of pandas, an array or a list. ``choices``
+        say what the text does not, or answer what was asked: ``unit="percent"``, ``columns=["fund"]`` (several
+        are several assets). Look at ``reading["outcome"]``: ``"read"`` has a ``sentence`` to check it by, and
+        ``series``.
         """
         body = {"text": text_of(source), "choices": choices}
         return cast(wire.Reading, await self._transport.json("POST", "/returns", body=body))
@@ -211,8 +245,9 @@ class _Ballast:
         self,
         returns: Returns,
         *,
-        kind: Kind,
-        rate: float | Sequence[float],
+        kind: Kind | None = None,
+        choices: wire.Choices | None = None,
+        rate: float | Sequence[float] | None = None,
         dates: Iterable[object] | None = None,
         periods_per_year: int | None = None,
         window: int | None = None,
@@ -228,18 +263,22 @@ class _Ballast:
     ) -> wire.Job:
         """Queues a walk-forward through a record of returns, as ``ballast backtest`` does, and does not wait for it.
 
-        ``returns`` and ``kind`` are as in ``train``; ``rate`` is what the bank paid, one fraction for all periods or
-        one for each. ``dates`` are texts or dates, one for each number, by default those of the index of a pandas
-        object, and tell how many periods make a year; ``periods_per_year`` says so without them. What is left out the
-        service chooses, and the report tells. Raises ``ValueError`` where ``returns``, ``rate`` or ``dates`` cannot be
-        meant, before anything is sent.
+        ``returns``, ``kind`` and ``choices`` are as in ``train``; ``rate`` is what the bank paid, one fraction for all
+        periods or one for each, by default as ``returns`` say. ``dates`` are texts or dates, one for each
+        number, by default those of the index of a pandas object, and tell how many periods make a year;
+        ``periods_per_year`` says so without them. What is left out the service chooses, and the report tells.
+        Raises ``ValueError`` where ``returns``, ``rate`` or ``dates`` cannot be meant, before anything is sent.
         """
-        record = log_returns(returns, kind)
-        days = dates_of(returns) if dates is None else [day(date) for date in dates]
-        if days is not None:
-            days = per_period("dates", days, returns, len(record), kind)
+        read = await self._one(returns, kind, choices)
+        record, rate = read.log_returns, read.rates if rate is None else rate
+        if rate is None:
+            raise ValueError("rate is missing: must be given, as returns do not say what the bank paid")
+        entries = returns if kind is not None else None
+        days = read.dates if dates is None else [day(date) for date in dates]
+        if dates is not None:
+            days = per_period("dates", days or [], entries, len(record), kind or "log")
         if isinstance(rate, Iterable):
-            rate = [float(paid) for paid in per_period("rate", rate, returns, len(record), kind)]
+            rate = [float(paid) for paid in per_period("rate", rate, entries, len(record), kind or "log")]
         request = {
             "log_returns": record,
             "rate": rate,
@@ -503,6 +542,14 @@ _PAGE = 200
 _REPORTS = 1000
 #: The pause before elements of a list that were refused for the moment are sent again: rates are by the second.
 _SECOND = 1.0
+
+
+def _last_rate(read: Read, rate_per_step: float | None) -> float:
+    if rate_per_step is not None:
+        return rate_per_step
+    if not read.rates:
+        raise ValueError("rate_per_step is missing: must be given, as returns do not say what the bank paid")
+    return read.rates[-1]
 
 
 def _amounts(contributions: float | Sequence[float] | None) -> float | list[float] | None:

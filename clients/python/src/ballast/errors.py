@@ -28,6 +28,25 @@ class DamagedPolicy(BallastError):
     """The bytes of an exported policy do not hash to its name."""
 
 
+class UnclearReturns(BallastError, ValueError):
+    """Returns that can be read in more than one way. ``argument`` is the one that they were given as, and ``questions``
+    what the service asks, each with its ``options``, whose ``choices`` settle it."""
+
+    def __init__(self, argument: str, questions: list[wire.Question]) -> None:
+        super().__init__(argument, questions)
+        self.argument = argument
+        self.questions = questions
+
+    def __str__(self) -> str:
+        lines = [f"{self.argument} can be read in more than one way: say which by choices."]
+        for question in self.questions:
+            lines.append(question["question"])
+            for option in question["options"]:
+                read = option.get("sentence") or option["label"]
+                lines.append(f"  choices={option['choices']}: {read}")
+        return "\n".join(lines)
+
+
 class JobEnded(BallastError):
     """A job that was waited for failed or was cancelled. ``job`` is its last state."""
 

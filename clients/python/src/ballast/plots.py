@@ -25,6 +25,37 @@ def walk_forward(report: wire.BacktestReport, ax: Axes | None = None) -> Axes:
     return axes
 
 
+def history(history: wire.History, ax: Axes | None = None) -> Axes:
+    """Wealth after each period of a session, from what it began with, and on a second axis the share that was held,
+    over the last days of the periods where all are known, and else over their numbers."""
+    axes = _axes(ax)
+    lived = frames.history(history)
+    over = lived.index if lived.empty or lived["date"].isna().any() else lived["date"]
+    axes.plot(over, lived["wealth"], color="C0", marker=".", label="wealth")
+    axes.axhline(history["initial_wealth"], color="C0", linewidth=0.8, linestyle=":")
+    axes.set_ylabel("wealth after the period")
+    axes.set_xlabel("period" if over is lived.index else "last day")
+    shares = axes.twinx()
+    shares.step(over, lived["executed_allocation"], where="mid", color="C1", linewidth=1.0, label="held")
+    shares.set_ylim(0.0, 1.05)
+    shares.set_ylabel("share of wealth held through the period")
+    lines = [*axes.get_lines()[:1], *shares.get_lines()]
+    axes.legend(handles=lines)
+    return axes
+
+
+def evaluation(report: wire.EvaluationReport, ax: Axes | None = None) -> Axes:
+    """What each strategy of an evaluation is worth for certain, with its interval, the best at the top."""
+    axes = _axes(ax)
+    table = frames.evaluation(report).sort_values("certainty_equivalent")
+    worth = table["certainty_equivalent"]
+    reach = [worth - table["certainty_equivalent_low"], table["certainty_equivalent_high"] - worth]
+    axes.errorbar(worth, range(len(table)), xerr=reach, fmt="o", capsize=3)
+    axes.set_yticks(range(len(table)), list(table.index))
+    axes.set_xlabel("certainty equivalent of terminal wealth")
+    return axes
+
+
 def frontier(report: wire.FrontierReport, ax: Axes | None = None) -> Axes:
     """What caution costs: basis points of certainty equivalent lost over the multiple of the radius, a line for each
     law that records were drawn from, in the band of its interval."""

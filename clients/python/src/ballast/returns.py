@@ -9,7 +9,10 @@ from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 from statistics import pstdev
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+from . import wire
+from .errors import UnclearReturns
 
 #: What the numbers are, with the names ``observe`` has for them.
 Kind: TypeAlias = Literal["log", "simple", "price"]
@@ -83,13 +86,20 @@ def log_returns_of_assets(
 
 
 def text_of(source: str | PathLike[str] | Table) -> str:
-    """A text as it is, that of a file (UTF-8, or UTF-16 where its first bytes say so), or a table of pandas as CSV."""
+    """A text as it is, that of a file (UTF-8, or UTF-16 where its first bytes say so), a table of pandas as CSV, with
+    its index where that holds dates, or numbers, a row a line."""
+    if isinstance(source, PathLike):
+        content = Path(source).read_bytes()
+        return content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    if isinstance(source, str):
+        return source
     if hasattr(source, "to_csv"):
-        return str(source.to_csv())
-    if not isinstance(source, PathLike):
-        return str(source)
-    content = Path(source).read_bytes()
-    return content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+        named = getattr(source, "columns", [getattr(source, "name", None)])
+        headed = all(isinstance(name, str) for name in named)
+        return str(source.to_csv(index=dates_of(source) is not None, header=headed))
+    rows = source.tolist() if hasattr(source, "tolist") else source
+    cells = [row if isinstance(row, Sequence) and not isinstance(row, str) else [row] for row in rows]
+    return "\n".join("\t".join(str(cell) for cell in row) for row in cells)
 
 
 def dates_of(returns: Returns) -> list[str] | None:
@@ -108,6 +118,37 @@ def dates_of(returns: Returns) -> list[str] | None:
 _DATED = ("datetime64", "datetime", "date", "period")
 #: A month or a day, maybe with a time.
 _DATE = re.compile(r"\d{4}-\d{2}(-\d{2}([ T].*)?)?$")
+
+
+class Read(NamedTuple):
+    """Returns of one asset as the service's reader takes them, and what stands beside them."""
+
+    log_returns: list[float]
+    dates: list[str] | None
+    periods_per_year: int | None
+    #: What the bank paid in each period, where a column says so.
+    rates: list[float] | None
+
+
+def one_record(reading: wire.Reading, name: str = "returns") -> Read:
+    """What the service read, where that is one reading of one asset.
+
+    Raises :class:`UnclearReturns` where it may be several, and ``ValueError`` where it is none; both name the argument.
+    """
+    if reading["outcome"] == "asked":
+        raise UnclearReturns(name, reading["questions"])
+    if reading["outcome"] == "refused":
+        raise ValueError(f"{name}: {reading['sentence']}")
+    if len(reading["series"]) != 1:
+        columns = [series["column"] for series in reading["series"]]
+        raise ValueError(f"{name} has the columns {columns}: must be one; train_assets and advise_assets take several")
+    paid = reading.get("rate")
+    return Read(
+        reading["series"][0]["log_returns"],
+        reading.get("dates"),
+        reading.get("periods_per_year"),
+        None if paid is None else paid["rates"],
+    )
 
 
 def day(date: object) -> str:

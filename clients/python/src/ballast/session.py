@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 from typing_extensions import Self, Unpack
 
-from . import frames, replay, wire
+from . import frames, plots, replay, wire
 from .driving import Answering, blocking
 from .errors import JobEnded
 from .labels import Labelled
@@ -18,6 +18,7 @@ from .transport import Transport, growing_pause
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
 #: Longest pause between two looks at a renewal that is due, in seconds.
 _LOOK = 0.5
@@ -235,6 +236,16 @@ class _Session(Labelled):
         """
         return frames.history(await self._history(), as_of)
 
+    async def _worst_case(self) -> pd.DataFrame:
+        """The law that the advice for the coming period is robust against, as what moves where
+        (:func:`ballast.frames.worst_case`, which says what it raises)."""
+        return frames.worst_case(await self._action(explain="worst_case"))
+
+    async def _plot(self, ax: Axes | None = None) -> Axes:
+        """Draws wealth after each period reported, and the share held in it (:func:`ballast.plots.history`). Raises
+        ``ImportError`` without pandas and matplotlib."""
+        return plots.history(await self._history(), ax)
+
     async def _refresh(self) -> Self:
         """Reads from the service where the session stands, and by which policy it lives."""
         await self._read()
@@ -274,6 +285,8 @@ class Session(_Session):
     label = Answering(wire.Labels).blocking(_Session._label)
     history = Answering(wire.History).blocking(_Session._history)
     frame = blocking(_Session._frame)
+    worst_case = blocking(_Session._worst_case)
+    plot = blocking(_Session._plot)
     refresh = blocking(_Session._refresh)
     delete = blocking(_Session._delete)
 
@@ -291,5 +304,7 @@ class AsyncSession(_Session):
     label = _Session._label
     history = _Session._history
     frame = _Session._frame
+    worst_case = _Session._worst_case
+    plot = _Session._plot
     refresh = _Session._refresh
     delete = _Session._delete

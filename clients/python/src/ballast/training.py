@@ -168,6 +168,11 @@ class _Evaluation(_Job):
         what it raises, and ``ImportError`` without pandas."""
         return frames.evaluation(await self._report(watch))
 
+    async def _plot(self, ax: Axes | None = None, watch: Watch | None = None) -> Axes:
+        """Draws what each strategy is worth for certain (:func:`ballast.plots.evaluation`). Waits as ``report`` does,
+        and raises what it raises, and ``ImportError`` without pandas and matplotlib."""
+        return plots.evaluation(await self._report(watch), ax)
+
 
 class _WalkForward(_Job):
     """A job that ends in a report; ``Ballast.walk_forward(id)`` finds it again."""
@@ -238,6 +243,7 @@ class Evaluation(Job, _Evaluation):
 
     report = Answering(wire.EvaluationReport).blocking(_Evaluation._report)
     frame = blocking(_Evaluation._frame)
+    plot = blocking(_Evaluation._plot)
 
 
 class WalkForward(Job, _WalkForward):
@@ -278,6 +284,7 @@ class AsyncEvaluation(AsyncJob, _Evaluation):
 
     report = _Evaluation._report
     frame = _Evaluation._frame
+    plot = _Evaluation._plot
 
 
 class AsyncWalkForward(AsyncJob, _WalkForward):
@@ -313,6 +320,28 @@ class ProgressPrinter:
             elif self._shown != (now := (job["state"], job["progress"]["steps_done"])):
                 self._shown = now
                 print(line, file=self._file, flush=True)
+
+
+class ProgressBar:
+    """A ``watch`` that draws a bar of steps by tqdm, in a terminal or a notebook; it ends with the job.
+
+    Raises ``ImportError`` without tqdm.
+    """
+
+    def __init__(self, **tqdm: Any) -> None:
+        try:
+            from tqdm.auto import tqdm as bar
+        except ImportError as error:
+            raise ImportError("bars are drawn by tqdm: pip install 'ballast-client[progress]'") from error
+        self._bar: Any = bar(**{"unit": "step", **tqdm})
+
+    def __call__(self, job: wire.Job) -> None:
+        progress = job["progress"]
+        self._bar.total, self._bar.n = progress["steps_total"], progress["steps_done"]
+        self._bar.set_description(job["state"], refresh=False)
+        self._bar.refresh()
+        if job["state"] in _TERMINAL:
+            self._bar.close()
 
 
 def progress_line(job: wire.Job) -> str:
