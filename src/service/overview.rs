@@ -44,11 +44,13 @@ impl Sessions {
         let calendars = self.store.calendars(tenant).await?;
         let first_days = calendars.into_iter().filter_map(|periods| first_day(today?, periods)).collect();
         let asked = SessionQuery { today: Today { now_ms, first_days }, ..asked };
-        let SessionList { sessions, total } = self.store.sessions(tenant, &asked).await?;
-        let care = match asked.after {
-            None => Some(self.store.care(tenant, &asked).await?),
-            Some(_) => None,
+        let counted = async {
+            match asked.after {
+                None => self.store.care(tenant, &asked).await.map(Some),
+                Some(_) => Ok(None),
+            }
         };
+        let (SessionList { sessions, total }, care) = tokio::try_join!(self.store.sessions(tenant, &asked), counted)?;
         let listed = |row: SessionSummary| {
             let stands: Option<Stands> = row.last.as_ref().map(|(answer, _)| read(answer)).transpose()?;
             let said = stands.and_then(|stands| stands.date);

@@ -104,7 +104,7 @@ CALLS = [
     ('ballast.train([0.1, 0.2], kind="price", rate_per_step=0.0)', None),
     ('ballast.train([0.1, 0.2], kind="prices", rate_per_step=0.0)', "arg-type"),
     ('ballast.train("fund.csv", choices={"unit": "percent"})', None),
-    ('ballast.train("fund.csv", choices={"unit": "per mille"})', "typeddict-item"),
+    ('ballast.train("fund.csv", choices={"unit": "per mille"})', "arg-type"),
     ('ballast.train(kind="price")', "call-arg"),
     ('ballast.train([0.1, 0.2], kind="log", rate_per_step=0.0, radius={"rule": "fixed", "radius": 0.01})', None),
     ('ballast.train([0.1, 0.2], kind="log", rate_per_step=0.0, radius={"rule": "fixed", "kappa": 0.01})', "arg-type"),
