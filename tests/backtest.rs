@@ -86,6 +86,16 @@ async fn a_job_reports_what_the_command_reports() {
     let by_hand =
         100.0 * (1.0 - 0.001 * allocation) * ((1.0 - allocation) * (1.0 + bank[12]) + allocation * (1.0 + risky[12]));
     assert!((wealth / by_hand - 1.0).abs() < 1e-12, "{wealth} {by_hand}");
+    // Two years of quarters hold five years that begin with a quarter; a twentieth of them is a quarter of the worst.
+    let stock = names.iter().position(|name| *name == "all-stock").unwrap();
+    let ends = reported["periods"][stock]["wealth"].as_array().unwrap().iter().map(|value| value.as_f64().unwrap());
+    let course: Vec<f64> = std::iter::once(100.0).chain(ends).collect();
+    let years: Vec<f64> = (0..5).map(|start| course[start + 4] / course[start] - 1.0).collect();
+    let worst = years.iter().copied().fold(f64::INFINITY, f64::min);
+    let lost = years.iter().filter(|year| **year < 0.0).count() as f64 / 5.0;
+    let value = |figure: &str| strategies[stock][figure]["value"].as_f64().unwrap();
+    assert!((value("worst_twentieth") - worst).abs() < 1e-12, "{years:?} {}", strategies[stock]);
+    assert!((value("chance_of_loss") - lost).abs() < 1e-12, "{years:?} {}", strategies[stock]);
 }
 
 /// Log-returns and simple returns are one record, as are a rate and a list of it; without dates a period is a period.

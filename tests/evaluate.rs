@@ -112,6 +112,48 @@ fn constant_mixes_have_their_exact_expectations() {
     assert!((stock.certainty_equivalent.value / certain - 1.0).abs() < 1e-12);
 }
 
+/// The chance that a sum of ten draws of the mixture is negative, by the normal law given how many came from the first component.
+fn all_stock_loss() -> f64 {
+    let choose = |k: i32| (1..=k).map(|i| f64::from(11 - i) / f64::from(i)).product::<f64>();
+    // Phi(-x) by the trapezoidal rule over [x, x + 10].
+    let tail = |x: f64| {
+        let density = |y: f64| (-0.5 * y * y).exp() / std::f64::consts::TAU.sqrt();
+        let inner: f64 = (1..2000).map(|node| density(x + f64::from(node) / 200.0)).sum();
+        (inner + 0.5 * density(x)) / 200.0
+    };
+    let given = |k: i32| {
+        let (first, second) = (f64::from(k), f64::from(10 - k));
+        tail((0.006 * first + 0.016 * second) / (0.016 * first + 0.00625 * second).sqrt())
+    };
+    (0..=10).map(|k| choose(k) * 0.4_f64.powi(k) * 0.6_f64.powi(10 - k) * given(k)).sum()
+}
+
+#[test]
+fn losses_and_falls_are_those_of_the_paths() {
+    let request = || paper(json!({ "frameworks": [], "constant_mixes": [0.0, 1.0], "paths": 4000, "level": 0.999 }));
+    let (evaluation, _, outcomes) = simulated(request());
+    let wealth = reported(request()).strategy("mix_1").unwrap().wealth.clone();
+    let exact = all_stock_loss();
+    assert!((0.2..0.5).contains(&exact), "{exact}");
+    assert!(wealth.chance_of_loss.low < exact && exact < wealth.chance_of_loss.high, "{exact} outside {wealth:?}");
+    // Every fall from one time to a later one.
+    let fall = |path: usize| {
+        let returns = evaluation.returns(0, path);
+        let sums: Vec<f64> = (0..=returns.len()).map(|until| returns[..until].iter().sum()).collect();
+        let falls = (0..sums.len())
+            .flat_map(|from| sums[from..].iter().map(|to| 1.0 - (to - sums[from]).exp()).collect::<Vec<f64>>());
+        falls.fold(0.0, f64::max)
+    };
+    let falls: Vec<f64> = (0..4000).map(fall).collect();
+    assert!(falls.iter().zip(&outcomes.outcomes).all(|(fall, outcome)| (fall - outcome.ended[1].fall).abs() < 1e-12));
+    assert!((wealth.max_drawdown.value - falls.iter().sum::<f64>() / 4000.0).abs() < 1e-12);
+    let mut ends: Vec<f64> = outcomes.outcomes.iter().map(|outcome| outcome.ended[1].wealth).collect();
+    ends.sort_by(f64::total_cmp);
+    assert!((wealth.worst_twentieth.value - ends[..200].iter().sum::<f64>() / 200.0).abs() < 1e-9, "{wealth:?}");
+    assert!(wealth.min.value == ends[0] && wealth.max.value == ends[3999] && wealth.quantile_20.value > ends[799]);
+    assert!(outcomes.outcomes.iter().all(|outcome| outcome.ended[0].fall == 0.0));
+}
+
 /// The known law's value by other code: more than all-stock, because a wealthy investor holds back.
 #[test]
 fn the_known_law_promises_its_value_and_keeps_it() {
@@ -157,7 +199,7 @@ fn differences_are_paired() {
     let report = EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS).unwrap();
     assert_eq!((report.reference.as_str(), report.strategies[0].difference.is_none()), ("plug_in", true));
     let kind = evaluation.request.problem.utility;
-    let apart = |outcome: &Outcome| utility(kind, outcome.wealth[1]) - utility(kind, outcome.wealth[0]);
+    let apart = |outcome: &Outcome| utility(kind, outcome.ended[1].wealth) - utility(kind, outcome.ended[0].wealth);
     let mean = outcomes.outcomes.iter().map(apart).sum::<f64>() / 400.0;
     let (found, own) = (report.strategies[1].difference.as_ref().unwrap(), &report.strategies[1]);
     assert!((found.utility.value - mean).abs() < 1e-12);
@@ -166,8 +208,9 @@ fn differences_are_paired() {
     assert!((found.certainty_equivalent.value - certain).abs() < 1e-9);
     // To first order a utility counts as wealth by e^(l CE) for exponential utility, each at its own strategy's mean.
     let slopes = [reference, own].map(|strategy| (0.01 * strategy.certainty_equivalent.value).exp());
-    let linear =
-        |outcome: &Outcome| slopes[1] * utility(kind, outcome.wealth[1]) - slopes[0] * utility(kind, outcome.wealth[0]);
+    let linear = |outcome: &Outcome| {
+        slopes[1] * utility(kind, outcome.ended[1].wealth) - slopes[0] * utility(kind, outcome.ended[0].wealth)
+    };
     let deviation = |of: &dyn Fn(&Outcome) -> f64| {
         let values: Vec<f64> = outcomes.outcomes.iter().map(of).collect();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -231,7 +274,7 @@ fn a_simulated_path_is_the_advisor_s_own() {
             let mut walk = advisor.walk(start, &returns);
             let advices: Vec<_> = walk.by_ref().collect();
             let end = walk.state;
-            assert_eq!(outcome.wealth[index], end.wealth);
+            assert_eq!(outcome.ended[index].wealth, end.wealth);
             let lived = &outcome.lived[4 * index..4 * (index + 1)];
             assert!(lived.iter().zip(&advices).all(|(lived, advice)| lived.allocation == advice.allocation));
         }
@@ -335,7 +378,7 @@ async fn an_evaluation_over_http_equals_one_in_process_and_its_sessions() {
     for (period, log_return) in evaluation.returns(0, 0).into_iter().enumerate() {
         wealth = app.observe(period + 1, log_return).await.1["wealth"].clone();
     }
-    assert_eq!(wealth.as_f64(), Some(outcomes.outcomes[0].wealth[0]));
+    assert_eq!(wealth.as_f64(), Some(outcomes.outcomes[0].ended[0].wealth));
 
     let given = json!({ "policies": { "adaptive": app.policy }, "frameworks": ["adaptive"] });
     let with_policy = app.evaluated(&small(given)).await;

@@ -11,6 +11,7 @@ use ballast::control::policy::advisor::{AdviceMode, Advisor};
 use ballast::control::pool::TrainingPool;
 use ballast::control::problem::state::State;
 use ballast::control::progress::Watch;
+use ballast::control::request::centre::CentreSpecification;
 use ballast::control::request::framework::Framework;
 use ballast::control::request::learning::Learning;
 use reqwest::StatusCode;
@@ -356,8 +357,17 @@ fn months(year: u32, window: usize, lived: usize) -> Vec<Period> {
 #[tokio::test(flavor = "multi_thread")]
 async fn ten_years_of_a_live_session_equal_the_backtest() {
     const LIVED: usize = 120;
-    let walk =
-        WalkForward { window: 36, every: 12, horizon: 13, risk_aversion: 3.0, trading_cost: 0.0, count: 12, seed: 5 };
+    let walk = WalkForward {
+        window: 36,
+        every: 12,
+        horizon: 13,
+        scale: 1.0,
+        centre: CentreSpecification::Empirical {},
+        risk_aversion: 3.0,
+        trading_cost: 0.0,
+        count: 12,
+        seed: 5,
+    };
     let (alpha, months) = (0.5, months(1991, walk.window, LIVED));
     let pool = TrainingPool::new(2).unwrap();
     let watch = Watch::unwatched();

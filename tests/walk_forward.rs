@@ -5,15 +5,27 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use ballast::control::error::TrainError;
 use ballast::control::evaluation::account::keep;
 use ballast::control::evaluation::rolling::{Decision, Period, Strategy, WalkForward};
+use ballast::control::kept::Kept;
 use ballast::control::policy::advisor::Advisor;
+use ballast::control::policy::one_period::OnePeriod;
 use ballast::control::pool::TrainingPool;
 use ballast::control::progress::Watch;
+use ballast::control::request::centre::CentreSpecification;
 use ballast::control::request::framework::Framework;
 use ballast::control::training::Training;
 
 const YEAR: usize = 4;
-const WALK: WalkForward =
-    WalkForward { window: 24, every: YEAR, horizon: YEAR, risk_aversion: 3.0, trading_cost: 0.0, count: 20, seed: 5 };
+const WALK: WalkForward = WalkForward {
+    window: 24,
+    every: YEAR,
+    horizon: YEAR,
+    scale: 1.0,
+    centre: CentreSpecification::Empirical {},
+    risk_aversion: 3.0,
+    trading_cost: 0.0,
+    count: 20,
+    seed: 5,
+};
 
 /// Returns that pay enough beyond the bank to be held at a wide level.
 fn periods(count: usize) -> Vec<Period> {
@@ -33,33 +45,76 @@ fn decide(walk: &WalkForward, strategies: &[Strategy], periods: &[Period], threa
     decisions
 }
 
+/// With every centre: what is held through a year is what a session of the same policy is told.
 #[test]
 fn a_year_equals_the_session_that_lives_it() {
-    let periods = periods(WALK.window + YEAR);
-    for (strategy, framework, alpha) in [
-        (Strategy::Adaptive { alpha: 0.9 }, Framework::Adaptive, 0.9),
-        (Strategy::Static { alpha: 0.9 }, Framework::Static, 0.9),
-        (Strategy::PlugIn, Framework::PlugIn, 0.1),
+    let mut radii = Vec::new();
+    for centre in [
+        CentreSpecification::Empirical {},
+        CentreSpecification::Smoothed { bandwidth: 0.02 },
+        CentreSpecification::Mixed { law: None, history: Some(vec![-0.02, 0.05]), weight: 12.0 },
     ] {
-        let decisions = &decide(&WALK, &[strategy], &periods, 1)[0];
-        let specification = WALK.specification(framework, alpha, &periods[..WALK.window]);
-        let watch = Watch::unwatched();
-        let advisor = Advisor::new(Training::new(&specification).unwrap().run(&watch).unwrap());
-        let returns: Vec<f64> = periods[WALK.window..].iter().map(|period| period.log_return).collect();
-        let mut walk = advisor.walk(advisor.initial_state(None, None).unwrap(), &returns);
-        let advices: Vec<_> = walk.by_ref().collect();
-        let end = walk.state;
-        assert_eq!((decisions.len(), advices.len()), (YEAR, YEAR));
-        for (decision, advice) in decisions.iter().zip(&advices) {
-            let expected = Decision { band: advice.band, radius: advice.radius, source: Some(advice.source) };
-            assert_eq!(*decision, expected);
+        let walk = WalkForward { centre, ..WALK };
+        for (strategy, framework, alpha) in [
+            (Strategy::Adaptive { alpha: 0.9 }, Framework::Adaptive, 0.9),
+            (Strategy::Static { alpha: 0.9 }, Framework::Static, 0.9),
+            (Strategy::PlugIn, Framework::PlugIn, 0.1),
+        ] {
+            radii.push(lived_as_told(&walk, strategy, framework, alpha));
         }
-        assert!(decisions.iter().any(|decision| decision.band.high > 0.0), "{strategy:?} shows nothing");
-        // The bank paid what the policy took it to pay, and nothing was charged.
-        let bands = decisions.iter().map(|decision| decision.band);
-        let account = keep(bands, &periods[WALK.window..], 0.0, 100.0);
-        assert_eq!(account.wealth.last(), Some(&end.wealth));
     }
+    // Smoothing moves no radius, 12 returns assumed beside 24 seen take a third of it.
+    assert_eq!(radii[3], radii[0]);
+    assert!((radii[6] / radii[0] - 2.0 / 3.0).abs() < 1e-12, "{radii:?}");
+    let scaled = WalkForward { centre: CentreSpecification::VolatilityScaled { half_life: 3.0 }, scale: 0.5, ..WALK };
+    let radius = lived_as_told(&scaled, Strategy::Static { alpha: 0.9 }, Framework::Static, 0.9);
+    let whole = WalkForward { scale: 1.0, ..scaled };
+    assert!(
+        (lived_as_told(&whole, Strategy::Static { alpha: 0.9 }, Framework::Static, 0.9) / radius - 2.0).abs() < 1e-12
+    );
+}
+
+/// The radius of the first period.
+fn lived_as_told(walk: &WalkForward, strategy: Strategy, framework: Framework, alpha: f64) -> f64 {
+    let periods = periods(walk.window + YEAR);
+    let decisions = &decide(walk, &[strategy], &periods, 1)[0];
+    let specification = walk.specification(framework, alpha, &periods[..walk.window]);
+    let watch = Watch::unwatched();
+    let advisor = Advisor::new(Training::new(&specification).unwrap().run(&watch).unwrap());
+    let returns: Vec<f64> = periods[walk.window..].iter().map(|period| period.log_return).collect();
+    let mut session = advisor.walk(advisor.initial_state(None, None).unwrap(), &returns);
+    let advices: Vec<_> = session.by_ref().collect();
+    let end = session.state;
+    assert_eq!((decisions.len(), advices.len()), (YEAR, YEAR));
+    for (decision, advice) in decisions.iter().zip(&advices) {
+        let expected = Decision { band: advice.band, radius: advice.radius, source: Some(advice.source) };
+        assert_eq!(*decision, expected);
+    }
+    assert!(decisions.iter().any(|decision| decision.band.high > 0.0), "{strategy:?} {:?} shows nothing", walk.centre);
+    // The bank paid what the policy took it to pay, and nothing was charged.
+    let bands = decisions.iter().map(|decision| decision.band);
+    let account = keep(bands, &periods[walk.window..], 0.0, 100.0);
+    assert_eq!(account.wealth.last(), Some(&end.wealth));
+    decisions[0].radius
+}
+
+/// At the volatility of now, where every period has a policy of its own: as `/advise` tells of the window before.
+#[test]
+fn a_period_at_the_volatility_of_now_is_that_of_advice_alone() {
+    let centre = CentreSpecification::VolatilityScaled { half_life: 3.0 };
+    let walk = WalkForward { every: 1, horizon: 1, centre, ..WALK };
+    let periods = periods(walk.window + YEAR);
+    let decisions = &decide(&walk, &[Strategy::Adaptive { alpha: 0.9 }], &periods, 1)[0];
+    for (start, decision) in decisions.iter().enumerate() {
+        let past = &periods[start..start + walk.window];
+        let specification = walk.specification(Framework::Adaptive, 0.9, past).completed().unwrap();
+        let (advice, _) = OnePeriod::new(&specification, Kept::default()).advise(0.0).unwrap();
+        assert!(
+            (decision.band.high - advice.allocation).abs() < 1e-9 && decision.radius == advice.radius,
+            "{decision:?} {advice:?}"
+        );
+    }
+    assert!(decisions.iter().any(|decision| decision.band.high != decisions[0].band.high), "{decisions:?}");
 }
 
 #[test]

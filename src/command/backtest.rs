@@ -16,6 +16,8 @@ use ballast::control::evaluation::backtest_report::BacktestReport;
 use ballast::control::pool::{PoolError, TrainingPool};
 use ballast::control::progress::Watch;
 use ballast::control::request::backtest::{BacktestRequest, Rates, defaults};
+use ballast::control::request::centre::CentreSpecification;
+use ballast::http::decode;
 use ballast::report::ChartError;
 use clap::Args;
 use thiserror::Error;
@@ -49,6 +51,13 @@ pub struct BacktestArgs {
     /// Of several assets one level, 0.1 unless given
     #[arg(long, value_delimiter = ',')]
     alpha: Vec<f64>,
+    /// Multiple of the radius of every ball; 1 unless given
+    #[arg(long)]
+    scale: Option<f64>,
+    /// What the balls are centred on, as `problem.centre` of a request: '{"kind": "smoothed", "bandwidth": 0.01}'; the returns seen
+    /// unless given
+    #[arg(long, value_parser = centre)]
+    centre: Option<CentreSpecification>,
     /// Relative risk aversion: 1 is log utility
     #[arg(long, default_value_t = defaults::risk_aversion())]
     risk_aversion: f64,
@@ -170,6 +179,8 @@ impl BacktestArgs {
             every: self.every,
             horizon: self.horizon,
             alpha: if self.alpha.is_empty() { defaults::alpha() } else { self.alpha.clone() },
+            scale: self.scale.unwrap_or_else(defaults::scale),
+            centre: self.centre.clone().unwrap_or_default(),
             risk_aversion: self.risk_aversion,
             trading_cost: self.trading_cost()?,
             cost_blind: self.cost_blind,
@@ -196,6 +207,10 @@ impl BacktestArgs {
     }
 }
 
+fn centre(text: &str) -> Result<CentreSpecification, String> {
+    decode::json(text.as_bytes()).map_err(|problem| problem.detail)
+}
+
 fn refused(option: &str, value: impl ToString, rule: &str) -> BacktestError {
     BacktestError::Option { option: option.into(), value: value.to_string(), rule: rule.into() }
 }
@@ -203,6 +218,8 @@ fn refused(option: &str, value: impl ToString, rule: &str) -> BacktestError {
 /// A field of the request is an option, or the file.
 impl From<FieldError> for BacktestError {
     fn from(FieldError { field, value, rule }: FieldError) -> Self {
+        // Fields of an object are those of its option.
+        let field = if field.starts_with("centre.") { field.replacen('.', " ", 1) } else { field };
         let option = match (field.strip_prefix("simple_returns"), field.strip_prefix("assets")) {
             (Some(at), _) => format!("the file{at}"),
             (None, Some(at)) => format!("--column{at}"),
@@ -331,6 +348,12 @@ mod tests {
         let few = BacktestArgs { count: Some(3), ..arguments(&[]) };
         let few = walk(&few, months(48)).err().unwrap().to_string();
         assert_eq!(few, "--count is 3: must lie in [10, 10000]");
+        let scaled = "--centre kind is volatility_scaled: must be another where the horizon exceeds 1";
+        let centre = r#"{"kind": "volatility_scaled", "half_life": 12}"#;
+        assert!(message(&["--centre", centre]).starts_with(scaled), "{}", message(&["--centre", centre]));
+        let wide = message(&["--centre", r#"{"kind": "smoothed", "bandwidth": 2}"#]);
+        assert_eq!(wide, "--centre bandwidth is 2: must be a number in [0, 1]");
+        assert_eq!(message(&["--scale", "1000"]), "--scale is 1000: must be a number in [0, 100]");
         assert_eq!(message(&["--alpha", "0.1,2"]), "--alpha[1] is 2: must be a number in [0.001, 0.999]");
     }
 }

@@ -14,11 +14,13 @@ use super::bench::paper;
 use super::compare::Workshop;
 use super::tables;
 
+mod page;
+
 #[derive(Debug, Clone, Args)]
 pub struct Evaluate {
     /// The request, as for POST /evaluate; the paper's problem unless given
     file: Option<PathBuf>,
-    /// Folder for report.json, strategies.csv and periods.csv, created if absent
+    /// Folder for report.html, report.json, strategies.csv and periods.csv, created if absent
     #[arg(long)]
     out: PathBuf,
 }
@@ -47,6 +49,7 @@ pub fn run(arguments: &Evaluate) -> Result<(), Box<dyn Error>> {
     let (_, report) = workshop.compare("simulating", &evaluation, &followers, workshop.seconds())?;
     workshop.finish();
     std::fs::create_dir_all(&arguments.out)?;
+    write(&arguments.out, "report.html", &page::page(&report).html()?)?;
     write(&arguments.out, "report.json", &serde_json::to_string_pretty(&report)?)?;
     write(&arguments.out, "strategies.csv", &tables::csv(&report))?;
     write(&arguments.out, "periods.csv", &tables::periods_csv(&report))?;

@@ -17,8 +17,8 @@ pub fn estimates(strategy: &StrategyReport) -> Vec<(&'static str, Estimate)> {
         ("max", utility.max),
         ("min", utility.min),
         ("certainty_equivalent", strategy.certainty_equivalent),
-        ("wealth_mean", strategy.wealth.mean),
     ];
+    found.extend(wealth(strategy));
     if let Some(difference) = &strategy.difference {
         found.push(("difference_utility", difference.utility));
         found.push(("difference_certainty_equivalent", difference.certainty_equivalent));
@@ -27,32 +27,53 @@ pub fn estimates(strategy: &StrategyReport) -> Vec<(&'static str, Estimate)> {
     found
 }
 
-/// One line a strategy: terminal utility, and the difference to the reference.
+/// Terminal wealth, and what it went through.
+fn wealth(strategy: &StrategyReport) -> [(&'static str, Estimate); 8] {
+    let wealth = &strategy.wealth;
+    [
+        ("wealth_mean", wealth.mean),
+        ("wealth_quantile_20", wealth.quantile_20),
+        ("wealth_quantile_90", wealth.quantile_90),
+        ("wealth_max", wealth.max),
+        ("wealth_min", wealth.min),
+        ("worst_twentieth", wealth.worst_twentieth),
+        ("chance_of_loss", wealth.chance_of_loss),
+        ("max_drawdown", wealth.max_drawdown),
+    ]
+}
+
+/// Decimals by which six digits of the initial wealth are written.
+pub fn decimals(report: &EvaluationReport) -> usize {
+    let whole = report.request.problem.initial_wealth.log10().floor() as i32 + 1;
+    (6 - whole).clamp(0, 12) as usize
+}
+
+/// One line a strategy: what its terminal wealth is worth for certain and how it spreads, and the difference to the reference.
 pub fn screen(report: &EvaluationReport) -> String {
-    let mut text = format!(
-        "{:<20}{:>22}{:>10}{:>10}{:>10}{:>10}{:>10}{:>12}  {}\n",
-        "terminal utility", "mean", "variance", "20 %", "90 %", "max", "min", "certain", "less the reference"
-    );
+    let heads = ["certain", "mean", "20 %", "90 %", "least", "most", "worst 5 %"];
+    let heads: String = heads.iter().map(|head| format!("{head:>13}")).collect();
+    let mut text = format!("{:<20}{heads}{:>9}{:>9}  certain, less the reference\n", "terminal wealth", "loss", "fall");
+    let places = decimals(report);
     for strategy in &report.strategies {
-        let utility = &strategy.utility;
+        let StrategyReport { wealth, certainty_equivalent, .. } = strategy;
+        let figures = [
+            *certainty_equivalent,
+            wealth.mean,
+            wealth.quantile_20,
+            wealth.quantile_90,
+            wealth.min,
+            wealth.max,
+            wealth.worst_twentieth,
+        ];
+        let figures: String = figures.iter().map(|figure| format!("{:>13.places$}", figure.value)).collect();
         let difference = strategy.difference.as_ref().map_or(String::from("(the reference)"), |difference| {
-            let Estimate { value, low, high } = difference.utility;
-            format!("{value:+.4} ({low:+.4} to {high:+.4})")
+            let Estimate { value, low, high } = difference.certainty_equivalent;
+            format!("{value:+.places$} ({low:+.places$} to {high:+.places$})")
         });
-        let reach = 0.5 * (utility.mean.high - utility.mean.low);
+        let percent = |share: Estimate| format!("{:.1} %", 100.0 * share.value);
+        let (loss, fall) = (percent(wealth.chance_of_loss), percent(wealth.max_drawdown));
         // Writing to a string cannot fail.
-        let _ = writeln!(
-            text,
-            "{:<20}{:>22}{:>10.4}{:>10.4}{:>10.4}{:>10.4}{:>10.4}{:>12.4}  {difference}",
-            strategy.strategy,
-            format!("{:.4} +- {reach:.4}", utility.mean.value),
-            utility.variance.value,
-            utility.quantile_20.value,
-            utility.quantile_90.value,
-            utility.max.value,
-            utility.min.value,
-            strategy.certainty_equivalent.value,
-        );
+        let _ = writeln!(text, "{:<20}{figures}{loss:>9}{fall:>9}  {difference}", strategy.strategy);
     }
     text + "\n" + &report.sentences.join("\n") + "\n"
 }

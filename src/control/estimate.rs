@@ -36,8 +36,8 @@ const STEP_NUMBERS: usize = 64;
 /// Predictions a function beyond those, where trading costs: at eight trades, while a refined table is made beside the one before.
 const TABLES: usize = 16;
 const FUNCTIONS_WITHOUT_COST: usize = 2;
-/// A simulated path: wealth of a strategy, and a step as a framework lived it, with the copies that a report sorts.
-const WEALTH_BYTES: usize = 48;
+/// A simulated path: what a strategy came to, and a step as a framework lived it, with the copies that a report sorts.
+const ENDED_BYTES: usize = 80;
 const LIVED_BYTES: usize = 48;
 const PATH_BYTES: usize = 256;
 /// A period of a strategy's walk-forward: its decision and account, the series that are resampled, and the report with its
@@ -223,7 +223,7 @@ pub fn evaluation(request: &EvaluationRequest, threads: usize) -> Footprint {
     let paths = request.history_count().saturating_mul(request.paths);
     let strategies = request.frameworks.len() + request.mixes().len();
     let lived = product(&[request.problem.horizon, request.frameworks.len(), LIVED_BYTES]);
-    let outcomes = product(&[paths, strategies * WEALTH_BYTES + lived + PATH_BYTES]);
+    let outcomes = product(&[paths, strategies * ENDED_BYTES + lived + PATH_BYTES]);
     most.cloned()
         .unwrap_or_else(|| Footprint::of("paths", request.paths, LEAST))
         .and("frameworks", request.frameworks.len(), policies.fold(kept_by_evaluation(request), usize::saturating_add))

@@ -188,6 +188,7 @@ fn walked() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
         ("every", whole(&HORIZON)),
         ("horizon", whole(&HORIZON)),
         ("alpha", listed(&backtest::LEVELS, within(backtest::ALPHA))),
+        ("scale", within(RADIUS_SCALE)),
         ("risk_aversion", within(backtest::RELATIVE)),
         ("trading_cost", within(TRADING_COST)),
         ("count", whole(&COUNT)),

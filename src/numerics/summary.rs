@@ -93,6 +93,16 @@ impl Clustered {
         Estimate { value, low: at(share - down), high: at(share + up) }
     }
 
+    /// The mean of the lowest share of all values; of the value at its edge as much counts as makes the share whole:
+    ///
+    ///   mean of q - (q - x)^+ / share,   q the quantile at the share.
+    ///
+    /// Source: Rockafellar and Uryasev (2000), J. Risk 2.
+    pub fn lowest(&self, values: &[f64], share: f64) -> Estimate {
+        let edge = quantile(values, share);
+        self.mean(&values.iter().map(|value| edge - (edge - value).max(0.0) / share).collect::<Vec<f64>>())
+    }
+
     /// The largest value of a group, averaged over groups, and the central interval of its exact bootstrap law: a group
     /// at random, as many values of it drawn with replacement, so P(largest <= x) is the mean over groups of F(x)^group.
     pub fn largest(&self, values: &[f64]) -> Estimate {
@@ -160,6 +170,17 @@ mod tests {
         sorted.sort_by(f64::total_cmp);
         assert_estimate(sample.quantile(&VALUES, &sorted, 0.9), [1.9, 1.2383380049902388, 2.2]);
         assert_estimate(sample.quantile(&VALUES, &sorted, 0.2), [0.38, 0.0, 0.9]);
+    }
+
+    /// The three lowest of thirty are 0 to 2, and an eighth of twenty is the two lowest and half of the third.
+    #[test]
+    fn the_lowest_share_is_averaged_and_its_edge_counted_in_part() {
+        let values: Vec<f64> = (0..30).map(|index| f64::from((7 * index) % 30)).collect();
+        assert!((Clustered::new(1, 30, 0.9).lowest(&values, 0.1).value - 1.0).abs() < 1e-12);
+        let sample = Clustered::new(4, 5, 0.95);
+        let found = sample.lowest(&VALUES, 0.125);
+        assert!((found.value - 0.5 * 0.3 / 2.5).abs() < 1e-12 && found.low < found.value, "{found:?}");
+        assert!((sample.lowest(&VALUES, 1.0).value - sample.mean(&VALUES).value).abs() < 1e-12);
     }
 
     #[test]

@@ -30,6 +30,8 @@ impl BacktestArgs {
             ("--horizon", self.horizon.map(|horizon| horizon.to_string())),
             ("--count", self.count.map(|count| count.to_string())),
             ("--cost-blind", self.cost_blind.then(|| "given".to_owned())),
+            ("--scale", self.scale.map(|scale| scale.to_string())),
+            ("--centre", self.centre.as_ref().map(|centre| centre.name().to_owned())),
         ];
         if let Some((option, value)) = of_training.into_iter().find_map(|(option, value)| Some((option, value?))) {
             return Err(refused(option, value, "must be left out of several assets, for which nothing is trained"));

@@ -50,13 +50,15 @@ pub fn figures(strategies: impl IntoIterator<Item = (String, Vec<Figure>)>) -> S
     csv.into_text()
 }
 
-/// How a strategy varied, and what it traded.
-pub fn of_returns(performance: &Performance) -> [Figure; 4] {
+/// How a strategy varied, what it traded, and what it lost in bad years.
+pub fn of_returns(performance: &Performance) -> [Figure; 6] {
     [
         estimated("annual_mean", performance.annual_mean),
         estimated("annual_volatility", performance.annual_volatility),
         estimated("sharpe_ratio", performance.sharpe_ratio),
         estimated("annual_turnover", performance.annual_turnover),
+        estimated("chance_of_loss", performance.chance_of_loss),
+        estimated("worst_twentieth", performance.worst_twentieth),
     ]
 }
 

@@ -51,7 +51,7 @@ pub fn counted(count: usize, noun: &str) -> String {
 }
 
 fn method(shown: &Shown) -> String {
-    let (walk, noun) = (shown.walked.backtest.walk, noun(shown));
+    let (walk, noun) = (&shown.walked.backtest.walk, noun(shown));
     format!(
         "{} Every {} a policy is trained on the {} before, for a horizon of {}, and lived by until the next: each {noun} it \
          is asked, held to, and told the return. Nothing later than a {noun} is used for its allocation. Relative risk \
@@ -76,8 +76,10 @@ pub fn of_years(years: usize) -> String {
 pub fn intervals(block: &str) -> String {
     format!(
         "Intervals are the middle {:.0} % of {RESAMPLES} circular block-bootstrap resamples, alike for all strategies: \
-         blocks of {block}, and of {YEAR_BLOCK} years for certainty equivalents. They take the past as one \
-         draw of a stationary world, so they are too narrow for what was never seen.",
+         blocks of {block}, and of {YEAR_BLOCK} years for certainty equivalents and losses. They take the past as one \
+         draw of a stationary world, so they are too narrow for what was never seen. The chance of loss and the worst 5 % are \
+         of years that begin with every period, so that they overlap: how many end with less than they began with, and what the \
+         worst twentieth of them returned on average.",
         100.0 * CONFIDENCE
     )
 }
@@ -86,7 +88,12 @@ fn notes(shown: &Shown) -> Vec<String> {
     let (choices, noun) = (&shown.report.choices, noun(shown));
     let block = periods(shown, shown.returns.periods_per_year);
     vec![
-        format!("Design points a step {}, seed {}, bridge radius; took {:.0} s.", choices.count, choices.seed, shown.seconds),
+        format!("Design points a step {}, seed {}; took {:.0} s.", choices.count, choices.seed, shown.seconds),
+        format!(
+            "Balls have {} times the radius of the bridge around {}.",
+            choices.scale,
+            choices.centre.in_words(choices.window)
+        ),
         format!(
             "A policy takes the bank to go on paying what it paid in the last {noun} before its training; accounts are \
              credited with what it really paid."
@@ -213,7 +220,17 @@ fn utility_table(shown: &Shown) -> Table {
 pub fn performance_table<'a>(strategies: impl Iterator<Item = (&'a str, &'a Performance)>) -> Table {
     let table = Table::new(
         "Performance, a year",
-        &["strategy", "mean, %", "volatility, %", "Sharpe ratio", "turnover, %", "max drawdown, %", "final wealth"],
+        &[
+            "strategy",
+            "mean, %",
+            "volatility, %",
+            "Sharpe ratio",
+            "turnover, %",
+            "chance of loss, %",
+            "worst 5 % of years, %",
+            "max drawdown, %",
+            "final wealth",
+        ],
     );
     strategies.fold(table, |table, (strategy, performance)| {
         table.row([
@@ -222,6 +239,8 @@ pub fn performance_table<'a>(strategies: impl Iterator<Item = (&'a str, &'a Perf
             estimate(performance.annual_volatility, 100.0, 2),
             estimate(performance.sharpe_ratio, 1.0, 2),
             estimate(performance.annual_turnover, 100.0, 0),
+            estimate(performance.chance_of_loss, 100.0, 1),
+            estimate(performance.worst_twentieth, 100.0, 1),
             number(100.0 * performance.max_drawdown, 1),
             number(performance.final_wealth, 0),
         ])

@@ -147,7 +147,7 @@ fn case(
 
 fn terminal_utilities(evaluation: &Evaluation, outcomes: &Outcomes, strategy: usize) -> Vec<f64> {
     let kind = evaluation.request.problem.utility;
-    outcomes.outcomes.iter().map(|outcome| utility(kind, outcome.wealth[strategy])).collect()
+    outcomes.outcomes.iter().map(|outcome| utility(kind, outcome.ended[strategy].wealth)).collect()
 }
 
 /// How the gap to the known law closes as histories grow.

@@ -85,8 +85,48 @@ impl Account {
 
     /// Wealth at the end of each whole year per unit at its start.
     pub fn yearly_growth(&self, year: usize) -> Vec<f64> {
-        self.wealth.windows(year + 1).step_by(year).map(|whole| whole[year] / whole[0]).collect()
+        self.rolling_growth(year).step_by(year).collect()
     }
+
+    /// The same of the years that begin with every period, one after another.
+    pub fn rolling_growth(&self, year: usize) -> impl Iterator<Item = f64> {
+        self.wealth.windows(year + 1).map(move |whole| whole[year] / whole[0])
+    }
+}
+
+/// Where the wealth of a strategy ends on a path, and how far it fell on the way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ended {
+    /// Terminal.
+    pub wealth: f64,
+    /// The largest fall below the highest so far, as a share of it. What is added or withdrawn is neither gain nor fall.
+    pub fall: f64,
+    /// Over the highest so far.
+    level: f64,
+}
+
+impl Ended {
+    /// The start.
+    pub fn at(wealth: f64) -> Self {
+        Ended { wealth, fall: 0.0, level: 1.0 }
+    }
+
+    /// After a period that leads to `wealth`, of which `added` comes from outside.
+    #[must_use]
+    pub fn after(self, wealth: f64, added: f64) -> Self {
+        let level = f64::min(1.0, self.level * (wealth - added) / self.wealth);
+        Ended { wealth, fall: self.fall.max(1.0 - level), level }
+    }
+}
+
+/// What a constant mix comes to.
+pub fn mix_ended(periods: &[Dynamics], initial_wealth: f64, mix: f64, returns: &[f64]) -> Ended {
+    let step = |(ended, holding): (Ended, f64), (dynamics, &log_return): (&Dynamics, &f64)| {
+        let allocation = dynamics.highest_action(ended.wealth, mix);
+        let (wealth, holding) = dynamics.next(ended.wealth, holding, allocation, log_return);
+        (ended.after(wealth, dynamics.contribution), holding)
+    };
+    periods.iter().zip(returns).fold((Ended::at(initial_wealth), 0.0), step).0
 }
 
 /// Certainty equivalent of mean utility over years that each start with `wealth`.
@@ -175,6 +215,17 @@ mod tests {
         let traded = keep_assets(&exchanged, &rows, &bank, 0.01, 100.0).traded;
         // 0.48 / 1.086 is sold of the one, and 0.4 bought of the other.
         assert!((traded[1] - (0.48 / 1.086 + 0.4)).abs() < 1e-12, "{traded:?}");
+    }
+
+    /// From 100 up to 120, and 10 added: 130. A quarter is lost, 10 withdrawn: 87.5. A fifth is gained: 105, still 10 % below the
+    /// highest. Half of that is lost: 45 % of the highest are left.
+    #[test]
+    fn what_is_added_or_withdrawn_is_neither_gain_nor_fall() {
+        let course = [(130.0, 10.0), (87.5, -10.0), (105.0, 0.0), (52.5, 0.0)];
+        let ended = course.iter().fold(Ended::at(100.0), |ended, &(wealth, added)| ended.after(wealth, added));
+        assert!((ended.fall - 0.55).abs() < 1e-12 && ended.wealth == 52.5, "{ended:?}");
+        // The bank's withdrawals alone make no fall.
+        assert_eq!([(60.0, -41.0), (10.0, -50.5)].iter().fold(Ended::at(100.0), |e, &(w, a)| e.after(w, a)).fall, 0.0);
     }
 
     #[test]

@@ -55,6 +55,8 @@ impl Backtest {
             window: given(request.window),
             every: given(request.every),
             horizon: given(request.horizon),
+            scale: request.scale,
+            centre: request.centre.clone(),
             risk_aversion: request.risk_aversion,
             trading_cost: if request.cost_blind { 0.0 } else { request.trading_cost },
             count: request.count,
@@ -198,6 +200,7 @@ fn renamed(error: FieldError, returns: &str) -> FieldError {
         "problem.history" => returns.to_owned(),
         // Of the bridges of a window.
         "problem.radius.paths" => "window".to_owned(),
+        other if other.starts_with("problem.centre") => other.trim_start_matches("problem.").to_owned(),
         other => other.rsplit('.').next().unwrap_or(other).to_owned(),
     };
     FieldError { field, ..error }

@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::request::centre::CentreSpecification;
+
 /// Name and version of the report's form.
 pub const FORMAT: &str = "ballast-backtest-1";
 
@@ -42,6 +44,10 @@ pub struct BacktestChoices {
     pub horizon: usize,
     /// Levels of the adaptive strategies.
     pub alpha: Vec<f64>,
+    /// Multiple of the radius of every ball.
+    pub scale: f64,
+    /// What the balls are centred on.
+    pub centre: CentreSpecification,
     /// Relative.
     pub risk_aversion: f64,
     /// Lost of what is traded, as a share of it.
@@ -93,6 +99,10 @@ pub struct Performance {
     pub sharpe_ratio: BootstrapEstimate,
     /// Share of wealth that is bought and sold in a year.
     pub annual_turnover: BootstrapEstimate,
+    /// Share of the years, one beginning with every period, that end with less than they began with.
+    pub chance_of_loss: BootstrapEstimate,
+    /// Mean return of the worst twentieth of these years.
+    pub worst_twentieth: BootstrapEstimate,
     /// Largest fall below the highest wealth so far, as a share of it.
     pub max_drawdown: f64,
     /// From 100.

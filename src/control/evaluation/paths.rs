@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use crate::control::error::{FieldError, TrainError};
+use crate::control::evaluation::account::{Ended, mix_ended};
 use crate::control::kept::Kept;
 use crate::control::policy::advice::AdviceSource;
 use crate::control::policy::advisor::{AdviceMode, Advisor};
@@ -52,11 +53,11 @@ pub struct Lived {
     pub resolved: bool,
 }
 
-/// One path: terminal wealth of every strategy, and every step of every framework, framework by framework.
+/// One path: what every strategy comes to, and every step of every framework, framework by framework.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// Terminal wealth, strategy by strategy: frameworks, then constant mixes.
-    pub wealth: Vec<f64>,
+    /// Strategy by strategy: frameworks, then constant mixes.
+    pub ended: Vec<Ended>,
     /// Framework by framework, each step by step.
     pub lived: Vec<Lived>,
 }
@@ -185,14 +186,6 @@ impl Evaluation {
     }
 }
 
-/// Terminal wealth of a constant mix.
-pub fn mix_wealth(periods: &[Dynamics], initial_wealth: f64, mix: f64, returns: &[f64]) -> f64 {
-    let step = |(wealth, holding): (f64, f64), (dynamics, &log_return): (&Dynamics, &f64)| {
-        dynamics.next(wealth, holding, dynamics.highest_action(wealth, mix), log_return)
-    };
-    periods.iter().zip(returns).fold((initial_wealth, 0.0), step).0
-}
-
 fn true_law(request: &EvaluationRequest) -> ContinuousLaw {
     let law = request.problem.law.as_ref().unwrap_or(&SamplingLaw::Bootstrap {});
     continuous_law(law, &request.problem)
@@ -263,10 +256,10 @@ impl Simulator<'_> {
         let problem = &self.evaluation.request.problem;
         let returns = self.evaluation.returns(history, path);
         let distances = self.distances_along(sample, &returns);
-        let mut outcome = Outcome { wealth: Vec::new(), lived: Vec::with_capacity(advisors.len() * returns.len()) };
+        let mut outcome = Outcome { ended: Vec::new(), lived: Vec::with_capacity(advisors.len() * returns.len()) };
         let mut seconds = 0.0;
         for advisor in advisors {
-            outcome.wealth.push(self.follow(
+            outcome.ended.push(self.follow(
                 advisor,
                 history,
                 &returns,
@@ -276,7 +269,7 @@ impl Simulator<'_> {
             )?);
         }
         for &mix in self.evaluation.request.mixes() {
-            outcome.wealth.push(mix_wealth(&self.periods, problem.initial_wealth, mix, &returns));
+            outcome.ended.push(mix_ended(&self.periods, problem.initial_wealth, mix, &returns));
         }
         self.report_path();
         Ok((outcome, seconds))
@@ -299,7 +292,7 @@ impl Simulator<'_> {
         returns.iter().map(before).collect()
     }
 
-    /// Terminal wealth of one framework.
+    /// What one framework comes to.
     fn follow(
         &self,
         advisor: &Advisor,
@@ -308,11 +301,12 @@ impl Simulator<'_> {
         distances: &[f64],
         lived: &mut Vec<Lived>,
         seconds: &mut f64,
-    ) -> Result<f64, TrainError> {
+    ) -> Result<Ended, TrainError> {
         let start = advisor.initial_state(Some(&self.evaluation.histories[history]), None)?;
         let moves = advisor.specification().problem.framework.learns();
         let mut walk = advisor.walk(start, returns);
-        for step in 0..returns.len() {
+        let mut ended = Ended::at(walk.state.wealth);
+        for (step, dynamics) in self.periods.iter().enumerate().take(returns.len()) {
             self.watch.go_on()?;
             let started = (self.clock)();
             let Some(advice) = walk.next() else { break };
@@ -322,8 +316,9 @@ impl Simulator<'_> {
             }
             let distance = distances[if moves { step } else { 0 }];
             lived.push(Lived { allocation: advice.allocation, radius: advice.radius, distance, resolved });
+            ended = ended.after(walk.state.wealth, dynamics.contribution);
         }
-        Ok(walk.state.wealth)
+        Ok(ended)
     }
 
     fn report_path(&self) {

@@ -57,7 +57,7 @@ pub struct StrategyReport {
     pub utility: UtilityReport,
     /// Terminal wealth that is worth as much for certain.
     pub certainty_equivalent: Estimate,
-    /// Terminal, in units of the initial wealth's currency.
+    /// Terminal, in units of the initial wealth's currency, and what it went through.
     pub wealth: WealthReport,
     /// This strategy less the reference, on the same returns; null for the reference.
     pub difference: Option<Difference>,
@@ -90,11 +90,26 @@ pub struct UtilityReport {
     pub min: Estimate,
 }
 
-/// Terminal wealth.
+/// Terminal wealth, and how it came to be.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WealthReport {
     /// Over paths.
     pub mean: Estimate,
+    /// A fifth of the paths end with less.
+    pub quantile_20: Estimate,
+    /// Nine tenths of the paths end with less.
+    pub quantile_90: Estimate,
+    /// Of the paths of one history, averaged over histories.
+    pub max: Estimate,
+    /// Of the paths of one history, averaged over histories.
+    pub min: Estimate,
+    /// The mean of the worst twentieth of the paths.
+    pub worst_twentieth: Estimate,
+    /// Share of the paths that end with less than was put in: the initial wealth and all contributions.
+    pub chance_of_loss: Estimate,
+    /// Mean over paths of the largest fall on the way below the highest so far, as a share of it; what is added or withdrawn is
+    /// neither gain nor fall.
+    pub max_drawdown: Estimate,
 }
 
 /// A paired difference to the reference.

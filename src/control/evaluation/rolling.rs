@@ -14,6 +14,7 @@ use crate::control::policy::advisor::Advisor;
 use crate::control::pool;
 use crate::control::problem::actions::Band;
 use crate::control::progress::Watch;
+use crate::control::request::centre::CentreSpecification;
 use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{
@@ -48,7 +49,7 @@ pub enum Strategy {
         /// Miscoverage of its ball.
         alpha: f64,
     },
-    /// The empirical law of the window, learned and taken as true.
+    /// The centre of the balls, learned and taken as true.
     PlugIn,
     /// The same share always.
     Mix {
@@ -69,7 +70,7 @@ pub struct Decision {
 }
 
 /// The choices that all trainings share.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct WalkForward {
     /// Periods of history that each policy is trained on.
     pub window: usize,
@@ -77,6 +78,10 @@ pub struct WalkForward {
     pub every: usize,
     /// Periods that a policy looks ahead.
     pub horizon: usize,
+    /// Multiple of the radius of every ball.
+    pub scale: f64,
+    /// Of the balls, and the law that plug-in takes as true.
+    pub centre: CentreSpecification,
     /// Relative risk aversion: log utility at 1, power utility above.
     pub risk_aversion: f64,
     /// That policies reckon with, of what is traded.
@@ -149,7 +154,8 @@ impl WalkForward {
                 horizon: self.horizon,
                 trading_cost: self.trading_cost,
                 utility: self.utility(),
-                radius: Some(RadiusRule::bridge(alpha)),
+                centre: self.centre.clone(),
+                radius: Some(RadiusRule::scaled_bridge(alpha, self.scale)),
                 ..ProblemSpecification::of(
                     past.iter().map(|period| period.log_return).collect(),
                     past.last().map_or(0.0, |last| last.bank_return),

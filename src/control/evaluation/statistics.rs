@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::control::evaluation::paths::{Evaluation, Follower, HistoryStart, Lived, Outcomes, mix_wealth};
+use crate::control::evaluation::account::mix_ended;
+use crate::control::evaluation::paths::{Evaluation, Follower, HistoryStart, Lived, Outcomes};
 use crate::control::evaluation::report::{
     Costs, Coverage, CoverageAtSize, Difference, EvaluationReport, FORMAT, HistoryReport, OwnMix, PeriodReport,
     RadiusSpread, Spread, StrategyReport, UtilityReport, WealthReport,
@@ -16,6 +17,8 @@ use crate::numerics::summary::{Clustered, Estimate, interpolated_quantile};
 
 /// Bins of the histograms.
 const BINS: usize = 40;
+/// Share of the paths that are the worst.
+const WORST: f64 = 0.05;
 
 impl EvaluationReport {
     /// The report of what was simulated, on the current pool. Cost O(strategies paths ln paths).
@@ -31,8 +34,9 @@ impl EvaluationReport {
         let request = &evaluation.request;
         let sample = Clustered::new(evaluation.histories.len(), request.paths, request.level);
         let count = request.frameworks.len() + request.mixes().len();
-        let wealth: Vec<Vec<f64>> =
-            (0..count).map(|index| outcomes.outcomes.iter().map(|outcome| outcome.wealth[index]).collect()).collect();
+        let wealth: Vec<Vec<f64>> = (0..count)
+            .map(|index| outcomes.outcomes.iter().map(|outcome| outcome.ended[index].wealth).collect())
+            .collect();
         let kind = request.problem.utility;
         let utilities: Vec<Vec<f64>> =
             wealth.iter().map(|wealth| wealth.iter().map(|&wealth| utility(kind, wealth)).collect()).collect();
@@ -108,7 +112,7 @@ impl Table<'_> {
             utility: self.utility(utilities),
             certainty_equivalent: self.certainty_equivalent(&self.wealth[index]),
             own_mix: follower.map(|_| self.own_mix(index)),
-            wealth: WealthReport { mean: self.sample.mean(&self.wealth[index]) },
+            wealth: self.wealth(index),
             difference: (index != self.reference).then(|| self.difference(index)),
             histogram: self.histogram(utilities),
             periods: follower.map(|_| self.periods(index)),
@@ -117,9 +121,26 @@ impl Table<'_> {
         })
     }
 
+    fn wealth(&self, index: usize) -> WealthReport {
+        let (wealth, problem) = (&self.wealth[index], &self.evaluation.request.problem);
+        let sorted = ascending(wealth);
+        let put_in =
+            problem.initial_wealth + (0..problem.horizon).map(|step| problem.contributions.at(step)).sum::<f64>();
+        let falls: Vec<f64> = self.outcomes.outcomes.iter().map(|outcome| outcome.ended[index].fall).collect();
+        WealthReport {
+            mean: self.sample.mean(wealth),
+            quantile_20: self.sample.quantile(wealth, &sorted, 0.2),
+            quantile_90: self.sample.quantile(wealth, &sorted, 0.9),
+            max: self.sample.largest(wealth),
+            min: self.sample.smallest(wealth),
+            worst_twentieth: self.sample.lowest(wealth, WORST),
+            chance_of_loss: self.sample.share(wealth, |wealth| *wealth < put_in),
+            max_drawdown: self.sample.mean(&falls),
+        }
+    }
+
     fn utility(&self, utilities: &[f64]) -> UtilityReport {
-        let mut sorted = utilities.to_vec();
-        sorted.sort_by(f64::total_cmp);
+        let sorted = ascending(utilities);
         UtilityReport {
             mean: self.sample.mean(utilities),
             variance: self.sample.variance(utilities),
@@ -169,7 +190,7 @@ impl Table<'_> {
         let periods = Dynamics::of(&request.problem);
         let of_path = |path: usize| {
             let returns = self.evaluation.returns(path / request.paths, path % request.paths);
-            mix_wealth(&periods, request.problem.initial_wealth, allocation, &returns)
+            mix_ended(&periods, request.problem.initial_wealth, allocation, &returns).wealth
         };
         let wealth: Vec<f64> = (0..self.outcomes.outcomes.len()).into_par_iter().map(of_path).collect();
         OwnMix { allocation, beyond: self.apart(&self.wealth[index], &wealth) }
@@ -287,21 +308,25 @@ fn share<'a>(steps: impl Iterator<Item = &'a Lived>, holds: impl Fn(&Lived) -> b
     held as f64 / f64::max(f64::from(all), 1.0)
 }
 
-fn sorted_with_mean(mut values: Vec<f64>) -> (Vec<f64>, f64) {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    values.sort_by(f64::total_cmp);
-    (values, mean)
+fn ascending(values: &[f64]) -> Vec<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted
+}
+
+fn sorted_with_mean(values: &[f64]) -> (Vec<f64>, f64) {
+    (ascending(values), values.iter().sum::<f64>() / values.len() as f64)
 }
 
 fn spread(values: Vec<f64>) -> Spread {
-    let (sorted, mean) = sorted_with_mean(values);
+    let (sorted, mean) = sorted_with_mean(&values);
     let at = |share| interpolated_quantile(&sorted, share);
     Spread { mean, quantile_10: at(0.1), quantile_90: at(0.9) }
 }
 
 fn radius_spread(values: Vec<f64>) -> RadiusSpread {
     let first_path = values[0];
-    let (sorted, mean) = sorted_with_mean(values);
+    let (sorted, mean) = sorted_with_mean(&values);
     let at = |share| interpolated_quantile(&sorted, share);
     RadiusSpread { mean, quantile_10: at(0.1), quantile_50: at(0.5), quantile_90: at(0.9), first_path }
 }

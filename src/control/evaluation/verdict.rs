@@ -173,7 +173,7 @@ impl BacktestReport {
     /// Of all that was lived.
     pub fn new(walked: &Walked) -> Self {
         let Walked { backtest, lines, analysis } = walked;
-        let (request, walk) = (&backtest.request, backtest.walk);
+        let (request, walk) = (&backtest.request, &backtest.walk);
         BacktestReport {
             format: FORMAT.to_owned(),
             frequency: backtest.frequency.map(|frequency| frequency.adjective().to_owned()),
@@ -185,6 +185,8 @@ impl BacktestReport {
                 every: walk.every,
                 horizon: walk.horizon,
                 alpha: request.alpha.clone(),
+                scale: request.scale,
+                centre: request.centre.clone(),
                 risk_aversion: request.risk_aversion,
                 trading_cost: request.trading_cost,
                 cost_blind: request.cost_blind,
@@ -232,6 +234,8 @@ mod tests {
                 annual_volatility: none,
                 sharpe_ratio: none,
                 annual_turnover: none,
+                chance_of_loss: none,
+                worst_twentieth: none,
                 max_drawdown: 0.2,
                 final_wealth: 120.0,
                 mean_allocation: 0.25,

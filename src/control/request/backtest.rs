@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
+use crate::control::request::centre::CentreSpecification;
 use crate::control::request::dates::{self, date};
 use crate::control::request::frequency::Frequency;
 use crate::control::request::rules::{self, COUNT, HISTORY_LENGTH, HORIZON, RATE, TRADING_COST, whole, within};
@@ -58,6 +59,12 @@ pub struct BacktestRequest {
     /// Levels of the adaptive strategies; the static one takes the second, or the only one.
     #[serde(default = "defaults::alpha")]
     pub alpha: Vec<f64>,
+    /// Multiple of the radius of every ball.
+    #[serde(default = "defaults::scale")]
+    pub scale: f64,
+    /// What the balls are centred on, and what plug-in takes for the law.
+    #[serde(default)]
+    pub centre: CentreSpecification,
     /// Relative: 1 is log utility.
     #[serde(default = "defaults::risk_aversion")]
     pub risk_aversion: f64,
@@ -90,6 +97,10 @@ pub mod defaults {
     /// Levels.
     pub fn alpha() -> Vec<f64> {
         vec![0.05, 0.1, 0.5]
+    }
+    /// As the bridge says.
+    pub fn scale() -> f64 {
+        1.0
     }
     /// Relative risk aversion.
     pub fn risk_aversion() -> f64 {

@@ -87,7 +87,12 @@ impl RadiusRule {
 
     /// The bridge rule at this miscoverage, with the default number of paths and no factor.
     pub fn bridge(alpha: f64) -> Self {
-        RadiusRule::Bridge { alpha, paths: defaults::paths(), scale: defaults::scale() }
+        RadiusRule::scaled_bridge(alpha, defaults::scale())
+    }
+
+    /// The same with a factor on the radius.
+    pub fn scaled_bridge(alpha: f64, scale: f64) -> Self {
+        RadiusRule::Bridge { alpha, paths: defaults::paths(), scale }
     }
 
     /// Simulated paths, 0 under rules that simulate none.

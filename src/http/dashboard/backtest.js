@@ -166,13 +166,15 @@ function results(told) {
         number(`${START} became`, ({ final_wealth }) => wealth(final_wealth)),
         number("Return a year", ({ annual_mean }) => percent(annual_mean.value)),
         number("Deviation a year", ({ annual_volatility }) => percent(annual_volatility.value)),
+        number("Chance of loss", ({ chance_of_loss }) => percent(chance_of_loss.value)),
+        number("Worst 5\u202f% of years", ({ worst_twentieth }) => percent(worst_twentieth.value)),
         number("Worst fall", ({ max_drawdown }) => percent(max_drawdown)),
         number("Held on average", ({ mean_allocation }) => allocation(mean_allocation)),
         number("Traded a year", ({ annual_turnover }) => percent(annual_turnover.value)),
       ],
       rows,
     ),
-    h("p", { class: "note" }, `Ranges in the chart hold with ${percent(intervals.confidence, 0)} confidence as far as the past is one draw of what may come. \u201cHindsight\u201d holds what \u201c${mainOf(told).name}\u201d held on average, which nobody knew beforehand.`),
+    h("p", { class: "note" }, `Ranges in the chart hold with ${percent(intervals.confidence, 0)} confidence as far as the past is one draw of what may come. \u201cHindsight\u201d holds what \u201c${mainOf(told).name}\u201d held on average, which nobody knew beforehand. A loss is a year that ends with less than it began with, and the worst 5\u202f% are what the worst of them returned on average: years that begin with every ${told.unit} count, so that they overlap.`),
   );
 }
 
@@ -300,7 +302,7 @@ function quant(told) {
       "div",
       {},
       h("p", { class: "note" }, sentences.map((sentence) => minus(sentence)).join(" ")),
-      h("p", { class: "note" }, `Each range is the middle ${percent(intervals.confidence, 0)} of ${count(intervals.resamples)} circular block-bootstrap resamples, the same for all strategies: blocks of ${counted(intervals.period_block, "period")}, and of ${counted(intervals.year_block, "year")} for certainty equivalents. ${counted(choices.count, "design point")} a step, seed ${count(choices.seed)}.`),
+      h("p", { class: "note" }, `Each range is the middle ${percent(intervals.confidence, 0)} of ${count(intervals.resamples)} circular block-bootstrap resamples, the same for all strategies: blocks of ${counted(intervals.period_block, "period")}, and of ${counted(intervals.year_block, "year")} for certainty equivalents and losses. ${counted(choices.count, "design point")} a step, seed ${count(choices.seed)}.`),
       table(
         "Estimates with their ranges",
         [
@@ -311,6 +313,8 @@ function quant(told) {
           range("Sharpe ratio", (row) => row.sharpe_ratio, hundredth),
           range("Mean return", (row) => row.annual_mean, percent),
           range("Volatility", (row) => row.annual_volatility, percent),
+          range("Chance of loss", (row) => row.chance_of_loss, percent),
+          range("Worst 5\u202f% of years", (row) => row.worst_twentieth, percent),
         ],
         lines,
       ),

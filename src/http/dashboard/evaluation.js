@@ -9,8 +9,8 @@ import { intervalChart } from "./interval_chart.js";
 import { until } from "./jobs.js";
 import { policyLink } from "./naming.js";
 import { unitOf } from "./periods.js";
-import { FRAMEWORKS, investorWords, PAPER, worth } from "./specification.js";
-import { binned, chanceBelow, pieces, worstAverage } from "./spread.js";
+import { FRAMEWORKS, investorWords, PAPER } from "./specification.js";
+import { binned, pieces } from "./spread.js";
 import { changing, interval, ordinal } from "./verdict.js";
 
 /** One colour a kind of policy, in every chart; constant mixes have one of their own. */
@@ -19,7 +19,6 @@ const MIX = 2;
 /** Histograms shown at once. */
 const SHOWN = 4;
 const BINS = 36;
-const TAIL = 0.05;
 
 export async function view(id, leaving) {
   const job = await get(`/jobs/${id}`, leaving);
@@ -51,27 +50,11 @@ function putIn({ initial_wealth, contributions, horizon }) {
   return initial_wealth + all;
 }
 
-/** Every strategy with its name, its colour and what its wealth ended like, what it is worth the most first. */
+/** Every strategy with its name, its colour and how its wealth spreads, what it is worth the most first. */
 function outcomes({ strategies, histogram_edges, request }) {
   const { utility } = request.problem;
-  const stake = putIn(request.problem);
   return strategies
-    .map((strategy) => {
-      const spread = pieces(strategy, histogram_edges, utility);
-      const quantile = (name) => worth(utility, strategy.utility[name].value);
-      return {
-        ...strategy,
-        name: named(strategy),
-        colour: colourOf(strategy),
-        spread,
-        loss: chanceBelow(spread, stake),
-        tail: worstAverage(spread, TAIL),
-        fifth: quantile("quantile_20"),
-        tenth: quantile("quantile_90"),
-        least: quantile("min"),
-        most: quantile("max"),
-      };
-    })
+    .map((strategy) => ({ ...strategy, name: named(strategy), colour: colourOf(strategy), spread: pieces(strategy, histogram_edges, utility) }))
     .sort((one, other) => other.certainty_equivalent.value - one.certainty_equivalent.value);
 }
 
@@ -123,14 +106,15 @@ function conclusions({ reference }, ended) {
     said.push(`${called(main)} comes ${ordinal(place)} of ${ended.length}, worth ${sure(main)}${far}.`);
   }
   if (main) {
-    const beside = stocks && stocks !== main ? ` All in stocks does so in ${percent(stocks.loss, 0)}, with ${wealth(stocks.tail)}.` : "";
-    said.push(`${called(main)} ends with less than was put in in ${percent(main.loss, 0)} of the futures; the worst 5\u202f% of them end with ${wealth(main.tail)} on average.${beside}`);
+    const beside = stocks && stocks !== main ? ` All in stocks does so in ${percent(stocks.wealth.chance_of_loss.value, 0)}, with ${wealth(stocks.wealth.worst_twentieth.value)}.` : "";
+    said.push(`${called(main)} ends with less than was put in in ${percent(main.wealth.chance_of_loss.value, 0)} of the futures; the worst 5\u202f% of them end with ${wealth(main.wealth.worst_twentieth.value)} on average.${beside}`);
   }
   return main?.own_mix ? [...said, changing({ name: called(main), ...main.own_mix, shown: "these futures do" })] : said;
 }
 
 function results(report, ended) {
-  const money = (name, read) => ({ name, numeric: true, cell: (row) => wealth(read(row)) });
+  const money = (name, figure) => ({ name, numeric: true, cell: (row) => wealth(row.wealth[figure].value) });
+  const share = (name, figure) => ({ name, numeric: true, cell: (row) => percent(row.wealth[figure].value) });
   return section(
     "What each is worth",
     h("div", { class: "words" }, conclusions(report, ended).map((sentence) => h("p", {}, sentence))),
@@ -144,18 +128,19 @@ function results(report, ended) {
       "How wealth ended, by what it is worth",
       [
         { name: "Strategy", cell: ({ name }) => name },
-        money("Worth as much as a sure", ({ certainty_equivalent }) => certainty_equivalent.value),
-        money("Average", (row) => row.wealth.mean.value),
-        { name: "Chance of loss", numeric: true, cell: ({ loss }) => percent(loss) },
-        money("Worst 5\u202f%, average", ({ tail }) => tail),
-        money("One in five below", ({ fifth }) => fifth),
-        money("One in ten above", ({ tenth }) => tenth),
-        money("Least", ({ least }) => least),
-        money("Most", ({ most }) => most),
+        { name: "Worth as much as a sure", numeric: true, cell: ({ certainty_equivalent }) => wealth(certainty_equivalent.value) },
+        money("Average", "mean"),
+        share("Chance of loss", "chance_of_loss"),
+        money("Worst 5\u202f%, average", "worst_twentieth"),
+        share("Worst fall, average", "max_drawdown"),
+        money("One in five below", "quantile_20"),
+        money("One in ten above", "quantile_90"),
+        money("Least", "min"),
+        money("Most", "max"),
       ],
       ended,
     ),
-    h("p", { class: "note" }, `A loss is to end with less than the ${wealth(putIn(report.request.problem))} put in. Chances of loss and the worst 5\u202f% are read off a histogram; ranges in the chart hold with ${percent(report.request.level, 0)} confidence.`),
+    h("p", { class: "note" }, `A loss is to end with less than the ${wealth(putIn(report.request.problem))} put in; a worst fall is the largest on the way below the highest so far. Ranges in the chart hold with ${percent(report.request.level, 0)} confidence.`),
   );
 }
 
@@ -214,12 +199,15 @@ function quant(report, ended) {
       h("p", { class: "note" }, sentences.map((sentence) => minus(sentence)).join(" ")),
       h("p", { class: "note" }, `${counted(request.paths, "path")} a history of ${count(histories.length)}; training took ${duration(costs.training_seconds)}, simulation ${duration(costs.simulation_seconds)}.`),
       table(
-        "Certainty equivalents and utility",
+        "Certainty equivalents, losses and utility",
         [
           { name: "Strategy", cell: ({ framework, name }) => (framework ? PAPER[framework] : name) },
           estimate("Certainty equivalent", ({ certainty_equivalent }) => certainty_equivalent, wealth),
           estimate(`More than ${referred}`, ({ difference }) => difference?.certainty_equivalent, (value) => tick(value, 0.01)),
           estimate("Beyond its own mix", ({ own_mix }) => own_mix?.beyond, (value) => tick(value, 0.01)),
+          estimate("Chance of loss", (row) => row.wealth.chance_of_loss, percent),
+          estimate("Worst 5\u202f%", (row) => row.wealth.worst_twentieth, wealth),
+          estimate("Worst fall", (row) => row.wealth.max_drawdown, percent),
           { name: "Mean utility", numeric: true, cell: ({ utility }) => figures(utility.mean.value, 7) },
           { name: "Variance", numeric: true, cell: ({ utility }) => significant(utility.variance.value, 3) },
         ],

@@ -19,18 +19,6 @@ const below = ({ from, to }, level) => (to > from ? Math.min(1, Math.max(0, (lev
 /** How likely it is to end below a level. */
 export const chanceBelow = (spread, level) => spread.reduce((sum, piece) => sum + piece.share * below(piece, level), 0);
 
-/** The average of the worst share of the outcomes. */
-export function worstAverage(spread, share) {
-  let [left, sum] = [share, 0];
-  for (const { from, to, share: mass } of spread) {
-    const taken = Math.min(left, mass);
-    sum += taken * (from + ((to - from) * taken) / mass / 2);
-    left -= taken;
-    if (left <= 0) break;
-  }
-  return sum / (share - left);
-}
-
 /** Shares in `count` bins even in wealth over `[low, high]`. */
 export function binned(spread, [low, high], count) {
   const edge = (k) => low + ((high - low) * k) / count;
