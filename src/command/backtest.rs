@@ -208,7 +208,7 @@ impl BacktestArgs {
 }
 
 fn centre(text: &str) -> Result<CentreSpecification, String> {
-    decode::json(text.as_bytes()).map_err(|problem| problem.detail)
+    decode::json(text.as_bytes()).map_err(|problem| problem.detail.into())
 }
 
 fn refused(option: &str, value: impl ToString, rule: &str) -> BacktestError {

@@ -167,7 +167,9 @@ impl Learning<'_> {
         let (specification, names, step, watch) = (self.specification, self.names, self.step, self.watch);
         let fitting = Fitting { specification, names, step, scaling: &scaling, watch };
         let named = |index: &usize| (*index, features[*index].clone());
-        let drawn: Vec<usize> = (0..self.counts.as_drawn(wanted)).filter(|index| !chosen.contains(index)).collect();
+        let left = wanted.saturating_sub(solved.len());
+        let drawn = (0..self.counts.as_drawn(wanted)).filter(|index| !chosen.contains(index)).take(left);
+        let drawn: Vec<usize> = drawn.collect();
         solved.extend(self.solve(states, drawn.iter().map(named).collect(), solved.len(), wanted)?);
         chosen.extend(drawn);
         let start = match before.and_then(|before| fitting.start_from(before)) {
