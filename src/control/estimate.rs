@@ -5,6 +5,7 @@
 //! (`tests/estimates.rs` holds the estimates to it).
 
 use super::bellman::problem::Problem;
+use super::evaluation::assets::{AssetsBacktest, PATHS};
 use super::evaluation::backtest::Backtest;
 use super::policy::Policy;
 use super::policy::prepared::{bytes_ready, factor_bytes, prepared_bytes};
@@ -43,6 +44,9 @@ const PATH_BYTES: usize = 256;
 /// A period of a strategy's walk-forward: its decision and account, the series that are resampled, and the report with its
 /// digits and the copies that the store is given.
 const DECIDED_BYTES: usize = 1024;
+/// A share of wealth in one of several assets: itself, that of the strategy's own mix, and the report with its digits and the
+/// copies that the store is given.
+const SHARE_BYTES: usize = 160;
 /// Atoms of the law that records are drawn from, beside those of the record.
 const RESAMPLED_VALUES: usize = 4096;
 /// What any job takes.
@@ -276,6 +280,23 @@ pub fn backtest(backtest: &Backtest, threads: usize) -> Footprint {
         "window",
         sizes.history,
         bridges.saturating_add(sizes.solving(threads)),
+    )
+}
+
+/// What a walk-forward of several assets, whose returns stand in `field`, takes on so many threads: the books and the report, and
+/// for each thread a record with its bridges and its step.
+pub fn backtest_of_assets(backtest: &AssetsBacktest, field: &'static str, threads: usize) -> Footprint {
+    let periods = backtest.record.rows.len();
+    let strategies = backtest.strategies().len();
+    let held = product(&[backtest.shares(), SHARE_BYTES]);
+    let books = product(&[backtest.lived().len(), strategies, DECIDED_BYTES]);
+    let steps = product(&[threads + 1, periods, backtest.record.assets.len(), STEP_NUMBERS, NUMBER]);
+    let bridges = product(&[threads, periods, PATHS, NUMBER]);
+    let record = held.saturating_add(books).saturating_add(LEAST);
+    Footprint::of(field, periods, record).and(
+        "windows",
+        backtest.choices.windows.len(),
+        steps.saturating_add(bridges),
     )
 }
 

@@ -5,17 +5,20 @@ use std::sync::Arc;
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use super::access::{By, Heavy};
-use super::extract::JsonBody;
+use super::decode;
+use super::extract::JsonBytes;
 use super::jobs::{Queueing, accepted, idempotency_key};
 use super::problem::Problem;
-use crate::control::request::backtest::BacktestRequest;
+use crate::control::request::backtest_assets::BacktestQuestion;
 use crate::service::Service;
 
-/// Queue a walk-forward through a record of returns.
+/// Queue a walk-forward through a record of returns, of one asset or of several.
 #[utoipa::path(post, path = "/backtest", tag = "jobs",
-    request_body(content = BacktestRequest, example = json!({
+    request_body(content = BacktestQuestion, example = json!({
         "simple_returns": [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.017, -0.009, 0.024, 0.011, -0.03, 0.019],
         "dates": ["2020-03", "2020-06", "2020-09", "2020-12", "2021-03", "2021-06", "2021-09", "2021-12", "2022-03", "2022-06",
             "2022-09", "2022-12"],
@@ -28,7 +31,21 @@ pub async fn backtest(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,
     headers: HeaderMap,
-    JsonBody(request): JsonBody<BacktestRequest>,
+    JsonBytes(bytes): JsonBytes,
 ) -> Result<Response, Problem> {
-    Ok(accepted(service.jobs.backtest(&caller, request, idempotency_key(&headers)?).await?))
+    Ok(accepted(service.jobs.backtest(&caller, question(&bytes)?, idempotency_key(&headers)?).await?))
+}
+
+/// What tells whether a request names assets.
+#[derive(Deserialize)]
+struct Said {
+    assets: Option<IgnoredAny>,
+}
+
+/// Read as what it is, so that what is wrong in it is told by its own field.
+fn question(bytes: &[u8]) -> Result<BacktestQuestion, Problem> {
+    match decode::object(bytes) {
+        Ok(Said { assets: Some(_) }) => decode::object(bytes).map(BacktestQuestion::Assets),
+        _ => decode::object(bytes).map(BacktestQuestion::Asset),
+    }
 }

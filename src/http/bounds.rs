@@ -6,6 +6,7 @@
 use serde_json::{Map, Value, json};
 use utoipa::openapi::{Object, OpenApi, RefOr, Schema};
 
+use crate::control::evaluation::assets::MOST_WINDOWS;
 use crate::control::request::assets::{ASSETS, DATES, LARGEST_FACTOR, NAME_LENGTH};
 use crate::control::request::backtest;
 use crate::control::request::centre_rules::{ASSUMED_WEIGHT, BANDWIDTH};
@@ -94,6 +95,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("WhatIf", "radius", within(FIXED_RADIUS)),
         ("WhatIf", "log_return", within((-LOG_RETURN, LOG_RETURN))),
         ("WhatIf", "simple_return", within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1()))),
+        ("WhatIf", "holdings", each(within((0.0, 1.0)))),
         ("SweepRange", "points", whole(&POINTS)),
         ("EvaluationRequest", "constant_mixes", json!({ "maxItems": MOST_MIXES, "items": within((0.0, 1.0)) })),
         ("EvaluationRequest", "paths", whole(&evaluation::PATHS)),
@@ -132,10 +134,7 @@ fn of_investor(problem: &'static str) -> impl Iterator<Item = (&'static str, &'s
 
 /// Of questions about several assets.
 fn of_assets() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
-    let (log_return, length) = (within((-LOG_RETURN, LOG_RETURN)), whole(&NAME_LENGTH));
-    let name = json!({ "minLength": length["minimum"], "maxLength": length["maximum"] });
-    let mut names = listed(&ASSETS, name);
-    names["uniqueItems"] = json!(true);
+    let (log_return, names) = (within((-LOG_RETURN, LOG_RETURN)), asset_names());
     let rules = [
         ("AssetsProblem", "horizon", whole(&HORIZON)),
         ("AssetsProblem", "trading_cost", within(TRADING_COST)),
@@ -196,12 +195,40 @@ fn walked() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
         ("simple_returns", listed(&backtest::PERIODS, within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1())))),
         ("dates", json!({ "minItems": backtest::PERIODS.start(), "maxItems": backtest::PERIODS.end() })),
     ];
-    fields.into_iter().map(|(field, rule)| ("BacktestRequest", field, rule))
+    fields.into_iter().map(|(field, rule)| ("BacktestRequest", field, rule)).chain(walked_of_assets())
+}
+
+/// Of a walk-forward of several assets.
+fn walked_of_assets() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
+    let rows = |bounds| listed(&backtest::PERIODS, listed(&ASSETS, within(bounds)));
+    let fields = [
+        ("assets", asset_names()),
+        ("log_returns", rows(backtest::bounds(false))),
+        ("simple_returns", rows(backtest::bounds(true))),
+        ("dates", json!({ "minItems": backtest::PERIODS.start(), "maxItems": backtest::PERIODS.end() })),
+        ("periods_per_year", whole(&backtest::YEAR)),
+        ("windows", json!({ "minItems": 1, "maxItems": MOST_WINDOWS })),
+        ("every", whole(&(1..=*DATES.end()))),
+        ("alpha", within(backtest::ALPHA)),
+        ("risk_aversion", within(backtest::RELATIVE)),
+        ("trading_cost", within(TRADING_COST)),
+    ];
+    fields.into_iter().map(|(field, rule)| ("AssetsBacktestRequest", field, rule))
+}
+
+/// Names of several assets.
+fn asset_names() -> Value {
+    let length = whole(&NAME_LENGTH);
+    let name = json!({ "minLength": length["minimum"], "maxLength": length["maximum"] });
+    let mut names = listed(&ASSETS, name);
+    names["uniqueItems"] = json!(true);
+    names
 }
 
 /// Of what a period reports, wherever it stands.
 fn reported() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
-    ["Observe", "Correct", "Report"].into_iter().flat_map(|schema| {
+    ["Observe", "Correct", "Report", "WhatIf"].into_iter().flat_map(|schema| {
+        let of_assets = ["log_returns", "simple_returns", "prices", "previous_prices"];
         let fields = [
             ("log_return", within((-LOG_RETURN, LOG_RETURN))),
             ("simple_return", within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1()))),
@@ -217,7 +244,8 @@ fn reported() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
             ("executed_allocations", each(within((0.0, 1.0)))),
             ("wealth", within(WEALTH)),
         ];
-        fields.map(|(field, rule)| (schema, field, rule))
+        let told = fields.into_iter().filter(move |(field, _)| schema != "WhatIf" || of_assets.contains(field));
+        told.map(move |(field, rule)| (schema, field, rule))
     })
 }
 

@@ -12,6 +12,7 @@ use super::bounds::{merged, with_field};
 use super::jobs::Train;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::backtest::BacktestRequest;
+use crate::control::request::backtest_assets::AssetsBacktestRequest;
 use crate::control::request::evaluation::EvaluationRequest;
 use crate::control::request::frontier::FrontierRequest;
 use crate::control::request::radius_rule::RadiusRule;
@@ -30,7 +31,7 @@ pub fn tell(description: &mut OpenApi) {
     }
 }
 
-fn told() -> [(&'static str, Map<String, Value>); 11] {
+fn told() -> [(&'static str, Map<String, Value>); 12] {
     let least = json!({ "history": [], "rate_per_step": 0.0 });
     [
         ("Specification", of::<Specification>(json!({ "problem": least }))),
@@ -43,6 +44,10 @@ fn told() -> [(&'static str, Map<String, Value>); 11] {
         ("RadiusRule", of::<RadiusRule>(json!({ "rule": "bridge" }))),
         ("EvaluationRequest", of::<EvaluationRequest>(json!({ "problem": least }))),
         ("BacktestRequest", of::<BacktestRequest>(json!({ "rate": 0.0 }))),
+        (
+            "AssetsBacktestRequest",
+            of::<AssetsBacktestRequest>(json!({ "assets": [], "rate": 0.0, "dates": [] })),
+        ),
         ("FrontierRequest", of::<FrontierRequest>(json!({ "problem": least }))),
     ]
 }

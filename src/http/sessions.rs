@@ -51,7 +51,7 @@ pub async fn open(
     let labels = Relabel { name, notes, tags };
     let called = Labels::default().after(&labels);
     let start = Start { policy, history, wealth, holding, holdings, renew, rolling, labels };
-    let live = service.sessions.open(&caller, start, idempotency_key(&headers)?).await?;
+    let live = service.sessions.open(&caller, start, idempotency_key(&headers)?, &caller.turn).await?;
     let session = wire::Session { labels: called, ..live.into() };
     let location = [(header::LOCATION, format!("/sessions/{}", session.session))];
     Ok((StatusCode::CREATED, location, Json(session)).into_response())
@@ -103,7 +103,7 @@ pub async fn correct(
     Id(id): Id,
     JsonBody(correction): JsonBody<Correct>,
 ) -> Result<Response, Problem> {
-    let corrected = service.sessions.correct(&caller, &id, &correction).await?;
+    let corrected = service.sessions.correct(&caller, &id, &correction, &caller.turn).await?;
     Ok(as_recorded(corrected))
 }
 
@@ -124,7 +124,8 @@ pub async fn renew(
     Id(id): Id,
     JsonBody(renewal): JsonBody<Renew>,
 ) -> Result<Response, Problem> {
-    Ok(as_recorded(service.sessions.renew(&caller.tenant, caller.actor(), &id, &renewal).await?))
+    let (by, turn) = (caller.actor(), Some(&*caller.turn));
+    Ok(as_recorded(service.sessions.renew(&caller.tenant, by, &id, &renewal, turn).await?))
 }
 
 /// An answer as it is stored.

@@ -6,6 +6,7 @@ use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::evaluation::assets::report::AssetsBacktestReport;
 use crate::control::evaluation::backtest_report::BacktestReport;
 use crate::control::evaluation::frontier::report::FrontierReport;
 use crate::control::evaluation::report::EvaluationReport;
@@ -108,6 +109,7 @@ impl From<Accepted> for AcceptedJob {
 pub enum JobReport {
     Evaluation(Box<EvaluationReport>),
     Backtest(Box<BacktestReport>),
+    BacktestOfAssets(Box<AssetsBacktestReport>),
     Frontier(Box<FrontierReport>),
 }
 

@@ -12,7 +12,9 @@ use crate::control::assets::fund::Fund;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
 use crate::control::problem::state::State;
+use crate::control::request::fund::CompositionRule;
 use crate::control::request::rules;
+use crate::control::request::specification::Specification;
 use crate::numerics::empirical::EmpiricalDistribution;
 
 /// What shares of wealth may sum to, beside rounding.
@@ -95,7 +97,7 @@ impl Assets {
     /// # Errors
     /// It is of other assets.
     pub(super) fn take(&mut self, told: &Composed) -> Result<(), FieldError> {
-        self.fund.composition = by_name("composition", &told.composition, &self.names)?;
+        self.fund.take(by_name("composition", &told.composition, &self.names)?);
         self.one_step = told.one_step.clone();
         Ok(())
     }
@@ -126,6 +128,18 @@ impl Assets {
         let bank = 1.0 + problem.rate_per_step;
         self.one_step = solution.map(|solution| self.fund.one_step(&self.names, &solution, state.wealth * bank));
         composed
+    }
+
+    /// The same from the composition that was held when the present one was chosen.
+    pub(super) fn compose_anew(&mut self, advisor: &Advisor, step: usize, state: &State) -> State {
+        self.fund.composition.clone_from(&self.fund.before);
+        self.compose(advisor, step, state)
+    }
+
+    /// Whether choosing the composition before the period after `step` takes a solution of the one-step problem.
+    pub(super) fn must_solve(advisor: &Advisor, step: usize) -> bool {
+        let Specification { problem, fund, .. } = advisor.specification();
+        step < problem.horizon && fund.as_ref().is_some_and(|fund| fund.composition == CompositionRule::OneStep)
     }
 
     /// Shares of wealth in the assets where so much is in all of them.
@@ -164,7 +178,10 @@ pub(super) fn mean(row: &[f64]) -> f64 {
 }
 
 /// Shares of wealth in the assets.
-fn shares(field: &str, values: &BTreeMap<String, f64>, names: &[String]) -> Result<Vec<f64>, FieldError> {
+///
+/// # Errors
+/// They are not of these assets, one is no share, or they are more than the whole.
+pub(super) fn shares(field: &str, values: &BTreeMap<String, f64>, names: &[String]) -> Result<Vec<f64>, FieldError> {
     let shares = by_name(field, values, names)?;
     for (name, share) in names.iter().zip(&shares) {
         rules::share(&format!("{field}.{name}"), *share)?;

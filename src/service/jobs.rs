@@ -13,9 +13,10 @@ use super::keys::Caller;
 use super::memory::Memory;
 use super::progress::{Progress, ProgressBoard};
 use crate::control::estimate;
+use crate::control::evaluation::assets::AssetsBacktest;
 use crate::control::evaluation::backtest::Backtest;
 use crate::control::policy::content_hash;
-use crate::control::request::backtest::BacktestRequest;
+use crate::control::request::backtest_assets::BacktestQuestion;
 use crate::control::request::evaluation::EvaluationRequest;
 use crate::control::request::frontier::FrontierRequest;
 use crate::control::request::specification::Specification;
@@ -150,16 +151,28 @@ impl Jobs {
     pub async fn backtest(
         &self,
         caller: &Caller,
-        request: BacktestRequest,
+        question: BacktestQuestion,
         key: Option<String>,
     ) -> Result<Accepted, ServiceError> {
-        let sent = serde_json::to_vec(&request).map_err(ServiceError::internal)?;
-        let backtest = Backtest::new(request)?;
-        self.memory.admits(&estimate::backtest(&backtest, self.threads))?;
-        let (of, steps) = ((&caller.tenant, caller.actor()), backtest.trainings());
-        let request = Request::of(JobKind::Backtest, &sent, &backtest.request, steps);
-        let job = self.queue(of, request, key).await?;
-        Ok(Accepted { job, warnings: backtest.warnings() })
+        let sent = serde_json::to_vec(&question).map_err(ServiceError::internal)?;
+        let (completed, estimate, steps, warnings) = match question {
+            BacktestQuestion::Asset(request) => {
+                let backtest = Backtest::new(request)?;
+                let estimate = estimate::backtest(&backtest, self.threads);
+                let (steps, warnings) = (backtest.trainings(), backtest.warnings());
+                (BacktestQuestion::Asset(backtest.request), estimate, steps, warnings)
+            }
+            BacktestQuestion::Assets(request) => {
+                let backtest = AssetsBacktest::asked(&request)?;
+                let estimate = estimate::backtest_of_assets(&backtest, request.returns().0, self.threads);
+                let (steps, warnings) = (backtest.strategies().len(), backtest.warnings(&request));
+                (BacktestQuestion::Assets(request), estimate, steps, warnings)
+            }
+        };
+        self.memory.admits(&estimate)?;
+        let request = Request::of(JobKind::Backtest, &sent, &completed, steps);
+        let job = self.queue((&caller.tenant, caller.actor()), request, key).await?;
+        Ok(Accepted { job, warnings })
     }
 
     /// Queues a frontier. The same key and request again give the same job.

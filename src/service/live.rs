@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::allowance::HeavyTurn;
 use super::answer::Observed;
-use super::assets::ObservedAssets;
+use super::assets::{Assets, ObservedAssets};
 use super::bounded::Bounded;
 use super::error::ServiceError;
 use super::periods::Periods;
@@ -22,12 +22,17 @@ pub(super) struct Means<'a> {
     pub advisor: Arc<Advisor>,
     pub advising: &'a Bounded,
     pub resolving: &'a Bounded,
-    pub turn: &'a HeavyTurn,
+    /// `None` of what the service does by itself.
+    pub turn: Option<&'a HeavyTurn>,
 }
 
 impl Means<'_> {
-    fn turns(&self) -> [&Bounded; 2] {
-        [self.advising, self.resolving]
+    /// Says that heavy work comes next.
+    async fn begin(&self) -> Result<(), ServiceError> {
+        match self.turn {
+            Some(turn) => Ok(turn.begin().await?),
+            None => Ok(()),
+        }
     }
 }
 
@@ -136,7 +141,7 @@ impl Live {
             None => match self.predicted(step, means).await? {
                 Ok(advice) => advice,
                 Err(outside) => {
-                    means.turn.begin().await?;
+                    means.begin().await?;
                     let (advisor, state) = (means.advisor.clone(), self.standing.state.clone());
                     let tenant = &self.row.tenant;
                     means.resolving.run(tenant, move || advisor.advise_outside(step, &state, &outside)).await?
@@ -172,9 +177,8 @@ impl Live {
         let passed = self.standing.after(dynamics, observe.period, report, allocation)?;
         let Passed { seen, log_return, executed_allocation, executed, standing } = passed;
         let advised = self.standing.assets.as_ref().map(|assets| assets.shares(allocation));
-        let (standing, uncertainty) =
-            measured(means.turns(), &means.advisor, &self.row.tenant, self.current.step(observe.period), standing)
-                .await?;
+        let next = self.current.step(observe.period);
+        let (standing, uncertainty) = measured(means, &self.row.tenant, next, standing).await?;
         let answer = Observed {
             session: observe.session.clone(),
             period: observe.period,
@@ -200,27 +204,32 @@ impl Live {
     }
 }
 
-/// The uncertainty set before `step` of the policy; of several assets, once their composition is chosen.
-///
-/// `turns` are those to advise and, where a composition must be solved for, to solve.
+/// The uncertainty set before `step` of the policy; of several assets, once their composition is chosen, which is heavy where
+/// it must be solved for.
 pub(super) async fn measured(
-    turns: [&Bounded; 2],
-    advisor: &Arc<Advisor>,
+    means: &Means<'_>,
     tenant: &Tenant,
     step: usize,
     mut standing: Standing,
 ) -> Result<(Standing, Uncertainty), ServiceError> {
-    let of_several = usize::from(standing.assets.is_some());
+    let advisor = &means.advisor;
     if standing.assets.is_none() && advisor.is_prompt(step, &standing.state) {
         let uncertainty = advisor.uncertainty(&standing.state);
         return Ok((standing, uncertainty));
     }
+    let turns = match standing.assets.is_some() && Assets::must_solve(advisor, step) {
+        true => {
+            means.begin().await?;
+            means.resolving
+        }
+        false => means.advising,
+    };
     let measuring = advisor.clone();
     let measure = move || {
         standing.compose(&measuring, step);
         (measuring.uncertainty(&standing.state), standing)
     };
-    let (uncertainty, standing) = turns[of_several].run(tenant, measure).await?;
+    let (uncertainty, standing) = turns.run(tenant, measure).await?;
     // The first session to get this far: the next advice finds its common random numbers simulated.
     let (advisor, reached) = (advisor.clone(), standing.state.clone());
     tokio::task::spawn_blocking(move || advisor.prepare(step, &reached));

@@ -17,6 +17,7 @@ mod content;
 pub mod drift;
 mod due;
 pub mod error;
+pub mod fund_advice;
 pub mod history;
 mod idempotency;
 mod identity;
@@ -50,6 +51,7 @@ mod sync;
 mod trainer;
 mod upkeep;
 pub mod what_if;
+pub mod what_if_assets;
 
 use std::sync::Arc;
 

@@ -43,8 +43,8 @@ pub struct Periods {
     pub stretches: Vec<Stretch>,
     start: Standing,
     history: Record,
-    /// What a correction or a renewal told last of several assets, after so many periods.
-    composed: BTreeMap<usize, Composed>,
+    /// What corrections and renewals told of several assets, one after the other, after so many periods.
+    composed: BTreeMap<usize, Vec<Composed>>,
 }
 
 /// What the session starts from, up to some period.
@@ -161,17 +161,22 @@ impl Periods {
                 EntryKind::Correction => {
                     periods.correct(&read(&entry.content_json)?)?;
                     let told = read::<Corrected>(&entry.answer_json)?.assets;
-                    periods.composed.extend(told.map(|told| (periods.all.len(), told)));
+                    periods.tell(told);
                 }
                 EntryKind::Renewal => {
                     let renew: Renew = read(&entry.content_json)?;
                     let Renewed { terms, assets, .. } = read(&entry.answer_json)?;
-                    periods.composed.extend(assets.map(|told| (periods.all.len(), told)));
+                    periods.tell(assets);
                     periods.stretches.push(plan.stretch(renew.policy, periods.all.len(), terms, renew.window));
                 }
             }
         }
         Ok(periods)
+    }
+
+    /// What an entry told of several assets that is no period.
+    fn tell(&mut self, told: Option<Composed>) {
+        self.composed.entry(self.all.len()).or_default().extend(told);
     }
 
     /// The policy that advises the coming period.
@@ -312,7 +317,7 @@ impl<'a> Passage<'a> {
             self.standing = self.standing.renewed(&self.record, *window, terms.learning)?;
         }
         let told_later = self.periods.composed.get(&self.step);
-        told_later.map_or(Ok(()), |told| self.standing.take(told))
+        told_later.into_iter().flatten().try_for_each(|told| self.standing.take(told))
     }
 }
 

@@ -82,7 +82,13 @@ impl Sessions {
     /// # Errors
     /// A field breaks a rule, or makes a later period break one; the correction was made with other content, or is not the
     /// next.
-    pub async fn correct(&self, caller: &Caller, session: &str, correct: &Correct) -> Result<String, ServiceError> {
+    pub async fn correct(
+        &self,
+        caller: &Caller,
+        session: &str,
+        correct: &Correct,
+        turn: &HeavyTurn,
+    ) -> Result<String, ServiceError> {
         let number = numbered("correction", correct.correction)?;
         correct.check()?;
         let (tenant, content) = (&caller.tenant, json(correct)?);
@@ -101,8 +107,8 @@ impl Sessions {
             let PutRight { before, standing, log_return, wealth_change } =
                 self.advising.run(tenant, put_right).await??;
             let step = current.step(observed);
-            let (standing, uncertainty) =
-                measured([&self.advising, &self.resolving], &advisor, tenant, step, standing).await?;
+            let means = self.means_of(advisor, Some(turn));
+            let (standing, uncertainty) = measured(&means, tenant, step, standing).await?;
             let radius = Some(uncertainty.radius);
             let answer = Corrected {
                 session: session.to_owned(),

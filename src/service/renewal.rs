@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use tracing::Instrument;
 
+use super::allowance::HeavyTurn;
 use super::content::json;
 use super::error::ServiceError;
 use super::live::{Live, measured};
@@ -33,6 +34,7 @@ impl Sessions {
         by: Actor,
         session: &str,
         renew: &Renew,
+        turn: Option<&HeavyTurn>,
     ) -> Result<String, ServiceError> {
         let number = numbered("renewal", renew.renewal)?;
         check_window("window", renew.window)?;
@@ -48,7 +50,7 @@ impl Sessions {
                 let rule = format!("must be at most {MOST_RENEWALS}: open a session on the record as it is now");
                 return Err(FieldError::new("renewal", number, rule).into());
             }
-            let Decided { new, onto, next } = self.decided(tenant, &by, facts, periods, renew).await?;
+            let Decided { new, onto, next } = self.decided((tenant, turn), &by, facts, periods, renew).await?;
             let (store, answer_json) = (self.store.by(by.clone()), new.answer_json.clone());
             held.clear();
             let appended = store.renew(new, onto).instrument(spans::of_write("append an entry")).await?;
@@ -61,7 +63,7 @@ impl Sessions {
     /// The next renewal of a session, as it stands by `facts`.
     async fn decided(
         &self,
-        tenant: &Tenant,
+        (tenant, turn): (&Tenant, Option<&HeavyTurn>),
         by: &Actor,
         facts: SessionFacts,
         periods: Periods,
@@ -83,8 +85,7 @@ impl Sessions {
         };
         let (standing, terms) = self.advising.run(tenant, go_on).await??;
         self.policies.starts_from(&advisor, standing.state.law.sample_size(), terms.horizon)?;
-        let (standing, uncertainty) =
-            measured([&self.advising, &self.resolving], &advisor, tenant, 0, standing).await?;
+        let (standing, uncertainty) = measured(&self.means_of(advisor, turn), tenant, 0, standing).await?;
         let current = plan.stretch(renew.policy.clone(), observed, terms, renew.window);
         let (horizon, radius) = (current.horizon(), Some(uncertainty.radius));
         let answer = Renewed {

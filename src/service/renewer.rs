@@ -10,11 +10,14 @@
 use std::collections::{BTreeMap, HashMap};
 use std::time::Duration;
 
+use futures_util::StreamExt;
+use futures_util::stream::FuturesUnordered;
 use serde::Serialize;
 use tokio::sync::mpsc::Receiver;
 use tokio::time::MissedTickBehavior;
 use utoipa::ToSchema;
 
+use self::turns::Turns;
 use super::clock::Clock;
 use super::error::ServiceError;
 use super::jobs::Jobs;
@@ -37,14 +40,17 @@ const ROUND: Duration = Duration::from_secs(60);
 /// Before the second attempt; doubled before each one after it, up to the longest.
 const FIRST_DELAY: Duration = Duration::from_secs(60);
 const LONGEST_DELAY: Duration = Duration::from_hours(24);
-/// A step that takes longer is left to a later round: no session is in the way of others for longer.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// A step that takes longer is left to a later round: no session is in the way of its tenant's others for longer. The joint
+/// factor of thirty assets over two thousand dates takes some seconds of it.
+const PATIENCE: Duration = Duration::from_secs(60);
 /// Sessions read in one step of a round.
 const PAGE: usize = 256;
 /// Renewals of one tenant under way at a time in this process, and begun with in one round.
 const OF_ONE: usize = 256;
 /// Sessions told of that are not looked at yet; of more a round finds out.
 pub(super) const TOLD: usize = 1024;
+
+mod turns;
 
 /// Where a renewal is that is due.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -139,21 +145,28 @@ pub(super) struct Renewer {
 impl Renewer {
     /// Renews sessions until the shutdown begins.
     pub(super) async fn run(self, mut told: Receiver<Name>, shutdown: Shutdown) {
-        let mut under_way = UnderWay::new();
+        let (mut under_way, mut turns, mut steps) = (UnderWay::new(), Turns::default(), FuturesUnordered::new());
         let (mut round, mut look) = (tokio::time::interval(ROUND), tokio::time::interval(PAUSE));
         look.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
+            while let Some(name) = turns.next() {
+                steps.push(self.go_on(name));
+            }
             tokio::select! {
                 () = shutdown.begun() => return,
-                Some(name) = told.recv() => self.begin(name, &mut under_way).await,
-                _ = look.tick(), if !under_way.is_empty() => self.follow(&mut under_way).await,
-                _ = round.tick() => self.find(&mut under_way).await,
+                Some(name) = told.recv() => begin(name, &under_way, &mut turns),
+                Some((name, job)) = steps.next(), if !steps.is_empty() => {
+                    turns.done(&name);
+                    job.map(|job| under_way.insert(name, job));
+                }
+                _ = look.tick(), if !under_way.is_empty() => self.follow(&mut under_way, &mut turns).await,
+                _ = round.tick() => self.find(&under_way, &mut turns).await,
             }
         }
     }
 
     /// Begins with all sessions that are due.
-    async fn find(&self, under_way: &mut UnderWay) {
+    async fn find(&self, under_way: &UnderWay, turns: &mut Turns) {
         let (mut after, mut begun) = (0, HashMap::<Tenant, usize>::new());
         loop {
             let page = match self.store.due_sessions(PAGE, after).await {
@@ -169,21 +182,14 @@ impl Renewer {
                 let of_one = begun.entry(tenant.clone()).or_default();
                 *of_one += 1;
                 if *of_one <= OF_ONE {
-                    self.begin((tenant, session), under_way).await;
+                    begin((tenant, session), under_way, turns);
                 }
             }
         }
     }
 
-    /// Begins with a session, unless as many of its tenant are under way as may be.
-    async fn begin(&self, name: Name, under_way: &mut UnderWay) {
-        if of_tenant(&name.0, under_way) < OF_ONE && !under_way.contains_key(&name) {
-            self.go_on(name, under_way).await;
-        }
-    }
-
     /// Looks at the jobs under way.
-    async fn follow(&self, under_way: &mut UnderWay) {
+    async fn follow(&self, under_way: &mut UnderWay, turns: &mut Turns) {
         let names: Vec<Name> = under_way.keys().cloned().collect();
         for name in names {
             let Some(job) = under_way.remove(&name) else { continue };
@@ -195,22 +201,25 @@ impl Renewer {
                     metrics::counter!(RENEWALS, "outcome" => "failed").increment(1);
                     tracing::warn!(session = name.1, job, error = row.error, "a renewal failed");
                 }
-                _ => self.go_on(name, under_way).await,
+                _ => turns.queue(name),
             }
         }
     }
 
-    /// Does the next step for a session; a step that fails is done again in a later round.
-    async fn go_on(&self, name: Name, under_way: &mut UnderWay) {
+    /// Does the next step for a session, and gives the job that it then waits for; a step that fails is done again in a later
+    /// round.
+    async fn go_on(&self, name: Name) -> (Name, Option<String>) {
         let step = tokio::time::timeout(PATIENCE, self.step(&name)).await;
-        match step.unwrap_or(Err(ServiceError::Busy)) {
-            Ok(Left::Nothing) => {}
-            Ok(Left::Job(job)) => drop(under_way.insert(name, job)),
+        let job = match step.unwrap_or(Err(ServiceError::Busy)) {
+            Ok(Left::Nothing) => None,
+            Ok(Left::Job(job)) => Some(job),
             Err(error) => {
                 metrics::counter!(RENEWALS, "outcome" => "failed").increment(1);
                 tracing::warn!(session = name.1, error = &error as &dyn std::error::Error, "a session was not renewed");
+                None
             }
-        }
+        };
+        (name, job)
     }
 
     async fn step(&self, (tenant, session): &Name) -> Result<Left, ServiceError> {
@@ -253,7 +262,7 @@ impl Renewer {
         let (tenant, session) = (&live.row.tenant, &live.row.session);
         let renewal = Renew { renewal: number, policy: policy.to_owned(), window: renew.window };
         let by = Actor::service(self.clock.now_milliseconds());
-        match self.sessions.renew(tenant, by, session, &renewal).await {
+        match self.sessions.renew(tenant, by, session, &renewal, None).await {
             Ok(_) => {
                 metrics::counter!(RENEWALS, "outcome" => "renewed").increment(1);
                 tracing::info!(session, policy, renewal = number, "session renewed");
@@ -288,6 +297,13 @@ impl Renewer {
             "the next policy of a session is trained"
         );
         Ok(Left::Job(job.row.job))
+    }
+}
+
+/// Begins with a session, unless as many of its tenant are under way as may be.
+fn begin(name: Name, under_way: &UnderWay, turns: &mut Turns) {
+    if of_tenant(&name.0, under_way) + turns.waiting(&name.0) < OF_ONE && !under_way.contains_key(&name) {
+        turns.queue(name);
     }
 }
 

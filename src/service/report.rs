@@ -18,8 +18,8 @@ pub const MOST_CORRECTIONS: usize = 1_000;
 pub const LONGEST_REASON: usize = 200;
 const ONE_RETURN: &str = "must be the only one of log_return, simple_return, price and missing";
 const RETURNS_ONCE: &str = "must be the only one of log_returns, simple_returns, prices and missing";
-const OF_SEVERAL: &str = "must be absent: the session is of one asset, and the field of several";
-const OF_ONE: &str = "must be absent: the session is of several assets, and the field of one";
+pub(super) const OF_SEVERAL: &str = "must be absent: the session is of one asset, and the field of several";
+pub(super) const OF_ONE: &str = "must be absent: the session is of several assets, and the field of one";
 
 /// A struct with fields of its own and those of a report.
 ///
@@ -191,7 +191,7 @@ impl Report {
     /// # Errors
     /// None is given, or more than one, or one out of bounds.
     pub(super) fn log_return(&self, known_price: Option<f64>) -> Result<Option<f64>, FieldError> {
-        self.none_of(&self.of_several(), OF_SEVERAL)?;
+        none_of(&self.of_several(), OF_SEVERAL)?;
         match (self.log_return, self.simple_return, self.price, self.missing) {
             (Some(value), None, None, false) => rules::log_return("log_return", value).map(|()| Some(value)),
             (None, Some(value), None, false) => log_return_of("simple_return", value).map(Some),
@@ -214,7 +214,7 @@ impl Report {
     pub(super) fn log_returns(&self, names: &[String], known: Option<&[f64]>) -> Result<Option<Vec<f64>>, FieldError> {
         let of_one = ["log_return", "simple_return", "price", "previous_price", "executed_allocation"];
         let values = [self.log_return, self.simple_return, self.price, self.previous_price, self.executed_allocation];
-        self.none_of(&std::array::from_fn::<_, 5, _>(|index| (of_one[index], values[index].is_some())), OF_ONE)?;
+        none_of(&std::array::from_fn::<_, 5, _>(|index| (of_one[index], values[index].is_some())), OF_ONE)?;
         if self.previous_prices.is_some() && self.prices.is_none() {
             return Err(FieldError::new("previous_prices", "an object", "must be absent unless prices are given"));
         }
@@ -263,11 +263,6 @@ impl Report {
         ]
     }
 
-    fn none_of(&self, fields: &[(&'static str, bool)], rule: &str) -> Result<(), FieldError> {
-        let given = fields.iter().find(|(_, is_given)| *is_given);
-        given.map_or(Ok(()), |(field, _)| Err(FieldError::new(*field, "given", rule)))
-    }
-
     /// What the return of one of several assets was given by, and its value.
     pub(super) fn given_of(&self, asset: &str) -> (String, Option<f64>) {
         let ways = [("simple_returns", &self.simple_returns), ("prices", &self.prices)];
@@ -296,6 +291,13 @@ impl Report {
         })?;
         between("price", price, ("previous_price", before))
     }
+}
+
+/// # Errors
+/// The first of the fields that is given.
+pub(super) fn none_of(fields: &[(&'static str, bool)], rule: &str) -> Result<(), FieldError> {
+    let given = fields.iter().find(|(_, is_given)| *is_given);
+    given.map_or(Ok(()), |(field, _)| Err(FieldError::new(*field, "given", rule)))
 }
 
 /// The values in the order of the assets, each of which has one.

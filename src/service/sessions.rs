@@ -151,7 +151,13 @@ impl Sessions {
     ///
     /// # Errors
     /// There is no such policy, or history, wealth or holding breaks a rule; a key used with another request.
-    pub async fn open(&self, caller: &Caller, start: Start, key: Option<String>) -> Result<Live, ServiceError> {
+    pub async fn open(
+        &self,
+        caller: &Caller,
+        start: Start,
+        key: Option<String>,
+        turn: &HeavyTurn,
+    ) -> Result<Live, ServiceError> {
         let tenant = &caller.tenant;
         let key = key.map(|key| start.under(key)).transpose()?;
         start.labels.check()?;
@@ -161,6 +167,9 @@ impl Sessions {
         // The policy's own wealth pays, whatever is held.
         advisor.check_withdrawals(&beginning.state)?;
         let plan = Plan::new(&advisor, beginning.state.law.sample_size(), renew, rolling)?;
+        if beginning.assets.is_some() && Assets::must_solve(&advisor, 0) {
+            turn.begin().await?;
+        }
         let Beginning { state, assets, history } = self.composed(tenant, &advisor, beginning).await?;
         let plan = Plan { assets: assets.as_ref().map(|assets| assets.planned()), ..plan };
         self.policies.starts_from(&advisor, state.law.sample_size(), plan.terms.horizon)?;
@@ -263,8 +272,11 @@ impl Sessions {
         live: &Live,
         turn: &'a HeavyTurn,
     ) -> Result<Means<'a>, ServiceError> {
-        let advisor = self.advisor(tenant, live).await?;
-        Ok(Means { advisor, advising: &self.advising, resolving: &self.resolving, turn })
+        Ok(self.means_of(self.advisor(tenant, live).await?, Some(turn)))
+    }
+
+    pub(super) fn means_of<'a>(&'a self, advisor: Arc<Advisor>, turn: Option<&'a HeavyTurn>) -> Means<'a> {
+        Means { advisor, advising: &self.advising, resolving: &self.resolving, turn }
     }
 
     /// Counts a session in memory by what it takes now.

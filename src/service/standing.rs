@@ -191,6 +191,17 @@ impl Standing {
         self.state = assets.compose(advisor, step, &self.state);
     }
 
+    /// Supposes that wealth, or what is held of several assets, were another since the last choice of the composition.
+    pub(super) fn suppose(&mut self, advisor: &Advisor, step: usize, wealth: Option<f64>, holdings: Option<Vec<f64>>) {
+        let Some(assets) = &mut self.assets else { return };
+        self.state.wealth = wealth.unwrap_or(self.state.wealth);
+        if let Some(holdings) = holdings {
+            self.state.holding = holdings.iter().sum::<f64>().min(1.0);
+            assets.fund.holdings = holdings;
+        }
+        self.state = assets.compose_anew(advisor, step, &self.state);
+    }
+
     /// Returns that it holds.
     pub(super) fn returns(&self) -> usize {
         let seen = self.seen.as_ref().map_or(0, EmpiricalDistribution::sample_size);

@@ -1,11 +1,15 @@
 //! Questions about a session that change nothing: one hypothesis, or one part of it swept over a range.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::error::ServiceError;
-use super::report::log_return_of;
+use super::live::Live;
+use super::report::{OF_ONE, OF_SEVERAL, Report, log_return_of, none_of};
 use super::sessions::Sessions;
+use super::what_if_assets::{AssetsWhatIfPoint, Supposition};
 use crate::control::error::FieldError;
 use crate::control::policy::advice::Advice;
 use crate::control::policy::advisor::AdviceMode;
@@ -35,6 +39,17 @@ pub struct WhatIf {
     pub log_return: Option<f64>,
     /// The same as `price / previous price - 1`.
     pub simple_return: Option<f64>,
+    /// Of several assets, by their names, each of which has one: share of wealth in it now, before trading.
+    pub holdings: Option<BTreeMap<String, f64>>,
+    /// Of several assets, returns of the coming period, in one of three ways; the advice is for the period after.
+    #[schema(example = json!({ "stocks": 0.012, "bonds": 0.004 }))]
+    pub log_returns: Option<BTreeMap<String, f64>>,
+    /// The same as `price / previous price - 1`.
+    pub simple_returns: Option<BTreeMap<String, f64>>,
+    /// Prices of several assets at the end of the coming period.
+    pub prices: Option<BTreeMap<String, f64>>,
+    /// Their prices at its start. Default: those reported for the period before.
+    pub previous_prices: Option<BTreeMap<String, f64>>,
     /// `worst_case`: solve the step, and show the whole worst-case law.
     pub explain: Option<Explain>,
     /// One of the above over a range instead; every point is solved.
@@ -111,6 +126,16 @@ pub enum WhatIfAnswer {
         session: String,
         points: Vec<WhatIfPoint>,
     },
+    /// Of several assets.
+    OneOfAssets {
+        session: String,
+        #[serde(flatten)]
+        point: Box<AssetsWhatIfPoint>,
+    },
+    SweepOfAssets {
+        session: String,
+        points: Vec<AssetsWhatIfPoint>,
+    },
 }
 
 impl SweepRange {
@@ -183,6 +208,48 @@ impl WhatIf {
         range.values(name)?.into_iter().map(at).collect()
     }
 
+    /// Refuses what the session, of one asset or several, has not.
+    fn fits(&self, several: bool) -> Result<(), FieldError> {
+        let sweep = self.sweep.clone().unwrap_or_default();
+        if several {
+            let of_one = [
+                ("holding", self.holding.is_some()),
+                ("log_return", self.log_return.is_some()),
+                ("simple_return", self.simple_return.is_some()),
+                ("sweep.holding", sweep.holding.is_some()),
+                ("sweep.log_return", sweep.log_return.is_some()),
+                ("sweep.simple_return", sweep.simple_return.is_some()),
+            ];
+            return none_of(&of_one, OF_ONE);
+        }
+        let of_several = [
+            ("holdings", self.holdings.is_some()),
+            ("log_returns", self.log_returns.is_some()),
+            ("simple_returns", self.simple_returns.is_some()),
+            ("prices", self.prices.is_some()),
+            ("previous_prices", self.previous_prices.is_some()),
+        ];
+        none_of(&of_several, OF_SEVERAL)
+    }
+
+    /// The report of several assets that is supposed of the coming period, and the field that says it.
+    fn report(&self) -> Option<(&'static str, Report)> {
+        let WhatIf { log_returns, simple_returns, prices, previous_prices, .. } = self.clone();
+        let field = match (&log_returns, &simple_returns, &prices, &previous_prices) {
+            (Some(_), ..) => "log_returns",
+            (None, Some(_), ..) => "simple_returns",
+            (None, None, Some(_), _) => "prices",
+            (None, None, None, Some(_)) => "previous_prices",
+            _ => return None,
+        };
+        Some((field, Report { log_returns, simple_returns, prices, previous_prices, ..Report::default() }))
+    }
+
+    fn mode(&self) -> AdviceMode {
+        let solves = self.sweep.is_some() || self.explain.is_some();
+        if solves { AdviceMode::Resolve } else { AdviceMode::Surrogate }
+    }
+
     /// A refusal of the return supposed, under the name by which the request gave it.
     fn renamed(&self, error: FieldError) -> FieldError {
         let sweep = self.sweep.clone().unwrap_or_default();
@@ -206,14 +273,26 @@ impl Sessions {
         let hypotheses = request.hypotheses()?;
         let live = self.get(tenant, &request.session).await?;
         live.goes_on()?;
+        let several = live.standing.assets.is_some();
+        request.fits(several)?;
+        if several {
+            let mut points = self.suppose_of_assets(tenant, &request, &live, hypotheses).await?;
+            let session = request.session;
+            return Ok(match (request.sweep, points.pop()) {
+                (None, Some(point)) => WhatIfAnswer::OneOfAssets { session, point: Box::new(point) },
+                (_, last) => {
+                    WhatIfAnswer::SweepOfAssets { session, points: points.into_iter().chain(last).collect() }
+                }
+            });
+        }
         let advisor = self.advisor(tenant, &live).await?;
-        let solves = request.sweep.is_some() || request.explain.is_some();
-        let mode = if solves { AdviceMode::Resolve } else { AdviceMode::Surrogate };
+        let mode = request.mode();
         let mut points = Vec::with_capacity(hypotheses.len());
         for hypothesis in hypotheses {
             let (advisor, state) = (advisor.clone(), live.standing.state.clone());
             let (step, following) = (live.step(), live.following());
-            let turns = if solves || hypothesis.radius.is_some() { &self.resolving } else { &self.advising };
+            let solves = mode == AdviceMode::Resolve || hypothesis.radius.is_some();
+            let turns = if solves { &self.resolving } else { &self.advising };
             let supposed =
                 turns.run(tenant, move || advisor.suppose(step, following, &state, &hypothesis, mode)).await?;
             let supposed = supposed.map_err(|error| request.renamed(error))?;
@@ -226,20 +305,39 @@ impl Sessions {
             (_, last) => Ok(WhatIfAnswer::Sweep { session, points: points.into_iter().chain(last).collect() }),
         }
     }
+
+    /// The same of several assets, point by point.
+    async fn suppose_of_assets(
+        &self,
+        tenant: &Tenant,
+        request: &WhatIf,
+        live: &Live,
+        hypotheses: Vec<Hypothesis>,
+    ) -> Result<Vec<AssetsWhatIfPoint>, ServiceError> {
+        let supposition = Supposition::new(live, request.holdings.as_ref(), request.report())?;
+        let (advisor, mode) = (self.advisor(tenant, live).await?, request.mode());
+        let mut points = Vec::with_capacity(hypotheses.len());
+        for hypothesis in hypotheses {
+            let solves =
+                mode == AdviceMode::Resolve || hypothesis.radius.is_some() || supposition.composes(&hypothesis);
+            let turns = if solves { &self.resolving } else { &self.advising };
+            let (advisor, supposition) = (advisor.clone(), supposition.clone());
+            let mut point = turns.run(tenant, move || supposition.answer(&advisor, &hypothesis, mode)).await??;
+            point.worst_case.take_if(|_| request.explain.is_none());
+            points.push(point);
+        }
+        Ok(points)
+    }
 }
 
 impl WhatIfPoint {
     fn new(period: usize, hypothesis: &Hypothesis, supposed: Supposed, explain: Option<Explain>) -> Self {
-        let radius_scale = match hypothesis.radius {
-            Some(HypotheticalRadius::Scaled(scale)) => Some(scale),
-            _ => None,
-        };
         let worst_case = supposed.worst_case;
         WhatIfPoint {
             period,
             wealth: supposed.wealth,
             log_return: hypothesis.log_return,
-            radius_scale,
+            radius_scale: hypothesis.radius_scale(),
             advice: supposed.advice,
             gamma: worst_case.as_ref().map(|worst| worst.multiplier),
             worst_law: worst_case.as_ref().and_then(WorstCase::summary),

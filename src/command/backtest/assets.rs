@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use ballast::control::evaluation::assets::report::AssetsBacktestReport;
 use ballast::control::evaluation::assets::{AssetsBacktest, AssetsChoices, AssetsRecord, AssetsWalked};
+use ballast::control::progress::Watch;
 
 use super::progress::Parts;
 use super::{BacktestArgs, BacktestError, Window, refused};
@@ -71,7 +72,7 @@ pub fn walk(args: &BacktestArgs, returns: SeveralReturns) -> Result<Shown, Backt
     let backtest = args.of_assets(record)?;
     let started = Instant::now();
     let parts = Parts::new(backtest.parts(), "stretches");
-    let walked = args.pool()?.install(|| backtest.run(&|| parts.one_more()));
+    let walked = args.pool()?.install(|| backtest.run(&Watch::unwatched(), &|| parts.one_more()))?;
     parts.finish();
     let report = AssetsBacktestReport::new(&walked);
     let times = times[walked.backtest.first..].to_vec();

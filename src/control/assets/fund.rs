@@ -36,6 +36,8 @@ pub struct Fund {
     pub rows: Vec<Vec<f64>>,
     /// Share of each asset in the fund; they sum to 1.
     pub composition: Vec<f64>,
+    /// The composition that was held when this one was chosen.
+    pub before: Vec<f64>,
     /// Share of wealth in each asset, before trading.
     pub holdings: Vec<f64>,
 }
@@ -107,7 +109,12 @@ impl Fund {
     /// Who has seen `rows` and holds these shares of wealth, before a composition is chosen.
     pub fn at(rows: Vec<Vec<f64>>, holdings: Vec<f64>) -> Self {
         let composition = inverse_volatility(&rows);
-        Fund { rows, composition, holdings }
+        Fund { rows, before: composition.clone(), composition, holdings }
+    }
+
+    /// Holds these shares from now on.
+    pub fn take(&mut self, composition: Vec<f64>) {
+        self.before = std::mem::replace(&mut self.composition, composition);
     }
 
     /// Log-returns of the fund, date by date.
@@ -180,7 +187,8 @@ impl Fund {
             let net = gain / left - problem.trading_cost * self.traded(&executed);
             varies.then_some([gain, net])
         };
-        self.composition = guarded(self.composition.clone(), proposed, value);
+        let chosen = guarded(self.composition.clone(), proposed, value);
+        self.take(chosen);
         (self.state(advisor, state, &self.composition), solution)
     }
 

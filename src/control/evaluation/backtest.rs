@@ -128,21 +128,13 @@ impl Backtest {
 
     /// What may be a mistake, by the last window; fields as they are named here.
     pub fn warnings(&self) -> Vec<Warning> {
-        let (returns, _) = self.request.returns();
-        let names =
-            [("problem.rate_per_step", "rate"), ("problem.trading_cost", "trading_cost"), ("problem.history", returns)];
         let last = &self.periods[self.periods.len() - self.walk.window..];
         let problem = ProblemSpecification {
             periods_per_year: Some(self.periods_per_year as f64),
             trading_cost: self.request.trading_cost,
             ..self.walk.specification(Framework::Adaptive, self.request.alpha[0], last).problem
         };
-        let renamed = |warning: Warning| Warning {
-            field: names.iter().find(|(from, _)| *from == warning.field).map_or(warning.field, |(_, to)| to),
-            message: names.iter().fold(warning.message, |message, (from, to)| message.replace(from, to)),
-            code: warning.code,
-        };
-        problem.warnings().into_iter().map(renamed).collect()
+        problem.warnings().into_iter().map(|warning| warning.of_walk(self.request.returns().0)).collect()
     }
 
     /// Decides every period on the current pool and keeps the books; `trained` hears of every training done.

@@ -41,6 +41,14 @@ pub struct Supposed {
 }
 
 impl Hypothesis {
+    /// The factor on the radius, if one is supposed.
+    pub fn radius_scale(&self) -> Option<f64> {
+        match self.radius {
+            Some(HypotheticalRadius::Scaled(scale)) => Some(scale),
+            _ => None,
+        }
+    }
+
     /// Checks what can be checked without a state; fields are named as on the wire.
     ///
     /// # Errors

@@ -120,6 +120,45 @@ impl Rates {
             Rates::Listed(rates) => rates.get(index).copied().unwrap_or_default(),
         }
     }
+
+    /// Checks that there is one for each of so many periods, and each of them.
+    ///
+    /// # Errors
+    /// A field that breaks its rule.
+    pub fn check(&self, periods: usize) -> Result<(), FieldError> {
+        match self {
+            Rates::Each(rate) => within("rate", *rate, RATE.0, RATE.1),
+            Rates::Listed(rates) => {
+                same_length("rate", rates.len(), periods)?;
+                let mut numbered = rates.iter().enumerate();
+                numbered.try_for_each(|(index, &rate)| within(&format!("rate[{index}]"), rate, RATE.0, RATE.1))
+            }
+        }
+    }
+}
+
+/// Between which returns lie, simple ones or log-returns.
+pub fn bounds(are_simple: bool) -> (f64, f64) {
+    let bound = rules::LOG_RETURN;
+    if are_simple { ((-bound).exp_m1(), bound.exp_m1()) } else { (-bound, bound) }
+}
+
+/// How often there is a period, by its dates.
+///
+/// # Errors
+/// A date that is none, or that does not follow the one before.
+pub fn frequency(dates: &[String]) -> Result<Frequency, FieldError> {
+    if let Some(index) = dates.iter().position(|text| date(text).is_none()) {
+        return Err(FieldError::new(format!("dates[{index}]"), &dates[index], dates::FORM));
+    }
+    let texts: Vec<&str> = dates.iter().map(String::as_str).collect();
+    let found = Frequency::of(&days(dates), &texts);
+    found.map_err(|wrong| FieldError::new(format!("dates[{}]", wrong.index), &dates[wrong.index], wrong.rule))
+}
+
+/// Those that are dates.
+pub fn days(dates: &[String]) -> Vec<Date> {
+    dates.iter().filter_map(|text| date(text)).collect()
 }
 
 impl BacktestRequest {
@@ -181,20 +220,12 @@ impl BacktestRequest {
     /// # Errors
     /// A date that is none, or that does not follow the one before.
     pub fn frequency(&self) -> Result<Option<Frequency>, FieldError> {
-        let Some(written) = &self.dates else { return Ok(None) };
-        if let Some(index) = written.iter().position(|text| date(text).is_none()) {
-            return Err(FieldError::new(format!("dates[{index}]"), &written[index], dates::FORM));
-        }
-        let texts: Vec<&str> = written.iter().map(String::as_str).collect();
-        let found = Frequency::of(&self.days(), &texts);
-        found
-            .map(Some)
-            .map_err(|wrong| FieldError::new(format!("dates[{}]", wrong.index), &written[wrong.index], wrong.rule))
+        self.dates.as_deref().map(frequency).transpose()
     }
 
     /// The dates that are dates.
     pub fn days(&self) -> Vec<Date> {
-        self.dates.iter().flatten().filter_map(|text| date(text)).collect()
+        days(self.dates.as_deref().unwrap_or_default())
     }
 
     fn check_record(&self) -> Result<(), FieldError> {
@@ -207,21 +238,11 @@ impl BacktestRequest {
             let rule = format!("must hold {} to {} returns", PERIODS.start(), PERIODS.end());
             return Err(FieldError::new(field, format!("{} periods", returns.len()), rule));
         }
+        let (low, high) = bounds(self.simple_returns.is_some());
         for (index, &value) in returns.iter().enumerate() {
-            let bound = rules::LOG_RETURN;
-            let (low, high) =
-                if self.simple_returns.is_some() { ((-bound).exp_m1(), bound.exp_m1()) } else { (-bound, bound) };
             within(&format!("{field}[{index}]"), value, low, high)?;
         }
-        match &self.rate {
-            Rates::Each(rate) => within("rate", *rate, RATE.0, RATE.1)?,
-            Rates::Listed(rates) => {
-                same_length("rate", rates.len(), returns.len())?;
-                for (index, &rate) in rates.iter().enumerate() {
-                    within(&format!("rate[{index}]"), rate, RATE.0, RATE.1)?;
-                }
-            }
-        }
+        self.rate.check(returns.len())?;
         self.dates.as_ref().map_or(Ok(()), |dates| same_length("dates", dates.len(), returns.len()))
     }
 
@@ -258,7 +279,9 @@ impl BacktestRequest {
     }
 }
 
-fn same_length(field: &str, found: usize, wanted: usize) -> Result<(), FieldError> {
+/// # Errors
+/// A list that is not as long as the record.
+pub fn same_length(field: &str, found: usize, wanted: usize) -> Result<(), FieldError> {
     if found == wanted {
         return Ok(());
     }

@@ -3,6 +3,7 @@
 pub mod annualised;
 pub mod assets;
 pub mod backtest;
+pub mod backtest_assets;
 pub mod centre;
 pub mod centre_rules;
 pub mod completion;

@@ -46,6 +46,19 @@ pub enum WarningCode {
     TradingCostHigh,
 }
 
+impl Warning {
+    /// The same of a walk-forward, whose fields have other names; that of its returns is given.
+    pub fn of_walk(self, returns: &'static str) -> Self {
+        let names =
+            [("problem.rate_per_step", "rate"), ("problem.trading_cost", "trading_cost"), ("problem.history", returns)];
+        Warning {
+            field: names.iter().find(|(from, _)| *from == self.field).map_or(self.field, |(_, to)| to),
+            message: names.iter().fold(self.message, |message, (from, to)| message.replace(from, to)),
+            code: self.code,
+        }
+    }
+}
+
 impl ProblemSpecification {
     /// What may be a mistake, in the order of the request. Cost O(n ln n) for n returns.
     ///

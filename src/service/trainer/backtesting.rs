@@ -1,24 +1,60 @@
-//! Walk-forward jobs: the trainings from one stretch to the next, a checkpoint each; then the books.
+//! Walk-forward jobs: the trainings from one stretch to the next, or the strategies of several assets, a checkpoint each; then the
+//! books.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
 use super::{Ended, Worker, failed, reported, requested};
+use crate::control::error::TrainError;
 use crate::control::estimate;
+use crate::control::evaluation::assets::AssetsBacktest;
+use crate::control::evaluation::assets::report::AssetsBacktestReport;
 use crate::control::evaluation::backtest::Backtest;
 use crate::control::evaluation::backtest_report::BacktestReport;
 use crate::control::evaluation::rolling::{Common, Decision};
 use crate::control::kept::Kept;
 use crate::control::pool;
 use crate::control::progress::Watch;
+use crate::control::request::backtest_assets::{AssetsBacktestRequest, BacktestQuestion};
 use crate::store::{ClaimedJob, JobOutcome};
 
 impl Worker {
     pub(super) fn backtest(&self, claimed: &ClaimedJob, stop: &AtomicBool) -> Result<JobOutcome, Ended> {
-        let backtest = Backtest::new(requested(claimed)?).map_err(|error| failed(error.to_string()))?;
+        let request = match requested(claimed)? {
+            BacktestQuestion::Asset(request) => request,
+            BacktestQuestion::Assets(request) => return self.backtest_of_assets(claimed, &request, stop),
+        };
+        let backtest = Backtest::new(request).map_err(|error| failed(error.to_string()))?;
         let _reserved = self.reserve(&estimate::backtest(&backtest, self.threads))?;
         let decisions = self.decided(claimed, &backtest, stop)?;
         reported(&BacktestReport::new(&backtest.walked(decisions)))
+    }
+
+    /// A checkpoint is all that a strategy held.
+    fn backtest_of_assets(
+        &self,
+        claimed: &ClaimedJob,
+        request: &AssetsBacktestRequest,
+        stop: &AtomicBool,
+    ) -> Result<JobOutcome, Ended> {
+        let backtest = AssetsBacktest::asked(request).map_err(|error| failed(error.to_string()))?;
+        let _reserved = self.reserve(&estimate::backtest_of_assets(&backtest, request.returns().0, self.threads))?;
+        let checkpoints = self.checkpoints(claimed)?;
+        let watch = Watch { stop, progress: &|_| {} };
+        let report = self.pool.install(|| {
+            let radii = backtest.radii(&watch, &|| {})?;
+            let decide = |(index, strategy)| {
+                let decided = || backtest.decide(strategy, &radii, &watch, &|| {});
+                self.checkpointed(claimed, &checkpoints, Some(index), decided)
+            };
+            let held = pool::map(backtest.strategies().into_iter().enumerate().collect(), decide);
+            let held = held.into_iter().collect::<Result<_, Ended>>()?;
+            Ok::<_, Ended>(AssetsBacktestReport::new(&backtest.walked(&radii, held)))
+        })?;
+        reported(&report)
     }
 
     /// What each strategy decided in every period. The trainings of a stretch run side by side: policy `index` of them is
@@ -29,11 +65,8 @@ impl Worker {
         backtest: &Backtest,
         stop: &AtomicBool,
     ) -> Result<Vec<Vec<Decision>>, Ended> {
-        let job = claimed.row.job.as_str();
         let kept = Kept::new(estimate::kept_by_backtest(backtest, self.threads));
-        let found = self.runtime.block_on(self.store.checkpoints(job))?;
-        let checkpoints: BTreeMap<usize, Vec<u8>> = found.into_iter().collect();
-        self.board.resume(job, checkpoints.len());
+        let checkpoints = self.checkpoints(claimed)?;
         // Progress within one of several trainings says nothing of the others.
         let watch = Watch { stop, progress: &|_| {} };
         let strategies = backtest.plain_strategies();
@@ -42,15 +75,11 @@ impl Worker {
         let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); strategies.len()];
         for stretch in 0..backtest.walk.stretches(backtest.periods.len()) {
             let common = Common::of(&strategies, kept.clone());
-            let decide = |(index, strategy)| -> Result<Vec<Decision>, Ended> {
+            let decide = |(index, strategy)| {
                 let step = (index < policies).then_some(stretch * policies + index);
-                let before = step.and_then(|step| checkpoints.get(&step));
-                if let Some(decided) = before.and_then(|bytes| serde_json::from_slice(bytes).ok()) {
-                    return Ok(decided);
-                }
-                let decided = backtest.walk.decide_stretch(strategy, &backtest.periods, stretch, &common, &watch)?;
-                step.map_or(Ok(()), |step| self.keep(claimed, step, &decided))?;
-                Ok(decided)
+                let decided =
+                    || backtest.walk.decide_stretch(strategy, &backtest.periods, stretch, &common, &watch);
+                self.checkpointed(claimed, &checkpoints, step, decided)
             };
             let numbered = strategies.iter().copied().enumerate().collect();
             let found = self.pool.install(|| pool::map(numbered, decide));
@@ -61,7 +90,33 @@ impl Worker {
         Ok(decisions)
     }
 
-    fn keep(&self, claimed: &ClaimedJob, step: usize, decided: &[Decision]) -> Result<(), Ended> {
+    /// What was done before, by the step that it was done in.
+    fn checkpoints(&self, claimed: &ClaimedJob) -> Result<BTreeMap<usize, Vec<u8>>, Ended> {
+        let job = claimed.row.job.as_str();
+        let found: BTreeMap<usize, Vec<u8>> =
+            self.runtime.block_on(self.store.checkpoints(job))?.into_iter().collect();
+        self.board.resume(job, found.len());
+        Ok(found)
+    }
+
+    /// What was decided in a step before, or is decided now and kept; without a step it is not.
+    fn checkpointed<T: Serialize + DeserializeOwned>(
+        &self,
+        claimed: &ClaimedJob,
+        checkpoints: &BTreeMap<usize, Vec<u8>>,
+        step: Option<usize>,
+        decide: impl FnOnce() -> Result<T, TrainError>,
+    ) -> Result<T, Ended> {
+        let before = step.and_then(|step| checkpoints.get(&step));
+        if let Some(decided) = before.and_then(|bytes| serde_json::from_slice(bytes).ok()) {
+            return Ok(decided);
+        }
+        let decided = decide()?;
+        step.map_or(Ok(()), |step| self.keep(claimed, step, &decided))?;
+        Ok(decided)
+    }
+
+    fn keep(&self, claimed: &ClaimedJob, step: usize, decided: &impl Serialize) -> Result<(), Ended> {
         let bytes = serde_json::to_vec(decided)
             .map_err(|error| failed(format!("what was decided cannot be written as JSON: {error}")))?;
         let saving = self.store.save_checkpoint(&claimed.row.job, claimed.attempt, step, &bytes);

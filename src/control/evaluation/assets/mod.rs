@@ -8,12 +8,14 @@
 //! worth beyond that is some basis points a year.
 
 use serde::Serialize;
+use utoipa::ToSchema;
 
 use self::rules::{AssetsStrategy, Rule, equal, strategies};
-use crate::control::error::FieldError;
+use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::account::{Account, keep_assets};
 use crate::control::evaluation::resampling::INITIAL_WEALTH;
 use crate::control::pool;
+use crate::control::progress::Watch;
 use crate::control::request::assets::{DATES, check_names, check_rows};
 use crate::control::request::backtest::{ALPHA, RELATIVE, defaults};
 use crate::control::request::frequency::Frequency;
@@ -22,17 +24,18 @@ use crate::control::request::specification::{UtilitySpecification, default_seed}
 use crate::numerics::fund_bridges::FundBridges;
 use crate::numerics::levelling::inverse_volatility;
 
+mod asked;
 mod figures;
 pub mod report;
 pub mod rules;
 mod words;
 
 /// Simulated bridges: the standard error of a radius is then a hundredth of it or two.
-const PATHS: usize = 500;
+pub const PATHS: usize = 500;
 /// Years that windows have, beside all.
 const WINDOW_YEARS: [usize; 2] = [10, 20];
 /// Windows at most.
-const MOST_WINDOWS: usize = 5;
+pub const MOST_WINDOWS: usize = 5;
 
 /// What several assets and the bank paid, period by period.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,7 +55,7 @@ pub struct AssetsRecord {
 }
 
 /// How a record of several assets is walked through.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AssetsChoices {
     /// Periods that strategies know; null is all since the first.
     pub windows: Vec<Option<usize>>,
@@ -199,8 +202,12 @@ impl AssetsBacktest {
 
     /// Parts of the work: stretches of a strategy, and radii of a window.
     pub fn parts(&self) -> usize {
-        let windows = &self.choices.windows;
-        self.starts().count() * (strategies(windows).len() + windows.len())
+        self.starts().count() * (self.strategies().len() + self.choices.windows.len())
+    }
+
+    /// Strategies in their order.
+    pub fn strategies(&self) -> Vec<AssetsStrategy> {
+        strategies(&self.choices.windows)
     }
 
     /// The first periods of the stretches.
@@ -210,28 +217,60 @@ impl AssetsBacktest {
 
     /// Decides every period on the current pool and keeps the books; `done` hears of every one of the [`parts`](Self::parts).
     /// Cost: a one-step problem a period for each of the robust strategies.
-    pub fn run(self, done: &(dyn Fn() + Sync)) -> AssetsWalked {
-        let radii: Vec<Vec<f64>> = self.choices.windows.iter().map(|&window| self.radii(window, done)).collect();
-        let decide = |strategy: AssetsStrategy| {
-            let at = self.choices.windows.iter().position(|window| *window == strategy.window);
-            let radii = at.map_or(&[][..], |at| &radii[at]);
-            self.line(strategy, strategy.decide(&self, radii, done), radii)
-        };
-        let lines = pool::map(strategies(&self.choices.windows), decide);
-        AssetsWalked { backtest: self, lines }
+    ///
+    /// # Errors
+    /// [`TrainError::Stopped`].
+    pub fn run(self, watch: &Watch, done: &(dyn Fn() + Sync)) -> Result<AssetsWalked, TrainError> {
+        let radii = self.radii(watch, done)?;
+        let held = pool::map(self.strategies(), |strategy| self.decide(strategy, &radii, watch, done));
+        Ok(self.walked(&radii, held.into_iter().collect::<Result<_, _>>()?))
     }
 
-    /// The radius of all funds at once at the start of every stretch.
-    fn radii(&self, window: Option<usize>, done: &(dyn Fn() + Sync)) -> Vec<f64> {
-        let radius = |start: usize| {
+    /// The radius of all funds at once, window by window, at the start of every stretch.
+    ///
+    /// # Errors
+    /// [`TrainError::Stopped`].
+    pub fn radii(&self, watch: &Watch, done: &(dyn Fn() + Sync)) -> Result<Vec<Vec<f64>>, TrainError> {
+        let radius = |(window, start): (Option<usize>, usize)| {
+            watch.go_on()?;
             let rows = self.record.known(start, window);
             let bridges = FundBridges::simulate(rows, PATHS, self.choices.seed);
             let own = bridges.quantile(&inverse_volatility(rows), self.choices.alpha).value;
             let radius = bridges.joint_factor(self.choices.alpha).value * own / (rows.len() as f64).sqrt();
             done();
-            radius
+            Ok(radius)
         };
-        pool::map(self.starts().collect(), radius)
+        let of_window = |&window: &Option<usize>| {
+            let starts = self.starts().map(|start| (window, start)).collect();
+            pool::map(starts, radius).into_iter().collect()
+        };
+        self.choices.windows.iter().map(of_window).collect()
+    }
+
+    /// What a strategy holds in every period, where the radii are those.
+    ///
+    /// # Errors
+    /// [`TrainError::Stopped`].
+    pub fn decide(
+        &self,
+        strategy: AssetsStrategy,
+        radii: &[Vec<f64>],
+        watch: &Watch,
+        done: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Vec<f64>>, TrainError> {
+        strategy.decide(self, self.radii_of(strategy, radii), watch, done)
+    }
+
+    /// The books of what every strategy held.
+    pub fn walked(self, radii: &[Vec<f64>], held: Vec<Vec<Vec<f64>>>) -> AssetsWalked {
+        let line = |(strategy, held)| self.line(strategy, held, self.radii_of(strategy, radii));
+        let lines = self.strategies().into_iter().zip(held).map(line).collect();
+        AssetsWalked { lines, backtest: self }
+    }
+
+    fn radii_of<'a>(&self, strategy: AssetsStrategy, radii: &'a [Vec<f64>]) -> &'a [f64] {
+        let at = self.choices.windows.iter().position(|window| *window == strategy.window);
+        at.map_or(&[][..], |at| &radii[at])
     }
 
     fn line(&self, strategy: AssetsStrategy, held: Vec<Vec<f64>>, radii: &[f64]) -> AssetsLine {
@@ -284,7 +323,7 @@ mod tests {
             trading_cost: COST,
             ..AssetsChoices::usual(record.periods_per_year)
         };
-        AssetsBacktest::new(record, choices).unwrap().run(&|| ())
+        AssetsBacktest::new(record, choices).unwrap().run(&Watch::unwatched(), &|| ()).unwrap()
     }
 
     fn named<'a>(walked: &'a AssetsWalked, name: &str) -> &'a AssetsLine {

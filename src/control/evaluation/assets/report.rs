@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use utoipa::ToSchema;
 
 use super::AssetsChoices;
 use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEstimate, Performance};
@@ -11,7 +12,7 @@ use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEs
 pub const FORMAT: &str = "ballast-backtest-assets-1";
 
 /// Strategies that lived through a record of several assets. The same record and choices give the same report, bit for bit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AssetsBacktestReport {
     /// `ballast-backtest-assets-1`.
     pub format: String,
@@ -38,7 +39,7 @@ pub struct AssetsBacktestReport {
 }
 
 /// One strategy in figures.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AssetsFigures {
     /// Its name.
     pub strategy: String,
@@ -54,7 +55,7 @@ pub struct AssetsFigures {
 }
 
 /// What one strategy did, a number a period.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct AssetsPeriods {
     /// Its name.
     pub strategy: String,

@@ -2,8 +2,10 @@
 
 use super::AssetsBacktest;
 use crate::control::assets::{AssetsLaw, AssetsSolution, AssetsStep};
+use crate::control::error::TrainError;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
+use crate::control::progress::Watch;
 use crate::control::request::fund::GroundNorm;
 use crate::numerics::least_variance::least_variance;
 use crate::numerics::levelling::inverse_volatility;
@@ -111,10 +113,20 @@ impl AssetsStrategy {
     }
 
     /// Shares of wealth in every period decided about; `radii` are those of the stretches. `done` hears of every stretch.
-    pub fn decide(&self, backtest: &AssetsBacktest, radii: &[f64], done: &(dyn Fn() + Sync)) -> Vec<Vec<f64>> {
+    ///
+    /// # Errors
+    /// [`TrainError::Stopped`].
+    pub fn decide(
+        &self,
+        backtest: &AssetsBacktest,
+        radii: &[f64],
+        watch: &Watch,
+        done: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Vec<f64>>, TrainError> {
         let (every, first, periods) = (backtest.choices.every, backtest.first, backtest.record.rows.len());
         let (mut last, mut held): (Option<AssetsSolution>, Vec<Vec<f64>>) = (None, Vec::new());
         for period in first..periods {
+            watch.go_on()?;
             let (stretch, is_start) = ((period - first) / every, (period - first).is_multiple_of(every));
             if is_start && period > first {
                 done();
@@ -134,7 +146,7 @@ impl AssetsStrategy {
             held.push(shares);
         }
         done();
-        held
+        Ok(held)
     }
 }
 

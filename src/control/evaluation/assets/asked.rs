@@ -1,0 +1,96 @@
+//! From a walk-forward request of several assets to the walk.
+
+use super::rules::{Rule, strategies};
+use super::{AssetsBacktest, AssetsChoices, AssetsRecord};
+use crate::control::error::FieldError;
+use crate::control::request::backtest::days;
+use crate::control::request::backtest_assets::{AssetsBacktestRequest, MOST_HELD, MOST_READ};
+use crate::control::request::specification::ProblemSpecification;
+use crate::control::request::warnings::Warning;
+use crate::numerics::fund_bridges::fund_returns;
+use crate::numerics::levelling::inverse_volatility;
+
+impl AssetsBacktest {
+    /// Checks and completes a request, and that what it asks for is bounded.
+    ///
+    /// # Errors
+    /// A field that breaks its rule.
+    pub fn asked(request: &AssetsBacktestRequest) -> Result<Self, FieldError> {
+        let (frequency, periods_per_year) = request.check()?;
+        let (field, returns) = request.returns();
+        let record = AssetsRecord {
+            assets: request.assets.clone(),
+            rows: request.log_rows(),
+            bank: (0..returns.len()).map(|index| request.rate.at(index)).collect(),
+            dates: days(&request.dates).into_iter().map(|date| frequency.shown(date)).collect(),
+            frequency,
+            periods_per_year,
+        };
+        let usual = AssetsChoices::usual(periods_per_year);
+        let choices = AssetsChoices {
+            windows: request.windows.clone().unwrap_or(usual.windows),
+            every: request.every.unwrap_or(usual.every),
+            alpha: request.alpha.unwrap_or(usual.alpha),
+            risk_aversion: request.risk_aversion,
+            trading_cost: request.trading_cost,
+            seed: request.seed,
+        };
+        let backtest = AssetsBacktest::new(record, choices).map_err(|error| renamed(error, field))?;
+        backtest.check_size(field)?;
+        Ok(backtest)
+    }
+
+    /// Shares that all strategies together hold.
+    pub fn shares(&self) -> usize {
+        let held = self.lived().len().saturating_mul(strategies(&self.choices.windows).len());
+        held.saturating_mul(self.record.assets.len())
+    }
+
+    fn check_size(&self, field: &str) -> Result<(), FieldError> {
+        let (shares, solved) = (self.shares(), self.read());
+        if shares > MOST_HELD {
+            let rule = format!("must be fewer: all strategies would hold {shares} shares, and {MOST_HELD} are the most");
+            return Err(FieldError::new(field, format!("{} periods", self.record.rows.len()), rule));
+        }
+        if solved > MOST_READ {
+            let rule = format!(
+                "must be fewer or shorter: their one-step problems would read {solved} log-returns, and {MOST_READ} are the most"
+            );
+            return Err(FieldError::new("windows", format!("{} windows", self.choices.windows.len()), rule));
+        }
+        Ok(())
+    }
+
+    /// Log-returns that the one-step problems of all periods read.
+    fn read(&self) -> usize {
+        let is_solved = |rule: &Rule| matches!(rule, Rule::Robust { .. });
+        let periods = self.first..self.record.rows.len();
+        let known = |window: Option<usize>| {
+            periods.clone().map(|period| window.map_or(period, |window| window.min(period))).sum::<usize>()
+        };
+        let solved = strategies(&self.choices.windows).into_iter().filter(|strategy| is_solved(&strategy.rule));
+        solved.map(|strategy| known(strategy.window)).sum::<usize>().saturating_mul(self.record.assets.len())
+    }
+
+    /// What may be a mistake, by the fund of inverse volatilities of the first periods decided about; fields as they are named in
+    /// `request`.
+    pub fn warnings(&self, request: &AssetsBacktestRequest) -> Vec<Warning> {
+        let rows = self.record.known(self.first, self.choices.windows.iter().copied().flatten().max());
+        let problem = ProblemSpecification {
+            periods_per_year: Some(self.record.periods_per_year as f64),
+            trading_cost: self.choices.trading_cost,
+            ..ProblemSpecification::of(fund_returns(rows, &inverse_volatility(rows)), self.record.bank[self.first - 1])
+        };
+        problem.warnings().into_iter().map(|warning| warning.of_walk(request.returns().0)).collect()
+    }
+}
+
+/// A rule that the walk breaks, under the name that its field has in a request.
+fn renamed(error: FieldError, returns: &str) -> FieldError {
+    let field = match error.field.strip_prefix("simple_returns") {
+        Some(at) => format!("{returns}{at}"),
+        None if error.field == "window" => "windows".to_owned(),
+        None => error.field,
+    };
+    FieldError { field, ..error }
+}

@@ -1,0 +1,133 @@
+//! The walk-forward request of several assets: a table of returns, and how it is walked through.
+
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::Value;
+use utoipa::ToSchema;
+
+use super::assets::check_names;
+use super::backtest::{BacktestRequest, PERIODS, Rates, YEAR, bounds, days, defaults, frequency, same_length};
+use super::frequency::Frequency;
+use super::rules::{whole, within};
+use super::specification::default_seed;
+use crate::control::error::FieldError;
+
+/// Log-returns that all one-step problems of a walk together read: some hours of two cores.
+pub const MOST_READ: usize = 1_000_000_000;
+/// Shares that all strategies together hold: a report of some forty megabytes.
+pub const MOST_HELD: usize = 2_000_000;
+
+/// A walk-forward through a record of several assets, by the one-step problem and by rules that people use.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AssetsBacktestRequest {
+    /// Names of the assets, each another, in the order of the columns.
+    #[schema(example = json!(["stocks", "bonds"]))]
+    pub assets: Vec<String>,
+    /// Of the assets, date by date, oldest first, none left out. Exactly one of this and `simple_returns` is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub log_returns: Option<Vec<Vec<f64>>>,
+    /// `price / previous price - 1`, likewise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simple_returns: Option<Vec<Vec<f64>>>,
+    /// What the bank pays a period, as a fraction: one number for all, or one for each.
+    pub rate: Rates,
+    /// One for each period, evenly apart: `2008-01-31`, `2008-01` or `2008`.
+    pub dates: Vec<String>,
+    /// Default: what `dates` tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub periods_per_year: Option<usize>,
+    /// How many of the last periods strategies know; null is all since the first. Default: 10 years, 20 years and all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub windows: Option<Vec<Option<usize>>>,
+    /// Periods from one measuring of the radius, and one choice of the static strategy, to the next. Default: a year of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub every: Option<usize>,
+    /// Miscoverage of the radius. Default: 0.1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub alpha: Option<f64>,
+    /// Relative: 1 is log utility.
+    #[serde(default = "defaults::risk_aversion")]
+    pub risk_aversion: f64,
+    /// Lost of what is traded, as a share of it; no strategy knows of it.
+    #[serde(default)]
+    pub trading_cost: f64,
+    /// The same request and seed give the same report, bit for bit.
+    #[serde(default = "default_seed")]
+    pub seed: u64,
+}
+
+/// A walk-forward of one asset, or of several, which `assets` names.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+#[allow(clippy::large_enum_variant)]
+pub enum BacktestQuestion {
+    /// One, which may be held beside the bank.
+    Asset(BacktestRequest),
+    /// Several.
+    Assets(AssetsBacktestRequest),
+}
+
+impl<'de> Deserialize<'de> for BacktestQuestion {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = Value::deserialize(deserializer)?;
+        let read = match value.get("assets") {
+            Some(_) => serde_json::from_value(value).map(BacktestQuestion::Assets),
+            None => serde_json::from_value(value).map(BacktestQuestion::Asset),
+        };
+        read.map_err(D::Error::custom)
+    }
+}
+
+impl AssetsBacktestRequest {
+    /// The field of the returns, and what it holds; nothing is held where both or neither are given.
+    pub fn returns(&self) -> (&'static str, &[Vec<f64>]) {
+        match (&self.log_returns, &self.simple_returns) {
+            (Some(returns), None) => ("log_returns", returns),
+            (None, Some(returns)) => ("simple_returns", returns),
+            _ => ("log_returns", &[]),
+        }
+    }
+
+    /// The log-returns, date by date.
+    pub fn log_rows(&self) -> Vec<Vec<f64>> {
+        let rows = self.returns().1.iter();
+        match self.simple_returns {
+            Some(_) => rows.map(|row| row.iter().map(|value| value.ln_1p()).collect()).collect(),
+            None => rows.cloned().collect(),
+        }
+    }
+
+    /// Checks the record as it is given; how often it has a period, and how many of them make a year.
+    ///
+    /// # Errors
+    /// The first field that breaks its rule.
+    pub fn check(&self) -> Result<(Frequency, usize), FieldError> {
+        if self.log_returns.is_some() == self.simple_returns.is_some() {
+            let value = if self.log_returns.is_some() { "given with simple_returns" } else { "null" };
+            return Err(FieldError::new("log_returns", value, "must be given, or simple_returns: exactly one of them"));
+        }
+        check_names("assets", &self.assets)?;
+        let (field, rows) = self.returns();
+        if !PERIODS.contains(&rows.len()) {
+            let rule = format!("must hold {} to {} periods", PERIODS.start(), PERIODS.end());
+            return Err(FieldError::new(field, format!("{} periods", rows.len()), rule));
+        }
+        let (low, high) = bounds(self.simple_returns.is_some());
+        for (period, row) in rows.iter().enumerate() {
+            if row.len() != self.assets.len() {
+                let rule = format!("must have one return for each of the {} assets", self.assets.len());
+                return Err(FieldError::new(format!("{field}[{period}]"), format!("{} values", row.len()), rule));
+            }
+            for (asset, &value) in row.iter().enumerate() {
+                within(&format!("{field}[{period}][{asset}]"), value, low, high)?;
+            }
+        }
+        self.rate.check(rows.len())?;
+        same_length("dates", self.dates.len(), rows.len())?;
+        let frequency = frequency(&self.dates)?;
+        let year = self.periods_per_year.unwrap_or_else(|| frequency.periods_per_year(&days(&self.dates)));
+        whole("periods_per_year", year, &YEAR)?;
+        Ok((frequency, year))
+    }
+}
