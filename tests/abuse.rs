@@ -247,6 +247,53 @@ async fn advice_that_must_solve_is_heavy_from_then_on() {
     assert_eq!(put_off["value"], "heavy", "{put_off}");
 }
 
+/// What is opened, observed and put right of several assets solves the one-step problem, and is heavy from the moment that is
+/// known: a report that is refused is not, nor is one of a fund whose shares are given.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_several_assets_report_is_heavy_where_it_solves() {
+    let mut app = App::configured(|config| config.limits = Limits::new([0, 4, 0], 4)).await;
+    let rows: Vec<[f64; 2]> =
+        (0..10).map(|k| [0.01 + 0.03 * f64::from(k * 7 % 10 - 4), 0.004 - 0.01 * f64::from(k * 3 % 10 - 5)]).collect();
+    let request = |composition: serde_json::Value| {
+        json!({ "problem": { "assets": ["stocks", "bonds"], "horizon": 2, "rate_per_step": 0.001, "history": rows,
+            "radius": { "rule": "fixed", "radius": 0.01 }, "composition": composition }, "design": { "count": 20 } })
+    };
+    let report = json!({ "log_returns": { "stocks": 0.01, "bonds": 0.002 } });
+    // Opens a session and reports a period of it, again and again, until something is put off.
+    let put_off = async |app: &mut App, rounds: usize| {
+        for _ in 0..rounds {
+            let (status, session) = app.post("/sessions", &json!({ "policy": app.policy })).await;
+            if status == 429 {
+                return Some(session);
+            }
+            app.session = session["session"].as_str().unwrap().to_owned();
+            let wrong = app.report(1, json!({ "log_returns": { "stocks": 0.01 } })).await;
+            assert_eq!(wrong.0, 422, "{}", wrong.1);
+            let (status, observed) = app.report(1, report.clone()).await;
+            if status == 429 {
+                return Some(observed);
+            }
+            assert_eq!(status, 200, "{observed}");
+        }
+        None
+    };
+    for (composition, is_heavy) in [(json!({ "given": [0.5, 0.5] }), false), (json!("one_step"), true)] {
+        let job = until("a training", async || {
+            let (status, job) = app.post("/train", &request(composition.clone())).await;
+            (status == 202).then_some(job)
+        })
+        .await;
+        let done = app.until(job["job"].as_str().unwrap(), |job| job["finished_ms"].is_i64()).await;
+        app.policy = done["policy"].as_str().unwrap().to_owned();
+        let deadline = Instant::now() + patience();
+        let mut refused = put_off(&mut app, 12).await;
+        while is_heavy && refused.is_none() && Instant::now() < deadline {
+            refused = put_off(&mut app, 12).await;
+        }
+        assert_eq!(refused.map(|answer| answer["value"].clone()), is_heavy.then(|| json!("heavy")), "{composition}");
+    }
+}
+
 /// Pointers to everything in a document; of a list only the ends, for its entries are alike.
 fn pointers(value: &Value, at: String, found: &mut Vec<String>) {
     found.push(at.clone());

@@ -181,16 +181,84 @@ async fn what_may_be_a_mistake_is_said() {
     app.cancel(job["job"].as_str().unwrap()).await;
 }
 
+/// A walk-forward of two assets, `quarters` of which the last three years and four are lived through.
+fn of_assets(quarters: usize, rest: &Value) -> Value {
+    let (risky, rate, dates) = record(quarters);
+    let rows: Vec<[f64; 2]> = risky.iter().enumerate().map(|(quarter, back)| [*back, other(quarter)]).collect();
+    let mut request = json!({ "assets": ["energy", "health"], "simple_returns": rows, "rate": rate, "dates": dates,
+        "windows": [12, null], "every": 2, "alpha": 0.9, "trading_cost": 0.01 });
+    rest.as_object().unwrap().iter().for_each(|(name, value)| request[name] = value.clone());
+    request
+}
+
+fn other(quarter: usize) -> f64 {
+    0.015 + 0.02 * (2.9 * quarter as f64).cos()
+}
+
+fn file_of_assets(folder: &std::path::Path, quarters: usize) -> std::path::PathBuf {
+    let (risky, bank, dates) = record(quarters);
+    let row = |index: usize| format!("{},{},{},{}\n", dates[index], risky[index], other(index), bank[index]);
+    let file = folder.join("returns.csv");
+    let rows: String = (0..quarters).map(row).collect();
+    std::fs::write(&file, format!("date,energy,health,rf\n{rows}")).unwrap();
+    file
+}
+
+/// A table of several assets: the report of the job is that of the command, also where it was cut off in the middle.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_job_reports_of_several_assets_what_the_command_reports() {
+    let mut app = App::start().await;
+    let request = of_assets(28, &json!({}));
+    let (status, job) = app.post("/backtest", &request).await;
+    assert_eq!((status, &job["warnings"]), (StatusCode::ACCEPTED, &json!([])), "{job}");
+    let reported = report(&app, job["job"].as_str().unwrap()).await;
+    let folder = tempfile::tempdir().unwrap();
+    let (file, out) = (file_of_assets(folder.path(), 28), folder.path().join("report"));
+    let command = Command::new(env!("CARGO_BIN_EXE_ballast"))
+        .args(["backtest".as_ref(), file.as_os_str(), "--out".as_ref(), out.as_os_str()])
+        .args("--window 12,all --every 2 --alpha 0.9 --cost-bp 100".split(' '))
+        .output()
+        .unwrap();
+    assert!(command.status.success(), "{}", String::from_utf8_lossy(&command.stderr));
+    let text = std::fs::read_to_string(out.join("report.json")).unwrap();
+    assert_eq!(reported, serde_json::from_str::<Value>(&text).unwrap());
+    assert_eq!(reported["format"], "ballast-backtest-assets-1");
+
+    // Log-returns are the same record, and so is a rate of each period.
+    let rows = request["simple_returns"].as_array().unwrap().iter().map(|row| row.as_array().unwrap());
+    let logs: Vec<Vec<f64>> =
+        rows.map(|row| row.iter().map(|back| back.as_f64().unwrap().ln_1p()).collect()).collect();
+    let job = queue(&app, &of_assets(28, &json!({ "simple_returns": null, "log_returns": logs }))).await;
+    assert_eq!(report(&app, &job).await, reported);
+
+    let longer = of_assets(60, &json!({}));
+    let whole = report(&app, &queue(&app, &longer).await).await;
+    let job = queue(&app, &longer).await;
+    app.until(&job, |job| job["progress"]["steps_done"].as_u64() > Some(0) || job["finished_ms"].is_i64()).await;
+    app.restart().await;
+    assert_eq!(report(&app, &job).await, whole);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_walk_forward_of_several_assets_is_cancelled_and_warned_of() {
+    let app = App::start().await;
+    let (status, job) = app.post("/backtest", &of_assets(800, &json!({ "rate": 0.2, "windows": [400] }))).await;
+    assert_eq!(status, StatusCode::ACCEPTED, "{job}");
+    let fields: Vec<&Value> = job["warnings"].as_array().unwrap().iter().map(|warning| &warning["field"]).collect();
+    assert_eq!(fields, ["rate", "rate"], "{job}");
+    let job = job["job"].as_str().unwrap();
+    app.until(job, |job| job["state"] == "running").await;
+    assert_eq!(app.cancel(job).await, StatusCode::ACCEPTED);
+    let ended = app.until(job, |job| job["finished_ms"].is_i64()).await;
+    assert_eq!((&ended["state"], &ended["report"]), (&json!("cancelled"), &Value::Null), "{ended}");
+}
+
 /// 1/N by hand, with what trading costs; what the others hold is by name, within the whole.
 #[test]
 fn a_file_of_several_assets_is_walked_by_the_command() {
     let folder = tempfile::tempdir().unwrap();
-    let (risky, bank, dates) = record(28);
-    let other = |quarter: usize| 0.015 + 0.02 * (2.9 * quarter as f64).cos();
-    let row = |index: usize| format!("{},{},{},{}\n", dates[index], risky[index], other(index), bank[index]);
-    let rows: String = (0..28).map(row).collect();
-    let file = folder.path().join("assets.csv");
-    std::fs::write(&file, format!("date,energy,health,rf\n{rows}")).unwrap();
+    let (risky, ..) = record(28);
+    let file = file_of_assets(folder.path(), 28);
     let out = folder.path().join("report");
     let command = |options: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));

@@ -484,6 +484,90 @@ async fn every_field_of_a_walk_forward_is_named() {
     assert_eq!((status, &job["progress"]["steps_total"]), (reqwest::StatusCode::ACCEPTED, &json!(3)), "{job}");
 }
 
+/// Three years of two assets by quarters, of which the last four are lived through.
+fn walk_of_assets() -> Value {
+    let row = |quarter: u32| [0.02, 0.01].map(|mean| mean + 0.03 * (1.7 * f64::from(quarter) * (1.0 + mean)).sin());
+    let rows: Vec<[f64; 2]> = (0..12).map(row).collect();
+    json!({ "assets": ["stocks", "bonds"], "simple_returns": rows, "rate": 0.002, "dates": quarters(12), "windows": [8] })
+}
+
+fn quarters(count: usize) -> Vec<String> {
+    (0..count).map(|k| format!("{}-{:02}", 2000 + k / 4, 3 * (k % 4) + 1)).collect()
+}
+
+/// Changes to a walk-forward of several assets, and the field each must be answered with.
+fn faulty_walks_of_assets() -> Vec<(&'static str, Value, &'static str)> {
+    let rows = walk_of_assets()["simple_returns"].clone();
+    let changed = |pointer: &str, value: Value| {
+        let mut rows = rows.clone();
+        *rows.pointer_mut(pointer).unwrap() = value;
+        rows
+    };
+    let gap: Vec<String> = quarters(13).into_iter().filter(|date| date != "2001-04").collect();
+    vec![
+        ("assets", json!(["stocks"]), "assets"),
+        ("assets", json!(["stocks", "stocks"]), "assets[1]"),
+        ("assets", json!(["stocks", ""]), "assets[1]"),
+        ("assets", json!(["stocks", "bonds", "gold"]), "simple_returns[0]"),
+        ("log_returns", rows.clone(), "log_returns"),
+        ("simple_returns", json!([[0.1, 0.2], [0.2, 0.1]]), "simple_returns"),
+        ("simple_returns", changed("/3", json!([0.1])), "simple_returns[3]"),
+        ("simple_returns", changed("/3/1", json!(-1.0)), "simple_returns[3][1]"),
+        ("simple_returns", changed("/3/1", json!("much")), "simple_returns[3][1]"),
+        ("simple_returns", json!(vec![[0.1, 0.2]; 12]), "simple_returns, stocks"),
+        ("simple_returns", Value::Null, "log_returns"),
+        ("rate", json!(0.6), "rate"),
+        ("rate", json!([0.1, 0.2]), "rate"),
+        ("dates", json!(["2008"]), "dates"),
+        ("dates", json!(vec!["31.1.2008"; 12]), "dates[0]"),
+        ("dates", json!(gap), "dates[5]"),
+        ("periods_per_year", json!(0), "periods_per_year"),
+        ("windows", json!([]), "windows"),
+        ("windows", json!([2, 3, 4, 5, 6, 7]), "windows"),
+        ("windows", json!([8, 8]), "windows"),
+        ("windows", json!([1]), "windows"),
+        ("windows", json!([9]), "simple_returns"),
+        ("windows", json!([null]), "simple_returns"),
+        ("every", json!(0), "every"),
+        ("every", json!(2001), "every"),
+        ("alpha", json!(1.0), "alpha"),
+        ("alpha", json!([0.1]), "alpha"),
+        ("risk_aversion", json!(0.9), "risk_aversion"),
+        ("trading_cost", json!(0.2), "trading_cost"),
+        ("seed", json!(0.5), "seed"),
+        ("horizon", json!(4), "horizon"),
+    ]
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_field_of_a_walk_forward_of_several_assets_is_named() {
+    let app = App::start().await;
+    for (name, value, field) in faulty_walks_of_assets() {
+        let mut request = walk_of_assets();
+        request[name] = value;
+        let (status, problem) = app.post("/backtest", &request).await;
+        assert_eq!(status, 422, "{name} {problem}");
+        assert_named(&problem, field);
+    }
+    // More than a report holds, and more than is solved in some hours.
+    let long = |assets: usize, days: usize, window: usize| {
+        let row = |day: usize| -> Vec<f64> { (0..assets).map(|asset| 0.01 * ((day * (7 + asset)) as f64).sin()).collect() };
+        let rows: Vec<Vec<f64>> = (0..days).map(row).collect();
+        let names: Vec<String> = (0..assets).map(|asset| format!("asset {asset}")).collect();
+        let first = "1950-01-01".parse::<jiff::civil::Date>().unwrap();
+        let date = |day: usize| first.checked_add(jiff::Span::new().days(day as i64)).unwrap().to_string();
+        let dates: Vec<String> = (0..days).map(date).collect();
+        json!({ "assets": names, "log_returns": rows, "rate": 0.0001, "dates": dates, "windows": [window] })
+    };
+    for (request, field) in [(long(30, 8000, 200), "log_returns"), (long(12, 18_000, 2000), "windows")] {
+        let (status, problem) = app.post("/backtest", &request).await;
+        assert_eq!(status, 422, "{problem}");
+        assert_named(&problem, field);
+    }
+    let (status, job) = app.post("/backtest", &walk_of_assets()).await;
+    assert_eq!((status, &job["progress"]["steps_total"]), (reqwest::StatusCode::ACCEPTED, &json!(10)), "{job}");
+}
+
 /// Names of the properties of a schema of the description.
 fn properties(schema: &str) -> BTreeSet<String> {
     let description: Value = serde_json::from_str(include_str!("../api/openapi.json")).unwrap();
@@ -509,9 +593,14 @@ fn the_walks_cover_every_field() {
     assert!(properties("OpenSession").is_subset(&walked), "{walked:?}");
     let lived: BTreeSet<String> = faulty_walk_forwards().iter().map(|(name, _, _)| (*name).to_owned()).collect();
     assert!(properties("BacktestRequest").is_subset(&lived), "{lived:?}");
+    let lived: BTreeSet<String> = faulty_walks_of_assets().iter().map(|(name, _, _)| (*name).to_owned()).collect();
+    assert!(properties("AssetsBacktestRequest").is_subset(&lived), "{lived:?}");
     let mut walked: BTreeSet<String> =
         faulty_hypotheses().iter().flat_map(|(_, field)| field.split('.').map(str::to_owned)).collect();
     walked.insert("session".into());
+    // Those of several assets are walked in `tests/funds.rs`.
+    let of_several = ["holdings", "log_returns", "simple_returns", "prices", "previous_prices"];
+    walked.extend(of_several.map(str::to_owned));
     for schema in ["WhatIf", "Sweep", "SweepRange"] {
         assert!(properties(schema).is_subset(&walked), "{schema} {walked:?}");
     }

@@ -6,6 +6,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use ballast::control::error::TrainError;
 use ballast::control::estimate;
+use ballast::control::evaluation::assets::AssetsBacktest;
+use ballast::control::evaluation::assets::report::AssetsBacktestReport;
 use ballast::control::evaluation::backtest::Backtest;
 use ballast::control::evaluation::backtest_report::BacktestReport;
 use ballast::control::evaluation::frontier::Frontier;
@@ -132,6 +134,7 @@ fn estimates_cover_what_is_taken_and_not_much_more() {
         holds(what, estimate::evaluation(&request, THREADS).bytes(), taken);
     }
     walk_forwards(&pool);
+    walks_of_assets(&pool);
     frontiers();
 }
 
@@ -162,6 +165,39 @@ fn frontiers() {
         assert_eq!(ended.err(), Some(TrainError::Stopped), "{what}");
         holds(what, estimated, taken);
     }
+}
+
+/// What walk-forwards of several assets take: the bridges and steps of a long window, and the books of a long record.
+fn walks_of_assets(pool: &TrainingPool) {
+    let request = |assets: usize, dates: usize, window: usize| {
+        let row = |date: usize| -> Vec<f64> {
+            (0..assets).map(|asset| 0.004 + 0.03 * ((date * (7 + asset) * 7919) as f64).sin()).collect()
+        };
+        let names: Vec<String> = (0..assets).map(|asset| format!("asset {asset}")).collect();
+        let date = |year: usize| format!("{:04}-{:02}", 1800 + year / 12, year % 12 + 1);
+        let request = json!({ "assets": names, "log_returns": (0..dates).map(row).collect::<Vec<_>>(), "rate": 0.002,
+            "dates": (0..dates).map(date).collect::<Vec<_>>(), "windows": [window] });
+        AssetsBacktest::asked(&serde_json::from_value(request).unwrap()).unwrap()
+    };
+    let watch = Watch::unwatched();
+    let backtest = request(30, 1912, 1900);
+    let estimated = estimate::backtest_of_assets(&backtest, "log_returns", THREADS).bytes();
+    let (taken, _) = most_bytes(|| {
+        let radii = pool.install(|| backtest.radii(&watch, &|| {})).unwrap();
+        let strategies = backtest.strategies()[..THREADS].to_vec();
+        pool.install(|| pool::map(strategies, |strategy| backtest.decide(strategy, &radii, &watch, &|| {}).unwrap()))
+    });
+    holds("a long window", estimated, taken);
+    let backtest = request(20, 4000, 24);
+    let estimated = estimate::backtest_of_assets(&backtest, "log_returns", THREADS).bytes();
+    let (strategies, lived) = (backtest.strategies().len(), backtest.lived().len());
+    let (taken, _) = most_bytes(|| {
+        let share = |period: usize| (0..20).map(|asset| 0.003 * (period + asset) as f64 % 0.05).collect();
+        let held = vec![(0..lived).map(share).collect::<Vec<Vec<f64>>>(); strategies];
+        let radii = [vec![0.0123456789; lived]];
+        serde_json::to_string(&AssetsBacktestReport::new(&backtest.walked(&radii, held))).unwrap()
+    });
+    holds("a record of several assets", estimated, taken);
 }
 
 /// What walk-forwards take: the trainings of a stretch side by side, and the books of a long record.

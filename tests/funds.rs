@@ -523,3 +523,138 @@ async fn a_fund_that_does_not_vary_is_not_taken() {
     app.restart().await;
     assert_eq!(app.action().await, before);
 }
+
+/// The fields of an answer to `/action`, taken from an answer of `/what-if`.
+#[track_caller]
+fn assert_same_action(what_if: &Value, action: &Value) {
+    let told = action.as_object().unwrap().iter().filter(|(field, _)| !["caution", "session"].contains(&field.as_str()));
+    for (field, value) in told {
+        assert_eq!(&what_if[field], value, "{field}: {what_if} {action}");
+    }
+}
+
+async fn what_if(app: &App, session: &str, mut supposed: Value) -> Value {
+    supposed["session"] = json!(session);
+    let (status, answer) = app.post("/what-if", &supposed).await;
+    assert_eq!(status, 200, "{answer}");
+    answer
+}
+
+/// Supposed is what a report would lead to, and what a start would: a twin session that really has it is told the same.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_supposed_of_several_assets_is_what_a_twin_is_told() {
+    let mut app = App::start().await;
+    let mut costly = request(4);
+    costly["problem"]["trading_cost"] = json!(0.002);
+    costly["problem"]["utility"] = json!({ "kind": "exponential", "risk_aversion": 0.02 });
+    costly["design"]["wealth"] = json!({ "min": 80.0, "max": 120.0 });
+    app.train(&costly).await;
+    app.open().await;
+    let session = app.session.clone();
+    let facts = async || {
+        let path = format!("/sessions/{session}");
+        (app.get(&path).await, app.get(&format!("{path}/history")).await, app.get(&format!("/action?session={session}")).await)
+    };
+    let before = facts().await;
+    assert!(number(&before.2.1["total"]) > 0.01, "the test shows nothing: {}", before.2.1);
+    assert_same_action(&what_if(&app, &session, json!({})).await, &before.2.1);
+
+    let holdings = json!({ "stocks": 0.1, "bonds": 0.6, "gold": 0.2 });
+    let start = json!({ "wealth": 110.0, "holdings": holdings });
+    let returns = [
+        json!({ "log_returns": { "stocks": 0.031, "bonds": -0.004, "gold": 0.012 } }),
+        json!({ "simple_returns": { "stocks": -0.08, "bonds": 0.01, "gold": 0.03 } }),
+        json!({ "prices": { "stocks": 104.0, "bonds": 99.5, "gold": 51.0 },
+            "previous_prices": { "stocks": 100.0, "bonds": 100.0, "gold": 50.0 } }),
+    ];
+    let with = |given: &Value, more: &Value| {
+        let mut both = given.clone();
+        more.as_object().unwrap().iter().for_each(|(field, value)| both[field] = value.clone());
+        both
+    };
+    let (mut supposed, mut nows) = (Vec::new(), Vec::new());
+    nows.push(what_if(&app, &session, start.clone()).await);
+    for report in &returns {
+        supposed.push(what_if(&app, &session, report.clone()).await);
+        nows.push(what_if(&app, &session, with(&start, report)).await);
+    }
+    let wide = what_if(&app, &session, json!({ "radius_scale": 3.0, "explain": "worst_case" })).await;
+    let sweep = json!({ "sweep": { "radius_scale": { "from": 0.0, "to": 3.0, "points": 4 } } });
+    let swept = what_if(&app, &session, sweep).await;
+    assert_eq!(facts().await, before, "a what-if changed something");
+
+    for (report, supposed) in returns.iter().zip(&supposed) {
+        app.open().await;
+        let (status, observed) = app.report(1, report.clone()).await;
+        assert_eq!(status, 200, "{observed}");
+        assert_same_action(supposed, &app.action().await.1);
+        assert_eq!((&supposed["wealth"], &supposed["period"]), (&observed["wealth"], &json!(2)));
+        assert_eq!(supposed["log_returns"], observed["assets"]["log_returns"]);
+    }
+    app.open_with(start.clone()).await;
+    assert_same_action(&nows[0], &app.action().await.1);
+    assert_ne!(nows[0]["trade"], before.2.1["trade"]);
+    for (report, supposed) in returns.iter().zip(&nows[1..]) {
+        app.open_with(start.clone()).await;
+        app.report(1, report.clone()).await;
+        assert_same_action(supposed, &app.action().await.1);
+    }
+    // Another radius moves the total alone.
+    assert_eq!((&wide["composition"], &wide["source"]), (&before.2.1["composition"], &json!("resolved_other_radius")));
+    assert!(number(&wide["total"]) < number(&before.2.1["total"]) && wide["worst_case"]["sentence"].is_string());
+    let points = swept["points"].as_array().unwrap();
+    assert_eq!((points.len(), &points[3]["allocation"]), (4, &wide["allocation"]));
+    assert!(points[3].get("worst_case").is_none() && points[3]["worst_law"]["share_moved"].is_number(), "{}", points[3]);
+
+    // What was held before the last choice is known after a correction and after a replay.
+    app.session.clone_from(&session);
+    app.report(1, returns[0].clone()).await;
+    let correction = with(&returns[1], &json!({ "correction": 1, "period": 1, "reason": "a slip" }));
+    let (status, corrected) = app.post(&format!("/sessions/{session}/corrections"), &correction).await;
+    assert_eq!(status, 200, "{corrected}");
+    let again = with(&returns[0], &json!({ "correction": 2, "period": 1, "reason": "none" }));
+    assert_eq!(app.post(&format!("/sessions/{session}/corrections"), &again).await.0, 200);
+    let told = what_if(&app, &session, start.clone()).await;
+    app.restart().await;
+    assert_eq!(what_if(&app, &session, start).await, told);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_cannot_be_supposed_is_named() {
+    let mut app = App::start().await;
+    app.train(&request(2)).await;
+    app.open().await;
+    let several = app.session.clone();
+    app.train(&support::specification(2)).await;
+    app.open().await;
+    let one = app.session.clone();
+    let shares = |stocks: f64| json!({ "stocks": stocks, "bonds": 0.3, "gold": 0.3 });
+    let range = json!({ "from": 0.0, "to": 0.1, "points": 3 });
+    for (session, supposed, field) in [
+        (&several, json!({ "log_return": 0.1 }), "log_return"),
+        (&several, json!({ "holding": 0.1 }), "holding"),
+        (&several, json!({ "sweep": { "log_return": range } }), "sweep.log_return"),
+        (&several, json!({ "sweep": { "holding": range } }), "sweep.holding"),
+        (&several, json!({ "holdings": shares(0.5) }), "holdings"),
+        (&several, json!({ "holdings": { "stocks": 0.1 } }), "holdings.bonds"),
+        (&several, json!({ "log_returns": { "stocks": 0.1, "bonds": 0.0, "silver": 0.0 } }), "log_returns.silver"),
+        (&several, json!({ "log_returns": shares(9.0) }), "log_returns.stocks"),
+        (&several, json!({ "log_returns": shares(0.1), "simple_returns": shares(0.1) }), "log_returns"),
+        (&several, json!({ "prices": shares(1.0) }), "previous_prices"),
+        (&several, json!({ "previous_prices": shares(1.0) }), "previous_prices"),
+        (&several, json!({ "wealth": 1e15, "simple_returns": shares(2.0) }), "simple_returns"),
+        (&one, json!({ "holdings": shares(0.1) }), "holdings"),
+        (&one, json!({ "log_returns": shares(0.1) }), "log_returns"),
+    ] {
+        let mut request = supposed.clone();
+        request["session"] = json!(session);
+        let (status, problem) = app.post("/what-if", &request).await;
+        let told = (status.as_u16(), problem["field"].as_str());
+        assert_eq!(told, (422, Some(field)), "{supposed}: {problem}");
+    }
+    app.session.clone_from(&several);
+    let returns = json!({ "stocks": 0.01, "bonds": 0.002, "gold": 0.0 });
+    assert_eq!(app.report(1, json!({ "log_returns": returns })).await.0, 200);
+    let last = json!({ "session": several, "log_returns": returns });
+    assert_eq!(app.post("/what-if", &last).await.1["field"], json!("log_returns"));
+}

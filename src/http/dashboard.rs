@@ -40,6 +40,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "api.js": SCRIPT,
         "backtest.js": SCRIPT,
         "backtest_asking.js": SCRIPT,
+        "backtest_assets.js": SCRIPT,
         "beside.js": SCRIPT,
         "care.js": SCRIPT,
         "chart.js": SCRIPT,

@@ -129,6 +129,59 @@ test("what every strategy did is saved as a file", async () => {
   assert.ok(Math.abs(last.at(-1) - report.strategies.at(-1).final_wealth) < 1e-6);
 });
 
+const OTHER = Array.from({ length: QUARTERS }, (_, k) => Number((1.5 + 4 * Math.cos(2.9 * k)).toFixed(2)));
+
+test("a record of several assets is asked for, and its report shows what was held of each", async () => {
+  await visitQuiet(page, `${ballast.url}/#/backtests/new`);
+  const table = RETURNS.map((back, k) => `${date(k)},${back},${OTHER[k]},${RATES[k]}`);
+  await page.getByLabel("Returns or prices").fill(`quarter,fund,bonds,rf\n${table.join("\n")}\n`);
+  const question = page.getByRole("group", { name: /columns/i });
+  await question.waitFor();
+  for (const name of ["fund", "bonds"]) await question.getByLabel(name).check();
+  await page.getByText("How it walks, and for the quant").click();
+  await page.getByLabel("Known of the past").waitFor();
+  assert.equal(await page.getByLabel("Design points").isVisible(), false);
+  await page.getByLabel("Known of the past").fill("1; all");
+  await page.getByRole("button", { name: "Backtest", exact: true }).click();
+  await page.locator(".error").getByText(/must lie in \[2, 2000\]/).waitFor();
+  await page.getByLabel("Known of the past").fill("8; all");
+  const asked = page.waitForRequest((request) => request.method() === "POST" && request.url().endsWith("/backtest"));
+  await page.getByRole("button", { name: "Backtest", exact: true }).click();
+  const request = (await asked).postDataJSON();
+  assert.deepEqual([request.assets, request.windows, request.alpha, request.log_returns.length], [["fund", "bonds"], [8, null], 0.1, QUARTERS]);
+  await page.getByRole("heading", { name: "What each came to" }).waitFor();
+  const told = await call(ballast.url, `/jobs/${page.url().split("/").at(-1)}/report`);
+  const words = await main();
+  assert.match(words, /18 ways to hold 2 assets, through 48 quarters, March 2006 to December 2017, for a balanced investor/);
+  for (const sentence of told.sentences) assert.ok(words.includes(plain(sentence)), sentence);
+  const shown = await cells("Strategies, by what a year of each is worth");
+  assert.equal(shown.length, 1 + told.strategies.length);
+  const equal = told.strategies.find(({ strategy }) => strategy === "1/N");
+  const row = shown.find(([name]) => name === "Equal shares");
+  assert.deepEqual([row[1], row[2], row[7]], [equal.yearly_certainty_equivalent.value.toFixed(2), equal.final_wealth.toFixed(2), "2.0"]);
+  assert.doesNotMatch(words, /undefined|NaN|null/);
+
+  await page.getByLabel("Strategy", { exact: true }).selectOption("Equal shares");
+  assert.deepEqual((await cells("Held of each asset on average by Equal shares")).slice(1), [["fund", "50.0 %"], ["bonds", "50.0 %"]]);
+  // Equal shares, bought at a cost of a thousandth and brought back to a half each quarter.
+  let [level, held] = [100, [0, 0]];
+  const lived = RETURNS.slice(WINDOW).map((back, k) => [back, OTHER[WINDOW + k]].map((part) => 1 + part / 100));
+  const wealth = lived.map((growths) => {
+    const traded = held.reduce((all, share) => all + Math.abs(0.5 - share), 0);
+    const grown = (growths[0] + growths[1]) / 2;
+    level *= (1 - 0.001 * traded) * grown;
+    held = growths.map((growth) => growth / 2 / grown);
+    return level;
+  });
+  const years = await cells("Returns by the year of Equal shares and of others");
+  assert.equal(years.find(([year]) => year === "2008")[1], percent(wealth[11] / wealth[7] - 1));
+  await page.getByRole("table", { name: "The worst falls of Equal shares" }).waitFor();
+  await page.getByRole("table", { name: "Returns of Equal shares quarter by quarter" }).waitFor();
+  await page.getByText("Ranges and ratios").click();
+  await page.getByRole("table", { name: "Estimates with their ranges" }).waitFor();
+  await usable(page, () => {});
+});
+
 test("falls, years and months of a track record are those of its levels", async () => {
   const { belowHighest, compounded, grouped, places, returnsOf, worstFalls } = await dashboardModule("track.js");
   const levels = [100, 110, 99, 121, 60.5, 90, 121, 120];

@@ -1,6 +1,7 @@
 // The report of one backtest: what strategies came to that were walked through a record, and one of them year by year.
 
 import { download, get } from "./api.js";
+import { heldOfAssets, ofAssets, quantOfAssets, resultsOfAssets, walkedAssets } from "./backtest_assets.js";
 import { lineChart } from "./chart.js";
 import { csvText, hundred } from "./csv.js";
 import { h, quantSection, section, table } from "./dom.js";
@@ -38,8 +39,16 @@ export async function view(id, leaving) {
     h("button", { class: "quiet", onclick: () => save(csv(told), `${name}.csv`, "text/csv") }, "Save as CSV"),
     h("a", { class: "button quiet", href: job.report, download: `${name}.json`, onclick: download }, "Export"),
   );
-  const told = { ...report, lines: lines(report), unit: unitOf(report.periods_per_year), times: times(report) };
-  return { title, trail, actions, body: [walked(told), results(told), chosen(told), quant(told)] };
+  const told = { ...report, ...(report.assets ? ofAssets(report) : ofOne(report)), unit: unitOf(report.periods_per_year), times: times(report) };
+  const [head, foot] = report.assets ? [[walkedAssets(told), resultsOfAssets(told)], quantOfAssets(told)] : [[walked(told), results(told)], quant(told)];
+  return { title, trail, actions, body: [...head, chosen(told), foot] };
+}
+
+/** The strategies of one asset; `market` is what they are held against, `known` who stands beside each, `main` who most is said of. */
+function ofOne(report) {
+  const told = { ...report, lines: lines(report) };
+  const beside = KNOWN.map((name) => known(told, name));
+  return { lines: told.lines, known: beside, market: known(told, "all-stock"), main: mainOf(told), held: "Share held in stocks" };
 }
 
 /** A strategy's kind, by its name in the report. */
@@ -183,16 +192,16 @@ function chosen(told) {
   const { lines } = told;
   const names = lines.map(({ name }, index) => [index, name]);
   const holder = h("div", {});
-  const show = (line) => holder.replaceChildren(...course(told, line), ...falls(told, line), ...years(told, line));
+  const show = (line) => holder.replaceChildren(...course(told, line), ...(told.assets ? heldOfAssets(told, line) : []), ...falls(told, line), ...years(told, line));
   const strategy = select({ name: "strategy", label: "Strategy", choices: names, changed: (index) => show(lines[index]) });
   strategy.element.classList.add("choosing");
-  strategy.control.value = lines.indexOf(mainOf(told));
-  show(mainOf(told));
+  strategy.control.value = lines.indexOf(told.main);
+  show(told.main);
   return section("One strategy through the years", strategy.element, holder);
 }
 
 /** It and those that everybody knows, each once. */
-const beside = (told, line) => [line, ...KNOWN.map((name) => known(told, name)).filter((other) => other !== line)];
+const beside = (told, line) => [line, ...told.known.filter((other) => other !== line)];
 
 function course(told, line) {
   const { times } = told;
@@ -200,7 +209,6 @@ function course(told, line) {
   const x = { values: times.values, label: "Period", format: at, here: at, tick: String, whole: true };
   const drawn = (one, values) => ({ name: one.name, colour: one.colour, kind: "line", bare: true, values });
   const gutter = 64;
-  const stocks = known(told, "all-stock");
   return [
     lineChart({ title: `Wealth from ${START}, equal ratios alike`, gutter, height: 250, x, y: { format: wealth, tick, log: true }, series: beside(told, line).map((one) => drawn(one, one.wealth)) }),
     lineChart({
@@ -209,10 +217,10 @@ function course(told, line) {
       height: 130,
       x,
       y: { format: percent, tick: percentTick, also: [0] },
-      series: [...new Set([line, stocks])].map((one) => drawn(one, belowHighest(one.wealth))),
+      series: [...new Set([line, told.market])].map((one) => drawn(one, belowHighest(one.wealth))),
     }),
     lineChart({
-      title: "Share held in stocks",
+      title: told.held,
       gutter,
       height: 130,
       x: { ...x, ...times.during },
@@ -224,8 +232,7 @@ function course(told, line) {
 
 /** The worst falls of a strategy, when they began and how long they lasted. */
 function falls(told, line) {
-  const { times, unit } = told;
-  const stocks = known(told, "all-stock");
+  const { times, unit, market } = told;
   const worst = worstFalls(belowHighest(line.wealth), FALLS);
   if (worst.length === 0) return [h("p", { class: "note" }, `\u201c${line.name}\u201d never fell below its highest.`)];
   const number = (name, cell) => ({ name, numeric: true, cell });
@@ -235,7 +242,7 @@ function falls(told, line) {
     { name: "Lowest", cell: ({ to }) => times.after(to) },
     { name: "Made good", cell: ({ back }) => (back === null ? "Not yet" : times.after(back)) },
     number("Fall", ({ depth }) => percent(depth)),
-    ...(line === stocks ? [] : [number("All in stocks meanwhile", (fall) => percent(back(fall, stocks.wealth)))]),
+    ...(line === market ? [] : [number(`${market.name} meanwhile`, (fall) => percent(back(fall, market.wealth)))]),
     number("Lasted", ({ from, back }) => counted((back ?? line.wealth.length - 1) - from, unit)),
   ];
   return [h("h3", {}, "Its worst falls"), table(`The worst falls of ${line.name}`, columns, worst)];

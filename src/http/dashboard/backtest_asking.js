@@ -8,6 +8,10 @@ import { unitOf } from "./periods.js";
 import { returnsField } from "./returns_field.js";
 import { INVESTORS, investorChoices, investorNote, queued } from "./specification.js";
 
+/** The windows of several assets: periods, or all. */
+const windowsOf = (text) => text.split(";").map((part) => (part.trim() === "all" ? null : typed(part.trim())));
+/** Confidence levels that are asked for unless others are, of several assets or of one. */
+const LEVELS = { true: "90", false: "95; 90; 50" };
 const OWN = "own";
 /** Twenty years to be trained on first, and ten to live through. */
 const EXAMPLE = { latest: 360 };
@@ -24,6 +28,7 @@ function asking() {
     name: "log_returns",
     label: "Returns or prices",
     example: EXAMPLE,
+    several: true,
     changed: (_, answer) => {
       record = answer;
       shown();
@@ -46,11 +51,22 @@ function asking() {
   const window = input({ name: "window", label: "Trained on", note: "Periods before. Blank: 20 years." });
   const every = input({ name: "every", label: "Trained anew every", note: "Periods. Blank: a year." });
   const horizon = input({ name: "horizon", label: "Looking ahead", note: "Periods. Blank: until the next training." });
-  const levels = input({ name: "alpha", label: "Confidence, %", note: "One to three, apart by semicolons; most is said of the second.", value: "95; 90; 50", unit: "confidence" });
+  const levels = input({ name: "alpha", label: "Confidence, %", note: "One to three, apart by semicolons; most is said of the second.", value: LEVELS.false, unit: "confidence" });
   const points = input({ name: "count", label: "Design points", note: "More is finer and slower, 10 to 10,000.", value: "100" });
   const seed = input({ name: "seed", label: "Seed", value: "1" });
   const blind = select({ name: "cost_blind", label: "Policies know of the trading cost", choices: { false: "Yes", true: "No" } });
+  const isSeveral = () => (record?.series.length ?? 0) > 1;
   const shown = () => {
+    for (const { element } of [horizon, points, blind]) element.hidden = isSeveral();
+    const asked = isSeveral()
+      ? { window: ["Known of the past", "Periods, or all; several apart by semicolons. Blank: 10 years, 20 years and all."], alpha: ["Confidence, %", "One level."] }
+      : { window: ["Trained on", "Periods before. Blank: 20 years."], alpha: ["Confidence, %", "One to three, apart by semicolons; most is said of the second."] };
+    for (const field of [window, levels]) {
+      const [label, note] = asked[field.name];
+      field.element.querySelector("label").textContent = label;
+      field.element.querySelector(".note").textContent = note;
+    }
+    if (Object.values(LEVELS).includes(levels.control.value)) levels.control.value = LEVELS[isSeveral()];
     const unit = unitOf(record?.periods_per_year);
     rate.element.querySelector("label").textContent = `Bank return per ${unit}, %`;
     rate.element.querySelector(".note").textContent = record?.rate ? `Blank: what ${record.rate.column} says, ${unit} by ${unit}.` : "The same in all; 3 % a year are 0.247 % a month.";
@@ -71,14 +87,20 @@ function asking() {
   );
   const text = ({ control }) => control.value.trim();
   const compose = () => {
-    const request = { log_returns: record.series[0].log_returns, dates: record.dates };
+    const { series, dates } = record;
+    const request = isSeveral()
+      ? { assets: series.map(({ column }) => column), log_returns: series[0].log_returns.map((_, date) => series.map(({ log_returns }) => log_returns[date])), dates }
+      : { log_returns: series[0].log_returns, dates };
     request.rate = text(rate) === "" ? record.rate?.rates : (fraction(text(rate)) ?? text(rate));
     request.risk_aversion = investor.control.value === OWN ? typed(text(aversion)) : INVESTORS[investor.control.value];
     request.trading_cost = fraction(text(cost)) ?? text(cost);
     request.alpha = text(levels).split(";").map((part) => (fraction(part) === null ? part : Number((1 - fraction(part)).toPrecision(12))));
-    request.cost_blind = blind.control.value === "true";
+    if (isSeveral()) {
+      if (request.alpha.length === 1) [request.alpha] = request.alpha;
+      if (text(window) !== "") request.windows = windowsOf(text(window));
+    } else request.cost_blind = blind.control.value === "true";
     if (!yearly.element.hidden) request.periods_per_year = typed(text(yearly));
-    for (const field of [window, every, horizon, points, seed]) if (text(field) !== "") request[field.name] = typed(text(field));
+    for (const field of isSeveral() ? [every, seed] : [window, every, horizon, points, seed]) if (text(field) !== "") request[field.name] = typed(text(field));
     return request;
   };
   form.addEventListener("submit", async (event) => {
@@ -95,6 +117,7 @@ function asking() {
       if (warnings.length > 0) form.replaceWith(queued("backtest", at, warnings, { ...request, rate_per_step: request.rate }));
       else location.hash = at;
     } catch (error) {
+      if (error.field === "windows") error.field = window.name;
       showProblem(form, message, error);
     }
     send.disabled = false;

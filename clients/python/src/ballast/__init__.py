@@ -46,6 +46,7 @@ from .errors import (
 )
 from .policy import AsyncPolicy, Policy
 from .session import AsyncSession, Session
+from .several import AssetsWalkForward, AsyncAssetsWalkForward
 from .training import (
     AsyncEvaluation,
     AsyncFrontier,
@@ -60,6 +61,8 @@ from .training import (
 )
 
 __all__ = [
+    "AssetsWalkForward",
+    "AsyncAssetsWalkForward",
     "AsyncBallast",
     "AsyncEvaluation",
     "AsyncFrontier",

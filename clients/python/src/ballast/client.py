@@ -30,6 +30,7 @@ from .returns import (
     text_of,
 )
 from .session import AsyncSession, Session
+from .several import AssetsWalkForward, AsyncAssetsWalkForward, record_of_assets
 from .training import (
     AsyncEvaluation,
     AsyncFrontier,
@@ -300,6 +301,43 @@ class _Ballast:
         }
         return await self._queued("/backtest", _given(request), idempotency_key)
 
+    async def _backtest_assets(
+        self,
+        returns: Table,
+        *,
+        kind: Kind,
+        rate: float | Sequence[float],
+        assets: Sequence[str] | None = None,
+        dates: Iterable[object] | None = None,
+        periods_per_year: int | None = None,
+        windows: Sequence[int | None] | None = None,
+        every: int | None = None,
+        alpha: float | None = None,
+        risk_aversion: float | None = None,
+        trading_cost: float | None = None,
+        seed: int | None = None,
+        idempotency_key: str | None = None,
+    ) -> wire.Job:
+        """Queues a walk-forward through a table of several assets, as ``ballast backtest`` does, and does not wait for
+        it.
+
+        ``returns``, ``kind`` and ``assets`` are as in ``advise_assets``; ``rate`` and ``dates`` as in ``backtest``, and
+        dates are needed. ``windows`` are how many of the last periods strategies know, ``None`` for all. What is left
+        out the service chooses, and the report tells. Raises ``ValueError`` where ``returns``, ``rate`` or ``dates``
+        cannot be meant, before anything is sent.
+        """
+        choices = {
+            "periods_per_year": periods_per_year,
+            "windows": None if windows is None else list(windows),
+            "every": every,
+            "alpha": alpha,
+            "risk_aversion": risk_aversion,
+            "trading_cost": trading_cost,
+            "seed": seed,
+        }
+        request = {**record_of_assets(returns, kind, rate, dates, assets), **_given(choices)}
+        return await self._queued("/backtest", request, idempotency_key)
+
     async def _frontier(
         self,
         /,
@@ -454,6 +492,8 @@ class Ballast(_Ballast):
     evaluation = blocking_into(_Ballast._job, Evaluation)
     backtest = blocking_into(_Ballast._backtest, WalkForward)
     walk_forward = blocking_into(_Ballast._job, WalkForward)
+    backtest_assets = blocking_into(_Ballast._backtest_assets, AssetsWalkForward)
+    assets_walk_forward = blocking_into(_Ballast._job, AssetsWalkForward)
     frontier = blocking_into(_Ballast._frontier, Frontier)
     frontier_of = blocking_into(_Ballast._job, Frontier)
     import_policy = blocking_into(_Ballast._import_policy, Policy)
@@ -512,6 +552,8 @@ class AsyncBallast(_Ballast):
     evaluation = awaiting_into(_Ballast._job, AsyncEvaluation)
     backtest = awaiting_into(_Ballast._backtest, AsyncWalkForward)
     walk_forward = awaiting_into(_Ballast._job, AsyncWalkForward)
+    backtest_assets = awaiting_into(_Ballast._backtest_assets, AsyncAssetsWalkForward)
+    assets_walk_forward = awaiting_into(_Ballast._job, AsyncAssetsWalkForward)
     frontier = awaiting_into(_Ballast._frontier, AsyncFrontier)
     frontier_of = awaiting_into(_Ballast._job, AsyncFrontier)
     import_policy = awaiting_into(_Ballast._import_policy, AsyncPolicy)

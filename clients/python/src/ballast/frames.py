@@ -74,9 +74,9 @@ def worst_case(advice: Explained) -> pd.DataFrame:
     return require_pandas().DataFrame(law["transport"], columns=["atom", "moved_to", "mass"])
 
 
-def allocation(advised: wire.AssetsAdvised | wire.AssetsAction) -> pd.Series[float]:
-    """What ``Ballast.advise_assets`` or ``Session.assets_action`` advises: the share of wealth in each asset, by its
-    name, in no particular order; the rest is in the bank.
+def allocation(advised: wire.AssetsAdvised | wire.AssetsAction | wire.AssetsWhatIfPoint) -> pd.Series[float]:
+    """What ``Ballast.advise_assets``, ``Session.assets_action`` or ``Session.assets_what_if`` advises: the share of
+    wealth in each asset, by its name, in no particular order; the rest is in the bank.
 
     Raises ``ImportError`` without pandas.
     """
@@ -124,23 +124,25 @@ _LISTED = (
 )
 
 
-def walk_forward(report: wire.BacktestReport) -> pd.DataFrame:
+def walk_forward(report: wire.BacktestReport | wire.AssetsBacktestReport) -> pd.DataFrame:
     """The strategies of a walk-forward, one a row by its name, the figures of the report as columns.
 
     A figure with an interval has two columns more, its ends, under its name with ``_low`` and ``_high``. Returns,
-    volatilities and shares are fractions, certainty equivalents and wealth are from 100. Raises ``ImportError`` without
-    pandas.
+    volatilities and shares are fractions, certainty equivalents and wealth are from 100. What was held of each of
+    several assets is told by :func:`held`. Raises ``ImportError`` without pandas.
     """
     rows = []
     for figures in report["strategies"]:
         row: dict[str, Any] = {}
         for name, value in cast(dict[str, Any], figures).items():
+            if name == "mean_allocations":
+                continue
             row |= _estimate(name, value) if isinstance(value, Mapping) else {name: value}
         rows.append(row)
     return require_pandas().DataFrame(rows).set_index("strategy")
 
 
-def periods(report: wire.BacktestReport, figure: Figure = "wealth") -> pd.DataFrame:
+def periods(report: wire.BacktestReport | wire.AssetsBacktestReport, figure: Figure = "wealth") -> pd.DataFrame:
     """One figure of a walk-forward, a row for each period and a column for each strategy.
 
     ``wealth`` is at the end of the period, from 100; ``allocation``, the ends ``low`` and ``high`` of the band and
@@ -148,10 +150,34 @@ def periods(report: wire.BacktestReport, figure: Figure = "wealth") -> pd.DataFr
     periods, a month as its first day, or counts from 1 where there are none. Raises ``ValueError`` for another figure,
     and ``ImportError`` without pandas.
     """
+    told = cast(list[dict[str, Any]], report["periods"])
+    figures = [name for name in _FIGURES if name in told[0]]
+    if figure not in figures:
+        raise ValueError(f"figure is {figure!r}: must be one of {', '.join(figures)}")
+    return _by_date(report, {strategy["strategy"]: strategy[figure] for strategy in told})
+
+
+def held(report: wire.AssetsBacktestReport, strategy: str | None = None) -> pd.DataFrame:
+    """The share of wealth in each of several assets that were walked forward, an asset a column: of one strategy a row
+    for each period, with its date as index, or without one the average of every strategy, a row for each.
+
+    Raises ``ValueError`` for a strategy that there is not, and ``ImportError`` without pandas.
+    """
+    pd, assets = require_pandas(), report["assets"]
+    if strategy is None:
+        means = {figures["strategy"]: figures["mean_allocations"] for figures in report["strategies"]}
+        return pd.DataFrame.from_dict(means, orient="index", columns=assets).rename_axis("strategy")
+    for told in report["periods"]:
+        if told["strategy"] == strategy:
+            return _by_date(report, told["allocations"])[assets]
+    names = ", ".join(told["strategy"] for told in report["periods"])
+    raise ValueError(f"strategy is {strategy!r}: must be one of {names}")
+
+
+def _by_date(report: wire.BacktestReport | wire.AssetsBacktestReport, columns: Mapping[str, Any]) -> pd.DataFrame:
+    """A row for each period, by its date or its number."""
     pd = require_pandas()
-    if figure not in _FIGURES:
-        raise ValueError(f"figure is {figure!r}: must be one of {', '.join(_FIGURES)}")
-    frame = pd.DataFrame({strategy["strategy"]: strategy[figure] for strategy in report["periods"]})
+    frame = pd.DataFrame(columns)
     dates = report.get("dates")
     if dates is None:
         return frame.set_axis(pd.RangeIndex(1, len(frame) + 1, name="period"))

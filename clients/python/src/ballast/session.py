@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Literal, cast
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, Literal, cast
 from urllib.parse import quote
 
 from typing_extensions import Self, Unpack
@@ -223,6 +223,37 @@ class _Session(Labelled):
         }
         return cast(wire.WhatIfAnswer, await self._transport.json("POST", "/what-if", body=supposed))
 
+    async def _assets_what_if(
+        self,
+        *,
+        wealth: float | None = None,
+        holdings: Mapping[str, float] | pd.Series[float] | None = None,
+        radius_scale: float | None = None,
+        radius: float | None = None,
+        log_returns: Mapping[str, float] | pd.Series[float] | None = None,
+        simple_returns: Mapping[str, float] | pd.Series[float] | None = None,
+        prices: Mapping[str, float] | pd.Series[float] | None = None,
+        previous_prices: Mapping[str, float] | pd.Series[float] | None = None,
+        explain: Literal["worst_case"] | None = None,
+    ) -> wire.AssetsWhatIfPoint:
+        """The same of a session of several assets, for hypothetical holdings or next returns of each by its name, a
+        dict or a Series: what ``observe`` and then ``assets_action`` would tell. :func:`ballast.frames.allocation`
+        makes a Series of it."""
+        supposed: dict[str, Any] = {
+            "session": self.id,
+            "wealth": wealth,
+            "holdings": holdings,
+            "radius_scale": radius_scale,
+            "radius": radius,
+            "log_returns": log_returns,
+            "simple_returns": simple_returns,
+            "prices": prices,
+            "previous_prices": previous_prices,
+            "explain": explain,
+        }
+        body = {name: value.to_dict() if hasattr(value, "to_dict") else value for name, value in supposed.items()}
+        return cast(wire.AssetsWhatIfPoint, await self._transport.json("POST", "/what-if", body=body))
+
     async def _history(self) -> wire.History:
         """Where the session started, what was reported and told, and what would be told now."""
         return cast(wire.History, await self._transport.json("GET", f"{self._path}/history"))
@@ -282,6 +313,7 @@ class Session(_Session):
     correct = Answering(wire.Corrected).blocking(_Session._correct)
     renew = Answering(wire.Renewed).blocking(_Session._renew)
     what_if = blocking(_Session._what_if)
+    assets_what_if = Answering(wire.AssetsWhatIfPoint).blocking(_Session._assets_what_if)
     label = Answering(wire.Labels).blocking(_Session._label)
     history = Answering(wire.History).blocking(_Session._history)
     frame = blocking(_Session._frame)
@@ -301,6 +333,7 @@ class AsyncSession(_Session):
     correct = _Session._correct
     renew = _Session._renew
     what_if = _Session._what_if
+    assets_what_if = _Session._assets_what_if
     label = _Session._label
     history = _Session._history
     frame = _Session._frame

@@ -24,6 +24,53 @@ class Annualised(TypedDict):
 Asset: TypeAlias = str
 
 
+LogReturnItem: TypeAlias = float
+
+
+LogReturn: TypeAlias = list[LogReturnItem]
+
+
+SimpleReturnItem: TypeAlias = float
+
+
+SimpleReturn: TypeAlias = list[SimpleReturnItem]
+
+
+Window: TypeAlias = int | None
+
+
+class AssetsChoices(TypedDict):
+    """How a record of several assets is walked through."""
+
+    windows: list[int | None]
+    """Periods that strategies know; null is all since the first."""
+    every: int
+    """Periods from one measuring of the radius, and one choice of the static strategy, to the next."""
+    alpha: float
+    """Miscoverage of the radius."""
+    risk_aversion: float
+    """Relative."""
+    trading_cost: float
+    """Lost of what is traded, as a share of it."""
+    seed: int
+    """Of the bridges and of the resamples."""
+
+
+class AssetsPeriods(TypedDict):
+    """What one strategy did, a number a period."""
+
+    strategy: str
+    """Its name."""
+    allocations: dict[str, list[float]]
+    """Share of wealth held in each asset, by its name."""
+    radius: list[float]
+    """Of the ball, in log-return; 0 where there was none."""
+    traded: list[float]
+    """Share of wealth that was bought and sold at the start."""
+    wealth: list[float]
+    """At the end, from 100."""
+
+
 ActionIntervalItem: TypeAlias = float
 
 
@@ -116,10 +163,10 @@ class BacktestPeriods(TypedDict):
     """At the end, from 100."""
 
 
-LogReturn: TypeAlias = float
+LogReturn1: TypeAlias = float
 
 
-SimpleReturn: TypeAlias = float
+SimpleReturn1: TypeAlias = float
 
 
 AlphaItem: TypeAlias = float
@@ -1155,6 +1202,47 @@ class Advice(TypedDict):
     """How it was found."""
 
 
+class AssetsBacktestRequest(TypedDict):
+    """A walk-forward through a record of several assets, by the one-step problem and by rules that people use."""
+
+    assets: list[Asset]
+    """Names of the assets, each another, in the order of the columns."""
+    log_returns: NotRequired[list[LogReturn] | None]
+    """Of the assets, date by date, oldest first, none left out. Exactly one of this and `simple_returns` is given."""
+    simple_returns: NotRequired[list[SimpleReturn] | None]
+    """`price / previous price - 1`, likewise."""
+    rate: Rates
+    """What the bank pays a period, as a fraction: one number for all, or one for each."""
+    dates: list[str]
+    """One for each period, evenly apart: `2008-01-31`, `2008-01` or `2008`."""
+    periods_per_year: NotRequired[int | None]
+    """Default: what `dates` tell."""
+    windows: NotRequired[list[Window] | None]
+    """How many of the last periods strategies know; null is all since the first. Default: 10 years, 20 years and all."""
+    every: NotRequired[int | None]
+    """Periods from one measuring of the radius, and one choice of the static strategy, to the next. Default: a year of them."""
+    alpha: NotRequired[float | None]
+    """Miscoverage of the radius. Default: 0.1."""
+    risk_aversion: NotRequired[float]
+    """Relative: 1 is log utility."""
+    trading_cost: NotRequired[float]
+    """Lost of what is traded, as a share of it; no strategy knows of it."""
+    seed: NotRequired[int]
+    """The same request and seed give the same report, bit for bit."""
+
+
+class AssetsFigures(Performance):
+    """One strategy in figures."""
+
+    strategy: str
+    """Its name."""
+    beyond_equal: NotRequired[BootstrapEstimate | None]
+    effective_assets: NotRequired[float | None]
+    """`(sum a)^2 / sum a^2`, the mean over the periods in which anything is held; null where nothing ever is."""
+    mean_allocations: dict[str, float]
+    """Share of wealth in each asset, by its name."""
+
+
 class AssetsProblem(TypedDict):
     """What is known of several assets, and the investor who may hold them."""
 
@@ -1230,9 +1318,9 @@ class BacktestRequest(TypedDict):
     until the next.
     """
 
-    log_returns: NotRequired[list[LogReturn] | None]
+    log_returns: NotRequired[list[LogReturn1] | None]
     """Of the risky asset, oldest first, none left out. Exactly one of this and `simple_returns` is given."""
-    simple_returns: NotRequired[list[SimpleReturn] | None]
+    simple_returns: NotRequired[list[SimpleReturn1] | None]
     """`price / previous price - 1`, likewise."""
     rate: Rates
     """What the bank pays a period, as a fraction: one number for all, or one for each."""
@@ -1750,6 +1838,16 @@ class WhatIf(TypedDict):
     """Return of the coming period, the advised allocation held through it; the advice is for the period after."""
     simple_return: NotRequired[float | None]
     """The same as `price / previous price - 1`."""
+    holdings: NotRequired[dict[str, float]]
+    """Of several assets, by their names, each of which has one: share of wealth in it now, before trading."""
+    log_returns: NotRequired[dict[str, float]]
+    """Of several assets, returns of the coming period, in one of three ways; the advice is for the period after."""
+    simple_returns: NotRequired[dict[str, float]]
+    """The same as `price / previous price - 1`."""
+    prices: NotRequired[dict[str, float]]
+    """Prices of several assets at the end of the coming period."""
+    previous_prices: NotRequired[dict[str, float]]
+    """Their prices at its start. Default: those reported for the period before."""
     explain: NotRequired[Explain | None]
     sweep: NotRequired[Sweep | None]
 
@@ -1872,6 +1970,37 @@ class AssetsAdvised(AssetsAdvice):
     """What in the question may be a mistake."""
 
 
+class AssetsBacktestReport(TypedDict):
+    """Strategies that lived through a record of several assets. The same record and choices give the same report, bit for bit."""
+
+    format: str
+    """`ballast-backtest-assets-1`."""
+    assets: list[str]
+    """Names, in the order of the columns."""
+    frequency: str
+    """`daily`, `weekly`, `monthly`, `quarterly` or `yearly`."""
+    periods_per_year: int
+    """Periods in a year."""
+    dates: list[str]
+    """Of the periods decided about."""
+    whole_years: int
+    """Whole years decided about, whose utility is taken."""
+    choices: AssetsChoices
+    """As completed."""
+    intervals: BacktestIntervals
+    """How the intervals were made."""
+    strategies: list[AssetsFigures]
+    """One strategy in figures each."""
+    periods: list[AssetsPeriods]
+    """What each strategy did, in their order."""
+    sentences: list[str]
+    """What the figures say, the most important first."""
+
+
+BacktestQuestion: TypeAlias = BacktestRequest | AssetsBacktestRequest
+"""A walk-forward of one asset, or of several, which `assets` names."""
+
+
 class Composed(TypedDict):
     """Several assets before the coming period, by their names."""
 
@@ -1970,6 +2099,35 @@ class FrontierRequest(TypedDict):
     """Periods in a row that are drawn together, 1 to half of the record. Default: the cube root of its length."""
     seed: NotRequired[int]
     """Of the resamples and of the simulated bridges."""
+
+
+class FundAdvice(Composed):
+    """What to hold of several assets through a period, by a policy of their fund."""
+
+    allocation: dict[str, float]
+    """Share of wealth to hold in each asset; the rest is in the bank."""
+    total: float
+    """Share of wealth in all assets together."""
+    trade: dict[str, float]
+    """The allocation less the holdings: shares of wealth to buy, or where they are negative to sell."""
+    band: list[float]
+    """The totals that are best kept as they are; where trading costs nothing both ends are the total."""
+    contribution: float
+    """Money added at the end of the period, withdrawn where it is negative."""
+    certainty_equivalent: float
+    """Certainty equivalent, in terminal wealth, of going on with this composition: the promise that a later one never breaks."""
+    floor: float
+    """Terminal wealth of selling everything now and staying in the bank."""
+    radius: float
+    """Radius of the ball around the law of the fund, in log-return."""
+    sample_size: int
+    """Dates seen, those of the history among them."""
+    surrogate_sd: float
+    """Predicted standard deviation of the log certainty equivalent."""
+    in_design: bool
+    """Whether the state of the fund lies where the surrogates were trained."""
+    source: AdviceSource
+    """How the total was found."""
 
 
 class Job(TypedDict):
@@ -2171,38 +2329,31 @@ AdviseAnswer: TypeAlias = Advised | AssetsAdvised
 """The answer to a question about one asset or several."""
 
 
-class AssetsAction(Composed):
+class AssetsAction(FundAdvice):
     """The robust allocation of several assets for the coming period."""
 
     session: str
     period: int
-    allocation: dict[str, float]
-    """Share of wealth to hold in each asset; the rest is in the bank."""
-    total: float
-    """Share of wealth in all assets together."""
-    trade: dict[str, float]
-    """The allocation less the holdings: shares of wealth to buy, or where they are negative to sell."""
-    band: list[float]
-    """The totals that are best kept as they are; where trading costs nothing both ends are the total."""
-    contribution: float
-    """Money added at the end of the period, withdrawn where it is negative."""
-    certainty_equivalent: float
-    """Certainty equivalent, in terminal wealth, of going on with this composition: the promise that a later one never breaks."""
-    floor: float
-    """Terminal wealth of selling everything now and staying in the bank."""
-    radius: float
-    """Radius of the ball around the law of the fund, in log-return."""
-    sample_size: int
-    """Dates seen, those of the history among them."""
-    surrogate_sd: float
-    """Predicted standard deviation of the log certainty equivalent."""
-    in_design: bool
-    """Whether the state of the fund lies where the surrogates were trained."""
-    source: AdviceSource
-    """How the total was found."""
     worst_case: NotRequired[WorstCase | None]
     caution: list[Caution]
     """What to know before the advice is followed."""
+
+
+class AssetsWhatIfPoint(FundAdvice):
+    """The advice on several assets under one hypothesis."""
+
+    period: int
+    """The period advised."""
+    wealth: float
+    """Wealth at its start."""
+    log_returns: NotRequired[dict[str, float]]
+    """The returns supposed, by asset, if any were."""
+    radius_scale: NotRequired[float | None]
+    """The factor on the radius supposed, if one was."""
+    gamma: NotRequired[float | None]
+    """Lagrange multiplier of the ball: utility lost per unit of extra radius. Where the step was solved."""
+    worst_law: NotRequired[WorstLawSummary | None]
+    worst_case: NotRequired[WorstCase | None]
 
 
 class EvaluationReport(TypedDict):
@@ -2252,7 +2403,7 @@ class FrontierReport(TypedDict):
     """What the figures say, and what they cannot."""
 
 
-JobReport: TypeAlias = EvaluationReport | BacktestReport | FrontierReport
+JobReport: TypeAlias = EvaluationReport | BacktestReport | AssetsBacktestReport | FrontierReport
 """The report of a job: of an evaluation, of a walk-forward or of a frontier."""
 
 
@@ -2330,7 +2481,20 @@ class WhatIfAnswer2(TypedDict):
     points: list[WhatIfPoint]
 
 
-WhatIfAnswer: TypeAlias = WhatIfAnswer1 | WhatIfAnswer2
+class WhatIfAnswer3(AssetsWhatIfPoint):
+    """Of several assets."""
+
+    session: str
+
+
+class WhatIfAnswer4(TypedDict):
+    """One point, or the points of a sweep in its order."""
+
+    session: str
+    points: list[AssetsWhatIfPoint]
+
+
+WhatIfAnswer: TypeAlias = WhatIfAnswer1 | WhatIfAnswer2 | WhatIfAnswer3 | WhatIfAnswer4
 """One point, or the points of a sweep in its order."""
 
 

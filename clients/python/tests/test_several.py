@@ -1,0 +1,96 @@
+"""Several assets: a table walked forward, and what is supposed of a session, by the names of pandas."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from ballast import AsyncBallast, Ballast, frames
+
+RISKY = [0.02 + 0.03 * math.sin(1.7 * quarter) for quarter in range(16)]
+TABLE = pd.DataFrame(
+    {"energy": RISKY, "health": [0.015 + 0.02 * math.cos(2.9 * quarter) for quarter in range(16)]},
+    index=pd.period_range("2010Q1", periods=16, freq="Q"),
+)
+
+
+def test_a_table_walked_forward_is_frames_by_strategy_by_date_and_by_asset(ballast: Ballast) -> None:
+    job = ballast.backtest_assets(
+        TABLE, kind="simple", rate=0.002, windows=[8, None], every=4, alpha=0.9, idempotency_key="of several"
+    )
+    report = job.report()
+    assert report["format"] == "ballast-backtest-assets-1" and report["assets"] == ["energy", "health"]
+    assert report["choices"]["windows"] == [8, None]
+    assert ballast.assets_walk_forward(job.id).report() == report
+
+    strategies = job.frame()
+    assert list(strategies.index) == [figures["strategy"] for figures in report["strategies"]]
+    one = report["strategies"][0]
+    for name in ("yearly_certainty_equivalent", "annual_mean"):
+        estimate = one[name]
+        ends = [strategies.iloc[0][column] for column in (name, f"{name}_low", f"{name}_high")]
+        assert ends == [estimate["value"], *estimate["interval"]]
+    assert "mean_allocations" not in strategies and strategies.loc["1/N", "final_wealth"] > 100.0
+
+    wealth = job.periods()
+    assert list(wealth.columns) == list(strategies.index) and len(wealth) == len(report["dates"]) == 8
+    assert wealth["1/N"].iloc[-1] == strategies.loc["1/N", "final_wealth"]
+    assert (job.periods("radius")["1/N"] == 0.0).all() and wealth.index.equals(job.periods("traded").index)
+    with pytest.raises(ValueError, match="must be one of wealth, radius, traded"):
+        job.periods("allocation")
+
+    held = job.held("1/N")
+    assert list(held.columns) == ["energy", "health"] and (held == 0.5).all().all() and held.index.equals(wealth.index)
+    means = job.held()
+    assert means.loc["1/N"].tolist() == pytest.approx([0.5, 0.5]) and list(means.index) == list(strategies.index)
+    with pytest.raises(ValueError, match="must be one of robust"):
+        frames.held(report, "adaptive")
+
+
+def test_prices_and_rates_by_date_are_the_same_record(ballast: Ballast) -> None:
+    prices = 100.0 * np.exp(np.log1p(TABLE).cumsum())
+    start = pd.DataFrame({"energy": [100.0], "health": [100.0]}, index=pd.period_range("2009Q4", periods=1, freq="Q"))
+    table = pd.concat([start, prices])
+    rate = pd.Series(0.002, index=table.index)
+
+    def walk(returns: pd.DataFrame, kind: str, rate: object) -> pd.DataFrame:
+        job = ballast.backtest_assets(returns, kind=kind, rate=rate, windows=[8], alpha=0.9)  # type: ignore[arg-type]
+        return job.periods()
+
+    pd.testing.assert_frame_equal(walk(table, "price", rate), walk(TABLE, "simple", 0.002))
+    with pytest.raises(ValueError, match="dates is None: must be given"):
+        ballast.backtest_assets(TABLE.to_numpy(), kind="simple", rate=0.0, assets=["energy", "health"])
+
+
+def test_what_is_supposed_of_several_assets_is_what_they_are_told(ballast: Ballast) -> None:
+    training = ballast.train_assets(
+        TABLE,
+        kind="simple",
+        rate_per_step=0.002,
+        horizon=2,
+        radius={"rule": "bridge", "scale": 0.1},
+        design={"count": 20},
+        idempotency_key="a policy of several",
+    )
+    session = training.session(holdings={"energy": 0.2, "health": 0.3})
+    assert session.assets_what_if()["allocation"] == session.assets_action()["allocation"]
+    returns = pd.Series({"energy": 0.03, "health": -0.01})
+    supposed = session.assets_what_if(simple_returns=returns)
+    moved = session.assets_what_if(holdings=pd.Series({"energy": 0.0, "health": 0.9}), radius_scale=2.0)
+    assert moved["trade"]["health"] == pytest.approx(moved["allocation"]["health"] - 0.9)
+    assert moved.get("radius_scale") == 2.0
+
+    async def awaited() -> float:
+        async with AsyncBallast(str(ballast._transport.http.base_url)) as service:
+            same = await service.session(session.id)
+            return (await same.assets_what_if(simple_returns=returns))["wealth"]
+
+    assert asyncio.run(awaited()) == supposed["wealth"]
+    session.observe(simple_returns=returns.to_dict())
+    told = session.assets_action()
+    pd.testing.assert_series_equal(frames.allocation(supposed), frames.allocation(told))
+    assert (supposed["wealth"], supposed["period"]) == (session.wealth, told["period"])
