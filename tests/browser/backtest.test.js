@@ -129,21 +129,40 @@ test("what every strategy did is saved as a file", async () => {
   assert.ok(Math.abs(last.at(-1) - report.strategies.at(-1).final_wealth) < 1e-6);
 });
 
+test("falls, years and months of a track record are those of its levels", async () => {
+  const { belowHighest, compounded, grouped, places, returnsOf, worstFalls } = await dashboardModule("track.js");
+  const levels = [100, 110, 99, 121, 60.5, 90, 121, 120];
+  assert.deepEqual(worstFalls(belowHighest(levels), 2).map(({ depth, from, to, back }) => [Number(depth.toFixed(6)), from, to, back]), [[-0.5, 3, 4, 6], [-0.1, 1, 2, 3]]);
+  assert.equal(worstFalls(belowHighest(levels), 9).at(-1).back, null);
+  assert.ok(Math.abs(compounded(returnsOf(levels)) - 0.2) < 1e-12);
+  const days = places(["2008-01-30", "2008-01-31", "2008-02-01", "2009-02-02"], 4, 252);
+  assert.deepEqual(grouped(days, ({ year, part }) => `${year} ${part}`), [["2008 01", [0, 1]], ["2008 02", [2]], ["2009 02", [3]]]);
+  assert.deepEqual(places(null, 14, 12).slice(11, 13), [{ year: "1", part: "12" }, { year: "2", part: "1" }]);
+  assert.deepEqual([places(null, 2, 1)[1], places(["2008", "2009"], 2, 1)[1]], [{ year: "2", part: null }, { year: "2009", part: null }]);
+});
+
+test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, folds open", async () => {
+  await page.getByText("Ranges, ratios and radii").click();
+  await page.getByRole("table", { name: "Estimates with their ranges" }).waitFor();
+  await usable(page, () => {});
+  await usable(page, () => visitQuiet(page, `${ballast.url}/#/backtests/new`));
+});
+
 const OTHER = Array.from({ length: QUARTERS }, (_, k) => Number((1.5 + 4 * Math.cos(2.9 * k)).toFixed(2)));
 
 test("a record of several assets is asked for, and its report shows what was held of each", async () => {
   await visitQuiet(page, `${ballast.url}/#/backtests/new`);
   const table = RETURNS.map((back, k) => `${date(k)},${back},${OTHER[k]},${RATES[k]}`);
   await page.getByLabel("Returns or prices").fill(`quarter,fund,bonds,rf\n${table.join("\n")}\n`);
-  const question = page.getByRole("group", { name: /columns/i });
-  await question.waitFor();
-  for (const name of ["fund", "bonds"]) await question.getByLabel(name).check();
+  const question = page.getByRole("group", { name: /Several columns are several assets/ });
+  for (const name of ["fund", "bonds"]) await question.getByLabel(name, { exact: false }).first().check();
+  await page.getByRole("button", { name: "Read it so" }).click();
   await page.getByText("How it walks, and for the quant").click();
   await page.getByLabel("Known of the past").waitFor();
   assert.equal(await page.getByLabel("Design points").isVisible(), false);
   await page.getByLabel("Known of the past").fill("1; all");
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
-  await page.locator(".error").getByText(/must lie in \[2, 2000\]/).waitFor();
+  await page.getByText("Known of the past is 1; it must be from 2 to 2000.").waitFor();
   await page.getByLabel("Known of the past").fill("8; all");
   const asked = page.waitForRequest((request) => request.method() === "POST" && request.url().endsWith("/backtest"));
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
@@ -180,23 +199,4 @@ test("a record of several assets is asked for, and its report shows what was hel
   await page.getByText("Ranges and ratios").click();
   await page.getByRole("table", { name: "Estimates with their ranges" }).waitFor();
   await usable(page, () => {});
-});
-
-test("falls, years and months of a track record are those of its levels", async () => {
-  const { belowHighest, compounded, grouped, places, returnsOf, worstFalls } = await dashboardModule("track.js");
-  const levels = [100, 110, 99, 121, 60.5, 90, 121, 120];
-  assert.deepEqual(worstFalls(belowHighest(levels), 2).map(({ depth, from, to, back }) => [Number(depth.toFixed(6)), from, to, back]), [[-0.5, 3, 4, 6], [-0.1, 1, 2, 3]]);
-  assert.equal(worstFalls(belowHighest(levels), 9).at(-1).back, null);
-  assert.ok(Math.abs(compounded(returnsOf(levels)) - 0.2) < 1e-12);
-  const days = places(["2008-01-30", "2008-01-31", "2008-02-01", "2009-02-02"], 4, 252);
-  assert.deepEqual(grouped(days, ({ year, part }) => `${year} ${part}`), [["2008 01", [0, 1]], ["2008 02", [2]], ["2009 02", [3]]]);
-  assert.deepEqual(places(null, 14, 12).slice(11, 13), [{ year: "1", part: "12" }, { year: "2", part: "1" }]);
-  assert.deepEqual([places(null, 2, 1)[1], places(["2008", "2009"], 2, 1)[1]], [{ year: "2", part: null }, { year: "2009", part: null }]);
-});
-
-test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, folds open", async () => {
-  await page.getByText("Ranges, ratios and radii").click();
-  await page.getByRole("table", { name: "Estimates with their ranges" }).waitFor();
-  await usable(page, () => {});
-  await usable(page, () => visitQuiet(page, `${ballast.url}/#/backtests/new`));
 });
