@@ -226,8 +226,7 @@ async fn a_job_reports_of_several_assets_what_the_command_reports() {
 
     // Log-returns are the same record, and so is a rate of each period.
     let rows = request["simple_returns"].as_array().unwrap().iter().map(|row| row.as_array().unwrap());
-    let logs: Vec<Vec<f64>> =
-        rows.map(|row| row.iter().map(|back| back.as_f64().unwrap().ln_1p()).collect()).collect();
+    let logs: Vec<Vec<f64>> = rows.map(|row| row.iter().map(|back| back.as_f64().unwrap().ln_1p()).collect()).collect();
     let job = queue(&app, &of_assets(28, &json!({ "simple_returns": null, "log_returns": logs }))).await;
     assert_eq!(report(&app, &job).await, reported);
 
@@ -242,7 +241,7 @@ async fn a_job_reports_of_several_assets_what_the_command_reports() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_walk_forward_of_several_assets_is_cancelled_and_warned_of() {
     let app = App::start().await;
-    let (status, job) = app.post("/backtest", &of_assets(800, &json!({ "rate": 0.2, "windows": [400] }))).await;
+    let (status, job) = app.post("/backtest", &of_assets(700, &json!({ "rate": 0.2, "windows": [350] }))).await;
     assert_eq!(status, StatusCode::ACCEPTED, "{job}");
     let fields: Vec<&Value> = job["warnings"].as_array().unwrap().iter().map(|warning| &warning["field"]).collect();
     assert_eq!(fields, ["rate", "rate"], "{job}");

@@ -550,16 +550,20 @@ async fn every_field_of_a_walk_forward_of_several_assets_is_named() {
         assert_named(&problem, field);
     }
     // More than a report holds, and more than is solved in some hours.
-    let long = |assets: usize, days: usize, window: usize| {
-        let row = |day: usize| -> Vec<f64> { (0..assets).map(|asset| 0.01 * ((day * (7 + asset)) as f64).sin()).collect() };
+    let long = |assets: usize, days: usize, windows: [usize; 5]| {
+        let back = |day: usize, asset: usize| (30.0 * ((day * (7 + asset)) as f64).sin()).round() / 1000.0;
+        let row = |day: usize| -> Vec<f64> { (0..assets).map(|asset| back(day, asset)).collect() };
         let rows: Vec<Vec<f64>> = (0..days).map(row).collect();
         let names: Vec<String> = (0..assets).map(|asset| format!("asset {asset}")).collect();
         let first = "1950-01-01".parse::<jiff::civil::Date>().unwrap();
         let date = |day: usize| first.checked_add(jiff::Span::new().days(day as i64)).unwrap().to_string();
         let dates: Vec<String> = (0..days).map(date).collect();
-        json!({ "assets": names, "log_returns": rows, "rate": 0.0001, "dates": dates, "windows": [window] })
+        json!({ "assets": names, "log_returns": rows, "rate": 0.0001, "dates": dates, "windows": windows })
     };
-    for (request, field) in [(long(30, 8000, 200), "log_returns"), (long(12, 18_000, 2000), "windows")] {
+    let windows = [2000, 1999, 1998, 1997, 1996];
+    for (request, field) in
+        [(long(30, 2200, [20, 30, 40, 50, 60]), "log_returns"), (long(12, 4000, windows), "windows")]
+    {
         let (status, problem) = app.post("/backtest", &request).await;
         assert_eq!(status, 422, "{problem}");
         assert_named(&problem, field);

@@ -527,7 +527,8 @@ async fn a_fund_that_does_not_vary_is_not_taken() {
 /// The fields of an answer to `/action`, taken from an answer of `/what-if`.
 #[track_caller]
 fn assert_same_action(what_if: &Value, action: &Value) {
-    let told = action.as_object().unwrap().iter().filter(|(field, _)| !["caution", "session"].contains(&field.as_str()));
+    let told =
+        action.as_object().unwrap().iter().filter(|(field, _)| !["caution", "session"].contains(&field.as_str()));
     for (field, value) in told {
         assert_eq!(&what_if[field], value, "{field}: {what_if} {action}");
     }
@@ -553,7 +554,11 @@ async fn what_is_supposed_of_several_assets_is_what_a_twin_is_told() {
     let session = app.session.clone();
     let facts = async || {
         let path = format!("/sessions/{session}");
-        (app.get(&path).await, app.get(&format!("{path}/history")).await, app.get(&format!("/action?session={session}")).await)
+        (
+            app.get(&path).await,
+            app.get(&format!("{path}/history")).await,
+            app.get(&format!("/action?session={session}")).await,
+        )
     };
     let before = facts().await;
     assert!(number(&before.2.1["total"]) > 0.01, "the test shows nothing: {}", before.2.1);
@@ -604,7 +609,11 @@ async fn what_is_supposed_of_several_assets_is_what_a_twin_is_told() {
     assert!(number(&wide["total"]) < number(&before.2.1["total"]) && wide["worst_case"]["sentence"].is_string());
     let points = swept["points"].as_array().unwrap();
     assert_eq!((points.len(), &points[3]["allocation"]), (4, &wide["allocation"]));
-    assert!(points[3].get("worst_case").is_none() && points[3]["worst_law"]["share_moved"].is_number(), "{}", points[3]);
+    assert!(
+        points[3].get("worst_case").is_none() && points[3]["worst_law"]["share_moved"].is_number(),
+        "{}",
+        points[3]
+    );
 
     // What was held before the last choice is known after a correction and after a replay.
     app.session.clone_from(&session);

@@ -290,14 +290,11 @@ pub fn backtest_of_assets(backtest: &AssetsBacktest, field: &'static str, thread
     let strategies = backtest.strategies().len();
     let held = product(&[backtest.shares(), SHARE_BYTES]);
     let books = product(&[backtest.lived().len(), strategies, DECIDED_BYTES]);
-    let steps = product(&[threads + 1, periods, backtest.record.assets.len(), STEP_NUMBERS, NUMBER]);
-    let bridges = product(&[threads, periods, PATHS, NUMBER]);
+    let known = backtest.choices.windows.iter().map(|window| window.unwrap_or(periods)).max().unwrap_or_default();
+    let steps = product(&[threads, known, backtest.record.assets.len(), STEP_NUMBERS, NUMBER]);
+    let bridges = product(&[threads, known, PATHS, NUMBER]);
     let record = held.saturating_add(books).saturating_add(LEAST);
-    Footprint::of(field, periods, record).and(
-        "windows",
-        backtest.choices.windows.len(),
-        steps.saturating_add(bridges),
-    )
+    Footprint::of(field, periods, record).and("windows", backtest.choices.windows.len(), steps.saturating_add(bridges))
 }
 
 /// Bytes of the cache that such a walk-forward should have.

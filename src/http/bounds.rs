@@ -83,19 +83,11 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         ("HyperparameterBounds", "noise_variance", pair),
         ("Advise", "wealth", wealth.clone()),
         ("Advise", "holding", within((0.0, 1.0))),
-        ("AdviseAssets", "wealth", wealth.clone()),
+        ("AdviseAssets", "wealth", wealth),
         ("ReadReturns", "text", json!({ "maxLength": 8_000_000 })),
         ("FrontierRequest", "scales", listed(&SCALES, within((0.0, LARGEST_SCALE)))),
         ("FrontierRequest", "resamples", whole(&RESAMPLES)),
         ("FrontierRequest", "block", json!({ "minimum": 1 })),
-        ("WhatIf", "session", json!({ "minLength": 1 })),
-        ("WhatIf", "wealth", wealth),
-        ("WhatIf", "holding", within((0.0, 1.0))),
-        ("WhatIf", "radius_scale", within(RADIUS_SCALE)),
-        ("WhatIf", "radius", within(FIXED_RADIUS)),
-        ("WhatIf", "log_return", within((-LOG_RETURN, LOG_RETURN))),
-        ("WhatIf", "simple_return", within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1()))),
-        ("WhatIf", "holdings", each(within((0.0, 1.0)))),
         ("SweepRange", "points", whole(&POINTS)),
         ("EvaluationRequest", "constant_mixes", json!({ "maxItems": MOST_MIXES, "items": within((0.0, 1.0)) })),
         ("EvaluationRequest", "paths", whole(&evaluation::PATHS)),
@@ -109,6 +101,7 @@ fn rules() -> Vec<(&'static str, &'static str, Value)> {
         .chain(of_designs())
         .chain(of_assets())
         .chain(of_sessions())
+        .chain(supposed())
         .chain(of_labels())
         .chain(walked())
         .chain(reported())
@@ -165,6 +158,21 @@ fn of_sessions() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
         ("Renew", "window", whole(&HISTORY_LENGTH)),
         ("Renewing", "every", json!({ "minimum": 1 })),
         ("Renewing", "window", whole(&HISTORY_LENGTH)),
+    ];
+    rules.into_iter()
+}
+
+/// Of what is supposed of a session.
+fn supposed() -> impl Iterator<Item = (&'static str, &'static str, Value)> {
+    let rules = [
+        ("WhatIf", "session", json!({ "minLength": 1 })),
+        ("WhatIf", "wealth", within(WEALTH)),
+        ("WhatIf", "holding", within((0.0, 1.0))),
+        ("WhatIf", "radius_scale", within(RADIUS_SCALE)),
+        ("WhatIf", "radius", within(FIXED_RADIUS)),
+        ("WhatIf", "log_return", within((-LOG_RETURN, LOG_RETURN))),
+        ("WhatIf", "simple_return", within(((-LOG_RETURN).exp_m1(), LOG_RETURN.exp_m1()))),
+        ("WhatIf", "holdings", each(within((0.0, 1.0)))),
     ];
     rules.into_iter()
 }

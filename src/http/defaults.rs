@@ -44,10 +44,7 @@ fn told() -> [(&'static str, Map<String, Value>); 12] {
         ("RadiusRule", of::<RadiusRule>(json!({ "rule": "bridge" }))),
         ("EvaluationRequest", of::<EvaluationRequest>(json!({ "problem": least }))),
         ("BacktestRequest", of::<BacktestRequest>(json!({ "rate": 0.0 }))),
-        (
-            "AssetsBacktestRequest",
-            of::<AssetsBacktestRequest>(json!({ "assets": [], "rate": 0.0, "dates": [] })),
-        ),
+        ("AssetsBacktestRequest", of::<AssetsBacktestRequest>(json!({ "assets": [], "rate": 0.0, "dates": [] }))),
         ("FrontierRequest", of::<FrontierRequest>(json!({ "problem": least }))),
     ]
 }

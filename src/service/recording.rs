@@ -107,9 +107,7 @@ impl Sessions {
             let PutRight { before, standing, log_return, wealth_change } =
                 self.advising.run(tenant, put_right).await??;
             let step = current.step(observed);
-            let means = self.means_of(advisor, Some(turn));
-            let (standing, uncertainty) = measured(&means, tenant, step, standing).await?;
-            let radius = Some(uncertainty.radius);
+            let (standing, uncertainty) = measured(&self.means_of(advisor, Some(turn)), tenant, step, standing).await?;
             let answer = Corrected {
                 session: session.to_owned(),
                 correction: number,
@@ -135,7 +133,6 @@ impl Sessions {
                 created_ms: self.clock.now_milliseconds(),
                 key: caller.key().to_string(),
             };
-            let seen = facts.seen.followed_by(&new);
             let next = Live {
                 renew: Plan::of(&facts.row)?.renew,
                 row: facts.row.into(),
@@ -144,8 +141,8 @@ impl Sessions {
                 corrections: number,
                 renewals,
                 current: current.into(),
-                seen,
-                radius,
+                seen: facts.seen.followed_by(&new),
+                radius: Some(answer.uncertainty.radius),
                 advice: None,
             };
             let store = self.store.by(caller.actor());

@@ -280,9 +280,7 @@ impl Sessions {
             let session = request.session;
             return Ok(match (request.sweep, points.pop()) {
                 (None, Some(point)) => WhatIfAnswer::OneOfAssets { session, point: Box::new(point) },
-                (_, last) => {
-                    WhatIfAnswer::SweepOfAssets { session, points: points.into_iter().chain(last).collect() }
-                }
+                (_, last) => WhatIfAnswer::SweepOfAssets { session, points: points.into_iter().chain(last).collect() },
             });
         }
         let advisor = self.advisor(tenant, &live).await?;

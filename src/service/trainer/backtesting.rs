@@ -77,8 +77,7 @@ impl Worker {
             let common = Common::of(&strategies, kept.clone());
             let decide = |(index, strategy)| {
                 let step = (index < policies).then_some(stretch * policies + index);
-                let decided =
-                    || backtest.walk.decide_stretch(strategy, &backtest.periods, stretch, &common, &watch);
+                let decided = || backtest.walk.decide_stretch(strategy, &backtest.periods, stretch, &common, &watch);
                 self.checkpointed(claimed, &checkpoints, step, decided)
             };
             let numbered = strategies.iter().copied().enumerate().collect();
@@ -93,8 +92,7 @@ impl Worker {
     /// What was done before, by the step that it was done in.
     fn checkpoints(&self, claimed: &ClaimedJob) -> Result<BTreeMap<usize, Vec<u8>>, Ended> {
         let job = claimed.row.job.as_str();
-        let found: BTreeMap<usize, Vec<u8>> =
-            self.runtime.block_on(self.store.checkpoints(job))?.into_iter().collect();
+        let found: BTreeMap<usize, Vec<u8>> = self.runtime.block_on(self.store.checkpoints(job))?.into_iter().collect();
         self.board.resume(job, found.len());
         Ok(found)
     }

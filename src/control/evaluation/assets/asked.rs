@@ -49,7 +49,8 @@ impl AssetsBacktest {
     fn check_size(&self, field: &str) -> Result<(), FieldError> {
         let (shares, solved) = (self.shares(), self.read());
         if shares > MOST_HELD {
-            let rule = format!("must be fewer: all strategies would hold {shares} shares, and {MOST_HELD} are the most");
+            let rule =
+                format!("must be fewer: all strategies would hold {shares} shares, and {MOST_HELD} are the most");
             return Err(FieldError::new(field, format!("{} periods", self.record.rows.len()), rule));
         }
         if solved > MOST_READ {
