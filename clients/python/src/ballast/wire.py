@@ -108,29 +108,6 @@ class AuditPage(TypedDict):
     """Give it as `after` for the next page; null on the last."""
 
 
-class BacktestChoices(TypedDict):
-    """The choices of a walk-forward."""
-
-    window: int
-    """Periods of history that each policy was trained on."""
-    every: int
-    """Periods from one training to the next."""
-    horizon: int
-    """Periods that a policy looked ahead."""
-    alpha: list[float]
-    """Levels of the adaptive strategies."""
-    risk_aversion: float
-    """Relative."""
-    trading_cost: float
-    """Lost of what is traded, as a share of it."""
-    cost_blind: bool
-    """Whether every policy was trained as if trading were free."""
-    count: int
-    """Design points per step."""
-    seed: int
-    """Of every training, and of the resamples."""
-
-
 class BacktestIntervals(TypedDict):
     """How the intervals were made: circular blocks of what was lived, the same for all strategies."""
 
@@ -662,6 +639,10 @@ class Performance(TypedDict):
     """Mean excess over the bank by its deviation."""
     annual_turnover: BootstrapEstimate
     """Share of wealth that is bought and sold in a year."""
+    chance_of_loss: BootstrapEstimate
+    """Share of the years, one beginning with every period, that end with less than they began with."""
+    worst_twentieth: BootstrapEstimate
+    """Mean return of the worst twentieth of these years."""
     max_drawdown: float
     """Largest fall below the highest wealth so far, as a share of it."""
     final_wealth: float
@@ -1115,10 +1096,27 @@ WarningCode: TypeAlias = Literal["rate_high", "rate_above_record", "record_in_pe
 
 
 class WealthReport(TypedDict):
-    """Terminal wealth."""
+    """Terminal wealth, and how it came to be."""
 
     mean: Estimate
     """Over paths."""
+    quantile_20: Estimate
+    """A fifth of the paths end with less."""
+    quantile_90: Estimate
+    """Nine tenths of the paths end with less."""
+    max: Estimate
+    """Of the paths of one history, averaged over histories."""
+    min: Estimate
+    """Of the paths of one history, averaged over histories."""
+    worst_twentieth: Estimate
+    """The mean of the worst twentieth of the paths."""
+    chance_of_loss: Estimate
+    """Share of the paths that end with less than was put in: the initial wealth and all contributions."""
+    max_drawdown: Estimate
+    """
+    Mean over paths of the largest fall on the way below the highest so far, as a share of it; what is added or withdrawn is
+    neither gain nor fall.
+    """
 
 
 class WithoutOne(TypedDict):
@@ -1285,67 +1283,6 @@ class BacktestFigures(Performance):
     """The certainty equivalent of the main adaptive strategy less that of this one."""
     all_bank_share: float
     """Share of the periods with nothing in the risky asset."""
-
-
-class BacktestReport(TypedDict):
-    """Strategies that lived through a record of returns. The same request gives the same report, bit for bit."""
-
-    format: str
-    """`ballast-backtest-1`."""
-    frequency: NotRequired[str | None]
-    """`daily`, `weekly`, `monthly`, `quarterly` or `yearly`; null where the periods have no dates."""
-    periods_per_year: int
-    """Periods in a year."""
-    dates: NotRequired[list[str] | None]
-    """Of the periods decided about, those after the first window; null where the periods have none."""
-    whole_years: int
-    """Whole years decided about, whose utility is taken."""
-    choices: BacktestChoices
-    """As completed."""
-    intervals: BacktestIntervals
-    """How the intervals were made."""
-    strategies: list[BacktestFigures]
-    """One strategy in figures each."""
-    periods: list[BacktestPeriods]
-    """What each strategy did, in their order."""
-    sentences: list[str]
-    """What the figures say, the most important first."""
-
-
-class BacktestRequest(TypedDict):
-    """
-    A walk-forward through a record of returns: every so many periods policies are trained on the window before, and lived by
-    until the next.
-    """
-
-    log_returns: NotRequired[list[LogReturn1] | None]
-    """Of the risky asset, oldest first, none left out. Exactly one of this and `simple_returns` is given."""
-    simple_returns: NotRequired[list[SimpleReturn1] | None]
-    """`price / previous price - 1`, likewise."""
-    rate: Rates
-    """What the bank pays a period, as a fraction: one number for all, or one for each."""
-    dates: NotRequired[list[str] | None]
-    """One for each period, evenly apart: `2008-01-31`, `2008-01` or `2008`. They tell the periods of a year."""
-    periods_per_year: NotRequired[int | None]
-    """Default: what `dates` tell; required without them."""
-    window: NotRequired[int | None]
-    """Periods of history that each policy is trained on. Default: 20 years of them."""
-    every: NotRequired[int | None]
-    """Periods from one training to the next. Default: a year of them, at most `horizon`."""
-    horizon: NotRequired[int | None]
-    """Periods that a policy looks ahead. Default: `every`."""
-    alpha: NotRequired[list[AlphaItem]]
-    """Levels of the adaptive strategies; the static one takes the second, or the only one."""
-    risk_aversion: NotRequired[float]
-    """Relative: 1 is log utility."""
-    trading_cost: NotRequired[float]
-    """Lost of what is traded, as a share of it; policies are trained with it."""
-    cost_blind: NotRequired[bool]
-    """Train every policy as if trading were free."""
-    count: NotRequired[int]
-    """Design points per step."""
-    seed: NotRequired[int]
-    """The same request and seed give the same report, bit for bit."""
 
 
 class Caution(TypedDict):
@@ -1997,8 +1934,96 @@ class AssetsBacktestReport(TypedDict):
     """What the figures say, the most important first."""
 
 
-BacktestQuestion: TypeAlias = BacktestRequest | AssetsBacktestRequest
-"""A walk-forward of one asset, or of several, which `assets` names."""
+class BacktestChoices(TypedDict):
+    """The choices of a walk-forward."""
+
+    window: int
+    """Periods of history that each policy was trained on."""
+    every: int
+    """Periods from one training to the next."""
+    horizon: int
+    """Periods that a policy looked ahead."""
+    alpha: list[float]
+    """Levels of the adaptive strategies."""
+    scale: float
+    """Multiple of the radius of every ball."""
+    centre: CentreSpecification
+    """What the balls are centred on."""
+    risk_aversion: float
+    """Relative."""
+    trading_cost: float
+    """Lost of what is traded, as a share of it."""
+    cost_blind: bool
+    """Whether every policy was trained as if trading were free."""
+    count: int
+    """Design points per step."""
+    seed: int
+    """Of every training, and of the resamples."""
+
+
+class BacktestReport(TypedDict):
+    """Strategies that lived through a record of returns. The same request gives the same report, bit for bit."""
+
+    format: str
+    """`ballast-backtest-1`."""
+    frequency: NotRequired[str | None]
+    """`daily`, `weekly`, `monthly`, `quarterly` or `yearly`; null where the periods have no dates."""
+    periods_per_year: int
+    """Periods in a year."""
+    dates: NotRequired[list[str] | None]
+    """Of the periods decided about, those after the first window; null where the periods have none."""
+    whole_years: int
+    """Whole years decided about, whose utility is taken."""
+    choices: BacktestChoices
+    """As completed."""
+    intervals: BacktestIntervals
+    """How the intervals were made."""
+    strategies: list[BacktestFigures]
+    """One strategy in figures each."""
+    periods: list[BacktestPeriods]
+    """What each strategy did, in their order."""
+    sentences: list[str]
+    """What the figures say, the most important first."""
+
+
+class BacktestRequest(TypedDict):
+    """
+    A walk-forward through a record of returns: every so many periods policies are trained on the window before, and lived by
+    until the next.
+    """
+
+    log_returns: NotRequired[list[LogReturn1] | None]
+    """Of the risky asset, oldest first, none left out. Exactly one of this and `simple_returns` is given."""
+    simple_returns: NotRequired[list[SimpleReturn1] | None]
+    """`price / previous price - 1`, likewise."""
+    rate: Rates
+    """What the bank pays a period, as a fraction: one number for all, or one for each."""
+    dates: NotRequired[list[str] | None]
+    """One for each period, evenly apart: `2008-01-31`, `2008-01` or `2008`. They tell the periods of a year."""
+    periods_per_year: NotRequired[int | None]
+    """Default: what `dates` tell; required without them."""
+    window: NotRequired[int | None]
+    """Periods of history that each policy is trained on. Default: 20 years of them."""
+    every: NotRequired[int | None]
+    """Periods from one training to the next. Default: a year of them, at most `horizon`."""
+    horizon: NotRequired[int | None]
+    """Periods that a policy looks ahead. Default: `every`."""
+    alpha: NotRequired[list[AlphaItem]]
+    """Levels of the adaptive strategies; the static one takes the second, or the only one."""
+    scale: NotRequired[float]
+    """Multiple of the radius of every ball."""
+    centre: NotRequired[CentreSpecification]
+    """What the balls are centred on, and what plug-in takes for the law."""
+    risk_aversion: NotRequired[float]
+    """Relative: 1 is log utility."""
+    trading_cost: NotRequired[float]
+    """Lost of what is traded, as a share of it; policies are trained with it."""
+    cost_blind: NotRequired[bool]
+    """Train every policy as if trading were free."""
+    count: NotRequired[int]
+    """Design points per step."""
+    seed: NotRequired[int]
+    """The same request and seed give the same report, bit for bit."""
 
 
 class Composed(TypedDict):
@@ -2289,7 +2314,7 @@ class StrategyReport(TypedDict):
     certainty_equivalent: Estimate
     """Terminal wealth that is worth as much for certain."""
     wealth: WealthReport
-    """Terminal, in units of the initial wealth's currency."""
+    """Terminal, in units of the initial wealth's currency, and what it went through."""
     difference: NotRequired[Difference | None]
     own_mix: NotRequired[OwnMix | None]
     histogram: list[int]
@@ -2354,6 +2379,10 @@ class AssetsWhatIfPoint(FundAdvice):
     """Lagrange multiplier of the ball: utility lost per unit of extra radius. Where the step was solved."""
     worst_law: NotRequired[WorstLawSummary | None]
     worst_case: NotRequired[WorstCase | None]
+
+
+BacktestQuestion: TypeAlias = BacktestRequest | AssetsBacktestRequest
+"""A walk-forward of one asset, or of several, which `assets` names."""
 
 
 class EvaluationReport(TypedDict):
