@@ -1,5 +1,6 @@
 //! Several assets in a session: composition first, then the policy of their fund.
 
+#[macro_use]
 mod support;
 
 use ballast::control::assets::fund::Fund;
@@ -17,34 +18,16 @@ use ballast::numerics::fund_bridges::fund_returns;
 use ballast::numerics::levelling::inverse_volatility;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
-use support::App;
+use support::{App, ROWS, several_assets as request};
 
-/// Stocks, bonds and gold: ten periods.
-const ROWS: [[f64; 3]; 10] = [
-    [0.0231, 0.004, -0.011],
-    [-0.0442, 0.009, 0.031],
-    [0.031, -0.003, 0.002],
-    [0.043, 0.001, -0.024],
-    [-0.012, 0.006, 0.017],
-    [0.018, 0.002, 0.009],
-    [0.055, -0.004, -0.013],
-    [-0.027, 0.008, 0.021],
-    [0.026, 0.003, -0.006],
-    [0.012, 0.005, 0.014],
-];
-
-fn request(horizon: usize) -> Value {
-    json!({
-        "problem": {
-            "assets": ["stocks", "bonds", "gold"],
-            "horizon": horizon,
-            "rate_per_step": 0.001,
-            "radius": { "rule": "bridge", "alpha": 0.1, "paths": 200, "scale": 0.2 },
-            "history": ROWS
-        },
-        "design": { "count": 20 }
-    })
-}
+over_either_store!(
+    a_session_of_several_assets_is_lived_by_their_names,
+    what_several_assets_report_is_put_right_and_renewed,
+    a_session_of_several_assets_is_renewed_by_itself,
+    a_fund_that_does_not_vary_is_not_taken,
+    money_rates_dates_and_gaps_of_several_assets_give_the_wealth_of_the_formula,
+    a_policy_of_several_assets_goes_out_and_comes_in_as_it_was,
+);
 
 fn trained(request: &Value) -> Advisor {
     let part = |name: &str| request.get(name).cloned().unwrap_or_else(|| json!({}));
@@ -71,9 +54,7 @@ fn sum(values: &[f64]) -> f64 {
     values.iter().sum()
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn a_session_of_several_assets_is_lived_by_their_names() {
-    let mut app = App::start().await;
+async fn a_session_of_several_assets_is_lived_by_their_names(mut app: App) {
     app.train(&request(4)).await;
     app.open_with(json!({ "wealth": 1000.0, "holdings": { "stocks": 0.2, "bonds": 0.1, "gold": 0.0 } })).await;
 
@@ -163,9 +144,7 @@ async fn a_session_of_several_assets_is_lived_by_their_names() {
     assert_eq!(history["observations"][2]["assets"], third["assets"]);
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn what_several_assets_report_is_put_right_and_renewed() {
-    let mut app = App::start().await;
+async fn what_several_assets_report_is_put_right_and_renewed(mut app: App) {
     app.train(&request(2)).await;
     let first = app.policy.clone();
     let report = |stocks: f64| json!({ "log_returns": { "stocks": stocks, "bonds": 0.004, "gold": -0.01 } });
@@ -219,9 +198,7 @@ async fn what_several_assets_report_is_put_right_and_renewed() {
     assert_ne!(first, onto);
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn a_session_of_several_assets_is_renewed_by_itself() {
-    let mut app = App::start().await;
+async fn a_session_of_several_assets_is_renewed_by_itself(mut app: App) {
     app.train(&request(2)).await;
     app.open_with(json!({ "renew": { "every": 1 } })).await;
     let (status, observed) =
@@ -240,6 +217,88 @@ async fn a_session_of_several_assets_is_renewed_by_itself() {
     let factor = number(&specification["fund"]["radius_factor"]);
     assert!((number(&specification["problem"]["radius"]["scale"]) / (0.2 * factor) - 1.0).abs() < 1e-12);
     assert_eq!(app.action().await.0, 200);
+}
+
+/// What the periods of an account make of it: `x' = x (1 - c sum_i |a_i - h_i|) ((1 - sum_i a_i)(1 + r) + sum_i a_i e^(z_i)) + C`.
+async fn money_rates_dates_and_gaps_of_several_assets_give_the_wealth_of_the_formula(mut app: App) {
+    const COST: f64 = 0.002;
+    let mut asked = request(4);
+    asked["problem"]["trading_cost"] = json!(COST);
+    asked["problem"]["contributions"] = json!([10.0, -5.0, 20.0, 0.0]);
+    app.train(&asked).await;
+    app.open_with(json!({ "wealth": 1000.0, "holdings": { "stocks": 0.2, "bonds": 0.1, "gold": 0.0 } })).await;
+    let (mut wealth, mut held) = (1000.0, vec![0.2, 0.1, 0.0]);
+    let executed = json!({ "stocks": 0.3, "bonds": 0.2, "gold": 0.1 });
+    let rows = [[0.03, 0.004, -0.01], [0.0; 3], [0.02_f64, -0.01, 0.05].map(f64::ln_1p), [-0.04, 0.002, 0.01]];
+    let named = |values: [f64; 3]| json!({ "stocks": values[0], "bonds": values[1], "gold": values[2] });
+    // The report, what the bank paid, what was added, and how many dates have been seen by then.
+    let periods = [
+        (json!({ "log_returns": named(rows[0]), "date": "2024-01-31", "rate": 0.004 }), 0.004, 10.0, 11),
+        (json!({ "missing": true, "date": "2024-02-29", "flow": -30.0 }), 0.001, -30.0, 11),
+        (
+            json!({ "simple_returns": named([0.02, -0.01, 0.05]), "executed_allocations": executed, "flow": 0.0,
+                "rate": -0.0005, "date": "2024-03-29" }),
+            -0.0005,
+            0.0,
+            12,
+        ),
+        (json!({ "log_returns": named(rows[3]), "date": "2024-04-30", "flow": 100.0 }), 0.001, 100.0, 13),
+    ];
+    for (index, ((report, rate, flow, seen), row)) in periods.iter().zip(rows).enumerate() {
+        let (status, action) = app.action().await;
+        assert_eq!(status, 200, "{action}");
+        let shares = listed(report.get("executed_allocations").unwrap_or(&action["allocation"]));
+        assert!(sum(&shares) > 0.0, "{action}");
+        let traded: f64 = shares.iter().zip(&held).map(|(share, held)| f64::abs(share - held)).sum();
+        let grown: Vec<f64> = shares.iter().zip(row).map(|(share, z)| share * z.exp()).collect();
+        let left = wealth * (1.0 - COST * traded);
+        let expected = left * ((1.0 - sum(&shares)) * (1.0 + rate) + sum(&grown)) + flow;
+        let (status, observed) = app.report(index + 1, report.clone()).await;
+        assert_eq!(status, 200, "{observed}");
+        assert!((number(&observed["wealth"]) / expected - 1.0).abs() < 1e-12, "{report}: {observed} {expected}");
+        held = grown.iter().map(|grown| left * grown / expected).collect();
+        let told = listed(&observed["assets"]["holdings"]);
+        assert!(told.iter().zip(&held).all(|(told, held)| (told - held).abs() < 1e-12), "{observed} {held:?}");
+        assert_eq!((&observed["sample_size"], &observed["date"]), (&json!(seen), &report["date"]), "{observed}");
+        assert_eq!(observed["assets"]["log_returns"].is_null(), report["missing"] == true, "{observed}");
+        wealth = number(&observed["wealth"]);
+        if index < 3 {
+            let late = json!({ "missing": true, "date": report["date"] });
+            let (status, refused) = app.report(index + 2, late).await;
+            assert_eq!((status.as_u16(), &refused["field"]), (422, &json!("date")), "{refused}");
+            let before = app.action().await;
+            app.restart().await;
+            assert_eq!(app.action().await, before);
+        }
+    }
+    let (_, session) = app.get(&format!("/sessions/{}", app.session)).await;
+    assert_eq!(number(&session["wealth"]), wealth);
+}
+
+/// Another service takes the document as the same policy and advises by it as the first does; a document of another fund is refused.
+async fn a_policy_of_several_assets_goes_out_and_comes_in_as_it_was(mut app: App) {
+    app.train(&request(2)).await;
+    app.open().await;
+    let document: Value = serde_json::from_slice(&app.export().await).unwrap();
+    let mut other = App::start().await;
+    let (status, imported) = other.post("/policies/import", &document).await;
+    assert_eq!((status.as_u16(), &imported["policy"]), (201, &json!(app.policy)), "the hash of its content");
+    other.policy.clone_from(&app.policy);
+    assert_eq!(other.export().await, app.export().await);
+    other.open().await;
+    let report = json!({ "log_returns": { "stocks": 0.02, "bonds": -0.005, "gold": 0.03 } });
+    for period in 1..=2 {
+        let [(_, mut here), (_, mut there)] = [app.action().await, other.action().await];
+        assert!(number(&here["total"]) > 0.0, "{here}");
+        [&mut here, &mut there].into_iter().for_each(|action| action["session"] = Value::Null);
+        assert_eq!(here, there);
+        assert_eq!(app.report(period, report.clone()).await.0, 200);
+        assert_eq!(other.report(period, report.clone()).await.0, 200);
+    }
+    let mut forged = document;
+    forged["specification"]["fund"]["radius_factor"] = json!(0.5);
+    let (status, refused) = other.post("/policies/import", &forged).await;
+    assert_eq!((status.as_u16(), &refused["field"]), (422, &json!("fund.radius_factor")), "{refused}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -506,9 +565,7 @@ fn a_policy_of_a_fund_is_what_its_assets_give() {
 }
 
 /// Two assets that hedge each other: their fund in equal parts does not vary, and is no law to be learned from.
-#[tokio::test(flavor = "multi_thread")]
-async fn a_fund_that_does_not_vary_is_not_taken() {
-    let mut app = App::start().await;
+async fn a_fund_that_does_not_vary_is_not_taken(mut app: App) {
     let mut request = request(2);
     let rows: Vec<[f64; 2]> = [0.01, -0.02, 0.03, 0.005, -0.012].map(|x: f64| [x.ln_1p(), (-x).ln_1p()]).to_vec();
     request["problem"]["assets"] = json!(["long", "short"]);

@@ -5,11 +5,10 @@ mod support;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use ballast::service::config::StoreLocation;
 use reqwest::Method;
 use serde_json::{Value, json};
 use support::patience::within;
-use support::{App, execute, postgres, specification};
+use support::{App, execute, specification};
 
 async fn list(app: &App, query: &str) -> Value {
     let (status, page) = app.get(&format!("/sessions?{query}")).await;
@@ -244,9 +243,8 @@ async fn sessions_are_found_and_in_order_over_a_folder() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn sessions_are_found_and_in_order_over_a_database() {
-    let Some(url) = postgres::database().await else { return };
-    let location = StoreLocation::Postgres(url.parse().unwrap());
-    story(App::configured(|config| config.store = location).await).await;
+    let Some(app) = App::over_a_database().await else { return };
+    story(app).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use support::patience::{assert_within, until};
 use support::postgres::{database, private_cluster};
 use support::process::{serve, steps_solved};
-use support::{App, specification};
+use support::{App, several_assets, specification};
 
 /// Long enough for a loaded machine to renew in, short enough to wait for.
 const LEASE: Duration = Duration::from_secs(3);
@@ -183,6 +183,49 @@ async fn a_session_lives_on_two_replicas_at_once() {
     }
     assert_eq!(second.app.delete(&format!("/sessions/{}", second.app.session)).await, 204);
     assert_eq!(first.app.action().await.0, 404);
+}
+
+/// A fund is composed once a period, whichever replica is asked: what one tells, the other does, and one alone that is told the same
+/// ends where they do.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_fund_lives_on_two_replicas_at_once() {
+    const HORIZON: usize = 4;
+    let Some(store) = database().await else { return };
+    let (mut first, mut second) = (Replica::start(&store, "all"), Replica::start(&store, "api"));
+    first.app.train(&several_assets(HORIZON)).await;
+    first.app.open().await;
+    second.app.session = first.app.session.clone();
+    let mut winners = Vec::new();
+    for period in 1..=HORIZON {
+        let (status, action) = first.app.action().await;
+        assert_eq!(status, 200, "{action}");
+        assert!(number(&action["total"]) > 0.0, "{action}");
+        assert_eq!(second.app.action().await.1, action);
+        // Eight reports that contradict each other.
+        let apps = [&first.app, &second.app];
+        let reports = (0..8).map(|client| {
+            let (app, z) = (apps[(client + period) % 2], 0.01 * (client as f64 - 3.5));
+            let report = json!({ "log_returns": { "stocks": z, "bonds": 0.004, "gold": -0.5 * z } });
+            async move { (app.report(period, report.clone()).await, report) }
+        });
+        let answers = join_all(reports).await;
+        let won: Vec<_> = answers.iter().filter(|((status, _), _)| *status == StatusCode::OK).collect();
+        assert_eq!(won.len(), 1, "{answers:?}");
+        let ((_, observed), report) = won[0];
+        assert_eq!(observed["assets"]["executed_allocations"], action["allocation"]);
+        winners.push((action, observed.clone(), report.clone()));
+    }
+    second.app.policy = first.app.policy.clone();
+    second.app.open().await;
+    for (period, (told, observed, report)) in (1..).zip(winners) {
+        let (_, action) = second.app.action().await;
+        for field in ["allocation", "composition", "certainty_equivalent", "one_step", "trade"] {
+            assert_eq!(action[field], told[field], "{field} of period {period}");
+        }
+        let (status, alone) = second.app.report(period, report).await;
+        assert_eq!((status, &alone["wealth"]), (StatusCode::OK, &observed["wealth"]));
+        assert_eq!(alone["assets"], observed["assets"]);
+    }
 }
 
 /// Eight contradicting corrections and the next period at once, through both replicas: each number has one winner, and the

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use ballast::http::{self, Running};
 use ballast::service::clock::Clock;
-use ballast::service::config::Config;
+use ballast::service::config::{Config, StoreLocation};
 use ballast::service::keys;
 use ballast::service::shutdown::Shutdown;
 use ballast::store::KeyRing;
@@ -32,7 +32,58 @@ pub struct App {
     pub session: String,
     pub policy: String,
     folder: TempDir,
+    /// Of the service that runs here.
+    store: Option<StoreLocation>,
     running: Option<Running>,
+}
+
+/// Runs each story over a folder, and over a database that replicas share.
+#[allow(unused_macros)]
+macro_rules! over_either_store {
+    ($($story:ident),* $(,)?) => {
+        mod over_a_folder {
+            $(#[tokio::test(flavor = "multi_thread")]
+            async fn $story() {
+                super::$story(super::App::start().await).await;
+            })*
+        }
+        mod over_a_database {
+            $(#[tokio::test(flavor = "multi_thread")]
+            async fn $story() {
+                if let Some(app) = super::App::over_a_database().await {
+                    super::$story(app).await;
+                }
+            })*
+        }
+    };
+}
+
+/// Stocks, bonds and gold: ten periods.
+pub const ROWS: [[f64; 3]; 10] = [
+    [0.0231, 0.004, -0.011],
+    [-0.0442, 0.009, 0.031],
+    [0.031, -0.003, 0.002],
+    [0.043, 0.001, -0.024],
+    [-0.012, 0.006, 0.017],
+    [0.018, 0.002, 0.009],
+    [0.055, -0.004, -0.013],
+    [-0.027, 0.008, 0.021],
+    [0.026, 0.003, -0.006],
+    [0.012, 0.005, 0.014],
+];
+
+/// A small training for them.
+pub fn several_assets(horizon: usize) -> Value {
+    json!({
+        "problem": {
+            "assets": ["stocks", "bonds", "gold"],
+            "horizon": horizon,
+            "rate_per_step": 0.001,
+            "radius": { "rule": "bridge", "alpha": 0.1, "paths": 200, "scale": 0.2 },
+            "history": ROWS
+        },
+        "design": { "count": 20 }
+    })
 }
 
 /// A small training: `horizon` steps, 20 design points.
@@ -110,20 +161,27 @@ impl App {
         App::configured(|_| {}).await
     }
 
-    /// Starts with a configuration changed by `change`; a restart does not keep the change.
+    /// Starts with a configuration changed by `change`, of which a restart keeps the store alone.
     pub async fn configured(change: impl FnOnce(&mut Config)) -> App {
         let folder = tempfile::tempdir().expect("a folder");
         let mut config = config(folder.path());
         change(&mut config);
+        let store = Some(config.store.clone());
         let running = start(config).await;
         let url = format!("http://{}", running.address);
-        App { running: Some(running), ..App::at(url, folder) }
+        App { running: Some(running), store, ..App::at(url, folder) }
+    }
+
+    /// Starts over a new database; `None` where there is no PostgreSQL.
+    pub async fn over_a_database() -> Option<App> {
+        let store = StoreLocation::Postgres(postgres::database().await?.parse().expect("an address"));
+        Some(App::configured(|config| config.store = store).await)
     }
 
     /// A client of a service that somebody else runs over `folder`.
     pub fn at(url: String, folder: TempDir) -> App {
         let (session, policy) = (String::new(), String::new());
-        App { client: Client::new(), url, session, policy, folder, running: None }
+        App { client: Client::new(), url, session, policy, folder, store: None, running: None }
     }
 
     /// Shows `key` with every request from now on; none where it is empty.
@@ -141,26 +199,35 @@ impl App {
         self.folder.path()
     }
 
-    /// Stops the service as SIGTERM does and starts another on the same folder.
+    /// Stops the service as SIGTERM does and starts another over the same store.
     pub async fn restart(&mut self) {
-        self.restart_after("SELECT 1").await;
+        self.stop().await;
+        self.start_again().await;
     }
 
-    /// As [`Self::restart`], with a statement run on the database in between.
+    /// As [`Self::restart`], with a statement run on the database of the folder in between.
     pub async fn restart_after(&mut self, statement: &'static str) {
-        self.client = Client::new();
-        self.running.take().expect("running").stop().await;
+        self.stop().await;
         execute(self.folder.path(), statement).await;
-        let running = start(config(self.folder.path())).await;
-        self.url = format!("http://{}", running.address);
-        self.running = Some(running);
+        self.start_again().await;
     }
 
     /// Stops the service and starts one over a folder within this one.
     pub async fn move_to(&mut self, folder: &str) {
+        self.stop().await;
+        self.store = Some(StoreLocation::Folder(self.folder.path().join(folder)));
+        self.start_again().await;
+    }
+
+    async fn stop(&mut self) {
         self.client = Client::new();
         self.running.take().expect("running").stop().await;
-        let running = start(config(&self.folder.path().join(folder))).await;
+    }
+
+    async fn start_again(&mut self) {
+        let mut config = config(self.folder.path());
+        config.store = self.store.clone().expect("a store");
+        let running = start(config).await;
         self.url = format!("http://{}", running.address);
         self.running = Some(running);
     }
