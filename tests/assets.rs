@@ -12,6 +12,7 @@ use ballast::numerics::fund_bridges::{FundBridges, fund_returns};
 use ballast::numerics::levelling::{Ground, inverse_volatility};
 use ballast::numerics::streams::stream;
 use ballast::numerics::wasserstein::WassersteinBall;
+use microlp::{ComparisonOp, LinearExpr, OptimizationDirection, Problem, SolveOutcome};
 use rand::RngExt;
 use serde_json::{Value, json};
 
@@ -218,8 +219,8 @@ fn another_asset_never_lowers_the_value_and_a_wider_ball_never_raises_it() {
     }
 }
 
-/// The worst expectation over laws on a grid of moves of two assets, up and down, by the dual of that transport programme, whose
-/// one variable is the price of distance.
+/// The worst expectation over laws on a grid of moves of two assets, up and down: the transport programme, with a mass for each atom
+/// and place, solved by a library. The masses of an atom sum to its own, and their distances to the radius at most.
 fn by_programme(
     returns: &[Vec<f64>],
     ground: &Ground,
@@ -244,21 +245,20 @@ fn by_programme(
         }
         places
     };
-    let atoms: Vec<Vec<(f64, f64)>> = returns.iter().map(places).collect();
-    let dual = |price: f64| {
-        let least = |places: &Vec<(f64, f64)>| {
-            places.iter().map(|(cost, utility)| utility + price * cost).fold(f64::INFINITY, f64::min)
-        };
-        atoms.iter().map(least).sum::<f64>() / atoms.len() as f64 - price * radius
-    };
-    // Concave in the price: by golden section, to rounding.
-    let (mut low, mut high) = (0.0, 2.0);
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    for _ in 0..60 {
-        let (left, right) = (high - golden * (high - low), low + golden * (high - low));
-        if dual(left) < dual(right) { low = left } else { high = right }
+    let mut programme = Problem::new(OptimizationDirection::Minimize);
+    let mut distance = LinearExpr::empty();
+    for row in returns {
+        let mut mass = LinearExpr::empty();
+        for (cost, utility) in places(row) {
+            let moved = programme.add_var(utility, (0.0, f64::INFINITY));
+            mass.add(moved, 1.0);
+            distance.add(moved, cost);
+        }
+        programme.add_constraint(mass, ComparisonOp::Eq, 1.0 / returns.len() as f64);
     }
-    dual(0.5 * (low + high))
+    programme.add_constraint(distance, ComparisonOp::Le, radius);
+    let SolveOutcome::Solution(worst) = programme.solve().unwrap() else { unreachable!("no limit is set") };
+    worst.objective()
 }
 
 #[test]
