@@ -29,10 +29,6 @@ use crate::service::shutdown::Shutdown;
 
 /// A head that is not whole after so many bytes, and one read of as many, is refused; hyper takes 100 lines at most.
 const HEAD_BYTES: usize = 32 << 10;
-/// A connection that has asked so often, or is so old, is closed with the next answer: what balances callers over
-/// replicas sees them anew, and nothing that gathers with a connection gathers for ever.
-const LARGEST_REQUESTS: u64 = 100_000;
-const LARGEST_AGE: Duration = Duration::from_secs(60 * 60);
 /// A body that was refused unread is taken after all where it is so small and comes so soon: the connection can go on.
 const SMALL_BODY: u64 = 64 << 10;
 const SMALL_BODY_WAIT: Duration = Duration::from_millis(100);
@@ -67,10 +63,7 @@ pub async fn hold<S>(
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
     let connection = held.connection.clone();
-    let keep_alive = HeaderValue::from_str(&format!("timeout={}", patience.between.as_secs()));
-    let keep_alive = keep_alive.unwrap_or(HeaderValue::from_static("timeout=1"));
-    let service =
-        service_fn(move |request| answer(connection.clone(), local, keep_alive.clone(), application.clone(), request));
+    let service = service_fn(move |request| answer(connection.clone(), local, patience, application.clone(), request));
     let stream = TokioIo::new(Patient::new(stream, patience, held.connection.clone()));
     let serving = http1::Builder::new()
         .timer(TokioTimer::new())
@@ -100,7 +93,7 @@ async fn unused_at_the_end(shutdown: &Shutdown, connection: &Connection) {
 async fn answer(
     connection: Arc<Connection>,
     local: SocketAddr,
-    keep_alive: HeaderValue,
+    patience: Patience,
     mut application: Router,
     request: hyper::Request<Incoming>,
 ) -> Result<Response, GaveWay> {
@@ -125,11 +118,12 @@ async fn answer(
     if !is_whole {
         connection.leave();
     }
-    let is_old = connection.requests() >= LARGEST_REQUESTS || connection.age() >= LARGEST_AGE;
+    let is_old = connection.requests() >= patience.requests || connection.age() >= patience.age;
     if !is_whole || is_old || connection.place == Place::Probes {
         response.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
     } else {
-        response.headers_mut().insert("keep-alive", keep_alive);
+        let keep_alive = HeaderValue::from_str(&format!("timeout={}", patience.between.as_secs()));
+        response.headers_mut().insert("keep-alive", keep_alive.unwrap_or(HeaderValue::from_static("timeout=1")));
     }
     if response.headers().get(header::CONTENT_TYPE).is_some_and(|media| media == "text/event-stream") {
         connection.stream();
@@ -227,5 +221,74 @@ impl hyper::body::Body for Writing {
 
     fn size_hint(&self) -> SizeHint {
         self.body.size_hint()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::Ipv4Addr;
+    use std::time::Instant;
+
+    use hyper_util::server::graceful::GracefulShutdown;
+    use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
+
+    use super::super::connections::{Bounds, Connections};
+    use super::*;
+
+    const LONG: Duration = Duration::from_secs(60);
+
+    /// The client's end of a connection that is closed after so many requests, or at this age.
+    fn connection(requests: u64, age: Duration) -> DuplexStream {
+        let (here, there) = tokio::io::duplex(4096);
+        let patience =
+            Patience { to_read: LONG, for_head: LONG, between: LONG, to_finish: LONG, left_bytes: 64, requests, age };
+        tokio::spawn(async move {
+            let connections = Connections::new(Bounds { all: 1, of_address: 1, for_probes: 0 });
+            let held = connections.place(Ipv4Addr::LOCALHOST.into()).unwrap();
+            let graceful = GracefulShutdown::new();
+            let stopping = Stopping { shutdown: Shutdown::new(), watcher: graceful.watcher() };
+            hold(here, &held, (Ipv4Addr::LOCALHOST, 1).into(), patience, Router::new(), stopping).await;
+        });
+        there
+    }
+
+    /// Asks once; whether the answer says that the connection is closed with it.
+    async fn is_last(stream: &mut DuplexStream) -> bool {
+        stream.write_all(b"GET / HTTP/1.1\r\nhost: a\r\n\r\n").await.unwrap();
+        let mut head = Vec::new();
+        while !head.ends_with(b"\r\n\r\n") {
+            head.push(stream.read_u8().await.unwrap());
+        }
+        let head = String::from_utf8(head).unwrap();
+        let [closes, stays] = ["connection: close\r\n", "keep-alive: timeout=60\r\n"].map(|line| head.contains(line));
+        assert!(closes != stays && head.contains("content-length: 0"), "{head}");
+        closes
+    }
+
+    async fn is_closed(stream: &mut DuplexStream) -> bool {
+        stream.read(&mut [0]).await.unwrap() == 0
+    }
+
+    #[tokio::test]
+    async fn a_connection_is_closed_with_the_answer_to_the_last_of_its_requests() {
+        let mut stream = connection(3, LONG);
+        let mut lasts = Vec::new();
+        for _ in 0..3 {
+            lasts.push(is_last(&mut stream).await);
+        }
+        assert_eq!(lasts, [false, false, true]);
+        assert!(is_closed(&mut stream).await);
+    }
+
+    #[tokio::test]
+    async fn a_connection_is_closed_with_the_first_answer_after_its_age() {
+        let (age, begun) = (Duration::from_secs(1), Instant::now());
+        let mut stream = connection(u64::MAX, age);
+        assert!(!is_last(&mut stream).await);
+        while !is_last(&mut stream).await {
+            tokio::time::sleep(age / 20).await;
+        }
+        assert!(begun.elapsed() >= age);
+        assert!(is_closed(&mut stream).await);
     }
 }

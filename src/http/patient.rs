@@ -30,6 +30,10 @@ pub struct Patience {
     pub to_finish: Duration,
     /// Bytes of it that are taken.
     pub left_bytes: usize,
+    /// Requests after which its connection is closed with the answer.
+    pub requests: u64,
+    /// The age at which it is.
+    pub age: Duration,
 }
 
 /// `stream`, whose reads and writes fail once the patience with its client is over.
@@ -180,7 +184,9 @@ mod tests {
         let connections = Connections::new(Bounds { all: 1, of_address: 1, for_probes: 0 });
         let held = connections.place(Ipv4Addr::LOCALHOST.into()).unwrap();
         let between = 3 * LIMIT;
-        let patience = Patience { to_read: LIMIT, for_head: LIMIT, between, to_finish: LIMIT, left_bytes: 64 };
+        let (requests, age) = (u64::MAX, Duration::MAX);
+        let patience =
+            Patience { to_read: LIMIT, for_head: LIMIT, between, to_finish: LIMIT, left_bytes: 64, requests, age };
         let patient = Patient::new(stream, patience, held.connection.clone());
         (held, patient)
     }

@@ -113,6 +113,10 @@ async fn start(config: Config, shutdown: Shutdown) -> Result<Running, ServeError
     Ok(Running { address, operations, scheme, shutdown, task })
 }
 
+/// A connection that has asked so often, or is so old, is closed with the next answer: what balances callers over
+/// replicas sees them anew, and nothing that gathers with a connection gathers for ever.
+const LARGEST_REQUESTS: u64 = 100_000;
+const LARGEST_AGE: Duration = Duration::from_secs(60 * 60);
 const OPERATORS_BOUNDS: Bounds = Bounds { all: OPERATORS, of_address: OPERATORS, for_probes: PROBES };
 
 fn bounds(config: &Config) -> Bounds {
@@ -129,6 +133,8 @@ fn manners(application: Router, bounds: Bounds, config: &Config, encryption: &Op
         to_finish: REFUSED_BODY_TIME,
         // The largest body taken anywhere: who sends more would be refused wherever he sent it.
         left_bytes: config.body_limit_bytes,
+        requests: LARGEST_REQUESTS,
+        age: LARGEST_AGE,
     };
     Manners { application, connections: Connections::new(bounds), patience, encryption: encryption.clone() }
 }
