@@ -123,6 +123,40 @@ fn columns_that_are_one_asset_lose_what_it_loses() {
     }
 }
 
+/// Columns of a file that nothing tells apart are an asset each, and those that are named are.
+#[test]
+fn the_command_asks_of_the_columns_of_a_file_what_the_service_is_asked() {
+    const FILE: &str = "data/us_industries_monthly.csv";
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let frontier = |arguments: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_ballast"));
+        command.current_dir(folder).args(["frontier", FILE, "--window", "60", "--scales", "0,0.5"]).args(arguments);
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let file = std::fs::read_to_string(folder.join(FILE)).unwrap();
+    let lines: Vec<Vec<&str>> = file.lines().map(|line| line.split(',').collect()).collect();
+    let place = |name: &str| lines[0].iter().position(|column| *column == name).unwrap();
+    let value = |line: &[&str], name: &str| line[place(name)].parse::<f64>().unwrap();
+    let two = |line: &Vec<&str>| ["energy", "health"].map(|name| value(line, name).ln_1p());
+    let rows: Vec<[f64; 2]> = lines[lines.len() - 60..].iter().map(two).collect();
+    let rate = value(lines.last().unwrap(), "risk_free_return");
+    let problem = json!({ "assets": ["energy", "health"], "history": rows, "rate_per_step": rate,
+        "periods_per_year": 12.0, "utility": { "kind": "power", "risk_aversion": 3.0 },
+        "radius": { "rule": "bridge", "alpha": 0.1 } });
+    let found = frontier(&["--column", "energy", "--column", "health", "--json"]);
+    let expected = report(&json!({ "problem": problem, "scales": [0.0, 0.5] }));
+    assert_eq!(serde_json::from_str::<Value>(&found).unwrap(), serde_json::to_value(&expected).unwrap());
+    assert_eq!(expected.request.resamples, Some(60));
+    let told = frontier(&["--resamples", "20"]);
+    assert!(
+        told.contains("Each of the 12 columns is an asset; --column takes one alone. The last 60 periods are used"),
+        "{told}"
+    );
+    assert!(told.ends_with(&format!("{}\n", expected.sentences.last().unwrap())), "{told}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_frontier_is_a_job_whose_report_is_the_library_s() {
     let app = App::start().await;

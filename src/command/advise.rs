@@ -53,7 +53,7 @@ pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
     let count = returns.rows().len();
     let advised = arguments.question(&returns).answer().map_err(|error| by_option(error, count))?;
     let told = || words::told(&advised, arguments.wealth, returns.frequency);
-    Ok(show(&returns, arguments.json, &advised, told)?)
+    Ok(show(&returns.sentence(), arguments.json, &advised, told)?)
 }
 
 impl AdviseArgs {

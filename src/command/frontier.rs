@@ -9,13 +9,14 @@ use ballast::control::evaluation::frontier::Frontier;
 use ballast::control::evaluation::frontier::report::{Bootstrap, FrontierReport, Resampled};
 use ballast::control::kept::Kept;
 use ballast::control::progress::Watch;
-use ballast::control::request::frontier::{FrontierProblem, FrontierRequest, default_resamples, default_scales};
+use ballast::control::request::assets::AssetsProblem;
+use ballast::control::request::frontier::{FrontierProblem, FrontierRequest, default_scales};
 use ballast::control::request::radius_rule::RadiusRule;
 use ballast::control::request::specification::{ProblemSpecification, default_seed};
 use clap::Args;
 
 use super::record::{Record, show};
-use super::returns::Returns;
+use super::returns::AnyReturns;
 
 #[derive(Debug, Clone, Args)]
 pub struct FrontierArgs {
@@ -27,9 +28,9 @@ pub struct FrontierArgs {
     /// Multiples of the radius, ascending
     #[arg(long, value_delimiter = ',', default_values_t = default_scales())]
     scales: Vec<f64>,
-    /// Records drawn from each law
-    #[arg(long, default_value_t = default_resamples())]
-    resamples: usize,
+    /// Records drawn from each law; 400 of one asset unless given, 60 of several
+    #[arg(long)]
+    resamples: Option<usize>,
     /// Periods in a row that are drawn together; the cube root of the number of returns unless given
     #[arg(long)]
     block: Option<usize>,
@@ -41,18 +42,29 @@ pub struct FrontierArgs {
 }
 
 pub fn run(arguments: &FrontierArgs) -> Result<(), Box<dyn Error>> {
-    let returns = arguments.record.read()?;
+    let returns = arguments.record.read_any()?;
+    let read = match &returns {
+        AnyReturns::One(returns) => returns.sentence(),
+        AnyReturns::Several(returns) => returns.sentence.clone(),
+    };
     let question = arguments.request(&returns).question().map_err(by_option)?;
     let report = Frontier::new(question, Kept::default()).run(&Watch::unwatched())?;
-    Ok(show(&returns, arguments.json, &report, || told(&report))?)
+    Ok(show(&read, arguments.json, &report, || told(&report))?)
 }
 
 impl FrontierArgs {
-    fn request(&self, returns: &Returns) -> FrontierRequest {
+    fn request(&self, returns: &AnyReturns) -> FrontierRequest {
         let radius = Some(RadiusRule::bridge(self.alpha));
-        let problem = ProblemSpecification { radius, ..self.record.problem(returns) };
+        let problem = match returns {
+            AnyReturns::One(returns) => {
+                FrontierProblem::Asset(ProblemSpecification { radius, ..self.record.problem(returns) })
+            }
+            AnyReturns::Several(returns) => {
+                FrontierProblem::Assets(AssetsProblem { radius, ..self.record.assets_problem(returns) })
+            }
+        };
         let FrontierArgs { scales, resamples, block, seed, .. } = self.clone();
-        FrontierRequest { problem: FrontierProblem::Asset(problem), scales, resamples, block, seed }
+        FrontierRequest { problem, scales, resamples, block, seed }
     }
 }
 

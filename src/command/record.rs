@@ -3,11 +3,14 @@
 use std::error::Error;
 
 use ballast::control::error::FieldError;
+use ballast::control::evaluation::assets::AssetsRecord;
+use ballast::control::request::assets::AssetsProblem;
+use ballast::control::request::frontier::asked_of;
 use ballast::control::request::specification::{ProblemSpecification, UtilitySpecification};
 use clap::Args;
 use serde::Serialize;
 
-use super::returns::{Returns, ReturnsFile};
+use super::returns::{AnyReturns, Returns, ReturnsError, ReturnsFile, SeveralReturns};
 
 #[derive(Debug, Clone, Args)]
 pub struct Record {
@@ -25,26 +28,71 @@ impl Record {
     /// # Errors
     /// An option breaks a rule, or the file cannot be read.
     pub fn read(&self) -> Result<Returns, Box<dyn Error>> {
-        if !(1.0..=100.0).contains(&self.risk_aversion) {
-            return Err(FieldError::new("--risk-aversion", self.risk_aversion, "must lie in [1, 100]").into());
-        }
-        let returns = self.file.read()?;
-        Ok(match self.window {
-            Some(window) => returns.last(window)?,
-            None => returns,
+        self.check()?;
+        Ok(self.last(self.file.read()?)?)
+    }
+
+    /// Columns that nothing tells apart are an asset each.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_any(&self) -> Result<AnyReturns, Box<dyn Error>> {
+        self.check()?;
+        Ok(match (self.file.read_any()?, self.window) {
+            (AnyReturns::One(returns), _) => AnyReturns::One(self.last(returns)?),
+            (AnyReturns::Several(returns), Some(window)) => AnyReturns::Several(last_of_several(returns, window)?),
+            (several, None) => several,
         })
+    }
+
+    fn check(&self) -> Result<(), FieldError> {
+        if (1.0..=100.0).contains(&self.risk_aversion) {
+            return Ok(());
+        }
+        Err(FieldError::new("--risk-aversion", self.risk_aversion, "must lie in [1, 100]"))
+    }
+
+    fn last(&self, returns: Returns) -> Result<Returns, ReturnsError> {
+        self.window.map_or(Ok(returns.clone()), |window| returns.last(window))
     }
 
     /// Of the returns read.
     pub fn problem(&self, returns: &Returns) -> ProblemSpecification {
         let history = returns.rows().iter().map(|row| row.period().log_return).collect();
+        self.asked(history, returns.rate(), returns.periods_per_year)
+    }
+
+    /// Of several assets.
+    pub fn assets_problem(&self, returns: &SeveralReturns) -> AssetsProblem {
+        let AssetsRecord { assets, rows, bank, periods_per_year, .. } = &returns.record;
+        let rate = bank.last().copied().unwrap_or(0.0);
+        asked_of(assets.clone(), rows.clone(), &self.asked(Vec::new(), rate, *periods_per_year))
+    }
+
+    fn asked(&self, history: Vec<f64>, rate: f64, periods_per_year: usize) -> ProblemSpecification {
         ProblemSpecification {
             horizon: 1,
-            periods_per_year: Some(returns.periods_per_year as f64),
+            periods_per_year: Some(periods_per_year as f64),
             utility: UtilitySpecification::relative(self.risk_aversion),
-            ..ProblemSpecification::of(history, returns.rate())
+            ..ProblemSpecification::of(history, rate)
         }
     }
+}
+
+/// The last `count` periods.
+fn last_of_several(mut returns: SeveralReturns, count: usize) -> Result<SeveralReturns, ReturnsError> {
+    let SeveralReturns { record, times, sentence } = &mut returns;
+    let found = record.rows.len();
+    if !(2..=found).contains(&count) {
+        let rule = "must be at most the returns of the file, and 2 or more";
+        return Err(ReturnsError::Option { option: "--window", value: format!("{count} of {found}"), rule });
+    }
+    record.rows.drain(..found - count);
+    record.bank.drain(..found - count);
+    record.dates.drain(..found - count);
+    times.drain(..found - count);
+    sentence.push_str(&format!(" The last {count} periods are used, from {}.", record.dates[0]));
+    Ok(returns)
 }
 
 /// Prints what was read and what is `told` of the answer; as JSON the answer alone, and what was read on the standard error.
@@ -52,16 +100,16 @@ impl Record {
 /// # Errors
 /// The answer cannot be written as JSON.
 pub fn show(
-    returns: &Returns,
+    read: &str,
     as_json: bool,
     answer: &impl Serialize,
     told: impl FnOnce() -> String,
 ) -> serde_json::Result<()> {
     if as_json {
-        eprintln!("{}", returns.sentence());
+        eprintln!("{read}");
         println!("{}", serde_json::to_string_pretty(answer)?);
     } else {
-        println!("{}\n\n{}", returns.sentence(), told());
+        println!("{read}\n\n{}", told());
     }
     Ok(())
 }

@@ -37,3 +37,31 @@ test("a session's page asks, and the report is drawn with its sentences and a ta
     await ballast.stop();
   }
 });
+
+test("a session of several assets asks of all of them, with the returns it observed and the scale that was asked for", async () => {
+  const [ballast, chromium] = await Promise.all([service(), browser()]);
+  try {
+    const page = await chromium.newPage();
+    page.setDefaultTimeout(60_000);
+    const assets = ["Stocks", "Bonds"];
+    const history = Array.from({ length: 24 }, (_, k) => [0.01 + 0.05 * Math.sin(1.7 * k), 0.003 + 0.01 * Math.cos(2.3 * k)]);
+    const radius = { rule: "bridge", alpha: 0.2, scale: 0.4 };
+    const problem = { assets, ground_norm: "sup", horizon: 2, rate_per_step: 0.002, periods_per_year: 12, history, radius };
+    const policy = await trained(ballast.url, { problem, design: { count: 20 } });
+    const { session } = await call(ballast.url, "/sessions", { policy });
+    await call(ballast.url, "/observe", { session, period: 1, log_returns: { Stocks: 0.02, Bonds: -0.01 } });
+    await page.goto(`${ballast.url}/#/sessions/${session}`);
+    await page.getByRole("button", { name: "How much caution?" }).click();
+    await page.getByText("Who knows this market holds").first().waitFor();
+    const { request } = await call(ballast.url, `/jobs/${page.url().split("/").at(-1)}/report`);
+    assert.deepEqual([request.problem.assets, request.problem.ground_norm, request.resamples], [assets, "sup", 60]);
+    assert.deepEqual([request.problem.history.length, request.problem.history.at(-1)], [25, [0.02, -0.01]]);
+    assert.ok(Math.abs(request.problem.radius.scale - 0.4) < 1e-12, `${request.problem.radius.scale}`);
+    const shown = await page.locator("main").innerText();
+    assert.ok(!/undefined|NaN|null/.test(shown), shown);
+    await usable(page, () => {});
+  } finally {
+    await chromium.close();
+    await ballast.stop();
+  }
+});

@@ -35,9 +35,9 @@ pub struct FrontierRequest {
     /// Multiples of the radius of the rule, ascending. 0 takes the record for the law.
     #[serde(default = "default_scales")]
     pub scales: Vec<f64>,
-    /// Resampled records of each kind.
-    #[serde(default = "default_resamples")]
-    pub resamples: usize,
+    /// Resampled records of each kind. Default: 400 of one asset, 60 of several, whose steps take longer.
+    #[serde(default)]
+    pub resamples: Option<usize>,
     /// Periods in a row that are drawn together, 1 to half of the record. Default: the cube root of its length.
     #[serde(default)]
     pub block: Option<usize>,
@@ -51,10 +51,8 @@ pub fn default_scales() -> Vec<f64> {
     vec![0.0, 0.1, 0.25, 0.5, 1.0]
 }
 
-/// Those drawn unless another number is given.
-pub fn default_resamples() -> usize {
-    400
-}
+/// Records drawn unless another number is given, of one asset and of several: at 240 returns of twelve that is some seconds.
+const DEFAULT_RESAMPLES: [usize; 2] = [400, 60];
 
 /// The problem of one asset, or of several, which `assets` names.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -98,6 +96,8 @@ pub struct FrontierQuestion {
     pub assets: AssetsProblem,
     /// The problem of the fund of inverse volatilities, which one asset is itself, for one period.
     pub fund: Specification,
+    /// Resampled records of each kind.
+    pub resamples: usize,
     /// Periods in a row that are drawn together.
     pub block: usize,
     /// Between which all log-returns lie.
@@ -109,7 +109,10 @@ impl FrontierRequest {
     /// A field breaks a rule.
     pub fn question(mut self) -> Result<FrontierQuestion, FieldError> {
         self.check_scales()?;
-        rules::whole("resamples", self.resamples, &RESAMPLES)?;
+        let [of_one, of_several] = DEFAULT_RESAMPLES;
+        let usual = if matches!(self.problem, FrontierProblem::Asset(_)) { of_one } else { of_several };
+        let resamples = self.resamples.unwrap_or(usual);
+        rules::whole("resamples", resamples, &RESAMPLES)?;
         let count = self.problem.periods();
         if !RETURNS.contains(&count) {
             let rule = format!("must hold {} to {} periods", RETURNS.start(), RETURNS.end());
@@ -124,16 +127,16 @@ impl FrontierRequest {
             }
         };
         let drawn = count * assets.assets.len() * self.scales.len();
-        if drawn * self.resamples > MOST_DRAWN {
+        if drawn * resamples > MOST_DRAWN {
             let rule = format!(
                 "must be at most {}: periods, assets, scales and resamples multiply to at most {MOST_DRAWN}",
                 MOST_DRAWN / drawn
             );
-            return Err(FieldError::new("resamples", self.resamples, rule));
+            return Err(FieldError::new("resamples", resamples, rule));
         }
         let block = self.block.unwrap_or_else(|| (count as f64).cbrt().round() as usize);
         rules::whole("block", block, &(1..=count / 2))?;
-        self.block = Some(block);
+        (self.resamples, self.block) = (Some(resamples), Some(block));
         let highest = match &mut self.problem {
             FrontierProblem::Asset(problem) => {
                 problem.utility = fund.problem.utility;
@@ -146,7 +149,7 @@ impl FrontierRequest {
         };
         let lowest = assets.support.map(|support| support.min);
         let support = (lowest.unwrap_or(f64::NEG_INFINITY), highest.unwrap_or(f64::INFINITY));
-        Ok(FrontierQuestion { request: self, assets, fund, block, support })
+        Ok(FrontierQuestion { request: self, assets, fund, resamples, block, support })
     }
 
     fn check_scales(&self) -> Result<(), FieldError> {
@@ -201,8 +204,14 @@ fn check_static(problem: &ProblemSpecification) -> Result<(), FieldError> {
 }
 
 fn as_assets(problem: &ProblemSpecification) -> AssetsProblem {
+    let rows = problem.history.iter().map(|&value| vec![value]).collect();
+    asked_of(vec!["asset".to_owned()], rows, problem)
+}
+
+/// What `problem` asks of one asset, asked of these for one period.
+pub fn asked_of(assets: Vec<String>, history: Vec<Vec<f64>>, problem: &ProblemSpecification) -> AssetsProblem {
     AssetsProblem {
-        assets: vec!["asset".to_owned()],
+        assets,
         ground_norm: GroundNorm::default(),
         composition: CompositionRule::default(),
         horizon: None,
@@ -215,6 +224,6 @@ fn as_assets(problem: &ProblemSpecification) -> AssetsProblem {
         utility: problem.utility,
         radius: problem.radius,
         support: problem.support.map(|support| LowestReturn { min: support.min }),
-        history: problem.history.iter().map(|&value| vec![value]).collect(),
+        history,
     }
 }

@@ -59,11 +59,11 @@ function drawn({ own, per_year }, { bootstrap, best, points: scales }) {
   );
 }
 
-/** A button that asks for it, of a problem as a policy has it with the returns and the wealth of now. */
-export function asking(asked, history, initial_wealth) {
+/** A button that asks for it, of a problem as a policy has it with the returns and the wealth of now; `fund` where there are several assets. */
+export function asking({ problem: asked, fund }, history, initial_wealth) {
   const { rate_per_step, periods_per_year, action_interval, utility, radius, support } = asked;
   const investor = { initial_wealth, action_interval, utility, radius, support };
-  const problem = { history, rate_per_step, periods_per_year, ...investor };
+  const problem = { history, rate_per_step, periods_per_year, ...investor, ...(fund && several(fund, radius)) };
   const button = h("button", { class: "quiet" }, "How much caution?");
   button.addEventListener("click", async () => {
     button.disabled = true;
@@ -77,4 +77,10 @@ export function asking(asked, history, initial_wealth) {
     button.disabled = false;
   });
   return button;
+}
+
+/** What is asked of several assets; the scale of the radius before it was made wide enough for all their funds. */
+function several({ assets, ground_norm, support, radius_factor }, radius) {
+  const scale = radius.scale && radius.scale / radius_factor;
+  return { assets, ground_norm, support, radius: { ...radius, scale } };
 }

@@ -91,7 +91,7 @@ async function fill(holder, told) {
   );
 }
 
-/** The same of several assets, of which no other caution is told. */
+/** The same of several assets, of which no other caution is advised. */
 function fillSeveral(holder, shown, action) {
   const { history, calendar } = shown;
   const advice = severalAdvice(action, place(shown, action), history.assets, [severalForm(action, shown), lastReport(shown)]);
@@ -103,6 +103,7 @@ function fillSeveral(holder, shown, action) {
     severalWorst(action, history.assets, calendar),
     severalHeld(shown),
     observed(shown),
+    frontier(shown),
   );
 }
 
@@ -188,17 +189,19 @@ const held = (shown, action) => section("What it held", h("div", { class: "duo" 
 
 /** What more or less caution would lose, where the policy has a ball. */
 function frontier({ session, policy, history, canTry }) {
-  const { problem } = policy.specification;
+  const { problem, fund } = policy.specification;
   if (!canTry || !hasBall(problem)) return "";
-  const seen = history.observations.map((row) => (row.now ?? row).log_return).filter((value) => value !== null);
+  const inOrder = (returns) => returns && fund.assets.map((name) => returns[name]);
+  const returnOf = (row) => (fund ? inOrder(row.assets.log_returns) : row.log_return);
+  const seen = history.observations.map((row) => returnOf(row.now ?? row)).filter((value) => value !== null);
   const element = section(
     "How much caution",
     h(
       "p",
       { class: "note" },
-      "What other amounts of caution would lose on some hundreds of records drawn like this one, a period at a time: without a trading cost, without forgetting, and without money that comes and goes.",
+      "What other amounts of caution would lose on many records drawn like this one, a period at a time: without a trading cost, without forgetting, and without money that comes and goes.",
     ),
-    h("p", {}, asking(problem, [...history.history, ...seen], session.wealth)),
+    h("p", {}, asking(policy.specification, [...history.history, ...seen], session.wealth)),
   );
   element.classList.add("asked-for");
   element.dataset.needs = "train";

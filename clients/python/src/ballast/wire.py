@@ -2118,8 +2118,8 @@ class FrontierRequest(TypedDict):
     """One asset as in `/advise`, or several."""
     scales: NotRequired[list[Scale]]
     """Multiples of the radius of the rule, ascending. 0 takes the record for the law."""
-    resamples: NotRequired[int]
-    """Resampled records of each kind."""
+    resamples: NotRequired[int | None]
+    """Resampled records of each kind. Default: 400 of one asset, 60 of several, whose steps take longer."""
     block: NotRequired[int | None]
     """Periods in a row that are drawn together, 1 to half of the record. Default: the cube root of its length."""
     seed: NotRequired[int]

@@ -116,7 +116,8 @@ impl Frontier {
         let request = &self.question.request;
         let best = self.step(&law.rows, 0.0).solve(None).allocation;
         let best_worth = self.worth(law, &best);
-        let total = LAWS * request.resamples;
+        let resamples = self.question.resamples;
+        let total = LAWS * resamples;
         let every = (total / REPORTS).max(1);
         let decide = |index: usize| {
             let rows = law.record(kind, self.question.assets.history.len(), request.seed, index)?;
@@ -129,9 +130,8 @@ impl Frontier {
             }
             Ok(decided)
         };
-        let decided =
-            (0..request.resamples).into_par_iter().map(decide).collect::<Result<Vec<Decided>, TrainError>>()?;
-        let sample = Clustered::new(request.resamples, 1, LEVEL);
+        let decided = (0..resamples).into_par_iter().map(decide).collect::<Result<Vec<Decided>, TrainError>>()?;
+        let sample = Clustered::new(resamples, 1, LEVEL);
         let least = least_on_average(&decided);
         let points = request.scales.iter().enumerate().map(|(index, &scale)| {
             let lost: Vec<f64> = decided.iter().map(|decided| decided.lost[index]).collect();
