@@ -15,6 +15,7 @@ use support::{App, specification};
 
 const DASHBOARD: &str = include_str!("../docker/grafana/ballast.json");
 const ALERTS: &str = include_str!("../docker/alerts.yaml");
+const OPERATING: &str = include_str!("../docs/operating.md");
 const PROMETHEUS: &str = include_str!("../docker/prometheus.yaml");
 const CLUSTER: &str = include_str!("../docker/compose.cluster.yaml");
 
@@ -122,6 +123,7 @@ fn every_alert_is_fired_by_prometheus_own_rules() {
     const FIRED: &str = include_str!("data/alerts_fired.yaml");
     for alert in ALERTS.lines().filter_map(|line| line.trim().strip_prefix("- alert: ")) {
         assert!(FIRED.contains(&format!("alertname=\"{alert}\"")), "{alert} is never fired");
+        assert!(OPERATING.contains(&format!("`{alert}`")), "{alert} is not explained");
     }
     let Some(promtool) = promtool() else { return };
     for arguments in [["check", "rules", "docker/alerts.yaml"], ["test", "rules", "tests/data/alerts_fired.yaml"]] {
