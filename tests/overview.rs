@@ -5,10 +5,11 @@ mod support;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
+use ballast::service::config::StoreLocation;
 use reqwest::Method;
 use serde_json::{Value, json};
 use support::patience::within;
-use support::{App, execute, specification};
+use support::{App, execute, postgres, specification};
 
 async fn list(app: &App, query: &str) -> Value {
     let (status, page) = app.get(&format!("/sessions?{query}")).await;
