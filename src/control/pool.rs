@@ -38,11 +38,11 @@ impl TrainingPool {
 fn give_way() {
     // Linux has priorities of threads, elsewhere this would be the whole process. Where it is refused, training is only as
     // important as all else.
-    #[cfg(target_os = "linux")]
-    let _ = rustix::process::setpriority_process(None, LOWEST_PRIORITY);
+    if cfg!(target_os = "linux") {
+        let _ = rustix::process::setpriority_process(None, LOWEST_PRIORITY);
+    }
 }
 
-#[cfg(target_os = "linux")]
 const LOWEST_PRIORITY: i32 = 19;
 
 /// `work` done on every item, in their order, on the pool this is called from.
@@ -50,12 +50,13 @@ pub fn map<T: Send, R: Send>(items: Vec<T>, work: impl Fn(T) -> R + Sync + Send)
     items.into_par_iter().map(work).collect()
 }
 
-#[cfg(all(test, target_os = "linux"))]
+#[cfg(test)]
 mod tests {
     use rustix::process::getpriority_process;
 
     use super::*;
 
+    #[cfg_attr(not(target_os = "linux"), ignore = "only Linux has priorities of threads")]
     #[test]
     fn a_pool_gives_way_and_who_waits_for_it_does_not() {
         let before = getpriority_process(None).unwrap();

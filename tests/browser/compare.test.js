@@ -55,6 +55,18 @@ test("two sessions ticked are told side by side", async () => {
   assert.match(plain(await chart.getAttribute("aria-valuetext")), /At the start: A 100\.00, B 100\.00/);
 });
 
+test("policies that differ are never said to be the same", async () => {
+  const problem = { horizon: 4, rate_per_step: 0.002, history: HISTORY, radius: { rule: "bridge", alpha: 0.1, scale: 0.3 } };
+  const design = { count: 40 };
+  const bounded = await trained(ballast.url, { problem: { ...problem, support: { min: -0.4, max: 0.4 } }, design });
+  const calibrated = await trained(ballast.url, { problem: { ...problem, radius: { ...problem.radius, rule: "calibrated" } }, design });
+  for (const [policy, what] of [[bounded, /They differ in deepest fall assumed; everything else/], [calibrated, /They differ in caution; everything else/]]) {
+    await tick("policies", [careful, policy]);
+    await page.getByRole("heading", { level: 1, name: "Two policies" }).waitFor();
+    assert.match(plain(await page.locator(".lead").innerText()), what);
+  }
+});
+
 test("of policies a third tick takes the place of the first, of sessions as many are ticked as are reported for", async () => {
   const third = (await call(ballast.url, "/sessions", { policy: careful })).session;
   const box = (id) => page.getByRole("row", { name: id.replace(/^[a-z]+_/, "").slice(0, 10) }).first().getByRole("checkbox");

@@ -19,15 +19,47 @@ export async function policiesBeside(ids, leaving) {
   const both = await Promise.all(ids.map((id) => get(`/policies/${id}`, leaving)));
   const asked = both.map(({ specification }) => specification);
   const table = beside("Two policies side by side", "policies", "Policy", ids, both.map(({ name }) => name), rows(asked));
-  return [h("p", { class: "lead" }, sentence(rows(asked))), table, curves(ids, both, leaving)];
+  return [h("p", { class: "lead" }, sentence(rows(asked), asked)), table, curves(ids, both, leaving)];
 }
 
-/** What differs, in a sentence. */
-function sentence(all) {
-  const apart = all.filter(({ cells: [one, other] }) => one !== other).map(({ name }) => name.toLowerCase());
-  if (apart.length === 0) return "The two were asked the same; only their seeds or their precision may differ.";
-  return `They differ in ${apart.length === 1 ? apart[0] : `${apart.slice(0, -1).join(", ")} and ${apart.at(-1)}`}; everything else is the same.`;
+/** What differs, in a sentence: nothing is said to be the same that is not, also where no row tells it. */
+function sentence(all, [one, other]) {
+  const apart = all.filter(({ cells: [left, right] }) => left !== right).map(({ name }) => name.toLowerCase());
+  const alike = JSON.stringify(one) === JSON.stringify(other);
+  if (apart.length === 0) return alike ? "The two were asked the same." : "They differ in details that no row below tells; each policy's own page has them.";
+  const [left, right] = [one, other].map(({ problem, fund }) => ({ ...problem, ...fund }));
+  const fields = new Set([...Object.keys(left), ...Object.keys(right)]);
+  const untold = [...fields].filter((field) => !apart.includes(ROW_OF[field]) && JSON.stringify(left[field]) !== JSON.stringify(right[field]));
+  const rest = untold.length === 0 ? "everything else asked of the investor is the same" : "other details differ too";
+  return `They differ in ${apart.length === 1 ? apart[0] : `${apart.slice(0, -1).join(", ")} and ${apart.at(-1)}`}; ${rest}.`;
 }
+
+/** The row that tells a field of the problem. */
+const ROW_OF = {
+  framework: "kind",
+  utility: "investor",
+  radius: "caution",
+  horizon: "periods ahead",
+  periods_per_year: "periods ahead",
+  rate_per_step: "bank",
+  trading_cost: "trading cost",
+  initial_wealth: "wealth at the start",
+  contributions: "money added",
+  action_interval: "share in stocks allowed",
+  learning: "older returns",
+  centre: "centre",
+  history: "record",
+  assets: "assets",
+  composition: "mix of assets",
+  ground_norm: "distance of markets",
+  support: "deepest fall assumed",
+  radius_factor: "assets",
+};
+
+/** How the total is spread over the assets. */
+const MIXES = { one_step: "Best against the worst market", equal: "Equal shares", inverse_volatility: "By inverse volatility" };
+const mix = (composition) => MIXES[composition] ?? composition.given.map((share) => percent(share, 0)).join(", ");
+const NORMS = { scaled_one: "Each asset by its own volatility", sup: "All assets at once" };
 
 function rows(asked) {
   const problems = asked.map(({ problem }) => problem);
@@ -46,6 +78,9 @@ function rows(asked) {
   };
   return [
     row("Kind", ({ framework }) => FRAMEWORKS[framework]),
+    row("Assets", (_, { fund }) => (fund ? fund.assets.join(", ") : "One")),
+    row("Mix of assets", (_, { fund }) => (fund ? mix(fund.composition) : "None")),
+    row("Distance of markets", (_, { fund }) => (fund ? NORMS[fund.ground_norm] : "Of one asset")),
     row("Investor", (problem) => utility(problem.utility)),
     row("Caution", (problem) => caution(problem)),
     row("Periods ahead", ({ horizon, periods_per_year }) => counted(horizon, unitOf(periods_per_year)), less(({ horizon }) => horizon, (value) => signed(value, count))),
@@ -53,7 +88,8 @@ function rows(asked) {
     row("Trading cost", ({ trading_cost }) => percent(trading_cost, 2), less(({ trading_cost }) => trading_cost, (value) => signed(value, (size) => points(size, 2)))),
     row("Wealth at the start", ({ initial_wealth }) => wealth(initial_wealth), less(({ initial_wealth }) => initial_wealth, (value) => signed(value, wealth))),
     row("Money added", (problem) => flowsInWords(problem) || "None"),
-    row("Most in stocks", ({ action_interval }) => percent(action_interval[1], 0)),
+    row("Share in stocks allowed", ({ action_interval: [least, most] }) => `${percent(least, 0)} to ${percent(most, 0)}`),
+    row("Deepest fall assumed", ({ support: ofOne }, { fund }) => ((fund?.support ?? ofOne)?.min === undefined ? "No bound" : percent(-Math.expm1((fund?.support ?? ofOne).min), 1))),
     row("Older returns", ({ learning }) => (learning.kind === "decay" ? `half after ${significant(learning.half_life)}` : "count like newer ones")),
     row("Centre", ({ centre }) => centreInWords(centre) || "The returns seen"),
     { name: "Record", cells: [record(one), same ? record(one) : `${record(other)}${record(other) === record(one) ? " (other returns)" : ""}`], apart: `mean ${signed(records[1].mean - records[0].mean, (value) => points(value, 2))}` },

@@ -9,13 +9,24 @@ const WANTED = [
 ];
 /** What else the parser says before what it wants. */
 const PARSER = /^(?:invalid (?:type|value|length)|unknown (?:variant|field)|missing field)[^]*?, expected /;
-const BOUNDS = /(?:lie|be a number|be a whole number)? ?in ([[(])(-?[\d.e+-]+), (-?[\d.e+-]+)([\])])/;
+const BOUNDS = /(lies?|be a number|be a whole number)? ?in ([[(])(-?[\d.e+-]+), (-?[\d.e+-]+)([\])])/;
+
+/** What a rule names by its place in the request. */
+const PLACES = [
+  [/problem\.horizon = (?=\d)/g, ""],
+  [/problem\.contributions/g, "the money added"],
+  [/(?:problem\.)?\bhorizon\b/g, "the number of periods ahead"],
+];
+/** What the parser of days says of what is none. */
+const NO_DAY = /^(?:failed to parse|unexpected|expected)[^]*\b(?:year|month|day|date)\b/;
 
 /** One sentence for a problem with a `rule`; `unit` is that of the field where it is not the request's: "percent", or "confidence",
  * which is what a share leaves of 100 %. */
 export function problemWords({ value, rule }, label, unit) {
   const name = label.replace(/, %(?=$|,)/, "");
-  return `${name} ${given(value, unit)}; it ${ruled(rule, unit)}.`;
+  const words = ruled(rule, unit);
+  // Of what is asked for and cannot be had, the rule says why, and does not bound a value.
+  return /^must\b/.test(words) ? `${name} ${given(value, unit)}; it ${words}.` : `${name}: ${words}.`;
 }
 
 /** What is unusual about a return, and of which asset where there are several; the rule ends with that, in percent. */
@@ -35,14 +46,17 @@ function ruled(rule, unit) {
   const wanted = WANTED.find(([pattern]) => pattern.test(rule));
   if (wanted) return `must be ${wanted[1]}`;
   if (PARSER.test(rule)) return `must be ${rule.replace(PARSER, "").replaceAll("`", "")}`;
+  if (NO_DAY.test(rule)) return "must be a day such as 2008-09-30";
   const whole = rule.includes("whole number") ? "a whole number " : "";
-  return rule.replace(BOUNDS, (_, opening, low, high, closing) => {
+  const named = PLACES.reduce((words, [place, name]) => words.replace(place, name), rule);
+  return named.replace(BOUNDS, (_, verb, opening, low, high, closing) => {
+    const be = verb === "lies" ? "lies" : "be";
     const turned = unit === "confidence";
     const [ends, marks] = turned ? [[high, low], [closing, opening]] : [[low, high], [opening, closing]];
     const closed = marks.map((mark) => mark === "[" || mark === "]");
-    if (closed[0] && closed[1]) return `be ${whole}from ${number(ends[0], unit, Math.ceil)} to ${number(ends[1], unit, Math.floor)}`;
+    if (closed[0] && closed[1]) return `${be} ${whole}from ${number(ends[0], unit, Math.ceil)} to ${number(ends[1], unit, Math.floor)}`;
     const [above, below] = [closed[0] ? "at least" : "above", closed[1] ? "at most" : "below"];
-    return `be ${whole}${above} ${number(ends[0], unit)} and ${below} ${number(ends[1], unit)}`;
+    return `${be} ${whole}${above} ${number(ends[0], unit)} and ${below} ${number(ends[1], unit)}`;
   });
 }
 

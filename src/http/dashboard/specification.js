@@ -146,7 +146,8 @@ export function caution(problem) {
   const { radius } = problem;
   if (!isCautious(problem)) return "none";
   const { alpha, scale = 1 } = radius;
-  const confidence = alpha === undefined ? radiusRule(radius) : `${percent(1 - alpha, 0)} confidence`;
+  const by = { calibrated: ", calibrated", concentration: " by the concentration bound" }[radius.rule] ?? "";
+  const confidence = alpha === undefined ? radiusRule(radius) : `${percent(1 - alpha, 0)} confidence${by}`;
   return scale === 1 ? confidence : `${confidence}, \u00d7 ${significant(scale)}`;
 }
 

@@ -7,14 +7,14 @@ import { lawChart } from "./law_chart.js";
 
 /** A move to within this of the deepest one is as deep, in log-return. */
 const NEAR = 0.01;
-/** Below this share of it, a market does not differ. */
+/** What moves besides is told from this share on. */
 const LITTLE = 5e-4;
 
 /** What the market assumes beyond the returns seen, a sentence. `unit` is what a period is called, `cautious` whether it might. */
 export function assumed({ transport }, unit, cautious = true) {
   const moves = transport.filter(({ atom, moved_to, mass }) => atom !== moved_to && mass > 0);
   const share = (some) => some.reduce((sum, { mass }) => sum + mass, 0);
-  if (share(moves) < LITTLE) return `It assumes that every ${unit} comes as those seen did${cautious ? ": no market allowed does worse to this advice" : ""}.`;
+  if (moves.length === 0) return `It assumes that every ${unit} comes as those seen did${cautious ? ": no market allowed does worse to this advice" : ""}.`;
   const lowest = Math.min(...moves.map(({ moved_to }) => moved_to));
   const deep = moves.filter(({ moved_to }) => moved_to <= lowest + NEAR);
   const rest = share(moves) - share(deep);
