@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
-use ballast::control::evaluation::assets::report::AssetsBacktestReport;
-use ballast::control::evaluation::assets::{AssetsBacktest, AssetsChoices, AssetsRecord, AssetsWalked};
+use ballast::control::evaluation::assets::report::{AssetsBacktestReport, AssetsChoices};
+use ballast::control::evaluation::assets::{AssetsBacktest, AssetsRecord, AssetsWalked};
 use ballast::control::progress::Watch;
 
 use super::progress::Parts;

@@ -1,7 +1,8 @@
 //! From a walk-forward request of several assets to the walk.
 
+use super::report::AssetsChoices;
 use super::rules::{Rule, strategies};
-use super::{AssetsBacktest, AssetsChoices, AssetsRecord};
+use super::{AssetsBacktest, AssetsRecord};
 use crate::control::error::FieldError;
 use crate::control::request::backtest::days;
 use crate::control::request::backtest_assets::{AssetsBacktestRequest, MOST_HELD, MOST_READ};

@@ -7,9 +7,7 @@
 //! the trading cost. Nothing is trained: a policy of a fund over many periods holds what the one-step problem proposes, and its
 //! worth beyond that is some basis points a year.
 
-use serde::Serialize;
-use utoipa::ToSchema;
-
+use self::report::AssetsChoices;
 use self::rules::{AssetsStrategy, Rule, equal, strategies};
 use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::account::{Account, keep_assets};
@@ -52,23 +50,6 @@ pub struct AssetsRecord {
     pub frequency: Frequency,
     /// Periods in a year.
     pub periods_per_year: usize,
-}
-
-/// How a record of several assets is walked through.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct AssetsChoices {
-    /// Periods that strategies know; null is all since the first.
-    pub windows: Vec<Option<usize>>,
-    /// Periods from one measuring of the radius, and one choice of the static strategy, to the next.
-    pub every: usize,
-    /// Miscoverage of the radius.
-    pub alpha: f64,
-    /// Relative.
-    pub risk_aversion: f64,
-    /// Lost of what is traded, as a share of it.
-    pub trading_cost: f64,
-    /// Of the bridges and of the resamples.
-    pub seed: u64,
 }
 
 /// A prepared walk.

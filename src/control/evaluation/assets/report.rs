@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::AssetsChoices;
 use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEstimate, Performance};
 
 /// Name and version of the report's form.
@@ -36,6 +35,23 @@ pub struct AssetsBacktestReport {
     pub periods: Vec<AssetsPeriods>,
     /// What the figures say, the most important first.
     pub sentences: Vec<String>,
+}
+
+/// How a record of several assets is walked through.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct AssetsChoices {
+    /// Periods that strategies know; null is all since the first.
+    pub windows: Vec<Option<usize>>,
+    /// Periods from one measuring of the radius, and one choice of the static strategy, to the next.
+    pub every: usize,
+    /// Miscoverage of the radius.
+    pub alpha: f64,
+    /// Relative.
+    pub risk_aversion: f64,
+    /// Lost of what is traded, as a share of it.
+    pub trading_cost: f64,
+    /// Of the bridges and of the resamples.
+    pub seed: u64,
 }
 
 /// One strategy in figures.
