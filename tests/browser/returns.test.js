@@ -55,6 +55,16 @@ test("pasted percent are percent", async () => {
   );
 });
 
+test("dates beside returns are dates and no prices, however they are written", async () => {
+  const returns = [0.012, -0.034, 0.021, -0.005];
+  const expected = returns.map((value) => Math.log1p(value));
+  for (const dates of [["2020-01", "2020-02", "2020-03", "2020-04"], ["20200131", "20200229", "20200331", "20200430"]]) {
+    await pasted(`month,fund\n${dates.map((date, index) => `${date},${returns[index]}`).join("\n")}\n`);
+    await note().getByText("4 monthly simple returns as fractions, January 2020 to April 2020").waitFor();
+    close(await history(), expected);
+  }
+});
+
 test("a file that is newest first is turned round, said and drawn", async () => {
   await chosen("prices.csv", "date,close\n2020-03-31,103\n2020-02-29,101\n2020-01-31,100\n");
   await note().getByText("The rows came newest first and are turned round.").waitFor();
