@@ -270,3 +270,97 @@ async fn what_is_wrong_with_several_assets_is_named() {
         assert_eq!((status.as_u16(), refused["field"].as_str()), (422, Some(named.as_str())), "{refused}");
     }
 }
+
+/// The dates that make the extremes are found by asking about every record without one, or with one twice; so are the premium and
+/// the number of periods at which something changes. The radius follows from the number of dates alone, so that it is the same.
+#[tokio::test(flavor = "multi_thread")]
+async fn how_near_advice_on_several_assets_is_to_changing_is_that_of_other_records() {
+    let app = App::start().await;
+    let rows: Vec<Vec<f64>> = (0..30)
+        .map(|k| {
+            let wave = |step: u32| f64::from(k * step % 30) / 30.0 - 0.5;
+            vec![0.012 + 0.09 * wave(7), 0.004 + 0.03 * wave(11), -0.01 + 0.05 * wave(13)]
+        })
+        .collect();
+    let names = ["stocks", "bonds", "gold"];
+    let ask = async |rows: &[Vec<f64>], radius: Value, more: Value| {
+        let problem = json!({ "assets": names, "rate_per_step": 0.001, "history": rows, "radius": radius });
+        let mut question = json!({ "problem": problem });
+        more.as_object().unwrap().iter().for_each(|(field, value)| question[field] = value.clone());
+        let (status, answer) = app.post("/advise", &question).await;
+        assert_eq!(status, 200, "{answer}");
+        answer
+    };
+    let number = |value: &Value| value.as_f64().unwrap_or_else(|| panic!("{value} is no number"));
+    let (none, sensitivity) = (json!({}), json!({ "sensitivity": true }));
+    let bold = json!({ "rule": "root_n", "kappa": 0.02 });
+    let told = ask(&rows, bold.clone(), sensitivity.clone()).await;
+    let plain = ask(&rows, bold.clone(), none.clone()).await;
+    assert_eq!((&told["allocation"], plain.get("sensitivity")), (&plain["allocation"], None));
+    assert!(number(&plain["total"]) > 0.1 && number(&plain["allocation"]["gold"]) == 0.0, "{plain}");
+    let found = &told["sensitivity"];
+
+    // The optimum is flat: shares are told to some thousandths.
+    let near = 5e-3;
+    for (part, record) in [("without_one", false), ("seen_again", true)] {
+        let mut totals = Vec::new();
+        for index in 0..rows.len() {
+            let mut other = rows.clone();
+            if record {
+                other.push(rows[index].clone())
+            } else {
+                drop(other.remove(index))
+            }
+            let answer = ask(&other, bold.clone(), none.clone()).await;
+            totals.push([number(&answer["total"]), number(&answer["allocation"]["bonds"])]);
+        }
+        for (place, range) in [&found[part]["total"], &found[part]["allocation"]["bonds"]].into_iter().enumerate() {
+            let all = || totals.iter().map(|shares| shares[place]);
+            let [lowest, highest] = ["lowest", "highest"].map(|end| number(&range[end]["share"]));
+            assert!((lowest - all().fold(f64::INFINITY, f64::min)).abs() < near, "{part}: {range} {totals:?}");
+            assert!((highest - all().fold(0.0, f64::max)).abs() < near, "{part}: {range} {totals:?}");
+            for end in ["lowest", "highest"] {
+                let index = range[end]["index"].as_u64().unwrap() as usize;
+                assert!((number(&range[end]["share"]) - totals[index][place]).abs() < near, "{range} {totals:?}");
+            }
+        }
+    }
+
+    for (asset, name) in names.into_iter().enumerate() {
+        let premium = &found["premium"][name];
+        let mean = rows.iter().map(|row| row[asset]).sum::<f64>() / 30.0;
+        assert!((number(&premium["present"]) - (mean - 0.001_f64.ln_1p())).abs() < 1e-12, "{premium}");
+        let shift = number(&premium["needed"]) - number(&premium["present"]);
+        assert_eq!(shift > 0.0, name == "gold", "{premium}");
+        let at = async |shift: f64| {
+            let mut other = rows.clone();
+            other.iter_mut().for_each(|row| row[asset] += shift);
+            number(&ask(&other, bold.clone(), none.clone()).await["allocation"][name])
+        };
+        let beside = [at(shift - 1e-4).await, at(shift + 1e-4).await];
+        assert!(beside[0] == 0.0 && beside[1] > 0.0, "{name}: {premium} {beside:?}");
+    }
+    assert_eq!(found["periods_more"], 0);
+
+    // So wide a ball that nothing is held.
+    let wide = ask(&rows, json!({ "rule": "root_n", "kappa": 0.2 }), sensitivity.clone()).await;
+    assert_eq!(wide["total"], 0.0, "{wide}");
+    let more = wide["sensitivity"]["periods_more"].as_u64().unwrap();
+    let within = async |more: u64| {
+        let radius = 0.2 / (30.0 + more as f64).sqrt();
+        number(&ask(&rows, json!({ "rule": "fixed", "radius": radius }), none.clone()).await["total"])
+    };
+    assert!(within(more).await > 0.0 && within(more - 1).await == 0.0, "{more}");
+
+    // A date that alone pays for all of it, and records that are too long.
+    let mut one: Vec<Vec<f64>> = rows.iter().map(|row| row.iter().map(|z| z - 0.015).collect()).collect();
+    one[9] = vec![0.9, 0.4, 0.3];
+    let hangs = ask(&one, json!({ "rule": "fixed", "radius": 0.002 }), sensitivity.clone()).await;
+    let caution = hangs["caution"].as_array().unwrap();
+    assert!(caution.iter().any(|one| one["code"] == "one_return"), "{hangs}");
+    assert!(caution.iter().any(|one| one["sentence"].as_str().unwrap().contains("the date number 10")), "{hangs}");
+    let long: Vec<Vec<f64>> = (0..361).map(|k| rows[k % 30].clone()).collect();
+    let problem = json!({ "assets": names, "rate_per_step": 0.001, "history": long });
+    let (status, problem) = app.post("/advise", &json!({ "problem": problem, "sensitivity": true })).await;
+    assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("sensitivity")), "{problem}");
+}

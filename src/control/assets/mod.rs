@@ -24,6 +24,7 @@ mod certificate;
 pub mod composition;
 pub mod fund;
 mod interior;
+pub mod sensitivity;
 pub mod worst;
 
 use self::branches::Branches;
