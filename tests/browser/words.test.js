@@ -64,7 +64,7 @@ test("a refusal names the field, the value and the rule in the unit of the field
     [{ value: 0.6, rule: "must lie in [-0.5, 0.5]" }, "Bank return per month, %", "percent", "Bank return per month is 60 %; it must be from -50 % to 50 %."],
     [{ value: 7, rule: "must lie in [-5, 5]" }, "Returns or prices, number 4,", null, "Returns or prices, number 4, is 7; it must be from -5 to 5."],
     [{ value: "x", rule: "unknown variant `x`, expected one of `log`, `power`" }, "Kind", null, "Kind is \u201cx\u201d; it must be one of log, power."],
-    [{ value: -1000, rule: "must leave a wealth that lies in [0.000001, 1000000]" }, "Money added", null, "Money added is -1,000; it must leave a wealth that lies from 0.000001 to 1,000,000."],
+    [{ value: -1000, rule: "must leave a wealth that lies in [0.000001, 1000000]" }, "Money added", null, "Money added is -1000; it must leave a wealth that lies from 0.000001 to 1,000,000."],
     [{ value: "31.01.2020", rule: "failed to parse four digit integer as year: invalid digit, expected 0-9 but got ." }, "Last day", null, "Last day is \u201c31.01.2020\u201d; it must be a day such as 2008-09-30."],
     [{ value: true, rule: "a session rolls only by a policy that learns" }, "How it goes on", null, "How it goes on: a session rolls only by a policy that learns."],
     [{ value: [1], rule: "must hold problem.horizon = 12 numbers" }, "Money added", null, "Money added is not as it must be; it must hold 12 numbers."],
