@@ -6,7 +6,6 @@ use utoipa::ToSchema;
 use super::error::ServiceError;
 use super::sessions::Sessions;
 use crate::control::assets::advice::AssetsAdvice;
-use crate::control::assets::sensitivity::{AssetsSensitivity, check_cost};
 use crate::control::request::annualised::Annualised;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::rules;
@@ -27,9 +26,6 @@ pub struct AdviseAssets {
     /// Of the simulated bridges.
     #[serde(default = "default_seed")]
     pub seed: u64,
-    /// Whether to say how near the advice is to changing.
-    #[serde(default)]
-    pub sensitivity: bool,
 }
 
 /// The advice on several assets.
@@ -37,9 +33,6 @@ pub struct AdviseAssets {
 pub struct AssetsAdvised {
     #[serde(flatten)]
     pub advice: AssetsAdvice,
-    /// How near it is to changing, where that was asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sensitivity: Option<AssetsSensitivity>,
     /// Of the fund of inverse volatilities, where `problem.periods_per_year` is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub annualised: Option<Annualised>,
@@ -65,19 +58,16 @@ impl Sessions {
     /// # Errors
     /// A field breaks a rule; the radius asks for more memory than can be kept; no turn to solve.
     pub async fn advise_assets(&self, tenant: &Tenant, question: AdviseAssets) -> Result<AssetsAdvised, ServiceError> {
-        let AdviseAssets { mut problem, wealth, seed, sensitivity } = question;
+        let AdviseAssets { mut problem, wealth, seed } = question;
         if let Some(wealth) = wealth {
             rules::wealth("wealth", wealth)?;
             problem.initial_wealth = wealth;
         }
         let fund = self.policies.one_period(&problem.fund(seed)?)?;
-        sensitivity.then(|| check_cost(&problem)).transpose()?;
         let solving = move || {
-            let (mut advice, solution) = AssetsAdvice::of(&problem, fund.problem(), fund.radius()?, seed);
-            let sensitivity = sensitivity.then(|| AssetsSensitivity::of(&problem, &fund, &advice, &solution));
-            advice.caution.extend(sensitivity.as_ref().and_then(|found| found.caution.clone()));
+            let advice = AssetsAdvice::of(&problem, fund.problem(), fund.radius()?, seed);
             let (annualised, warnings) = (fund.problem().annualised(), fund.problem().warnings());
-            Ok::<_, ServiceError>(AssetsAdvised { advice, sensitivity, annualised, warnings })
+            Ok::<_, ServiceError>(AssetsAdvised { advice, annualised, warnings })
         };
         self.resolving.run(tenant, solving).await?
     }

@@ -1,7 +1,7 @@
 //! From a question about several assets to the advice.
 
 use super::advice::{AssetsAdvice, named, worst_means};
-use super::{AssetsLaw, AssetsSolution, AssetsStep};
+use super::{AssetsLaw, AssetsStep};
 use crate::control::policy::caution::Caution;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
@@ -44,17 +44,17 @@ pub fn step(problem: &AssetsProblem, fund: &ProblemSpecification, rows: &[Vec<f6
 
 impl AssetsAdvice {
     /// The step of `problem`, whose fund of inverse volatilities has the completed problem `fund` and the radius `of_fund`, with the
-    /// seed of its simulations; and the solution that it is.
+    /// seed of its simulations.
     /// Cost: that of [`AssetsStep::solve`], and of the joint factor under `bridge` and `calibrated`.
     /// Checked by: `tests/advise.rs::several_assets_are_advised_by_name_as_solved_directly`.
-    pub fn of(problem: &AssetsProblem, fund: &ProblemSpecification, of_fund: f64, seed: u64) -> (Self, AssetsSolution) {
+    pub fn of(problem: &AssetsProblem, fund: &ProblemSpecification, of_fund: f64, seed: u64) -> Self {
         let rows = &problem.history;
         let radius_factor = radius_factor(problem, fund, seed);
         let radius = radius_factor * of_fund;
         let floor = fund.initial_wealth * (1.0 + fund.rate_per_step);
         let solution = step(problem, fund, rows, radius).solve(None);
         let composition = CompositionRule::OneStep.composition(rows, || solution.clone());
-        let advice = AssetsAdvice {
+        AssetsAdvice {
             allocation: named(&problem.assets, &solution.allocation),
             composition: named(&problem.assets, &composition),
             total: solution.allocation.iter().sum(),
@@ -66,7 +66,6 @@ impl AssetsAdvice {
             sample_size: rows.len(),
             worst_means: worst_means(&problem.assets, rows, &solution),
             caution: Caution::short_record(rows.len(), rows.len() as f64).into_iter().collect(),
-        };
-        (advice, solution)
+        }
     }
 }

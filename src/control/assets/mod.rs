@@ -24,7 +24,6 @@ mod certificate;
 pub mod composition;
 pub mod fund;
 mod interior;
-pub mod sensitivity;
 pub mod worst;
 
 use self::branches::Branches;

@@ -42,16 +42,6 @@ impl Caution {
         Some(Caution { code: CautionCode::ShortRecord, sentence })
     }
 
-    /// Of a date of several assets without which the advice would be another.
-    pub(in crate::control) fn one_date(index: usize, without: f64, with: f64) -> Self {
-        let [without, with] = [without, with].map(|share| 100.0 * share);
-        let sentence = format!(
-            "Without the date number {} of its record the advice would be to hold {without:.1} % in all, and with it is {with:.1} %.",
-            index + 1
-        );
-        Caution { code: CautionCode::OneReturn, sentence }
-    }
-
     /// Of a return without which the advice would be another.
     pub(super) fn one_return(simple_return: f64, without: f64, with: f64) -> Self {
         let [lacking, without, with] = [simple_return, without, with].map(|share| 100.0 * share);

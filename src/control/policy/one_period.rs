@@ -10,7 +10,6 @@ use crate::control::error::FieldError;
 use crate::control::kept::Kept;
 use crate::control::problem::state::State;
 use crate::control::request::framework::Framework;
-use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::{ProblemSpecification, Specification};
 use crate::control::solved_step::StepSolution;
 use crate::control::uncertainty::radius::RadiusEstimator;
@@ -51,7 +50,7 @@ impl OnePeriod {
     /// A holding that is no share.
     pub fn sensitivity(&self, holding: f64, advice: &Advice) -> Result<Sensitivity, FieldError> {
         let state = self.state(holding)?;
-        let radius = Some(self.found_rule());
+        let radius = Some(RadiusEstimator::new(self.advisor.specification(), self.kept.clone()).found_rule());
         let of = |record: &[f64]| {
             let problem = ProblemSpecification { history: record.to_vec(), radius, ..self.problem().clone() };
             let specification = Specification { problem, ..self.advisor.specification().clone() };
@@ -60,23 +59,6 @@ impl OnePeriod {
             OnePeriod::new(&specification, self.kept.clone()).advisor.advise(0, &state, AdviceMode::Resolve).allocation
         };
         Ok(self.advisor.sensitivity_by(0, &state, &self.problem().history, advice, &of))
-    }
-
-    /// The rule of the radius, of a calibrated one with its factor.
-    fn found_rule(&self) -> RadiusRule {
-        RadiusEstimator::new(self.advisor.specification(), self.kept.clone()).found_rule()
-    }
-
-    /// The same with the factor of a calibrated radius as it was found.
-    pub fn knowing_its_factor(&self) -> Self {
-        let problem = ProblemSpecification { radius: Some(self.found_rule()), ..self.problem().clone() };
-        OnePeriod::new(&Specification { problem, ..self.advisor.specification().clone() }, self.kept.clone())
-    }
-
-    /// The radius were the record another.
-    pub fn radius_of(&self, record: &[f64]) -> f64 {
-        let law = self.problem().learning.law(record);
-        self.advisor.radius(&State { law, wealth: self.problem().initial_wealth, holding: 0.0 })
     }
 
     /// Checks that [`Self::sensitivity`] can be told at a bounded cost.

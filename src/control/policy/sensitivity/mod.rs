@@ -9,8 +9,6 @@ mod search;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-pub use self::search::LONGEST_RECORD;
-pub(in crate::control) use self::search::{RESOLUTION, is_invested, is_other, parted, periods_more};
 pub(super) use self::search::{check_cost, check_learning};
 use super::advice::Advice;
 use super::caution::Caution;

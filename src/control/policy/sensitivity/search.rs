@@ -26,7 +26,7 @@ const WIDENED: f64 = 0.5;
 /// Equal parts into which the next returns considered are cut.
 const PARTS: usize = 48;
 /// Returns and shifts are told to this, in log-return.
-pub(in crate::control) const RESOLUTION: f64 = 1e-6;
+const RESOLUTION: f64 = 1e-6;
 /// An allocation this near to an end of the action interval is at it: ten times what the search for the best leaves open.
 const AT_AN_END: f64 = 1e-6;
 /// An advice that moves by more than this share of the action interval is another one.
@@ -160,7 +160,9 @@ impl Asked<'_> {
     fn hangs_on_one(&self, WithoutOne { lowest, highest }: WithoutOne) -> Option<Caution> {
         let told = self.advice.allocation;
         let change = |left_out: &LeftOut| (left_out.allocation - told).abs();
-        let is_another = |left_out: &LeftOut| is_other(left_out.allocation, told, self.highest);
+        let is_another = |left_out: &LeftOut| {
+            is_invested(left_out.allocation) != is_invested(told) || change(left_out) > FAR * self.highest
+        };
         let ends = [lowest, highest].into_iter().filter(is_another);
         let worst = ends.max_by(|one, other| change(one).total_cmp(&change(other)))?;
         Some(Caution::one_return(worst.simple_return, worst.allocation, told))
@@ -226,9 +228,23 @@ impl Asked<'_> {
     }
 
     fn periods_more(&self) -> Option<usize> {
-        let Advice { allocation, radius, .. } = *self.advice;
+        if is_invested(self.advice.allocation) {
+            return Some(0);
+        }
+        if let RadiusRule::Fixed { .. } = self.problem.radius_rule() {
+            return None;
+        }
         let size = |more: usize| self.problem.learning.effective_size(self.record.len() + more);
-        periods_more(self.problem.radius_rule(), (allocation, radius), size, self.within)
+        let leaves = |more: usize| is_invested((self.within)(self.advice.radius * (size(0) / size(more)).sqrt()));
+        let (mut too_few, mut enough) = (0, MOST_PERIODS);
+        if !leaves(enough) {
+            return None;
+        }
+        while enough - too_few > 1 {
+            let between = usize::midpoint(too_few, enough);
+            if leaves(between) { enough = between } else { too_few = between }
+        }
+        Some(enough)
     }
 
     fn extremes(&self) -> [f64; 2] {
@@ -244,45 +260,13 @@ impl Asked<'_> {
     }
 }
 
-/// How many more returns it takes until anything is held where `allocation` is with that radius: `size` is the effective size of so
-/// many more, and `within` what would be held within another radius.
-pub(in crate::control) fn periods_more(
-    rule: RadiusRule,
-    (allocation, radius): (f64, f64),
-    size: impl Fn(usize) -> f64,
-    within: impl Fn(f64) -> f64,
-) -> Option<usize> {
-    if is_invested(allocation) {
-        return Some(0);
-    }
-    if let RadiusRule::Fixed { .. } = rule {
-        return None;
-    }
-    let leaves = |more: usize| is_invested(within(radius * (size(0) / size(more)).sqrt()));
-    let (mut too_few, mut enough) = (0, MOST_PERIODS);
-    if !leaves(enough) {
-        return None;
-    }
-    while enough - too_few > 1 {
-        let between = usize::midpoint(too_few, enough);
-        if leaves(between) { enough = between } else { too_few = between }
-    }
-    Some(enough)
-}
-
-/// Whether one of two advices is another than the other, where the highest allocation is that: far from it, or the bank alone
-/// where the other is not.
-pub(in crate::control) fn is_other(one: f64, other: f64, highest: f64) -> bool {
-    is_invested(one) != is_invested(other) || (one - other).abs() > FAR * highest
-}
-
 /// Whether an allocation is more than the bank alone.
-pub(in crate::control) fn is_invested(allocation: f64) -> bool {
+fn is_invested(allocation: f64) -> bool {
     allocation > AT_AN_END
 }
 
 /// Halves an interval, of whose ends the upper one alone is above, down to one as narrow as can be told that is so too.
-pub(in crate::control) fn parted([mut below, mut above]: [f64; 2], is_above: impl Fn(f64) -> bool) -> [f64; 2] {
+fn parted([mut below, mut above]: [f64; 2], is_above: impl Fn(f64) -> bool) -> [f64; 2] {
     while above - below > RESOLUTION {
         let between = f64::midpoint(below, above);
         if is_above(between) { above = between } else { below = between }
