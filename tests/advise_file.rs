@@ -87,7 +87,7 @@ fn more_days_than_a_radius_is_simulated_for_need_a_window() {
     let path = folder.path().join("days.csv");
     let first = jiff::civil::date(1970, 1, 1);
     let day = |day: i64| {
-        format!("{},{}\n", first.checked_add(jiff::Span::new().days(day)).unwrap(), 0.001 * (day % 7 - 2) as f64)
+        format!("{},{}\n", first.checked_add(jiff::Span::new().days(day)).unwrap(), 0.001 * (day % 7 - 3) as f64)
     };
     std::fs::write(&path, format!("date,return\n{}", (0..15_000).map(day).collect::<String>())).unwrap();
     let asked = ["advise", path.to_str().unwrap(), "--rate", "0"];

@@ -60,7 +60,7 @@ test("policies that differ are never said to be the same", async () => {
   const design = { count: 40 };
   const bounded = await trained(ballast.url, { problem: { ...problem, support: { min: -0.4, max: 0.4 } }, design });
   const calibrated = await trained(ballast.url, { problem: { ...problem, radius: { ...problem.radius, rule: "calibrated" } }, design });
-  for (const [policy, what] of [[bounded, /They differ in deepest fall assumed; everything else/], [calibrated, /They differ in caution; everything else/]]) {
+  for (const [policy, what] of [[bounded, /They differ in moves assumed possible; everything else/], [calibrated, /They differ in caution; everything else/]]) {
     await tick("policies", [careful, policy]);
     await page.getByRole("heading", { level: 1, name: "Two policies" }).waitFor();
     assert.match(plain(await page.locator(".lead").innerText()), what);

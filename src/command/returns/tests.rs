@@ -52,8 +52,8 @@ fn what_the_file_does_not_say_is_asked_with_the_options_that_say_it() {
         asked,
         "Which day is 01/02/2008?\n  --day-first true: 1 February 2008. 3 monthly simple returns as fractions, February 2008 to \
          April 2008, as in column fund. Mean 6.67 % and deviation 25.17 % a month, 80.00 % and 87.18 % a year.\n  --day-first \
-         false: 2 January 2008. 3 daily simple returns as fractions, 2 January 2008 to 4 January 2008, as in column fund. Mean \
-         6.67 % and deviation 25.17 % a day, 1680.00 % and 399.50 % a year.\nAre the returns fractions or percent? What is \
+         false: 2 January 2008. 3 daily simple returns in percent, 2 January 2008 to 4 January 2008, as in column fund. Mean \
+         0.07 % and deviation 0.25 % a day, 16.80 % and 3.99 % a year.\nAre the returns fractions or percent? What is \
          0.3?\n  --unit fraction: Fractions: 0.3 is 30.00 %. 3 monthly simple returns as fractions, February 2008 to April \
          2008, as in column fund. Mean 6.67 % and deviation 25.17 % a month, 80.00 % and 87.18 % a year.\n  --unit percent: \
          Percent: 0.3 is 0.30 %. 3 monthly simple returns in percent, February 2008 to April 2008, as in column fund. Mean \

@@ -27,10 +27,10 @@ function sentence(all, [one, other]) {
   const apart = all.filter(({ cells: [left, right] }) => left !== right).map(({ name }) => name.toLowerCase());
   const alike = JSON.stringify(one) === JSON.stringify(other);
   if (apart.length === 0) return alike ? "The two were asked the same." : "They differ in details that no row below tells; each policy's own page has them.";
-  const [left, right] = [one, other].map(({ problem, fund }) => ({ ...problem, ...fund }));
+  const [left, right] = [one, other].map(({ problem, fund, design: { count, ...design }, surrogate, seed }) => ({ ...problem, ...fund, count, design, surrogate, seed }));
   const fields = new Set([...Object.keys(left), ...Object.keys(right)]);
   const untold = [...fields].filter((field) => !apart.includes(ROW_OF[field]) && JSON.stringify(left[field]) !== JSON.stringify(right[field]));
-  const rest = untold.length === 0 ? "everything else asked of the investor is the same" : "other details differ too";
+  const rest = untold.length === 0 ? "everything else is the same" : "other details differ too";
   return `They differ in ${apart.length === 1 ? apart[0] : `${apart.slice(0, -1).join(", ")} and ${apart.at(-1)}`}; ${rest}.`;
 }
 
@@ -52,13 +52,18 @@ const ROW_OF = {
   assets: "assets",
   composition: "mix of assets",
   ground_norm: "distance of markets",
-  support: "deepest fall assumed",
-  radius_factor: "assets",
+  support: "moves assumed possible",
+  count: "precision",
+  seed: "precision",
 };
 
 /** How the total is spread over the assets. */
 const MIXES = { one_step: "Best against the worst market", equal: "Equal shares", inverse_volatility: "By inverse volatility" };
 const mix = (composition) => MIXES[composition] ?? composition.given.map((share) => percent(share, 0)).join(", ");
+const moves = (support) => {
+  const end = (log, word) => (log === undefined ? [] : [`${word} ${percent(Math.expm1(log), 1)}`]);
+  return support ? [...end(support.min, "down to"), ...end(support.max, "up to")].join(", ") : "Any";
+};
 const NORMS = { scaled_one: "Each asset by its own volatility", sup: "All assets at once" };
 
 function rows(asked) {
@@ -89,7 +94,7 @@ function rows(asked) {
     row("Wealth at the start", ({ initial_wealth }) => wealth(initial_wealth), less(({ initial_wealth }) => initial_wealth, (value) => signed(value, wealth))),
     row("Money added", (problem) => flowsInWords(problem) || "None"),
     row("Share in stocks allowed", ({ action_interval: [least, most] }) => `${percent(least, 0)} to ${percent(most, 0)}`),
-    row("Deepest fall assumed", ({ support: ofOne }, { fund }) => ((fund?.support ?? ofOne)?.min === undefined ? "No bound" : percent(-Math.expm1((fund?.support ?? ofOne).min), 1))),
+    row("Moves assumed possible", ({ support }, { fund }) => moves(fund?.support ?? support)),
     row("Older returns", ({ learning }) => (learning.kind === "decay" ? `half after ${significant(learning.half_life)}` : "count like newer ones")),
     row("Centre", ({ centre }) => centreInWords(centre) || "The returns seen"),
     { name: "Record", cells: [record(one), same ? record(one) : `${record(other)}${record(other) === record(one) ? " (other returns)" : ""}`], apart: `mean ${signed(records[1].mean - records[0].mean, (value) => points(value, 2))}` },

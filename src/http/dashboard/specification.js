@@ -147,7 +147,7 @@ export function caution(problem) {
   if (!isCautious(problem)) return "none";
   const { alpha, scale = 1 } = radius;
   const by = { calibrated: ", calibrated", concentration: " by the concentration bound" }[radius.rule] ?? "";
-  const confidence = alpha === undefined ? radiusRule(radius) : `${percent(1 - alpha, 0)} confidence${by}`;
+  const confidence = alpha === undefined ? radiusRule(radius) : `${percentName(1 - alpha)} confidence${by}`;
   return scale === 1 ? confidence : `${confidence}, \u00d7 ${significant(scale)}`;
 }
 
