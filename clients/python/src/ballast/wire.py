@@ -21,19 +21,6 @@ class Annualised(TypedDict):
     """Standard deviation of the history's log-returns, of independent periods: `sqrt(p)` times that of one."""
 
 
-class AssetPremium(TypedDict):
-    """What an asset of the record pays beyond the bank."""
-
-    present: float
-    """Mean log-return less `ln(1 + rate_per_step)`, a period."""
-    needed: NotRequired[float | None]
-    """
-    The same where every return of this asset alone is shifted by the amount at which its share leaves 0, found by halving to
-    1e-6: above `present` where it is not held now, else below it. Null where no shift up to the distance between its lowest
-    and its highest return does it.
-    """
-
-
 Asset: TypeAlias = str
 
 
@@ -208,15 +195,6 @@ class BootstrapEstimate(TypedDict):
     """Its ends."""
 
 
-class ByDate(TypedDict):
-    """A share of wealth, and the date of the record that makes it."""
-
-    index: int
-    """In the record, from 0."""
-    share: float
-    """The share of wealth."""
-
-
 class CareCount(TypedDict):
     """How many sessions need care, and why; one may have several reasons."""
 
@@ -371,15 +349,6 @@ class ExpectedError(TypedDict):
 
 
 Explain: TypeAlias = Literal["worst_case"]
-
-
-class Extremes(TypedDict):
-    """The lowest and the highest of a share, each with the date that makes it."""
-
-    lowest: ByDate
-    """The lowest."""
-    highest: ByDate
-    """The highest."""
 
 
 FeatureMap: TypeAlias = Literal["standardized", "raw_moments"]
@@ -645,15 +614,6 @@ class Observe(TypedDict):
 
 
 Tag: TypeAlias = str
-
-
-class OverDates(TypedDict):
-    """The range of an advice over the records that differ by one date."""
-
-    total: Extremes
-    """Of the share of wealth in all assets together."""
-    allocation: dict[str, Extremes]
-    """Of the share of wealth in each asset, by its name."""
 
 
 class OwnMix(TypedDict):
@@ -1312,22 +1272,6 @@ class AssetsProblem(TypedDict):
     """Log-returns, date by date, oldest first; each date has one for each asset."""
 
 
-class AssetsSensitivity(TypedDict):
-    """How near an advice on several assets is to changing."""
-
-    without_one: NotRequired[OverDates | None]
-    seen_again: OverDates
-    """With one date of the record seen once more."""
-    premium: dict[str, AssetPremium]
-    """What each asset pays beyond the bank, and what it would have to, by its name."""
-    periods_more: NotRequired[int | None]
-    """
-    More dates, of the law of those seen, after which anything is held: the least number m at which the step with the radius
-    times sqrt(n / (n + m)) holds something. 0 where something is held already; null where it is not within 10000 periods, or
-    the radius rule is `fixed`.
-    """
-
-
 class BacktestFigures(Performance):
     """One strategy in figures."""
 
@@ -1899,8 +1843,6 @@ class AdviseAssets(TypedDict):
     """Wealth now. Default: the problem's initial wealth."""
     seed: NotRequired[int]
     """Of the simulated bridges."""
-    sensitivity: NotRequired[bool]
-    """Whether to say how near the advice is to changing."""
 
 
 AdviseQuestion: TypeAlias = Advise | AdviseAssets
@@ -1960,7 +1902,6 @@ class AssetsAdvice(TypedDict):
 class AssetsAdvised(AssetsAdvice):
     """The advice on several assets."""
 
-    sensitivity: NotRequired[AssetsSensitivity | None]
     annualised: NotRequired[Annualised | None]
     warnings: list[Warning]
     """What in the question may be a mistake."""
