@@ -234,6 +234,9 @@ fn every_field_of_every_request_has_its_row_and_its_bounds() {
                         said.extend(rows(elsewhere, &field));
                     }
                 }
+                if outermost.iter().any(|row| row.contains("[`problem.centre`](#centres)")) {
+                    said.extend(rows(&linked[0].1, &format!("problem.{field}")));
+                }
                 assert!(!said.is_empty(), "{operation_name}: no row for {field}");
                 for end in ends(&schema) {
                     assert!(has_number(&said.join(" "), end), "{field} does not say {end}");
