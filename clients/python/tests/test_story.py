@@ -331,7 +331,8 @@ def test_every_field_of_a_walk_forward_is_an_argument() -> None:
 
 
 def test_every_hypothesis_is_an_argument() -> None:
-    arguments = set(inspect.signature(Session.what_if).parameters) - {"self"}
+    asked = (Session.what_if, Session.assets_what_if)
+    arguments = {name for call in asked for name in inspect.signature(call).parameters} - {"self"}
     assert arguments == set(wire.WhatIf.__annotations__) - {"session"}
 
 

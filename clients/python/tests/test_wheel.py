@@ -35,5 +35,5 @@ def test_what_the_package_needs_is_little_and_the_rest_is_chosen() -> None:
     assert always == {"httpx", "typing-extensions"}
     extras = set(re.findall(r"extra == '(\w+)'", "\n".join(needed)))
     readme = (HERE / "README.md").read_text()
-    assert extras == {"pandas", "plots", "sklearn", "skfolio", "test"}
+    assert extras == {"pandas", "plots", "progress", "sklearn", "skfolio", "test"}
     assert extras - {"test"} <= set(re.findall(r"\[(\w+)\]", readme))
