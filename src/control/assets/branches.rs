@@ -13,6 +13,8 @@ use crate::numerics::levelling::{Levelling, Phase};
 /// Newton steps for a local minimum, which it is approached from one side by; they double the digits from the third or so on.
 const NEWTON_STEPS: usize = 40;
 const NEWTON_TOLERANCE: f64 = 1e-13;
+/// The factor by which the level of a branch moves in a step, at most.
+const NEAR: f64 = 1.5;
 /// At 1 a local minimum and a maximum meet.
 const MOST_FOLLOWED: f64 = 1.0 - 1e-4;
 
@@ -173,13 +175,9 @@ impl Branches {
             for (index, &share) in allocation.iter().enumerate() {
                 let position = step.ground.lowered(index, positions[index], floors[index], level);
                 wealth += position;
-                // What is not held moves for nothing where all move together, and does not move where each is paid for.
                 let growth = match share > 0.0 {
                     true => position / share,
-                    false if step.ground.is_sup() => {
-                        (growths[index] * level).max(step.least_growth).min(growths[index])
-                    }
-                    false => growths[index],
+                    false => step.unheld(growths[index], level),
                 };
                 let moves = follows && position < positions[index] && position > floors[index];
                 moving += if moves { position } else { 0.0 };
@@ -219,9 +217,10 @@ struct Inside {
     moving: f64,
 }
 
-/// Levels as near as those of one branch before and after a step.
+/// True for levels as near as those of one branch before and after a step. Two branches of an atom are often no further apart than
+/// the factor 2: were the one that has gone taken for the other, nothing would keep a step from where it comes back, far below.
 fn near(left: f64, right: f64) -> bool {
-    (1.0 / 3.0..3.0).contains(&(left / right))
+    (1.0 / NEAR..NEAR).contains(&(left / right))
 }
 
 /// Tells the level of every local minimum of u(w) + price D along the phases, but for D = 0, and whether it lies inside a phase.
