@@ -1,6 +1,7 @@
 //! The bounds that the search tells of every point: they hold whatever its state.
 
 use super::interior::{Interior, dot};
+use crate::numerics::dispatch::dispatched;
 
 /// Others enter where they raise the bound by more than this share of the gap without them, and with the one that raises it
 /// most those of at least this share of its slope.
@@ -18,27 +19,29 @@ impl Interior<'_> {
         }
         let masses = self.law();
         let (mut mean, mut gradient, mut others) = (0.0, vec![0.0; assets], vec![0.0; self.whole.assets()]);
-        for atom in 0..self.step.atoms() {
-            for branch in self.branches.of(atom) {
-                let (found, mass) = (&self.branches.all[branch], masses[branch]);
-                mean += mass * (found.payoff - price * found.cost);
-                let weight = mass * found.slope;
-                let excess = self.branches.excess(branch);
-                gradient.iter_mut().zip(excess).for_each(|(sum, excess)| *sum += weight * excess);
-                if assets < others.len() {
-                    let growths = self.whole.growth(atom).iter();
-                    let excess = growths.map(|growth| self.whole.unheld(*growth, found.level) - 1.0);
-                    others.iter_mut().zip(excess).for_each(|(sum, excess)| *sum += weight * excess);
+        dispatched!({
+            for atom in 0..self.step.atoms() {
+                for branch in self.branches.of(atom) {
+                    let (found, mass) = (&self.branches.all[branch], masses[branch]);
+                    mean += mass * (found.payoff - price * found.cost);
+                    let weight = mass * found.slope;
+                    for (sum, excess) in gradient.iter_mut().zip(self.branches.excess(branch)) {
+                        *sum += weight * excess;
+                    }
+                    if assets < others.len() {
+                        for (sum, growth) in others.iter_mut().zip(self.whole.growth(atom)) {
+                            *sum += weight * (self.whole.unheld(*growth, found.level) - 1.0);
+                        }
+                    }
                 }
             }
-        }
+        });
         self.held.iter().for_each(|&asset| others[asset] = f64::NEG_INFINITY);
         let steepest = |gradient: &[f64]| gradient.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let (among, outside) = (steepest(&gradient), steepest(&others));
         let total = self.step.total;
-        let upper = |steepest: f64| {
-            mean + (total.highest * steepest).max(total.lowest * steepest) - dot(&gradient, shares)
-        };
+        let upper =
+            |steepest: f64| mean + (total.highest * steepest).max(total.lowest * steepest) - dot(&gradient, shares);
         self.upper = self.upper.min(upper(among.max(outside)));
         if upper(among.max(outside)) - upper(among) > ENTERING * (upper(among) - self.lower) {
             let counts = |asset: &usize| others[*asset] - among > ENTERING_TOO * (outside - among);

@@ -15,8 +15,8 @@
 mod newton;
 
 use self::newton::Direction;
-use super::branches::Branches;
 use super::AssetsStep;
+use super::branches::Branches;
 
 /// What a barrier is brought to, of what is reached: after a step of this length, or more; shorter ones do with less.
 const REDUCTIONS: [(f64, f64); 3] = [(0.9, 0.2), (0.5, 0.4), (0.0, 0.9)];

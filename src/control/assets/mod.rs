@@ -41,7 +41,7 @@ const CONTENT: f64 = 1e-7;
 const ROUNDING: f64 = 1e-14;
 /// First barriers of searches, in relative utility, and that of one near a similar step.
 const BARRIERS: [f64; 3] = [1e-3, 1e-2, 1e-1];
-const BARRIER_NEAR: f64 = 1e-4;
+const BARRIER_NEAR: f64 = 1e-5;
 /// Shares below this are rounding of a search that stays inside its bounds.
 const LEAST_SHARE: f64 = 1e-6;
 
@@ -134,7 +134,8 @@ impl AssetsStep {
 
     /// The assets that a search begins with: those held near by, or, where few are ever held, the one of the highest mean.
     fn first_held(&self, near: Option<&AssetsSolution>) -> Vec<usize> {
-        let held: Vec<usize> = (0..self.assets).filter(|&asset| near.is_some_and(|near| near.allocation[asset] > 0.0)).collect();
+        let held: Vec<usize> =
+            (0..self.assets).filter(|&asset| near.is_some_and(|near| near.allocation[asset] > 0.0)).collect();
         if !held.is_empty() {
             return held;
         }
@@ -221,8 +222,11 @@ impl AssetsStep {
 
     /// The growth of what is not held once positions are lowered to a level: it moves for nothing where all move together, and
     /// does not move where each is paid for.
+    #[inline(always)]
     fn unheld(&self, growth: f64, level: f64) -> f64 {
-        if self.ground.is_sup() { (growth * level).max(self.least_growth).min(growth) } else { growth }
+        let moved = if self.ground.is_sup() { growth * level } else { growth };
+        let held_up = if moved > self.least_growth { moved } else { self.least_growth };
+        if held_up < growth { held_up } else { growth }
     }
 
     /// What an allocation is worth at least, in relative utility: the dual at a price of distance.
