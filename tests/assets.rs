@@ -316,6 +316,28 @@ fn the_bounds_hold_between_the_bounds_of_the_total_and_with_a_floor() {
     }
 }
 
+/// Twenty years of twelve industries at which the adversary's crash of all atoms is about to go at the best price: a search that
+/// takes the crash for the small move beside it never closes.
+#[test]
+fn a_window_at_which_the_crash_comes_and_goes_is_certified() {
+    let file = include_str!("../data/us_industries_monthly.csv");
+    let lines = file.lines().filter(|line| !line.starts_with('#')).skip(1);
+    let row = |line: &str| line.split(',').skip(1).take(12).map(|cell| cell.parse::<f64>().unwrap().ln_1p()).collect();
+    let all: Vec<Vec<f64>> = lines.map(row).collect();
+    let returns = &all[716 - 240..716];
+    let deviation = |asset: usize| {
+        let mean = returns.iter().map(|row| row[asset]).sum::<f64>() / 240.0;
+        (returns.iter().map(|row| (row[asset] - mean).powi(2)).sum::<f64>() / 240.0).sqrt()
+    };
+    let radius = 1.3 * (0..12).map(deviation).sum::<f64>() / 12.0 / 240.0_f64.sqrt();
+    for ground in [Ground::Weighted(inverse_volatility(returns)), Ground::Sup] {
+        let law = AssetsLaw { returns, radius, floor: f64::NEG_INFINITY };
+        let solution = AssetsStep::new(law, ground, POWER, 0.003, WHOLE).solve(None);
+        certified(&solution);
+        assert!(solution.value > BP, "{solution:?}");
+    }
+}
+
 #[test]
 fn a_large_radius_at_a_fixed_total_leads_to_inverse_volatilities() {
     let returns: Vec<Vec<f64>> = sample(3, 60, 5).iter().map(|row| vec![0.5 * row[0], row[1], 1.5 * row[2]]).collect();

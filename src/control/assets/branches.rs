@@ -13,6 +13,8 @@ use crate::numerics::levelling::{Levelling, Phase};
 /// Newton steps for a local minimum, which it is approached from one side by; they double the digits from the third or so on.
 const NEWTON_STEPS: usize = 40;
 const NEWTON_TOLERANCE: f64 = 1e-13;
+/// The factor by which the level of a branch moves in a step, at most.
+const NEAR: f64 = 1.5;
 /// At 1 a local minimum and a maximum meet.
 const MOST_FOLLOWED: f64 = 1.0 - 1e-4;
 
@@ -167,19 +169,15 @@ impl Branches {
         let count = allocation.len();
         let phases = levelling.phases(rest, &positions[..count], &floors[..count], &step.ground);
         let mut last = self.last;
-        let bounded = local_minima(phases, step.utility, price, slope, &mut last, |level, follows| {
+        let bounded = local_minima(phases, step.utility, price, slope, &mut last, |level, follows, known| {
             let start = self.still.len();
             let (mut wealth, mut moving) = (rest, 0.0);
             for (index, &share) in allocation.iter().enumerate() {
                 let position = step.ground.lowered(index, positions[index], floors[index], level);
                 wealth += position;
-                // What is not held moves for nothing where all move together, and does not move where each is paid for.
                 let growth = match share > 0.0 {
                     true => position / share,
-                    false if step.ground.is_sup() => {
-                        (growths[index] * level).max(step.least_growth).min(growths[index])
-                    }
-                    false => growths[index],
+                    false => step.unheld(growths[index], level),
                 };
                 let moves = follows && position < positions[index] && position > floors[index];
                 moving += if moves { position } else { 0.0 };
@@ -189,7 +187,7 @@ impl Branches {
             let cost = step.ground.cost(count, level, |index| {
                 positions[index] / step.ground.lowered(index, positions[index], floors[index], level)
             });
-            let (value, slope) = step.utility.at(wealth);
+            let (value, slope) = known.unwrap_or_else(|| step.utility.at(wealth));
             let aversion = step.utility.relative_aversion(wealth) / wealth;
             // Where the level follows only just, it would follow without bounds: such a move counts as one that stays.
             let (room, follows) = (1.0 - aversion * moving, follows && aversion * moving < MOST_FOLLOWED);
@@ -217,14 +215,18 @@ struct Inside {
     at_peak: f64,
     /// What moves; NaN before it is asked for.
     moving: f64,
+    /// The utility and its slope there.
+    utility: (f64, f64),
 }
 
-/// Levels as near as those of one branch before and after a step.
+/// True for levels as near as those of one branch before and after a step. Two branches of an atom are often no further apart than
+/// the factor 2: were the one that has gone taken for the other, nothing would keep a step from where it comes back, far below.
 fn near(left: f64, right: f64) -> bool {
-    (1.0 / 3.0..3.0).contains(&(left / right))
+    (1.0 / NEAR..NEAR).contains(&(left / right))
 }
 
-/// Tells the level of every local minimum of u(w) + price D along the phases, but for D = 0, and whether it lies inside a phase.
+/// Tells the level of every local minimum of u(w) + price D along the phases, but for D = 0, whether it
+/// follows price and allocation, and U and U' there where they are known.
 /// `slope` is U' where nothing is moved. False where there is no least value: it falls for ever.
 fn local_minima(
     phases: &[Phase],
@@ -232,7 +234,7 @@ fn local_minima(
     price: f64,
     mut slope: f64,
     last: &mut Inside,
-    mut found: impl FnMut(f64, bool),
+    mut found: impl FnMut(f64, bool, Option<(f64, f64)>),
 ) -> bool {
     // What a unit of distance takes just before a phase starts; the first one starts at the atom itself.
     let mut before = None;
@@ -240,7 +242,7 @@ fn local_minima(
         let &Phase { fixed, speed, rate, high, low } = phase;
         let start = slope * speed * high / rate;
         if before.is_some_and(|before| before > price && start <= price) {
-            found(high, false);
+            found(high, false, None);
         }
         let end = if low > 0.0 {
             slope = utility.at(fixed + speed * low).1;
@@ -253,18 +255,20 @@ fn local_minima(
             let peak = utility.steepest(fixed);
             if last.fixed != fixed || last.rate != rate {
                 let at_peak = if peak < f64::INFINITY { utility.at(fixed + peak).1 * peak / rate } else { 0.0 };
-                *last = Inside { fixed, rate, at_peak, moving: f64::NAN };
+                *last = Inside { fixed, rate, at_peak, moving: f64::NAN, utility: (0.0, 0.0) };
             }
             if start > price || (peak < speed * high && last.at_peak > price) {
                 if last.moving.is_nan() {
                     last.moving = inside(phase, utility, price, peak.min(speed * high));
+                    last.utility = utility.at(fixed + last.moving);
                 }
-                found(last.moving / speed, true);
+                // Below the end of its phase the level is that of a move all the same, whose utility is another.
+                found(last.moving / speed, true, (last.moving >= speed * low).then_some(last.utility));
             }
         }
     }
     match (before, phases.first()) {
-        (Some(before), Some(last)) if before > price && last.low > 0.0 => found(last.low, false),
+        (Some(before), Some(last)) if before > price && last.low > 0.0 => found(last.low, false, None),
         (Some(before), Some(_)) => return before <= price,
         _ => {}
     }

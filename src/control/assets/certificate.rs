@@ -1,6 +1,12 @@
 //! The bounds that the search tells of every point: they hold whatever its state.
 
 use super::interior::{Interior, dot};
+use crate::numerics::dispatch::dispatched;
+
+/// Others enter where they raise the bound by more than this share of the gap without them, and with the one that raises it
+/// most those of at least this share of its slope.
+const ENTERING: f64 = 1.0;
+const ENTERING_TOO: f64 = 0.5;
 
 impl Interior<'_> {
     /// Both bounds of the step, at this point and from the multipliers' law.
@@ -12,28 +18,57 @@ impl Interior<'_> {
             (self.lower, self.best, self.best_price) = (lower, shares.to_vec(), price);
         }
         let masses = self.law();
-        let (mut mean, mut gradient) = (0.0, vec![0.0; assets]);
-        for (found, (mass, branch)) in self.branches.all.iter().zip(masses.iter().zip(0..)) {
-            mean += mass * (found.payoff - price * found.cost);
-            let weight = mass * found.slope;
-            let excess = self.branches.excess(branch);
-            gradient.iter_mut().zip(excess).for_each(|(sum, excess)| *sum += weight * excess);
-        }
-        let steepest = gradient.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (mut mean, mut gradient, mut others) = (0.0, vec![0.0; assets], vec![0.0; self.whole.assets()]);
+        dispatched!({
+            for atom in 0..self.step.atoms() {
+                for branch in self.branches.of(atom) {
+                    let (found, mass) = (&self.branches.all[branch], masses[branch]);
+                    mean += mass * (found.payoff - price * found.cost);
+                    let weight = mass * found.slope;
+                    for (sum, excess) in gradient.iter_mut().zip(self.branches.excess(branch)) {
+                        *sum += weight * excess;
+                    }
+                    if assets < others.len() {
+                        for (sum, growth) in others.iter_mut().zip(self.whole.growth(atom)) {
+                            *sum += weight * (self.whole.unheld(*growth, found.level) - 1.0);
+                        }
+                    }
+                }
+            }
+        });
+        self.held.iter().for_each(|&asset| others[asset] = f64::NEG_INFINITY);
+        let steepest = |gradient: &[f64]| gradient.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (among, outside) = (steepest(&gradient), steepest(&others));
         let total = self.step.total;
-        let upper = mean + (total.highest * steepest).max(total.lowest * steepest) - dot(&gradient, shares);
-        self.upper = self.upper.min(upper);
+        let upper =
+            |steepest: f64| mean + (total.highest * steepest).max(total.lowest * steepest) - dot(&gradient, shares);
+        self.upper = self.upper.min(upper(among.max(outside)));
+        if upper(among.max(outside)) - upper(among) > ENTERING * (upper(among) - self.lower) {
+            let counts = |asset: &usize| others[*asset] - among > ENTERING_TOO * (outside - among);
+            self.entering = (0..others.len()).filter(counts).collect();
+        }
+    }
+
+    /// A row of the assets searched among as one of all.
+    pub fn of_all(&self, row: &[f64]) -> Vec<f64> {
+        let mut all = vec![0.0; self.whole.assets()];
+        self.held.iter().zip(row).for_each(|(&asset, entry)| all[asset] = *entry);
+        all
     }
 
     /// By how much the law of this point moves each log-return, on average.
     pub fn mean_moves(&self) -> Vec<f64> {
         let masses = self.law();
-        let mut moves = vec![0.0; self.step.assets()];
+        let mut moves = vec![0.0; self.whole.assets()];
         for atom in 0..self.step.atoms() {
+            let growths = self.whole.growth(atom);
             for branch in self.branches.of(atom).skip(1) {
-                let grown = self.branches.excess(branch).iter().zip(self.step.growth(atom));
-                for (sum, (excess, growth)) in moves.iter_mut().zip(grown) {
-                    *sum += masses[branch] * ((excess + 1.0) / growth).ln();
+                let level = self.branches.all[branch].level;
+                let mut moved: Vec<f64> = growths.iter().map(|growth| self.whole.unheld(*growth, level)).collect();
+                let held = self.held.iter().zip(self.branches.excess(branch));
+                held.for_each(|(&asset, excess)| moved[asset] = excess + 1.0);
+                for (sum, (moved, growth)) in moves.iter_mut().zip(moved.iter().zip(growths)) {
+                    *sum += masses[branch] * (moved / growth).ln();
                 }
             }
         }

@@ -15,8 +15,8 @@
 mod newton;
 
 use self::newton::Direction;
+use super::AssetsStep;
 use super::branches::Branches;
-use super::{AssetsSolution, AssetsStep};
 
 /// What a barrier is brought to, of what is reached: after a step of this length, or more; shorter ones do with less.
 const REDUCTIONS: [(f64, f64); 3] = [(0.9, 0.2), (0.5, 0.4), (0.0, 0.9)];
@@ -71,7 +71,12 @@ pub(super) struct Pair {
 
 /// The search.
 pub(super) struct Interior<'a> {
+    /// The step with the assets searched among, which are `held` of the `whole`.
     pub step: &'a AssetsStep,
+    pub whole: &'a AssetsStep,
+    pub held: &'a [usize],
+    /// Others that would raise the value by more than what is left to find among these.
+    pub entering: Vec<usize>,
     /// The shares, then the price gamma.
     pub point: Vec<f64>,
     /// t_j.
@@ -118,18 +123,25 @@ fn top(branches: &Branches, atom: usize, barrier: f64) -> f64 {
 }
 
 impl<'a> Interior<'a> {
-    pub fn start(step: &'a AssetsStep, near: Option<&AssetsSolution>, barrier: f64) -> Self {
+    /// `near`, where the search starts, are shares of the assets searched among, and a price.
+    pub fn start(
+        step: &'a AssetsStep,
+        whole: &'a AssetsStep,
+        held: &'a [usize],
+        near: Option<(Vec<f64>, f64)>,
+        barrier: f64,
+    ) -> Self {
         let assets = step.assets();
         let highest = step.total.highest;
         let lowest = step.total.lowest.min(highest - LEAST_ROOM);
         let middle = 0.5 * (lowest + highest);
         let even = middle / assets as f64;
         let mut point = vec![even; assets];
-        if let Some(near) = near {
+        if let Some((shares, _)) = &near {
             let inside = |(share, near): (&mut f64, &f64)| *share = DRAWN_INSIDE * *share + (1.0 - DRAWN_INSIDE) * near;
-            point.iter_mut().zip(&near.allocation).for_each(inside);
+            point.iter_mut().zip(shares).for_each(inside);
         }
-        point.push(near.map_or(middle, |near| near.multiplier.max(LEAST_ROOM)));
+        point.push(near.as_ref().map_or(middle, |(_, price)| price.max(LEAST_ROOM)));
         let unit =
             |index: usize| (0..=assets).map(|other| if other == index { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
         let sum = |sign: f64| (0..=assets).map(|other| if other < assets { sign } else { 0.0 }).collect::<Vec<f64>>();
@@ -142,6 +154,9 @@ impl<'a> Interior<'a> {
             lines.into_iter().map(|(direction, offset)| Bound { direction, offset, multiplier: 0.0 }).collect();
         let mut interior = Interior {
             step,
+            whole,
+            held,
+            entering: Vec::new(),
             best: point[..assets].to_vec(),
             best_price: point[assets],
             point,
@@ -226,12 +241,12 @@ impl<'a> Interior<'a> {
         }));
     }
 
-    /// Runs until the bounds are within the tolerance.
+    /// Runs until the bounds are within the tolerance, or other assets would enter.
     pub fn run(&mut self, tolerance: f64) {
         let mut length = 1.0;
         for _ in 0..STEP_LIMIT {
             self.tell_bounds();
-            if self.upper - self.lower < tolerance {
+            if self.upper - self.lower < tolerance || !self.entering.is_empty() {
                 return;
             }
             self.lower_barrier(length);

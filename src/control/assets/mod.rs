@@ -41,7 +41,7 @@ const CONTENT: f64 = 1e-7;
 const ROUNDING: f64 = 1e-14;
 /// First barriers of searches, in relative utility, and that of one near a similar step.
 const BARRIERS: [f64; 3] = [1e-3, 1e-2, 1e-1];
-const BARRIER_NEAR: f64 = 1e-4;
+const BARRIER_NEAR: f64 = 1e-5;
 /// Shares below this are rounding of a search that stays inside its bounds.
 const LEAST_SHARE: f64 = 1e-6;
 
@@ -115,22 +115,38 @@ impl AssetsStep {
     /// The best allocation. `near` is where the search starts: the solution of a similar step.
     ///
     /// A search that does not bring its bounds together is followed by others, which start further inside; bounds of all of them
-    /// hold. Cost: some 20 to 60 evaluations, each O(n d ln d) with O(n d^2) of algebra; of 4 searches at most.
+    /// hold. Cost: some 20 to 60 evaluations, each O(n d ln d) with O(n d^2) of algebra, d the assets searched among; of 4 searches
+    /// at most.
     pub fn solve(&self, near: Option<&AssetsSolution>) -> AssetsSolution {
-        let mut best = match near {
-            Some(near) => self.search(Some(near), BARRIER_NEAR),
-            None => self.search(None, BARRIERS[0]),
-        };
+        let barrier = if near.is_some() { BARRIER_NEAR } else { BARRIERS[0] };
+        let mut best = self.search(self.first_held(near), near, barrier);
         for barrier in BARRIERS.into_iter().skip(usize::from(near.is_none())) {
             if best.bound - best.value < CONTENT {
                 break;
             }
-            let next = self.search(None, barrier);
+            let next = self.search((0..self.assets).collect(), None, barrier);
             let (bound, evaluations) = (best.bound.min(next.bound), best.evaluations + next.evaluations);
             let better = if next.value > best.value { next } else { best };
             best = AssetsSolution { bound, evaluations, ..better };
         }
         self.at_least_the_bank(best)
+    }
+
+    /// The assets that a search begins with: those held near by, or, where few are ever held, the one of the highest mean.
+    fn first_held(&self, near: Option<&AssetsSolution>) -> Vec<usize> {
+        let held: Vec<usize> =
+            (0..self.assets).filter(|&asset| near.is_some_and(|near| near.allocation[asset] > 0.0)).collect();
+        if !held.is_empty() {
+            return held;
+        }
+        if !self.ground.is_sup() {
+            return (0..self.assets).collect();
+        }
+        let mut means = vec![0.0; self.assets];
+        for (atom, mass) in self.masses.iter().enumerate() {
+            means.iter_mut().zip(self.growth(atom)).for_each(|(mean, growth)| *mean += mass * growth);
+        }
+        (0..self.assets).max_by(|&left, &right| means[left].total_cmp(&means[right])).into_iter().collect()
     }
 
     /// A search that found nothing better leaves all in the bank where that is allowed, whatever became of it; and nothing is worth
@@ -145,28 +161,72 @@ impl AssetsStep {
         AssetsSolution { allocation: nothing.clone(), value: 0.0, bound: bound.max(0.0), mean_moves: nothing, ..found }
     }
 
-    fn search(&self, near: Option<&AssetsSolution>, barrier: f64) -> AssetsSolution {
-        let mut interior = Interior::start(self, near, barrier);
-        interior.run(TOLERANCE);
-        let (mut allocation, price) = (interior.best.clone(), interior.best_price);
-        let total: f64 = allocation.iter().sum();
-        allocation.iter_mut().filter(|share| **share < LEAST_SHARE).for_each(|share| *share = 0.0);
-        let left: f64 = allocation.iter().sum();
-        if left > 0.0 {
-            allocation.iter_mut().for_each(|share| *share *= total / left);
+    /// Searches among the assets `held`, and among more once they would count: the bound is that of all.
+    fn search(&self, mut held: Vec<usize>, near: Option<&AssetsSolution>, mut barrier: f64) -> AssetsSolution {
+        let mut start = near.map(|near| (held.iter().map(|&asset| near.allocation[asset]).collect(), near.multiplier));
+        let (mut upper, mut evaluations) = (f64::INFINITY, 0);
+        loop {
+            let among = self.among(&held);
+            let mut interior = Interior::start(&among, self, &held, start, barrier);
+            interior.run(TOLERANCE);
+            upper = interior.upper.min(upper);
+            evaluations += interior.evaluations;
+            if interior.entering.is_empty() {
+                return among.told(&interior, upper, evaluations);
+            }
+            let entering = std::mem::take(&mut interior.entering);
+            let (shares, price) = interior.point.split_at(held.len());
+            let mut shares = shares.to_vec();
+            shares.resize(held.len() + entering.len(), 0.0);
+            (start, barrier) = (Some((shares, price[0])), interior.barrier.max(BARRIER_NEAR));
+            held.extend(entering);
         }
-        let mut value = self.value_at(&allocation, price);
+    }
+
+    fn told(&self, interior: &Interior<'_>, upper: f64, evaluations: usize) -> AssetsSolution {
+        let (mut shares, price) = (interior.best.clone(), interior.best_price);
+        let total: f64 = shares.iter().sum();
+        shares.iter_mut().filter(|share| **share < LEAST_SHARE).for_each(|share| *share = 0.0);
+        let left: f64 = shares.iter().sum();
+        if left > 0.0 {
+            shares.iter_mut().for_each(|share| *share *= total / left);
+        }
+        let mut value = self.value_at(&shares, price);
         if value < interior.lower - TOLERANCE {
-            (allocation, value) = (interior.best.clone(), interior.lower);
+            (shares, value) = (interior.best.clone(), interior.lower);
         }
         AssetsSolution {
-            allocation,
+            allocation: interior.of_all(&shares),
             value: self.utility.inverse(value - ROUNDING * value.abs()),
-            bound: self.utility.inverse(interior.upper.max(value)),
+            bound: self.utility.inverse(upper.max(value)),
             multiplier: price,
             mean_moves: interior.mean_moves(),
-            evaluations: interior.evaluations,
+            evaluations,
         }
+    }
+
+    /// The step with some of the assets alone.
+    fn among(&self, held: &[usize]) -> AssetsStep {
+        let of = |row: &[f64]| held.iter().map(|&asset| row[asset]).collect::<Vec<f64>>();
+        AssetsStep {
+            assets: held.len(),
+            growths: (0..self.atoms()).flat_map(|atom| of(self.growth(atom))).collect(),
+            masses: self.masses.clone(),
+            ground: match &self.ground {
+                Ground::Sup => Ground::Sup,
+                Ground::Weighted(weights) => Ground::Weighted(of(weights)),
+            },
+            ..*self
+        }
+    }
+
+    /// The growth of what is not held once positions are lowered to a level: it moves for nothing where all move together, and
+    /// does not move where each is paid for.
+    #[inline(always)]
+    fn unheld(&self, growth: f64, level: f64) -> f64 {
+        let moved = if self.ground.is_sup() { growth * level } else { growth };
+        let held_up = if moved > self.least_growth { moved } else { self.least_growth };
+        if held_up < growth { held_up } else { growth }
     }
 
     /// What an allocation is worth at least, in relative utility: the dual at a price of distance.

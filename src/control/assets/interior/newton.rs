@@ -47,12 +47,10 @@ fn add_square(matrix: &mut [f64], weight: f64, vector: &[f64]) {
     }
 }
 
-/// What an atom leaves behind when its t is eliminated: sums of `multiplier / slack`, of it times gradients, and of
-/// `barrier p / slack`.
-#[derive(Clone, Default)]
+/// What an atom leaves behind when its t is eliminated: sums of `multiplier / slack`, and of `barrier p / slack`.
+#[derive(Clone, Copy, Default)]
 struct Eliminated {
     stiffness: f64,
-    gradient: Vec<f64>,
     target: f64,
 }
 
@@ -69,9 +67,11 @@ impl Interior<'_> {
         let size = self.point.len();
         let mut system = System { size, matrix: vec![0.0; size * size], right: vec![0.0; size] };
         let mut eliminated = vec![Eliminated::default(); self.tops.len()];
+        // Sums of `multiplier / slack` times gradients, atom by atom.
+        let mut gradients = vec![0.0; self.tops.len() * size];
         dispatched!({
-            for (atom, left) in eliminated.iter_mut().enumerate() {
-                self.add_atom(atom, left, &mut system);
+            for (atom, (left, gradient)) in eliminated.iter_mut().zip(gradients.chunks_exact_mut(size)).enumerate() {
+                *left = self.add_atom(atom, gradient, &mut system);
             }
         });
         system.right[size - 1] -= self.step.radius;
@@ -85,17 +85,19 @@ impl Interior<'_> {
             *diagonal *= 1.0 + ROUNDING;
         }
         let point = Cholesky::factor(DMatrix::from_vec(size, size, system.matrix))?.solve(&system.right);
-        let top =
-            |(left, mass): (&Eliminated, &f64)| (mass - left.target + dot(&left.gradient, &point)) / left.stiffness;
-        let tops: Vec<f64> = eliminated.iter().zip(&self.step.masses).map(top).collect();
+        let atoms = eliminated.iter().zip(gradients.chunks_exact(size)).zip(&self.step.masses);
+        let top = |((left, gradient), mass): ((&Eliminated, &[f64]), &f64)| {
+            (mass - left.target + dot(gradient, &point)) / left.stiffness
+        };
+        let tops: Vec<f64> = atoms.map(top).collect();
         Some(self.with_multipliers(point, tops))
     }
 
     #[inline(always)]
-    fn add_atom(&self, atom: usize, left: &mut Eliminated, system: &mut System) {
+    fn add_atom(&self, atom: usize, whole: &mut [f64], system: &mut System) -> Eliminated {
         let (size, mass, price) = (system.size, self.step.masses[atom], self.point[system.size - 1]);
         let mut gradient = [0.0; MOST_ASSETS + 1];
-        left.gradient = vec![0.0; size];
+        let mut left = Eliminated::default();
         for branch in self.branches.of(atom) {
             let (found, pair) = (&self.branches.all[branch], self.pairs[branch]);
             let (stiffness, target) = (pair.multiplier / pair.slack, self.barrier * mass / pair.slack);
@@ -106,7 +108,7 @@ impl Interior<'_> {
                 *entry = found.slope * excess;
             }
             gradient[size - 1] = found.cost;
-            for ((entry, sum), right) in gradient.iter().zip(&mut left.gradient).zip(&mut system.right) {
+            for ((entry, sum), right) in gradient.iter().zip(whole.iter_mut()).zip(&mut system.right) {
                 *sum += stiffness * entry;
                 *right += target * entry;
             }
@@ -122,10 +124,11 @@ impl Interior<'_> {
             }
         }
         let left_over = (mass - left.target) / left.stiffness;
-        for (right, sum) in system.right.iter_mut().zip(&left.gradient) {
+        for (right, sum) in system.right.iter_mut().zip(whole.iter()) {
             *right += left_over * sum;
         }
-        add_square(&mut system.matrix, -1.0 / left.stiffness, &left.gradient);
+        add_square(&mut system.matrix, -1.0 / left.stiffness, whole);
+        left
     }
 
     /// `weight sum_i p_i v_i v_i'`, v_i = e_i / a_i - e_gamma / gamma over what moves by itself; where all move together, what
