@@ -202,6 +202,31 @@ async fn several_assets_are_advised_by_name_as_solved_directly() {
     assert!(held >= 22, "{held} of 26");
 }
 
+/// What is told to be held without a crash is the advice under a floor at the lowest return seen, asked for by itself; and the
+/// crash is most of what keeps power utility from a record that pays.
+#[tokio::test(flavor = "multi_thread")]
+async fn the_crash_is_what_a_floor_at_the_lowest_return_takes_away() {
+    let app = App::start().await;
+    let rows: Vec<[f64; 2]> = HISTORY.iter().zip(HISTORY.iter().rev()).map(|(left, right)| [*left, *right]).collect();
+    let lowest = HISTORY.iter().copied().fold(f64::INFINITY, f64::min);
+    let mut taken = 0.0_f64;
+    for norm in ["scaled_one", "sup"] {
+        let mut problem = json!({ "assets": ["left", "right"], "ground_norm": norm, "history": rows, "rate_per_step": 0.0,
+            "utility": { "kind": "power", "risk_aversion": 3.0 }, "radius": { "rule": "fixed", "radius": 0.004 } });
+        let (status, advised) = app.post("/advise", &json!({ "problem": problem })).await;
+        assert_eq!(status, 200, "{advised}");
+        problem["support"] = json!({ "min": lowest });
+        let floored = app.post("/advise", &json!({ "problem": problem })).await.1;
+        assert_eq!(floored["without_crash"], Value::Null, "{floored}");
+        let number = |of: &Value, field: &str| of[field].as_f64().unwrap();
+        let without = number(&advised, "without_crash");
+        // Both searches end within their bounds, which a flat optimum lets lie apart.
+        assert!((without - number(&floored, "total")).abs() < 0.005, "{advised} {floored}");
+        taken = taken.max(without - number(&advised, "total"));
+    }
+    assert!(taken > 0.05, "{taken}");
+}
+
 /// Columns that are one asset are advised as that asset, and the radius of all funds is that of the fund of inverse volatilities
 /// times the factor.
 #[tokio::test(flavor = "multi_thread")]

@@ -173,7 +173,9 @@ async fn what_several_assets_report_is_put_right_and_renewed(mut app: App) {
     assert_eq!(app.action().await, before);
     let history = app.get(&format!("/sessions/{}/history", app.session)).await;
     assert_eq!(history.0, 200, "{}", history.1);
-    assert!(history.1["observations"][0]["now"]["wealth"].is_number());
+    let first_now = &history.1["observations"][0]["now"];
+    assert!(first_now["wealth"].is_number());
+    assert_eq!(first_now["assets"], report(0.03), "{first_now}");
 
     // On by a policy that was trained on what was seen by then; by none of other assets.
     app.session = right;

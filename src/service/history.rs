@@ -1,5 +1,7 @@
 //! What a session was told, and what it would be told now.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -13,6 +15,7 @@ use super::periods::{Passage, Periods, Step};
 use super::plan::{Plan, Renew, Renewed};
 use super::report::{Correct, Report};
 use super::sessions::Sessions;
+use crate::control::assets::advice::named;
 use crate::control::policy::advisor::AdviceMode;
 use crate::control::request::terms::Terms;
 use crate::store::{EntryKind, SessionRow, Tenant};
@@ -64,6 +67,9 @@ pub struct Now {
     pub reported: Option<Report>,
     /// Null where it is missing.
     pub log_return: Option<f64>,
+    /// Of several assets, by their names.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub assets: Option<AssetsNow>,
     /// What would have been advised for it.
     pub advised_allocation: f64,
     pub executed_allocation: f64,
@@ -73,6 +79,13 @@ pub struct Now {
     pub holding: f64,
     /// Radius of the uncertainty set after it, in the unit of an advice's.
     pub radius: f64,
+}
+
+/// What stands of a period of several assets with all corrections made.
+#[derive(Debug, Serialize, ToSchema)]
+pub struct AssetsNow {
+    /// By the names of the assets; null where they are missing.
+    pub log_returns: Option<BTreeMap<String, f64>>,
 }
 
 /// One correction, as it was made.
@@ -159,8 +172,12 @@ impl Sessions {
         for (step, period) in periods.all.iter().enumerate() {
             let stretch = passage.stretch();
             let passed = passage.next().map_err(ServiceError::of_recorded)?;
-            let Some(Step { before, log_return, executed_allocation, .. }) = passed else { break };
+            let Some(Step { before, seen, log_return, executed_allocation }) = passed else { break };
             if step >= first {
+                let assets = before
+                    .assets
+                    .as_ref()
+                    .map(|assets| AssetsNow { log_returns: seen.row().map(|row| named(&assets.names, row)) });
                 let (advising, local) = (self.policies.advisor(tenant, &stretch.policy).await?, stretch.step(step));
                 let before = before.with_law(stretch.terms.learning).state;
                 let advise = move || advising.advise(local, &before, AdviceMode::Surrogate);
@@ -171,6 +188,7 @@ impl Sessions {
                 told.push(Now {
                     reported: period.is_corrected.then(|| period.report.clone()),
                     log_return,
+                    assets,
                     advised_allocation: advice.allocation,
                     executed_allocation,
                     wealth: then.wealth,

@@ -1,14 +1,15 @@
-//! How long `GET /action` takes for one client on loopback.
+//! How long `GET /action` takes for one client on loopback, and `POST /observe` before it.
 
 use std::error::Error;
+use std::path::PathBuf;
 use std::time::Instant;
 
 use ballast::control::request::specification::InitialLaws;
 use ballast::numerics::summary::quantile;
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
-use super::paper;
+use super::{assets, paper};
 use crate::command::api_client::{ApiClient, ApiError};
 use crate::command::host::Host;
 
@@ -22,7 +23,17 @@ pub struct ActionBench {
     /// Sessions asked
     #[arg(long, default_value_t = 1000)]
     calls: usize,
+    /// Assets: of 1 the paper's configuration, of more a power of wealth over their first 240 months, whose composition
+    /// `/observe` chooses anew
+    #[arg(long, default_value_t = 1)]
+    assets: usize,
+    /// CSV file of simple returns of several assets: dates, assets, and the bank in the last column
+    #[arg(long, default_value = "data/us_industries_monthly.csv")]
+    file: PathBuf,
 }
+
+/// Months seen of several assets before the first period.
+const MONTHS: usize = 240;
 
 pub async fn run(bench: &ActionBench) -> Result<(), Box<dyn Error>> {
     let host = Host::start("bench").await?;
@@ -31,19 +42,67 @@ pub async fn run(bench: &ActionBench) -> Result<(), Box<dyn Error>> {
     measured
 }
 
+/// What is trained, and what is reported of a session's first period.
+struct Case {
+    specification: Value,
+    returns: Vec<Value>,
+}
+
+impl Case {
+    fn of(bench: &ActionBench) -> Result<Self, Box<dyn Error>> {
+        if bench.assets == 1 {
+            let specification = paper::specification(20, bench.horizon, bench.count, InitialLaws::Given);
+            // Returns spread evenly over what the mixture gives nine times in ten.
+            let spread = |call: usize| -0.15 + 0.3 * (call as f64 * 0.618_033_988_75).fract();
+            let returns = (0..bench.calls).map(|call| json!({ "log_return": spread(call) })).collect();
+            return Ok(Case { specification: serde_json::to_value(&specification)?, returns });
+        }
+        let rows = assets::read(&bench.file)?;
+        let later = rows.len().saturating_sub(MONTHS);
+        if later == 0 || rows[0].len() < bench.assets {
+            return Err(
+                format!("{} has {} months of {} assets", bench.file.display(), rows.len(), rows[0].len()).into()
+            );
+        }
+        let names: Vec<String> = (1..=bench.assets).map(|asset| format!("asset_{asset}")).collect();
+        let of = |row: &Vec<f64>| names.iter().cloned().zip(row.iter().map(|value| json!(value))).collect();
+        let named = |call: usize| -> Map<String, Value> { of(&rows[MONTHS + call % later]) };
+        let history: Vec<&[f64]> = rows[..MONTHS].iter().map(|row| &row[..bench.assets]).collect();
+        let problem = json!({
+            "assets": names,
+            "history": history,
+            "horizon": bench.horizon,
+            "rate_per_step": assets::RATE,
+            "utility": { "kind": "power", "risk_aversion": assets::RISK_AVERSION },
+        });
+        Ok(Case {
+            specification: json!({ "problem": problem, "design": { "count": bench.count }, "seed": 1 }),
+            returns: (0..bench.calls).map(|call| json!({ "log_returns": named(call) })).collect(),
+        })
+    }
+}
+
 async fn measure(api: &ApiClient, bench: &ActionBench) -> Result<(), Box<dyn Error>> {
-    let specification = paper::specification(20, bench.horizon, bench.count, InitialLaws::Given);
+    let case = Case::of(bench)?;
     println!("training {} design points, {} steps", bench.count, bench.horizon);
-    let job = api.post("/train", &serde_json::to_value(&specification)?).await?;
+    let job = api.post("/train", &case.specification).await?;
     let mut events = api.events(&format!("/jobs/{}/events", text(&job, "job")?)).await?;
     let mut last = job;
     while let Some(event) = events.next().await? {
         last = event;
     }
     let policy = text(&last, "policy")?;
-    let (mut first, mut again, mut livez, mut resolved) = (Vec::new(), Vec::new(), Vec::new(), 0);
-    for call in 0..bench.calls {
-        let session = open_session(api, policy, call).await?;
+    let (mut observe, mut first, mut again, mut livez, mut resolved) = (vec![], vec![], vec![], vec![], 0);
+    for returns in case.returns {
+        // The first step is solved at one state; the second, after an observation, answers from the surrogates.
+        let opened = api.post("/sessions", &json!({ "policy": policy })).await?;
+        let session = text(&opened, "session")?;
+        let mut report = returns;
+        report["session"] = json!(session);
+        report["period"] = json!(1);
+        let started = Instant::now();
+        api.post("/observe", &report).await?;
+        observe.push(1e6 * started.elapsed().as_secs_f64());
         let action = format!("/action?session={session}");
         first.push(microseconds(api, &action).await?);
         again.push(microseconds(api, &action).await?);
@@ -51,21 +110,12 @@ async fn measure(api: &ApiClient, bench: &ActionBench) -> Result<(), Box<dyn Err
         resolved += usize::from(api.get(&action).await?["source"] != "policy_surrogate");
     }
     println!("{:<26} {:>10} {:>10}   of {} sessions", "call", "median us", "99 % us", bench.calls);
-    for (name, times) in [("/action", &first), ("/action, asked again", &again), ("/livez", &livez)] {
+    let calls = [("/observe", &observe), ("/action", &first), ("/action, asked again", &again), ("/livez", &livez)];
+    for (name, times) in calls {
         println!("{name:<26} {:>10.0} {:>10.0}", quantile(times, 0.5), quantile(times, 0.99));
     }
     println!("{resolved} of them lay outside the design and were re-solved");
     Ok(())
-}
-
-/// A session in its second period: the first step is solved at one state, the second answers from the surrogates.
-async fn open_session(api: &ApiClient, policy: &str, index: usize) -> Result<String, Box<dyn Error>> {
-    let session = api.post("/sessions", &json!({ "policy": policy })).await?;
-    let session = text(&session, "session")?;
-    // Returns spread evenly over what the mixture gives nine times in ten.
-    let log_return = -0.15 + 0.3 * (index as f64 * 0.618_033_988_75).fract();
-    api.post("/observe", &json!({ "session": session, "period": 1, "log_return": log_return })).await?;
-    Ok(session.to_owned())
 }
 
 async fn microseconds(api: &ApiClient, path: &str) -> Result<f64, ApiError> {

@@ -2,7 +2,7 @@
 //! the month before.
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use ballast::control::assets::{AssetsLaw, AssetsSolution, AssetsStep};
@@ -34,9 +34,9 @@ pub struct AssetsBench {
 }
 
 /// Of wealth.
-const RISK_AVERSION: f64 = 3.0;
+pub const RISK_AVERSION: f64 = 3.0;
 /// A month of bills, about what they paid on average.
-const RATE: f64 = 0.003;
+pub const RATE: f64 = 0.003;
 /// Radii are this times the mean deviation of the assets, over the root of the months: about half of that of all funds at once.
 const RADIUS: f64 = 1.3;
 
@@ -62,7 +62,7 @@ struct Found {
 }
 
 pub fn run(bench: &AssetsBench) -> Result<(), Box<dyn Error>> {
-    let rows = read(bench)?;
+    let rows = read(&bench.file)?;
     if !bench.json {
         println!(
             "{:<12}{:>8}{:>8}{:>12}{:>12}{:>16}",
@@ -86,8 +86,8 @@ pub fn run(bench: &AssetsBench) -> Result<(), Box<dyn Error>> {
 }
 
 /// Log-returns, month by month.
-fn read(bench: &AssetsBench) -> Result<Vec<Vec<f64>>, Box<dyn Error>> {
-    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(&bench.file)?;
+pub fn read(file: &Path) -> Result<Vec<Vec<f64>>, Box<dyn Error>> {
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(file)?;
     let mut rows = Vec::new();
     for record in reader.records() {
         let record = record?;

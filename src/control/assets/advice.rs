@@ -17,6 +17,9 @@ pub struct AssetsAdvice {
     pub composition: BTreeMap<String, f64>,
     /// Share of wealth in all assets together.
     pub total: f64,
+    /// The same were no log-return below the lowest seen of any asset: what it is above `total` is the part of the caution that
+    /// is for a crash which nobody has seen. Null where `problem.support` rules one out already.
+    pub without_crash: Option<f64>,
     /// Wealth for certain that is worth as much as the allocation is against the worst law: at least this.
     pub certainty_equivalent: f64,
     /// No allocation is worth more than this.

@@ -31,7 +31,21 @@ pub fn utility(fund: &ProblemSpecification) -> RelativeUtility {
 
 /// The step of `problem`, whose fund has the completed problem `fund`, had `rows` been seen, in a ball of this radius.
 pub fn step(problem: &AssetsProblem, fund: &ProblemSpecification, rows: &[Vec<f64>], radius: f64) -> AssetsStep {
-    let floor = problem.support.map_or(f64::NEG_INFINITY, |support| support.min);
+    step_above(floor(problem), problem, fund, rows, radius)
+}
+
+/// What no log-return is moved below.
+fn floor(problem: &AssetsProblem) -> f64 {
+    problem.support.map_or(f64::NEG_INFINITY, |support| support.min)
+}
+
+fn step_above(
+    floor: f64,
+    problem: &AssetsProblem,
+    fund: &ProblemSpecification,
+    rows: &[Vec<f64>],
+    radius: f64,
+) -> AssetsStep {
     let [lowest, highest] = fund.action_interval;
     AssetsStep::new(
         AssetsLaw { returns: rows, radius, floor },
@@ -45,22 +59,28 @@ pub fn step(problem: &AssetsProblem, fund: &ProblemSpecification, rows: &[Vec<f6
 impl AssetsAdvice {
     /// The step of `problem`, whose fund of inverse volatilities has the completed problem `fund` and the radius `of_fund`, with the
     /// seed of its simulations.
-    /// Cost: that of [`AssetsStep::solve`], and of the joint factor under `bridge` and `calibrated`.
-    /// Checked by: `tests/advise.rs::several_assets_are_advised_by_name_as_solved_directly`.
+    /// Cost: that of [`AssetsStep::solve`], twice where a return may fall below those seen, and of the joint factor under `bridge`
+    /// and `calibrated`.
+    /// Checked by: `tests/advise.rs::several_assets_are_advised_by_name_as_solved_directly` and
+    /// `the_crash_is_what_a_floor_at_the_lowest_return_takes_away`.
     pub fn of(problem: &AssetsProblem, fund: &ProblemSpecification, of_fund: f64, seed: u64) -> Self {
         let rows = &problem.history;
         let radius_factor = radius_factor(problem, fund, seed);
         let radius = radius_factor * of_fund;
-        let floor = fund.initial_wealth * (1.0 + fund.rate_per_step);
+        let bank = fund.initial_wealth * (1.0 + fund.rate_per_step);
         let solution = step(problem, fund, rows, radius).solve(None);
+        let lowest = rows.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        let without_crash = (floor(problem) < lowest)
+            .then(|| step_above(lowest, problem, fund, rows, radius).solve(Some(&solution)).allocation.iter().sum());
         let composition = CompositionRule::OneStep.composition(rows, || solution.clone());
         AssetsAdvice {
             allocation: named(&problem.assets, &solution.allocation),
             composition: named(&problem.assets, &composition),
             total: solution.allocation.iter().sum(),
-            certainty_equivalent: floor * solution.value.exp(),
-            bound: floor * solution.bound.exp(),
-            floor,
+            without_crash,
+            certainty_equivalent: bank * solution.value.exp(),
+            bound: bank * solution.bound.exp(),
+            floor: bank,
             radius,
             radius_factor,
             sample_size: rows.len(),

@@ -187,20 +187,13 @@ function due({ session: { renewal } }) {
 
 const held = (shown, action) => section("What it held", h("div", { class: "duo" }, ...holdings(shown, action)));
 
-/** The log-returns of assets that a period was put right with; `null` where only prices were said, or nothing. */
-function putRight(reported) {
-  const { log_returns, simple_returns } = reported ?? {};
-  if (log_returns || !simple_returns) return log_returns ?? null;
-  return Object.fromEntries(Object.entries(simple_returns).map(([name, value]) => [name, Math.log1p(value)]));
-}
-
 /** What more or less caution would lose, where the policy has a ball. */
 function frontier({ session, policy, history, canTry }) {
   const { problem, fund } = policy.specification;
   if (!canTry || !hasBall(problem)) return "";
   const inOrder = (returns) => returns && fund.assets.map((name) => returns[name]);
-  const ofAssets = (row) => inOrder(row.now ? putRight(row.now.reported) : row.assets.log_returns) ?? null;
-  const returnOf = (row) => (fund ? ofAssets(row) : (row.now ?? row).log_return);
+  const stands = (row) => row.now ?? row;
+  const returnOf = (row) => (fund ? (inOrder(stands(row).assets.log_returns) ?? null) : stands(row).log_return);
   const seen = history.observations.map(returnOf).filter((value) => value !== null);
   const element = section(
     "How much caution",

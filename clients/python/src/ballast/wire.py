@@ -56,6 +56,13 @@ class AssetsChoices(TypedDict):
     """Of the bridges and of the resamples."""
 
 
+class AssetsNow(TypedDict):
+    """What stands of a period of several assets with all corrections made."""
+
+    log_returns: NotRequired[dict[str, float]]
+    """By the names of the assets; null where they are missing."""
+
+
 class AssetsPeriods(TypedDict):
     """What one strategy did, a number a period."""
 
@@ -1459,6 +1466,7 @@ class Now(TypedDict):
     reported: NotRequired[Report | None]
     log_return: NotRequired[float | None]
     """Null where it is missing."""
+    assets: NotRequired[AssetsNow | None]
     advised_allocation: float
     """What would have been advised for it."""
     executed_allocation: float
@@ -1881,6 +1889,11 @@ class AssetsAdvice(TypedDict):
     """Share of each asset in what is held; where next to nothing is, that of inverse volatilities."""
     total: float
     """Share of wealth in all assets together."""
+    without_crash: NotRequired[float | None]
+    """
+    The same were no log-return below the lowest seen of any asset: what it is above `total` is the part of the caution that
+    is for a crash which nobody has seen. Null where `problem.support` rules one out already.
+    """
     certainty_equivalent: float
     """Wealth for certain that is worth as much as the allocation is against the worst law: at least this."""
     bound: float
