@@ -8,7 +8,6 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::time::Instant;
 
 use ballast::control::error::{FieldError, TrainError};
 use ballast::control::evaluation::backtest::{Backtest, Walked};
@@ -17,9 +16,10 @@ use ballast::control::pool::{PoolError, TrainingPool};
 use ballast::control::progress::Watch;
 use ballast::control::request::backtest::{BacktestRequest, Rates, defaults};
 use ballast::control::request::centre::CentreSpecification;
-use ballast::http::decode;
-use ballast::report::ChartError;
+use ballast::http::{dashboard, decode};
+use ballast::report::{self, FileError};
 use clap::Args;
+use serde::Serialize;
 use thiserror::Error;
 
 use super::returns::{AnyReturns, Returns, ReturnsError, ReturnsFile, Row};
@@ -27,7 +27,6 @@ use progress::Parts;
 
 mod assets;
 mod files;
-mod page;
 mod progress;
 
 #[derive(Debug, Clone, Args)]
@@ -90,8 +89,8 @@ pub enum BacktestError {
     Train(#[from] TrainError),
     #[error("writing {}", path.display())]
     Write { path: PathBuf, source: std::io::Error },
-    #[error("drawing the report")]
-    Chart(#[from] ChartError),
+    #[error("writing the page")]
+    Page(#[from] FileError),
     #[error("writing JSON")]
     Json(#[from] serde_json::Error),
 }
@@ -130,7 +129,26 @@ pub struct Shown {
     pub report: BacktestReport,
     /// As they were read.
     pub returns: Returns,
-    pub seconds: f64,
+}
+
+/// A report and what was read for it, in a sentence.
+#[derive(Serialize)]
+pub struct Read<'a, R> {
+    #[serde(flatten)]
+    pub report: &'a R,
+    pub read: &'a str,
+}
+
+fn page(
+    module: &str,
+    name: &str,
+    dates: &[String],
+    read: &impl Serialize,
+    sentences: &[String],
+) -> Result<String, FileError> {
+    let date = |date: Option<&String>| date.cloned().unwrap_or_default();
+    let title = format!("{name}, {} to {}", date(dates.first()), date(dates.last()));
+    report::html(dashboard::embedded, module, &title, read, sentences)
 }
 
 /// Walks, counts and writes.
@@ -140,14 +158,14 @@ pub fn run(args: &BacktestArgs) -> Result<(), BacktestError> {
             println!("{}\n", returns.sentence());
             let shown = walk(args, returns)?;
             let (strategies, periods) = (files::strategies(&shown.report.strategies), files::periods(&shown));
-            files::write(&args.out, &page::page(&shown), &shown.report, &strategies, &periods)?;
+            files::write(&args.out, &shown.page()?, &shown.report, &strategies, &periods)?;
             shown.report.sentences
         }
         AnyReturns::Several(returns) => {
             println!("{}\n", returns.sentence);
             let shown = assets::walk(args, returns)?;
             let (strategies, periods) = (assets::files::strategies(&shown.report), assets::files::periods(&shown));
-            files::write(&args.out, &assets::page::page(&shown), &shown.report, &strategies, &periods)?;
+            files::write(&args.out, &shown.page()?, &shown.report, &strategies, &periods)?;
             shown.report.sentences
         }
     };
@@ -230,6 +248,13 @@ impl From<FieldError> for BacktestError {
 }
 
 impl Shown {
+    /// The report as a page.
+    fn page(&self) -> Result<String, FileError> {
+        let (report, read) = (&self.report, self.returns.sentence());
+        let dates = report.dates.as_deref().unwrap_or_default();
+        page("backtest.js", "Backtest", dates, &Read { report, read: &read }, &report.sentences)
+    }
+
     /// The periods decided about, after the first window.
     pub fn rows(&self) -> &[Row] {
         &self.returns.rows()[self.walked.backtest.walk.window..]
@@ -239,12 +264,11 @@ impl Shown {
 /// Decides every period, keeps the books, and measures them.
 fn walk(args: &BacktestArgs, returns: Returns) -> Result<Shown, BacktestError> {
     let backtest = args.backtest(&returns)?;
-    let started = Instant::now();
     let trainings = Parts::new(backtest.trainings(), "trainings");
     let walked = args.pool()?.install(|| backtest.run(&Watch::unwatched(), &|| trainings.one_more()))?;
     trainings.finish();
     let report = BacktestReport::new(&walked);
-    Ok(Shown { walked, report, returns, seconds: started.elapsed().as_secs_f64() })
+    Ok(Shown { walked, report, returns })
 }
 
 fn file(folder: &Path, name: &str, text: &str) -> Result<(), BacktestError> {
@@ -294,7 +318,7 @@ mod tests {
         assert_eq!(one.report, other.report);
         assert_eq!(files::periods(&one).lines().count(), 1 + 12 * one.walked.lines.len());
         assert_eq!(one.report.whole_years, 1);
-        let page = page::page(&one).html().unwrap();
+        let page = one.page().unwrap();
         assert!(page.contains("adaptive, alpha 0.9") && page.contains("Trading costs 10 bp"), "{page}");
         assert!(page.contains("The whole years are 1, fewer than 10"), "{page}");
     }
@@ -311,9 +335,7 @@ mod tests {
         let mean = (24..28).map(risky_return).sum::<f64>() / 4.0;
         assert!((stock.performance.annual_mean.value - 4.0 * mean).abs() < 1e-12, "{stock:?}");
         assert_eq!(files::periods(&shown).lines().nth(1).unwrap().split(',').next(), Some("2006-03"));
-        let page = page::page(&shown).html().unwrap();
-        assert!(page.contains("Every 2 quarters a policy is trained on the 24 quarters before"), "{page}");
-        assert!(!page.contains("month"), "{page}");
+        assert!(shown.page().unwrap().contains("<title>Backtest, 2006-03 to 2006-12</title>"));
     }
 
     #[test]

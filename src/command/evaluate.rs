@@ -6,15 +6,14 @@ use std::path::{Path, PathBuf};
 use ballast::control::error::FieldError;
 use ballast::control::evaluation::paths::Evaluation;
 use ballast::control::request::evaluation::EvaluationRequest;
-use ballast::http::decode;
+use ballast::http::{dashboard, decode};
+use ballast::report;
 use clap::Args;
 use serde_json::json;
 
 use super::bench::paper;
 use super::compare::Workshop;
 use super::tables;
-
-mod page;
 
 #[derive(Debug, Clone, Args)]
 pub struct Evaluate {
@@ -49,7 +48,10 @@ pub fn run(arguments: &Evaluate) -> Result<(), Box<dyn Error>> {
     let (_, report) = workshop.compare("simulating", &evaluation, &followers, workshop.seconds())?;
     workshop.finish();
     std::fs::create_dir_all(&arguments.out)?;
-    write(&arguments.out, "report.html", &page::page(&report).html()?)?;
+    let title =
+        format!("{} strategies on {} futures", report.strategies.len(), report.request.paths * report.histories.len());
+    let page = report::html(dashboard::embedded, "evaluation.js", &title, &report, &report.sentences)?;
+    write(&arguments.out, "report.html", &page)?;
     write(&arguments.out, "report.json", &serde_json::to_string_pretty(&report)?)?;
     write(&arguments.out, "strategies.csv", &tables::csv(&report))?;
     write(&arguments.out, "periods.csv", &tables::periods_csv(&report))?;

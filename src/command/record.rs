@@ -81,7 +81,7 @@ impl Record {
 
 /// The last `count` periods.
 fn last_of_several(mut returns: SeveralReturns, count: usize) -> Result<SeveralReturns, ReturnsError> {
-    let SeveralReturns { record, times, sentence } = &mut returns;
+    let SeveralReturns { record, sentence } = &mut returns;
     let found = record.rows.len();
     if !(2..=found).contains(&count) {
         let rule = "must be at most the returns of the file, and 2 or more";
@@ -90,7 +90,6 @@ fn last_of_several(mut returns: SeveralReturns, count: usize) -> Result<SeveralR
     record.rows.drain(..found - count);
     record.bank.drain(..found - count);
     record.dates.drain(..found - count);
-    times.drain(..found - count);
     sentence.push_str(&format!(" The last {count} periods are used, from {}.", record.dates[0]));
     Ok(returns)
 }

@@ -3,8 +3,9 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
+use ballast::http::dashboard;
 use ballast::numerics::summary::Estimate;
-use ballast::report::Csv;
+use ballast::report::{self, Csv};
 use clap::Args;
 use serde::Serialize;
 
@@ -13,7 +14,6 @@ use super::evaluate::write;
 use super::tables;
 
 mod findings;
-mod page;
 mod printed;
 mod runs;
 
@@ -101,8 +101,8 @@ pub fn run(arguments: &Reproduce) -> Result<(), Box<dyn Error>> {
     let study = runs::study(&plan, &workshop)?;
     workshop.finish();
     let findings = findings::all(&section, &study);
-    let html = page::page(&plan, arguments.quick, &section, &study, &findings).html()?;
     let whole = Reproduction { seconds: workshop.seconds(), plan, findings, section, study };
+    let html = page(&whole, arguments.quick)?;
     write(&arguments.out, "reproduction.html", &html)?;
     write(&arguments.out, "reproduction.json", &serde_json::to_string_pretty(&whole)?)?;
     write_tables(&arguments.out, &whole)?;
@@ -113,6 +113,23 @@ pub fn run(arguments: &Reproduce) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// Everything found, and what the page puts beside it.
+#[derive(Serialize)]
+struct Shown<'a> {
+    #[serde(flatten)]
+    whole: &'a Reproduction,
+    quick: bool,
+    sample_size: usize,
+    printed: &'a [printed::PrintedTable],
+}
+
+fn page(whole: &Reproduction, quick: bool) -> Result<String, report::FileError> {
+    let shown = Shown { whole, quick, sample_size: runs::SAMPLE_SIZE, printed: &printed::TABLES };
+    let sentences: Vec<String> = whole.findings.iter().map(ToString::to_string).collect();
+    let title = "Nonparametric adaptive robust control: section 3 anew";
+    report::html(dashboard::embedded, "reproduction.js", title, &shown, &sentences)
+}
+
 fn write_tables(folder: &Path, whole: &Reproduction) -> Result<(), String> {
     write(folder, "strategies.csv", &tables::csv(&whole.section.all))?;
     write(folder, "periods.csv", &tables::periods_csv(&whole.section.all))?;
@@ -121,7 +138,7 @@ fn write_tables(folder: &Path, whole: &Reproduction) -> Result<(), String> {
         for strategy in case.report.iter().flat_map(|report| &report.strategies) {
             let Some(column) = table.column(&strategy.strategy) else { continue };
             let ours = tables::estimates(strategy);
-            for ((name, _), paper) in printed::STATISTICS.iter().zip(column) {
+            for (name, paper) in printed::STATISTICS.iter().zip(column) {
                 let Some((_, Estimate { value, low, high })) = ours.iter().find(|(own, _)| own == name) else {
                     continue;
                 };

@@ -8,7 +8,6 @@ use std::path::PathBuf;
 use ballast::control::evaluation::account::Annual;
 use ballast::control::evaluation::assets::AssetsRecord;
 use ballast::control::evaluation::rolling::Period;
-use ballast::control::request::dates;
 pub use ballast::control::request::frequency::Frequency;
 use ballast::returns::{Choices, Holds, Kind, Reading, Record, Series, Unit, decoded, read};
 use clap::Args;
@@ -45,8 +44,6 @@ pub struct ReturnsFile {
 pub struct Row {
     /// Of the end of the period, in ISO 8601, as fine as the frequency: `2008-01` of a month.
     pub date: String,
-    /// The same in years.
-    pub time: f64,
     pub log_return: f64,
     pub risky_return: f64,
     pub risk_free_return: f64,
@@ -71,8 +68,6 @@ pub struct Returns {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeveralReturns {
     pub record: AssetsRecord,
-    /// When the periods ended, in years.
-    pub times: Vec<f64>,
     /// What was read, for a reader to see whether it is what he meant.
     pub sentence: String,
 }
@@ -149,7 +144,6 @@ impl Returns {
         let [series] = &record.series[..] else { return Err(ReturnsError::Several { found: record.series.len() }) };
         let rows = dates.into_iter().zip(&series.log_returns).zip(&series.simple_returns).zip(rates);
         let row = |(((date, log_return), risky_return), risk_free_return): (((String, &f64), &f64), f64)| Row {
-            time: time(&date, frequency),
             date,
             log_return: *log_return,
             risky_return: *risky_return,
@@ -261,7 +255,6 @@ impl AnyReturns {
         let row = |period: usize| record.series.iter().map(|series| series.log_returns[period]).collect();
         let by_option = rate.map_or(String::new(), |rate| format!(" The bank pays {:.3} % by --rate.", 100.0 * rate));
         Ok(AnyReturns::Several(SeveralReturns {
-            times: dates.iter().map(|date| time(date, frequency)).collect(),
             sentence: format!(
                 "{}{by_option} Each of the {} columns is an asset; --column takes one alone.",
                 record.sentence,
@@ -316,11 +309,6 @@ impl Calendar {
         };
         Ok(Calendar { dates, frequency, periods_per_year: periods_per_year.unwrap_or(periods), rates, bank })
     }
-}
-
-/// In years.
-fn time(date: &str, frequency: Frequency) -> f64 {
-    dates::date(date).map_or(0.0, |date| frequency.time(date))
 }
 
 /// The rules of the options.

@@ -43,7 +43,7 @@ fn wealth(strategy: &StrategyReport) -> [(&'static str, Estimate); 8] {
 }
 
 /// Decimals by which six digits of the initial wealth are written.
-pub fn decimals(report: &EvaluationReport) -> usize {
+fn decimals(report: &EvaluationReport) -> usize {
     let whole = report.request.problem.initial_wealth.log10().floor() as i32 + 1;
     (6 - whole).clamp(0, 12) as usize
 }

@@ -34,6 +34,10 @@ impl Asset {
         Asset { is_compressed: true, ..self }
     }
 
+    pub fn bytes(&self) -> &'static [u8] {
+        self.bytes
+    }
+
     /// The file of `page` that is called `name`.
     ///
     /// # Errors

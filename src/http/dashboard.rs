@@ -64,6 +64,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "histogram.js": SCRIPT,
         "holder.js": SCRIPT,
         "interval_chart.js": SCRIPT,
+        "job_report.js": SCRIPT,
         "jobs.js": SCRIPT,
         "key.js": SCRIPT,
         "law_chart.js": SCRIPT,
@@ -80,8 +81,10 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "policy.js": SCRIPT,
         "problem_words.js": SCRIPT,
         "report_fields.js": SCRIPT,
+        "report_file.js": SCRIPT,
         "report_lines.js": SCRIPT,
         "reporting.js": SCRIPT,
+        "reproduction.js": SCRIPT,
         "returns_field.js": SCRIPT,
         "sensitivity.js": SCRIPT,
         "several.js": SCRIPT,
@@ -113,6 +116,11 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
 
 fn asset(name: &str) -> Option<&'static Asset> {
     ASSETS.iter().find(|asset| asset.name == name)
+}
+
+/// The bytes of a file of the dashboard: a report that stands by itself is drawn by the same modules.
+pub fn embedded(name: &str) -> Option<&'static [u8]> {
+    asset(name).map(Asset::bytes)
 }
 
 /// The dashboard. A program that asks for JSON and not for HTML gets the description of the interface instead.

@@ -10,7 +10,7 @@ mod bodies;
 mod bounds;
 mod connections;
 mod conversation;
-mod dashboard;
+pub mod dashboard;
 pub mod decode;
 mod defaults;
 mod described;

@@ -1,17 +1,15 @@
 //! A file of several assets, walked through by the one-step problem and by rules that people use.
 
-use std::time::Instant;
-
 use ballast::control::evaluation::assets::report::{AssetsBacktestReport, AssetsChoices};
 use ballast::control::evaluation::assets::{AssetsBacktest, AssetsRecord, AssetsWalked};
 use ballast::control::progress::Watch;
+use ballast::report::FileError;
 
 use super::progress::Parts;
-use super::{BacktestArgs, BacktestError, Window, refused};
+use super::{BacktestArgs, BacktestError, Read, Window, page, refused};
 use crate::command::returns::SeveralReturns;
 
 pub mod files;
-pub mod page;
 
 /// Everything the page is made from.
 pub struct Shown {
@@ -19,9 +17,15 @@ pub struct Shown {
     pub report: AssetsBacktestReport,
     /// What was read, in a sentence.
     pub read: String,
-    /// When the periods decided about ended, in years.
-    pub times: Vec<f64>,
-    pub seconds: f64,
+}
+
+impl Shown {
+    /// The report as a page.
+    pub fn page(&self) -> Result<String, FileError> {
+        let (report, read) = (&self.report, &self.read);
+        let name = format!("Backtest of {} assets", report.assets.len());
+        page("backtest.js", &name, &report.dates, &Read { report, read }, &report.sentences)
+    }
 }
 
 impl BacktestArgs {
@@ -68,13 +72,11 @@ impl BacktestArgs {
 
 /// Decides every period, keeps the books, and measures them.
 pub fn walk(args: &BacktestArgs, returns: SeveralReturns) -> Result<Shown, BacktestError> {
-    let SeveralReturns { record, times, sentence } = returns;
+    let SeveralReturns { record, sentence } = returns;
     let backtest = args.of_assets(record)?;
-    let started = Instant::now();
     let parts = Parts::new(backtest.parts(), "stretches");
     let walked = args.pool()?.install(|| backtest.run(&Watch::unwatched(), &|| parts.one_more()))?;
     parts.finish();
     let report = AssetsBacktestReport::new(&walked);
-    let times = times[walked.backtest.first..].to_vec();
-    Ok(Shown { walked, report, read: sentence, times, seconds: started.elapsed().as_secs_f64() })
+    Ok(Shown { walked, report, read: sentence })
 }

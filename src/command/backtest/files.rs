@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::path::Path;
 
 use ballast::control::evaluation::backtest_report::{BacktestFigures, BootstrapEstimate, Performance};
-use ballast::report::{Csv, Page};
+use ballast::report::Csv;
 use serde::Serialize;
 
 use super::{BacktestError, Shown, file};
@@ -16,14 +16,14 @@ pub type Figure = (&'static str, f64, Option<[f64; 2]>);
 
 pub fn write(
     folder: &Path,
-    page: &Page,
+    page: &str,
     report: &impl Serialize,
     strategies: &str,
     periods: &str,
 ) -> Result<(), BacktestError> {
     let made = std::fs::create_dir_all(folder);
     made.map_err(|source| BacktestError::Write { path: folder.into(), source })?;
-    file(folder, PAGE, &page.html()?)?;
+    file(folder, PAGE, page)?;
     file(folder, "report.json", &(serde_json::to_string_pretty(report)? + "\n"))?;
     file(folder, "strategies.csv", strategies)?;
     file(folder, "periods.csv", periods)

@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use ballast::control::bellman::problem::Problem;
-use ballast::control::evaluation::paths::{Evaluation, Follower, Outcomes};
+use ballast::control::evaluation::paths::{Evaluation, Follower};
 use ballast::control::evaluation::report::EvaluationReport;
 use ballast::control::pool;
 use ballast::control::problem::sampling_law::continuous_law;
@@ -47,9 +47,6 @@ pub struct Case {
     pub found: usize,
     /// The comparison over the first of them; absent where fewer than two were found.
     pub report: Option<EvaluationReport>,
-    /// Terminal utilities of the adaptive and the known-law investor, on all paths.
-    #[serde(skip)]
-    pub utilities: [Vec<f64>; 2],
 }
 
 /// The paper's tables and figures.
@@ -136,18 +133,12 @@ fn case(
     let found = histories.len();
     histories.truncate(plan.close_histories);
     if histories.len() < 2 {
-        return Ok(Case { quantile: target, found, report: None, utilities: Default::default() });
+        return Ok(Case { quantile: target, found, report: None });
     }
     let evaluation = Evaluation::starting_at(request.clone(), histories)?;
     let stage = format!("simulating the histories with Q near {target}");
-    let (outcomes, report) = workshop.compare(&stage, &evaluation, followers, 0.0)?;
-    let utilities = [0, 1].map(|strategy| terminal_utilities(&evaluation, &outcomes, strategy));
-    Ok(Case { quantile: target, found, report: Some(report), utilities })
-}
-
-fn terminal_utilities(evaluation: &Evaluation, outcomes: &Outcomes, strategy: usize) -> Vec<f64> {
-    let kind = evaluation.request.problem.utility;
-    outcomes.outcomes.iter().map(|outcome| utility(kind, outcome.ended[strategy].wealth)).collect()
+    let (_, report) = workshop.compare(&stage, &evaluation, followers, 0.0)?;
+    Ok(Case { quantile: target, found, report: Some(report) })
 }
 
 /// How the gap to the known law closes as histories grow.

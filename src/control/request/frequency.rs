@@ -151,32 +151,4 @@ impl Frequency {
         };
         date.strftime(format).to_string()
     }
-
-    /// The same in years; of months and longer the day does not count.
-    pub fn time(self, date: Date) -> f64 {
-        let year = f64::from(date.year());
-        match self {
-            Daily | Weekly => year + f64::from(date.day_of_year() - 1) / f64::from(date.days_in_year()),
-            Monthly | Quarterly | Yearly => year + f64::from(date.month() - 1) / 12.0,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// By the calendar: 2024 has 366 days, of which the 184th is the second of July, and May is the fifth month.
-    #[test]
-    fn a_date_in_years_is_as_fine_as_the_periods_are() {
-        let date = |month, day| Date::constant(2024, month, day);
-        for frequency in [Daily, Weekly] {
-            assert_eq!(frequency.time(date(7, 2)), 2024.5);
-        }
-        for frequency in [Monthly, Quarterly, Yearly] {
-            assert_eq!([1, 31].map(|day| frequency.time(date(5, day))), [2024.0 + 4.0 / 12.0; 2]);
-        }
-        let ends = [Daily, Weekly, Monthly, Quarterly, Yearly].map(|frequency| frequency.time(date(1, 1)));
-        assert_eq!(ends, [2024.0; 5]);
-    }
 }

@@ -1,16 +1,13 @@
 // The report of one backtest: what strategies came to that were walked through a record, and one of them year by year.
 
-import { download, get } from "./api.js";
 import { heldOfAssets, ofAssets, quantOfAssets, resultsOfAssets, walkedAssets } from "./backtest_assets.js";
 import { lineChart } from "./chart.js";
 import { csvText, hundred } from "./csv.js";
 import { h, quantSection, section, table } from "./dom.js";
 import { select } from "./form.js";
-import { allocation, count, counted, figures, minus, percent, percentTick, short, tick, wealth } from "./format.js";
+import { allocation, count, counted, figures, minus, percent, percentTick, tick, wealth } from "./format.js";
 import { intervalChart } from "./interval_chart.js";
-import { until } from "./jobs.js";
 import { dated, unitOf } from "./periods.js";
-import { save } from "./picture.js";
 import { FRAMEWORKS, investorWords, percentName } from "./specification.js";
 import { belowHighest, compounded, grouped, places, returnsOf, worstFalls } from "./track.js";
 import { changing, interval, ordinal } from "./verdict.js";
@@ -26,22 +23,14 @@ const COLOURS = { static: 4, "plug-in": 5, "cost-blind": 6, constant: 9, "60/40"
 const LEVELS = { 1: [0], 2: [7, 0], 3: [7, 0, 8] };
 const KNOWN = ["all-bank", "60/40", "all-stock"];
 
-export async function view(id, leaving) {
-  const job = await get(`/jobs/${id}`, leaving);
-  const trail = h("p", { class: "trail" }, h("a", { href: "#/evaluations" }, "Evaluations"));
-  const title = `Backtest ${short(id)}`;
-  if (job.state !== "succeeded") return { title, trail, body: until(job, leaving) };
-  const report = await get(job.report, leaving);
-  const name = `backtest-${short(id)}`;
-  const actions = h(
-    "div",
-    { class: "actions" },
-    h("button", { class: "quiet", onclick: () => save(csv(told), `${name}.csv`, "text/csv") }, "Save as CSV"),
-    h("a", { class: "button quiet", href: job.report, download: `${name}.json`, onclick: download }, "Export"),
-  );
-  const told = { ...report, ...(report.assets ? ofAssets(report) : ofOne(report)), unit: unitOf(report.periods_per_year), times: times(report) };
+/** The report with what is said and drawn of it. */
+const tell = (report) => ({ ...report, ...(report.assets ? ofAssets(report) : ofOne(report)), unit: unitOf(report.periods_per_year), times: times(report) });
+
+export function body(report) {
+  const told = tell(report);
   const [head, foot] = report.assets ? [[walkedAssets(told), resultsOfAssets(told)], quantOfAssets(told)] : [[walked(told), results(told)], quant(told)];
-  return { title, trail, actions, body: [...head, chosen(told), foot] };
+  const read = report.read ? h("p", { class: "note" }, minus(report.read.replaceAll("\n", " "))) : "";
+  return [...head, chosen(told), read, foot];
 }
 
 /** The strategies of one asset; `market` is what they are held against, `known` who stands beside each, `main` who most is said of. */
@@ -338,7 +327,8 @@ function quant(told) {
 }
 
 /** What every strategy did, a period a line. */
-function csv({ lines, dates }) {
+export function csv(report) {
+  const { lines, dates } = tell(report);
   const head = ["Period", "Date", ...lines.flatMap(({ name }) => [`${name}: held, %`, `${name}: return, %`, `${name}: wealth`])];
   const returns = lines.map(({ wealth }) => returnsOf(wealth));
   const rows = lines[0].periods.wealth.map((_, k) => [

@@ -154,9 +154,9 @@ export function figure({ title, legend, holder, rows, note }) {
 
 /**
  * Lines over common positions.
- * x: `{values, domain, label, here, format, tick, whole, between}`, `between` where x names the unit before it and `here` what stands beside a value read, where that is not label and format; y: `{format, tick, also, log}`, `log` where equal ratios take equal room;
- * series: `[{name, values, kind: "line" | "bars" | "levels", bare, colour}]`, null where there is nothing. Bars and levels span
- * the unit before their x; a bare line has no dots; `colour` is the series' place unless said. What is read at first is `start`, or the last value of the first series; `gutter` lines up charts that stand above each other.
+ * x: `{values, domain, label, here, format, tick, whole, between, log}`, `between` where x names the unit before it and `here` what stands beside a value read, where that is not label and format; y: `{format, tick, also, log}`, `log` where equal ratios take equal room;
+ * series: `[{name, values, band, kind: "line" | "bars" | "levels", bare, joined, apart, colour}]`, null where there is nothing. Bars and levels span
+ * the unit before their x; a bare line has no dots, one that is `joined` passes over what is missing, and one `apart` is dots alone; `band` holds a low and a high end for each value; `colour` is the series' place unless said. What is read at first is `start`, or the last value of the first series; `gutter` lines up charts that stand above each other.
  */
 export function lineChart({ title, x, y, series: given, height = 190, note, start: first, gutter = 0 }) {
   const series = given.map((one, index) => ({ colour: index, ...one }));
@@ -173,12 +173,16 @@ export function lineChart({ title, x, y, series: given, height = 190, note, star
       h("span", {}, name ? [kind === "bars" ? block(colour) : swatch(colour), `${name} `] : null, outputs[index]),
     ),
   );
-  const [size, sized] = y.log ? [Math.log, Math.exp] : [(value) => value, (value) => value];
+  const same = (value) => value;
+  const [size, sized] = y.log ? [Math.log, Math.exp] : [same, same];
+  const along = x.log ? Math.log : same;
+  const said = ({ values, band }, index) => (band && Number.isFinite(values[index]) ? `${y.format(values[index])} (${band[index].map(y.format).join(" to ")})` : y.format(values[index]));
   const yDomain = extent(
-    series.flatMap(({ values }) => values.map((value) => (value === null ? null : size(value)))),
+    series.flatMap(({ values, band }) => [...values, ...(band ?? []).flat()].map((value) => (value === null ? null : size(value)))),
     y.also,
   );
-  const xDomain = x.domain ?? [x.values[0], x.values.at(-1)];
+  const ends = x.domain ?? [x.values[0], x.values.at(-1)];
+  const xDomain = ends.map(along);
   let cursor,
     xScale = scale(xDomain, [0, 1]);
   const start =
@@ -198,8 +202,8 @@ export function lineChart({ title, x, y, series: given, height = 190, note, star
     );
     xScale = scale(xDomain, [left, width - 14]);
     const up = scale(yDomain, [height - 30, 10]);
-    const frame = { x: xScale, y: (value) => up(size(value)), left, right: width - 4, bottom: height - 30 };
-    const xTicks = ticks(...xDomain, Math.min(12, width / 70)).filter(
+    const frame = { x: (value) => xScale(along(value)), y: (value) => up(size(value)), left, right: width - 4, bottom: height - 30 };
+    const xTicks = (x.log ? logTicks(...ends) : ticks(...ends, Math.min(12, width / 70))).filter(
       (tick) => (!x.whole || Number.isInteger(tick)) && !(x.between && tick === 0),
     );
     cursor = s("line", { class: "cursor", y1: 6, y2: frame.bottom });
@@ -207,7 +211,7 @@ export function lineChart({ title, x, y, series: given, height = 190, note, star
     return [
       axes({
         ...frame,
-        x: (value) => xScale(value - shift),
+        x: (value) => xScale(along(value - shift)),
         xTicks,
         yTicks,
         xFormat: x.tick ?? x.format,
@@ -218,7 +222,7 @@ export function lineChart({ title, x, y, series: given, height = 190, note, star
     ];
   });
   const mark = () => {
-    const pixel = xScale((x.values[shown[position]] ?? 0) - shift);
+    const pixel = xScale(along((x.values[shown[position]] ?? 0) - shift));
     cursor?.setAttribute("x1", pixel);
     cursor?.setAttribute("x2", pixel);
   };
@@ -226,21 +230,21 @@ export function lineChart({ title, x, y, series: given, height = 190, note, star
     position = at;
     const index = shown[at];
     here.textContent = x.here ? x.here(x.values[index]) : `${x.label} ${x.format(x.values[index])}`;
-    const words = series.map(({ values }, k) => (outputs[k].textContent = y.format(values[index])));
+    const words = series.map((one, k) => (outputs[k].textContent = said(one, index)));
     mark();
     return `${here.textContent}: ${series.map(({ name }, k) => `${name} ${words[k]}`).join(", ")}`;
   };
   const nearest = (pixel) => {
     const value = xScale.inverse(pixel) + shift;
     return shown.reduce(
-      (best, index, at) => (Math.abs(x.values[index] - value) < Math.abs(x.values[shown[best]] - value) ? at : best),
+      (best, index, at) => (Math.abs(along(x.values[index]) - value) < Math.abs(along(x.values[shown[best]]) - value) ? at : best),
       0,
     );
   };
   if (shown.length > 0) walkable(holder, { label: title, count: shown.length, start, at: nearest, read });
   const columns = [{ name: x.label, cell: (index) => x.format(x.values[index]) }];
   columns.push(
-    ...series.map(({ name, values }) => ({ name, numeric: true, cell: (index) => y.format(values[index]) })),
+    ...series.map((one) => ({ name: one.name, numeric: true, cell: (index) => said(one, index) })),
   );
   return figure({ title, legend, holder, note, rows: () => table(title, columns, shown) });
 }
@@ -248,7 +252,7 @@ export function lineChart({ title, x, y, series: given, height = 190, note, star
 /** Bars narrower than this, in pixels, are drawn as one shape. */
 const NARROWEST = 5;
 
-function drawn({ values, kind, bare, colour }, positions, { x, y, bottom }) {
+function drawn({ values, band, kind, bare, joined, apart, colour }, positions, { x, y, bottom }) {
   const points = values.map((value, k) => [x(positions[k]), y(value), value]);
   const seen = points.filter(([, , value]) => Number.isFinite(value));
   const wide = x(1) - x(0);
@@ -270,13 +274,19 @@ function drawn({ values, kind, bare, colour }, positions, { x, y, bottom }) {
     return seen.map(([right, py]) =>
       s("line", { class: `level s${colour}`, x1: right - wide + 1, x2: right - 1, y1: py, y2: py }),
     );
-  const path = points.map(([px, py, value], k) => {
+  const run = joined ? seen : points;
+  const path = run.map(([px, py, value], k) => {
     if (!Number.isFinite(value)) return "";
-    return `${k > 0 && Number.isFinite(points[k - 1][2]) ? "L" : "M"}${px.toFixed(1)} ${py.toFixed(1)}`;
+    return `${k > 0 && Number.isFinite(run[k - 1][2]) ? "L" : "M"}${px.toFixed(1)} ${py.toFixed(1)}`;
   });
   const ends =
     !bare && seen.length <= 40 ? seen.map(([cx, cy]) => s("circle", { class: `dot s${colour}`, cx, cy, r: 2.5 })) : null;
-  return [s("path", { class: `line s${colour}`, d: path.join("") }), ends];
+  const outline = band && [...band.map(([low], k) => [k, low]), ...band.map(([, high], k) => [k, high]).reverse()].map(([k, end]) => `${x(positions[k]).toFixed(1)} ${y(end).toFixed(1)}`);
+  return [
+    band ? s("path", { class: `band s${colour}`, d: `M${outline.join("L")}Z` }) : null,
+    apart ? null : s("path", { class: `line s${colour}`, d: path.join("") }),
+    ends,
+  ];
 }
 
 /** A staircase over positions that end a unit each, closed along `bottom` where that is given. */

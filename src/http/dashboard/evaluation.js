@@ -1,13 +1,10 @@
 // The report of one evaluation: what was compared and what came of it in sentences and in wealth, the rest for the quant.
 
-import { download, get } from "./api.js";
 import { lineChart } from "./chart.js";
 import { disclosure, h, quantSection, section, table } from "./dom.js";
-import { count, counted, duration, figures, minus, percent, percentTick, short, significant, tick, wealth } from "./format.js";
+import { count, counted, duration, figures, minus, percent, percentTick, significant, tick, wealth } from "./format.js";
 import { histogram } from "./histogram.js";
 import { intervalChart } from "./interval_chart.js";
-import { until } from "./jobs.js";
-import { policyLink } from "./naming.js";
 import { unitOf } from "./periods.js";
 import { FRAMEWORKS, investorWords, PAPER } from "./specification.js";
 import { binned, pieces } from "./spread.js";
@@ -20,20 +17,10 @@ const MIX = 2;
 const SHOWN = 4;
 const BINS = 36;
 
-export async function view(id, leaving) {
-  const job = await get(`/jobs/${id}`, leaving);
-  const trail = h("p", { class: "trail" }, h("a", { href: "#/evaluations" }, "Evaluations"));
-  const title = `Evaluation ${short(id)}`;
-  if (job.state !== "succeeded") return { title, trail, body: until(job, leaving) };
-  const report = await get(job.report, leaving);
+/** `policyLink(id)` is how a policy is named. */
+export function body(report, policyLink) {
   const ended = outcomes(report);
-  const export_ = h(
-    "a",
-    { class: "button quiet", href: job.report, download: `evaluation-${short(id)}.json`, onclick: download },
-    "Export",
-  );
-  const body = [compared(report), results(report, ended), spreads(report, ended), courses(report), quant(report, ended)];
-  return { title, trail, actions: export_, body };
+  return [compared(report, policyLink), results(report, ended), spreads(report, ended), courses(report), quant(report, ended)];
 }
 
 const named = ({ framework, constant_mix }) => {
@@ -59,7 +46,7 @@ function outcomes({ strategies, histogram_edges, request }) {
 }
 
 /** What was compared, on what, for whom. */
-function compared({ request, histories, strategies }) {
+function compared({ request, histories, strategies }, policyLink) {
   const { problem } = request;
   const unit = unitOf(problem.periods_per_year);
   const drawn = request.histories.kind === "drawn";

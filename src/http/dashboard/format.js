@@ -63,6 +63,7 @@ export const oneIn = (probability) => count(Math.max(1, Math.round(1 / probabili
 
 /** A number on an axis, with the digits that its `step` asks for. */
 export function tick(value, step) {
+  if (!Number.isFinite(value)) return "\u2013";
   const size = Math.max(Math.abs(value), Math.abs(step) || Math.abs(value));
   if (size >= 1e7 || (size !== 0 && size < 1e-4)) return significant(value, apart(size, step));
   return grouped(value, Math.min(FINEST, decimals(step)));

@@ -1,25 +1,13 @@
 // What more or less caution would lose on records like the one at hand: asked for, and the report of it.
 
-import { download, get, post } from "./api.js";
+import { post } from "./api.js";
 import { announce, h, section, table } from "./dom.js";
-import { minus, percent, short, tick } from "./format.js";
+import { minus, percent, tick } from "./format.js";
 import { intervalChart } from "./interval_chart.js";
-import { until } from "./jobs.js";
 
-export async function view(id, leaving) {
-  const job = await get(`/jobs/${id}`, leaving);
-  const trail = h("p", { class: "trail" }, h("a", { href: "#/jobs" }, "Jobs"));
-  const title = `Frontier of caution ${short(id)}`;
-  if (job.state !== "succeeded") return { title, trail, body: until(job, leaving) };
-  const report = await get(job.report, leaving);
-  const name = `frontier-${short(id)}.json`;
-  const actions = h("a", { class: "button quiet", href: job.report, download: name, onclick: download }, "Export");
-  const words = h(
-    "div",
-    { class: "words" },
-    report.sentences.map((sentence) => h("p", {}, minus(sentence))),
-  );
-  return { title, trail, actions, body: [words, ...report.resampled.map((resampled) => drawn(report, resampled))] };
+export function body(report) {
+  const words = h("div", { class: "words" }, report.sentences.map((sentence) => h("p", {}, minus(sentence))));
+  return [words, ...report.resampled.map((resampled) => drawn(report, resampled))];
 }
 
 const TITLES = {

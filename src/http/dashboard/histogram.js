@@ -6,8 +6,9 @@ import { percent, percentTick, tick, wealth } from "./format.js";
 
 const HEIGHT = 130;
 
-/** `shares` of even bins over `domain`; `top`: the largest share of all that are drawn alike; `marks`: `[{name, at}]`. */
-export function histogram({ title, shares, domain, top, colour, marks }) {
+/** `shares` of even bins over `domain`; `top`: the largest share of all that are drawn alike; `marks`: `[{name, at}]`; `of` is what is
+ * counted, told by `format`. */
+export function histogram({ title, shares, domain, top, colour, marks, of = "Wealth", format = wealth }) {
   const width = (domain[1] - domain[0]) / shares.length;
   const from = (bin) => domain[0] + bin * width;
   const output = h("b", {});
@@ -37,7 +38,7 @@ export function histogram({ title, shares, domain, top, colour, marks }) {
   });
   const read = (at) => {
     position = at;
-    here.textContent = `Wealth ${wealth(from(at))} to ${wealth(from(at + 1))}`;
+    here.textContent = `${of} ${format(from(at))} to ${format(from(at + 1))}`;
     output.textContent = percent(shares[at]);
     mark();
     return `${here.textContent}: ${output.textContent}`;
@@ -45,7 +46,7 @@ export function histogram({ title, shares, domain, top, colour, marks }) {
   const start = shares.indexOf(Math.max(...shares));
   walkable(holder, { label: title, count: shares.length, start, read, at: (pixel) => Math.floor((x.inverse(pixel) - domain[0]) / width) });
   const columns = [
-    { name: "Wealth", cell: (bin) => `${wealth(from(bin))} to ${wealth(from(bin + 1))}` },
+    { name: of, cell: (bin) => `${format(from(bin))} to ${format(from(bin + 1))}` },
     { name: "How often", numeric: true, cell: (bin) => percent(shares[bin]) },
   ];
   const seen = shares.map((_, bin) => bin).filter((bin) => shares[bin] > 0);

@@ -2,14 +2,12 @@
 
 import { offers, Problem } from "./api.js";
 import { announce, h } from "./dom.js";
-import * as backtest from "./backtest.js";
 import * as backtestAsking from "./backtest_asking.js";
 import * as compare from "./compare.js";
-import * as evaluation from "./evaluation.js";
 import * as evaluationAsking from "./evaluation_asking.js";
 import * as evaluations from "./evaluations.js";
-import * as frontier from "./frontier.js";
 import { holderWords, lacking, lackWords } from "./holder.js";
+import { ofBacktest, ofEvaluation, ofFrontier } from "./job_report.js";
 import * as jobs from "./jobs.js";
 import { held, keyForm } from "./key.js";
 import * as policies from "./policies.js";
@@ -33,11 +31,11 @@ const ROUTES = [
   [/^#\/sessions\/([^/]+)$/, session.view, "sessions"],
   [/^#\/evaluations$/, evaluations.view, "evaluations"],
   [/^#\/evaluations\/new(?:\?(.*))?$/, evaluationAsking.view, "evaluations", "train"],
-  [/^#\/evaluations\/([^/]+)$/, evaluation.view, "evaluations"],
+  [/^#\/evaluations\/([^/]+)$/, ofEvaluation, "evaluations"],
   [/^#\/backtests\/new$/, backtestAsking.view, "evaluations", "train"],
-  [/^#\/backtests\/([^/]+)$/, backtest.view, "evaluations"],
+  [/^#\/backtests\/([^/]+)$/, ofBacktest, "evaluations"],
   [/^#\/compare(?:\?(.*))?$/, compare.view, "compare"],
-  [/^#\/frontiers\/([^/]+)$/, frontier.view, "jobs"],
+  [/^#\/frontiers\/([^/]+)$/, ofFrontier, "jobs"],
   [/^#\/key$/, key, "key"],
 ];
 

@@ -1,0 +1,30 @@
+// The page of a job's report: the job until it is done, then what the report's own module draws of it.
+
+import { download, get } from "./api.js";
+import * as backtest from "./backtest.js";
+import { h } from "./dom.js";
+import * as evaluation from "./evaluation.js";
+import { short } from "./format.js";
+import * as frontier from "./frontier.js";
+import { until } from "./jobs.js";
+import { policyLink } from "./naming.js";
+import { save } from "./picture.js";
+
+const EVALUATIONS = ["Evaluations", "#/evaluations"];
+
+/** `drawn.body(report)` makes the page, `drawn.csv(report)`, where it has one, what else is saved. */
+const reported = (noun, [above, href], drawn) => async (id, leaving) => {
+  const job = await get(`/jobs/${id}`, leaving);
+  const trail = h("p", { class: "trail" }, h("a", { href }, above));
+  const title = `${noun} ${short(id)}`;
+  if (job.state !== "succeeded") return { title, trail, body: until(job, leaving) };
+  const report = await get(job.report, leaving);
+  const name = `${noun.toLowerCase().replace(/ .*/, "")}-${short(id)}`;
+  const sheet = drawn.csv && h("button", { class: "quiet", onclick: () => save(drawn.csv(report), `${name}.csv`, "text/csv") }, "Save as CSV");
+  const whole = h("a", { class: "button quiet", href: job.report, download: `${name}.json`, onclick: download }, "Export");
+  return { title, trail, actions: h("div", { class: "actions" }, [sheet, whole].filter(Boolean)), body: drawn.body(report, policyLink) };
+};
+
+export const ofBacktest = reported("Backtest", EVALUATIONS, backtest);
+export const ofEvaluation = reported("Evaluation", EVALUATIONS, evaluation);
+export const ofFrontier = reported("Frontier of caution", ["Jobs", "#/jobs"], frontier);

@@ -1,0 +1,200 @@
+// The paper's section 3 computed anew: what holds and what does not, then each of its tables and figures.
+
+import { lineChart } from "./chart.js";
+import { h, section, table } from "./dom.js";
+import { count, percent, percentTick, significant, tick } from "./format.js";
+import { histogram } from "./histogram.js";
+import { PAPER } from "./specification.js";
+import { interval } from "./verdict.js";
+
+const STATISTICS = [["mean", "Mean"], ["variance", "Variance"], ["quantile_20", "20 % quantile"], ["quantile_90", "90 % quantile"], ["max", "Most"], ["min", "Least"]];
+/** Columns of the paper's tables and the strategies they are of. */
+const PRINTED = { adaptive: ["adaptive", "Adaptive robust"], known_law: ["known_law", "True law"], static_robust: ["static", "Static robust"] };
+const COLOURS = { adaptive: 0, static: 1, plug_in: 3, known_law: 4 };
+const BINS = 30;
+
+const four = (value) => tick(value, 0.0001);
+const estimate = (found) => interval(found, four);
+const named = ({ strategy, framework, constant_mix }) => (framework ? (PAPER[framework] ?? strategy) : `${percent(constant_mix, 0)} in stocks`);
+const find = ({ strategies }, name) => strategies.find(({ strategy }) => strategy === name);
+const number = (name, cell) => ({ name, numeric: true, cell });
+const note = (...words) => h("p", { class: "note" }, words);
+
+export function body({ plan, quick, sample_size, findings, section: found, study, printed }) {
+  return [
+    h(
+      "div",
+      { class: "words" },
+      h("p", {}, `Bayraktar and Chen, Nonparametric Adaptive Robust Control Under Model Uncertainty, section 3: ${plan.horizon} steps, the bank pays 0.002 a step, exponential utility with risk aversion 0.01, wealth 100, a mixture of two normals, ${sample_size} returns of history, alpha 0.1. Ranges hold with 95 % confidence over initial histories.`),
+      quick ? h("p", {}, "This is the quick run: tiny designs and few histories. Its figures mean little.") : "",
+    ),
+    section("What holds and what does not", h("div", { class: "duo" }, verdicts("Agrees", findings.filter(({ agrees }) => agrees)), verdicts("Differs", findings.filter(({ agrees }) => !agrees)))),
+    quantiles(found),
+    ...found.cases.map((one, index) => whole(one, index, printed[index], found)),
+    mixes(found.all, printed),
+    coverage(found.all),
+    convergence(study),
+  ];
+}
+
+const verdicts = (title, some) =>
+  h("div", {}, h("h3", {}, `${title}: ${count(some.length)}`), h("ul", { class: `verdicts ${title.toLowerCase()}` }, some.map(({ statement, found }) => h("li", {}, h("b", {}, statement), " ", found))));
+
+function quantiles({ quantiles: { shown, drawn, mean }, all }) {
+  const domain = [Math.min(...shown), Math.max(...shown)];
+  const bin = (value) => Math.min(BINS - 1, Math.floor((BINS * (value - domain[0])) / (domain[1] - domain[0])));
+  const shares = Array.from({ length: BINS }, (_, k) => shown.filter((value) => bin(value) === k).length / shown.length);
+  const periods = find(all, "adaptive").periods.filter(({ radius }) => radius);
+  const sizes = { values: periods.map(({ sample_size }) => sample_size), label: "Returns seen", format: String, whole: true };
+  return section(
+    "Figure 1",
+    note(`The first ${count(shown.length)} of ${count(drawn)} simulated quantiles Q of the bridge statistic at t0 = 20 and alpha = 0.1, whose mean is ${four(mean.value)}, and the radius as returns come in.`),
+    histogram({ title: "Simulated quantiles", of: "Q", format: four, shares, domain, top: Math.max(...shares), colour: 0, marks: [] }),
+    lineChart({
+      title: "Radius",
+      x: sizes,
+      y: { format: four, tick },
+      series: [
+        { name: "Median, and the middle 80 % of paths", kind: "line", bare: true, colour: 0, values: periods.map(({ radius }) => radius.quantile_50), band: periods.map(({ radius }) => [radius.quantile_10, radius.quantile_90]) },
+        { name: "One path", kind: "line", bare: true, colour: 1, values: periods.map(({ radius }) => radius.first_path) },
+      ],
+    }),
+  );
+}
+
+/** A table of the paper and its part of the second figure. */
+function whole({ quantile, found, report }, index, printed, { quantiles, all }) {
+  const tables = () => Object.entries(PRINTED).map(([column, [strategy, name]]) => statistics(name, printed[column], find(report, strategy), find(all, strategy), report, all));
+  return section(
+    `Table ${index + 1} and Figure 2, Q near ${quantile}`,
+    note(`${count(found)} of ${count(quantiles.drawn)} simulated histories have a Q within 2 % of it${found > 0 ? `: one in ${count(Math.round(quantiles.drawn / found))}` : ""}.`),
+    report ? [...tables(), utilities(report)] : "",
+  );
+}
+
+function statistics(name, paper, own, all, report, everywhere) {
+  const columns = [
+    { name: "Terminal utility", cell: ([, label]) => label },
+    number("Paper", ([, , k]) => four(paper[k])),
+    number(`Here, ${count(report.histories.length)} such histories of ${count(report.request.paths)} paths`, ([key]) => estimate(own.utility[key])),
+    number(`Here, ${count(everywhere.histories.length)} histories of ${count(everywhere.request.paths)} paths`, ([key]) => estimate(all.utility[key])),
+  ];
+  return [h("h3", {}, name), table(name, columns, STATISTICS.map(([key, label], k) => [key, label, k]))];
+}
+
+/** How terminal utility spreads, on one scale. */
+function utilities({ strategies, histogram_edges: edges }) {
+  const some = ["adaptive", "known_law"].map((name) => find({ strategies }, name)).filter(Boolean);
+  const shares = ({ histogram: counts }) => counts.map((one) => one / counts.reduce((sum, other) => sum + other, 0));
+  const top = Math.max(...some.flatMap(shares));
+  const drawn = (one) => histogram({ title: `Terminal utility: ${named(one).toLowerCase()}`, of: "Utility", format: (value) => tick(value, 0.1), shares: shares(one), domain: [edges[0], edges.at(-1)], top, colour: COLOURS[one.strategy], marks: [] });
+  return h("div", { class: "duo" }, some.map(drawn));
+}
+
+/** Mean and variance of all strategies, and what they held. */
+function mixes(all, printed) {
+  const points = all.strategies.map((one) => ({ one, at: one.utility.variance.value, mean: one.utility.mean.value, constant: one.constant_mix !== null }));
+  const paper = printed.map(({ adaptive: [mean, variance] }) => ({ at: variance, mean, paper: true }));
+  const placed = [...points, ...paper].sort((one, other) => one.at - other.at);
+  const series = (name, colour, is, more) => ({ name, colour, kind: "line", values: placed.map((point) => (is(point) ? point.mean : null)), ...more });
+  const deciding = all.strategies.filter(({ periods }) => periods);
+  const ranked = [...all.strategies].sort((one, other) => other.certainty_equivalent.value - one.certainty_equivalent.value);
+  const held = (one) => ({
+    name: named(one),
+    colour: COLOURS[one.strategy],
+    kind: "line",
+    values: one.periods.map(({ allocation }) => allocation.mean),
+    band: one.strategy === "adaptive" ? one.periods.map(({ allocation }) => [allocation.quantile_10, allocation.quantile_90]) : null,
+  });
+  return section(
+    "The frontier of constant mixes",
+    note("What a constant share in stocks, nothing to everything by tenths, earns at what variance, and the frameworks beside it."),
+    lineChart({
+      title: "Mean and variance of terminal utility",
+      height: 300,
+      x: { values: placed.map(({ at }) => at), label: "Variance", format: (value) => tick(value, 0.01), tick },
+      y: { format: four, tick },
+      series: [
+        series("Constant mixes", 2, ({ constant }) => constant, { joined: true }),
+        ...deciding.map((one) => series(named(one), COLOURS[one.strategy], (point) => point.one === one, { apart: true })),
+        series("Adaptive as printed", 5, (point) => point.paper, { apart: true }),
+      ],
+    }),
+    table(
+      "All strategies, all histories, by what each is worth",
+      [
+        { name: "Strategy", cell: named },
+        number("Certainty equivalent", (row) => estimate(row.certainty_equivalent)),
+        number("Mean utility", (row) => estimate(row.utility.mean)),
+        number("Variance", (row) => interval(row.utility.variance, (value) => tick(value, 0.001))),
+        number("Mean less adaptive", ({ difference }) => (difference ? estimate(difference.utility) : "\u2013")),
+      ],
+      ranked,
+    ),
+    lineChart({
+      title: "Average share in stocks; the middle 80 % of adaptive paths shaded",
+      x: { values: deciding[0].periods.map(({ period }) => period), label: "Period", format: String, whole: true },
+      y: { format: percent, tick: percentTick, also: [0] },
+      series: deciding.map(held),
+    }),
+  );
+}
+
+function coverage(all) {
+  const told = find(all, "adaptive").coverage;
+  if (!told) return "";
+  const { by_sample_size: sizes, ever_left, target } = told;
+  return section(
+    "Does the ball hold the true law?",
+    note(`On ${interval(ever_left, percent)} of the paths the ball of some period does not.`),
+    lineChart({
+      title: "Share of steps at which the ball held the true law",
+      x: { values: sizes.map(({ sample_size }) => sample_size), label: "Returns seen", format: String, whole: true },
+      y: { format: percent, tick: percentTick },
+      series: [
+        { name: "Held it, and the range of that", kind: "line", colour: 0, values: sizes.map(({ covered }) => covered.value), band: sizes.map(({ covered: { low, high } }) => [low, high]) },
+        { name: "Aimed at", kind: "line", colour: 2, bare: true, values: sizes.map(() => target) },
+      ],
+    }),
+  );
+}
+
+function convergence({ rows, slopes }) {
+  const sizes = [...new Set(rows.map(({ sample_size }) => sample_size))].sort((one, other) => one - other);
+  const of = (strategy, gap) => sizes.map((size) => rows.find((row) => row.strategy === strategy && row.sample_size === size)?.[gap].value ?? null).map((value) => (value > 0 ? value : null));
+  const gaps = (gap, title) => {
+    const adaptive = of("adaptive", gap);
+    const rate = sizes.map((size) => adaptive[0] && adaptive[0] * (size / sizes[0]) ** -0.5);
+    const series = [["adaptive", adaptive, 0], ["static", of("static", gap), 1]].map(([strategy, values, colour]) => ({ name: PAPER[strategy], kind: "line", joined: true, colour, values }));
+    return lineChart({
+      title,
+      height: 240,
+      x: { values: sizes, label: "Returns of history", format: String, log: true },
+      y: { format: (value) => significant(value), tick: (value) => significant(value), log: true },
+      series: [...series, { name: "Rate \u22121/2", kind: "line", bare: true, colour: 2, values: rate }],
+    });
+  };
+  return section(
+    "Convergence to the known law",
+    note("The value gap is what the known law is worth at the start less what the framework promises there, the gap of section 2.4; the realised gap is what it cost on the same simulated returns."),
+    gaps("value_gap", "Value gap"),
+    gaps("realised_gap", "Realised gap"),
+    table(
+      "Gaps to the known law, in terminal utility",
+      [
+        { name: "Returns of history", cell: ({ sample_size }) => count(sample_size) },
+        { name: "Framework", cell: ({ strategy }) => PAPER[strategy] },
+        number("Mean radius", ({ radius }) => four(radius)),
+        number("Value gap", ({ value_gap }) => estimate(value_gap)),
+        number("Realised gap", ({ realised_gap }) => estimate(realised_gap)),
+      ],
+      rows,
+    ),
+    h("h3", {}, "Fitted powers of the length of history; section 2.4 predicts \u22120.5"),
+    table(
+      "Fitted powers of the length of history",
+      [{ name: "Framework", cell: ({ strategy }) => PAPER[strategy] }, { name: "Gap", cell: ({ gap }) => gap }, number("All", ({ all }) => tick(all, 0.01)), number("Last two", ({ last }) => tick(last, 0.01))],
+      slopes,
+    ),
+  );
+}

@@ -1,0 +1,168 @@
+//! A report as one HTML file: the modules that draw it, its data as JSON, its styles and its typeface.
+//!
+//! The modules stand in an import map as `data:` addresses, each under its name, so that they are the dashboard's own to the
+//! letter but for the `./` before the names they import. A browser may run these and load nothing else: the policy names the
+//! two scripts of the page by their hashes.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// What shows the page, whatever draws it.
+const SHOWS: &str = "report_file.js";
+const SHEETS: [&str; 2] = ["style.css", "print.css"];
+const TYPEFACE: &str = "inter.woff2";
+/// Before the name of a module where a module imports it.
+const BESIDE: &str = " from \"./";
+
+/// A report that cannot be written.
+#[derive(Debug, Error)]
+pub enum FileError {
+    #[error("there is no file {name:?} to draw the report with")]
+    Missing { name: String },
+    #[error("writing the data of the report")]
+    Json(#[from] serde_json::Error),
+}
+
+/// The embedded files by their names.
+pub type Files = fn(&str) -> Option<&'static [u8]>;
+
+/// The file. `module` draws `data` below `title`; `sentences` are what a reader without scripts sees.
+///
+/// # Errors
+/// A module that is not among `files`, or data that are no JSON.
+pub fn html(
+    files: Files,
+    module: &str,
+    title: &str,
+    data: &impl Serialize,
+    sentences: &[String],
+) -> Result<String, FileError> {
+    let mut imports = BTreeMap::new();
+    for name in [SHOWS, module] {
+        collect(files, name, &mut imports)?;
+    }
+    let map = json(&serde_json::json!({ "imports": imports }))?;
+    let start = format!(
+        "import {{ show }} from \"ballast/{SHOWS}\"; import * as drawn from \"ballast/{module}\"; show(drawn);"
+    );
+    let mut style = String::new();
+    for name in SHEETS {
+        style.push_str(&text(files, name)?);
+    }
+    let style = style.replace(TYPEFACE, &address("font/woff2", bytes(files, TYPEFACE)?));
+    let policy = format!(
+        "default-src 'none'; script-src data: {} {}; style-src {}; font-src data:; base-uri 'none'; form-action 'none'; \
+         require-trusted-types-for 'script'",
+        hash(&map),
+        hash(&start),
+        hash(&style)
+    );
+    let data = json(&serde_json::json!({ "title": title, "data": data }))?;
+    let title = escaped(title);
+    let sentences: String = sentences.iter().map(|sentence| format!("<p>{}</p>\n", escaped(sentence))).collect();
+    Ok(format!(
+        r#"<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="content-security-policy" content="{policy}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>{title}</title>
+<style>{style}</style>
+<script type="importmap">{map}</script>
+</head>
+<body>
+<main class="report"><noscript><h1>{title}</h1>
+{sentences}<p>The figures and charts of this report are drawn by scripts, which are not run here.</p></noscript></main>
+<p id="status" class="unseen" role="status" aria-live="polite"></p>
+<script type="application/json" id="report">{data}</script>
+<script type="module">{start}</script>
+</body>
+</html>
+"#
+    ))
+}
+
+/// A module and all that it imports, as addresses.
+fn collect(files: Files, name: &str, imports: &mut BTreeMap<String, String>) -> Result<(), FileError> {
+    let key = format!("ballast/{name}");
+    if imports.contains_key(&key) {
+        return Ok(());
+    }
+    let source = text(files, name)?;
+    let whole = source.replace(BESIDE, " from \"ballast/");
+    imports.insert(key, address("text/javascript", whole.as_bytes()));
+    let names = source.split(BESIDE).skip(1).filter_map(|rest| rest.split_once('"'));
+    names.map(|(name, _)| name).try_for_each(|name| collect(files, name, imports))
+}
+
+fn bytes(files: Files, name: &str) -> Result<&'static [u8], FileError> {
+    files(name).ok_or_else(|| FileError::Missing { name: name.into() })
+}
+
+fn text(files: Files, name: &str) -> Result<String, FileError> {
+    bytes(files, name).map(|bytes| String::from_utf8_lossy(bytes).into_owned())
+}
+
+fn address(media: &str, bytes: &[u8]) -> String {
+    format!("data:{media};base64,{}", STANDARD.encode(bytes))
+}
+
+/// How a policy names an inline script or style.
+fn hash(text: &str) -> String {
+    format!("'sha256-{}'", STANDARD.encode(Sha256::digest(text)))
+}
+
+/// JSON within a `<script>`, which nothing in it ends.
+fn json(value: &impl Serialize) -> Result<String, serde_json::Error> {
+    Ok(serde_json::to_string(value)?.replace('<', "\\u003c"))
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn files(name: &str) -> Option<&'static [u8]> {
+        Some(match name {
+            SHOWS => b"export const show = 1;",
+            "drawn.js" => b"import { a } from \"./a.js\";\nexport const body = a;",
+            "a.js" => b"import { body } from \"./drawn.js\";\nexport const a = 1;",
+            "style.css" => b"src: url(\"inter.woff2\")",
+            "print.css" | TYPEFACE => b"",
+            _ => return None,
+        })
+    }
+
+    #[test]
+    fn a_file_holds_every_module_once_and_nothing_in_its_data_ends_a_script() {
+        let hostile = "</script><script>alert(1)</script> & <b>";
+        let page = html(files, "drawn.js", hostile, &[hostile], &[hostile.to_owned()]).unwrap();
+        assert_eq!(page.matches("<script").count(), 3, "{page}");
+        assert_eq!(page.matches("</script>").count(), 3, "{page}");
+        assert!(page.contains("<p>&lt;/script&gt;&lt;script&gt;alert(1)&lt;/script&gt; &amp; &lt;b&gt;</p>"), "{page}");
+        for name in [SHOWS, "drawn.js", "a.js"] {
+            assert_eq!(
+                page.matches(&format!("\"ballast/{name}\":\"data:text/javascript;base64,")).count(),
+                1,
+                "{page}"
+            );
+        }
+        let whole = STANDARD.encode("import { a } from \"ballast/a.js\";\nexport const body = a;");
+        assert!(page.contains(&whole) && page.contains("url(\"data:font/woff2;base64,\")"), "{page}");
+    }
+
+    #[test]
+    fn a_module_that_is_not_there_is_named() {
+        let error = html(files, "gone.js", "", &0, &[]).unwrap_err();
+        assert_eq!(error.to_string(), "there is no file \"gone.js\" to draw the report with");
+    }
+}
