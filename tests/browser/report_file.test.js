@@ -58,6 +58,7 @@ test("a chart is walked by keyboard, has a table and is saved as a picture", asy
   await chart.getByRole("slider").press("ArrowLeft");
   assert.notEqual(await chart.getByRole("slider").getAttribute("aria-valuetext"), before);
   await chart.getByText("As a table").click();
+  await chart.getByRole("table").waitFor();
   assert.equal(await chart.getByRole("row").count(), 1 + 9);
   for (const kind of ["SVG", "PNG"]) {
     const [file] = await Promise.all([page.waitForEvent("download"), chart.getByRole("button", { name: kind }).click()]);

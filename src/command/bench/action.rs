@@ -77,7 +77,7 @@ impl Case {
         });
         Ok(Case {
             specification: json!({ "problem": problem, "design": { "count": bench.count }, "seed": 1 }),
-            returns: (0..bench.calls).map(|call| json!({ "log_returns": named(call) })).collect(),
+            returns: (0..bench.calls).map(|call| json!({ "log_returns": named(call), "confirm": true })).collect(),
         })
     }
 }

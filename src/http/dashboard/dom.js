@@ -80,7 +80,7 @@ export function facts(entries) {
 
 /** A titled part of a page. */
 export function section(title, ...children) {
-  const heading = h("h2", { id: `h-${title.toLowerCase().replace(/[^a-z]+/g, "-")}` }, title);
+  const heading = h("h2", { id: `h-${title.toLowerCase().replace(/[^a-z0-9]+/g, "-")}` }, title);
   return h("section", { "aria-labelledby": heading.id }, heading, children);
 }
 

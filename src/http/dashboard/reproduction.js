@@ -64,7 +64,7 @@ function quantiles({ quantiles: { shown, drawn, mean }, all }) {
 
 /** A table of the paper and its part of the second figure. */
 function whole({ quantile, found, report }, index, printed, { quantiles, all }) {
-  const tables = () => Object.entries(PRINTED).map(([column, [strategy, name]]) => statistics(name, printed[column], find(report, strategy), find(all, strategy), report, all));
+  const tables = () => Object.entries(PRINTED).map(([column, [strategy, name]]) => statistics(`${name}, Q near ${quantile}`, printed[column], find(report, strategy), find(all, strategy), report, all));
   return section(
     `Table ${index + 1} and Figure 2, Q near ${quantile}`,
     note(`${count(found)} of ${count(quantiles.drawn)} simulated histories have a Q within 2 % of it${found > 0 ? `: one in ${count(Math.round(quantiles.drawn / found))}` : ""}.`),
