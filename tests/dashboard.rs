@@ -51,6 +51,21 @@ async fn served(app: &App, address: &str, name: &str, bytes: &[u8]) -> String {
     headers["content-security-policy"].to_str().expect("text").to_owned()
 }
 
+/// The address of a page without its `#`, as people type it, leads there in a browser; a program is told that there is nothing.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_browser_at_an_unknown_path_is_sent_to_the_page_of_that_name() {
+    let app = App::start().await;
+    let client = reqwest::Client::builder().redirect(reqwest::redirect::Policy::none()).build().expect("a client");
+    let ask = |accept: &'static str| client.get(format!("{}/report", app.url)).header(ACCEPT, accept).send();
+    let answer = ask("text/html,application/xhtml+xml,*/*;q=0.8").await.expect("an answer");
+    assert_eq!(
+        (answer.status(), &answer.headers()["location"]),
+        (StatusCode::SEE_OTHER, &"/#/report".parse().unwrap())
+    );
+    let answer = ask("*/*").await.expect("an answer");
+    assert_eq!(answer.status(), StatusCode::NOT_FOUND);
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn every_file_is_served_as_what_it_is_under_a_strict_policy() {
     let app = App::start().await;

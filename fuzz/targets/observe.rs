@@ -11,6 +11,7 @@ use ballast::service::answer::Observed;
 use ballast::service::clock::Clock;
 use ballast::service::config::Config;
 use ballast::service::keys::Caller;
+use ballast::store::labels::Relabel;
 use ballast::service::report::Observe;
 use ballast::service::sessions::Start;
 use ballast::service::shutdown::Shutdown;
@@ -46,7 +47,16 @@ static LIVE: LazyLock<Live> = LazyLock::new(|| {
 });
 
 fn open(runtime: &Runtime, service: &Service, caller: &Caller, policy: &str) -> String {
-    let start = Start { policy: policy.to_owned(), history: None, wealth: None, holding: None };
+    let start = Start {
+        policy: policy.to_owned(),
+        history: None,
+        wealth: None,
+        holding: None,
+        holdings: None,
+        renew: None,
+        rolling: false,
+        labels: Relabel::default(),
+    };
     let opened = runtime.block_on(service.sessions.open(caller, start, None));
     opened.expect("a session").row.session.clone()
 }

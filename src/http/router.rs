@@ -5,9 +5,9 @@ use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use axum::extract::{Request, State};
-use axum::http::{Method, Uri};
+use axum::http::{HeaderMap, Method, Uri, header};
 use axum::middleware::{self, Next};
-use axum::response::{IntoResponse, Response};
+use axum::response::{IntoResponse, Redirect, Response};
 use axum::{Extension, Router};
 use futures_util::FutureExt;
 use tracing::Instrument;
@@ -169,9 +169,20 @@ async fn answered(State(around): State<Surroundings>, request: Request, next: Ne
     response
 }
 
-async fn unknown_route(_: By<Read>, uri: Uri) -> Problem {
+/// A browser that is sent to a page by its address without the `#` is sent there; the page itself asks for a key.
+async fn unknown_route(
+    caller: Result<By<Read>, Problem>,
+    method: Method,
+    headers: HeaderMap,
+    uri: Uri,
+) -> Result<Redirect, Problem> {
+    let wants = headers.get(header::ACCEPT).and_then(|accept| accept.to_str().ok());
+    if method == Method::GET && wants.is_some_and(|accept| accept.contains("text/html")) {
+        return Ok(Redirect::to(&format!("/#{}", uri.path())));
+    }
+    caller?;
     let problem = Problem::new(ProblemKind::UnknownRoute, format!("there is nothing at {}", uri.path()));
-    problem.naming("path", uri.path(), "must be a path of /openapi.json")
+    Err(problem.naming("path", uri.path(), "must be a path of /openapi.json"))
 }
 
 async fn wrong_method(_: Option<By<Read>>, method: Method, uri: Uri) -> Problem {

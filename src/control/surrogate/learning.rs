@@ -25,6 +25,9 @@ const MOST_TOGETHER: usize = 256;
 const BYTES_TOGETHER: usize = 8 << 20;
 /// Bytes of a value of a law in such a state.
 pub const LAW_BYTES: usize = 40;
+/// Sets of fresh states that must each say that a design is accurate enough; the larger error is claimed. A design that stopped at
+/// the first set that was kind to it claimed too little, by a factor of 1.3 in the geometric mean.
+const SETS: usize = 2;
 /// Progress is reported about this often a step.
 const REPORTS_PER_STEP: usize = 100;
 
@@ -133,12 +136,23 @@ impl Learning<'_> {
             let mut diagnostics =
                 StepDiagnostics { value: Some(value), policy: Some(policy), ..diagnostics(step, &known.solved) };
             if let Some(aim) = &self.aim {
-                let checks = Checks::of(&deviations, stored.deviation_limit, self.specification.seed, step, round);
-                let some = checks.weighted.iter().map(|&(state, _)| (fresh.start + state, guards[state].clone()));
-                let before = known.solved.len();
-                let checked = self.solve(states, some.collect(), before, before + checks.weighted.len())?;
                 let served = ValueSurrogate::new(self.specification, step, &stored);
-                let own = checks.error(&served, self.specification, step, &checked);
+                let (mut own, mut checked, mut seen) = (0.0_f64, Vec::new(), Vec::new());
+                for set in 0..SETS {
+                    let number = SETS * round + set;
+                    let checks = Checks::of(&deviations, stored.deviation_limit, self.specification.seed, step, number);
+                    let some = checks.weighted.iter().map(|&(state, _)| (fresh.start + state, guards[state].clone()));
+                    let before = known.solved.len() + checked.len();
+                    let solved = self.solve(states, some.collect(), before, before + checks.weighted.len())?;
+                    own = own.max(checks.error(&served, self.specification, step, &solved));
+                    // A state in both sets is one design point.
+                    let named = checks.weighted.iter().map(|(state, _)| *state).zip(solved);
+                    checked.extend(named.filter(|(state, _)| !seen.contains(state)).map(|(_, point)| point));
+                    seen.extend(checks.weighted.iter().map(|(state, _)| *state));
+                    if !aim.is_met_by(own) {
+                        break;
+                    }
+                }
                 if !aim.is_met_by(own) && known.solved.len() < most {
                     wanted = aim.next(known.solved.len(), own).min(most);
                     known.solved.extend(checked.into_iter().take(most - known.solved.len()));
