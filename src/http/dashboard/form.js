@@ -82,7 +82,7 @@ export function showProblem(form, message, problem, otherwise) {
   }
   if (control === null) {
     message.hidden = false;
-    message.textContent = problem.rule && problem.field ? problemWords(problem, inWords(problem.field)) : problem.message;
+    message.textContent = failureWords(problem);
     // A refusal that names no field is not mended in one.
     const place = problem.field ? otherwise : null;
     place?.closest("details")?.setAttribute("open", "");
@@ -101,6 +101,23 @@ export function showProblem(form, message, problem, otherwise) {
   control.closest(".field").append(error);
   control.focus();
   control.addEventListener("input", () => clear(form), { once: true });
+}
+
+const failureWords = (problem) => (problem.rule && problem.field ? problemWords(problem, inWords(problem.field)) : problem.message);
+
+/** Does what a press of `button` asks for; it rests meanwhile. Why that failed stands beside it until it is pressed again. */
+export async function pressed(button, act, words = failureWords) {
+  if (button.nextElementSibling?.matches("span.error")) button.nextElementSibling.remove();
+  button.disabled = true;
+  try {
+    await act();
+    button.disabled = false;
+  } catch (error) {
+    button.disabled = false;
+    button.after(h("span", { class: "error", role: "alert" }, words(error)));
+    // A button that rests loses the focus.
+    if (document.activeElement === document.body) button.focus();
+  }
 }
 
 /** The last part of a field's path, as a label would have it: `design.sampling_law.degrees_of_freedom` is Degrees of freedom. */

@@ -1,7 +1,8 @@
 // What more or less caution would lose on records like the one at hand: asked for, and the report of it.
 
 import { post } from "./api.js";
-import { announce, h, section, table } from "./dom.js";
+import { h, section, table } from "./dom.js";
+import { pressed } from "./form.js";
 import { minus, percent, tick } from "./format.js";
 import { intervalChart } from "./interval_chart.js";
 
@@ -53,17 +54,11 @@ export function asking({ problem: asked, fund }, history, initial_wealth) {
   const investor = { initial_wealth, action_interval, utility, radius, support };
   const problem = { history, rate_per_step, periods_per_year, ...investor, ...(fund && several(fund, radius)) };
   const button = h("button", { class: "quiet" }, "How much caution?");
-  button.addEventListener("click", async () => {
-    button.disabled = true;
-    try {
-      const { job } = await post("/frontier", { problem });
-      location.hash = `#/frontiers/${job}`;
-    } catch (error) {
-      announce(error.message);
-      button.after(h("p", { class: "error" }, error.message));
-    }
-    button.disabled = false;
-  });
+  const act = async () => {
+    const { job } = await post("/frontier", { problem });
+    location.hash = `#/frontiers/${job}`;
+  };
+  button.addEventListener("click", () => pressed(button, act));
   return button;
 }
 

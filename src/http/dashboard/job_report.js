@@ -4,6 +4,7 @@ import { download, get } from "./api.js";
 import * as backtest from "./backtest.js";
 import { h } from "./dom.js";
 import * as evaluation from "./evaluation.js";
+import { pressed } from "./form.js";
 import { short } from "./format.js";
 import * as frontier from "./frontier.js";
 import { until } from "./jobs.js";
@@ -21,7 +22,7 @@ const reported = (noun, [above, href], drawn) => async (id, leaving) => {
   const report = await get(job.report, leaving);
   const name = `${noun.toLowerCase().replace(/ .*/, "")}-${short(id)}`;
   const sheet = drawn.csv && h("button", { class: "quiet", onclick: () => save(drawn.csv(report), `${name}.csv`, "text/csv") }, "Save as CSV");
-  const whole = h("a", { class: "button quiet", href: job.report, download: `${name}.json`, onclick: download }, "Export");
+  const whole = h("a", { class: "button quiet", href: job.report, download: `${name}.json`, onclick: (event) => pressed(event.currentTarget, () => download(event)) }, "Export");
   return { title, trail, actions: h("div", { class: "actions" }, [sheet, whole].filter(Boolean)), body: drawn.body(report, policyLink) };
 };
 

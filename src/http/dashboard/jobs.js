@@ -1,7 +1,8 @@
 // Jobs: what is being computed, how far it is, and how to stop it.
 
-import { follow, get, isOver, post, Problem } from "./api.js";
+import { follow, get, isOver, post } from "./api.js";
 import { announce, h } from "./dom.js";
+import { pressed } from "./form.js";
 import { count, counted, duration, moment, short } from "./format.js";
 import { all, foot, Pages } from "./pages.js";
 import { welcome } from "./welcome.js";
@@ -197,13 +198,11 @@ function links(card) {
     { class: "quiet", "data-needs": "train", disabled: job.cancel_requested, "aria-label": `Cancel ${short(job.job)}` },
     "Cancel",
   );
-  stop.addEventListener("click", async () => {
-    stop.disabled = true;
+  const act = async () => {
+    card.update(await post(`/jobs/${job.job}/cancel`));
     announce("Asked it to stop.");
-    const answer = await post(`/jobs/${job.job}/cancel`).catch((error) => error);
-    if (answer instanceof Problem) announce(answer.message);
-    else card.update(answer);
-  });
+  };
+  stop.addEventListener("click", () => pressed(stop, act));
   return stop;
 }
 

@@ -5,8 +5,9 @@ import { falls, mixed, wealths } from "./comparators.js";
 import { correctionForm } from "./correction.js";
 import { besides } from "./course.js";
 import { csvText, hundred } from "./csv.js";
-import { announce, disclosure, h, section, table } from "./dom.js";
+import { disclosure, h, section, table } from "./dom.js";
 import { standing } from "./flows.js";
+import { pressed } from "./form.js";
 import { allocation, count, figures, moment, percent, short, wealth } from "./format.js";
 import { policyLink } from "./naming.js";
 import { day } from "./periods.js";
@@ -103,13 +104,13 @@ const ONE = ["log_return", "simple_return", "price", "previous_price", "executed
 const REPORT = [...ONE, ...ONE.map((name) => `${name}s`), "missing", "date", "rate", "flow", "wealth"];
 const reportOf = (said) => Object.fromEntries(REPORT.filter((name) => (said[name] ?? false) !== false).map((name) => [name, said[name]]));
 
-/** Sends a correction that was said before, or that takes a return away. */
-async function correct({ id, session, refresh }, period, report, reason, news) {
+/** Sends a correction that was said before, or that takes a return away, as a press of `button`. */
+function correct(button, { id, session, refresh }, period, report, reason, news) {
   const request = { correction: session.corrections + 1, period, reason, confirm: true, ...report };
-  await post(`/sessions/${id}/corrections`, request).then(
-    () => refresh(news),
-    (error) => announce(error.message),
-  );
+  return pressed(button, async () => {
+    await post(`/sessions/${id}/corrections`, request);
+    await refresh(news);
+  });
 }
 
 /** The last report, with what to do where it was wrong. */
@@ -121,11 +122,11 @@ export function lastReport(shown) {
   const held = history.assets ? { executed_allocations: assetsHeld(row) } : { executed_allocation };
   const name = calendar.inText(row.period);
   const { date } = standing(row);
-  const undo = () => {
+  const undo = ({ target }) => {
     const words = `Take back the return of ${name}?\n\nThe period stays, without a return, until you put one in. What was reported stays on record.`;
     if (!confirm(words)) return;
     const report = { missing: true, ...held, ...(date ? { date } : {}) };
-    correct(shown, row.period, report, "The report was taken back", `The return of ${name} is taken back.`);
+    correct(target, shown, row.period, report, "The report was taken back", `The return of ${name} is taken back.`);
   };
   const mend = () => {
     shown.right.open = true;
@@ -155,17 +156,17 @@ function corrections(shown) {
   if (history.corrections.length === 0) return "";
   const words = ({ period, reason, corrected_ms }) =>
     `${calendar.name(period)} was put right on ${moment(corrected_ms)}: ${reason}`;
-  const undo = (made) => {
+  const undo = (button, made) => {
     const earlier = history.corrections.filter(({ period, correction }) => period === made.period && correction < made.correction).at(-1);
     const said = earlier ?? history.observations[made.period - 1].reported;
     const news = `${calendar.name(made.period)} is as it was before.`;
-    return correct(shown, made.period, reportOf(said), `Correction ${made.correction} was undone`, news);
+    return correct(button, shown, made.period, reportOf(said), `Correction ${made.correction} was undone`, news);
   };
   const made = [...history.corrections].reverse();
   return h(
     "ul",
     { class: "corrections" },
-    made.map((one, index) => h("li", {}, words(one), index === 0 ? [" ", h("button", { class: "link", "data-needs": "operate", onclick: () => undo(one) }, "Undo")] : null)),
+    made.map((one, index) => h("li", {}, words(one), index === 0 ? [" ", h("button", { class: "link", "data-needs": "operate", onclick: ({ target }) => undo(target, one) }, "Undo")] : null)),
   );
 }
 

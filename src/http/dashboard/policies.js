@@ -1,7 +1,8 @@
 // Policies: what trainings gave, and what came in from elsewhere.
 
 import { get, post } from "./api.js";
-import { announce, h, table } from "./dom.js";
+import { h, table } from "./dom.js";
+import { pressed } from "./form.js";
 import { count, moment, percent, significant } from "./format.js";
 import { called, headed, tagList } from "./naming.js";
 import { foot, Pages } from "./pages.js";
@@ -90,14 +91,12 @@ function importer() {
     "aria-label": "Policy document to import",
   });
   const label = h("label", { class: "button quiet", for: "import" }, "Import");
-  file.addEventListener("change", async () => {
-    try {
-      const { policy } = await post("/policies/import", await file.files[0].text());
-      location.hash = `#/policies/${policy}`;
-    } catch (error) {
-      announce(error.message);
-      label.after(h("p", { class: "error" }, error.message));
-    }
-  });
+  const act = async () => {
+    const chosen = file.files[0];
+    // The same file may be chosen again once it was changed.
+    const { policy } = await post("/policies/import", await chosen.text().finally(() => (file.value = "")));
+    location.hash = `#/policies/${policy}`;
+  };
+  file.addEventListener("change", () => pressed(label, act));
   return h("span", { "data-needs": "train" }, file, label);
 }

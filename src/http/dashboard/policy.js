@@ -2,7 +2,8 @@
 
 import { download, get, offers, remove } from "./api.js";
 import { lineChart } from "./chart.js";
-import { announce, disclosure, h, section, table } from "./dom.js";
+import { disclosure, h, section, table } from "./dom.js";
+import { pressed } from "./form.js";
 import { basisPoints, count, figures, moment, percent, percentTick, short } from "./format.js";
 import { labelled, titled } from "./naming.js";
 import { unitOf } from "./periods.js";
@@ -48,7 +49,7 @@ export async function view(id, leaving) {
         class: "button quiet",
         href: `/policies/${id}/export`,
         download: `policy-${short(id)}.json`,
-        onclick: download,
+        onclick: (event) => pressed(event.currentTarget, () => download(event)),
       },
       "Export",
     ),
@@ -65,18 +66,13 @@ export async function view(id, leaving) {
 
 function deletion(id) {
   const button = h("button", { class: "quiet danger", "data-needs": "train" }, "Delete");
-  button.addEventListener("click", async () => {
-    if (!confirm("Delete this policy for good?")) return;
-    try {
-      await remove(`/policies/${id}`);
-      location.hash = "#/policies";
-    } catch (error) {
-      const used = error.type === "/problems/in-use";
-      const words = used ? "Sessions live by this policy. Delete those first." : error.message;
-      announce(words);
-      button.after(h("p", { class: "error" }, words, used ? [" ", h("a", { href: `#/?search=${id}` }, "Show them")] : ""));
-    }
-  });
+  const act = async () => {
+    await remove(`/policies/${id}`);
+    location.hash = "#/policies";
+  };
+  const used = () => ["Sessions live by this policy. Delete those first. ", h("a", { href: `#/?search=${id}` }, "Show them")];
+  const words = (error) => (error.type === "/problems/in-use" ? used() : error.message);
+  button.addEventListener("click", () => confirm("Delete this policy for good?") && pressed(button, act, words));
   return button;
 }
 

@@ -3,8 +3,9 @@
 
 import { post, text } from "./api.js";
 import { lineChart } from "./chart.js";
-import { announce, h } from "./dom.js";
+import { h } from "./dom.js";
 import { fileDrop } from "./file_drop.js";
+import { pressed } from "./form.js";
 import { count, percent, percentTick } from "./format.js";
 
 const KINDS = { simple: "Simple returns", log: "Log-returns", price: "Prices" };
@@ -134,8 +135,8 @@ const isTyping = ({ inputType = "" }) => /^(insertText|insertLineBreak|deleteCon
 function drop(id, open, example) {
   const zone = fileDrop(id, open);
   if (!example) return zone;
-  const load = () => text(EXAMPLE).then((content) => open(content, example), (error) => announce(error.message));
-  const offer = h("button", { type: "button", class: "link", onclick: load }, "Use the example: US stock market, monthly");
+  const load = async () => open(await text(EXAMPLE), example);
+  const offer = h("button", { type: "button", class: "link", onclick: () => pressed(offer, load) }, "Use the example: US stock market, monthly");
   zone.append(h("p", {}, offer));
   return zone;
 }

@@ -6,6 +6,7 @@ import { risky } from "./comparators.js";
 import { holdings, wealthCourse, worstFallFact } from "./course.js";
 import { announce, facts, h, section } from "./dom.js";
 import { banked, netAdded, standing } from "./flows.js";
+import { pressed } from "./form.js";
 import { allocation, count, counted, percent, points, wealth } from "./format.js";
 import { asking } from "./frontier.js";
 import { labelled, titled } from "./naming.js";
@@ -211,12 +212,10 @@ function frontier({ session, policy, history, canTry }) {
 
 function deletion(id) {
   const button = h("button", { class: "quiet danger", "data-needs": "operate" }, "Delete");
-  button.addEventListener("click", async () => {
-    if (!confirm("Delete this session and all it observed?")) return;
-    await remove(`/sessions/${id}`).then(
-      () => (location.hash = "#/sessions"),
-      (error) => announce(error.message),
-    );
-  });
+  const act = async () => {
+    await remove(`/sessions/${id}`);
+    location.hash = "#/sessions";
+  };
+  button.addEventListener("click", () => confirm("Delete this session and all it observed?") && pressed(button, act));
   return h("p", { class: "end" }, button);
 }

@@ -1,7 +1,7 @@
 // The form that opens a session: on a page of its own, so that whoever asks for it stands before it.
 
 import { get, post } from "./api.js";
-import { announce, h } from "./dom.js";
+import { h } from "./dom.js";
 import { fieldset, input, select, showProblem } from "./form.js";
 import { moment, short } from "./format.js";
 import { labelFields } from "./naming.js";
@@ -59,8 +59,9 @@ function opening(policies, asked, leaving) {
     const field = (name, index) => input({ within: `asset-${index}-`, name: `holdings.${name}`, label: `${name} held already, %`, note: "Of wealth. Blank: nothing.", unit: "percent" });
     shares.replaceChildren(...(assets ?? []).map((name, index) => field(name, index).element));
   };
-  let choosing = Promise.resolve();
-  const choose = () => (choosing = chosen().catch((error) => leaving.aborted || announce(error.message)));
+  let choosing = null;
+  const failed = (error) => leaving.aborted || showProblem(form, message, { field: policy.name, message: error.message });
+  const choose = () => (choosing = chosen().then(() => true, (error) => (failed(error), false)));
   policy.control.addEventListener("change", choose);
   choose();
   const other = h(
@@ -85,8 +86,8 @@ function opening(policies, asked, leaving) {
     event.preventDefault();
     const trouble = await history.trouble();
     if (trouble) return showProblem(form, message, { field: "history", message: trouble });
+    if (!(await choosing) && !(await choose())) return;
     const request = { policy: policy.control.value, ...labels.read() };
-    await choosing;
     if (known.length > 0) request.history = assets ? byDate(known, assets) : known[0].log_returns;
     const wealth = typed(stake.control.value);
     if (wealth !== null) request.wealth = wealth;
