@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { browser, call, service, trained } from "./ballast.js";
-import { plain } from "./page.js";
+import { plain, visit } from "./page.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 
@@ -62,6 +62,33 @@ test("a session says what is added at the end of the period, reckons with it, an
   assert.equal(wealth.toFixed(2), foretold);
   await page.getByText("At the end of the period 8.25 is withdrawn.").first().waitFor();
   assert.match(await main(), /beside 5\.00 added/);
+});
+
+test("what the form says will be refused is refused in the same words", async () => {
+  const { policies: [{ policy }] } = await call(ballast.url, "/policies");
+  const { session } = await call(ballast.url, "/sessions", { policy });
+  await visit(page, `${ballast.url}/#/sessions/${session}`);
+  await page.getByText("I held another share, or money came or went").click();
+  await page.getByLabel("Return in period 1").fill("-2");
+  for (const [label, text, words] of [
+    ["Money added at the end", "-1000", "Money added at the end is -1000; it must leave a wealth that is taken: what the return, the allocation and what is added give is -8"],
+    ["Share held, %", "150", "Share held is 150 %; it must be from 0 % to 100 %."],
+    ["The bank paid, %", "-60", "The bank paid is -60 %; it must be from -50 % to 50 %."],
+    ["Wealth reached", "0", "Wealth reached is 0; it must be from 0.000001 to"],
+    ["Return in period 1", "-99.9", "Return in period 1 is -99.9 %; it must be from -99.32 % to"],
+  ]) {
+    const field = page.getByLabel(label);
+    const before = await field.inputValue();
+    await field.fill(text);
+    const foretold = plain(await page.locator("output", { hasText: "This will be refused" }).innerText());
+    await page.getByRole("button", { name: "Report period 1" }).click();
+    await page.locator("form .error:visible").waitFor();
+    const told = plain(await page.locator("form .error:visible").innerText());
+    assert.equal(foretold, `This will be refused. ${told}`);
+    assert.ok(told.startsWith(words), told);
+    await field.fill(before);
+  }
+  await page.getByText(/^Wealth 100\.00 \u2192 [\d.]+ at/).waitFor();
 });
 
 test("a policy that forgets is asked for by the form, and sessions by it renew themselves or roll", async () => {

@@ -1,9 +1,7 @@
 // The return of the coming period, reported once: what is sent again after a failure is the very same request.
 
 import { h } from "./dom.js";
-import { endWords } from "./flows.js";
-import { allocation, percent, wealth } from "./format.js";
-import { reportFields, sendReports } from "./report_fields.js";
+import { foretold, reportFields, sendReports } from "./report_fields.js";
 
 /** The form; what is held where nothing else is said is the advice. */
 export function observeForm(action, { id, session, policy, calendar, refresh }) {
@@ -12,18 +10,7 @@ export function observeForm(action, { id, session, policy, calendar, refresh }) 
   const advised = action.allocation;
   const foretell = () => {
     const read = fields.read(advised);
-    if (read === null) return (preview.textContent = "");
-    const { growth, executed, rate, added, ended, missing } = read;
-    const wrong = [
-      (executed < 0 || executed > 1) && `${percent(executed)} cannot be held`,
-      growth <= 0 && "more than everything cannot be lost",
-    ].find(Boolean);
-    if (wrong) return (preview.textContent = `This will be refused: ${wrong}.`);
-    const traded = 1 - trading_cost * Math.abs(executed - session.holding);
-    const grown = session.wealth * traded * ((1 - executed) * (1 + rate) + executed * growth);
-    const seen = missing ? "No return; wealth" : "Wealth";
-    const reached = Number.isNaN(ended) ? grown + added : ended;
-    preview.textContent = `${seen} ${wealth(session.wealth)} \u2192 ${wealth(reached)} at ${allocation(executed)} held. ${endWords(added)}`;
+    preview.textContent = read === null ? "" : foretold(read, { wealth: session.wealth, before: [session.holding], cost: trading_cost });
   };
   const fields = reportFields({
     label: `Return in ${calendar.inText(action.period)}, %`,

@@ -1,5 +1,7 @@
 // A refusal in the words of the form: the field by its label, the value and its bounds in the unit of the field.
 
+import { wealth } from "./format.js";
+
 const MINUS = "\u2212";
 /** What the service's parser calls the types of numbers. */
 const WANTED = [
@@ -16,6 +18,7 @@ const PLACES = [
   [/problem\.horizon = (?=\d)/g, ""],
   [/problem\.contributions/g, "the money added"],
   [/(?:problem\.)?\bhorizon\b/g, "the number of periods ahead"],
+  [/(?<=\bgive is )-?[\d.e+-]+/g, (amount) => wealth(Number(amount))],
 ];
 /** What the parser of days says of what is none. */
 const NO_DAY = /^(?:failed to parse|unexpected|expected)[^]*\b(?:year|month|day|date)\b/;

@@ -3,11 +3,15 @@
 import { get, post } from "./api.js";
 import { h } from "./dom.js";
 import { clear, input, select, showProblem } from "./form.js";
+import { endWords } from "./flows.js";
 import { allocation, percent, wealth } from "./format.js";
 import { fraction, typed } from "./number_text.js";
-import { unusualWords } from "./problem_words.js";
+import { problemWords, unusualWords } from "./problem_words.js";
 
 const KINDS = { simple_return: "Gain or loss", log_return: "Log-return", missing: "None is known" };
+
+/** What the service takes. */
+export const LIMITS = { log_return: [-5, 5], simple_return: [-5, 5].map(Math.expm1), share: [0, 1], rate: [-0.5, 0.5], wealth: [1e-6, 1e15] };
 
 /** The fields for a period, with the policy's rate and contribution as what they are where nothing is said, and its last day
  * as it most likely is. */
@@ -61,8 +65,7 @@ export function reportFields({ within, label, rate, contribution, date: likely =
       texts.set(given, logReturn === null ? "" : inPercent(report.simple_return ?? Math.expm1(logReturn)));
       for (const [field, text] of texts) field.control.value = text;
     },
-    /** The growth of the asset, what is held, what the bank pays, what is added and what is reached where it is said; null
-     * where something cannot be read. */
+    /** What `foretold` reads; null where something cannot be read. */
     read(advised) {
       const blank = (field, otherwise, read) => (field.control.value.trim() === "" ? otherwise : read(field.control.value));
       const value = isMissing() ? 0 : fraction(given.control.value);
@@ -71,7 +74,9 @@ export function reportFields({ within, label, rate, contribution, date: likely =
       const ended = blank(reached, Number.NaN, typed);
       if ([value, executed, rateThen, added, ended].some((number) => typeof number !== "number")) return null;
       const growth = kind.control.value === "log_return" ? Math.exp(value) : 1 + value;
-      return { growth, executed, rate: rateThen, added, ended, missing: isMissing() };
+      const returned = LIMITS[kind.control.value] ?? LIMITS.simple_return;
+      const numbers = [[given, value, returned], [held, executed, LIMITS.share], [paid, rateThen, LIMITS.rate], [reached, ended, LIMITS.wealth]];
+      return { parts: [{ held: executed, growth }], rate: rateThen, added, ended, missing: isMissing(), numbers, flow, reached };
     },
     /** The report; fields that cannot be read go as they are typed, for the service to refuse by name. */
     report() {
@@ -102,6 +107,29 @@ export function reportFields({ within, label, rate, contribution, date: likely =
 
 /** A share as it is typed in percent. */
 export const inPercent = (share) => (share === null || share === undefined ? "" : String(Number((100 * share).toPrecision(12))));
+
+/** What a report makes of `wealth`, or why it will be refused, in the words of its refusal. Of what is read, `parts` are the shares
+ * held of each asset and their growths, beside what was held `before`, and `numbers` the fields with what is said in them and what
+ * the service takes. */
+export function foretold(read, { wealth: now, before, cost }) {
+  const { parts, rate, added, ended, missing, numbers, flow, reached } = read;
+  const refused = ({ element, control }, value, rule) =>
+    `This will be refused. ${problemWords({ value, rule }, element.querySelector("label").textContent, control.dataset.unit)}`;
+  const within = ([low, high]) => `in [${low}, ${high}]`;
+  const beyond = numbers.find(([, value, [low, high]]) => value < low || value > high);
+  if (beyond) return refused(beyond[0], beyond[1], `must be a number ${within(beyond[2])}`);
+  const sum = (of) => parts.reduce((all, part, index) => all + of(part, index), 0);
+  const whole = sum(({ held }) => held);
+  if (whole > 1 + 1e-9) return `This will be refused: ${percent(whole)} in all cannot be held.`;
+  const traded = 1 - cost * sum(({ held }, index) => Math.abs(held - before[index]));
+  const grown = (1 - whole) * (1 + rate) + sum(({ held, growth }) => held * growth);
+  const left = Number.isNaN(ended) ? now * traded * grown + added : ended;
+  if (left < LIMITS.wealth[0] || left > LIMITS.wealth[1]) {
+    const leaves = `what the return, the allocation and what is added give is ${left}, and a wealth lies ${within(LIMITS.wealth)}`;
+    return flow.control.value.trim() === "" ? refused(reached, null, `must be reported: ${leaves}`) : refused(flow, added, `must leave a wealth that is taken: ${leaves}`);
+  }
+  return `${missing ? "No return; wealth" : "Wealth"} ${wealth(now)} \u2192 ${wealth(left)} at ${allocation(whole)} held. ${endWords(added)}`;
+}
 
 /**
  * Sends what `compose` makes of the form to `path`, once at a time, and then has the session shown anew by `refresh`. What is

@@ -4,7 +4,7 @@ import { SOURCES, why } from "./advice.js";
 import { disclosure, h, section, table } from "./dom.js";
 import { endWords } from "./flows.js";
 import { allocation, figures, minus, percent, points, wealth } from "./format.js";
-import { sendReports } from "./report_fields.js";
+import { foretold, sendReports } from "./report_fields.js";
 import { assetsHeld, severalFields } from "./several_fields.js";
 import { priceFields, shareCount } from "./share_prices.js";
 import { stackedChart } from "./stacked.js";
@@ -69,14 +69,9 @@ export function severalForm(action, { id, session, history: { assets }, policy, 
   const { rate_per_step, trading_cost } = policy.specification.problem;
   const preview = h("output", { class: "note" });
   const foretell = () => {
-    const told = fields.read();
-    if (told === null) return (preview.textContent = "");
-    const whole = sum(Object.values(told.held));
-    if (whole > 1 + 1e-9) return (preview.textContent = `This will be refused: ${percent(whole)} in all cannot be held.`);
-    const cost = trading_cost * sum(assets.map((name) => Math.abs(told.held[name] - action.holdings[name])));
-    const grown = (1 - whole) * (1 + told.rate) + sum(assets.map((name) => told.held[name] * (1 + told.back[name])));
-    const reached = Number.isNaN(told.ended) ? session.wealth * (1 - cost) * grown + told.added : told.ended;
-    preview.textContent = `Wealth ${wealth(session.wealth)} \u2192 ${wealth(reached)} at ${allocation(whole)} held. ${endWords(told.added)}`;
+    const read = fields.read();
+    const before = assets.map((name) => action.holdings[name]);
+    preview.textContent = read === null ? "" : foretold(read, { wealth: session.wealth, before, cost: trading_cost });
   };
   const fields = severalFields(assets, { advised: action.allocation, rate: rate_per_step, added: action.contribution, date: calendar.next, changed: () => foretell() });
   const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });

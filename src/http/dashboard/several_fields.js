@@ -5,7 +5,7 @@ import { standing } from "./flows.js";
 import { input, select } from "./form.js";
 import { allocation, percent, wealth } from "./format.js";
 import { fraction, typed } from "./number_text.js";
-import { inPercent } from "./report_fields.js";
+import { inPercent, LIMITS } from "./report_fields.js";
 
 const KINDS = { simple: "Gains or losses", missing: "None is known" };
 
@@ -79,13 +79,17 @@ export function severalFields(assets, { within = "", advised, rate, added, date 
       for (const [field, read] of [[paid, fraction], [flow, typed], [reached, typed], [day, (said) => said]]) if (text(field) !== "") report[field.name] = read(text(field)) ?? text(field);
       return report;
     },
-    /** What the period brought, or null where something cannot be read; what is not known counts as unmoved. */
+    /** What `foretold` reads, or null where something cannot be read; what is not known counts as unmoved. */
     read() {
       const blank = (field, otherwise, read) => (text(field) === "" ? otherwise : read(text(field)));
-      const back = isMissing() ? Object.fromEntries(assets.map((name) => [name, 0])) : byName(returns, () => null);
-      const told = { back, held: byName(held, (name) => advised[name]), rate: blank(paid, rate, fraction), added: blank(flow, added, typed), ended: blank(reached, Number.NaN, typed) };
-      const numbers = [...Object.values(told.back), ...Object.values(told.held), told.rate, told.added, told.ended];
-      return numbers.every((number) => typeof number === "number") ? told : null;
+      const back = returns.map((field) => (isMissing() ? 0 : fraction(text(field))));
+      const shares = held.map((field, index) => blank(field, advised[assets[index]], fraction));
+      const [paying, adding, ended] = [blank(paid, rate, fraction), blank(flow, added, typed), blank(reached, Number.NaN, typed)];
+      if ([...back, ...shares, paying, adding, ended].some((number) => typeof number !== "number")) return null;
+      const parts = assets.map((_, index) => ({ held: shares[index], growth: 1 + back[index] }));
+      const all = (fields, values, limits) => fields.map((field, index) => [field, values[index], limits]);
+      const numbers = [...all(returns, back, LIMITS.simple_return), ...all(held, shares, LIMITS.share), [paid, paying, LIMITS.rate], [reached, ended, LIMITS.wealth]];
+      return { parts, rate: paying, added: adding, ended, missing: isMissing(), numbers, flow, reached };
     },
   };
 }
