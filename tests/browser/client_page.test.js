@@ -149,14 +149,36 @@ test("the periods are saved as a file of numbers", async () => {
   await go();
   const { name, bytes } = await saved(page.getByRole("button", { name: "Save as CSV" }));
   assert.match(name, /^session-[0-9a-f]+\.csv$/);
-  const rows = bytes.toString().trim().split("\r\n").map((line) => line.split(","));
-  // The names of three columns hold a comma, and stand in quotes.
-  assert.match(bytes.toString(), /^Period,Name,Last day,"Return, %","Advised, %","Held, %",Wealth,All in the bank,60\/40,All in stocks,"Below the highest, %"\r\n/);
-  assert.equal(rows.length, 5);
-  assert.deepEqual(rows[3].slice(0, 3), ["2", "February 2008", "2008-02-29"]);
-  assert.ok(Math.abs(Number(rows[3][3]) + 10) < 1e-9 && rows[3][5] === "50");
+  const { csvRows } = await dashboardModule("csv.js");
+  const rows = csvRows(bytes.toString(), ",").map(({ cells }) => cells);
+  const [head, start, ...lines] = rows;
+  assert.deepEqual(head, ["Period", "Name", "Last day", "Return, %", "The bank paid, %", "Money added", "Advised, %", "Held, %", "Wealth", "All in the bank", "60/40", "All in stocks", "Below the highest, %", "Caution, % a month", "Returns seen", "Reported"]);
+  assert.deepEqual([start[1], start[8], start.length, lines.length], ["Start", "100", head.length, 3]);
+  assert.deepEqual(lines[1].slice(0, 3), ["2", "February 2008", "2008-02-29"]);
+  assert.deepEqual([Number(lines[1][3]).toFixed(9), ...[4, 5, 7].map((column) => lines[1][column])], ["-10.000000000", "0.2", "0", "50"]);
   const { observations } = await call(ballast.url, `/sessions/${session}/history`);
-  assert.ok(Math.abs(Number(rows[4][6]) - observations[2].wealth) < 1e-9);
+  const [last, { wealth, radius, sample_size, observed_ms }] = [lines[2], observations[2]];
+  for (const [column, value] of [[8, wealth], [13, 100 * radius]]) assert.ok(Math.abs(Number(last[column]) - value) < 1e-9, `${last[column]} is not ${value}`);
+  assert.deepEqual(last.slice(-2), [String(sample_size), new Date(observed_ms).toISOString()]);
+});
+
+test("money, the bank's rate, the band and what was put right stand in the file too", async () => {
+  const { csv } = await dashboardModule("observed.js");
+  const { calendar } = await dashboardModule("periods.js");
+  const row = { period: 1, log_return: 0, band: [0.2, 0.4], advised_allocation: 0.2, executed_allocation: 0.2, wealth: 90, radius: 0.01, sample_size: 11, observed_ms: 0, reported: { date: "2008-01-31" } };
+  const now = { reported: { date: "2008-01-31", rate: 0.004, flow: -5 }, log_return: Math.log(1.5), advised_allocation: 0.3, executed_allocation: 0.25, wealth: 105, radius: 0.02 };
+  const made = (correction, reason) => ({ correction, period: 1, reason, corrected_ms: 1000 * correction });
+  const terms = { rate_per_step: 0.002, trading_cost: 0.01, contributions: 3 };
+  const history = { initial_wealth: 100, initial_holding: 0, terms, observations: [{ ...row, now }], corrections: [made(1, "=a slip"), made(2, "the index, revised")], renewals: [] };
+  const problem = { framework: "adaptive", radius: { rule: "bridge" }, trading_cost: 0.01 };
+  const { csvRows } = await dashboardModule("csv.js");
+  const text = csv({ history, calendar: calendar(history, 12), policy: { specification: { problem } }, cautionScale: 0.5 });
+  const [heads, , told] = csvRows(text, ",").map(({ cells }) => cells);
+  const of = Object.fromEntries(heads.map((name, index) => [name, told[index]]));
+  assert.deepEqual(
+    ["Return, %", "Return told first, %", "The bank paid, %", "Money added", "Advised, %", "Best kept from, %", "Best kept to, %", "Held, %", "Held told first, %", "Wealth", "Wealth told first", "Caution, % a month", "Reported", "Put right", "Put right because"].map((name) => of[name]),
+    ["50", "0", "0.4", "-5", "30", "20", "40", "25", "20", "105", "90", "1", "1970-01-01T00:00:00.000Z", "1970-01-01T00:00:02.000Z", "'=a slip; the index, revised"],
+  );
 });
 
 test("a chart is saved as a drawing and as a picture, dark on white from a dark page", async () => {

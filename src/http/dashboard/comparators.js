@@ -1,6 +1,6 @@
 // The same start, lived otherwise: what shares held through the same returns, rates and flows would have come to.
 
-import { standing, termsOf, addedIn } from "./flows.js";
+import { addedIn, rateIn, termsOf } from "./flows.js";
 import { belowHighest } from "./track.js";
 
 /** What is held beside the bank, in words. */
@@ -10,7 +10,7 @@ export const risky = ({ assets }) => (assets ? "the assets" : "stocks");
 const lived = (history) =>
   history.observations.map((row, index) => ({
     growth: Math.exp((row.now ?? row).log_return ?? 0),
-    rate: standing(row).rate ?? termsOf(history, index + 1).terms.rate_per_step,
+    rate: rateIn(history, index + 1),
     cost: termsOf(history, index + 1).terms.trading_cost,
     added: addedIn(history, index + 1),
   }));

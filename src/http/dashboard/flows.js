@@ -22,13 +22,15 @@ export function addedIn(history, period) {
   return standing(history.observations[period - 1]).flow ?? added(terms, period - first + 1);
 }
 
+/** What the bank paid in a period as it is reported, and what the policy says of one that is not. */
+export const rateIn = (history, period) => standing(history.observations[period - 1]).rate ?? termsOf(history, period).terms.rate_per_step;
+
 /** Wealth of selling everything at the start and staying in the bank, after each period up to `horizon`; of those observed as
  * they were reported. */
 export function banked(history, horizon) {
   const held = [history.initial_wealth * (1 - history.terms.trading_cost * history.initial_holding)];
   for (let period = 1; period <= horizon; period++) {
-    const rate = standing(history.observations[period - 1]).rate ?? termsOf(history, period).terms.rate_per_step;
-    held.push(held[period - 1] * (1 + rate) + addedIn(history, period));
+    held.push(held[period - 1] * (1 + rateIn(history, period)) + addedIn(history, period));
   }
   return held;
 }

@@ -6,13 +6,14 @@ import { correctionForm } from "./correction.js";
 import { besides } from "./course.js";
 import { csvText, hundred } from "./csv.js";
 import { disclosure, h, section, table } from "./dom.js";
-import { standing } from "./flows.js";
+import { addedIn, rateIn, standing } from "./flows.js";
 import { pressed } from "./form.js";
 import { allocation, count, figures, moment, percent, short, wealth } from "./format.js";
 import { policyLink } from "./naming.js";
 import { day } from "./periods.js";
 import { save } from "./picture.js";
 import { assetReturns, assetsHeld } from "./several_fields.js";
+import { isCautious } from "./specification.js";
 
 /** Periods shown at first; who wants all asks. */
 const NEWEST = 24;
@@ -73,31 +74,44 @@ export function observed(shown) {
   );
 }
 
-/** The periods as a file: numbers plain, shares and returns in percent; what was put right as it stands, with what was told first. */
-export function csv({ history, calendar }) {
+/** The periods as a file, a row each with all that is known of it: numbers plain, shares and returns in percent; what was put right
+ * as it stands, with what was told first. */
+export function csv({ history, calendar, policy, cautionScale }) {
+  const { observations, corrections, assets = [] } = history;
   const own = wealths(history);
-  const beside = besides(history).map(({ name, share }) => [name, mixed(history, share)]);
   const deep = falls(history);
-  const assets = history.assets ?? [];
-  const corrected = history.observations.some(({ now }) => now);
+  const isCorrected = corrections.length > 0;
+  const isCostly = policy.specification.problem.trading_cost > 0;
   const simple = (log_return) => hundred(Number.isFinite(log_return ?? Number.NaN) ? Math.expm1(log_return) : null);
-  const head = ["Period", "Name", "Last day", "Return, %"];
-  if (corrected) head.push("Return told first, %");
-  head.push("Advised, %", "Held, %", ...assets.flatMap((name) => [`${name} returned, %`, `${name} held, %`]));
-  head.push("Wealth", ...beside.map(([name]) => name), "Below the highest, %");
-  const start = [0, "Start", ...head.slice(2, -2 - beside.length).map(() => ""), own[0], ...beside.map(() => own[0]), 0];
-  const lines = history.observations.map((row, index) => {
-    const stands = row.now ?? row;
-    const [returned, holds] = assets.length > 0 ? [assetReturns(history, index), assetsHeld(row)] : [];
-    return [
-      ...[row.period, calendar.name(row.period), standing(row).date ?? "", simple(stands.log_return)],
-      ...(corrected ? [simple(row.log_return)] : []),
-      ...[stands.advised_allocation, stands.executed_allocation].map(hundred),
-      ...assets.flatMap((name) => [simple(returned?.[name]), hundred(holds[name])]),
-      ...[stands.wealth, ...beside.map(([, wealths]) => wealths[index + 1]), hundred(deep[index + 1])],
-    ];
-  });
-  return csvText([head, start, ...lines]);
+  const at = (milliseconds) => (milliseconds === undefined ? null : new Date(milliseconds).toISOString());
+  const madeIn = ({ period }) => corrections.filter((made) => made.period === period);
+  /** A number of a row as it stands, and where anything was put right as it was told first. */
+  const both = (name, unit, of) => [[`${name}${unit}`, (row) => of(row.now ?? row)], isCorrected && [`${name} told first${unit}`, of]];
+  /** What heads each column, what stands in it for a row, and for the start. */
+  const columns = [
+    ["Period", ({ period }) => period, 0],
+    ["Name", ({ period }) => calendar.name(period), "Start"],
+    ["Last day", (row) => standing(row).date],
+    ...both("Return", ", %", ({ log_return }) => simple(log_return)),
+    ["The bank paid, %", ({ period }) => hundred(rateIn(history, period))],
+    ["Money added", ({ period }) => addedIn(history, period)],
+    ...both("Advised", ", %", ({ advised_allocation }) => hundred(advised_allocation)),
+    ...["from", "to"].map((end, index) => isCostly && [`Best kept ${end}, %`, ({ band }) => hundred(band?.[index])]),
+    ...both("Held", ", %", ({ executed_allocation }) => hundred(executed_allocation)),
+    ...assets.flatMap((name) => [
+      [`${name} returned, %`, ({ period }) => simple(assetReturns(history, period - 1)?.[name])],
+      [`${name} held, %`, (row) => hundred(assetsHeld(row)[name])],
+    ]),
+    ...both("Wealth", "", ({ wealth }) => wealth).map((column) => column && [...column, own[0]]),
+    ...besides(history).map(({ name, share }) => [name, mixed(history, share)]).map(([name, wealths]) => [name, ({ period }) => wealths[period], own[0]]),
+    ["Below the highest, %", ({ period }) => hundred(deep[period]), 0],
+    isCautious(policy.specification.problem) && [`Caution, % a ${calendar.unit}`, (row) => hundred((row.now ?? row).radius * cautionScale)],
+    ["Returns seen", ({ sample_size }) => sample_size],
+    ["Reported", ({ observed_ms }) => at(observed_ms)],
+    isCorrected && ["Put right", (row) => at(madeIn(row).at(-1)?.corrected_ms)],
+    isCorrected && ["Put right because", (row) => madeIn(row).map(({ reason }) => reason).join("; ")],
+  ].filter(Boolean);
+  return csvText([columns.map(([name]) => name), columns.map(([, , start]) => start), ...observations.map((row) => columns.map(([, of]) => of(row)))]);
 }
 
 const ONE = ["log_return", "simple_return", "price", "previous_price", "executed_allocation"];
