@@ -179,6 +179,33 @@ test("who needs care is told in a sentence", async () => {
   assert.equal(careWords({ active: 1, any: 0, overdue: 0, renewal: 0, alarm: 0 }), "None of 1 active session needs care.");
 });
 
+test("those ticked are deleted at once after one question, and what stays is named", async () => {
+  const asked = [];
+  const answer = (verb) => page.once("dialog", (dialog) => (asked.push(dialog.message()), dialog[verb]()));
+  const old = ["Old 1", "Old 2", "Old 3"];
+  const ids = [];
+  for (const name of old) ids.push((await call(ballast.url, "/sessions", { policy, name })).session);
+  await go("");
+  for (const name of old) await page.getByLabel(`Tick session ${name}`).check();
+  const button = page.getByRole("button", { name: "Delete the 3" });
+  answer("dismiss");
+  await button.click();
+  assert.equal(asked[0], "Delete 3 sessions and all that was observed?\n\nsession Old 1, session Old 2, session Old 3");
+  assert.equal((await call(ballast.url, "/sessions")).total, 6);
+  await page.route(`**/sessions/${ids[1]}`, (route) => route.abort());
+  answer("accept");
+  await button.click();
+  await page.locator(".error").getByText("Not deleted: session Old 2. The service did not answer. Is it running?").waitFor();
+  await shown("4 of 4");
+  assert.ok(await page.getByLabel("Tick session Old 2").isChecked(), "what stays is ticked for another try");
+  await page.unroute(`**/sessions/${ids[1]}`);
+  answer("accept");
+  await page.getByRole("button", { name: "Delete the 1" }).click();
+  await page.getByText("1 deleted.").waitFor();
+  await shown("3 of 3");
+  assert.deepEqual([asked.length, await page.locator("main .error").count(), await page.getByRole("button", { name: /^Delete/ }).count()], [3, 0, 0]);
+});
+
 test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {
   await usable(page, go);
 });

@@ -1,7 +1,7 @@
 // Sessions, one investor a row: where each stands, when he reported last, what to do for him now, and what needs care.
 
 import { advised } from "./advised.js";
-import { get } from "./api.js";
+import { get, remove } from "./api.js";
 import { care, careWords } from "./care.js";
 import { h, table } from "./dom.js";
 import { input, select } from "./form.js";
@@ -61,7 +61,16 @@ function overview(chosen, first, leaving) {
   const needs = h("p", { class: "note needs", role: "status" });
   const beyond = h("span", {});
   const advice = advised(leaving, () => tellBeyond());
-  const ticks = ticking("sessions", { at: "#/report", words: (ticked) => `Report for the ${count(ticked)}` });
+  const ticks = ticking("sessions", {
+    at: "#/report",
+    words: (ticked) => `Report for the ${count(ticked)}`,
+    asked: (ticked) => `Delete ${counted(ticked, "session")} and all that was observed?`,
+    remove: (id) => remove(`/sessions/${id}`),
+    removed: async () => {
+      await Promise.all([ask({}), judgeAll()]);
+      if (page.total === 0 && !filtered(chosen)) dispatchEvent(new HashChangeEvent("hashchange"));
+    },
+  });
   const tags = h("datalist", { id: "tags" });
   const known = new Set();
   const holder = h("div", {});
@@ -123,7 +132,8 @@ function overview(chosen, first, leaving) {
     needs.replaceChildren(careWords(counts), " ", all, " ", beyond);
   };
   // Those of all sessions, whatever is searched for.
-  if (filtered({ ...chosen, state: "" })) get("/sessions?limit=1", leaving).then(({ care }) => judge(care), failed);
+  const judgeAll = () => get("/sessions?limit=1", leaving).then(({ care }) => judge(care), failed);
+  if (filtered({ ...chosen, state: "" })) judgeAll();
   else judge(first.care);
   return [needs, element, ticks.link, holder, h("div", { class: "foot" }, line, more)];
 }

@@ -1,17 +1,24 @@
-// Rows of a list ticked, and the ways to the pages that show two of them side by side, or take many together.
+// Rows of a list ticked, and what can be done with them: two shown side by side, many taken together to a page, or deleted.
 
 import { h } from "./dom.js";
+import { pressed } from "./form.js";
+import { count } from "./format.js";
+
+/** So many are named where it is asked whether they are meant. */
+const NAMED = 20;
 
 /**
- * `{box(id, name), link}` of a list of `kind`, "sessions" or "policies": the tick of a row, and the link that two ticks give. Two
- * may be ticked, or any number where there is something for `many`: `{words(count), at}`, a link to the address `at`.
+ * `{box(id, name), link}` of a list of `kind`, "sessions" or "policies": the tick of a row, and what can be done with those ticked. Two
+ * may be ticked, or any number where there is something for `many`: `{words(count), at, asked(count), remove(id), removed()}`, a link to
+ * the address `at`, and what is asked before each is removed and done afterwards.
  */
 export function ticking(kind, many = null) {
   let ticked = [];
-  const boxes = new Map();
-  const note = h("span", { class: "note", role: "status" });
+  const [boxes, names] = [new Map(), new Map()];
+  const note = h("span", { class: "note", role: "status", tabindex: -1 });
   const go = h("a", { class: "button quiet", hidden: true }, "Compare the two");
   const all = many && h("a", { class: "button quiet", hidden: true });
+  const deletion = many && h("button", { class: "quiet danger", hidden: true, "data-needs": "operate" });
   const tell = () => {
     for (const [id, box] of boxes) box.checked = ticked.includes(id);
     const query = `${kind}=${ticked.map(encodeURIComponent).join(",")}`;
@@ -19,9 +26,10 @@ export function ticking(kind, many = null) {
     go.href = `#/compare?${query}`;
     note.textContent = ["Tick two to compare them.", "Tick one more to compare the two."][ticked.length] ?? "";
     if (!many) return;
-    all.hidden = ticked.length === 0;
+    all.hidden = deletion.hidden = ticked.length === 0;
     all.href = `${many.at}?${query}`;
     all.textContent = many.words(ticked.length);
+    deletion.textContent = `Delete the ${count(ticked.length)}`;
   };
   const box = (id, name) => {
     const control = h("input", { type: "checkbox", class: "tickbox", "aria-label": `${many ? "Tick" : "Compare"} ${name}` });
@@ -32,8 +40,29 @@ export function ticking(kind, many = null) {
       tell();
     });
     boxes.set(id, control);
+    names.set(id, name);
     return control;
   };
+  const removeAll = async () => {
+    const asked = [...ticked];
+    /** Those that stay, by why. */
+    const kept = new Map();
+    for (const id of asked) {
+      const error = await many.remove(id).then(() => null, (error) => error);
+      if (error && error.status !== 404) kept.set(error.message, [...(kept.get(error.message) ?? []), id]);
+    }
+    ticked = [...kept.values()].flat();
+    tell();
+    await many.removed();
+    if (kept.size > 0) throw new Error([...kept].map(([reason, ids]) => `Not deleted: ${ids.map((id) => names.get(id)).join(", ")}. ${reason}`).join(" "));
+    note.textContent = `${count(asked.length)} deleted.`;
+    note.focus();
+  };
+  deletion?.addEventListener("click", () => {
+    const rest = ticked.length - NAMED;
+    const listed = ticked.slice(0, NAMED).map((id) => names.get(id)).join(", ");
+    if (confirm(`${many.asked(ticked.length)}\n\n${listed}${rest > 0 ? ` and ${count(rest)} more` : ""}`)) pressed(deletion, removeAll);
+  });
   tell();
-  return { box, link: h("span", { class: "comparing" }, note, go, all) };
+  return { box, link: h("span", { class: "comparing" }, note, go, all, deletion) };
 }
