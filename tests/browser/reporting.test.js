@@ -87,6 +87,9 @@ test("a header puts the columns in any order, and a column that means nothing is
   const wrong = (text) => read(text).rows.map(({ trouble }) => trouble);
   assert.deepEqual(wrong("client;return;world\nAda;1;2\nTrust;;1"), ["has no asset called \u201cworld\u201d", "holds several assets: it needs a header, and a return in each of the columns \u201cWorld\u201d, \u201cBonds A/B\u201d"]);
   assert.deepEqual(wrong("client;return;date\nAda;much;\nSmith, John;1;31/10/2026"), ["\u201cmuch\u201d in the column \u201creturn\u201d is not a number of percent", "\u201c31/10/2026\u201d in the column \u201cdate\u201d is not a day such as 2008-09-30"]);
+  const dates = read("client;return;date\nAda;1;31.01.2020\nSmith, John;1;1.2.2020").rows.map(({ report }) => report.date);
+  assert.deepEqual(dates, ["2020-01-31", "2020-02-01"]);
+  assert.deepEqual(wrong("client;return;date\nAda;1;31.02.2020"), ["\u201c31.02.2020\u201d in the column \u201cdate\u201d is not a day such as 2008-09-30"]);
   assert.deepEqual(wrong("client,return\nAda,1,2"), ["has 3 cells, and the header 2"]);
   assert.deepEqual(wrong("client;world;bonds a/b;world held\nTrust;1;1;30"), ["says what is held of some assets, and not of Bonds A/B"]);
   // Of two columns of one meaning the second is not read.
@@ -138,7 +141,7 @@ test("who gets what is shown before, and what came of it after", async () => {
   assert.equal(await page.getByRole("button", { name: "Report" }).isDisabled(), true);
   await lines().fill(`Ada\t1.2\nGrace Hopper 90\nTwin 1\nNobody 2\n${short(sessions[4])}`);
   await page.getByLabel("Return of the others, %").fill("-0,5");
-  await page.getByLabel("Last day").fill("2026-10-31");
+  await page.getByLabel("Last day").fill("31.10.2026");
   const before = await rows("Returns to report");
   assert.match(before[0], /^Ada \w+ 1 1\.20 % to 2026-10-31 yes$/);
   assert.match(before[2], /^Twin 1 – 1\.00 % to 2026-10-31 Line 3: 2 sessions are called so/);

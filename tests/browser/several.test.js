@@ -100,7 +100,7 @@ test("a return is reported for each asset, and other shares where they were held
   await report();
   await page.locator(".field .error").getByText("The return is blank.").waitFor();
   await page.getByLabel("Return of Gold, %").fill("-1");
-  await page.getByLabel("Last day").fill("2026-10-31");
+  await page.getByLabel("Last day").fill("31.10.2026");
   const foretold = /\u2192 ([\d,.]+?) at/.exec(await page.locator(".observe output").innerText())[1].replaceAll(",", "");
   await report();
   await page.getByRole("heading", { name: "November 2026, period 2 of 4" }).waitFor();

@@ -26,6 +26,15 @@ const parsed = (date) => Date.parse(`${date}T00:00:00Z`);
 const written = (time) => new Date(time).toISOString().slice(0, 10);
 const told = (time, options) => new Date(time).toLocaleDateString("en-GB", { timeZone: "UTC", ...options });
 
+/** The day that a text names, year first or as 30.9.2008, in the form 2008-09-30; null where it names none. */
+export function dayOf(text) {
+  const [, ...yearFirst] = /^(\d{4})-(\d\d?)-(\d\d?)$/.exec(text) ?? [];
+  const [, ...dayFirst] = /^(\d\d?)\.(\d\d?)\.(\d{4})$/.exec(text) ?? [];
+  const date = [...yearFirst, ...dayFirst.reverse()].map((part) => part.padStart(2, "0")).join("-");
+  const time = parsed(date);
+  return Number.isFinite(time) && written(time) === date ? date : null;
+}
+
 /** A day, as 30 Sep 2008. */
 export const day = (date) => told(parsed(date), { day: "numeric", month: "short", year: "numeric" });
 

@@ -6,6 +6,7 @@ import { clear, input, select, showProblem } from "./form.js";
 import { endWords } from "./flows.js";
 import { allocation, percent, wealth } from "./format.js";
 import { fraction, typed } from "./number_text.js";
+import { dayOf } from "./periods.js";
 import { problemWords, unusualWords } from "./problem_words.js";
 
 const KINDS = { simple_return: "Gain or loss", log_return: "Log-return", missing: "None is known" };
@@ -86,7 +87,7 @@ export function reportFields({ within, label, rate, contribution, date: likely =
         [paid, fraction],
         [flow, typed],
         [reached, typed],
-        [date, (text) => text],
+        [date, dayOf],
       ];
       for (const [{ name, control }, read] of texts)
         if (control.value.trim() !== "") report[name] = read(control.value.trim()) ?? control.value;

@@ -3,7 +3,7 @@
 import { csvRows } from "./csv.js";
 import { short } from "./format.js";
 import { fraction, hundredth, typed } from "./number_text.js";
-import { day } from "./periods.js";
+import { day, dayOf } from "./periods.js";
 
 /** So much of an identifier tells whose it is. */
 const LEAST = 6;
@@ -114,7 +114,7 @@ function tableOf(text) {
 
 /** A cell of a share, an amount, a day or a period; null where it is none. */
 function cellValue(name, text, scaled) {
-  if (name === "date") return /^\d{4}-\d\d-\d\d$/.test(text) ? text : null;
+  if (name === "date") return dayOf(text);
   const value = SHARES.includes(name) ? scaled(text) : typed(text);
   return typeof value !== "number" || (name === "period" && !(Number.isInteger(value) && value > 0)) ? null : value;
 }

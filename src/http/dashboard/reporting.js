@@ -7,6 +7,7 @@ import { area, fieldset, input, select } from "./form.js";
 import { count, counted, percent, wealth } from "./format.js";
 import { headed } from "./naming.js";
 import { all } from "./pages.js";
+import { dayOf } from "./periods.js";
 import { problemWords, unusualWords } from "./problem_words.js";
 import { finder, HEADS, inUnit, LATELY, otherUnit, readLines, written } from "./report_lines.js";
 
@@ -81,7 +82,7 @@ function reporting(sessions, chosen, leaving) {
   };
   const look = () => {
     const of = (control, read) => (control.value.trim() === "" ? undefined : (read(control.value.trim()) ?? undefined));
-    const terms = (unit) => ({ simple_return: of(common.control, inUnit(unit)), date: of(date.control, String) });
+    const terms = (unit) => ({ simple_return: of(common.control, inUnit(unit)), date: of(date.control, (text) => dayOf(text) ?? text) });
     const as = (unit) => readLines(lines.control.value, find, terms(unit), { assetsOf: policies.of, lately: (entry) => !next.checked && isLate(entry), unit });
     const seems = otherUnit(as("percent").rows, (entry) => entry.deviation ?? policies.deviation(entry.policy));
     if (seems === null) unit.control.value = "";

@@ -5,6 +5,7 @@ import { standing } from "./flows.js";
 import { input, select } from "./form.js";
 import { allocation, percent, wealth } from "./format.js";
 import { fraction, typed } from "./number_text.js";
+import { dayOf } from "./periods.js";
 import { inPercent, LIMITS } from "./report_fields.js";
 
 const KINDS = { simple: "Gains or losses", missing: "None is known" };
@@ -76,7 +77,7 @@ export function severalFields(assets, { within = "", advised, rate, added, date 
     report() {
       const report = isMissing() ? { missing: true } : { simple_returns: byName(returns, () => null) };
       if (isHeldSaid()) report.executed_allocations = byName(held, (name) => advised[name]);
-      for (const [field, read] of [[paid, fraction], [flow, typed], [reached, typed], [day, (said) => said]]) if (text(field) !== "") report[field.name] = read(text(field)) ?? text(field);
+      for (const [field, read] of [[paid, fraction], [flow, typed], [reached, typed], [day, dayOf]]) if (text(field) !== "") report[field.name] = read(text(field)) ?? text(field);
       return report;
     },
     /** What `foretold` reads, or null where something cannot be read; what is not known counts as unmoved. */
