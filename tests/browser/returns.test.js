@@ -55,6 +55,16 @@ test("pasted percent are percent", async () => {
   );
 });
 
+test("what is said and asked of negative numbers has minus signs", async () => {
+  await pasted("-3.2 -1.4 2.1 0.4 -5");
+  await note().getByText("Mean \u22121.42 %").waitFor();
+  await pasted("-0.3 -0.2 -0.1 0.2");
+  await note().getByText("What is \u22120.3?").waitFor();
+  const asked = await page.locator(".asked").innerText();
+  assert.match(asked, /Fractions: \u22120\.3 is \u221230\.00 %.* Mean \u221210\.00 %/);
+  assert.doesNotMatch(asked, /-\d/);
+});
+
 test("dates beside returns are dates and no prices, however they are written", async () => {
   const returns = [0.012, -0.034, 0.021, -0.005];
   const expected = returns.map((value) => Math.log1p(value));

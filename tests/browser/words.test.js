@@ -6,7 +6,7 @@ import { test } from "node:test";
 import { dashboardModule } from "./modules.js";
 import { plain } from "./page.js";
 
-const { figures, minus, tick } = await dashboardModule("format.js");
+const { allocation, figures, minus, tick } = await dashboardModule("format.js");
 const { typed } = await dashboardModule("number_text.js");
 const { SOURCES } = await dashboardModule("advice.js");
 const { problemWords, unusualWords } = await dashboardModule("problem_words.js");
@@ -18,6 +18,10 @@ test("neighbours on an axis have different labels", () => {
     assert.equal(new Set(labels).size, 5, labels.join(", "));
     assert.ok(labels.every((label) => label.length <= 12), labels.join(", "));
   }
+});
+
+test("nothing and everything are said alike in a column, however little they are off", () => {
+  assert.deepEqual([0, -1e-17, 0.0004, 0.0006, 0.9994, 0.9996, 1, null].map((share) => plain(allocation(share))), ["0 %", "0 %", "0 %", "0.1 %", "99.9 %", "100 %", "100 %", "\u2013"]);
 });
 
 test("a number typed is one number or none", () => {

@@ -18,9 +18,9 @@ export function percent(fraction, digits = 1) {
   return Number.isFinite(fraction) ? `${grouped(100 * fraction, digits)}${NARROW}%` : "\u2013";
 }
 
-/** An allocation: nothing and everything are said without decimals. */
+/** An allocation: nothing and everything, or as good as that, are said without decimals. */
 export function allocation(fraction) {
-  return percent(fraction, fraction === 0 || fraction === 1 ? 0 : 1);
+  return percent(fraction, [0, 1000].includes(Math.round(1000 * fraction)) ? 0 : 1);
 }
 
 /** Wealth, in whatever unit the investor counts. */

@@ -6,7 +6,7 @@ import { lineChart } from "./chart.js";
 import { h } from "./dom.js";
 import { fileDrop } from "./file_drop.js";
 import { pressed } from "./form.js";
-import { count, percent, percentTick } from "./format.js";
+import { count, minus, percent, percentTick } from "./format.js";
 
 const KINDS = { simple: "Simple returns", log: "Log-returns", price: "Prices" };
 const UNITS = { percent: "Percent (1.2)", fraction: "Fractions (0.012)" };
@@ -125,7 +125,7 @@ export function returnsField({ name, label, blank = null, example = null, severa
 
 const words = ({ sentence, questions }) => {
   const said = sentence ?? questions.map(({ question }) => question).join(" ");
-  return said.charAt(0).toUpperCase() + said.slice(1);
+  return minus(said.charAt(0).toUpperCase() + said.slice(1));
 };
 
 /** What is typed is mended word by word and keeps what was said of it; what is pasted is another text. */
@@ -167,13 +167,13 @@ function questions(asked, say, several) {
     h(
       "fieldset",
       {},
-      h("legend", {}, isMany(one) ? `${one.question} Several columns are several assets.` : one.question),
+      h("legend", {}, minus(one.question), isMany(one) ? " Several columns are several assets." : ""),
       one.options.map(({ label, sentence }, index) =>
         h(
           "label",
           { class: "option" },
           h("input", { type: isMany(one) ? "checkbox" : "radio", name: `asked-${one.asks}`, value: index }),
-          h("span", {}, label, sentence ? h("span", { class: "note" }, ` ${sentence}`) : null),
+          h("span", {}, minus(label), sentence ? h("span", { class: "note" }, ` ${minus(sentence)}`) : null),
         ),
       ),
     );
