@@ -96,7 +96,7 @@ test("a training from a file, watched to its end", async () => {
   await page.getByRole("button", { name: "Train", exact: true }).click();
   await page.getByRole("progressbar").waitFor();
   await page
-    .getByText(/\d of 4 steps/)
+    .getByText(/\d of 4 steps done/)
     .first()
     .waitFor();
   await page.getByRole("link", { name: "See the policy" }).click();
@@ -205,7 +205,8 @@ test("a long training is cancelled", async () => {
     design: { count: 3000 },
   });
   await go("#/jobs");
-  await page.getByText(/^Period 60, solving/).waitFor();
+  await page.getByText(/^Step 1, solving: \d+ of 3000 situations/).waitFor();
+  await page.getByText("0 of 60 steps done").waitFor();
   await page.getByRole("button", { name: /^Cancel/ }).click();
   await page.locator(".state.cancelled").waitFor();
 });

@@ -147,11 +147,11 @@ function summary({ state, progress, error, kind }) {
   const left = timeLeft(kind, progress);
   if (kind === "backtest") return `Trains policies and lives by them${left}`;
   if (kind === "frontier") return `${count(progress.points_done ?? 0)} records are advised${left}`;
-  const idle = progress.steps_done > 0 ? "Between two periods" : "Starting";
-  const at = progress.step === null || progress.phase === null ? idle : `Period ${progress.step + 1}, ${progress.phase}`;
-  const points = progress.points_total
-    ? `: ${count(progress.points_done)} of ${counted(progress.points_total, "situation")}`
-    : "";
+  const { steps_done, step, phase, points_done, points_total } = progress;
+  const idle = steps_done > 0 ? "Between two steps" : "Starting";
+  // Counted as they are done, beside how many are: the periods are solved from the last to the first.
+  const at = phase === "simulating" ? "Simulating" : step === null || phase === null ? idle : `Step ${count(steps_done + 1)}, ${phase}`;
+  const points = points_total ? `: ${count(points_done)} of ${counted(points_total, phase === "simulating" ? "path" : "situation")}` : "";
   return `${at}${points}${left}`;
 }
 
@@ -174,7 +174,7 @@ function bar({ job, state, progress }) {
   );
 }
 
-const stepsDone = ({ steps_done, steps_total }) => `${steps_done} of ${counted(steps_total, "step")}`;
+const stepsDone = ({ steps_done, steps_total }) => `${steps_done} of ${counted(steps_total, "step")} done`;
 
 /** Steps done, and nine tenths of the one being solved by its points: the rest is fitting. */
 function done({ steps_done, steps_total, points_done, points_total, phase }) {
@@ -203,7 +203,7 @@ function links(card) {
     announce("Asked it to stop.");
   };
   stop.addEventListener("click", () => pressed(stop, act));
-  return stop;
+  return h("span", {}, stop);
 }
 
 /** Follows the first running jobs and asks for the others now and then; the function given looks for new ones. */
