@@ -6,7 +6,8 @@ import { test } from "node:test";
 import { dashboardModule } from "./modules.js";
 import { plain } from "./page.js";
 
-const { allocation, figures, minus, tick } = await dashboardModule("format.js");
+const { allocation, figures, minus, percentTick, tick } = await dashboardModule("format.js");
+const { grain, ticks } = await dashboardModule("chart.js");
 const { typed } = await dashboardModule("number_text.js");
 const { SOURCES } = await dashboardModule("advice.js");
 const { problemWords, unusualWords } = await dashboardModule("problem_words.js");
@@ -22,6 +23,27 @@ test("neighbours on an axis have different labels", () => {
 
 test("nothing and everything are said alike in a column, however little they are off", () => {
   assert.deepEqual([0, -1e-17, 0.0004, 0.0006, 0.9994, 0.9996, 1, null].map((share) => plain(allocation(share))), ["0 %", "0 %", "0 %", "0.1 %", "99.9 %", "100 %", "100 %", "\u2013"]);
+});
+
+test("labels of an axis are told apart, and from 0, also where it has one", () => {
+  const labelled = (format, places) => places.map((place) => plain(format(place, grain(places))));
+  assert.deepEqual(labelled(percentTick, [0.0005]), ["0.05 %"]);
+  assert.deepEqual(labelled(percentTick, [0.00015]), ["0.015 %"]);
+  assert.deepEqual(labelled(percentTick, [-0.2]), ["-20 %"]);
+  assert.deepEqual(labelled(percentTick, [1 / 3]), ["33.3 %"]);
+  assert.deepEqual(labelled(percentTick, [0]), ["0 %"]);
+  assert.deepEqual(labelled(percentTick, [0.005, 0.015, 0.03]), ["0.5 %", "1.5 %", "3.0 %"]);
+  assert.deepEqual(labelled(percentTick, [0, 0.25, 0.5]), ["0 %", "25 %", "50 %"]);
+  assert.deepEqual(labelled(tick, [0.02]), ["0.02"]);
+  assert.deepEqual(labelled(tick, [100.25, 100.5]), ["100.25", "100.50"]);
+  for (const [low, high] of [[0.0002659, 0.0002672], [0.00031, 0.00069], [0.00041, 0.00059], [-0.03, 0.01], [0.0001, 0.9]])
+    for (const wanted of [1, 3, 6]) {
+      const places = ticks(low, high, wanted);
+      const labels = labelled(percentTick, places);
+      assert.ok(places.length > 0, `${wanted} between ${low} and ${high}`);
+      assert.equal(new Set(labels).size, places.length, labels.join(", "));
+      labels.forEach((label, index) => assert.equal(Number(label.replace(" %", "")) === 0, places[index] === 0, `${label} for ${places[index]}`));
+    }
 });
 
 test("a number typed is one number or none", () => {

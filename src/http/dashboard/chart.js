@@ -3,7 +3,7 @@
 import { disclosure, h, s, table } from "./dom.js";
 import { pictureButtons } from "./picture.js";
 
-/** Round numbers that span `[low, high]` with about `wanted` steps. */
+/** Round numbers that span `[low, high]` with about `wanted` steps; at least one. */
 export function ticks(low, high, wanted) {
   const rough = (high - low) / Math.max(1, wanted);
   if (!(rough > 0)) return [low];
@@ -11,7 +11,23 @@ export function ticks(low, high, wanted) {
   const step = power * [1, 2, 5, 10].find((factor) => factor * power >= rough * 0.999);
   const values = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) values.push(k * step + 0); // never \u22120
-  return values;
+  return values.length > 0 ? values : ticks(low, high, 2 * wanted);
+}
+
+/** Digits of the only place of an axis that is no round number. */
+const DIGITS = 3;
+/** No more digits tell the places of an axis apart. */
+const MOST_DIGITS = 12;
+
+/** The power of ten of which all `places` of an axis are multiples: what their labels tell apart, from each other and from 0. */
+export function grain(places) {
+  const top = Math.floor(Math.log10(Math.max(...places.map(Math.abs))) + 1e-9);
+  if (!Number.isFinite(top)) return 1;
+  const whole = (unit) => places.every((place) => Math.abs(place / unit - Math.round(place / unit)) < 1e-4);
+  const least = top + 1 - (places.length > 1 ? MOST_DIGITS : DIGITS);
+  let power = top;
+  while (power > least && !whole(10 ** power)) power -= 1;
+  return 10 ** power;
 }
 
 /** Round numbers that span `[low, high]`, both above 0, where equal ratios take equal room. */
@@ -107,17 +123,18 @@ const LETTER_HALF = 3.4;
 
 /** Horizontal rules with their values, and the labels below. */
 export function axes({ x, y, xTicks, yTicks, xFormat, yFormat, left, right, bottom }) {
+  const [across, up] = [grain(xTicks), grain(yTicks)];
   return [
     yTicks.map((tick) => [
       s("line", { class: "rule", x1: left, x2: right, y1: y(tick), y2: y(tick) }),
       s(
         "text",
         { class: "tick", x: left - 8, y: y(tick), dy: "0.32em", "text-anchor": "end" },
-        yFormat(tick, yTicks[1] - yTicks[0]),
+        yFormat(tick, up),
       ),
     ]),
     xTicks.map((tick) => {
-      const words = xFormat(tick, xTicks[1] - xTicks[0]);
+      const words = xFormat(tick, across);
       const beyond = x(tick) + LETTER_HALF * words.length > right;
       return s("text", { class: "tick", x: beyond ? right : x(tick), y: bottom + 18, "text-anchor": beyond ? "end" : "middle" }, words);
     }),
@@ -198,7 +215,7 @@ export function lineChart({ title, x, y, series: given, height = 190, note, star
     const yTicks = y.log ? logTicks(...yDomain.map(sized)) : ticks(...yDomain, height / 38);
     const left = Math.max(
       gutter,
-      16 + 6.6 * Math.max(...yTicks.map((tick) => y.tick(tick, yTicks[1] - yTicks[0]).length)),
+      16 + 6.6 * Math.max(...yTicks.map((tick) => y.tick(tick, grain(yTicks)).length)),
     );
     xScale = scale(xDomain, [left, width - 14]);
     const up = scale(yDomain, [height - 30, 10]);

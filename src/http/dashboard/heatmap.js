@@ -1,6 +1,6 @@
 // A field over a rectangle, as cells: read by pointer and arrow keys, with its scale beside it.
 
-import { axes, figure, plot, scale, ticks } from "./chart.js";
+import { axes, figure, grain, plot, scale, ticks } from "./chart.js";
 import { h, s, table } from "./dom.js";
 
 const HEIGHT = 340;
@@ -43,7 +43,7 @@ export function heatmap({ title, x, y, field, range, format, dots, own = null, n
     cursor;
   const holder = plot(HEIGHT, (width) => {
     const yTicks = ticks(y.values[0], y.values.at(-1), 6);
-    const left = 14 + 6.6 * Math.max(...yTicks.map((tick) => y.tick(tick, yTicks[1] - yTicks[0]).length));
+    const left = 14 + 6.6 * Math.max(...yTicks.map((tick) => y.tick(tick, grain(yTicks)).length));
     const right = width - 70;
     const [across, up] = [
       scale([x.values[0] - dx, x.values.at(-1) + dx], [left, right]),

@@ -1,6 +1,6 @@
 // Estimates with their intervals, a line each, on one scale.
 
-import { extent, figure, plot, scale, ticks } from "./chart.js";
+import { extent, figure, grain, plot, scale, ticks } from "./chart.js";
 import { s, table } from "./dom.js";
 
 const LINE = 26;
@@ -25,7 +25,7 @@ export function intervalChart({ title, noun = "Strategy", rows, format, tick }) 
         s(
           "text",
           { class: "tick", x: x(place), y: bottom + 18, "text-anchor": "middle" },
-          tick(place, places[1] - places[0]),
+          tick(place, grain(places)),
         ),
       ]),
       rows.map(({ name, value, low, high, colour = 0 }, index) => {

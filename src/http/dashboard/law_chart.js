@@ -1,6 +1,6 @@
 // Two laws of the coming log-return, back to back: above the line the returns seen, below it the worst case.
 
-import { axes, figure, plot, scale, ticks, walkable } from "./chart.js";
+import { axes, figure, grain, plot, scale, ticks, walkable } from "./chart.js";
 import { h, s, table } from "./dom.js";
 import { percent, percentTick } from "./format.js";
 
@@ -78,7 +78,7 @@ export function lawChart({ transport }) {
       bottom: HEIGHT - 30,
       xTicks: round.map(Math.log1p),
       yTicks: [...levels.map((level) => -level), 0, ...levels],
-      xFormat: (tick) => percentTick(Math.expm1(tick), round[1] - round[0]),
+      xFormat: (tick) => percentTick(Math.expm1(tick), grain(round)),
       yFormat: (tick, step) => percentTick(Math.abs(tick), step),
     });
     const bar = (bin, name, top, height) =>
