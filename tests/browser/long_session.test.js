@@ -60,6 +60,24 @@ test("its newest periods stand, and all where they are asked for, with no chart 
   assert.equal(await rows.count(), PERIODS);
 });
 
+test("so many periods of several assets are drawn as areas without gaps, of no more columns than can be told apart", async () => {
+  await visitQuiet(page, address());
+  const drawn = await page.evaluate(async (periods) => {
+    const { stackedChart } = await import("/dashboard/stacked.js");
+    const shares = Array.from({ length: periods }, (_, k) => ({ One: 0.5 + 0.3 * Math.sin(k), Two: 0.1 }));
+    document.querySelector("main").prepend(stackedChart({ title: "Held", assets: ["One", "Two"], shares, x: { name: String, tick: String } }));
+    const holder = document.querySelector("main .plot");
+    while (!holder.querySelector("path")) await new Promise(requestAnimationFrame);
+    const boxes = (path) => [...path.getAttribute("d").matchAll(/M(\S+) [^H]+H([^V]+)/g)].map(([, from, to]) => [Number(from), Number(to)]);
+    return { width: holder.clientWidth, areas: [...holder.querySelectorAll("path.bar")].map(boxes) };
+  }, PERIODS);
+  assert.equal(drawn.areas.length, 2);
+  for (const boxes of drawn.areas) {
+    assert.ok(boxes.length > 100 && boxes.length <= drawn.width / 4, `${boxes.length} columns of ${drawn.width} pixels`);
+    boxes.forEach(([from, to], k) => assert.ok((to - from >= 3 || k + 1 === boxes.length) && (k === 0 || from === boxes[k - 1][1]), `${from} to ${to}`));
+  }
+});
+
 test("of a long record it is said that no single return makes a difference", async () => {
   await page.getByText("It is steady: it rests on 540 returns, of which no single one makes a difference.").waitFor();
 });

@@ -14,9 +14,6 @@ const EQUAL = "1/N";
 const KNOWN = [EQUAL, "60 % 1/N"];
 const NAMES = { "robust scaled_one": "Robust", "robust sup": "Robust, sup norm", "static scaled_one": "Chosen once a stretch", "plug-in": "Trusts the record", "minimum variance": "Least variance", "inverse volatility": "Inverse volatility", "1/N": "Equal shares", "60 % 1/N": "60 % in equal shares" };
 
-/** Periods drawn one beside the other; of more, so many of them. */
-const MOST_BARS = 400;
-
 const sum = (numbers) => numbers.reduce((all, number) => all + number, 0);
 
 /** A strategy's kind, by its name in the report. */
@@ -100,14 +97,10 @@ export function resultsOfAssets({ lines, intervals, sentences }) {
 
 /** What a strategy held of each asset through time, and on average. */
 export function heldOfAssets({ assets, times }, line) {
-  const length = line.periods.wealth.length;
-  const every = Math.ceil(length / MOST_BARS);
-  const drawn = Array.from({ length: Math.ceil(length / every) }, (_, bar) => bar * every);
-  const shares = drawn.map((k) => Object.fromEntries(assets.map((name) => [name, line.periods.allocations[name][k]])));
-  const called = (bar) => times.name(1 + (bar - 1) * every);
+  const shares = line.periods.wealth.map((_, k) => Object.fromEntries(assets.map((name) => [name, line.periods.allocations[name][k]])));
   const number = (name, cell) => ({ name, numeric: true, cell });
   return [
-    stackedChart({ title: "Share of wealth in each asset", assets, shares, x: { name: called, tick: called } }),
+    stackedChart({ title: "Share of wealth in each asset", assets, shares, x: { name: times.name, tick: times.name } }),
     table(`Held of each asset on average by ${line.name}`, [{ name: "Asset", cell: (name) => name }, number("Share of wealth", (name) => percent(line.mean_allocations[name]))], assets),
   ];
 }

@@ -11,7 +11,7 @@ export function ticks(low, high, wanted) {
   const step = power * [1, 2, 5, 10].find((factor) => factor * power >= rough * 0.999);
   const values = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) values.push(k * step + 0); // never \u22120
-  return values.length > 0 ? values : ticks(low, high, 2 * wanted);
+  return values.length > 0 ? values : ticks(low, high, 2 * Math.max(1, wanted));
 }
 
 /** Digits of the only place of an axis that is no round number. */

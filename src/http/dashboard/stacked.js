@@ -1,6 +1,6 @@
 // What was held of each of several assets through time, one above the other; what is left to the whole is in the bank.
 
-import { axes, block, figure, plot, scale, walkable } from "./chart.js";
+import { axes, block, figure, plot, scale, ticks, walkable } from "./chart.js";
 import { h, s, table } from "./dom.js";
 import { allocation, percentTick } from "./format.js";
 
@@ -8,6 +8,9 @@ const [HEIGHT, FOOT, TOP] = [190, 30, 10];
 /** So many assets have a colour of their own; the others are told together. */
 const COLOURS = 6;
 const QUARTERS = [0, 0.25, 0.5, 0.75, 1];
+
+/** Columns narrower than this, in pixels, are drawn as the average of several periods. */
+const NARROWEST = 4;
 
 /** `shares`: for each period, from the first, the share of wealth in each of `assets` by its name. `x`: `{name(period), tick(period)}`. */
 export function stackedChart({ title, assets, shares, x }) {
@@ -27,20 +30,20 @@ export function stackedChart({ title, assets, shares, x }) {
     const [left, right, bottom] = [64, width - 4, HEIGHT - FOOT];
     across = scale([0, shares.length], [left, width - 14]);
     const y = scale([0, 1], [bottom, TOP]);
-    const every = Math.ceil(shares.length / Math.max(1, Math.floor(width / 80)));
-    const xTicks = shares.map((_, index) => index + 1).filter((period) => (period - 1) % every === 0);
-    const wide = across(1) - across(0);
-    const bars = shares.map((held, index) => {
-      let below = 0;
-      return layers.map(({ of }, layer) => {
-        const [from, to] = [below, below + of(held)];
-        below = to;
-        return s("rect", { class: `bar s${layer}`, x: across(index) + 1, width: Math.max(0.5, wide - 2), y: y(to), height: Math.max(0, y(from) - y(to)) });
-      });
+    const xTicks = ticks(1, shares.length, width / 80).filter(Number.isInteger);
+    const every = Math.ceil(NARROWEST / (across(1) - across(0)));
+    const stacked = Array.from({ length: Math.ceil(shares.length / every) }, (_, column) => {
+      const [start, within] = [column * every, shares.slice(column * every, (column + 1) * every)];
+      const held = layers.map(({ of }) => within.reduce((sum, one) => sum + of(one), 0) / within.length);
+      return { start, end: start + within.length, tops: held.map((_, layer) => held.slice(0, layer + 1).reduce((sum, share) => sum + share, 0)) };
     });
+    // Narrow columns stand close, on whole pixels: gaps between them would be stripes.
+    const gap = across(1) - across(0) >= 2 * NARROWEST ? 1 : 0;
+    const box = ({ start, end, tops }, layer) => `M${Math.round(across(start)) + gap} ${y(tops[layer]).toFixed(1)}H${Math.round(across(end)) - gap}V${y(tops[layer - 1] ?? 0).toFixed(1)}H${Math.round(across(start)) + gap}Z`;
+    const areas = layers.map((_, layer) => s("path", { class: `bar s${layer}`, d: stacked.map((one) => box(one, layer)).join("") }));
     cursor = s("line", { class: "cursor", y1: 6, y2: bottom });
     mark();
-    return [axes({ x: (period) => across(period - 0.5), y, xTicks, yTicks: QUARTERS, xFormat: x.tick, yFormat: percentTick, left, right, bottom }), bars, cursor];
+    return [axes({ x: (period) => across(period - 0.5), y, xTicks, yTicks: QUARTERS, xFormat: x.tick, yFormat: percentTick, left, right, bottom }), areas, cursor];
   });
   const read = (at) => {
     position = at;
