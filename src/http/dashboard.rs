@@ -83,6 +83,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "report_fields.js": SCRIPT,
         "report_file.js": SCRIPT,
         "report_lines.js": SCRIPT,
+        "report_title.js": SCRIPT,
         "reporting.js": SCRIPT,
         "reproduction.js": SCRIPT,
         "returns_field.js": SCRIPT,

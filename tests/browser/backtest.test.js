@@ -68,6 +68,8 @@ test("what is asked for is the record as it was read, and few choices", async ()
 test("it is followed to its end, and what it says comes first", async () => {
   await page.getByRole("heading", { name: "What each came to" }).waitFor();
   const job = page.url().split("/").at(-1);
+  assert.equal(await page.locator("h1").textContent(), "Backtest of stocks, March 2006 to December 2017");
+  await page.locator(`header.page [title="${job}"]`).getByText(/^Asked for on \d+ \w+ \d{4}/).waitFor();
   report = await call(ballast.url, `/jobs/${job}/report`);
   const words = await main();
   assert.match(words, /8 ways to hold stocks, through 48 quarters, March 2006 to December 2017, for a balanced investor/);
@@ -170,6 +172,7 @@ test("a record of several assets is asked for, and its report shows what was hel
   assert.deepEqual([request.assets, request.windows, request.alpha, request.log_returns.length], [["fund", "bonds"], [8, null], 0.1, QUARTERS]);
   await page.getByRole("heading", { name: "What each came to" }).waitFor();
   const told = await call(ballast.url, `/jobs/${page.url().split("/").at(-1)}/report`);
+  assert.equal(await page.locator("h1").textContent(), "Backtest of fund and bonds, March 2006 to December 2017");
   const words = await main();
   assert.match(words, /18 ways to hold 2 assets, through 48 quarters, March 2006 to December 2017, for a balanced investor/);
   for (const sentence of told.sentences) assert.ok(words.includes(plain(sentence)), sentence);
@@ -199,4 +202,10 @@ test("a record of several assets is asked for, and its report shows what was hel
   await page.getByText("Ranges and ratios").click();
   await page.getByRole("table", { name: "Estimates with their ranges" }).waitFor();
   await usable(page, () => {});
+});
+
+test("the list calls each by what it is about, and none by its identifier", async () => {
+  await page.goto(`${ballast.url}/#/evaluations`);
+  for (const name of ["Backtest of stocks, March 2006 to December 2017", "Backtest of fund and bonds, March 2006 to December 2017"]) await page.getByRole("heading", { level: 2, name, exact: true }).waitFor();
+  assert.doesNotMatch(await page.locator("body").innerText(), /[0-9a-f]{10}/);
 });

@@ -109,3 +109,17 @@ test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, folds op
   await page.getByRole("table", { name: "Certainty equivalents, losses and utility" }).waitFor();
   await usable(page, () => {});
 });
+
+test("it is called by the policy it is of, and by its record while that has no name", async () => {
+  const heading = (level, name) => page.getByRole("heading", { level, name, exact: true }).waitFor();
+  const unnamed = "Evaluation of stocks, on 24 returns, 3 months ahead";
+  await heading(1, unnamed);
+  await page.goto(`${ballast.url}/#/evaluations`);
+  await heading(2, unnamed);
+  await fetch(`${ballast.url}/policies/${policy}`, { method: "PATCH", headers: { "content-type": "application/json" }, body: JSON.stringify({ name: "Careful" }) });
+  await page.goto(`${ballast.url}/#/jobs`);
+  await heading(2, "Evaluation of Careful");
+  await page.goto(`${ballast.url}/#/evaluations/${evaluation}`);
+  await heading(1, "Evaluation of Careful");
+  assert.match(await page.title(), /^Evaluation of Careful/);
+});

@@ -31,7 +31,7 @@ test("a session's page asks, and the report is drawn with its sentences and a ta
     await usable(page, () => {});
     await page.goto(`${ballast.url}/#/jobs`);
     await page.getByRole("link", { name: "See the report" }).click();
-    await page.getByRole("heading", { name: /^Frontier of caution/ }).waitFor();
+    await page.getByRole("heading", { name: "Frontier of caution of stocks, on 24 returns", exact: true, level: 1 }).waitFor();
   } finally {
     await chromium.close();
     await ballast.stop();

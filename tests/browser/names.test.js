@@ -40,11 +40,11 @@ test("a training is named, and so is what it gives", async () => {
 
 test("a training is listed by the name of its policy, and says where that is gone", async () => {
   await go("#/jobs");
-  await page.getByRole("heading", { level: 2, name: /^Training of World & bills \w+$/ }).waitFor();
-  await page.getByRole("heading", { level: 2, name: /^Training \w+$/ }).waitFor();
+  await page.getByRole("heading", { level: 2, name: /^Training of World & bills$/ }).waitFor();
+  await page.getByRole("heading", { level: 2, name: /^Training, \d+ \w+ \d{4}/ }).waitFor();
   const other = await trained(ballast.url, { problem: { horizon: 1, rate_per_step: 0.003, history: HISTORY }, design: { count: 20 }, name: "Short-lived" });
   await go("#/jobs");
-  await page.getByRole("heading", { level: 2, name: /^Training of Short-lived/ }).waitFor();
+  await page.getByRole("heading", { level: 2, name: /^Training of Short-lived$/ }).waitFor();
   await fetch(`${ballast.url}/policies/${other}`, { method: "DELETE" });
   await go("#/jobs");
   await page.getByText("Its policy was deleted.").waitFor();

@@ -5,27 +5,29 @@ import * as backtest from "./backtest.js";
 import { h } from "./dom.js";
 import * as evaluation from "./evaluation.js";
 import { pressed } from "./form.js";
-import { short } from "./format.js";
+import { moment, short } from "./format.js";
 import * as frontier from "./frontier.js";
 import { until } from "./jobs.js";
 import { policyLink } from "./naming.js";
 import { save } from "./picture.js";
+import { about, KINDS } from "./report_title.js";
 
 const EVALUATIONS = ["Evaluations", "#/evaluations"];
 
 /** `drawn.body(report)` makes the page, `drawn.csv(report)`, where it has one, what else is saved. */
-const reported = (noun, [above, href], drawn) => async (id, leaving) => {
+const reported = (kind, [above, href], drawn) => async (id, leaving) => {
   const job = await get(`/jobs/${id}`, leaving);
   const trail = h("p", { class: "trail" }, h("a", { href }, above));
-  const title = `${noun} ${short(id)}`;
-  if (job.state !== "succeeded") return { title, trail, body: until(job, leaving) };
+  const under = h("p", { class: "note", title: id }, `Asked for on ${moment(job.created_ms)}`);
+  if (job.state !== "succeeded") return { title: KINDS[kind], trail, under, body: until(job, leaving) };
   const report = await get(job.report, leaving);
-  const name = `${noun.toLowerCase().replace(/ .*/, "")}-${short(id)}`;
+  const title = `${KINDS[kind]}${await about(kind, report, leaving)}`;
+  const name = `${kind}-${short(id)}`;
   const sheet = drawn.csv && h("button", { class: "quiet", onclick: () => save(drawn.csv(report), `${name}.csv`, "text/csv") }, "Save as CSV");
   const whole = h("a", { class: "button quiet", href: job.report, download: `${name}.json`, onclick: (event) => pressed(event.currentTarget, () => download(event)) }, "Export");
-  return { title, trail, actions: h("div", { class: "actions" }, [sheet, whole].filter(Boolean)), body: drawn.body(report, policyLink) };
+  return { title, trail, under, actions: h("div", { class: "actions" }, [sheet, whole].filter(Boolean)), body: drawn.body(report, policyLink) };
 };
 
-export const ofBacktest = reported("Backtest", EVALUATIONS, backtest);
-export const ofEvaluation = reported("Evaluation", EVALUATIONS, evaluation);
-export const ofFrontier = reported("Frontier of caution", ["Jobs", "#/jobs"], frontier);
+export const ofBacktest = reported("backtest", EVALUATIONS, backtest);
+export const ofEvaluation = reported("evaluate", EVALUATIONS, evaluation);
+export const ofFrontier = reported("frontier", ["Jobs", "#/jobs"], frontier);

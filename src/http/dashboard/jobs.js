@@ -3,8 +3,9 @@
 import { follow, get, isOver, post } from "./api.js";
 import { announce, h } from "./dom.js";
 import { pressed } from "./form.js";
-import { count, counted, duration, moment, short } from "./format.js";
+import { count, counted, duration, moment } from "./format.js";
 import { all, foot, Pages } from "./pages.js";
+import { byDay, KINDS, whenSeen } from "./report_title.js";
 import { welcome } from "./welcome.js";
 
 /** Browsers keep six connections to one address: following two jobs leaves room for everything else. */
@@ -12,10 +13,9 @@ const FOLLOWED = 2;
 /** Jobs that are not followed are asked for this often, in milliseconds. */
 const POLL = 1000;
 
-const WORDS = { train: "Training", evaluate: "Evaluation", backtest: "Backtest", frontier: "Frontier of caution" };
 /** Where the page of a report is. */
 const REPORTS = { evaluate: "evaluations", backtest: "backtests", frontier: "frontiers" };
-const named = (kind) => WORDS[kind] ?? kind.replace(/_/g, " ");
+const named = (job) => `${KINDS[job.kind]}${byDay(job)}`;
 
 export async function view(_, leaving) {
   const pages = new Pages("/jobs", "jobs", leaving);
@@ -98,7 +98,7 @@ function card(job, changed, names) {
       if (kept) element.querySelector("a, button")?.focus();
     }
     changed(now);
-    if (ended) announce(`${named(now.kind)} ${short(now.job)} ${now.state}.`);
+    if (ended) announce(`${element.querySelector("h2").textContent}: ${now.state}.`);
   };
   card.update(job);
   return card;
@@ -115,14 +115,15 @@ function advanced(element, job) {
 
 function contents(card) {
   const { job } = card;
-  const about = h("span", {});
-  const title = h("h2", {}, named(job.kind), " ", about, h("code", {}, short(job.job)));
+  const about = h("span", {}, byDay(job));
+  const title = h("h2", { title: job.job }, KINDS[job.kind], about);
   const open = links(card);
   if (job.policy)
     card.names(job.policy, (name) => {
       if (name === null) open.replaceWith(h("p", { class: "note" }, "Its policy was deleted."));
-      else if (name) about.textContent = `of ${name} `;
+      else if (name) about.textContent = ` of ${name}`;
     }).catch(() => {});
+  if (job.report) whenSeen(card.element, job, (words) => (about.textContent = words));
   const state = h(
     "span",
     { class: `state ${job.state}` },
@@ -164,12 +165,13 @@ function timeLeft(kind, { seconds_left, steps_done, phase }) {
   return `, about ${duration(seconds_left)} left`;
 }
 
-function bar({ job, state, progress }) {
+function bar(job) {
+  const { state, progress } = job;
   if (state !== "running") return null;
   return h(
     "div",
     { class: "progress" },
-    h("progress", { max: progress.steps_total, value: done(progress), "aria-label": `Progress of ${short(job)}` }),
+    h("progress", { max: progress.steps_total, value: done(progress), "aria-label": `Progress of ${named(job)}` }),
     h("span", {}, stepsDone(progress)),
   );
 }
@@ -195,7 +197,7 @@ function links(card) {
   if (isOver(job)) return null;
   const stop = h(
     "button",
-    { class: "quiet", "data-needs": "train", disabled: job.cancel_requested, "aria-label": `Cancel ${short(job.job)}` },
+    { class: "quiet", "data-needs": "train", disabled: job.cancel_requested, "aria-label": `Cancel ${named(job)}` },
     "Cancel",
   );
   const act = async () => {
