@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { browser, call, service } from "./ballast.js";
+import { browser, call, service, trained } from "./ballast.js";
 
 const SESSIONS = 211;
 /** More than a page of every list that the dashboard asks for. */
@@ -118,4 +118,13 @@ test("the form of an evaluation stands before whoever asks from a policy", async
   await page.getByRole("link", { name: "Evaluate" }).click();
   await page.getByRole("heading", { level: 1, name: "Compare out of sample" }).waitFor();
   assert.equal(await page.getByLabel("Policy", { exact: true }).inputValue(), policy);
+});
+
+test("the table of policies stands whole at 1280 pixels, whatever its words, with boxes of one size", async () => {
+  const problem = { horizon: 2, rate_per_step: 0.002, history: HISTORY, utility: { kind: "exponential", risk_aversion: 0.01 }, radius: { rule: "concentration", alpha: 0.1, C: 1, c: 1 } };
+  await trained(ballast.url, { problem, design: { count: 20 }, name: "A name of so many words that it takes more than a line of the table" });
+  await go("#/policies");
+  const table = page.getByRole("region", { name: "Policies, newest first" });
+  assert.equal(await table.evaluate(({ scrollWidth, clientWidth }) => scrollWidth - clientWidth), 0);
+  assert.deepEqual(await table.locator(".tickbox").evaluateAll((boxes) => boxes.map(({ offsetWidth }) => offsetWidth)), [16, 16]);
 });

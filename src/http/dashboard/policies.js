@@ -3,7 +3,7 @@
 import { get, post } from "./api.js";
 import { h, table } from "./dom.js";
 import { pressed } from "./form.js";
-import { count, moment, percent, significant } from "./format.js";
+import { count, moment, percent } from "./format.js";
 import { called, headed, tagList } from "./naming.js";
 import { foot, Pages } from "./pages.js";
 import { ticking } from "./ticking.js";
@@ -56,6 +56,7 @@ function listed(rows, ticks) {
     (read) =>
     ({ detail }) =>
       detail ? read(detail.specification.problem, detail) : "\u2013";
+  const said = (read) => (row) => h("div", { class: "said" }, of(read)(row));
   return table(
     "Policies, newest first",
     [
@@ -70,13 +71,12 @@ function listed(rows, ticks) {
           ),
       },
       { name: "Kind", cell: of(({ framework }) => FRAMEWORKS[framework]) },
-      { name: "Investor", cell: of((problem) => utility(problem.utility)) },
-      { name: "Caution", cell: of((problem) => caution(problem)) },
+      { name: "Investor", cell: said((problem) => utility(problem.utility)) },
+      { name: "Caution", cell: said((problem) => caution(problem)) },
       { name: "Periods ahead", numeric: true, cell: of(({ horizon }) => count(horizon)) },
       { name: "Bank rate", numeric: true, cell: of(({ rate_per_step }) => percent(rate_per_step, 2)) },
       { name: "Returns", numeric: true, cell: of(({ history }) => count(history.length)) },
-      { name: "Size", numeric: true, cell: ({ bytes }) => `${significant(bytes / 1e6, 2)} MB` },
-      { name: "Stored", cell: ({ created_ms }) => moment(created_ms) },
+      { name: "Stored", cell: ({ created_ms }) => h("span", { title: moment(created_ms) }, moment(created_ms).split(",")[0]) },
     ],
     rows,
   );
