@@ -97,6 +97,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "specification.js": SCRIPT,
         "spread.js": SCRIPT,
         "stacked.js": SCRIPT,
+        "strategies.js": SCRIPT,
         "surface.js": SCRIPT,
         "surface_picture.js": SCRIPT,
         "surface_view.js": SCRIPT,

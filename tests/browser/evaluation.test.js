@@ -95,7 +95,7 @@ test("a strategy has one colour in every chart", async () => {
   const stroke = (locator) => locator.evaluate((element) => getComputedStyle(element).stroke);
   const fill = (locator) => locator.evaluate((element) => getComputedStyle(element).fill);
   const seen = { adaptive: [], plug_in: [] };
-  for (const [kind, name, colour] of [["adaptive", "Cautious, learns", "s0"], ["plug_in", "Trusts the record", "s3"]]) {
+  for (const [kind, name, colour] of [["adaptive", "Cautious, learns", "s0"], ["plug_in", "Trusts the record", "s5"]]) {
     seen[kind].push(await stroke(page.locator(`figure:has-text("Average share in stocks") path.line.${colour}`).first()));
     seen[kind].push(await stroke(page.locator(`figure:has-text("Worth as much as a sure") line.range.${colour}`).first()));
     seen[kind].push(await fill(page.getByRole("slider", { name, exact: true }).locator("rect.bar").first()));

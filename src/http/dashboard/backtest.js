@@ -9,6 +9,7 @@ import { allocation, count, counted, figures, minus, percent, percentTick, tick,
 import { intervalChart } from "./interval_chart.js";
 import { dated, unitOf } from "./periods.js";
 import { FRAMEWORKS, investorWords, percentName } from "./specification.js";
+import { colourOf, colourOfLevel } from "./strategies.js";
 import { belowHighest, compounded, grouped, places, returnsOf, worstFalls } from "./track.js";
 import { changing, interval, ordinal } from "./verdict.js";
 
@@ -17,10 +18,6 @@ const START = 100;
 const FALLS = 5;
 /** Years below which no strategy is called better than another. */
 const FEWEST_YEARS = 10;
-/** One colour a strategy, in every chart; the three that everybody knows as on the page of a session. */
-const COLOURS = { static: 4, "plug-in": 5, "cost-blind": 6, constant: 9, "60/40": 3, "all-stock": 1, "all-bank": 2 };
-/** Of cautious ones that learn, by how many there are: what most is said of comes first. */
-const LEVELS = { 1: [0], 2: [7, 0], 3: [7, 0, 8] };
 const KNOWN = ["all-bank", "60/40", "all-stock"];
 
 /** The report with what is said and drawn of it. */
@@ -68,7 +65,7 @@ const lines = (report) =>
     periods: report.periods[index],
     wealth: [START, ...report.periods[index].wealth],
     name: named(figures, report),
-    colour: COLOURS[kindOf(figures.strategy)] ?? LEVELS[report.choices.alpha.length][index],
+    colour: kindOf(figures.strategy) === "adaptive" ? colourOfLevel(index, report.choices.alpha.length) : colourOf(kindOf(figures.strategy)),
   }));
 
 /** The one that most is said about: the second cautious one that learns, or the only one. */

@@ -5,11 +5,10 @@ import { allocation, count, counted, minus, percent, tick, wealth } from "./form
 import { intervalChart } from "./interval_chart.js";
 import { investorWords } from "./specification.js";
 import { stackedChart } from "./stacked.js";
+import { colourOf } from "./strategies.js";
 import { interval } from "./verdict.js";
 
 const START = 100;
-/** One colour a family of strategies; those that know nothing as on the page of one asset. */
-const COLOURS = { "robust scaled_one": 0, "robust sup": 7, "static scaled_one": 4, "plug-in": 5, "minimum variance": 8, "inverse volatility": 6, "1/N": 1, "60 % 1/N": 3 };
 const EQUAL = "1/N";
 const KNOWN = [EQUAL, "60 % 1/N"];
 const NAMES = { "robust scaled_one": "Robust", "robust sup": "Robust, sup norm", "static scaled_one": "Chosen once a stretch", "plug-in": "Trusts the record", "minimum variance": "Least variance", "inverse volatility": "Inverse volatility", "1/N": "Equal shares", "60 % 1/N": "60 % in equal shares" };
@@ -40,7 +39,7 @@ export function ofAssets(report) {
       periods: { ...periods, allocation: totals },
       wealth: [START, ...periods.wealth],
       name: named(figures.strategy),
-      colour: COLOURS[familyOf(figures.strategy)],
+      colour: colourOf(familyOf(figures.strategy)),
     };
   });
   const known = KNOWN.map((name) => lines.find(({ strategy }) => strategy === name));

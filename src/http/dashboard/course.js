@@ -6,13 +6,14 @@ import { h, section } from "./dom.js";
 import { banked } from "./flows.js";
 import { allocation, percent, percentTick, tick, wealth } from "./format.js";
 import { isCautious } from "./specification.js";
+import { colourOf } from "./strategies.js";
 import { worstFalls } from "./track.js";
 
 /** What the session is measured by, each held through the same returns; 60/40 as people call it. */
 export const besides = (history) => [
-  { name: "All in the bank", share: 0, colour: 2 },
-  { name: "60/40", share: 0.6, colour: 3 },
-  { name: `All in ${risky(history)}`, share: 1, colour: 1 },
+  { name: "All in the bank", share: 0, colour: colourOf("all-bank") },
+  { name: "60/40", share: 0.6, colour: colourOf("60/40") },
+  { name: `All in ${risky(history)}`, share: 1, colour: colourOf("all-stock") },
 ];
 /** Charts above each other start at one line. */
 const GUTTER = 64;
@@ -86,7 +87,7 @@ export function holdings(shown, action) {
   const ends = ["low", "high"].map((name, end) => ({
     name: `Best kept, ${name} end`,
     kind: "levels",
-    colour: 1 + end,
+    colour: [9, 6][end],
     values: told(
       ({ band }) => band[end],
       ({ band }) => band[end],
@@ -94,6 +95,7 @@ export function holdings(shown, action) {
   }));
   const advised = {
     name: "Advised",
+    colour: 9,
     kind: "levels",
     values: told(
       ({ allocation }) => allocation,

@@ -8,11 +8,9 @@ import { intervalChart } from "./interval_chart.js";
 import { unitOf } from "./periods.js";
 import { FRAMEWORKS, investorWords, PAPER } from "./specification.js";
 import { binned, pieces } from "./spread.js";
+import { colourOf, colourOfMix } from "./strategies.js";
 import { changing, interval, ordinal } from "./verdict.js";
 
-/** One colour a kind of policy, in every chart; constant mixes have one of their own. */
-const COLOURS = { adaptive: 0, static: 1, plug_in: 3, known_law: 4, parametric_adaptive: 5, parametric_static: 6 };
-const MIX = 2;
 /** Histograms shown at once. */
 const SHOWN = 4;
 const BINS = 36;
@@ -29,7 +27,7 @@ const named = ({ framework, constant_mix }) => {
   return `${percent(constant_mix, 0)} in stocks`;
 };
 
-const colourOf = ({ framework }) => (framework ? COLOURS[framework] : MIX);
+const coloured = ({ framework, constant_mix }) => (framework ? colourOf(framework) : colourOfMix(constant_mix));
 
 /** What was put in over the periods, with the start. */
 function putIn({ initial_wealth, contributions, horizon }) {
@@ -41,7 +39,7 @@ function putIn({ initial_wealth, contributions, horizon }) {
 function outcomes({ strategies, histogram_edges, request }) {
   const { utility } = request.problem;
   return strategies
-    .map((strategy) => ({ ...strategy, name: named(strategy), colour: colourOf(strategy), spread: pieces(strategy, histogram_edges, utility) }))
+    .map((strategy) => ({ ...strategy, name: named(strategy), colour: coloured(strategy), spread: pieces(strategy, histogram_edges, utility) }))
     .sort((one, other) => other.certainty_equivalent.value - one.certainty_equivalent.value);
 }
 
@@ -166,7 +164,7 @@ function courses({ strategies, request }) {
   const deciding = strategies.filter(({ periods }) => periods);
   if (deciding.length === 0) return "";
   const unit = unitOf(request.problem.periods_per_year);
-  const series = deciding.map((one) => ({ name: named(one), colour: colourOf(one), kind: "line", values: one.periods.map(({ allocation }) => allocation.mean) }));
+  const series = deciding.map((one) => ({ name: named(one), colour: coloured(one), kind: "line", values: one.periods.map(({ allocation }) => allocation.mean) }));
   const x = { values: deciding[0].periods.map(({ period }) => period), label: unit[0].toUpperCase() + unit.slice(1), format: String, whole: true };
   return section(
     "What each held",
@@ -213,7 +211,7 @@ function radii({ strategies }) {
     title: "Mean radius",
     x: { values: guarding[0].periods.map(({ period }) => period), label: "Period", format: String, whole: true },
     y: { format: (value) => figures(value, 3), tick },
-    series: guarding.map((one) => ({ name: named(one), colour: colourOf(one), kind: "line", values: one.periods.map(({ radius }) => radius?.mean ?? null) })),
+    series: guarding.map((one) => ({ name: named(one), colour: coloured(one), kind: "line", values: one.periods.map(({ radius }) => radius?.mean ?? null) })),
   });
 }
 

@@ -5,12 +5,12 @@ import { h, section, table } from "./dom.js";
 import { count, percent, percentTick, significant, tick } from "./format.js";
 import { histogram } from "./histogram.js";
 import { PAPER } from "./specification.js";
+import { colourOf, colourOfMix } from "./strategies.js";
 import { interval } from "./verdict.js";
 
 const STATISTICS = [["mean", "Mean"], ["variance", "Variance"], ["quantile_20", "20 % quantile"], ["quantile_90", "90 % quantile"], ["max", "Most"], ["min", "Least"]];
 /** Columns of the paper's tables and the strategies they are of. */
 const PRINTED = { adaptive: ["adaptive", "Adaptive robust"], known_law: ["known_law", "True law"], static_robust: ["static", "Static robust"] };
-const COLOURS = { adaptive: 0, static: 1, plug_in: 3, known_law: 4 };
 const BINS = 30;
 
 const four = (value) => tick(value, 0.0001);
@@ -87,7 +87,7 @@ function utilities({ strategies, histogram_edges: edges }) {
   const some = ["adaptive", "known_law"].map((name) => find({ strategies }, name)).filter(Boolean);
   const shares = ({ histogram: counts }) => counts.map((one) => one / counts.reduce((sum, other) => sum + other, 0));
   const top = Math.max(...some.flatMap(shares));
-  const drawn = (one) => histogram({ title: `Terminal utility: ${named(one).toLowerCase()}`, of: "Utility", format: (value) => tick(value, 0.1), shares: shares(one), domain: [edges[0], edges.at(-1)], top, colour: COLOURS[one.strategy], marks: [] });
+  const drawn = (one) => histogram({ title: `Terminal utility: ${named(one).toLowerCase()}`, of: "Utility", format: (value) => tick(value, 0.1), shares: shares(one), domain: [edges[0], edges.at(-1)], top, colour: colourOf(one.strategy), marks: [] });
   return h("div", { class: "duo" }, some.map(drawn));
 }
 
@@ -101,7 +101,7 @@ function mixes(all, printed) {
   const ranked = [...all.strategies].sort((one, other) => other.certainty_equivalent.value - one.certainty_equivalent.value);
   const held = (one) => ({
     name: named(one),
-    colour: COLOURS[one.strategy],
+    colour: colourOf(one.strategy),
     kind: "line",
     values: one.periods.map(({ allocation }) => allocation.mean),
     band: one.strategy === "adaptive" ? one.periods.map(({ allocation }) => [allocation.quantile_10, allocation.quantile_90]) : null,
@@ -115,9 +115,9 @@ function mixes(all, printed) {
       x: { values: placed.map(({ at }) => at), label: "Variance", format: (value) => tick(value, 0.01), tick },
       y: { format: four, tick },
       series: [
-        series("Constant mixes", 2, ({ constant }) => constant, { joined: true }),
-        ...deciding.map((one) => series(named(one), COLOURS[one.strategy], (point) => point.one === one, { apart: true })),
-        series("Adaptive as printed", 5, (point) => point.paper, { apart: true }),
+        series("Constant mixes", colourOfMix(0.5), ({ constant }) => constant, { joined: true }),
+        ...deciding.map((one) => series(named(one), colourOf(one.strategy), (point) => point.one === one, { apart: true })),
+        series("Adaptive as printed", colourOf("constant"), (point) => point.paper, { apart: true }),
       ],
     }),
     table(
@@ -165,7 +165,7 @@ function convergence({ rows, slopes }) {
   const gaps = (gap, title) => {
     const adaptive = of("adaptive", gap);
     const rate = sizes.map((size) => adaptive[0] && adaptive[0] * (size / sizes[0]) ** -0.5);
-    const series = [["adaptive", adaptive, 0], ["static", of("static", gap), 1]].map(([strategy, values, colour]) => ({ name: PAPER[strategy], kind: "line", joined: true, colour, values }));
+    const series = [["adaptive", adaptive], ["static", of("static", gap)]].map(([strategy, values]) => ({ colour: colourOf(strategy), name: PAPER[strategy], kind: "line", joined: true, values }));
     return lineChart({
       title,
       height: 240,

@@ -5,8 +5,9 @@ import { h, s, table } from "./dom.js";
 import { allocation, percentTick } from "./format.js";
 
 const [HEIGHT, FOOT, TOP] = [190, 30, 10];
-/** So many assets have a colour of their own; the others are told together. */
-const COLOURS = 6;
+/** So many assets have a colour of their own, whichever stand beside each other unlike; the others are told together. */
+const COLOURS = [0, 1, 3, 6, 4, 7];
+const OTHERS = 2;
 const QUARTERS = [0, 0.25, 0.5, 0.75, 1];
 
 /** Columns narrower than this, in pixels, are drawn as the average of several periods. */
@@ -14,14 +15,14 @@ const NARROWEST = 4;
 
 /** `shares`: for each period, from the first, the share of wealth in each of `assets` by its name. `x`: `{name(period), tick(period)}`. */
 export function stackedChart({ title, assets, shares, x }) {
-  const own = assets.length > COLOURS ? assets.slice(0, COLOURS - 1) : assets;
+  const own = assets.length > COLOURS.length ? assets.slice(0, COLOURS.length - 1) : assets;
   const others = assets.slice(own.length);
-  const layers = own.map((name) => ({ name, of: (held) => held[name] }));
-  if (others.length > 0) layers.push({ name: "Others", of: (held) => others.reduce((sum, name) => sum + held[name], 0) });
+  const layers = own.map((name, index) => ({ name, colour: COLOURS[index], of: (held) => held[name] }));
+  if (others.length > 0) layers.push({ name: "Others", colour: OTHERS, of: (held) => others.reduce((sum, name) => sum + held[name], 0) });
   const told = [...layers, { name: "Bank", of: (held) => 1 - assets.reduce((sum, name) => sum + held[name], 0) }];
   const here = h("span", { class: "here" });
   const outputs = told.map(() => h("b", {}));
-  const legend = h("span", { class: "legend" }, here, told.map(({ name }, index) => h("span", {}, index < layers.length ? block(index) : null, `${name} `, outputs[index])));
+  const legend = h("span", { class: "legend" }, here, told.map(({ name, colour }, index) => h("span", {}, index < layers.length ? block(colour) : null, `${name} `, outputs[index])));
   let [across, cursor, position] = [scale([0, 1], [0, 1]), null, shares.length - 1];
   const mark = () => {
     for (const end of ["x1", "x2"]) cursor?.setAttribute(end, across(position + 0.5));
@@ -40,7 +41,7 @@ export function stackedChart({ title, assets, shares, x }) {
     // Narrow columns stand close, on whole pixels: gaps between them would be stripes.
     const gap = across(1) - across(0) >= 2 * NARROWEST ? 1 : 0;
     const box = ({ start, end, tops }, layer) => `M${Math.round(across(start)) + gap} ${y(tops[layer]).toFixed(1)}H${Math.round(across(end)) - gap}V${y(tops[layer - 1] ?? 0).toFixed(1)}H${Math.round(across(start)) + gap}Z`;
-    const areas = layers.map((_, layer) => s("path", { class: `bar s${layer}`, d: stacked.map((one) => box(one, layer)).join("") }));
+    const areas = layers.map(({ colour }, layer) => s("path", { class: `bar s${colour}`, d: stacked.map((one) => box(one, layer)).join("") }));
     cursor = s("line", { class: "cursor", y1: 6, y2: bottom });
     mark();
     return [axes({ x: (period) => across(period - 0.5), y, xTicks, yTicks: QUARTERS, xFormat: x.tick, yFormat: percentTick, left, right, bottom }), areas, cursor];

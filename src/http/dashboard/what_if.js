@@ -4,6 +4,7 @@ import { post } from "./api.js";
 import { lineChart } from "./chart.js";
 import { h, section } from "./dom.js";
 import { allocation, percentTick, points, significant, tick, wealth } from "./format.js";
+import { colourOf } from "./strategies.js";
 
 /** From trusting the returns seen to twice the caution; every point is a robust step solved. */
 const SWEEP = { from: 0, to: 2, points: 21 };
@@ -49,7 +50,7 @@ function charts(solved, { radius, allocation: advised }, cautionScale, unit) {
         start: own,
         x,
         y: { format: wealth, tick },
-        series: [line("", (point) => point.certainty_equivalent), line("All in the bank", ({ floor }) => floor, { bare: true, colour: 2 })],
+        series: [line("", (point) => point.certainty_equivalent), line("All in the bank", ({ floor }) => floor, { bare: true, colour: colourOf("all-bank") })],
       }),
     ),
   ];
