@@ -86,14 +86,23 @@ async fn the_page_of_the_interface_is_served_and_loads_nothing_from_elsewhere() 
     let ours = files_of("src/http/documentation");
     let page = String::from_utf8(ours["index.html"].clone()).expect("UTF-8");
     assert_eq!(served(&app, "/docs", "index.html", page.as_bytes()).await, POLICY);
-    assert_eq!(served(&app, "/docs/start.js", "start.js", &ours["start.js"]).await, POLICY);
+    for file in ["page.css", "start.js"] {
+        assert_eq!(served(&app, &format!("/docs/{file}"), file, &ours[file]).await, POLICY);
+    }
     let loaded: Vec<&str> = ["src=\"", "href=\""]
         .iter()
         .flat_map(|attribute| page.split(attribute).skip(1).filter_map(|rest| rest.split('"').next()))
         .collect();
     assert_eq!(
         loaded,
-        ["/docs/swagger-ui-bundle.js", "/docs/start.js", "data:,", "/docs/swagger-ui.css", "/openapi.json"]
+        [
+            "/docs/swagger-ui-bundle.js",
+            "/docs/start.js",
+            "data:,",
+            "/docs/swagger-ui.css",
+            "/docs/page.css",
+            "/openapi.json"
+        ]
     );
     for (file, media) in [("swagger-ui-bundle.js", "text/javascript"), ("swagger-ui.css", "text/css")] {
         let answer = app.client.get(format!("{}/docs/{file}", app.url)).send().await.expect("an answer");

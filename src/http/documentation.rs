@@ -25,9 +25,12 @@ static PAGE: LazyLock<Asset> =
     LazyLock::new(|| Asset::new(("index.html", HTML, include_bytes!("documentation/index.html"))));
 
 static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
-    let start = Asset::new(("start.js", SCRIPT, include_bytes!("documentation/start.js")));
+    let ours = [
+        Asset::new(("page.css", STYLE, include_bytes!("documentation/page.css"))),
+        Asset::new(("start.js", SCRIPT, include_bytes!("documentation/start.js"))),
+    ];
     let theirs = [("swagger-ui.css", STYLE), ("swagger-ui-bundle.js", SCRIPT)];
-    theirs.into_iter().filter_map(|(name, media)| embedded(name, media)).chain([start]).collect()
+    theirs.into_iter().filter_map(|(name, media)| embedded(name, media)).chain(ours).collect()
 });
 
 /// A file of Swagger UI, compressed as it is kept.

@@ -64,6 +64,10 @@ export async function browser() {
       // The example's returns stand elsewhere.
       return existsSync(path) ? route.fulfill({ path }) : route.continue();
     });
+    await context.route(/\/docs(\/(page\.css|start\.js))?$/, (route) => {
+      const name = basename(new URL(route.request().url()).pathname);
+      return route.fulfill({ path: join(FILES, "../documentation", name === "docs" ? "index.html" : name) });
+    });
     return context;
   };
   return launched;
