@@ -4,7 +4,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { browser, call, service } from "./ballast.js";
-import { usable, visit } from "./page.js";
+import { visit } from "./page.js";
 
 /** Nothing that is waited for takes longer, in milliseconds. */
 const PATIENCE = 60_000;
@@ -274,15 +274,6 @@ test("every view fits, at 390 and 1600 pixels", async () => {
       assert.equal(beyond, 0, `${hash} at ${width} pixels`);
     }
   }
-});
-
-test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {
-  const settle = async (hash) => {
-    await go(hash);
-    await settled();
-  };
-  await usable(page, settle, views());
-  await page.setViewportSize({ width: 1280, height: 900 });
 });
 
 test("a policy in use is not deleted, a session is", async () => {

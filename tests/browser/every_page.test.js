@@ -1,9 +1,10 @@
-// The pages beside the views: the interface, the key, what is not there, and every page of the guide, for everybody in light and in dark.
+// Every page on every screen, for everybody: each view where there is nothing yet and where there is something, the interface and the guide.
 
 import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
-import { browser, service } from "./ballast.js";
-import { accessible, visitQuiet } from "./page.js";
+import { browser, call, service, trained } from "./ballast.js";
+import { usable, visitQuiet } from "./page.js";
 
 let ballast, chromium, page;
 
@@ -18,40 +19,101 @@ after(async () => {
   await ballast?.stop();
 });
 
-/** What Swagger UI breaks by its own markup and colours. */
-const OF_SWAGGER = ["color-contrast", "heading-order", "nested-interactive", "scrollable-region-focusable"];
+const visit = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
+const nothing = `session_${"0".repeat(32)}`;
+/** Views that need nothing to be there. */
+const BARE = ["#/", "#/jobs", "#/train", "#/policies", "#/report", "#/sessions/new", "#/evaluations", "#/evaluations/new", "#/backtests/new", "#/compare", "#/key", "#/nowhere", `#/sessions/${nothing}`];
 
-/** That axe finds nothing on a page, in light and in dark, once `open` has brought it up. */
-async function forEverybody(where, open, apart) {
-  for (const colorScheme of ["light", "dark"]) {
-    await page.emulateMedia({ colorScheme });
-    await open();
-    await accessible(page, `${where} in ${colorScheme}`, apart);
-  }
+test("every view where there is nothing yet", () => usable(page, visit, BARE));
+
+const HISTORY = Array.from({ length: 24 }, (_, k) => 0.01 + 0.05 * Math.sin(1.7 * k));
+const BONDS = HISTORY.map((_, k) => 0.003 + 0.01 * Math.cos(2.3 * k));
+const both = (k) => [HISTORY[k], BONDS[k]];
+
+/** A job once it has ended. */
+async function ended(path, request) {
+  const { job } = await call(ballast.url, path, request);
+  while ((await call(ballast.url, `/jobs/${job}`)).finished_ms === null) await new Promise((resolve) => setTimeout(resolve, 50));
+  return job;
 }
+
+test("every view where there is something, of one asset and of several", async () => {
+  const design = { count: 20 };
+  const problem = { horizon: 2, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY };
+  const wide = { ...problem, assets: ["Stocks", "Bonds"], history: HISTORY.map((_, k) => both(k)), radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } };
+  const [one, several] = [await trained(ballast.url, { problem, design, name: "A name of so many words that they take more than a line" }), await trained(ballast.url, { problem: wide, design })];
+  const [lived, other] = [(await call(ballast.url, "/sessions", { policy: one, name: "Ada" })).session, (await call(ballast.url, "/sessions", { policy: several })).session];
+  await call(ballast.url, "/observe", { session: lived, period: 1, simple_return: 0.02, date: "2026-01-31" });
+  await call(ballast.url, "/observe", { session: other, period: 1, log_returns: { Stocks: 0.02, Bonds: -0.01 } });
+  const walk = { rate: 0.002, periods_per_year: 4, log_returns: HISTORY };
+  const dates = HISTORY.map((_, k) => `${2004 + Math.floor(k / 4)}-${String(3 * (k % 4) + 3).padStart(2, "0")}`);
+  const jobs = {
+    evaluations: [await ended("/evaluate", { problem, design, frameworks: ["adaptive"], paths: 100 })],
+    backtests: [await ended("/backtest", { ...walk, window: 8, every: 4, count: 10, alpha: [0.5] }), await ended("/backtest", { ...walk, dates, assets: ["Stocks", "Bonds"], log_returns: wide.history, windows: [8], alpha: 0.5 })],
+    frontiers: [await ended("/frontier", { problem: { history: HISTORY, rate_per_step: 0.002 } })],
+  };
+  // One that failed to be, and one that runs or waits as long as this test looks.
+  const { job: stopped } = await call(ballast.url, "/evaluate", { problem: { ...problem, horizon: 200 }, design: { count: 1000 }, frameworks: ["adaptive"] });
+  const { job: running } = await call(ballast.url, "/train", { problem: { ...problem, horizon: 200 }, design: { count: 1000 } });
+  await fetch(`${ballast.url}/jobs/${stopped}/cancel`, { method: "POST" });
+  const places = [
+    ...["#/", "#/jobs", "#/policies", "#/sessions/new", "#/evaluations", "#/evaluations/new", `#/train?like=${one}`, `#/train?newer=${several}`, `#/report?sessions=${lived},${other}`],
+    ...[one, several].map((policy) => `#/policies/${policy}`),
+    ...[lived, other].map((session) => `#/sessions/${session}`),
+    ...Object.entries({ ...jobs, evaluations: [...jobs.evaluations, stopped] }).flatMap(([at, all]) => all.map((job) => `#/${at}/${job}`)),
+    `#/compare?policies=${one},${several}`,
+    `#/compare?sessions=${lived},${other}`,
+  ];
+  const routes = [...(await readFile(new URL("../../src/http/dashboard/main.js", import.meta.url), "utf8")).matchAll(/^ {2}\[\/(\S+)\/, /gm)].map(([, route]) => new RegExp(route));
+  assert.ok(routes.length > 15, `${routes}`);
+  const unseen = routes.filter((route) => ![...BARE, ...places].some((place) => route.test(place)));
+  assert.deepEqual(unseen, [], "a view is on no list of this test");
+  // What moves or is asked for a moment later stands still: a job that runs is told by the events of it.
+  await usable(page, async (hash) => {
+    await page.goto("about:blank");
+    await page.goto(`${ballast.url}/${hash}`);
+    await page.locator("main:not([aria-busy]) h1").waitFor();
+    if (hash === "#/jobs") return page.locator("progress").waitFor();
+    await page.waitForLoadState("networkidle");
+  }, places);
+  await fetch(`${ballast.url}/jobs/${running}/cancel`, { method: "POST" });
+});
+
+test("the page that asks for a key", async () => {
+  await ballast.key("read");
+  await page.goto("about:blank");
+  for (;;) {
+    const { status } = await fetch(`${ballast.url}/policies`);
+    if (status === 401) break;
+    await new Promise((resolve) => setTimeout(resolve, 50));
+  }
+  await usable(page, async () => {
+    await visit("#/policies");
+    await page.getByRole("heading", { level: 1, name: "A key is needed" }).waitFor();
+  });
+});
+
+/** What Swagger UI breaks by its own markup. */
+const OF_SWAGGER = ["heading-order", "landmark-unique", "nested-interactive", "scrollable-region-focusable"];
+
+test("the interface, with calls opened, but for what Swagger UI brings", async () => {
+  const open = async () => {
+    await page.goto("about:blank");
+    await page.goto(`${ballast.url}/docs`);
+    await page.locator("#operations-jobs-train").getByRole("button").first().click();
+    await page.locator("#operations-jobs-train").getByText('"target": "floor_gain"').first().waitFor();
+    const tried = page.locator("#operations-jobs-list");
+    await tried.getByRole("button").first().click();
+    await tried.getByRole("button", { name: "Try it out" }).click();
+    await tried.getByRole("button", { name: "Execute" }).waitFor();
+  };
+  await usable(page, open, ["/docs"], OF_SWAGGER);
+});
 
 test("every page of the guide", async () => {
   await page.goto(`${ballast.url}/guide`);
   const links = await page.locator("nav a").evaluateAll((links) => links.map(({ href }) => href));
   const pages = [...new Set(links.map((href) => href.split("#")[0]))].filter((href) => new URL(href).pathname.startsWith("/guide"));
   assert.ok(pages.length > 15, `${pages}`);
-  for (const address of pages) await forEverybody(address, () => page.goto(address));
-});
-
-test("a view that is not there, and a session that is not", async () => {
-  await forEverybody("a missing view", () => visitQuiet(page, `${ballast.url}/#/nowhere`));
-  await page.getByRole("heading", { level: 1, name: "There is nothing here" }).waitFor();
-  await forEverybody("a missing session", () => visitQuiet(page, `${ballast.url}/#/sessions/session_${"0".repeat(32)}`));
-  await page.getByRole("heading", { level: 1, name: "It is not here" }).waitFor();
-});
-
-test("the page for a key", () => forEverybody("#/key", () => visitQuiet(page, `${ballast.url}/#/key`)));
-
-test("the interface, with a call opened, but for what Swagger UI brings", () => {
-  const open = async () => {
-    await page.goto(`${ballast.url}/docs`);
-    await page.locator("#operations-jobs-train").getByRole("button").first().click();
-    await page.locator("#operations-jobs-train").getByText('"target": "floor_gain"').first().waitFor();
-  };
-  return forEverybody("/docs", open, OF_SWAGGER);
+  await usable(page, (address) => page.goto(address), pages);
 });

@@ -1,9 +1,8 @@
-// The documents as a site: a wide table, long code and pictures on every screen, and the way there and back.
+// The documents as a site: its pictures, and the way there and back.
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { browser, service } from "./ballast.js";
-import { usable } from "./page.js";
 
 let ballast, chromium, page;
 
@@ -15,10 +14,6 @@ before(async () => {
 after(async () => {
   await chromium?.close();
   await ballast?.stop();
-});
-
-test("the guide can be read by everybody on every screen", async () => {
-  await usable(page, (place) => page.goto(`${ballast.url}${place}`), ["/guide", "/guide/concepts", "/guide/results", "/guide/requests"]);
 });
 
 test("the guide is a click from the overview, and the overview from the guide", async () => {

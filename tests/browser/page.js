@@ -38,8 +38,8 @@ export async function accessible(page, where, apart = []) {
   assert.ok(passes.length > 10);
 }
 
-/** In light, in dark, at 200 % and at 320 pixels, each opened by `open`: that axe finds nothing and that nothing scrolls sideways. */
-export async function usable(page, open, places = [""]) {
+/** In light, in dark, at 200 % and at 320 pixels, each opened by `open`: that axe finds nothing, but what the rules `apart` find, and that nothing scrolls sideways. */
+export async function usable(page, open, places = [""], apart = []) {
   for (const { colorScheme, width, height, deviceScaleFactor = 1 } of LOOKS) {
     await page.emulateMedia({ colorScheme });
     await page.setViewportSize({ width, height });
@@ -49,7 +49,7 @@ export async function usable(page, open, places = [""]) {
       await open(place);
       const where = `${place} in ${colorScheme} at ${width}`;
       assert.equal(await page.evaluate(() => devicePixelRatio), deviceScaleFactor, where);
-      await accessible(page, where);
+      await accessible(page, where, apart);
       assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth), 0, where);
     }
     await zoom?.send("Emulation.clearDeviceMetricsOverride");

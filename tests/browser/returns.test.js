@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { browser, call, service } from "./ballast.js";
-import { accessible } from "./page.js";
+import { usable } from "./page.js";
 
 let ballast, chromium, page;
 
@@ -175,7 +175,8 @@ test("what is asked, read and refused breaks no rule of accessibility", async ()
   for (const text of ["0.2 -0.15 0.3 -0.1", "month,fund,rf\n2020-01,1,0.1\n2020-02,-2,0.1\n2020-03,3,0.1", "1 x"]) {
     await pasted(text);
     await page.locator(".note.telling, .note.wrong").first().waitFor();
-    await accessible(page, text);
+    await usable(page, () => {}, [text]);
+    await page.setViewportSize({ width: 1280, height: 900 });
   }
 });
 
