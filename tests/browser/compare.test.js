@@ -67,6 +67,34 @@ test("policies that differ are never said to be the same", async () => {
   }
 });
 
+test("of several assets, of their distance, of what may be held and of money added each difference is told in words", async () => {
+  const design = { count: 20, initial_laws: "resampled" };
+  const one = { horizon: 2, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } };
+  const pair = { ...one, assets: ["Stocks", "Bonds"], history: HISTORY.map((value, k) => [value, 0.003 + 0.004 * Math.cos(k)]) };
+  const asked = { one, pair, sup: { ...pair, ground_norm: "sup" }, other: { ...pair, assets: ["Stocks", "Gold"] }, half: { ...one, action_interval: [0, 0.5] }, adding: { ...one, contributions: 5 }, early: { ...one, contributions: [10, 0] }, late: { ...one, contributions: [0, 10] } };
+  const policies = {};
+  for (const [name, problem] of Object.entries(asked)) policies[name] = await trained(ballast.url, { problem, design });
+  const cases = [
+    ["one", "pair", /differ in assets, mix of assets, distance of markets,.* and record; other details differ too\./, { Assets: ["One", "Stocks, Bonds"], "Distance of markets": ["Of one asset", "Each asset by its own volatility"] }],
+    ["pair", "other", /differ in assets; everything else is the same\./, { Assets: ["Stocks, Bonds", "Stocks, Gold"] }],
+    ["pair", "sup", /differ in distance of markets/, { "Distance of markets": ["Each asset by its own volatility", "All assets at once"] }],
+    ["one", "half", /differ in share allowed outside the bank; everything else is the same\./, { "Share allowed outside the bank": ["0 % to 100 %", "0 % to 50 %"] }],
+    ["one", "adding", /differ in money added; everything else is the same\./, { "Money added": ["None", "At the end of each period 5.00 is added."] }],
+    ["adding", "late", /differ in money added; everything else is the same\./, { "Money added": ["At the end of each period 5.00 is added.", "In 1 of the periods money is added, 10.00 in all."] }],
+    ["early", "late", /differ in money added; everything else is the same\./, { "Money added": ["In 1 of the periods money is added, 10.00 in all.", "In 1 of the periods money is added, 10.00 in all. (other amounts or periods)"] }],
+  ];
+  const sessions = Object.fromEntries(await Promise.all(Object.entries(policies).map(async ([name, policy]) => [name, (await call(ballast.url, "/sessions", { policy })).session])));
+  for (const [kind, ids, who] of [["policies", policies, "They"], ["sessions", sessions, "Their policies"]])
+    for (const [left, right, words, cells] of cases) {
+      await go(`#/compare?${kind}=${ids[left]},${ids[right]}`);
+      const main = plain(await page.locator("main").innerText());
+      assert.match(main, new RegExp(`${who} ${words.source}`), `${kind}: ${left} and ${right}`);
+      assert.doesNotMatch(main, /NaN|undefined|null/, `${kind}: ${left} and ${right}`);
+      const told = await rows();
+      for (const [name, both] of Object.entries(cells)) assert.deepEqual(told[name], [...both, "differs"], `${kind}: ${left} and ${right}`);
+    }
+});
+
 test("of policies a third tick takes the place of the first, of sessions as many are ticked as are reported for", async () => {
   const third = (await call(ballast.url, "/sessions", { policy: careful })).session;
   const box = (id) => page.getByRole("row", { name: id.replace(/^[a-z]+_/, "").slice(0, 10) }).first().getByRole("checkbox");

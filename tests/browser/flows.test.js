@@ -49,7 +49,7 @@ test("a session says what is added at the end of the period, reckons with it, an
     design: { count: 40 },
   });
   await page.goto(`${ballast.url}/#/policies/${policy}`);
-  await page.getByText(/In 1 of the periods money is added, 5\.00 in all, and in 1 withdrawn, 8\.25 in all\./).waitFor();
+  await page.getByText(/In 1 of the periods money is added, 5\.00 in all, and in 1 of the periods money is withdrawn, 8\.25 in all\./).waitFor();
   const { session } = await call(ballast.url, "/sessions", { policy, holding: 0.2 });
   await page.goto(`${ballast.url}/#/sessions/${session}`);
   await page.getByText("At the end of the period 5.00 is added.").first().waitFor();

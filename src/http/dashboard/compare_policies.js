@@ -19,19 +19,20 @@ export async function policiesBeside(ids, leaving) {
   const both = await Promise.all(ids.map((id) => get(`/policies/${id}`, leaving)));
   const asked = both.map(({ specification }) => specification);
   const table = beside("Two policies side by side", "policies", "Policy", ids, both.map(({ name }) => name), rows(asked));
-  return [h("p", { class: "lead" }, sentence(rows(asked), asked)), table, curves(ids, both, leaving)];
+  return [h("p", { class: "lead" }, differences(asked, "They")), table, curves(ids, both, leaving)];
 }
 
 /** What differs, in a sentence: nothing is said to be the same that is not, also where no row tells it. */
-function sentence(all, [one, other]) {
+export function differences([one, other], subject) {
+  const all = rows([one, other]);
   const apart = all.filter(({ cells: [left, right] }) => left !== right).map(({ name }) => name.toLowerCase());
   const alike = JSON.stringify(one) === JSON.stringify(other);
-  if (apart.length === 0) return alike ? "The two were asked the same." : "They differ in details that no row below tells; each policy's own page has them.";
+  if (apart.length === 0) return alike ? "The two were asked the same." : `${subject} differ in details that no row below tells; each policy's own page has them.`;
   const [left, right] = [one, other].map(({ problem, fund, design: { count, ...design }, surrogate, seed }) => ({ ...problem, ...fund, count, design, surrogate, seed }));
   const fields = new Set([...Object.keys(left), ...Object.keys(right)]);
   const untold = [...fields].filter((field) => !apart.includes(ROW_OF[field]) && JSON.stringify(left[field]) !== JSON.stringify(right[field]));
   const rest = untold.length === 0 ? "everything else is the same" : "other details differ too";
-  return `They differ in ${apart.length === 1 ? apart[0] : `${apart.slice(0, -1).join(", ")} and ${apart.at(-1)}`}; ${rest}.`;
+  return `${subject} differ in ${apart.length === 1 ? apart[0] : `${apart.slice(0, -1).join(", ")} and ${apart.at(-1)}`}; ${rest}.`;
 }
 
 /** The row that tells a field of the problem. */
@@ -45,7 +46,7 @@ const ROW_OF = {
   trading_cost: "trading cost",
   initial_wealth: "wealth at the start",
   contributions: "money added",
-  action_interval: "share in stocks allowed",
+  action_interval: "share allowed outside the bank",
   learning: "older returns",
   centre: "centre",
   history: "record",
@@ -66,7 +67,8 @@ const moves = (support) => {
 };
 const NORMS = { scaled_one: "Each asset by its own volatility", sup: "All assets at once" };
 
-function rows(asked) {
+/** What two policies were asked, `{problem, fund, design, seed}` each, row by row. */
+export function rows(asked) {
   const problems = asked.map(({ problem }) => problem);
   const row = (name, read, apart) => {
     const cells = asked.map((one) => read(one.problem, one));
@@ -76,7 +78,8 @@ function rows(asked) {
   const less = (read, words) => words(read(other) - read(one));
   const signed = (value, words) => `${value > 0 ? "+" : ""}${words(value)}`;
   const records = problems.map(({ history }) => moments(history));
-  const same = one.history.length === other.history.length && one.history.every((value, index) => value === other.history[index]);
+  const changed = (field) => JSON.stringify(one[field]) !== JSON.stringify(other[field]);
+  const added = problems.map((problem) => flowsInWords(problem) || "None");
   const record = ({ history }) => {
     const { mean, deviation } = moments(history);
     return `${counted(history.length, "return")}: mean ${percent(mean, 2)}, deviation ${percent(deviation, 2)}`;
@@ -92,12 +95,12 @@ function rows(asked) {
     row("Bank", ({ rate_per_step }) => percent(rate_per_step, 3), less(({ rate_per_step }) => rate_per_step, (value) => signed(value, (size) => points(size, 3)))),
     row("Trading cost", ({ trading_cost }) => percent(trading_cost, 2), less(({ trading_cost }) => trading_cost, (value) => signed(value, (size) => points(size, 2)))),
     row("Wealth at the start", ({ initial_wealth }) => wealth(initial_wealth), less(({ initial_wealth }) => initial_wealth, (value) => signed(value, wealth))),
-    row("Money added", (problem) => flowsInWords(problem) || "None"),
-    row("Share in stocks allowed", ({ action_interval: [least, most] }) => `${percent(least, 0)} to ${percent(most, 0)}`),
+    { name: "Money added", cells: [added[0], added[1] === added[0] && changed("contributions") ? `${added[1]} (other amounts or periods)` : added[1]] },
+    row("Share allowed outside the bank", ({ action_interval: [least, most] }) => `${percent(least, 0)} to ${percent(most, 0)}`),
     row("Moves assumed possible", ({ support }, { fund }) => moves(fund?.support ?? support)),
     row("Older returns", ({ learning }) => (learning.kind === "decay" ? `half after ${significant(learning.half_life)}` : "count like newer ones")),
     row("Centre", ({ centre }) => centreInWords(centre) || "The returns seen"),
-    { name: "Record", cells: [record(one), same ? record(one) : `${record(other)}${record(other) === record(one) ? " (other returns)" : ""}`], apart: `mean ${signed(records[1].mean - records[0].mean, (value) => points(value, 2))}` },
+    { name: "Record", cells: [record(one), `${record(other)}${changed("history") && record(other) === record(one) ? " (other returns)" : ""}`], apart: `mean ${signed(records[1].mean - records[0].mean, (value) => points(value, 2))}` },
     row("Precision", (_, { design, seed }) => `${counted(design.count, "situation")}, seed ${count(seed)}`),
   ];
 }

@@ -5,19 +5,21 @@ import { get } from "./api.js";
 import { beside, LETTERS } from "./beside.js";
 import { lineChart } from "./chart.js";
 import { falls, risky, wealths } from "./comparators.js";
+import { differences, rows as asked } from "./compare_policies.js";
 import { LEAST_FALL, LEAST_SHARE } from "./course.js";
 import { h, section } from "./dom.js";
 import { addedIn, netAdded } from "./flows.js";
 import { allocation, count, percent, percentTick, points, tick, wealth } from "./format.js";
 import { called } from "./naming.js";
 import { calendar } from "./periods.js";
-import { caution, utility } from "./specification.js";
 import { worstFalls } from "./track.js";
 
 export async function sessionsBeside(ids, leaving) {
   const both = await Promise.all(ids.map((id) => read(id, leaving)));
   const table = beside("Two sessions side by side", "sessions", "Session", ids, both.map(({ session }) => session.name), rows(both));
-  return [h("p", { class: "lead" }, sentence(both)), table, courses(both)];
+  const specifications = both.map(({ policy }) => policy.specification);
+  const policies = both[0].policy.policy === both[1].policy.policy ? "" : h("p", { class: "sentence" }, differences(specifications, "Their policies"));
+  return [h("p", { class: "lead" }, sentence(both)), policies, table, courses(both)];
 }
 
 async function read(id, leaving) {
@@ -51,6 +53,9 @@ function sentence([one, other]) {
   return `100 in A has become ${wealth(first)} in ${after(one)}, and in B ${wealth(second)} in ${after(other)}.${held}`;
 }
 
+/** Rows of the policies that are told also where they do not differ. */
+const ALWAYS = ["Investor", "Caution"];
+
 function rows(both) {
   const row = (name, read, apart) => {
     const values = both.map(read);
@@ -75,8 +80,7 @@ function rows(both) {
     row("Last period", last),
     row("Returns seen", ({ session }) => ({ size: session.sample_size, words: count(session.sample_size) }), signed(count)),
     row("Policy", ({ policy }) => called(policy.policy, policy.name)),
-    row("Investor", ({ problem }) => utility(problem.utility)),
-    row("Caution", ({ problem }) => caution(problem)),
+    ...asked(both.map(({ policy }) => policy.specification)).filter(({ name, cells: [left, right] }) => ALWAYS.includes(name) || left !== right),
   ];
 }
 

@@ -57,9 +57,9 @@ export function inWords(problem) {
   const { contributions } = problem;
   if (none(problem)) return "";
   if (Array.isArray(contributions)) {
-    const [into, out] = [contributions.filter((amount) => amount > 0), contributions.filter((amount) => amount < 0)];
-    const total = (amounts) => wealth(Math.abs(amounts.reduce((sum, amount) => sum + amount, 0)));
-    return `In ${into.length} of the periods money is added, ${total(into)} in all, and in ${out.length} withdrawn, ${total(out)} in all.`;
+    const told = (word, amounts) => (amounts.length > 0 ? [`in ${amounts.length} of the periods money is ${word}, ${wealth(Math.abs(amounts.reduce((sum, amount) => sum + amount, 0)))} in all`] : []);
+    const words = [...told("added", contributions.filter((amount) => amount > 0)), ...told("withdrawn", contributions.filter((amount) => amount < 0))].join(", and ");
+    return `${words[0].toUpperCase()}${words.slice(1)}.`;
   }
   return endWords(contributions).replace("the period", "each period");
 }
