@@ -6,6 +6,7 @@ import asyncio
 import math
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import pytest
 from conftest import RETURNS, Service, train
 
 from ballast import AsyncBallast, Ballast, UnclearReturns
-from ballast.returns import Kind, dates_of, log_returns, log_returns_of_assets
+from ballast.returns import Kind, dates_of, log_returns
 
 SIMPLE = [0.02, -0.05, 0.0]
 LOGS = [math.log(1.02), math.log(0.95), 0.0]
@@ -75,21 +76,38 @@ def test_what_cannot_be_meant_is_refused(returns: Any, kind: Kind, message: str)
         log_returns(returns, kind)
 
 
-def test_what_cannot_be_meant_of_several_assets_is_refused() -> None:
-    table = pd.DataFrame({"stocks": SIMPLE, "bonds": SIMPLE}, index=INDEX)
+def test_what_cannot_be_meant_of_several_assets_is_refused(ballast: Ballast) -> None:
+    months = pd.DataFrame({"stocks": [*SIMPLE, 0.03], "bonds": [0.01, 0.0, -0.01, 0.02]}, index=MONTHS[:4])
+    said: dict[str, Any] = {"kind": "simple", "rate_per_step": 0.0}
     refused = {
-        "index of returns has 2008-01-01 after 2008-03-01": table.iloc[[2, 0, 1]],
-        r"bonds: returns\[1\] is nan: must be finite": table.assign(bonds=[0.1, math.nan, 0.2]),
-        r"bonds: returns has a standard deviation of 2\.05": table.assign(bonds=100 * table["bonds"].abs()),
-        "assets has 'stocks' twice": table.set_axis(["stocks", "stocks"], axis="columns"),
+        "index of returns has 2005-01-31 after 2005-03-31": months.iloc[[2, 0, 1, 3]],
+        r"returns: line 3: bonds is \"\": must be a number": months.assign(bonds=[0.1, math.nan, 0.2, 0.1]),
+        "assets has 'stocks' twice": months.set_axis(["stocks", "stocks"], axis="columns"),
+        r"returns\[1\] has 1 numbers: must have one for each of \['stocks', 'bonds'\]": [[0.1, 0.2], [0.1]],
+        "assets is None: must name the columns where returns is no DataFrame": months.to_numpy(),
     }
     for message, wrong in refused.items():
+        names = ["stocks", "bonds"] if isinstance(wrong, list) else None
         with pytest.raises(ValueError, match=message):
-            log_returns_of_assets(wrong, "simple")
-    names, rows = log_returns_of_assets(table, "simple")
-    assert names == ["stocks", "bonds"] and [row[0] for row in rows] == [row[1] for row in rows] == pytest.approx(
-        LOGS, abs=1e-15
-    )
+            ballast.advise_assets(wrong, assets=names, **said)
+
+
+def test_several_assets_are_the_same_in_rows_in_a_frame_and_in_a_file(ballast: Ballast, tmp_path: Path) -> None:
+    rows = [[value, 0.002 - 0.3 * value] for value in RECORD]
+    # Names that are numbers, such as those of deciles, are no row of numbers.
+    table = pd.DataFrame(rows, index=MONTHS, columns=["1", "2"])
+    table.assign(rf=BANK).to_csv(tmp_path / "table")
+    # The dates say how many periods make a year, and the column of the bank what it pays.
+    said: dict[str, Any] = {"kind": "simple", "rate_per_step": BANK[-1], "periods_per_year": 12.0, **ONCE}
+    plain = ballast.advise_assets(rows, assets=["1", "2"], **said)
+    assert set(plain["allocation"]) == {"1", "2"} and plain["sample_size"] == 24
+    assert ballast.advise_assets(table, rate_per_step=BANK[-1], **ONCE) == plain
+    assert ballast.advise_assets(table.assign(rf=BANK), assets=["1", "2"], **ONCE) == plain
+    assert ballast.advise_assets(table.rename(columns=int), rate_per_step=BANK[-1], **ONCE) == plain
+    named = table.set_axis(["one", "two"], axis="columns").assign(rf=BANK)
+    named.to_csv(tmp_path / "named")
+    found = ballast.advise_assets(tmp_path / "named", assets=["one", "two"], **ONCE)
+    assert found["allocation"]["one"] == plain["allocation"]["1"]
 
 
 def test_a_volatile_record_can_be_given_as_prices() -> None:
@@ -209,8 +227,36 @@ def test_what_can_be_read_in_two_ways_is_asked_by_name(ballast: Ballast) -> None
         ballast.advise(RECORD)
     with pytest.raises(ValueError, match="rate is missing: must be given"):
         ballast.backtest(RECORD)
-    with pytest.raises(ValueError, match="kind is 'log': must be left out where returns are read"):
-        ballast.advise("0.01 0.02", kind="log", rate_per_step=0.0)
+
+
+def test_a_calm_record_in_percent_is_asked_about_though_its_kind_is_said(ballast: Ballast) -> None:
+    """0.4 % and 40 % look alike, whoever says that they are simple returns."""
+    percent = [0.4, -0.3, 0.8, 0.1, -0.2, 0.5, 0.3, -0.1]
+    table = pd.DataFrame({"one": percent, "two": percent[::-1]})
+    said: dict[str, Any] = {"rate_per_step": 0.0005}
+    calls: list[Callable[..., Any]] = [
+        lambda **more: ballast.advise(percent, **said, **more),
+        lambda **more: ballast.train(percent, design={"count": 20}, horizon=2, **said, **more),
+        lambda **more: ballast.frontier(percent, scales=[0.0], resamples=20, **said, **more),
+        lambda **more: ballast.backtest(percent, rate=0.0005, window=4, periods_per_year=12, **more),
+        lambda **more: ballast.advise_assets(table, **said, **more),
+        lambda **more: ballast.train_assets(table, design={"count": 20}, horizon=2, **said, **more),
+        lambda **more: ballast.frontier(table, scales=[0.0], resamples=20, **said, **more),
+    ]
+    for call in calls:
+        for kind in ("simple", "log"):
+            with pytest.raises(UnclearReturns) as caught:
+                call(kind=kind)
+            assert [question["asks"] for question in caught.value.questions] == ["unit"]
+            assert "choices={'unit': 'percent'}: " in str(caught.value)
+    taken = ballast.advise(percent, kind="simple", choices={"unit": "percent"}, **said)
+    assert taken == ballast.advise([value / 100.0 for value in percent], kind="simple", **said)
+    of_both = ballast.advise_assets(table, kind="simple", choices={"unit": "percent"}, **said)
+    assert of_both["allocation"] == pytest.approx(
+        ballast.advise_assets(table / 100.0, kind="simple", **said)["allocation"], abs=1e-9
+    )
+    # Prices have no unit.
+    assert ballast.advise([100.4, 100.1, 100.9, 101.0], kind="price", **said)["sample_size"] == 3
 
 
 def test_it_is_read_alike_where_it_is_awaited(service: Service) -> None:
@@ -225,7 +271,7 @@ def test_it_is_read_alike_where_it_is_awaited(service: Service) -> None:
 
 
 def test_the_history_of_a_session_is_named(ballast: Ballast) -> None:
-    with pytest.raises(ValueError, match=r"^history\[1\] is nan: must be finite"):
+    with pytest.raises(ValueError, match=r"^history: line 2: column 1 is .nan.: must be a number"):
         ballast.policy("x").session(history=[0.1, math.nan])
 
 
@@ -234,7 +280,8 @@ def test_a_series_trains_as_its_list_does(ballast: Ballast) -> None:
     count = pd.Series([3]).iloc[0]
     assert not isinstance(count, int)
     from_series = ballast.train(series, kind="log", horizon=count, rate_per_step=0.001, design={"count": 20})
-    assert from_series.policy().id == train(ballast).policy().id
+    # Its dates say that these are months.
+    assert from_series.policy().id == train(ballast, periods_per_year=12).policy().id
 
 
 def test_nothing_imports_pandas_or_numpy() -> None:

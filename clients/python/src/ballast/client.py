@@ -21,16 +21,14 @@ from .returns import (
     Read,
     Returns,
     Table,
-    dates_of,
     day,
-    log_returns,
-    log_returns_of_assets,
-    one_record,
     per_period,
+    read,
+    read_assets,
     text_of,
 )
 from .session import AsyncSession, Session
-from .several import AssetsWalkForward, AsyncAssetsWalkForward, record_of_assets
+from .several import AssetsWalkForward, AsyncAssetsWalkForward
 from .training import (
     AsyncEvaluation,
     AsyncFrontier,
@@ -86,24 +84,24 @@ class _Ballast:
 
         ``returns`` is a list, an array, a Series, a DataFrame, the ``Path`` of a CSV or its text: returns of any kind,
         in any unit, or prices. The service reads it (:meth:`read_returns`), with its dates and the column of
-        the bank. Where it can be read in two ways, :class:`UnclearReturns` says which they are, and ``choices``
-        which is meant. With ``kind`` (``"simple"``, ``"log"`` or ``"price"``) numbers are taken as they are:
-        fractions, oldest first.
+        the bank. ``kind`` (``"simple"``, ``"log"`` or ``"price"``) says what the numbers are where they do not, and
+        ``choices`` all else, such as ``{"unit": "percent"}``. Where they can still be read in two ways,
+        :class:`UnclearReturns` says which those are, and what to add to ``choices`` for each.
 
         ``rate_per_step`` is what the bank pays per period of the returns, as a fraction: 0.00247 a month for 3 % a
         year; by default what it paid last, where ``returns`` say so. What is left out the service chooses, and
         ``Policy.detail`` tells. ``name``, ``notes`` and ``tags`` are what the policy is to be called, and no
         part of what it is. The same ``idempotency_key`` and arguments again, even from another process, give
         the same job. Raises ``ValueError`` where ``returns`` cannot be meant (a number that is missing, dates
-        of an index that do not increase, percents), before anything is sent.
+        of an index that do not increase), before anything is queued.
         """
-        read = await self._one(returns, kind, choices)
+        found = await self._one(returns, kind, choices)
         problem = {
-            "history": read.log_returns,
+            "history": found.series[0],
             "framework": framework,
             "horizon": horizon,
-            "rate_per_step": _last_rate(read, rate_per_step),
-            "periods_per_year": read.periods_per_year if periods_per_year is None else periods_per_year,
+            "rate_per_step": _last_rate(found, rate_per_step),
+            "periods_per_year": found.periods_per_year if periods_per_year is None else periods_per_year,
             "initial_wealth": initial_wealth,
             "action_interval": None if action_interval is None else list(action_interval),
             "trading_cost": trading_cost,
@@ -139,10 +137,10 @@ class _Ballast:
         what the investor has, and what share of it is in the asset already. ``sensitivity=True`` also says how
         near the advice is to changing.
         """
-        read = await self._one(returns, kind, choices)
-        told = {"rate_per_step": _last_rate(read, rate_per_step), "periods_per_year": read.periods_per_year}
+        found = await self._one(returns, kind, choices)
+        told = {"rate_per_step": _last_rate(found, rate_per_step), "periods_per_year": found.periods_per_year}
         question = {
-            "problem": {"history": read.log_returns, **_given(told), **_given(problem)},
+            "problem": {"history": found.series[0], **_given(told), **_given(problem)},
             "wealth": wealth,
             "holding": holding,
             "sensitivity": sensitivity,
@@ -154,20 +152,22 @@ class _Ballast:
         /,
         returns: Table,
         *,
-        kind: Kind,
-        rate_per_step: float,
+        kind: Kind | None = None,
+        choices: wire.Choices | None = None,
+        rate_per_step: float | None = None,
         assets: Sequence[str] | None = None,
         wealth: float | None = None,
         **problem: Any,
     ) -> wire.AssetsAdvised:
         """What to hold of each of several assets through one period. Nothing is trained or stored.
 
-        ``returns`` has a column for each asset, oldest date first: a DataFrame, whose columns are their names, or rows
-        of numbers with ``assets``. Every other field of the problem is given by name, such as ``ground_norm``,
+        ``returns`` has a column for each asset: a DataFrame, whose columns are their names, rows of numbers with
+        ``assets``, or a text or the ``Path`` of a file, of which ``assets`` chooses the columns, as it may of a
+        DataFrame. They are read as in ``train``, and so are ``kind``, ``choices`` and ``rate_per_step``: what the bank
+        pays may stand in a column that is not chosen. Every other field of the problem is given by name, such as ``ground_norm``,
         ``utility``, ``radius`` or ``support``.
         """
-        names, rows = log_returns_of_assets(returns, kind, assets)
-        whole = {"assets": names, "history": rows, "rate_per_step": rate_per_step, **_given(problem)}
+        whole = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
         question = _given({"problem": whole, "wealth": wealth})
         return cast(wire.AssetsAdvised, await self._transport.json("POST", "/advise", body=question))
 
@@ -176,8 +176,9 @@ class _Ballast:
         /,
         returns: Table,
         *,
-        kind: Kind,
-        rate_per_step: float,
+        kind: Kind | None = None,
+        choices: wire.Choices | None = None,
+        rate_per_step: float | None = None,
         assets: Sequence[str] | None = None,
         design: wire.DesignSpecification | None = None,
         surrogate: wire.SurrogateSpecification | None = None,
@@ -190,24 +191,34 @@ class _Ballast:
     ) -> wire.Job:
         """Queues the training of a policy for several assets, and does not wait for it.
 
-        ``returns``, ``kind``, ``assets`` and ``rate_per_step`` are as in ``advise_assets``, and so is every other field
+        ``returns``, ``kind``, ``choices``, ``assets`` and ``rate_per_step`` are as in ``advise_assets``, and so is every other field
         of the problem that is given by name; also ``horizon``, ``trading_cost``, ``contributions`` and ``composition``.
         What else is given is as in ``train``.
         """
-        names, rows = log_returns_of_assets(returns, kind, assets)
-        of_assets = {"assets": names, "history": rows, "rate_per_step": rate_per_step, **_given(problem)}
+        of_assets = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
         whole = {"problem": of_assets, "design": design, "surrogate": surrogate, "seed": seed}
         return await self._queued("/train", {**_given(whole), **relabelled(name, notes, tags)}, idempotency_key)
 
     async def _one(self, returns: Returns, kind: Kind | None, choices: wire.Choices | None) -> Read:
-        """Returns of one asset: by the service's reader, or as they are said to be."""
-        if kind is None:
-            return one_record(await self._read_returns(returns, **(choices or {})))
-        if choices is not None or isinstance(returns, str | os.PathLike):
-            raise ValueError(f"kind is {kind!r}: must be left out where returns are read; choices says what they are")
-        record, days = log_returns(returns, kind), dates_of(returns)
-        dates = None if days is None else per_period("dates", days, returns, len(record), kind)
-        return Read(record, dates, None, None)
+        """Returns of one asset."""
+        found = await read(self._transport, returns, kind, choices)
+        if len(found.series) != 1:
+            raise ValueError("returns has several columns: must be one; train_assets and advise_assets take several")
+        return found
+
+    async def _of_assets(
+        self,
+        returns: Table,
+        kind: Kind | None,
+        choices: wire.Choices | None,
+        rate_per_step: float | None,
+        assets: Sequence[str] | None,
+        problem: Mapping[str, Any],
+    ) -> dict[str, Any]:
+        """The problem of several assets."""
+        names, found = await read_assets(self._transport, returns, kind, choices, assets)
+        told = {"rate_per_step": _last_rate(found, rate_per_step), "periods_per_year": found.periods_per_year}
+        return {"assets": names, "history": found.rows, **_given(told), **_given(problem)}
 
     async def _read_returns(self, source: str | os.PathLike[str] | Table, /, **choices: Any) -> wire.Reading:
         """What a text of returns or prices says: one record, or what must be asked, or where it is wrong.
@@ -270,22 +281,12 @@ class _Ballast:
         periods or one for each, by default as ``returns`` say. ``dates`` are texts or dates, one for each
         number, by default those of the index of a pandas object, and tell how many periods make a year;
         ``periods_per_year`` says so without them. What is left out the service chooses, and the report tells.
-        Raises ``ValueError`` where ``returns``, ``rate`` or ``dates`` cannot be meant, before anything is sent.
+        Raises ``ValueError`` where ``returns``, ``rate`` or ``dates`` cannot be meant, before anything is queued.
         """
-        read = await self._one(returns, kind, choices)
-        record, rate = read.log_returns, read.rates if rate is None else rate
-        if rate is None:
-            raise ValueError("rate is missing: must be given, as returns do not say what the bank paid")
-        entries = returns if kind is not None else None
-        days = read.dates if dates is None else [day(date) for date in dates]
-        if dates is not None:
-            days = per_period("dates", days or [], entries, len(record), kind or "log")
-        if isinstance(rate, Iterable):
-            rate = [float(paid) for paid in per_period("rate", rate, entries, len(record), kind or "log")]
+        found = await self._one(returns, kind, choices)
         request = {
-            "log_returns": record,
-            "rate": rate,
-            "dates": days,
+            "log_returns": found.series[0],
+            **_beside(found, returns, rate, dates),
             "periods_per_year": periods_per_year,
             "window": window,
             "every": every,
@@ -305,8 +306,9 @@ class _Ballast:
         self,
         returns: Table,
         *,
-        kind: Kind,
-        rate: float | Sequence[float],
+        kind: Kind | None = None,
+        choices: wire.Choices | None = None,
+        rate: float | Sequence[float] | None = None,
         assets: Sequence[str] | None = None,
         dates: Iterable[object] | None = None,
         periods_per_year: int | None = None,
@@ -321,12 +323,19 @@ class _Ballast:
         """Queues a walk-forward through a table of several assets, as ``ballast backtest`` does, and does not wait for
         it.
 
-        ``returns``, ``kind`` and ``assets`` are as in ``advise_assets``; ``rate`` and ``dates`` as in ``backtest``, and
+        ``returns``, ``kind``, ``choices`` and ``assets`` are as in ``advise_assets``; ``rate`` and ``dates`` as in ``backtest``, and
         dates are needed. ``windows`` are how many of the last periods strategies know, ``None`` for all. What is left
         out the service chooses, and the report tells. Raises ``ValueError`` where ``returns``, ``rate`` or ``dates``
-        cannot be meant, before anything is sent.
+        cannot be meant, before anything is queued.
         """
-        choices = {
+        names, found = await read_assets(self._transport, returns, kind, choices, assets)
+        beside = _beside(found, returns, rate, dates)
+        if beside["dates"] is None:
+            raise ValueError("dates is None: must be given where returns has none")
+        request = {
+            "assets": names,
+            "log_returns": found.rows,
+            **beside,
             "periods_per_year": periods_per_year,
             "windows": None if windows is None else list(windows),
             "every": every,
@@ -335,16 +344,16 @@ class _Ballast:
             "trading_cost": trading_cost,
             "seed": seed,
         }
-        request = {**record_of_assets(returns, kind, rate, dates, assets), **_given(choices)}
-        return await self._queued("/backtest", request, idempotency_key)
+        return await self._queued("/backtest", _given(request), idempotency_key)
 
     async def _frontier(
         self,
         /,
         returns: Returns | Table,
         *,
-        kind: Kind,
-        rate_per_step: float,
+        kind: Kind | None = None,
+        choices: wire.Choices | None = None,
+        rate_per_step: float | None = None,
         assets: Sequence[str] | None = None,
         scales: Sequence[float] | None = None,
         resamples: int | None = None,
@@ -361,11 +370,12 @@ class _Ballast:
         ``returns`` are of one asset as in ``advise``, or, with more than one column, of several as in
         ``advise_assets``. Every other field of the problem is given by name, such as ``utility`` or ``radius``.
         """
-        whole: dict[str, Any] = {"rate_per_step": rate_per_step, **_given(problem)}
         if assets is None and len(getattr(returns, "columns", ())) < 2:
-            whole["history"] = log_returns(returns, kind)
+            found = await self._one(returns, kind, choices)
+            told = {"rate_per_step": _last_rate(found, rate_per_step), "periods_per_year": found.periods_per_year}
+            whole = {"history": found.series[0], **_given(told), **_given(problem)}
         else:
-            whole["assets"], whole["history"] = log_returns_of_assets(returns, kind, assets)
+            whole = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
         request = {
             "problem": whole,
             "scales": None if scales is None else list(scales),
@@ -590,12 +600,31 @@ _REPORTS = 1000
 _SECOND = 1.0
 
 
-def _last_rate(read: Read, rate_per_step: float | None) -> float:
+def _last_rate(found: Read, rate_per_step: float | None) -> float:
     if rate_per_step is not None:
         return rate_per_step
-    if not read.rates:
+    if not found.rates:
         raise ValueError("rate_per_step is missing: must be given, as returns do not say what the bank paid")
-    return read.rates[-1]
+    return found.rates[-1]
+
+
+def _beside(
+    found: Read, returns: Returns, rate: float | Sequence[float] | None, dates: Iterable[object] | None
+) -> dict[str, Any]:
+    """What the bank paid through a record and the dates of its periods: as given, or else as they were read.
+
+    Raises ``ValueError`` that names the argument and the rule.
+    """
+    count = len(found.series[0])
+    days = found.dates
+    if dates is not None:
+        days = per_period("dates", [day(date) for date in dates], returns, count, found.kind)
+    if isinstance(rate, Iterable):
+        rate = [float(paid) for paid in per_period("rate", rate, returns, count, found.kind)]
+    rate = found.rates if rate is None else rate
+    if rate is None:
+        raise ValueError("rate is missing: must be given, as returns do not say what the bank paid")
+    return {"rate": rate, "dates": days}
 
 
 def _amounts(contributions: float | Sequence[float] | None) -> float | list[float] | None:

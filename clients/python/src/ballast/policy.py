@@ -11,7 +11,7 @@ from . import wire
 from .driving import Answering, awaiting_into, blocking, blocking_into
 from .errors import DamagedPolicy
 from .labels import Labelled
-from .returns import Kind, Returns, log_returns, log_returns_of_assets
+from .returns import Kind, Returns, read, read_assets
 from .session import AsyncSession, Session
 from .transport import Transport, idempotent
 
@@ -40,7 +40,8 @@ class _Policy(Labelled):
         self,
         *,
         history: Returns | None = None,
-        kind: Kind = "log",
+        kind: Kind | None = None,
+        choices: wire.Choices | None = None,
         wealth: float | None = None,
         holding: float | None = None,
         holdings: Mapping[str, float] | None = None,
@@ -54,6 +55,7 @@ class _Policy(Labelled):
         """Opens a session of an investor.
 
         ``history`` is what the investor has seen, ``wealth`` what he has; by default both are the policy's own.
+        ``history``, ``kind`` and ``choices`` are read as those of :meth:`Ballast.train <ballast.Ballast.train>`.
         ``holding`` is the share of it in the risky asset, by default none; of several assets ``holdings`` says it of
         each by its name, and ``history`` is a DataFrame with a column for each. With ``rolling`` the first step of the
         policy, whose learning must be decay, advises up to 5200 periods. ``name``, ``notes`` and ``tags`` are what the
@@ -74,19 +76,21 @@ class _Policy(Labelled):
         if holdings is not None:
             request["holdings"] = dict(holdings)
         if history is not None:
-            request["history"] = await self._known(history, kind)
+            request["history"] = await self._known(history, kind, choices)
         headers = idempotent(idempotency_key)
         return cast(wire.Session, await self._transport.json("POST", "/sessions", body=request, headers=headers))
 
-    async def _known(self, history: Returns, kind: Kind) -> list[float] | list[list[float]]:
+    async def _known(
+        self, history: Returns, kind: Kind | None, choices: wire.Choices | None
+    ) -> list[float] | list[list[float]]:
         """Returns known at the start; of a DataFrame of several assets the columns in the order of the policy."""
         if len(getattr(history, "columns", ())) < 2:
-            return log_returns(history, kind, "history")
+            return (await read(self._transport, history, kind, choices, "history")).series[0]
         fund = (await self._detail())["specification"].get("fund")
         names = [] if fund is None else fund["assets"]
         if sorted(names) != sorted(str(name) for name in history.columns):
             raise ValueError(f"history has the columns {list(history.columns)}: must have those of the policy, {names}")
-        return log_returns_of_assets(history[names], kind)[1]
+        return (await read_assets(self._transport, history, kind, choices, names, "history"))[1].rows
 
     async def _delete(self) -> None:
         """Deletes it. Raises :class:`InUse` while sessions live by it, and :class:`NotFound` where there is none."""

@@ -1,4 +1,7 @@
-"""Returns in whatever holds numbers, as the log-returns the service takes. Nothing here imports pandas or NumPy."""
+"""Returns in whatever holds numbers, as the log-returns the service takes. Nothing here imports pandas or NumPy.
+
+What is learned from is read by the service (:func:`read`), so that a file, a paste and a Series mean the same
+everywhere; what is reported of periods that passed is taken as it is said to be (:func:`log_returns`)."""
 
 from __future__ import annotations
 
@@ -9,10 +12,13 @@ from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 from statistics import pstdev
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, cast
 
 from . import wire
 from .errors import UnclearReturns
+
+if TYPE_CHECKING:
+    from .transport import Transport
 
 #: What the numbers are, with the names ``observe`` has for them.
 Kind: TypeAlias = Literal["log", "simple", "price"]
@@ -52,37 +58,8 @@ def log_returns(returns: Returns, kind: Kind, name: str = "returns") -> list[flo
     return [math.log1p(number) for number in numbers] if kind == "simple" else numbers
 
 
-#: A DataFrame, a two-dimensional array, a list of rows: a column for each asset.
+#: A DataFrame, a two-dimensional array, a list of rows: a column for each asset. Also a text, or the path of a file.
 Table: TypeAlias = Any
-
-
-def log_returns_of_assets(
-    returns: Table, kind: Kind, assets: Sequence[str] | None = None
-) -> tuple[list[str], list[list[float]]]:
-    """Names and rows of log-returns, each column read as :func:`log_returns` reads one.
-
-    Raises ``ValueError`` that names the asset, the entry, its value and the rule.
-    """
-    columns = getattr(returns, "columns", None)
-    named = columns if assets is None else assets
-    if named is None or (assets is not None and columns is not None):
-        raise ValueError(f"assets is {assets}: must name the columns where returns is no DataFrame, and only there")
-    names = [str(name) for name in named]
-    rows = returns.to_numpy() if hasattr(returns, "to_numpy") else returns
-    table = [list(row) for row in rows]
-    for index, row in enumerate(table):
-        if len(row) != len(names):
-            raise ValueError(f"returns[{index}] has {len(row)} numbers: must have one for each of {names}")
-    if twice := next((name for place, name in enumerate(names) if name in names[:place]), None):
-        raise ValueError(f"assets has {twice!r} twice: each asset must have a name of its own")
-    _check_order(returns, kind, "returns")
-    each = []
-    for asset, name in enumerate(names):
-        try:
-            each.append(log_returns([row[asset] for row in table], kind))
-        except ValueError as error:
-            raise ValueError(f"{name}: {error}") from None
-    return names, [list(row) for row in zip(*each, strict=True)]
 
 
 def text_of(source: str | PathLike[str] | Table) -> str:
@@ -96,8 +73,11 @@ def text_of(source: str | PathLike[str] | Table) -> str:
     if hasattr(source, "to_csv"):
         named = getattr(source, "columns", [getattr(source, "name", None)])
         headed = all(isinstance(name, str) for name in named)
-        return str(source.to_csv(index=dates_of(source) is not None, header=headed))
-    rows = source.tolist() if hasattr(source, "tolist") else source
+        days = dates_of(source)
+        dated = source if days is None else source.set_axis(days, axis="index")
+        return str(dated.to_csv(index=days is not None, header=headed))
+    held = source.to_numpy() if hasattr(source, "to_numpy") else source
+    rows = held.tolist() if hasattr(held, "tolist") else held
     cells = [row if isinstance(row, Sequence) and not isinstance(row, str) else [row] for row in rows]
     return "\n".join("\t".join(str(cell) for cell in row) for row in cells)
 
@@ -121,34 +101,84 @@ _DATE = re.compile(r"\d{4}-\d{2}(-\d{2}([ T].*)?)?$")
 
 
 class Read(NamedTuple):
-    """Returns of one asset as the service's reader takes them, and what stands beside them."""
+    """Returns as the service's reader takes them, and what stands beside them."""
 
-    log_returns: list[float]
+    #: Log-returns, a list for each asset.
+    series: list[list[float]]
+    kind: Kind
     dates: list[str] | None
     periods_per_year: int | None
     #: What the bank paid in each period, where a column says so.
     rates: list[float] | None
 
+    @property
+    def rows(self) -> list[list[float]]:
+        """A row for each period."""
+        return [list(row) for row in zip(*self.series, strict=True)]
 
-def one_record(reading: wire.Reading, name: str = "returns") -> Read:
-    """What the service read, where that is one reading of one asset.
 
-    Raises :class:`UnclearReturns` where it may be several, and ``ValueError`` where it is none; both name the argument.
+async def read(
+    transport: Transport, source: Returns, kind: Kind | None, choices: wire.Choices | None, name: str = "returns"
+) -> Read:
+    """What the service reads, where that is one reading.
+
+    ``kind`` and ``choices`` say what the source does not. Raises :class:`UnclearReturns` where it may be several
+    readings, and ``ValueError`` where it is none; both name the argument.
     """
+    _check_order(source, kind, name)
+    said = {**(choices or {}), **({} if kind is None else {"kind": kind})}
+    body = {"text": text_of(source), "choices": said}
+    reading = cast(wire.Reading, await transport.json("POST", "/returns", body=body))
     if reading["outcome"] == "asked":
         raise UnclearReturns(name, reading["questions"])
     if reading["outcome"] == "refused":
         raise ValueError(f"{name}: {reading['sentence']}")
-    if len(reading["series"]) != 1:
-        columns = [series["column"] for series in reading["series"]]
-        raise ValueError(f"{name} has the columns {columns}: must be one; train_assets and advise_assets take several")
-    paid = reading.get("rate")
+    series, paid = reading["series"], reading.get("rate")
     return Read(
-        reading["series"][0]["log_returns"],
+        [one["log_returns"] for one in series],
+        series[0]["kind"],
         reading.get("dates"),
         reading.get("periods_per_year"),
         None if paid is None else paid["rates"],
     )
+
+
+async def read_assets(
+    transport: Transport,
+    source: Table,
+    kind: Kind | None,
+    choices: wire.Choices | None,
+    assets: Sequence[str] | None,
+    name: str = "returns",
+) -> tuple[list[str], Read]:
+    """The names of several assets, and what the service reads of each, as :func:`read`.
+
+    ``assets`` names the columns of rows, or chooses among those of a DataFrame, of a text or of a file; by default all
+    of a DataFrame.
+    """
+    columns = getattr(source, "columns", None)
+    named = columns if assets is None else assets
+    if named is None:
+        raise ValueError(f"assets is None: must name the columns where {name} is no DataFrame")
+    names = [str(each) for each in named]
+    if twice := next((each for place, each in enumerate(names) if each in names[:place]), None):
+        raise ValueError(f"assets has {twice!r} twice: each asset must have a name of its own")
+    if columns is not None:
+        source = source.set_axis([_heading(column) for column in columns], axis="columns")
+    elif not isinstance(source, str | PathLike):
+        rows = [list(row) for row in source]
+        for index, row in enumerate(rows):
+            if len(row) != len(names):
+                raise ValueError(f"{name}[{index}] has {len(row)} numbers: must have one for each of {names}")
+        source = text_of([[_heading(each) for each in names], *rows])
+    chosen: wire.Choices = {**(choices or {}), "columns": [_heading(each) for each in names]}
+    return names, await read(transport, source, kind, chosen, name)
+
+
+def _heading(asset: object) -> str:
+    """The name of an asset as a heading, which a number alone would not be."""
+    name = str(asset)
+    return name if any(letter.isalpha() for letter in name) else f"asset {name}"
 
 
 def day(date: object) -> str:
@@ -178,7 +208,7 @@ def _number(value: Any, place: str) -> float:
         raise ValueError(f"{place} is {value!r}: must be a number") from None
 
 
-def _check_order(returns: Returns, kind: Kind, name: str) -> None:
+def _check_order(returns: Returns, kind: Kind | None, name: str) -> None:
     """Dates increase; where the index has none, prices must still come in its order."""
     index: Any = getattr(returns, "index", None)
     dates = dates_of(returns)

@@ -2,44 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 from . import frames, wire
 from .driving import Answering, blocking
-from .returns import Kind, Table, dates_of, day, log_returns_of_assets, per_period
 from .training import AsyncJob, Job, Watch, _Job
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-def record_of_assets(
-    returns: Table,
-    kind: Kind,
-    rate: float | Sequence[float],
-    dates: Iterable[object] | None,
-    assets: Sequence[str] | None,
-) -> dict[str, Any]:
-    """The table of a walk-forward: names, log-returns, dates, and what the bank paid.
-
-    Raises ``ValueError`` where one of them cannot be meant.
-    """
-    names, rows = log_returns_of_assets(returns, kind, assets)
-    days = dates_of(returns) if dates is None else [day(date) for date in dates]
-    if days is None:
-        raise ValueError("dates is None: must be given where returns has no index of dates")
-    paid = (
-        [float(each) for each in per_period("rate", rate, returns, len(rows), kind)]
-        if isinstance(rate, Iterable)
-        else rate
-    )
-    return {
-        "assets": names,
-        "log_returns": rows,
-        "rate": paid,
-        "dates": per_period("dates", days, returns, len(rows), kind),
-    }
 
 
 class _AssetsWalkForward(_Job):

@@ -41,11 +41,11 @@ class Advised:
         assets = [place for place in range(len(columns)) if place != bank]
         problem = {name: getattr(self, name) for name in self._PROBLEM}
         names = [str(columns[asset]) for asset in assets]
-        framed = hasattr(X, "iloc")
-        record = X.iloc[:, assets] if framed else table[:, assets]
+        # Rows without dates: a validation's rows may have gaps, and a calm window is of fractions all the same.
+        said: wire.Choices = {"unit": "fraction"}
         with Ballast(self.url) as ballast:
             advice = ballast.advise_assets(
-                record, kind="simple", rate_per_step=rate, assets=None if framed else names, **problem
+                table[:, assets], kind="simple", choices=said, rate_per_step=rate, assets=names, **problem
             )
         self.advice_: wire.AssetsAdvised = advice
         self.rate_per_step_ = rate

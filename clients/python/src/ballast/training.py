@@ -124,7 +124,8 @@ class _Training(_Job):
         self,
         *,
         history: Returns | None = None,
-        kind: Kind = "log",
+        kind: Kind | None = None,
+        choices: wire.Choices | None = None,
         wealth: float | None = None,
         holding: float | None = None,
         holdings: Mapping[str, float] | None = None,
@@ -141,6 +142,7 @@ class _Training(_Job):
         return await policy._session(
             history=history,
             kind=kind,
+            choices=choices,
             wealth=wealth,
             holding=holding,
             holdings=holdings,
