@@ -6,6 +6,7 @@ import inspect
 import json
 import math
 
+import numpy as np
 import pytest
 from conftest import REPOSITORY, RETURNS, Network, compare, train, walk
 
@@ -71,8 +72,10 @@ def test_advice_on_several_assets(ballast: Ballast) -> None:
     assert sum(advised["allocation"].values()) == pytest.approx(advised["total"])
     assert set(advised["composition"]) == set(advised["worst_means"]) == {"stocks", "bonds"}
     assert advised["bound"] >= advised["certainty_equivalent"] >= advised["floor"]
-    with pytest.raises(ValueError, match=r"bonds: returns\[0\] is -1.0: must be above -1"):
-        ballast.advise_assets([[0.1, -1.0]], kind="simple", assets=["stocks", "bonds"], rate_per_step=0.0)
+    with pytest.raises(ValueError, match=r"returns: line 3: bonds is \"-1.0\": must be above -1"):
+        ballast.advise_assets(
+            [[0.1, 0.1], [-0.1, -1.0]], choices={"unit": "fraction"}, assets=["stocks", "bonds"], rate_per_step=0.0
+        )
     with pytest.raises(ValueError, match="assets is None: must name the columns"):
         ballast.advise_assets(rows, kind="log", rate_per_step=0.0)
 
@@ -85,7 +88,9 @@ def test_a_session_of_several_assets(ballast: Ballast) -> None:
     )
     policy = training.policy()
     moved = policy.session(history=record[["bonds", "stocks"]], holdings={"stocks": 0.5, "bonds": 0.0})
-    assert moved.history()["history"] == record.values.tolist() and moved.assets_action()["holdings"]["stocks"] == 0.5
+    simple: list[list[float]] = [[math.log1p(value) for value in row] for row in record.values.tolist()]
+    np.testing.assert_allclose(moved.history()["history"], simple, atol=1e-15)
+    assert moved.assets_action()["holdings"]["stocks"] == 0.5
     with pytest.raises(ValueError, match="must have those of the policy"):
         policy.session(history=record.rename(columns={"bonds": "gold"}))
     session = policy.session(wealth=100.0)
@@ -356,7 +361,9 @@ def test_every_field_of_a_specification_is_an_argument() -> None:
 def test_a_training_opens_sessions_as_its_policy_does() -> None:
     training, policy = inspect.signature(Training.session).parameters, inspect.signature(Policy.session).parameters
     assert set(training) - {"watch"} == set(policy)
-    assert set(policy) - {"self", "kind", "idempotency_key"} == set(wire.OpenSession.__annotations__) - {"policy"}
+    assert set(policy) - {"self", "kind", "choices", "idempotency_key"} == set(wire.OpenSession.__annotations__) - {
+        "policy"
+    }
 
 
 def test_every_field_of_a_report_is_an_argument() -> None:

@@ -164,8 +164,8 @@ class _Ballast:
         ``returns`` has a column for each asset: a DataFrame, whose columns are their names, rows of numbers with
         ``assets``, or a text or the ``Path`` of a file, of which ``assets`` chooses the columns, as it may of a
         DataFrame. They are read as in ``train``, and so are ``kind``, ``choices`` and ``rate_per_step``: what the bank
-        pays may stand in a column that is not chosen. Every other field of the problem is given by name, such as ``ground_norm``,
-        ``utility``, ``radius`` or ``support``.
+        pays may stand in a column that is not chosen. Every other field of the problem is given by name, such as
+        ``ground_norm``, ``utility``, ``radius`` or ``support``.
         """
         whole = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
         question = _given({"problem": whole, "wealth": wealth})
@@ -191,9 +191,9 @@ class _Ballast:
     ) -> wire.Job:
         """Queues the training of a policy for several assets, and does not wait for it.
 
-        ``returns``, ``kind``, ``choices``, ``assets`` and ``rate_per_step`` are as in ``advise_assets``, and so is every other field
-        of the problem that is given by name; also ``horizon``, ``trading_cost``, ``contributions`` and ``composition``.
-        What else is given is as in ``train``.
+        ``returns``, ``kind``, ``choices``, ``assets`` and ``rate_per_step`` are as in ``advise_assets``, and so
+        is every other field of the problem that is given by name; also ``horizon``, ``trading_cost``,
+        ``contributions`` and ``composition``. What else is given is as in ``train``.
         """
         of_assets = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
         whole = {"problem": of_assets, "design": design, "surrogate": surrogate, "seed": seed}
@@ -323,10 +323,10 @@ class _Ballast:
         """Queues a walk-forward through a table of several assets, as ``ballast backtest`` does, and does not wait for
         it.
 
-        ``returns``, ``kind``, ``choices`` and ``assets`` are as in ``advise_assets``; ``rate`` and ``dates`` as in ``backtest``, and
-        dates are needed. ``windows`` are how many of the last periods strategies know, ``None`` for all. What is left
-        out the service chooses, and the report tells. Raises ``ValueError`` where ``returns``, ``rate`` or ``dates``
-        cannot be meant, before anything is queued.
+        ``returns``, ``kind``, ``choices`` and ``assets`` are as in ``advise_assets``; ``rate`` and ``dates`` as in
+        ``backtest``, and dates are needed. ``windows`` are how many of the last periods strategies know, ``None`` for
+        all. What is left out the service chooses, and the report tells. Raises ``ValueError`` where ``returns``,
+        ``rate`` or ``dates`` cannot be meant, before anything is queued.
         """
         names, found = await read_assets(self._transport, returns, kind, choices, assets)
         beside = _beside(found, returns, rate, dates)
