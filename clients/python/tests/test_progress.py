@@ -32,6 +32,14 @@ def test_a_finished_training_has_one_event(ballast: Ballast) -> None:
     assert again.policy().id == policy.id
 
 
+def test_a_training_that_is_looked_at_is_itself(ballast: Ballast) -> None:
+    training = train(ballast, seed=30)
+    ended = ballast.training(training.id).policy()
+    assert "succeeded" not in repr(training)
+    assert training.refresh() is training and training.job["state"] == "succeeded"
+    assert training.refresh().policy().id == ended.id and training.cancel() is training
+
+
 def test_a_restart_in_the_middle_is_bridged(service: Service, ballast: Ballast) -> None:
     training = train(ballast, horizon=LONG, seed=33)
     seen: list[wire.Job] = []

@@ -257,7 +257,7 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     ballast.import_policy(policy.export())
     policy.delete()
     assert training.id in [job["job"] for job in ballast.jobs()]
-    assert ballast.training(training.id).cancel()["state"] == "succeeded"
+    assert ballast.training(training.id).cancel().job["state"] == "succeeded"
     assert ballast.health()["status"] == "ok"
     evaluation = compare(ballast)
     assert ballast.evaluation(evaluation.id).report()["reference"] == "all_bank"

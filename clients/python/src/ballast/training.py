@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 from urllib.parse import quote
 
 import httpx
+from typing_extensions import Self
 
 from . import frames, plots, wire
 from .driving import Answering, awaiting_into, blocking, blocking_into
@@ -45,15 +46,15 @@ class _Job:
     def id(self) -> str:
         return self.job["job"]
 
-    async def _refresh(self) -> wire.Job:
-        """The job as it is now."""
+    async def _refresh(self) -> Self:
+        """Asks the service how far it is, which ``job`` then says."""
         self.job = await self._transport.json("GET", self._path)
-        return self.job
+        return self
 
-    async def _cancel(self) -> wire.Job:
+    async def _cancel(self) -> Self:
         """Asks the job to stop, which it does within a second; a job that has ended stays as it is."""
         self.job = await self._transport.json("POST", f"{self._path}/cancel")
-        return self.job
+        return self
 
     async def _delete(self) -> None:
         """Deletes a job that has ended, its report and its idempotency key; a policy that it made stays.
@@ -227,8 +228,8 @@ class _Frontier(_Job):
 class Job(_Job):
     __doc__ = _Job.__doc__
 
-    refresh = Answering(wire.Job).blocking(_Job._refresh)
-    cancel = Answering(wire.Job).blocking(_Job._cancel)
+    refresh = blocking(_Job._refresh)
+    cancel = blocking(_Job._cancel)
     delete = blocking(_Job._delete)
     events = Answering(wire.Job).iterating(_Job._events)
 
