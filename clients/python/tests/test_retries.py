@@ -8,7 +8,7 @@ from email.utils import formatdate
 import pytest
 from conftest import Network, Service, train
 
-from ballast import Ballast, IdempotencyConflict, Overloaded, ProblemError, Session, StorageFull, Unreachable
+from ballast import Ballast, IdempotencyConflict, Overloaded, ProblemError, Repeating, Session, StorageFull, Unreachable
 
 
 def test_a_lost_answer_to_observe_is_given_again_and_counts_once(
@@ -110,8 +110,27 @@ def test_a_service_that_stays_away_is_unreachable_and_a_restart_is_bridged(servi
     with Ballast(service.url, retries=1) as impatient, pytest.raises(Unreachable) as error:
         impatient.health()
     assert error.value.__cause__ is not None
+    assert f"nothing answers at {service.url}" in str(error.value) and "ballast serve" in str(error.value)
     service.start()
     assert session.observe(log_return=0.01).period == 2
+
+
+def test_the_first_loss_is_told_and_no_other(ballast: Ballast, network: Network, pauses: list[float]) -> None:
+    network.refuse(3)
+    with pytest.warns(Repeating) as told:
+        ballast.health()
+    (refused,) = (str(warning.message) for warning in told)
+    address = str(ballast._transport.http.base_url)
+    assert refused.startswith(f"nothing answers at {address} yet (connection refused): trying again for up to 13 s.")
+    assert "Start a service with 'ballast serve --data ballast-data'" in refused and len(pauses) == 3
+    training = train(ballast, seed=22)
+    network.refuse(2)
+    with pytest.warns(Repeating) as told:
+        training.policy()
+    assert len(told) == 1
+    network.lose_answers(1)
+    with pytest.warns(Repeating, match=r"^an answer was lost \(the connection was reset\): trying again"):
+        ballast.health()
 
 
 def test_overload_is_named(ballast: Ballast, network: Network, pauses: list[float]) -> None:

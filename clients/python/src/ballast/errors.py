@@ -24,6 +24,10 @@ class Unreachable(BallastError):
     the method that sent it says so."""
 
 
+class Repeating(RuntimeWarning):
+    """Warns, once a call, that no answer has come and that the request is sent again: why, and for how long."""
+
+
 class DamagedPolicy(BallastError):
     """The bytes of an exported policy do not hash to its name."""
 

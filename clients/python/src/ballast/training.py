@@ -67,7 +67,7 @@ class _Job:
         """The job now, then at every change of it, up to its end. A stream that breaks is taken up where it was."""
         last_id, failures = "", 0
         while True:
-            reason = "the service ended them"
+            reason, cause = "the service ended them", None
             try:
                 async with self._transport.stream(f"{self._path}/events", last_id) as chunks:
                     parser = Parser()
@@ -79,14 +79,19 @@ class _Job:
                             if self.job["state"] in _TERMINAL:
                                 return
             except httpx.RequestError as error:
-                reason = repr(error)
+                reason, cause = repr(error), error
+                if not failures:
+                    self._transport.warn(error)
             except ProblemError as error:
                 if error.status not in RETRIED_STATUS:
                     raise
                 reason = repr(error)
             # A service that stops ends its streams in good order, and comes back.
             if failures >= self._transport.retries:
-                raise Unreachable(f"no more events of the job {self.id}: {reason}")
+                told = f"no more events of the job {self.id}"
+                raise Unreachable(
+                    f"{told}: {reason}" if cause is None else self._transport.silence(told, cause, failures + 1)
+                ) from cause
             await self._transport.pause(growing_pause(failures))
             failures += 1
 

@@ -14,6 +14,7 @@ import math
 import random
 import time
 import uuid
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
@@ -22,7 +23,7 @@ from typing import Any, TypeAlias
 
 import httpx
 
-from .errors import Unreachable, of_response
+from .errors import Repeating, Unreachable, of_response
 
 #: First pause before a repetition, in seconds; it doubles with each, up to the longest.
 FIRST_PAUSE = 0.2
@@ -36,6 +37,9 @@ Body: TypeAlias = Mapping[str, Any] | Sequence[Any] | bytes
 
 #: Refusals for the moment.
 RETRIED_STATUS = (429, 503)
+#: Nobody listens there, or nobody that lets itself be reached.
+_NOBODY = (httpx.ConnectError, httpx.ConnectTimeout)
+_START = "Start a service with 'ballast serve --data ballast-data', or give its address as Ballast(url)."
 _LOST = (httpx.TimeoutException, httpx.NetworkError, httpx.RemoteProtocolError)
 
 
@@ -95,7 +99,9 @@ class Transport(ABC):
                 response = await self.send(request)
             except httpx.RequestError as error:
                 if last or not isinstance(error, _LOST):
-                    raise Unreachable(f"no answer to {method} {request.url}: {error!r}") from error
+                    raise Unreachable(self.silence(f"{method} {request.url}", error, attempt + 1)) from error
+                if not lost:
+                    self.warn(error)
                 lost, pause = True, growing_pause(attempt)
             else:
                 # What is not there any more was deleted by the request whose answer was lost.
@@ -108,6 +114,20 @@ class Transport(ABC):
                 pause = max(asked, growing_pause(attempt))
             await self.pause(pause)
         raise AssertionError("the last attempt returns or raises")
+
+    def silence(self, asked: str, error: httpx.RequestError, tries: int) -> str:
+        """What is said where no answer came, at the last."""
+        if isinstance(error, _NOBODY):
+            return f"nothing answers at {self.http.base_url}, tried {tries} times: {error}. {_START}"
+        return f"no answer to {asked}: {error!r}"
+
+    def warn(self, error: httpx.RequestError) -> None:
+        """Says that an answer is waited for, which may take long."""
+        longest = sum(min(FIRST_PAUSE * 2.0**attempt, LONGEST_PAUSE) for attempt in range(self.retries))
+        lacking = f"nothing answers at {self.http.base_url} yet" if isinstance(error, _NOBODY) else "an answer was lost"
+        advised = f" {_START}" if isinstance(error, _NOBODY) else ""
+        text = f"{lacking} ({error}): trying again for up to {longest:.0f} s.{advised}"
+        warnings.warn(text, Repeating, stacklevel=2)
 
     async def json(
         self,
