@@ -120,6 +120,7 @@ def test_the_first_loss_is_told_and_no_other(ballast: Ballast, network: Network,
     with pytest.warns(Repeating) as told:
         ballast.health()
     (refused,) = (str(warning.message) for warning in told)
+    assert told[0].filename == __file__
     address = str(ballast._transport.http.base_url)
     assert refused.startswith(f"nothing answers at {address} yet (connection refused): trying again for up to 13 s.")
     assert "Start a service with 'ballast serve --data ballast-data'" in refused and len(pauses) == 3

@@ -9,6 +9,8 @@ session, the period of an observation).
 from __future__ import annotations
 
 import asyncio
+import inspect
+import itertools
 import json
 import math
 import random
@@ -19,6 +21,7 @@ from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from email.utils import parsedate_to_datetime
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import httpx
@@ -37,6 +40,7 @@ Body: TypeAlias = Mapping[str, Any] | Sequence[Any] | bytes
 
 #: Refusals for the moment.
 RETRIED_STATUS = (429, 503)
+_HERE = Path(__file__).parent
 #: Nobody listens there, or nobody that lets itself be reached.
 _NOBODY = (httpx.ConnectError, httpx.ConnectTimeout)
 _START = "Start a service with 'ballast serve --data ballast-data', or give its address as Ballast(url)."
@@ -127,7 +131,9 @@ class Transport(ABC):
         lacking = f"nothing answers at {self.http.base_url} yet" if isinstance(error, _NOBODY) else "an answer was lost"
         advised = f" {_START}" if isinstance(error, _NOBODY) else ""
         text = f"{lacking} ({error}): trying again for up to {longest:.0f} s.{advised}"
-        warnings.warn(text, Repeating, stacklevel=2)
+        # At the line of the program, not at one of this package.
+        own = itertools.takewhile(lambda frame: Path(frame.filename).parent == _HERE, inspect.stack(0))
+        warnings.warn(text, Repeating, stacklevel=1 + sum(1 for _ in own))
 
     async def json(
         self,
