@@ -7,6 +7,7 @@ import math
 import subprocess
 import sys
 from collections.abc import Callable
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import pandas as pd
 import pytest
 from conftest import RETURNS, Service, train
 
-from ballast import AsyncBallast, Ballast, UnclearReturns
+from ballast import AsyncBallast, Ballast, Policy, Training, UnclearReturns
 from ballast.returns import Kind, dates_of, log_returns
 
 SIMPLE = [0.02, -0.05, 0.0]
@@ -287,3 +288,21 @@ def test_a_series_trains_as_its_list_does(ballast: Ballast) -> None:
 def test_nothing_imports_pandas_or_numpy() -> None:
     code = "import ballast, sys; sys.exit(bool({'pandas', 'numpy'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+def test_what_is_learned_from_is_read_everywhere_by_one_rule(ballast: Ballast) -> None:
+    calls = [
+        call
+        for made in (Ballast, Policy, Training)
+        for name in dir(made)
+        if not name.startswith("_") and callable(call := getattr(made, name)) and "kind" in signature(call).parameters
+    ]
+    assert len(calls) == 9
+    for call in calls:
+        defaults = {name: signature(call).parameters[name].default for name in ("kind", "choices")}
+        assert defaults == {"kind": None, "choices": None}, call
+    # Of numbers with losses simple returns are read, and log-returns where they are said to be.
+    policy = train(ballast).policy()
+    for more, told in (({}, [math.log1p(value) for value in RETURNS]), ({"kind": "log"}, RETURNS)):
+        known = policy.session(history=RETURNS, **more).history()["history"]  # type: ignore[arg-type]
+        np.testing.assert_allclose(known, told, atol=1e-15)

@@ -3,7 +3,7 @@
     from ballast import Ballast
 
     with Ballast("http://127.0.0.1:8080") as ballast:
-        session = ballast.train(returns, kind="simple", rate_per_step=0.0025, horizon=12).session()
+        session = ballast.train(returns, rate_per_step=0.0025, horizon=12).session()
         while not session.completed:
             allocation = session.action()["allocation"]
             session.observe(simple_return=...)
