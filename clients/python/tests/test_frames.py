@@ -74,9 +74,41 @@ def test_allocations_have_the_names_of_the_assets(ballast: Ballast) -> None:
     held = frames.allocation(advised)
     assert held.name == "allocation" and held.to_dict() == advised["allocation"]
     assert held.sum() == pytest.approx(advised["total"]) and held["stocks"] > 0.0
+    figures = frames.figures(advised)
+    assert figures["total"] == advised["total"] and figures["sample_size"] == len(RETURNS)
+    # Part of the caution is for a crash that nobody has seen.
+    assert figures["without_crash"] == advised.get("without_crash") and figures["without_crash"] >= figures["total"]
+    assert {"bound", "floor", "radius", "radius_factor"} <= set(figures.index) and "allocation" not in figures
+    one = frames.figures(ballast.advise(RETURNS, kind="log", rate_per_step=0.0))
+    assert one["allocation"] >= 0.0 and "certainty_equivalent" in one and "without_crash" not in one
     means = frames.worst_means(advised)
     assert means.loc["stocks", "seen"] == pytest.approx(table["stocks"].mean())
     assert (means["worst"] <= means["seen"]).all()
+
+
+def test_a_session_of_several_assets_is_a_frame_for_each_figure(ballast: Ballast, session: Session) -> None:
+    table = pd.DataFrame({"stocks": RETURNS, "bonds": [value * value - 0.0005 for value in RETURNS]})
+    fund = ballast.train_assets(
+        table, kind="log", rate_per_step=0.0, horizon=3, radius={"rule": "fixed", "radius": 1e-4}, design={"count": 20}
+    ).session()
+    fund.observe(simple_returns={"stocks": 0.1, "bonds": -0.01}, executed_allocations={"stocks": 0.25, "bonds": 0.5})
+    fund.observe(missing=True)
+    then = fund.assets_frame()
+    assert (
+        then.columns.tolist() == ["stocks", "bonds"] and then.index.tolist() == [1, 2] and then.index.name == "period"
+    )
+    assert then.loc[1].tolist() == pytest.approx([0.1, -0.01]) and then.loc[2].isna().all()
+    assert fund.assets_frame("executed_allocation").loc[1].tolist() == [0.25, 0.5]
+    told = fund.history()["observations"][0]["assets"]
+    assert fund.assets_frame("holding").loc[1].to_dict() == told["holdings"]  # type: ignore[index]
+    assert fund.assets_frame("advised_allocation").loc[1].to_dict() == told["advised_allocations"]  # type: ignore[index]
+    fund.correct(1, "a slip", simple_returns={"stocks": 0.2, "bonds": 0.0})
+    assert fund.assets_frame("log_return").loc[1].tolist() == pytest.approx([math.log(1.2), 0.0])
+    pd.testing.assert_frame_equal(fund.assets_frame(as_of="then"), then)
+    with pytest.raises(ValueError, match="figure is 'wealth': must be one of simple_return, log_return"):
+        fund.assets_frame("wealth")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="history is of one asset"):
+        session.assets_frame()
 
 
 def test_a_walk_forward_is_frames(ballast: Ballast) -> None:

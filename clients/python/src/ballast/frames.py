@@ -22,6 +22,8 @@ Explained: TypeAlias = wire.Advised | wire.Action | wire.WhatIfPoint
 
 #: The figures of a walk-forward that have a number for each period.
 Figure: TypeAlias = Literal["wealth", "allocation", "low", "high", "radius", "traded"]
+#: The figures of a session of several assets that have a number for each asset.
+AssetsFigure: TypeAlias = Literal["simple_return", "log_return", "advised_allocation", "executed_allocation", "holding"]
 
 
 def history(history: wire.History, as_of: Literal["now", "then"] = "now") -> pd.DataFrame:
@@ -55,6 +57,40 @@ def history(history: wire.History, as_of: Literal["now", "then"] = "now") -> pd.
     return frame.assign(date=pd.to_datetime(frame["date"]))
 
 
+def assets_history(
+    history: wire.History, figure: AssetsFigure = "simple_return", as_of: Literal["now", "then"] = "now"
+) -> pd.DataFrame:
+    """One figure of a session of several assets, a row for each period observed and a column for each asset.
+
+    ``simple_return`` and ``log_return`` have every correction made unless ``as_of`` is ``"then"``, and are NaN where
+    they are missing. ``advised_allocation``, ``executed_allocation`` and ``holding``, after the period, are shares of
+    wealth as they were told at the time. Raises ``ValueError`` for another figure and for a session of one asset, and
+    ``ImportError`` without pandas.
+    """
+    assets = history.get("assets")
+    if not assets:
+        raise ValueError("history is of one asset: see frames.history")
+    if figure not in _ASSETS_FIGURES:
+        raise ValueError(f"figure is {figure!r}: must be one of {', '.join(_ASSETS_FIGURES)}")
+    rows = []
+    for observation in history["observations"]:
+        told = cast(dict[str, Any], observation)
+        if as_of == "now" and figure.endswith("return") and told.get("now") is not None:
+            told = told["now"]
+        rows.append(told["assets"].get(_ASSETS_FIGURES[figure]) or {})
+    pd = require_pandas()
+    index = pd.Index([observation["period"] for observation in history["observations"]], name="period")
+    frame = pd.DataFrame(rows, index=index, columns=assets, dtype=float)
+    return frame.map(math.expm1) if figure == "simple_return" else frame
+
+
+_ASSETS_FIGURES = {
+    "simple_return": "log_returns",
+    "log_return": "log_returns",
+    "advised_allocation": "advised_allocations",
+    "executed_allocation": "executed_allocations",
+    "holding": "holdings",
+}
 _STANDING = ("advised_allocation", "executed_allocation", "wealth", "holding", "radius")
 
 
@@ -81,6 +117,18 @@ def allocation(advised: wire.AssetsAdvised | wire.AssetsAction | wire.AssetsWhat
     Raises ``ImportError`` without pandas.
     """
     return require_pandas().Series(advised["allocation"], name="allocation", dtype=float)
+
+
+def figures(advised: Explained | wire.AssetsAdvised | wire.AssetsAction | wire.AssetsWhatIfPoint) -> pd.Series[float]:
+    """The numbers of an advice that stand alone, by the name of their field: ``certainty_equivalent``, ``floor``,
+    ``radius`` and so on.
+
+    Of several assets ``total`` is the share of wealth in all together, and ``without_crash``, where
+    ``Ballast.advise_assets`` tells it, what that would be were no return below the lowest seen. Raises ``ImportError``
+    without pandas.
+    """
+    numbers = {name: value for name, value in advised.items() if type(value) in (int, float)}
+    return require_pandas().Series(numbers, name="figure", dtype=float)
 
 
 def worst_means(advised: wire.AssetsAdvised) -> pd.DataFrame:

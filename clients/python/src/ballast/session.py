@@ -267,6 +267,13 @@ class _Session(Labelled):
         """
         return frames.history(await self._history(), as_of)
 
+    async def _assets_frame(
+        self, figure: frames.AssetsFigure = "simple_return", as_of: Literal["now", "then"] = "now"
+    ) -> pd.DataFrame:
+        """One figure of a session of several assets by period and asset: their returns, or the share advised, executed
+        or held of each (:func:`ballast.frames.assets_history`, which says what it raises)."""
+        return frames.assets_history(await self._history(), figure, as_of)
+
     async def _worst_case(self) -> pd.DataFrame:
         """The law that the advice for the coming period is robust against, as what moves where
         (:func:`ballast.frames.worst_case`, which says what it raises)."""
@@ -317,6 +324,7 @@ class Session(_Session):
     label = Answering(wire.Labels).blocking(_Session._label)
     history = Answering(wire.History).blocking(_Session._history)
     frame = blocking(_Session._frame)
+    assets_frame = blocking(_Session._assets_frame)
     worst_case = blocking(_Session._worst_case)
     plot = blocking(_Session._plot)
     refresh = blocking(_Session._refresh)
@@ -337,6 +345,7 @@ class AsyncSession(_Session):
     label = _Session._label
     history = _Session._history
     frame = _Session._frame
+    assets_frame = _Session._assets_frame
     worst_case = _Session._worst_case
     plot = _Session._plot
     refresh = _Session._refresh
