@@ -55,6 +55,11 @@ test("what is asked for is the record as it was read, and few choices", async ()
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
   await page.locator(".error").getByText(/must hold at least 604, the window and a year/).waitFor();
   await page.getByLabel("Trained on").fill(String(WINDOW));
+  await page.getByLabel("Trained anew every").fill("9");
+  await page.getByLabel("Looking ahead").fill("4");
+  await page.getByRole("button", { name: "Backtest", exact: true }).click();
+  await page.locator(".error").getByText("Trained anew every is 9; it must be at least 1, and at most \u201cLooking ahead\u201d: a policy is lived by until the next is trained.").waitFor();
+  for (const label of ["Trained anew every", "Looking ahead"]) await page.getByLabel(label).fill("");
   await page.getByLabel("Confidence, %").fill("90; 50");
   await page.getByLabel("Design points").fill("10");
   const asked = page.waitForRequest((request) => request.method() === "POST" && request.url().endsWith("/backtest"));

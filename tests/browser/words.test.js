@@ -98,6 +98,8 @@ test("a refusal names the field, the value and the rule in the unit of the field
     [{ value: -1, rule: "must be a number in [-0.9932620530009145, 147.4131591025766]" }, "Return in period 2, %", "percent", "Return in period 2 is -100 %; it must be from -99.32 % to 14,741.31 %."],
   ];
   for (const [problem, label, unit, words] of cases) assert.equal(plain(problemWords(problem, label, unit)), words);
+  const every = { value: 40, rule: "must be at most the horizon" };
+  assert.equal(problemWords(every, "Trained anew every", null, "Looking ahead"), "Trained anew every is 40; it must be at most \u201cLooking ahead\u201d.");
 });
 
 test("numbers of a column have the digits of each other, and a sentence has minus signs", () => {

@@ -93,7 +93,8 @@ export function showProblem(form, message, problem, otherwise) {
   const part = /^\[(\d+)\]$/.exec((problem.field ?? "").slice(control.name.length));
   const own = problem.rule && (problem.field === control.name || part) && control.labels.length > 0;
   const label = own && `${control.labels[0].textContent}${part ? `, number ${Number(part[1]) + 1},` : ""}`;
-  const words = own ? problemWords(problem, label, control.dataset.unit) : problem.message;
+  const ahead = [...form.querySelectorAll('[name="horizon"], [name$=".horizon"]')].find((field) => field.closest("[hidden]") === null);
+  const words = own ? problemWords(problem, label, control.dataset.unit, ahead?.labels[0].textContent) : problem.message;
   const error = h("p", { class: "error", role: "alert", id: `${control.id}-error` }, words);
   control.setAttribute("aria-invalid", "true");
   control.dataset.described = control.getAttribute("aria-describedby") ?? "";

@@ -13,21 +13,21 @@ const WANTED = [
 const PARSER = /^(?:invalid (?:type|value|length)|unknown (?:variant|field)|missing field)[^]*?, expected /;
 const BOUNDS = /(lies?|be a number|be a whole number)? ?in ([[(])(-?[\d.e+-]+), (-?[\d.e+-]+)([\])])/;
 
-/** What a rule names by its place in the request. */
-const PLACES = [
+/** What a rule names by its place in the request; `ahead` is the label of the field that says how far is looked ahead. */
+const places = (ahead) => [
   [/problem\.horizon = (?=\d)/g, ""],
   [/problem\.contributions/g, "the money added"],
-  [/(?:problem\.)?\bhorizon\b/g, "the number of periods ahead"],
+  [/(?:the )?(?:problem\.)?\bhorizon\b/g, ahead ? `\u201c${ahead}\u201d` : "the number of periods ahead"],
   [/(?<=\bgive is )-?[\d.e+-]+/g, (amount) => wealth(Number(amount))],
 ];
 /** What the parser of days says of what is none. */
 const NO_DAY = /^(?:failed to parse|unexpected|expected)[^]*\b(?:year|month|day|date)\b/;
 
 /** One sentence for a problem with a `rule`; `unit` is that of the field where it is not the request's: "percent", or "confidence",
- * which is what a share leaves of 100 %. */
-export function problemWords({ value, rule }, label, unit) {
+ * which is what a share leaves of 100 %; `ahead` as above, where the form has such a field. */
+export function problemWords({ value, rule }, label, unit, ahead) {
   const name = label.replace(/, %(?=$|,)/, "");
-  const words = ruled(rule, unit);
+  const words = ruled(rule, unit, ahead);
   // Of what is asked for and cannot be had, the rule says why, and does not bound a value.
   return /^must\b/.test(words) ? `${name} ${given(value, unit)}; it ${words}.` : `${name}: ${words}.`;
 }
@@ -45,13 +45,13 @@ function given(value, unit) {
   return typeof value === "number" ? `is ${number(value, unit)}` : `is \u201c${value}\u201d`;
 }
 
-function ruled(rule, unit) {
+function ruled(rule, unit, ahead) {
   const wanted = WANTED.find(([pattern]) => pattern.test(rule));
   if (wanted) return `must be ${wanted[1]}`;
   if (PARSER.test(rule)) return `must be ${rule.replace(PARSER, "").replaceAll("`", "")}`;
   if (NO_DAY.test(rule)) return "must be a day such as 2008-09-30";
   const whole = rule.includes("whole number") ? "a whole number " : "";
-  const named = PLACES.reduce((words, [place, name]) => words.replace(place, name), rule);
+  const named = places(ahead).reduce((words, [place, name]) => words.replace(place, name), rule);
   return named.replace(BOUNDS, (_, verb, opening, low, high, closing) => {
     const be = verb === "lies" ? "lies" : "be";
     const turned = unit === "confidence";
