@@ -41,6 +41,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "backtest.js": SCRIPT,
         "backtest_asking.js": SCRIPT,
         "backtest_assets.js": SCRIPT,
+        "backtest_figures.js": SCRIPT,
         "beside.js": SCRIPT,
         "care.js": SCRIPT,
         "chart.js": SCRIPT,

@@ -185,7 +185,7 @@ test("a record of several assets is asked for, and its report shows what was hel
   assert.equal(shown.length, 1 + told.strategies.length);
   const equal = told.strategies.find(({ strategy }) => strategy === "1/N");
   const row = shown.find(([name]) => name === "Equal shares");
-  assert.deepEqual([row[1], row[2], row[7]], [equal.yearly_certainty_equivalent.value.toFixed(2), equal.final_wealth.toFixed(2), "2.0"]);
+  assert.deepEqual([row[1], row[2], row[9]], [equal.yearly_certainty_equivalent.value.toFixed(2), equal.final_wealth.toFixed(2), "2.0"]);
   assert.doesNotMatch(words, /undefined|NaN|null/);
 
   await page.getByLabel("Strategy", { exact: true }).selectOption("Equal shares");

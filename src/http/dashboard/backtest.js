@@ -1,19 +1,18 @@
 // The report of one backtest: what strategies came to that were walked through a record, and one of them year by year.
 
 import { heldOfAssets, ofAssets, quantOfAssets, resultsOfAssets, walkedAssets } from "./backtest_assets.js";
+import { estimate, ranges, results, START } from "./backtest_figures.js";
 import { lineChart } from "./chart.js";
 import { csvText, hundred } from "./csv.js";
 import { h, quantSection, section, table } from "./dom.js";
 import { select } from "./form.js";
 import { allocation, count, counted, figures, minus, percent, percentTick, tick, wealth } from "./format.js";
-import { intervalChart } from "./interval_chart.js";
 import { dated, unitOf } from "./periods.js";
 import { FRAMEWORKS, investorWords, percentName } from "./specification.js";
 import { colourOf, colourOfLevel } from "./strategies.js";
 import { belowHighest, compounded, grouped, places, returnsOf, worstFalls } from "./track.js";
-import { changing, interval, ordinal } from "./verdict.js";
+import { changing, ordinal } from "./verdict.js";
 
-const START = 100;
 /** Falls listed. */
 const FALLS = 5;
 /** Years below which no strategy is called better than another. */
@@ -25,7 +24,7 @@ const tell = (report) => ({ ...report, ...(report.assets ? ofAssets(report) : of
 
 export function body(report) {
   const told = tell(report);
-  const [head, foot] = report.assets ? [[walkedAssets(told), resultsOfAssets(told)], quantOfAssets(told)] : [[walked(told), results(told)], quant(told)];
+  const [head, foot] = report.assets ? [[walkedAssets(told), resultsOfAssets(told)], quantOfAssets(told)] : [[walked(told), resultsOfOne(told)], quant(told)];
   const read = report.read ? h("p", { class: "note" }, minus(report.read.replaceAll("\n", " "))) : "";
   return [...head, chosen(told), read, foot];
 }
@@ -138,39 +137,10 @@ function apart({ lines }, main, quoted) {
   return `The record shows ${quoted} ${parts.join(" and ")}${rest > 0 ? `; it cannot tell it from the other ${rest}` : ""}.`;
 }
 
-const estimate = ({ value, interval: [low, high] }) => ({ value, low, high });
-
-function results(told) {
-  const { lines, intervals } = told;
-  const rows = [...lines].sort((one, other) => other.yearly_certainty_equivalent.value - one.yearly_certainty_equivalent.value);
-  const number = (name, cell) => ({ name, numeric: true, cell });
-  return section(
-    "What each came to",
-    h("div", { class: "words" }, conclusions(told).map((sentence) => h("p", {}, sentence))),
-    intervalChart({
-      title: `A year from ${START} is worth as much as a sure`,
-      rows: rows.map(({ name, colour, yearly_certainty_equivalent }) => ({ name, colour, ...estimate(yearly_certainty_equivalent) })),
-      format: wealth,
-      tick,
-    }),
-    table(
-      "Strategies, by what a year of each is worth",
-      [
-        { name: "Strategy", cell: ({ name }) => name },
-        number("A year is worth a sure", (row) => wealth(row.yearly_certainty_equivalent.value)),
-        number(`${START} became`, ({ final_wealth }) => wealth(final_wealth)),
-        number("Return a year", ({ annual_mean }) => percent(annual_mean.value)),
-        number("Deviation a year", ({ annual_volatility }) => percent(annual_volatility.value)),
-        number("Chance of loss", ({ chance_of_loss }) => percent(chance_of_loss.value)),
-        number("Worst 5\u202f% of years", ({ worst_twentieth }) => percent(worst_twentieth.value)),
-        number("Worst fall", ({ max_drawdown }) => percent(max_drawdown)),
-        number("Held on average", ({ mean_allocation }) => allocation(mean_allocation)),
-        number("Traded a year", ({ annual_turnover }) => percent(annual_turnover.value)),
-      ],
-      rows,
-    ),
-    h("p", { class: "note" }, `Ranges in the chart hold with ${percent(intervals.confidence, 0)} confidence as far as the past is one draw of what may come. \u201cHindsight\u201d holds what \u201c${mainOf(told).name}\u201d held on average, which nobody knew beforehand. A loss is a year that ends with less than it began with, and the worst 5\u202f% are what the worst of them returned on average: years that begin with every ${told.unit} count, so that they overlap.`),
-  );
+/** What is said of them, and what each came to. */
+function resultsOfOne(told) {
+  const more = ` \u201cHindsight\u201d holds what \u201c${mainOf(told).name}\u201d held on average, which nobody knew beforehand.`;
+  return results(told, conclusions(told), more);
 }
 
 /** One strategy beside the three that everybody knows; which one is chosen here. */
@@ -286,31 +256,17 @@ function map({ dates, unit }, line, where, byYear, called) {
 
 /** What else is known: sentences by the report's own names, estimates with their ranges, radii. */
 function quant(told) {
-  const { sentences, lines, intervals, choices, times } = told;
+  const { sentences, lines, choices, times } = told;
   const guarding = lines.filter(({ periods }) => periods.radius.some((radius) => radius > 0));
-  const range = (name, read, format) => ({ name, numeric: true, cell: (row) => (read(row) ? interval(estimate(read(row)), format) : "\u2013") });
-  const hundredth = (value) => tick(value, 0.01);
+  const behind = ({ value, interval: [low, high] }) => ({ value: -value, interval: [-high, -low] });
+  const measured = { ...told, lines: lines.map((line) => ({ ...line, ahead: behind(line.adaptive_ahead) })) };
+  const beside = { ahead: `More than ${mainOf(told).strategy}`, beyond_own_mix: "Beyond its own mix" };
   const build = () =>
     h(
       "div",
       {},
       h("p", { class: "note" }, sentences.map((sentence) => minus(sentence)).join(" ")),
-      h("p", { class: "note" }, `Each range is the middle ${percent(intervals.confidence, 0)} of ${count(intervals.resamples)} circular block-bootstrap resamples, the same for all strategies: blocks of ${counted(intervals.period_block, "period")}, and of ${counted(intervals.year_block, "year")} for certainty equivalents and losses. ${counted(choices.count, "design point")} a step, seed ${count(choices.seed)}.`),
-      table(
-        "Estimates with their ranges",
-        [
-          { name: "Strategy", cell: ({ strategy }) => strategy },
-          range("Certainty equivalent of a year", (row) => row.yearly_certainty_equivalent, wealth),
-          range(`More than ${mainOf(told).strategy}`, ({ adaptive_ahead: { value, interval } }) => ({ value: -value, interval: [-interval[1], -interval[0]] }), hundredth),
-          range("Beyond its own mix", (row) => row.beyond_own_mix, hundredth),
-          range("Sharpe ratio", (row) => row.sharpe_ratio, hundredth),
-          range("Mean return", (row) => row.annual_mean, percent),
-          range("Volatility", (row) => row.annual_volatility, percent),
-          range("Chance of loss", (row) => row.chance_of_loss, percent),
-          range("Worst 5\u202f% of years", (row) => row.worst_twentieth, percent),
-        ],
-        lines,
-      ),
+      ranges(measured, beside, `${counted(choices.count, "design point")} a step, seed ${count(choices.seed)}.`),
       guarding.length > 0
         ? lineChart({
             title: "Radius",

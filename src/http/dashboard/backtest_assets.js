@@ -1,14 +1,12 @@
 // What the report of several assets walked forward says: who the strategies were, what each came to, and what it held.
 
-import { h, quantSection, section, table } from "./dom.js";
-import { allocation, count, counted, minus, percent, tick, wealth } from "./format.js";
-import { intervalChart } from "./interval_chart.js";
+import { ranges, results, START } from "./backtest_figures.js";
+import { h, quantSection, table } from "./dom.js";
+import { count, counted, minus, percent } from "./format.js";
 import { investorWords } from "./specification.js";
 import { stackedChart } from "./stacked.js";
 import { colourOf } from "./strategies.js";
-import { interval } from "./verdict.js";
 
-const START = 100;
 const EQUAL = "1/N";
 const KNOWN = [EQUAL, "60 % 1/N"];
 const NAMES = { "robust scaled_one": "Robust", "robust sup": "Robust, sup norm", "static scaled_one": "Chosen once a stretch", "plug-in": "Trusts the record", "minimum variance": "Least variance", "inverse volatility": "Inverse volatility", "1/N": "Equal shares", "60 % 1/N": "60 % in equal shares" };
@@ -60,39 +58,8 @@ export function walkedAssets({ assets, choices, lines, unit, times }) {
   );
 }
 
-const estimate = ({ value, interval: [low, high] }) => ({ value, low, high });
-
-/** The report's own sentences, and every strategy by what a year of it is worth. */
-export function resultsOfAssets({ lines, intervals, sentences }) {
-  const rows = [...lines].sort((one, other) => other.yearly_certainty_equivalent.value - one.yearly_certainty_equivalent.value);
-  const number = (name, cell) => ({ name, numeric: true, cell });
-  return section(
-    "What each came to",
-    h("div", { class: "words" }, sentences.map((sentence) => h("p", {}, minus(sentence)))),
-    intervalChart({
-      title: `A year from ${START} is worth as much as a sure`,
-      rows: rows.map(({ name, colour, yearly_certainty_equivalent }) => ({ name, colour, ...estimate(yearly_certainty_equivalent) })),
-      format: wealth,
-      tick,
-    }),
-    table(
-      "Strategies, by what a year of each is worth",
-      [
-        { name: "Strategy", cell: ({ name }) => name },
-        number("A year is worth a sure", (row) => wealth(row.yearly_certainty_equivalent.value)),
-        number(`${START} became`, ({ final_wealth }) => wealth(final_wealth)),
-        number("Return a year", ({ annual_mean }) => percent(annual_mean.value)),
-        number("Deviation a year", ({ annual_volatility }) => percent(annual_volatility.value)),
-        number("Worst fall", ({ max_drawdown }) => percent(max_drawdown)),
-        number("Held on average", ({ mean_allocation }) => allocation(mean_allocation)),
-        number("Assets held in effect", ({ effective_assets }) => (effective_assets === null ? "\u2013" : tick(effective_assets, 0.1))),
-        number("Traded a year", ({ annual_turnover }) => percent(annual_turnover.value)),
-      ],
-      rows,
-    ),
-    h("p", { class: "note" }, `Ranges in the chart hold with ${percent(intervals.confidence, 0)} confidence as far as the past is one draw of what may come.`),
-  );
-}
+/** The report's own sentences, and what each came to. */
+export const resultsOfAssets = (told) => results(told, told.sentences.map(minus));
 
 /** What a strategy held of each asset through time, and on average. */
 export function heldOfAssets({ assets, times }, line) {
@@ -104,28 +71,9 @@ export function heldOfAssets({ assets, times }, line) {
   ];
 }
 
-/** Estimates with their ranges, by the report's own names. */
-export function quantOfAssets({ lines, intervals, choices }) {
-  const range = (name, read, format) => ({ name, numeric: true, cell: (row) => (read(row) ? interval(estimate(read(row)), format) : "\u2013") });
-  const hundredth = (value) => tick(value, 0.01);
-  return quantSection("Ranges and ratios", () =>
-    h(
-      "div",
-      {},
-      h("p", { class: "note" }, `Each range is the middle ${percent(intervals.confidence, 0)} of ${count(intervals.resamples)} circular block-bootstrap resamples, the same for all strategies: blocks of ${counted(intervals.period_block, "period")}, and of ${counted(intervals.year_block, "year")} for certainty equivalents. Alpha ${choices.alpha}, seed ${count(choices.seed)}.`),
-      table(
-        "Estimates with their ranges",
-        [
-          { name: "Strategy", cell: ({ strategy }) => strategy },
-          range("Certainty equivalent of a year", (row) => row.yearly_certainty_equivalent, wealth),
-          range("More than 1/N", (row) => row.beyond_equal, hundredth),
-          range("Beyond 1/N at its own total", (row) => row.beyond_own_mix, hundredth),
-          range("Sharpe ratio", (row) => row.sharpe_ratio, hundredth),
-          range("Mean return", (row) => row.annual_mean, percent),
-          range("Volatility", (row) => row.annual_volatility, percent),
-        ],
-        lines,
-      ),
-    ),
-  );
+/** Estimates with their ranges. */
+export function quantOfAssets(told) {
+  const { alpha, seed } = told.choices;
+  const beside = { beyond_equal: "More than 1/N", beyond_own_mix: "Beyond 1/N at its own total" };
+  return quantSection("Ranges and ratios", () => h("div", {}, ranges(told, beside, `Alpha ${alpha}, seed ${count(seed)}.`)));
 }

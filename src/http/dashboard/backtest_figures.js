@@ -1,0 +1,68 @@
+// The figures of strategies walked through a record, of one asset or of several: what each came to, and within what ranges.
+
+import { h, section, table } from "./dom.js";
+import { allocation, count, counted, percent, tick, wealth } from "./format.js";
+import { intervalChart } from "./interval_chart.js";
+import { interval } from "./verdict.js";
+
+export const START = 100;
+
+export const estimate = ({ value, interval: [low, high] }) => ({ value, low, high });
+
+/** What is said, and every strategy by what a year of it is worth; `more` stands in the note below. */
+export function results({ lines, intervals, assets, unit }, sentences, more = "") {
+  const rows = [...lines].sort((one, other) => other.yearly_certainty_equivalent.value - one.yearly_certainty_equivalent.value);
+  const estimated = (format) => ({ value }) => format(value);
+  const columns = [
+    ["yearly_certainty_equivalent", "A year is worth a sure", estimated(wealth)],
+    ["final_wealth", `${START} became`, wealth],
+    ["annual_mean", "Return a year", estimated(percent)],
+    ["annual_volatility", "Deviation a year", estimated(percent)],
+    ["chance_of_loss", "Chance of loss", estimated(percent)],
+    ["worst_twentieth", "Worst 5\u202f% of years", estimated(percent)],
+    ["max_drawdown", "Worst fall", percent],
+    ["mean_allocation", "Held on average", allocation],
+    assets && ["effective_assets", "Assets held in effect", (number) => (number === null ? "\u2013" : tick(number, 0.1))],
+    ["annual_turnover", "Traded a year", estimated(percent)],
+  ].filter(Boolean);
+  return section(
+    "What each came to",
+    h("div", { class: "words" }, sentences.map((sentence) => h("p", {}, sentence))),
+    intervalChart({
+      title: `A year from ${START} is worth as much as a sure`,
+      rows: rows.map(({ name, colour, yearly_certainty_equivalent }) => ({ name, colour, ...estimate(yearly_certainty_equivalent) })),
+      format: wealth,
+      tick,
+    }),
+    table(
+      "Strategies, by what a year of each is worth",
+      [{ name: "Strategy", cell: ({ name }) => name }, ...columns.map(([key, name, format]) => ({ name, numeric: true, cell: (row) => format(row[key]) }))],
+      rows,
+    ),
+    h("p", { class: "note" }, `Ranges in the chart hold with ${percent(intervals.confidence, 0)} confidence as far as the past is one draw of what may come.${more} A loss is a year that ends with less than it began with, and the worst 5\u202f% are what the worst of them returned on average: years that begin with every ${unit} count, so that they overlap.`),
+  );
+}
+
+/** Estimates with their ranges, by the report's own names; `names` are those of what each is measured against, by what the report
+ * calls that, and `more` ends the note above. */
+export function ranges({ lines, intervals }, names, more) {
+  const hundredth = (value) => tick(value, 0.01);
+  const columns = [
+    ["yearly_certainty_equivalent", "Certainty equivalent of a year", wealth],
+    ...Object.entries(names).map(([key, name]) => [key, name, hundredth]),
+    ["sharpe_ratio", "Sharpe ratio", hundredth],
+    ["annual_mean", "Mean return", percent],
+    ["annual_volatility", "Volatility", percent],
+    ["chance_of_loss", "Chance of loss", percent],
+    ["worst_twentieth", "Worst 5\u202f% of years", percent],
+  ];
+  const cell = (key, format) => (row) => (row[key] ? interval(estimate(row[key]), format) : "\u2013");
+  return [
+    h("p", { class: "note" }, `Each range is the middle ${percent(intervals.confidence, 0)} of ${count(intervals.resamples)} circular block-bootstrap resamples, the same for all strategies: blocks of ${counted(intervals.period_block, "period")}, and of ${counted(intervals.year_block, "year")} for certainty equivalents and losses. ${more}`),
+    table(
+      "Estimates with their ranges",
+      [{ name: "Strategy", cell: ({ strategy }) => strategy }, ...columns.map(([key, name, format]) => ({ name, numeric: true, cell: cell(key, format) }))],
+      lines,
+    ),
+  ];
+}
