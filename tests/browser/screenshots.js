@@ -31,6 +31,7 @@ try {
       history: returns.slice(start - MONTHS, start).map(Math.log1p),
     },
     design: { count: 500, initial_laws: "resampled" },
+    name: "Balanced, by twenty years of months",
   });
   let policy = null;
   while (policy === null) {
@@ -40,27 +41,27 @@ try {
       throw new Error(`the training ${now.state}: ${now.error}`);
     policy = now.policy;
   }
-  const { session } = await call(url, "/sessions", { policy });
+  const { session } = await call(url, "/sessions", { policy, name: "Ada" });
   for (let period = 1; period <= LIVED; period++) {
     // The last day of a month is the one before the first of the next.
     const date = new Date(Date.UTC(2008, period, 0)).toISOString().slice(0, 10);
     await call(url, "/observe", { session, period, simple_return: returns[start + period - 1], date });
   }
   await shot(`#/sessions/${session}`, "light", "slider", "docs/images/session.png", 1080);
-  await shot(`#/policies/${policy}`, "dark", "application", "docs/images/policy.png", 1035);
+  await shot(`#/policies/${policy}`, "dark", "application", "docs/images/policy.png");
 } finally {
   await chromium.close();
   await ballast.stop();
 }
 
-/** A picture of a view, 1280 pixels wide, once its last chart stands. */
+/** A picture of a view, 1280 pixels wide, once its last chart stands; as high as the view where no `height` is given. */
 async function shot(hash, colorScheme, role, file, height) {
-  const page = await chromium.newPage({ viewport: { width: 1280, height }, colorScheme });
+  const page = await chromium.newPage({ viewport: { width: 1280, height: height ?? 900 }, colorScheme });
   await page.goto(`${ballast.url}/${hash}`);
   await page.getByRole(role).last().waitFor();
   await page.waitForLoadState("networkidle");
   await page.evaluate(() => document.fonts.ready);
-  await page.screenshot({ path: root(file) });
+  await page.screenshot({ path: root(file), fullPage: height === undefined });
   await page.close();
   console.log(`${file}: ${(await stat(root(file))).size} bytes`);
 }
