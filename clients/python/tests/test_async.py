@@ -14,14 +14,14 @@ import pytest
 from conftest import RETURNS, Service, walk
 
 import ballast as package
-from ballast import AsyncBallast, Ballast, JobEnded, ReportGap, Unreachable, training
+from ballast import AsyncBallast, Ballast, JobEnded, ReportGap, Unreachable, jobs
 from ballast.driving import run
 
 TWINS = {
     name.removeprefix("Async"): (getattr(package, name.removeprefix("Async")), getattr(package, name))
     for name in package.__all__
     if name.startswith("Async")
-} | {"Job": (training.Job, training.AsyncJob)}
+} | {"Job": (jobs.Job, jobs.AsyncJob)}
 
 
 class AsyncNetwork(httpx.AsyncBaseTransport):

@@ -5,11 +5,14 @@ from __future__ import annotations
 import asyncio
 import math
 
+import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
 
 from ballast import AsyncBallast, Ballast, frames
+
+matplotlib.use("Agg")
 
 RISKY = [0.02 + 0.03 * math.sin(1.7 * quarter) for quarter in range(16)]
 TABLE = pd.DataFrame(
@@ -42,6 +45,9 @@ def test_a_table_walked_forward_is_frames_by_strategy_by_date_and_by_asset(balla
     assert (job.periods("radius")["1/N"] == 0.0).all() and wealth.index.equals(job.periods("traded").index)
     with pytest.raises(ValueError, match="must be one of wealth, radius, traded"):
         job.periods("allocation")
+
+    lines = {line.get_label(): line for line in job.plot().get_lines()}
+    assert list(lines["1/N"].get_ydata()) == wealth["1/N"].tolist()  # type: ignore[arg-type]
 
     held = job.held("1/N")
     assert list(held.columns) == ["energy", "health"] and (held == 0.5).all().all() and held.index.equals(wealth.index)

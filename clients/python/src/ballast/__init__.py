@@ -45,21 +45,21 @@ from .errors import (
     Unreachable,
     UnusualReturn,
 )
-from .policy import AsyncPolicy, Policy
-from .session import AsyncSession, Session
-from .several import AssetsWalkForward, AsyncAssetsWalkForward
-from .training import (
+from .jobs import (
+    AssetsWalkForward,
+    AsyncAssetsWalkForward,
     AsyncEvaluation,
     AsyncFrontier,
     AsyncTraining,
     AsyncWalkForward,
     Evaluation,
     Frontier,
-    ProgressBar,
-    ProgressPrinter,
     Training,
     WalkForward,
 )
+from .policy import AsyncPolicy, Policy
+from .progress import ProgressBar, ProgressPrinter
+from .session import AsyncSession, Session
 
 __all__ = [
     "AssetsWalkForward",

@@ -14,6 +14,18 @@ from typing_extensions import Self
 
 from . import wire
 from .driving import Answering, awaiting_into, blocking, blocking_into
+from .jobs import (
+    AssetsWalkForward,
+    AsyncAssetsWalkForward,
+    AsyncEvaluation,
+    AsyncFrontier,
+    AsyncTraining,
+    AsyncWalkForward,
+    Evaluation,
+    Frontier,
+    Training,
+    WalkForward,
+)
 from .labels import relabelled
 from .policy import AsyncPolicy, Policy
 from .returns import (
@@ -28,17 +40,6 @@ from .returns import (
     text_of,
 )
 from .session import AsyncSession, Session
-from .several import AssetsWalkForward, AsyncAssetsWalkForward
-from .training import (
-    AsyncEvaluation,
-    AsyncFrontier,
-    AsyncTraining,
-    AsyncWalkForward,
-    Evaluation,
-    Frontier,
-    Training,
-    WalkForward,
-)
 from .transport import RETRIED_STATUS, Awaiting, Transport, Waiting, growing_pause, idempotent
 
 #: What a list of sessions is in the order of; with ``-`` before it descending.

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def walk_forward(report: wire.BacktestReport, ax: Axes | None = None) -> Axes:
+def walk_forward(report: wire.BacktestReport | wire.AssetsBacktestReport, ax: Axes | None = None) -> Axes:
     """The wealth of every strategy of a walk-forward from 100, over the periods, on a logarithmic scale."""
     axes = _axes(ax)
     frames.periods(report).plot(ax=axes, logy=True, linewidth=1.2)

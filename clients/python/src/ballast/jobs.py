@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from contextlib import suppress
-from typing import TYPE_CHECKING, Any, TextIO, cast
+from collections.abc import AsyncIterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, cast
 from urllib.parse import quote
 
 import httpx
@@ -17,6 +15,7 @@ from .driving import Answering, awaiting_into, blocking, blocking_into
 from .errors import JobEnded, ProblemError, Unreachable
 from .events import Parser
 from .policy import AsyncPolicy, Policy, _Policy
+from .progress import TERMINAL, Watch
 from .returns import Kind, Returns
 from .session import AsyncSession, Session
 from .transport import RETRIED_STATUS, Transport, growing_pause
@@ -24,11 +23,6 @@ from .transport import RETRIED_STATUS, Transport, growing_pause
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-
-#: Called with the job at every change of it.
-Watch = Callable[[wire.Job], object]
-
-_TERMINAL = ("succeeded", "failed", "cancelled")
 
 
 class _Job:
@@ -76,7 +70,7 @@ class _Job:
                             last_id, failures = event.id, 0
                             self.job = json.loads(event.data)
                             yield self.job
-                            if self.job["state"] in _TERMINAL:
+                            if self.job["state"] in TERMINAL:
                                 return
             except httpx.RequestError as error:
                 reason, cause = repr(error), error
@@ -182,7 +176,27 @@ class _Evaluation(_Job):
         return plots.evaluation(await self._report(watch), ax)
 
 
-class _WalkForward(_Job):
+class _Walk(_Job):
+    """What walks of one asset and of several share: strategies, and what they did by period."""
+
+    async def _frame(self, watch: Watch | None = None) -> pd.DataFrame:
+        """The report's strategies, one a row (:func:`ballast.frames.walk_forward`). Waits as ``report`` does, and
+        raises what it raises, and ``ImportError`` without pandas."""
+        return frames.walk_forward(await self._ended(watch))
+
+    async def _periods(self, figure: frames.Figure = "wealth", watch: Watch | None = None) -> pd.DataFrame:
+        """What each strategy did or had, by date: ``"wealth"``, ``"traded"``, ``"radius"`` and, of one asset,
+        ``"allocation"`` and so on (:func:`ballast.frames.periods`). Waits as ``report`` does, and raises what it
+        raises, ``ValueError`` for another figure and ``ImportError`` without pandas."""
+        return frames.periods(await self._ended(watch), figure)
+
+    async def _plot(self, ax: Axes | None = None, watch: Watch | None = None) -> Axes:
+        """Draws the wealth of every strategy (:func:`ballast.plots.walk_forward`). Waits as ``report`` does, and raises
+        what it raises, and ``ImportError`` without pandas and matplotlib."""
+        return plots.walk_forward(await self._ended(watch), ax)
+
+
+class _WalkForward(_Walk):
     """A job that ends in a report; ``Ballast.walk_forward(id)`` finds it again."""
 
     async def _report(self, watch: Watch | None = None) -> wire.BacktestReport:
@@ -192,21 +206,22 @@ class _WalkForward(_Job):
         """
         return cast(wire.BacktestReport, await self._ended(watch))
 
-    async def _frame(self, watch: Watch | None = None) -> pd.DataFrame:
-        """The report's strategies, one a row (:func:`ballast.frames.walk_forward`). Waits as ``report`` does, and
-        raises what it raises, and ``ImportError`` without pandas."""
-        return frames.walk_forward(await self._report(watch))
 
-    async def _periods(self, figure: frames.Figure = "wealth", watch: Watch | None = None) -> pd.DataFrame:
-        """What each strategy did or had, by date: ``"wealth"``, ``"allocation"`` and so on
-        (:func:`ballast.frames.periods`). Waits as ``report`` does, and raises what it raises, ``ValueError`` for
-        another figure and ``ImportError`` without pandas."""
-        return frames.periods(await self._report(watch), figure)
+class _AssetsWalkForward(_Walk):
+    """A job that ends in a report on several assets; ``Ballast.assets_walk_forward(id)`` finds it again."""
 
-    async def _plot(self, ax: Axes | None = None, watch: Watch | None = None) -> Axes:
-        """Draws the wealth of every strategy (:func:`ballast.plots.walk_forward`). Waits as ``report`` does, and raises
-        what it raises, and ``ImportError`` without pandas and matplotlib."""
-        return plots.walk_forward(await self._report(watch), ax)
+    async def _report(self, watch: Watch | None = None) -> wire.AssetsBacktestReport:
+        """Waits for the end of the walk-forward, showing each change to ``watch``.
+
+        Raises :class:`JobEnded` where the job fails or is cancelled.
+        """
+        return cast(wire.AssetsBacktestReport, await self._ended(watch))
+
+    async def _held(self, strategy: str | None = None, watch: Watch | None = None) -> pd.DataFrame:
+        """The share of wealth in each asset: of one strategy by date, or without one on average, a strategy a row
+        (:func:`ballast.frames.held`). Waits as ``report`` does, and raises what it raises, ``ValueError`` for a
+        strategy that there is not and ``ImportError`` without pandas."""
+        return frames.held(await self._report(watch), strategy)
 
 
 class _Frontier(_Job):
@@ -254,13 +269,23 @@ class Evaluation(Job, _Evaluation):
     plot = blocking(_Evaluation._plot)
 
 
-class WalkForward(Job, _WalkForward):
+class _WaitedWalk(Job, _Walk):
+    frame = blocking(_Walk._frame)
+    periods = blocking(_Walk._periods)
+    plot = blocking(_Walk._plot)
+
+
+class WalkForward(_WaitedWalk, _WalkForward):
     __doc__ = _WalkForward.__doc__
 
     report = Answering(wire.BacktestReport).blocking(_WalkForward._report)
-    frame = blocking(_WalkForward._frame)
-    periods = blocking(_WalkForward._periods)
-    plot = blocking(_WalkForward._plot)
+
+
+class AssetsWalkForward(_WaitedWalk, _AssetsWalkForward):
+    __doc__ = _AssetsWalkForward.__doc__
+
+    report = Answering(wire.AssetsBacktestReport).blocking(_AssetsWalkForward._report)
+    held = blocking(_AssetsWalkForward._held)
 
 
 class Frontier(Job, _Frontier):
@@ -295,13 +320,23 @@ class AsyncEvaluation(AsyncJob, _Evaluation):
     plot = _Evaluation._plot
 
 
-class AsyncWalkForward(AsyncJob, _WalkForward):
+class _AwaitedWalk(AsyncJob, _Walk):
+    frame = _Walk._frame
+    periods = _Walk._periods
+    plot = _Walk._plot
+
+
+class AsyncWalkForward(_AwaitedWalk, _WalkForward):
     """A :class:`WalkForward` whose calls are awaited."""
 
     report = _WalkForward._report
-    frame = _WalkForward._frame
-    periods = _WalkForward._periods
-    plot = _WalkForward._plot
+
+
+class AsyncAssetsWalkForward(_AwaitedWalk, _AssetsWalkForward):
+    """An :class:`AssetsWalkForward` whose calls are awaited."""
+
+    report = _AssetsWalkForward._report
+    held = _AssetsWalkForward._held
 
 
 class AsyncFrontier(AsyncJob, _Frontier):
@@ -310,54 +345,3 @@ class AsyncFrontier(AsyncJob, _Frontier):
     report = _Frontier._report
     frame = _Frontier._frame
     plot = _Frontier._plot
-
-
-class ProgressPrinter:
-    """A ``watch`` that prints: one line that is rewritten on a terminal, a line for each finished step elsewhere."""
-
-    def __init__(self, file: TextIO | None = None) -> None:
-        self._file = sys.stderr if file is None else file
-        self._shown: tuple[str, int] | None = None
-
-    def __call__(self, job: wire.Job) -> None:
-        line = progress_line(job)
-        with suppress(BrokenPipeError):
-            if self._file.isatty():
-                end = "\n" if job["state"] in _TERMINAL else ""
-                print(f"\r\x1b[K{line}", end=end, file=self._file, flush=True)
-            elif self._shown != (now := (job["state"], job["progress"]["steps_done"])):
-                self._shown = now
-                print(line, file=self._file, flush=True)
-
-
-class ProgressBar:
-    """A ``watch`` that draws a bar of steps by tqdm, in a terminal or a notebook; it ends with the job.
-
-    Raises ``ImportError`` without tqdm.
-    """
-
-    def __init__(self, **tqdm: Any) -> None:
-        try:
-            from tqdm.auto import tqdm as bar
-        except ImportError as error:
-            raise ImportError("bars are drawn by tqdm: pip install 'ballast-client[progress]'") from error
-        self._bar: Any = bar(**{"unit": "step", **tqdm})
-
-    def __call__(self, job: wire.Job) -> None:
-        progress = job["progress"]
-        self._bar.total, self._bar.n = progress["steps_total"], progress["steps_done"]
-        self._bar.set_description(job["state"], refresh=False)
-        self._bar.refresh()
-        if job["state"] in _TERMINAL:
-            self._bar.close()
-
-
-def progress_line(job: wire.Job) -> str:
-    """A job in a line."""
-    progress = job["progress"]
-    line = f"{job['state']}: {progress['steps_done']} of {progress['steps_total']} steps"
-    if (step := progress.get("step")) is not None:
-        line += f", step {step}: {progress.get('points_done')} of {progress.get('points_total')} design points"
-    if (left := progress.get("seconds_left")) is not None:
-        line += f", about {left:.0f} s left"
-    return line
