@@ -85,7 +85,7 @@ def test_what_cannot_be_meant_of_several_assets_is_refused(ballast: Ballast) -> 
         r"returns: line 3: bonds is \"\": must be a number": months.assign(bonds=[0.1, math.nan, 0.2, 0.1]),
         "assets has 'stocks' twice": months.set_axis(["stocks", "stocks"], axis="columns"),
         r"returns\[1\] has 1 numbers: must have one for each of \['stocks', 'bonds'\]": [[0.1, 0.2], [0.1]],
-        "assets is None: must name the columns where returns is no DataFrame": months.to_numpy(),
+        "assets is None: must name the columns where returns is no DataFrame, text or file": months.to_numpy(),
     }
     for message, wrong in refused.items():
         names = ["stocks", "bonds"] if isinstance(wrong, list) else None
@@ -97,7 +97,6 @@ def test_several_assets_are_the_same_in_rows_in_a_frame_and_in_a_file(ballast: B
     rows = [[value, 0.002 - 0.3 * value] for value in RECORD]
     # Names that are numbers, such as those of deciles, are no row of numbers.
     table = pd.DataFrame(rows, index=MONTHS, columns=["1", "2"])
-    table.assign(rf=BANK).to_csv(tmp_path / "table")
     # The dates say how many periods make a year, and the column of the bank what it pays.
     said: dict[str, Any] = {"kind": "simple", "rate_per_step": BANK[-1], "periods_per_year": 12.0, **ONCE}
     plain = ballast.advise_assets(rows, assets=["1", "2"], **said)
@@ -106,9 +105,27 @@ def test_several_assets_are_the_same_in_rows_in_a_frame_and_in_a_file(ballast: B
     assert ballast.advise_assets(table.assign(rf=BANK), assets=["1", "2"], **ONCE) == plain
     assert ballast.advise_assets(table.rename(columns=int), rate_per_step=BANK[-1], **ONCE) == plain
     named = table.set_axis(["one", "two"], axis="columns").assign(rf=BANK)
-    named.to_csv(tmp_path / "named")
-    found = ballast.advise_assets(tmp_path / "named", assets=["one", "two"], **ONCE)
-    assert found["allocation"]["one"] == plain["allocation"]["1"]
+    named.to_csv(tmp_path / "named.csv")
+    # Dates and the rates of the bank are no assets, wherever they stand.
+    for returns in (
+        named,
+        named.rename_axis("month").reset_index(),
+        tmp_path / "named.csv",
+        str(tmp_path / "named.csv"),
+    ):
+        for assets in (None, ["one", "two"]):
+            found = ballast.advise_assets(returns, assets=assets, **ONCE)
+            assert found["allocation"] == {"one": plain["allocation"]["1"], "two": plain["allocation"]["2"]}
+    with pytest.raises(FileNotFoundError):
+        ballast.advise_assets("missing.csv")
+    # Nor is the bank a second asset of a frontier.
+    asked: list[tuple[Any, float | None]] = [(named[["one", "rf"]], None), (named["one"], BANK[-1])]
+    ends = [
+        ballast.frontier(returns, rate_per_step=rate, scales=[0.0], resamples=20).report() for returns, rate in asked
+    ]
+    assert ends[0]["resampled"] == ends[1]["resampled"]
+    with pytest.raises(UnclearReturns, match="or all of them as several assets: advise_assets"):
+        ballast.advise(table, rate_per_step=0.0)
 
 
 def test_a_volatile_record_can_be_given_as_prices() -> None:

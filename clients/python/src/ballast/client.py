@@ -162,11 +162,11 @@ class _Ballast:
     ) -> wire.AssetsAdvised:
         """What to hold of each of several assets through one period. Nothing is trained or stored.
 
-        ``returns`` has a column for each asset: a DataFrame, whose columns are their names, rows of numbers with
-        ``assets``, or a text or the ``Path`` of a file, of which ``assets`` chooses the columns, as it may of a
-        DataFrame. They are read as in ``train``, and so are ``kind``, ``choices`` and ``rate_per_step``: what the bank
-        pays may stand in a column that is not chosen. Every other field of the problem is given by name, such as
-        ``ground_norm``, ``utility``, ``radius`` or ``support``.
+        ``returns`` has a column for each asset: a DataFrame, a text or the ``Path`` of a file, or rows of numbers with
+        ``assets``. By default the assets are all columns that hold neither dates nor the rates of the bank; ``assets``
+        chooses among them. They are read as in ``train``, and so are ``kind``, ``choices`` and ``rate_per_step``: what
+        the bank pays may stand in a column that is not chosen. Every other field of the problem is given by name, such
+        as ``ground_norm``, ``utility``, ``radius`` or ``support``.
         """
         whole = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
         question = _given({"problem": whole, "wealth": wealth})
@@ -377,6 +377,10 @@ class _Ballast:
             whole = {"history": found.series[0], **_given(told), **_given(problem)}
         else:
             whole = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
+            if len(whole["assets"]) == 1:
+                # Of two columns one was of dates or of the bank.
+                del whole["assets"]
+                whole["history"] = [log_return for (log_return,) in whole["history"]]
         request = {
             "problem": whole,
             "scales": None if scales is None else list(scales),

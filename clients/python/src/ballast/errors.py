@@ -48,6 +48,10 @@ class UnclearReturns(BallastError, ValueError):
             for option in question["options"]:
                 read = option.get("sentence") or option["label"]
                 lines.append(f"  choices={option['choices']}: {read}")
+            if question["asks"] == "columns":
+                lines.append(
+                    "  or all of them as several assets: advise_assets, train_assets, backtest_assets, frontier"
+                )
         return "\n".join(lines)
 
 

@@ -63,8 +63,10 @@ Table: TypeAlias = Any
 
 
 def text_of(source: str | PathLike[str] | Table) -> str:
-    """A text as it is, that of a file (UTF-8, or UTF-16 where its first bytes say so), a table of pandas as CSV, with
-    its index where that holds dates, or numbers, a row a line."""
+    """A text as it is, that of a file (UTF-8, or UTF-16 where its first bytes say so; a line that ends as the name of
+    one does is its path), a table of pandas as CSV, with its index where that holds dates, or numbers, a row a line."""
+    if isinstance(source, str) and "\n" not in source and source.lower().endswith(_FILES):
+        source = Path(source)
     if isinstance(source, PathLike):
         content = Path(source).read_bytes()
         return content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
@@ -94,6 +96,8 @@ def dates_of(returns: Returns) -> list[str] | None:
     return [day(date) for date in (index.to_timestamp(how="end") if hasattr(index, "to_timestamp") else index)]
 
 
+#: How a line ends that is the path of a file, and no returns.
+_FILES = (".csv", ".tsv", ".txt")
 #: What pandas calls the values of an index of dates.
 _DATED = ("datetime64", "datetime", "date", "period")
 #: A month or a day, maybe with a time.
@@ -126,9 +130,7 @@ async def read(
     readings, and ``ValueError`` where it is none; both name the argument.
     """
     _check_order(source, kind, name)
-    said = {**(choices or {}), **({} if kind is None else {"kind": kind})}
-    body = {"text": text_of(source), "choices": said}
-    reading = cast(wire.Reading, await transport.json("POST", "/returns", body=body))
+    reading = await _reading(transport, text_of(source), kind, choices)
     if reading["outcome"] == "asked":
         raise UnclearReturns(name, reading["questions"])
     if reading["outcome"] == "refused":
@@ -143,6 +145,11 @@ async def read(
     )
 
 
+async def _reading(transport: Transport, text: str, kind: Kind | None, choices: wire.Choices | None) -> wire.Reading:
+    said = {**(choices or {}), **({} if kind is None else {"kind": kind})}
+    return cast(wire.Reading, await transport.json("POST", "/returns", body={"text": text, "choices": said}))
+
+
 async def read_assets(
     transport: Transport,
     source: Table,
@@ -154,13 +161,14 @@ async def read_assets(
     """The names of several assets, and what the service reads of each, as :func:`read`.
 
     ``assets`` names the columns of rows, or chooses among those of a DataFrame, of a text or of a file; by default all
-    of a DataFrame.
+    that hold neither dates nor the rates of the bank.
     """
     columns = getattr(source, "columns", None)
-    named = columns if assets is None else assets
-    if named is None:
-        raise ValueError(f"assets is None: must name the columns where {name} is no DataFrame")
-    names = [str(each) for each in named]
+    if assets is None:
+        if columns is None and not isinstance(source, str | PathLike):
+            raise ValueError(f"assets is None: must name the columns where {name} is no DataFrame, text or file")
+        assets = await _assets_of(transport, source, kind, choices, name)
+    names = [str(each) for each in assets]
     if twice := next((each for place, each in enumerate(names) if each in names[:place]), None):
         raise ValueError(f"assets has {twice!r} twice: each asset must have a name of its own")
     if columns is not None:
@@ -173,6 +181,25 @@ async def read_assets(
         source = text_of([[_heading(each) for each in names], *rows])
     chosen: wire.Choices = {**(choices or {}), "columns": [_heading(each) for each in names]}
     return names, await read(transport, source, kind, chosen, name)
+
+
+async def _assets_of(
+    transport: Transport, source: Table, kind: Kind | None, choices: wire.Choices | None, name: str
+) -> list[str]:
+    """The columns that hold neither dates nor rates, as the service's reader tells them."""
+    columns = getattr(source, "columns", None)
+    if columns is None:
+        places, headed = None, source
+    else:
+        places = [str(column) for column in columns]
+        headed = source.set_axis([_heading(column) for column in columns], axis="columns")
+    reading = await _reading(transport, text_of(headed), kind, choices)
+    if reading["outcome"] == "refused":
+        raise ValueError(f"{name}: {reading['sentence']}")
+    found = [column["name"] for column in reading["columns"] if column["holds"] == "values"]
+    if not found and reading["outcome"] == "asked":
+        raise UnclearReturns(name, reading["questions"])
+    return found if places is None else [place for place in places if _heading(place) in found]
 
 
 def _heading(asset: object) -> str:
