@@ -172,6 +172,11 @@ def test_pictures_show_the_frames(ballast: Ballast) -> None:
     wealth = walked.periods()
     assert set(wealth.columns) <= set(lines)
     assert list(lines["all-stock"].get_ydata()) == wealth["all-stock"].tolist()  # type: ignore[arg-type]
+    # The names of the strategies stand beside the lines, on the figure.
+    axes = walked.plot()
+    axes.figure.draw_without_rendering()  # type: ignore[union-attr]
+    names = axes.get_legend().get_window_extent()  # type: ignore[union-attr]
+    assert axes.get_window_extent().x1 <= names.x0 and names.x1 <= axes.figure.bbox.x1
 
     found = tried(ballast)
     axes = found.plot()
@@ -231,6 +236,7 @@ def test_a_session_and_an_evaluation_are_drawn(ballast: Ballast, session: Sessio
     assert np.asarray(wealth.get_ydata()).tolist() == [row["wealth"] for row in rows] and np.asarray(
         wealth.get_xdata()
     ).tolist() == [1, 2]
+    assert all(tick == round(tick) for tick in axes.get_xticks())
     (held,) = axes.figure.axes[1].get_lines()
     assert np.asarray(held.get_ydata()).tolist() == [row["executed_allocation"] for row in rows]
     evaluation = compare(ballast)

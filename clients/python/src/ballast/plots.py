@@ -22,6 +22,8 @@ def walk_forward(report: wire.BacktestReport | wire.AssetsBacktestReport, ax: Ax
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_formatter("{x:g}")
     axes.set_ylabel("wealth, from 100")
+    # Beside the lines: of several assets there are ten strategies and more.
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return axes
 
 
@@ -35,6 +37,8 @@ def history(history: wire.History, ax: Axes | None = None) -> Axes:
     axes.axhline(history["initial_wealth"], color="C0", linewidth=0.8, linestyle=":")
     axes.set_ylabel("wealth after the period")
     axes.set_xlabel("period" if over is lived.index else "last day")
+    if over is lived.index:
+        axes.locator_params(axis="x", integer=True)
     shares = axes.twinx()
     shares.step(over, lived["executed_allocation"], where="mid", color="C1", linewidth=1.0, label="held")
     shares.set_ylim(0.0, 1.05)
@@ -92,4 +96,4 @@ def _axes(ax: Axes | None) -> Axes:
         from matplotlib import pyplot
     except ImportError as error:
         raise ImportError("plots are drawn by matplotlib: pip install 'ballast-client[plots]'") from error
-    return pyplot.subplots()[1]
+    return pyplot.subplots(layout="constrained")[1]
