@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from inspect import signature
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -106,6 +107,8 @@ def test_several_assets_are_the_same_in_rows_in_a_frame_and_in_a_file(ballast: B
     assert ballast.advise_assets(table.rename(columns=int), rate_per_step=BANK[-1], **ONCE) == plain
     named = table.set_axis(["one", "two"], axis="columns").assign(rf=BANK)
     named.to_csv(tmp_path / "named.csv")
+    polars = SimpleNamespace(columns=["1", "2"], to_numpy=lambda: np.array(rows))
+    assert ballast.advise_assets(polars, **said) == plain
     # Dates and the rates of the bank are no assets, wherever they stand.
     for returns in (
         named,

@@ -164,6 +164,9 @@ async def read_assets(
     that hold neither dates nor the rates of the bank.
     """
     columns = getattr(source, "columns", None)
+    if columns is not None and not hasattr(source, "set_axis"):
+        # A table of polars: rows, and their names.
+        source, assets, columns = source.to_numpy(), list(columns) if assets is None else assets, None
     if assets is None:
         if columns is None and not isinstance(source, str | PathLike):
             raise ValueError(f"assets is None: must name the columns where {name} is no DataFrame, text or file")
