@@ -18,9 +18,8 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
   const period = select({ within, name: "period", label: "Period", choices: periods.reverse(), changed: (value) => fill(Number(value)) });
   const { rate_per_step, contributions } = policy.specification.problem;
   const contribution = Array.isArray(contributions) ? null : contributions;
-  const fields = history.assets
-    ? severalFields(history.assets, { within, advised: null, rate: rate_per_step, added: contribution })
-    : reportFields({ within, label: "Return, %", rate: rate_per_step, contribution });
+  const blank = { within, advised: null, rate: rate_per_step, contribution };
+  const fields = history.assets ? severalFields(history.assets, blank) : reportFields({ ...blank, label: "Return, %" });
   fill(history.observations.length);
   const reason = input({
     within,

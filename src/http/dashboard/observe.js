@@ -2,24 +2,19 @@
 
 import { h } from "./dom.js";
 import { foretold, reportFields, sendReports } from "./report_fields.js";
+import { severalFields } from "./several_fields.js";
 
 /** The form; what is held where nothing else is said is the advice. */
-export function observeForm(action, { id, session, policy, calendar, refresh }) {
+export function observeForm(action, { id, session, history: { assets }, policy, calendar, refresh }) {
   const { rate_per_step, trading_cost } = policy.specification.problem;
   const preview = h("output", { class: "note" });
-  const advised = action.allocation;
+  const before = assets ? assets.map((name) => action.holdings[name]) : [session.holding];
   const foretell = () => {
-    const read = fields.read(advised);
-    preview.textContent = read === null ? "" : foretold(read, { wealth: session.wealth, before: [session.holding], cost: trading_cost });
+    const read = fields.read();
+    preview.textContent = read === null ? "" : foretold(read, { wealth: session.wealth, before, cost: trading_cost });
   };
-  const fields = reportFields({
-    label: `Return in ${calendar.inText(action.period)}, %`,
-    rate: rate_per_step,
-    contribution: action.contribution,
-    date: calendar.next,
-    changed: () => foretell(),
-  });
-  fields.advised(advised);
+  const blank = { advised: action.allocation, rate: rate_per_step, contribution: action.contribution, date: calendar.next, changed: foretell };
+  const fields = assets ? severalFields(assets, blank) : reportFields({ ...blank, label: `Return in ${calendar.inText(action.period)}, %` });
   const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
   const button = h("button", { type: "submit" }, `Report ${calendar.inText(action.period)}`);
   const form = h(

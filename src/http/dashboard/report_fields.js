@@ -14,9 +14,9 @@ const KINDS = { simple_return: "Gain or loss", log_return: "Log-return", missing
 /** What the service takes. */
 export const LIMITS = { log_return: [-5, 5], simple_return: [-5, 5].map(Math.expm1), share: [0, 1], rate: [-0.5, 0.5], wealth: [1e-6, 1e15] };
 
-/** The fields for a period, with the policy's rate and contribution as what they are where nothing is said, and its last day
- * as it most likely is. */
-export function reportFields({ within, label, rate, contribution, date: likely = null, changed }) {
+/** The fields for a period, with what is `advised` and the policy's rate and contribution as what they are where nothing is said, and
+ * its last day as it most likely is; `advised` is null where that is what was advised then. */
+export function reportFields({ within, label, advised, rate, contribution, date: likely = null, changed }) {
   const edited = () => changed?.();
   const given = input({
     within,
@@ -37,7 +37,7 @@ export function reportFields({ within, label, rate, contribution, date: likely =
     },
   });
   const share = (name, label, note) => input({ within, name, label, note, unit: "percent", changed: edited });
-  const held = share("executed_allocation", "Share held, %", "Blank: as advised.");
+  const held = share("executed_allocation", "Share held, %", advised === null ? "Blank: as advised." : `Blank: the ${allocation(advised)} advised.`);
   const paid = share("rate", "The bank paid, %", `Blank: ${percent(rate, 3)}, the policy\u2019s.`);
   const flow = input({
     within,
@@ -67,7 +67,7 @@ export function reportFields({ within, label, rate, contribution, date: likely =
       for (const [field, text] of texts) field.control.value = text;
     },
     /** What `foretold` reads; null where something cannot be read. */
-    read(advised) {
+    read() {
       const blank = (field, otherwise, read) => (field.control.value.trim() === "" ? otherwise : read(field.control.value));
       const value = isMissing() ? 0 : fraction(given.control.value);
       const executed = blank(held, advised, fraction);
@@ -99,9 +99,6 @@ export function reportFields({ within, label, rate, contribution, date: likely =
       const text = given.control.value.trim();
       const words = text === "" ? "The return is blank." : `\u201c${text}\u201d is not a number of percent.`;
       return { message: words, field: "return" };
-    },
-    advised(allocated) {
-      held.element.querySelector(".note").textContent = `Blank: the ${allocation(allocated)} advised.`;
     },
   };
 }

@@ -14,7 +14,7 @@ import { observeForm } from "./observe.js";
 import { lastReport, observed, righting } from "./observed.js";
 import { calendar } from "./periods.js";
 import { nearness } from "./sensitivity.js";
-import { severalAdvice, severalForm, severalHeld, severalWorst } from "./several.js";
+import { severalAdvice, severalHeld, severalWorst } from "./several.js";
 import { hasBall, isCautious, isParametric, moments, utility } from "./specification.js";
 import { conservatism } from "./what_if.js";
 import { worstMarket } from "./worst_market.js";
@@ -64,7 +64,7 @@ export async function view(id, leaving) {
 const cautionScale = (problem) => (isParametric(problem.framework) ? moments(problem.history).deviation : 1);
 
 async function fill(holder, told) {
-  const { id, session, history, calendar, policy, leaving } = told;
+  const { id, session, history, leaving } = told;
   const shown = { ...told, right: null };
   shown.right = history.observations.length > 0 ? righting(shown) : null;
   if (session.state !== "active") {
@@ -72,40 +72,33 @@ async function fill(holder, told) {
     return holder.replaceChildren(h("div", { class: "columns" }, ended), figures(shown, null), history.assets ? severalHeld(shown) : held(shown, null), observed(shown));
   }
   const action = await get(`/action?session=${id}`, leaving);
-  if (history.assets) return fillSeveral(holder, shown, action);
-  const report = observeForm(action, shown);
-  const advice = adviceView(action, place(shown, action), [report, lastReport(shown)]);
-  const near = nearness({ id, session, policy, leaving, unit: calendar.unit });
-  const cautious = isCautious(policy.specification.problem);
-  const caution = shown.canAsk && cautious ? conservatism(shown, action) : null;
-  holder.replaceChildren(
-    changed(shown),
-    due(shown),
-    h("div", { class: "columns" }, advice.element, wealthCourse(shown)),
-    figures(shown, action),
-    near.element,
-    worstMarket({ ...shown, cautious }, advice, () => near.ask().then(() => caution?.ask())),
-    caution?.element ?? "",
-    held(shown, action),
-    observed(shown),
-    frontier(shown),
-  );
-}
-
-/** The same of several assets, of which no other caution is advised. */
-function fillSeveral(holder, shown, action) {
-  const { history, calendar } = shown;
-  const advice = severalAdvice(action, place(shown, action), history.assets, [severalForm(action, shown), lastReport(shown)]);
+  const { advice, found } = (history.assets ? ofSeveral : ofOne)(shown, action, [observeForm(action, shown), lastReport(shown)]);
   holder.replaceChildren(
     changed(shown),
     due(shown),
     h("div", { class: "columns" }, advice, wealthCourse(shown)),
     figures(shown, action),
-    severalWorst(action, history.assets, calendar),
-    severalHeld(shown),
+    ...found,
     observed(shown),
     frontier(shown),
   );
+}
+
+/** The advice with what follows it, `rest`, and how it was found and went. */
+function ofOne(shown, action, rest) {
+  const { id, session, policy, leaving, calendar } = shown;
+  const advice = adviceView(action, place(shown, action), rest);
+  const near = nearness({ id, session, policy, leaving, unit: calendar.unit });
+  const cautious = isCautious(policy.specification.problem);
+  const caution = shown.canAsk && cautious ? conservatism(shown, action) : null;
+  const worst = worstMarket({ ...shown, cautious }, advice, () => near.ask().then(() => caution?.ask()));
+  return { advice: advice.element, found: [near.element, worst, caution?.element ?? "", held(shown, action)] };
+}
+
+/** The same of several assets, of which no other caution is advised. */
+function ofSeveral(shown, action, rest) {
+  const { assets } = shown.history;
+  return { advice: severalAdvice(action, place(shown, action), assets, rest), found: [severalWorst(action, assets, shown.calendar), severalHeld(shown)] };
 }
 
 /** What the advice is about: its period, when it is all for, and in what money. */

@@ -1,11 +1,10 @@
-// A session of several assets: what to hold of each, the report of all of them, and what the worst market makes of each.
+// A session of several assets: what to hold of each, and what the worst market makes of each.
 
 import { SOURCES, why } from "./advice.js";
 import { disclosure, h, section, table } from "./dom.js";
 import { endWords } from "./flows.js";
 import { allocation, figures, minus, percent, points, wealth } from "./format.js";
-import { foretold, sendReports } from "./report_fields.js";
-import { assetsHeld, severalFields } from "./several_fields.js";
+import { assetsHeld } from "./several_fields.js";
 import { priceFields, shareCount } from "./share_prices.js";
 import { stackedChart } from "./stacked.js";
 
@@ -62,24 +61,6 @@ export function severalAdvice(action, place, assets, rest) {
     ),
     rest,
   );
-}
-
-/** The form for the coming period; what is held where nothing else is said is the advice. */
-export function severalForm(action, { id, session, history: { assets }, policy, calendar, refresh }) {
-  const { rate_per_step, trading_cost } = policy.specification.problem;
-  const preview = h("output", { class: "note" });
-  const foretell = () => {
-    const read = fields.read();
-    const before = assets.map((name) => action.holdings[name]);
-    preview.textContent = read === null ? "" : foretold(read, { wealth: session.wealth, before, cost: trading_cost });
-  };
-  const fields = severalFields(assets, { advised: action.allocation, rate: rate_per_step, added: action.contribution, date: calendar.next, changed: () => foretell() });
-  const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
-  const button = h("button", { type: "submit" }, `Report ${calendar.inText(action.period)}`);
-  const form = h("form", { class: "observe", novalidate: true, "data-needs": "operate" }, fields.element, preview, message, h("p", { class: "send" }, button));
-  const compose = () => ({ session: id, period: action.period, ...fields.report() });
-  sendReports(form, { button, message, fields, path: "/observe", compose, once: "a period counts once.", session, refresh });
-  return form;
 }
 
 /** What the worst market of the coming period makes of each asset, behind the shares of what is held. */

@@ -25,10 +25,10 @@ export function assetReturns({ assets, observations }, index) {
 export const assetsHeld = (row) => standing(row).executed_allocations ?? row.assets.advised_allocations;
 
 /**
- * The fields: `advised` is the share of each where none is typed, null where that is what was advised then; `rate` and `added` are
- * the policy's, `added` null where it differs from period to period, `date` the last day as it most likely is.
+ * The fields: `advised` is the share of each where none is typed, null where that is what was advised then; `rate` and `contribution` are
+ * the policy's, the latter null where it differs from period to period, `date` the last day as it most likely is.
  */
-export function severalFields(assets, { within = "", advised, rate, added, date = null, changed = null }) {
+export function severalFields(assets, { within = "", advised, rate, contribution, date = null, changed = null }) {
   const part = (list, label, note) =>
     assets.map((name, index) => input({ within: `${within}asset-${index}-`, name: `${list}.${name}`, label: label(name), note: note(name), unit: "percent", changed }));
   const returns = part("simple_returns", (name) => `Return of ${name}, %`, () => null);
@@ -36,7 +36,7 @@ export function severalFields(assets, { within = "", advised, rate, added, date 
   const field = (name, label, note, more = {}) => input({ within, name, label, note, changed, ...more });
   const day = field("date", "Last day", "Such as 2008-09-30. May be blank.", { inputmode: "text", value: date ?? "" });
   const paid = field("rate", "The bank paid, %", `Blank: ${percent(rate, 3)}, the policy\u2019s.`, { unit: "percent" });
-  const flow = field("flow", "Money added at the end", `Blank: ${added === null ? "what the policy says" : `${wealth(added)}, the policy\u2019s`}. \u2212100 is 100 taken.`);
+  const flow = field("flow", "Money added at the end", `Blank: ${contribution === null ? "what the policy says" : `${wealth(contribution)}, the policy\u2019s`}. \u2212100 is 100 taken.`);
   const reached = field("wealth", "Wealth reached", "Blank: what all the rest gives.");
   const isMissing = () => kind.control.value === "missing";
   const silenced = () => returns.forEach(({ control }) => (control.disabled = isMissing()));
@@ -85,12 +85,12 @@ export function severalFields(assets, { within = "", advised, rate, added, date 
       const blank = (field, otherwise, read) => (text(field) === "" ? otherwise : read(text(field)));
       const back = returns.map((field) => (isMissing() ? 0 : fraction(text(field))));
       const shares = held.map((field, index) => blank(field, advised[assets[index]], fraction));
-      const [paying, adding, ended] = [blank(paid, rate, fraction), blank(flow, added, typed), blank(reached, Number.NaN, typed)];
-      if ([...back, ...shares, paying, adding, ended].some((number) => typeof number !== "number")) return null;
+      const [paying, added, ended] = [blank(paid, rate, fraction), blank(flow, contribution, typed), blank(reached, Number.NaN, typed)];
+      if ([...back, ...shares, paying, added, ended].some((number) => typeof number !== "number")) return null;
       const parts = assets.map((_, index) => ({ held: shares[index], growth: 1 + back[index] }));
       const all = (fields, values, limits) => fields.map((field, index) => [field, values[index], limits]);
       const numbers = [...all(returns, back, LIMITS.simple_return), ...all(held, shares, LIMITS.share), [paid, paying, LIMITS.rate], [reached, ended, LIMITS.wealth]];
-      return { parts, rate: paying, added: adding, ended, missing: isMissing(), numbers, flow, reached };
+      return { parts, rate: paying, added, ended, missing: isMissing(), numbers, flow, reached };
     },
   };
 }
