@@ -114,12 +114,12 @@ impl Checks {
     }
 
     /// The root mean square of what `served` is off by, in basis points, from the states solved in the order of the checks.
-    pub fn error(
+    pub fn error<'a>(
         &self,
         served: &ValueSurrogate,
         specification: &Specification,
         step: usize,
-        solved: &[DesignPoint],
+        solved: impl Iterator<Item = &'a DesignPoint>,
     ) -> f64 {
         let dynamics = Dynamics::of(&specification.problem)[step];
         let squares = |point: &DesignPoint| {

@@ -116,6 +116,16 @@ struct Known {
     solved: Vec<DesignPoint>,
 }
 
+/// What is judged of a fit.
+struct Found {
+    served: ValueSurrogate,
+    /// Predicted at the fresh states, and the most at which the surrogate serves.
+    deviations: Vec<f64>,
+    limit: f64,
+    /// Points solved before.
+    before: usize,
+}
+
 impl Learning<'_> {
     /// Solves the design, and fits both surrogates to it; the search for their scales starts from those of the step after.
     ///
@@ -137,22 +147,8 @@ impl Learning<'_> {
                 StepDiagnostics { value: Some(value), policy: Some(policy), ..diagnostics(step, &known.solved) };
             if let Some(aim) = &self.aim {
                 let served = ValueSurrogate::new(self.specification, step, &stored);
-                let (mut own, mut checked, mut seen) = (0.0_f64, Vec::new(), Vec::new());
-                for set in 0..SETS {
-                    let number = SETS * round + set;
-                    let checks = Checks::of(&deviations, stored.deviation_limit, self.specification.seed, step, number);
-                    let some = checks.weighted.iter().map(|&(state, _)| (fresh.start + state, guards[state].clone()));
-                    let before = known.solved.len() + checked.len();
-                    let solved = self.solve(states, some.collect(), before, before + checks.weighted.len())?;
-                    own = own.max(checks.error(&served, self.specification, step, &solved));
-                    // A state in both sets is one design point.
-                    let named = checks.weighted.iter().map(|(state, _)| *state).zip(solved);
-                    checked.extend(named.filter(|(state, _)| !seen.contains(state)).map(|(_, point)| point));
-                    seen.extend(checks.weighted.iter().map(|(state, _)| *state));
-                    if !aim.is_met_by(own) {
-                        break;
-                    }
-                }
+                let found = Found { served, deviations, limit: stored.deviation_limit, before: known.solved.len() };
+                let (own, checked) = self.judge(states, aim, &found, (fresh, &guards), round)?;
                 if !aim.is_met_by(own) && known.solved.len() < most {
                     wanted = aim.next(known.solved.len(), own).min(most);
                     known.solved.extend(checked.into_iter().take(most - known.solved.len()));
@@ -163,6 +159,36 @@ impl Learning<'_> {
             }
             return Ok(StepSolution { step, solution: Solution::Surrogates(Box::new(stored)), diagnostics });
         }
+    }
+
+    /// The error that is claimed of a fit, by sets of fresh states until one says that it is too large, and what is solved of them.
+    fn judge(
+        &self,
+        states: &impl Candidates,
+        aim: &Aim,
+        found: &Found,
+        (fresh, guards): (Range<usize>, &[Features]),
+        round: usize,
+    ) -> Result<(f64, Vec<DesignPoint>), TrainError> {
+        let Found { served, deviations, limit, before } = found;
+        let (mut own, mut numbers, mut solved) = (0.0_f64, Vec::new(), Vec::new());
+        for set in 0..SETS {
+            let checks = Checks::of(deviations, *limit, self.specification.seed, self.step, SETS * round + set);
+            let drawn: Vec<usize> = checks.weighted.iter().map(|&(state, _)| state).collect();
+            // A state that an earlier set holds is solved already.
+            let new: Vec<usize> = drawn.iter().copied().filter(|state| !numbers.contains(state)).collect();
+            let some = new.iter().map(|&state| (fresh.start + state, guards[state].clone())).collect();
+            let done = before + solved.len();
+            solved.extend(self.solve(states, some, done, done + new.len())?);
+            numbers.extend(new);
+            let place = |state: &usize| numbers.iter().position(|number| number == state);
+            let points = drawn.iter().filter_map(place).map(|place| &solved[place]);
+            own = own.max(checks.error(served, self.specification, self.step, points));
+            if !aim.is_met_by(own) {
+                break;
+            }
+        }
+        Ok((own, solved))
     }
 
     /// Solves as many more design points as are wanted, and fits both surrogates to all. `before` are surrogates whose scales may
