@@ -34,6 +34,11 @@ impl Ground {
         }
     }
 
+    /// What a unit of its move adds to the sum that costs.
+    fn weight(&self, index: usize) -> f64 {
+        if let Ground::Weighted(weights) = self { weights[index] } else { 0.0 }
+    }
+
     /// Where a position is once the level is reached.
     pub fn lowered(&self, index: usize, position: f64, floor: f64, level: f64) -> f64 {
         (self.speed(index, position) * level).max(floor).min(position)
@@ -96,9 +101,14 @@ impl Levelling {
                 fixed += position;
                 continue;
             }
-            fixed += floor;
             let own = ground.speed(index, position);
-            self.turns.extend([(floor / own, true, index), (position / own, false, index)]);
+            self.turns.push((position / own, false, index));
+            if floor > 0.0 {
+                fixed += floor;
+                self.turns.push((floor / own, true, index));
+            } else {
+                (speed, rate, moving) = (speed + own, rate + ground.weight(index), moving + 1);
+            }
         }
         self.turns.sort_unstable_by(|left, right| left.0.total_cmp(&right.0));
         for &(level, ends, index) in &self.turns {
@@ -108,7 +118,7 @@ impl Levelling {
             }
             low = level;
             let own = ground.speed(index, positions[index]);
-            let weight = if let Ground::Weighted(weights) = ground { weights[index] } else { 0.0 };
+            let weight = ground.weight(index);
             if ends {
                 (fixed, speed, rate, moving) = (fixed - floors[index], speed + own, rate + weight, moving + 1);
             } else {

@@ -36,15 +36,13 @@ const OFF_CENTRE: f64 = 100.0;
 /// Branches of less of their atom's mass are let go with their place.
 const LEAST_MASS: f64 = 1e-6;
 /// Shares of the start by which one near a similar step is drawn inside.
-const DRAWN_INSIDE: f64 = 0.02;
+const DRAWN_INSIDE: f64 = 0.002;
 /// Prices tried for the start at most, and how far its law may be, over the radius or under it.
 const PRICES: usize = 8;
 const SPREAD: f64 = 3.0;
-/// Factors by which the first prices tried are apart, near a similar step and elsewhere, and the share at which they are near
-/// enough: where all atoms begin to move at about one price, no price has a law as far away as the radius.
+/// Factors by which the first prices tried are apart, near a similar step and elsewhere.
 const PRICE_NEAR: f64 = 1.03;
 const PRICE_FAR: f64 = 1.5;
-const PRICE_WIDTH: f64 = 0.02;
 /// Room that the sum of the shares has at least.
 const LEAST_ROOM: f64 = 1e-6;
 
@@ -67,6 +65,23 @@ impl Bound {
 pub(super) struct Pair {
     pub slack: f64,
     pub multiplier: f64,
+}
+
+/// Of the dual, which is concave, at a price of distance.
+#[derive(Debug, Clone, Copy)]
+struct Tangent {
+    price: f64,
+    value: f64,
+    slope: f64,
+}
+
+impl Tangent {
+    /// The price at which this one, which rises, meets one at a higher price, which falls; halfway where there is no value.
+    fn meets(self, high: Tangent) -> f64 {
+        let along = (high.value - self.value - high.slope * (high.price - self.price)) / (self.slope - high.slope);
+        let between = (0.0..=high.price - self.price).contains(&along);
+        self.price + if between { along } else { 0.5 * (high.price - self.price) }
+    }
 }
 
 /// The search.
@@ -177,11 +192,12 @@ impl<'a> Interior<'a> {
         interior
     }
 
-    /// Finds a price at which the centred laws at the start are about as far away as the radius: by bisection.
-    /// The first prices are apart by the factor `wider`, and further apart until one is too low and one too high.
+    /// Finds a price at which the centred laws at the start are about as far away as the radius. The first prices are apart by
+    /// the factor `wider`, and further apart until one is too low and one too high; the next is where the tangents of the dual
+    /// at both meet, which finds the price at which all atoms begin to move however sharp it is.
     fn price_the_start(&mut self, mut wider: f64) {
         let assets = self.step.assets();
-        let (mut low, mut high) = (0.0, f64::INFINITY);
+        let (mut low, mut high): (Option<Tangent>, Option<Tangent>) = (None, None);
         for _ in 0..PRICES {
             let price = self.point[assets];
             self.find();
@@ -192,23 +208,20 @@ impl<'a> Interior<'a> {
                     distance += self.step.masses[atom] * self.barrier / (branch.payoff - top) * branch.cost;
                 }
             }
-            if distance > SPREAD * self.step.radius {
-                low = price;
-            } else if distance < self.step.radius / SPREAD {
-                high = price;
-            } else {
-                break;
+            if (self.step.radius / SPREAD..=SPREAD * self.step.radius).contains(&distance) {
+                return;
             }
-            self.point[assets] = match (low > 0.0, high.is_finite()) {
-                (true, true) => 0.5 * (low + high),
-                (true, false) => wider * price,
+            let (value, exact) = self.step.dual(&self.branches, price);
+            let tangent = Tangent { price, value, slope: exact - self.step.radius };
+            *(if tangent.slope > 0.0 { &mut low } else { &mut high }) = Some(tangent);
+            self.point[assets] = match (low, high) {
+                (Some(low), Some(high)) => low.meets(high),
+                (Some(_), None) => wider * price,
                 _ => price / wider,
             };
-            if high - low < PRICE_WIDTH * high {
-                break;
-            }
             wider *= wider;
         }
+        self.find();
     }
 
     fn find(&mut self) {
@@ -219,7 +232,6 @@ impl<'a> Interior<'a> {
 
     /// The first point: everything on the central path but the shares.
     fn open(&mut self) {
-        self.find();
         self.pairs.clear();
         for atom in 0..self.step.atoms() {
             self.centre(atom);

@@ -41,7 +41,7 @@ const CONTENT: f64 = 1e-7;
 const ROUNDING: f64 = 1e-14;
 /// First barriers of searches, in relative utility, and that of one near a similar step.
 const BARRIERS: [f64; 3] = [1e-3, 1e-2, 1e-1];
-const BARRIER_NEAR: f64 = 1e-5;
+const BARRIER_NEAR: f64 = 1e-6;
 /// Shares below this are rounding of a search that stays inside its bounds.
 const LEAST_SHARE: f64 = 1e-6;
 

@@ -11,6 +11,10 @@ use crate::numerics::elementary::{exp_m1, ln};
 /// Largest exponent taken: exp(600) is finite, and a loss that deep is never chosen.
 const LARGEST_EXPONENT: f64 = 600.0;
 
+/// Whole risk aversions up to this are multiplied out above this wealth: `W^n - 1 = (W - 1) (1 + ... + W^(n-1))`.
+const MOST_MULTIPLIED: f64 = 16.0;
+const LEAST_MULTIPLIED: f64 = 1e-12;
+
 /// Utility of the log gain over the floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RelativeUtility {
@@ -82,6 +86,16 @@ impl RelativeUtility {
                 let exponent = (-k * (wealth - 1.0)).min(LARGEST_EXPONENT);
                 let power = exponent.exp_m1();
                 (-power / k, power + 1.0)
+            }
+            RelativeUtility::Power { eta }
+                if eta.fract() == 0.0 && eta <= MOST_MULTIPLIED && wealth > LEAST_MULTIPLIED =>
+            {
+                let (inverse, mut power, mut sum) = (1.0 / wealth, 1.0, 0.0);
+                for _ in 1..eta as usize {
+                    power *= inverse;
+                    sum += power;
+                }
+                ((wealth - 1.0) * sum / (eta - 1.0), power * inverse)
             }
             RelativeUtility::Power { eta } => {
                 let power = ((1.0 - eta) * wealth.ln()).min(LARGEST_EXPONENT).exp_m1();
@@ -192,9 +206,8 @@ mod tests {
 
     #[test]
     fn by_wealth_it_is_the_utility_of_its_logarithm_and_steepest_where_it_says() {
-        for utility in
-            [RelativeUtility::Exponential { k: 1.2 }, RelativeUtility::Power { eta: 3.0 }, RelativeUtility::Log]
-        {
+        let powers = [2.0, 2.5, 3.0].map(|eta| RelativeUtility::Power { eta });
+        for utility in powers.into_iter().chain([RelativeUtility::Exponential { k: 1.2 }, RelativeUtility::Log]) {
             for wealth in [0.2, 0.9, 1.0, 1.7_f64] {
                 let (value, slope) = utility.at(wealth);
                 assert!((value - utility.value(wealth.ln())).abs() < 1e-14 * (1.0 + value.abs()));
