@@ -196,7 +196,7 @@ def worst_law(ballast: Ballast, market: list[float], rate: float) -> Picture:
     for loss in range(30, 5, -5):
         x = left + unit * (32 - loss) / 100
         picture.line("rule", (x, 365), (x, 371))
-        picture.text(x, 388, f"{-loss} %", "middle soft")
+        picture.text(x, 388, f"\u2212{loss} %", "middle soft")
     picture.text(WIDTH / 2, 410, "return of the month", "middle soft")
     print(
         f"The worst law moves {percent(moved, 1)} of the months, {moved * len(market):.1f} of {len(market)}, "
