@@ -109,6 +109,9 @@ test("one strategy is told by its worst falls, its years and its quarters", asyn
   const years = await cells("Returns by the year of All in stocks and of others");
   const of2008 = lived.slice(8, 12).reduce((product, growth) => product * growth) - 1;
   assert.equal(years.find(([year]) => year === "2008")[1], percent(of2008));
+  const five = wealth.slice(20).map((level, k) => (level / wealth[k]) ** (1 / 5) - 1);
+  const rolled = page.getByRole("figure", { name: "Return a year over the 5 years before" });
+  assert.equal(plain(await rolled.locator("p.note").textContent()), `Over any 5 years of the record \u201cAll in stocks\u201d earned between ${percent(Math.min(...five))} and ${percent(Math.max(...five))} a year.`);
   const map = await cells("Returns of All in stocks quarter by quarter");
   assert.deepEqual(map[0].slice(1), ["Mar", "Jun", "Sep", "Dec", "Whole year"]);
   assert.deepEqual(map.find(([year]) => year === "2008").slice(1), [...lived.slice(8, 12).map((growth) => percent(growth - 1)), percent(of2008)]);
@@ -137,11 +140,12 @@ test("what every strategy did is saved as a file", async () => {
 });
 
 test("falls, years and months of a track record are those of its levels", async () => {
-  const { belowHighest, compounded, grouped, places, returnsOf, worstFalls } = await dashboardModule("track.js");
+  const { belowHighest, compounded, grouped, places, returnsOf, rolling, worstFalls } = await dashboardModule("track.js");
   const levels = [100, 110, 99, 121, 60.5, 90, 121, 120];
   assert.deepEqual(worstFalls(belowHighest(levels), 2).map(({ depth, from, to, back }) => [Number(depth.toFixed(6)), from, to, back]), [[-0.5, 3, 4, 6], [-0.1, 1, 2, 3]]);
   assert.equal(worstFalls(belowHighest(levels), 9).at(-1).back, null);
   assert.ok(Math.abs(compounded(returnsOf(levels)) - 0.2) < 1e-12);
+  assert.deepEqual(rolling(levels, 1.5, 2).map((back) => (back === null ? null : Number(((1 + back) ** 1.5).toFixed(6)))), [null, null, null, 1.21, 0.55, 0.909091, 1, 1.983471]);
   const days = places(["2008-01-30", "2008-01-31", "2008-02-01", "2009-02-02"], 4, 252);
   assert.deepEqual(grouped(days, ({ year, part }) => `${year} ${part}`), [["2008 01", [0, 1]], ["2008 02", [2]], ["2009 02", [3]]]);
   assert.deepEqual(places(null, 14, 12).slice(11, 13), [{ year: "1", part: "12" }, { year: "2", part: "1" }]);

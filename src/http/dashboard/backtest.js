@@ -10,13 +10,15 @@ import { allocation, count, counted, figures, minus, percent, percentTick, tick,
 import { dated, unitOf } from "./periods.js";
 import { FRAMEWORKS, investorWords, percentName } from "./specification.js";
 import { colourOf, colourOfLevel } from "./strategies.js";
-import { belowHighest, compounded, grouped, places, returnsOf, worstFalls } from "./track.js";
+import { belowHighest, compounded, grouped, places, returnsOf, rolling, worstFalls } from "./track.js";
 import { changing, ordinal } from "./verdict.js";
 
 /** Falls listed. */
 const FALLS = 5;
 /** Years below which no strategy is called better than another. */
 const FEWEST_YEARS = 10;
+/** Years that roll through the record: the first that it holds twice. */
+const ROLLING = [5, 1];
 const KNOWN = ["all-bank", "60/40", "all-stock"];
 
 /** The report with what is said and drawn of it. */
@@ -175,6 +177,7 @@ function course(told, line) {
       y: { format: percent, tick: percentTick, also: [0] },
       series: [...new Set([line, told.market])].map((one) => drawn(one, belowHighest(one.wealth))),
     }),
+    ...overYears(told, line, { gutter, x }, drawn),
     lineChart({
       title: told.held,
       gutter,
@@ -182,6 +185,28 @@ function course(told, line) {
       x: { ...x, ...times.during },
       y: { format: allocation, tick: percentTick, also: [0, 0.1] },
       series: [drawn(line, [...line.periods.allocation, null])],
+    }),
+  ];
+}
+
+/** The return a year over the years before, whenever one looks: no single start or end decides. */
+function overYears(told, line, placed, drawn) {
+  const { periods_per_year, market } = told;
+  const span = ROLLING.find((years) => line.wealth.length > 2 * years * periods_per_year);
+  if (!span) return [];
+  const of = (one) => rolling(one.wealth, span, periods_per_year);
+  const [own, theirs] = [of(line), of(market)];
+  const all = own.filter((back) => back !== null);
+  const behind = own.filter((back, k) => back !== null && back < theirs[k]).length;
+  const against = line === market ? "" : ` In ${percent(behind / all.length, 0)} of them that was less than \u201c${market.name}\u201d earned.`;
+  return [
+    lineChart({
+      ...placed,
+      title: `Return a year over the ${span > 1 ? `${span} years` : "year"} before`,
+      height: 170,
+      y: { format: percent, tick: percentTick, also: [0] },
+      series: beside(told, line).map((one) => drawn(one, of(one))),
+      note: `Over any ${counted(span, "year")} of the record \u201c${line.name}\u201d earned between ${percent(Math.min(...all))} and ${percent(Math.max(...all))} a year.${against}`,
     }),
   ];
 }

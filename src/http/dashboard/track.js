@@ -1,4 +1,4 @@
-// A track record: how far wealth lay below its highest, the worst of those falls, and returns by the year and by the month.
+// A track record: how far wealth lay below its highest, the worst of those falls, and returns by the year, by the month and over years that roll.
 
 /** How far each level lies below the highest so far, 0 or less. */
 export function belowHighest(levels) {
@@ -30,6 +30,10 @@ export function worstFalls(falls, most) {
 
 /** The return of each period, of levels one more than there are periods. */
 export const returnsOf = (levels) => levels.slice(1).map((level, index) => level / levels[index] - 1);
+
+/** At each level the return a year since `years` before, of levels `a_year` to the year; null where there is nothing so long before. */
+export const rolling = (levels, years, a_year) =>
+  levels.map((level, at) => (at < Math.round(years * a_year) ? null : (level / levels[at - Math.round(years * a_year)]) ** (1 / years) - 1));
 
 /** Returns one after the other, as one. */
 export const compounded = (returns) => returns.reduce((level, back) => level * (1 + back), 1) - 1;
