@@ -28,7 +28,7 @@ export function policyLink(id, asked = true) {
 export const tagList = (tags) => (tags.length > 0 ? h("span", { class: "tags" }, tags.map((tag) => h("span", { class: "tag" }, tag))) : null);
 
 /** The tags in a text, apart by commas; what stands in quotes is one tag, a quote in it doubled. */
-export const tagsOf = (text) =>
+const tagsOf = (text) =>
   [...text.matchAll(/\s*(?:"((?:[^"]|"")*)"\s*|([^,]*))(?:,|$)/g)]
     .map(([, whole, plain]) => (whole === undefined ? plain : whole.replaceAll('""', '"')).trim())
     .filter(Boolean);

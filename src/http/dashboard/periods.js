@@ -3,7 +3,6 @@
 import { standing } from "./flows.js";
 
 const DAY = 86_400_000;
-const DAYS_A_YEAR = 365.25;
 /** Days between two last days, at least and at most, by the unit they tell; and that unit's months or days. */
 const UNITS = [
   { unit: "day", least: 1, most: 4 },
@@ -52,18 +51,6 @@ function later(time, months) {
 
 /** The day that it is where the reader is, as 2008-09-30. */
 export const isoDay = (now) => [now.getFullYear(), now.getMonth() + 1, now.getDate()].map((part) => String(part).padStart(2, "0")).join("-");
-
-/** The last day of the period after the one that ended on `date`; null where it is not said how many periods a year has. */
-export function nextDay(date, periods_per_year) {
-  if (!(periods_per_year > 0)) return null;
-  const [time, unit] = [parsed(date), unitOf(periods_per_year)];
-  const { months, days } = UNITS.find((one) => one.unit === unit) ?? {};
-  if (months) return written(later(time, months));
-  if (unit !== "day") return written(time + (days ?? Math.max(1, Math.round(DAYS_A_YEAR / periods_per_year))) * DAY);
-  // Markets rest on Saturdays and Sundays.
-  const weekday = new Date(time).getUTCDay();
-  return written(time + (weekday === 5 ? 3 : weekday === 6 ? 2 : 1) * DAY);
-}
 
 /** By how many days `today` is later than `next`. */
 export const daysLate = (next, today) => Math.max(0, Math.round((parsed(today) - parsed(next)) / DAY));
