@@ -140,6 +140,16 @@ test("paper holds the charts in its width, and nothing to press", async () => {
   await page.setViewportSize({ width: 1280, height: 900 });
 });
 
+test("charts are drawn anew for paper, where letters keep their size, and again for the screen", async () => {
+  await go();
+  const widths = () => page.evaluate(() => [...document.querySelectorAll(".plot svg")].map(({ width }) => width.baseVal.value));
+  const seen = await widths();
+  await page.evaluate(() => addEventListener("beforeprint", () => (window.printed = [...document.querySelectorAll(".plot svg")].map(({ width }) => width.baseVal.value))));
+  await page.pdf({ format: "A4" });
+  assert.deepEqual(await page.evaluate(() => window.printed), seen.map(() => 672));
+  assert.deepEqual([await widths(), seen.length > 3], [seen, true]);
+});
+
 const saved = async (button) => {
   const [file] = await Promise.all([page.waitForEvent("download"), button.click()]);
   return { name: file.suggestedFilename(), bytes: await readFile(await file.path()) };

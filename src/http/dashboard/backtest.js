@@ -267,7 +267,7 @@ function map({ dates, unit }, line, where, byYear, called) {
     const back = cells.get(`${year} ${part}`);
     return back === undefined ? "" : h("span", { class: `shaded ${shade(back)}` }, percent(back));
   };
-  const whole = { name: "Whole year", numeric: true, cell: ([, indices]) => percent(compounded(indices.map((index) => returns[index]))) };
+  const whole = { name: "Whole year", numeric: true, cell: ([, indices]) => h("span", { class: "shaded" }, percent(compounded(indices.map((index) => returns[index])))) };
   const name = (part) => (dates ? MONTHS[part - 1] : part);
   const grain = dates && parts.length > 4 ? "month" : unit;
   const drawn = table(

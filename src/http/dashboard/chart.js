@@ -74,10 +74,17 @@ export function plot(height, draw) {
     );
     holder.replaceChildren(picture);
   };
-  holder.redraw = () => holder.clientWidth > 0 && drawn(Math.max(LEAST_WIDTH, holder.clientWidth));
-  new ResizeObserver(holder.redraw).observe(holder);
+  holder.redraw = (width = holder.clientWidth) => holder.clientWidth > 0 && drawn(Math.max(LEAST_WIDTH, width));
+  new ResizeObserver(() => holder.redraw()).observe(holder);
   return holder;
 }
+
+/** A page of A4 between the margins of print.css, in pixels: drawings as wide keep the size of their letters on paper. */
+const PAPER_WIDTH = 672;
+
+const redrawAll = (width) => document.querySelectorAll(".plot").forEach((holder) => holder.redraw(width));
+globalThis.addEventListener?.("beforeprint", () => redrawAll(PAPER_WIDTH));
+globalThis.addEventListener?.("afterprint", () => redrawAll());
 
 /**
  * Lets a reader walk along `count` positions of a plot by pointer or arrow keys.
@@ -247,7 +254,9 @@ export function lineChart({ title, x, y, series: given, height = 190, note, star
     position = at;
     const index = shown[at];
     here.textContent = x.here ? x.here(x.values[index]) : `${x.label} ${x.format(x.values[index])}`;
-    const words = series.map((one, k) => (outputs[k].textContent = said(one, index)));
+    const words = series.map((one) => said(one, index));
+    // Dots stand where others do not: what is not here goes unsaid beside its name.
+    series.forEach(({ apart, values }, k) => (outputs[k].textContent = apart && !Number.isFinite(values[index]) ? "" : words[k]));
     mark();
     return `${here.textContent}: ${series.map(({ name }, k) => `${name} ${words[k]}`).join(", ")}`;
   };
