@@ -75,6 +75,7 @@ test("the reproduction says in two columns what agrees and what differs", async 
   await open("paper/reproduction.html");
   const [agrees, differs] = await Promise.all(["agrees", "differs"].map((name) => page.locator(`.verdicts.${name} li`).count()));
   assert.ok(agrees > 0 && agrees + differs > 5, `${agrees} and ${differs}`);
+  assert.doesNotMatch((await page.locator(".verdicts").allInnerTexts()).join(" "), /[\s[(]-\d/);
   for (const name of ["Figure 1", /Table 1 and Figure 2/, /Table 2 and Figure 2/, /frontier/, /Convergence/]) await page.getByRole("heading", { name }).waitFor();
   await accessible(page, "reproduction");
 });

@@ -2,7 +2,7 @@
 
 import { lineChart } from "./chart.js";
 import { h, section, table } from "./dom.js";
-import { count, percent, percentTick, significant, tick } from "./format.js";
+import { count, minus, percent, percentTick, significant, tick } from "./format.js";
 import { histogram } from "./histogram.js";
 import { PAPER } from "./specification.js";
 import { colourOf, colourOfMix } from "./strategies.js";
@@ -38,7 +38,7 @@ export function body({ plan, quick, sample_size, findings, section: found, study
 }
 
 const verdicts = (title, some) =>
-  h("div", {}, h("h3", {}, `${title}: ${count(some.length)}`), h("ul", { class: `verdicts ${title.toLowerCase()}` }, some.map(({ statement, found }) => h("li", {}, h("b", {}, statement), " ", found))));
+  h("div", {}, h("h3", {}, `${title}: ${count(some.length)}`), h("ul", { class: `verdicts ${title.toLowerCase()}` }, some.map(({ statement, found }) => h("li", {}, h("b", {}, minus(statement)), " ", minus(found)))));
 
 function quantiles({ quantiles: { shown, drawn, mean }, all }) {
   const domain = [Math.min(...shown), Math.max(...shown)];
