@@ -2,7 +2,7 @@
 
 import { post } from "./api.js";
 import { announce, h } from "./dom.js";
-import { fieldset, input, select, showProblem } from "./form.js";
+import { fieldset, input, refusal, select, sending } from "./form.js";
 import { fraction, typed } from "./number_text.js";
 import { unitOf } from "./periods.js";
 import { returnsField } from "./returns_field.js";
@@ -73,7 +73,6 @@ function asking() {
     yearly.element.hidden = record === null || Boolean(record.periods_per_year);
   };
   shown();
-  const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
   const send = h("button", { type: "submit" }, "Backtest");
   const more = h("details", {}, h("summary", {}, "How it walks, and for the quant"), fieldset("How it walks", [window, every, horizon, levels, blind, points, seed]));
   const form = h(
@@ -82,7 +81,7 @@ function asking() {
     h("fieldset", {}, h("legend", {}, "The record"), source.element),
     fieldset("The investor", [investor, aversion, rate, yearly, cost]),
     more,
-    message,
+    refusal(),
     h("p", { class: "send" }, send, h("span", { class: "note" }, "Runs in the background. Ten years of months take a minute or two.")),
   );
   const text = ({ control }) => control.value.trim();
@@ -103,24 +102,17 @@ function asking() {
     for (const field of isSeveral() ? [every, seed] : [window, every, horizon, points, seed]) if (text(field) !== "") request[field.name] = typed(text(field));
     return request;
   };
-  form.addEventListener("submit", async (event) => {
-    event.preventDefault();
+  const ask = async () => {
     const trouble = await source.trouble();
-    if (trouble) return showProblem(form, message, { field: "log_returns", message: trouble });
-    if (text(rate) === "" && !record.rate) return showProblem(form, message, { field: "rate", message: "What the bank paid is needed: a number here, or a column of the record." });
-    send.disabled = true;
-    try {
-      const request = compose();
-      const { job, warnings } = await post("/backtest", request);
-      announce("The backtest is queued.");
-      const at = `#/backtests/${job}`;
-      if (warnings.length > 0) form.replaceWith(queued("backtest", at, warnings, { ...request, rate_per_step: request.rate }));
-      else location.hash = at;
-    } catch (error) {
-      if (error.field === "windows") error.field = window.name;
-      showProblem(form, message, error);
-    }
-    send.disabled = false;
-  });
+    if (trouble) throw { field: "log_returns", message: trouble };
+    if (text(rate) === "" && !record.rate) throw { field: "rate", message: "What the bank paid is needed: a number here, or a column of the record." };
+    const request = compose();
+    const { job, warnings } = await post("/backtest", request);
+    announce("The backtest is queued.");
+    const at = `#/backtests/${job}`;
+    if (warnings.length > 0) form.replaceWith(queued("backtest", at, warnings, { ...request, rate_per_step: request.rate }));
+    else location.hash = at;
+  };
+  sending(form, send, ask, { told: (error) => error.field === "windows" && (error.field = window.name) });
   return form;
 }

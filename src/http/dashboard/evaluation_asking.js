@@ -2,7 +2,7 @@
 
 import { get, post } from "./api.js";
 import { announce, h } from "./dom.js";
-import { fieldset, input, select, showProblem } from "./form.js";
+import { fieldset, input, refusal, select, sending } from "./form.js";
 import { typed } from "./number_text.js";
 import { all } from "./pages.js";
 import { policyChoices } from "./session_opening.js";
@@ -44,13 +44,12 @@ function asking(policies, asked) {
   const drawn = () => (count.element.hidden = histories.control.value !== "drawn");
   histories.control.addEventListener("change", drawn);
   drawn();
-  const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
   const send = h("button", { type: "submit" }, "Evaluate");
   const form = h(
     "form",
     { novalidate: true },
     fieldset("What to compare", [policy, histories, count, paths, frameworks]),
-    message,
+    refusal(),
     h(
       "p",
       { class: "send" },
@@ -62,26 +61,19 @@ function asking(policies, asked) {
       ),
     ),
   );
-  form.addEventListener("submit", async (event) => {
-    event.preventDefault();
-    send.disabled = true;
-    try {
-      const { specification } = await get(`/policies/${policy.control.value}`);
-      const request = composed(specification, policy.control.value, {
-        frameworks: [...frameworks.querySelectorAll(":checked")].map(({ value }) => value),
-        paths: typed(paths.control.value),
-        histories:
-          histories.control.value === "drawn"
-            ? { kind: "drawn", count: typed(count.control.value) }
-            : { kind: "given" },
-      });
-      const job = await post("/evaluate", request);
-      announce("The evaluation is queued.");
-      location.hash = `#/evaluations/${job.job}`;
-    } catch (error) {
-      showProblem(form, message, error);
-    }
-    send.disabled = false;
+  sending(form, send, async () => {
+    const { specification } = await get(`/policies/${policy.control.value}`);
+    const request = composed(specification, policy.control.value, {
+      frameworks: [...frameworks.querySelectorAll(":checked")].map(({ value }) => value),
+      paths: typed(paths.control.value),
+      histories:
+        histories.control.value === "drawn"
+          ? { kind: "drawn", count: typed(count.control.value) }
+          : { kind: "given" },
+    });
+    const job = await post("/evaluate", request);
+    announce("The evaluation is queued.");
+    location.hash = `#/evaluations/${job.job}`;
   });
   return form;
 }

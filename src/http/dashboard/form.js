@@ -121,6 +121,25 @@ export async function pressed(button, act, words = failureWords) {
   }
 }
 
+/** Where a form says what is amiss with no field of it in particular. */
+export const refusal = () => h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
+
+/** At every sending of `form` does what is asked for, while `button` rests. Why that failed stands at the field it names, or in the
+ * form's own message or `otherwise`, once `told(error)` has seen it. */
+export function sending(form, button, act, { otherwise, told } = {}) {
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    button.disabled = true;
+    try {
+      await act();
+    } catch (error) {
+      told?.(error);
+      showProblem(form, form.querySelector(":scope > .error"), error, otherwise);
+    }
+    button.disabled = false;
+  });
+}
+
 /** The last part of a field's path, as a label would have it: `design.sampling_law.degrees_of_freedom` is Degrees of freedom. */
 function inWords(path) {
   const last = path.replace(/\[\d+\]/g, "").split(".").at(-1).replaceAll("_", " ");

@@ -2,7 +2,7 @@
 
 import { get, patch } from "./api.js";
 import { announce, h } from "./dom.js";
-import { area, input, showProblem } from "./form.js";
+import { area, input, refusal, sending } from "./form.js";
 import { short } from "./format.js";
 
 /** What a thing is called in a sentence. */
@@ -77,25 +77,17 @@ export function labelled(noun, path, id, labels) {
     const fields = labelFields({ within: "label-" });
     fields.show(labels);
     const before = fields.read({ all: true });
-    const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
     const save = h("button", { type: "submit" }, "Save");
     const leave = h("button", { type: "button", class: "quiet", onclick: () => rest().focus() }, "Leave as it was");
-    const form = h("form", { novalidate: true, "aria-label": `What this ${noun.toLowerCase()} is called` }, h("div", { class: "fields" }, fields.parts.map((part) => part.element)), message, h("p", { class: "send" }, save, leave));
-    form.addEventListener("submit", async (event) => {
-      event.preventDefault();
-      save.disabled = true;
-      try {
-        const edited = Object.entries(fields.read({ all: true })).filter(([name, value]) => JSON.stringify(value) !== JSON.stringify(before[name]));
-        if (edited.length > 0) labels = await patch(path, Object.fromEntries(edited));
-        const title = titled(noun, id, labels.name);
-        document.querySelector("h1").textContent = title;
-        document.title = `${title} \u00b7 Ballast`;
-        rest().focus();
-        announce(`It is called ${title}.`);
-      } catch (error) {
-        showProblem(form, message, error);
-      }
-      save.disabled = false;
+    const form = h("form", { novalidate: true, "aria-label": `What this ${noun.toLowerCase()} is called` }, h("div", { class: "fields" }, fields.parts.map((part) => part.element)), refusal(), h("p", { class: "send" }, save, leave));
+    sending(form, save, async () => {
+      const edited = Object.entries(fields.read({ all: true })).filter(([name, value]) => JSON.stringify(value) !== JSON.stringify(before[name]));
+      if (edited.length > 0) labels = await patch(path, Object.fromEntries(edited));
+      const title = titled(noun, id, labels.name);
+      document.querySelector("h1").textContent = title;
+      document.title = `${title} \u00b7 Ballast`;
+      rest().focus();
+      announce(`It is called ${title}.`);
     });
     element.replaceChildren(form);
     fields.name.control.focus();

@@ -2,7 +2,7 @@
 
 import { get, post } from "./api.js";
 import { h } from "./dom.js";
-import { fieldset, input, select, showProblem } from "./form.js";
+import { fieldset, input, refusal, select, sending, showProblem } from "./form.js";
 import { moment, short } from "./format.js";
 import { labelFields } from "./naming.js";
 import { fraction, typed } from "./number_text.js";
@@ -71,7 +71,8 @@ function opening(policies, asked, leaving) {
     history.element,
   );
   const more = h("details", {}, h("summary", {}, "Tags and notes"), h("div", { class: "fields" }, labels.tags.element, labels.notes.element));
-  const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
+  const message = refusal();
+  const open = h("button", { type: "submit" }, "Open");
   const form = h(
     "form",
     { novalidate: true },
@@ -80,12 +81,11 @@ function opening(policies, asked, leaving) {
     other,
     more,
     message,
-    h("p", { class: "send" }, h("button", { type: "submit" }, "Open")),
+    h("p", { class: "send" }, open),
   );
-  form.addEventListener("submit", async (event) => {
-    event.preventDefault();
+  sending(form, open, async () => {
     const trouble = await history.trouble();
-    if (trouble) return showProblem(form, message, { field: "history", message: trouble });
+    if (trouble) throw { field: "history", message: trouble };
     if (!(await choosing) && !(await choose())) return;
     const request = { policy: policy.control.value, ...labels.read() };
     if (known.length > 0) request.history = assets ? byDate(known, assets) : known[0].log_returns;
@@ -99,12 +99,8 @@ function opening(policies, asked, leaving) {
     if (going.control.value === "rolls") request.rolling = true;
     if (going.control.value === "renews")
       request.renew = { every: typed(every.control.value), window: typed(window.control.value) };
-    try {
-      const { session } = await post("/sessions", request);
-      location.hash = `#/sessions/${session}`;
-    } catch (error) {
-      showProblem(form, message, error);
-    }
+    const { session } = await post("/sessions", request);
+    location.hash = `#/sessions/${session}`;
   });
   return form;
 }

@@ -2,7 +2,7 @@
 
 import { get, post } from "./api.js";
 import { announce, h } from "./dom.js";
-import { fieldset, showProblem } from "./form.js";
+import { fieldset, refusal, sending } from "./form.js";
 import { labelFields, policyLink } from "./naming.js";
 import { returnsField } from "./returns_field.js";
 import { queued } from "./specification.js";
@@ -64,7 +64,6 @@ export async function view(query, leaving) {
   const asked = new URLSearchParams(query ?? "");
   const origin = asked.get("from") ?? asked.get("newer");
   let request = origin ? await like(origin, leaving) : initial();
-  const message = h("p", { class: "error", role: "alert", hidden: true });
   const json = h("textarea", { id: "json", rows: 18, spellcheck: "false", "aria-describedby": "json-note json-error" });
   const jsonError = h("p", { id: "json-error", class: "error", hidden: true });
   const source = returnsField({
@@ -137,7 +136,7 @@ export async function view(query, leaving) {
     fields.elements,
     fieldset("What it is called", labels.parts),
     advanced,
-    message,
+    refusal(),
     h(
       "p",
       { class: "send" },
@@ -145,22 +144,15 @@ export async function view(query, leaving) {
       h("span", { class: "note" }, "Trains in the background; the job list shows how far it is."),
     ),
   );
-  form.addEventListener("submit", async (event) => {
-    event.preventDefault();
+  const ask = async () => {
     const trouble = await source.trouble();
-    if (trouble) return showProblem(form, message, { field: "problem.history", message: trouble });
-    send.disabled = true;
-    try {
-      const job = await post("/train", json.value);
-      announce(`Training ${job.job} is queued.`);
-      if (job.warnings.length > 0) form.replaceWith(queued("training", "#/jobs", job.warnings, request.problem));
-      else location.hash = "#/jobs";
-    } catch (error) {
-      if (error.field === "body") advanced.open = true;
-      showProblem(form, message, error, json);
-    }
-    send.disabled = false;
-  });
+    if (trouble) throw { field: "problem.history", message: trouble };
+    const job = await post("/train", json.value);
+    announce(`Training ${job.job} is queued.`);
+    if (job.warnings.length > 0) form.replaceWith(queued("training", "#/jobs", job.warnings, request.problem));
+    else location.hash = "#/jobs";
+  };
+  sending(form, send, ask, { otherwise: json, told: (error) => error.field === "body" && (advanced.open = true) });
   fields.show(request);
   if (origin) showRecord();
   written();
