@@ -2,7 +2,7 @@
 
 import { h } from "./dom.js";
 import { standing } from "./flows.js";
-import { input, select } from "./form.js";
+import { input, refusal, select } from "./form.js";
 import { reportFields, sendReports } from "./report_fields.js";
 import { severalFields } from "./several_fields.js";
 
@@ -29,7 +29,7 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
     inputmode: "text",
     maxlength: 200,
   });
-  const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
+  const message = refusal();
   const button = h("button", { type: "submit" }, "Put it right");
   const form = h(
     "form",

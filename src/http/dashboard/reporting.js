@@ -3,7 +3,7 @@
 import { get, post } from "./api.js";
 import { announce, h, section, table } from "./dom.js";
 import { fileDrop } from "./file_drop.js";
-import { area, fieldset, input, select } from "./form.js";
+import { area, fieldset, input, refusal, select } from "./form.js";
 import { count, counted, percent, wealth } from "./format.js";
 import { headed } from "./naming.js";
 import { all } from "./pages.js";
@@ -73,7 +73,7 @@ function reporting(sessions, chosen, leaving) {
   const doubt = h("div", { hidden: true, role: "group" }, unitWords, unit.element);
   const preview = h("div", {});
   const outcome = h("div", {});
-  const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
+  const message = refusal();
   const button = h("button", { type: "submit" }, "Report");
   const isLate = ({ last_report_ms }) => Boolean(last_report_ms) && Date.now() - last_report_ms < LATELY;
   const say = (words) => {
