@@ -17,8 +17,9 @@ import pandas as pd
 import pytest
 from conftest import RETURNS, Service, train
 
-from ballast import AsyncBallast, Ballast, Policy, Training, UnclearReturns
-from ballast.returns import Kind, dates_of, log_returns
+from ballast import AsyncBallast, Ballast, UnclearReturns
+from ballast.policy import Opening
+from ballast.returns import Kind, dates_of, log_returns, per_period
 
 SIMPLE = [0.02, -0.05, 0.0]
 LOGS = [math.log(1.02), math.log(0.95), 0.0]
@@ -167,6 +168,12 @@ def test_a_walk_forward_takes_dates_and_rates_from_pandas(ballast: Ballast) -> N
         prices.to_list(), kind="price", rate=rate.to_list(), dates=[str(date) for date in quarters], **choices
     ).report()
     assert plain == report
+    # The first change of a price is none, and neither it nor what the bank paid beside it is a period.
+    changes = prices.pct_change()
+    later = ballast.backtest(changes.dropna(), rate=rate[1:], **choices).report()
+    assert ballast.backtest(changes, rate=rate, **choices).report() == later
+    table = pd.DataFrame({"stocks": changes, "bonds": 0.3 * changes.shift(-1)}).shift(-1)
+    assert per_period("rate", range(13), table, 12, "simple") == list(range(12))
     with pytest.raises(ValueError, match="rate has another index than returns: align the two first"):
         ballast.backtest(prices, kind="price", rate=rate.shift(freq="D"), **choices)
     with pytest.raises(ValueError, match="dates has 12 entries: must have 13, one for each entry of returns"):
@@ -311,16 +318,13 @@ def test_nothing_imports_pandas_or_numpy() -> None:
 
 
 def test_what_is_learned_from_is_read_everywhere_by_one_rule(ballast: Ballast) -> None:
-    calls = [
-        call
-        for made in (Ballast, Policy, Training)
-        for name in dir(made)
-        if not name.startswith("_") and callable(call := getattr(made, name)) and "kind" in signature(call).parameters
-    ]
-    assert len(calls) == 9
+    public = [getattr(Ballast, name) for name in dir(Ballast) if not name.startswith("_")]
+    calls = [call for call in public if callable(call) and "kind" in signature(call).parameters]
+    assert len(calls) == 7
     for call in calls:
         defaults = {name: signature(call).parameters[name].default for name in ("kind", "choices")}
         assert defaults == {"kind": None, "choices": None}, call
+    assert {"kind", "choices"} <= Opening.__optional_keys__
     # Of numbers with losses simple returns are read, and log-returns where they are said to be.
     policy = train(ballast).policy()
     for more, told in (({}, [math.log1p(value) for value in RETURNS]), ({"kind": "log"}, RETURNS)):

@@ -5,13 +5,15 @@ from __future__ import annotations
 import inspect
 import json
 import math
+from typing import cast
 
 import numpy as np
 import pytest
 from conftest import REPOSITORY, RETURNS, Network, compare, train, walk
 
 import ballast as package
-from ballast import Ballast, Policy, Session, Training, frames, wire
+from ballast import Ballast, Session, frames, wire
+from ballast.policy import Opening
 
 
 def test_an_investor_lives_to_the_horizon(session: Session) -> None:
@@ -358,12 +360,13 @@ def test_every_field_of_a_specification_is_an_argument() -> None:
     assert arguments == (set(problem) - {"history"}) | of_whole | set(wire.Relabel.__annotations__)
 
 
-def test_a_training_opens_sessions_as_its_policy_does() -> None:
-    training, policy = inspect.signature(Training.session).parameters, inspect.signature(Policy.session).parameters
-    assert set(training) - {"watch"} == set(policy)
-    assert set(policy) - {"self", "kind", "choices", "idempotency_key"} == set(wire.OpenSession.__annotations__) - {
-        "policy"
-    }
+def test_every_field_of_an_opening_is_an_argument(ballast: Ballast, session: Session) -> None:
+    of_returns = {"kind", "choices", "idempotency_key"}
+    assert set(Opening.__annotations__) - of_returns == set(wire.OpenSession.__annotations__) - {"policy"}
+    blank = cast(Opening, dict.fromkeys(Opening.__annotations__))
+    opened = ballast.policy(session.policy).session(**blank)
+    assert (opened.policy, opened.wealth, opened.holding) == (session.policy, 100.0, 0.0)
+    opened.delete()
 
 
 def test_every_field_of_a_report_is_an_argument() -> None:

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING, Any, cast
 from urllib.parse import quote
 
 import httpx
-from typing_extensions import Self
+from typing_extensions import Self, Unpack
 
 from . import frames, plots, wire
 from .driving import Answering, awaiting_into, blocking, blocking_into
 from .errors import JobEnded, ProblemError, Unreachable
 from .events import Parser
-from .policy import AsyncPolicy, Policy, _Policy
+from .policy import AsyncPolicy, Opening, Policy, _Policy
 from .progress import TERMINAL, Watch
-from .returns import Kind, Returns
 from .session import AsyncSession, Session
 from .transport import RETRIED_STATUS, Transport, growing_pause
 
@@ -120,39 +119,9 @@ class _Training(_Job):
             raise JobEnded(self.job)
         return policy
 
-    async def _session(
-        self,
-        *,
-        history: Returns | None = None,
-        kind: Kind | None = None,
-        choices: wire.Choices | None = None,
-        wealth: float | None = None,
-        holding: float | None = None,
-        holdings: Mapping[str, float] | None = None,
-        renew: wire.Renewing | None = None,
-        rolling: bool = False,
-        name: str | None = None,
-        notes: str | None = None,
-        tags: Sequence[str] | None = None,
-        idempotency_key: str | None = None,
-        watch: Watch | None = None,
-    ) -> wire.Session:
+    async def _session(self, *, watch: Watch | None = None, **opening: Unpack[Opening]) -> wire.Session:
         """Waits for the policy and opens a session of it, as :meth:`Policy.session` does."""
-        policy = _Policy(self._transport, await self._policy(watch))
-        return await policy._session(
-            history=history,
-            kind=kind,
-            choices=choices,
-            wealth=wealth,
-            holding=holding,
-            holdings=holdings,
-            renew=renew,
-            rolling=rolling,
-            name=name,
-            notes=notes,
-            tags=tags,
-            idempotency_key=idempotency_key,
-        )
+        return await _Policy(self._transport, await self._policy(watch))._session(**opening)
 
 
 class _Evaluation(_Job):

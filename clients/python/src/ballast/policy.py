@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from typing import cast
+from typing import Any, TypedDict, cast
 from urllib.parse import quote
+
+from typing_extensions import Unpack
 
 from . import wire
 from .driving import Answering, awaiting_into, blocking, blocking_into
@@ -14,6 +16,23 @@ from .labels import Labelled
 from .returns import Kind, Returns, read, read_assets
 from .session import AsyncSession, Session
 from .transport import Transport, idempotent
+
+
+class Opening(TypedDict, total=False):
+    """What a session may be opened with; :meth:`Policy.session` says what each means."""
+
+    history: Returns | None
+    kind: Kind | None
+    choices: wire.Choices | None
+    wealth: float | None
+    holding: float | None
+    holdings: Mapping[str, float] | None
+    renew: wire.Renewing | None
+    rolling: bool
+    name: str | None
+    notes: str | None
+    tags: Sequence[str] | None
+    idempotency_key: str | None
 
 
 class _Policy(Labelled):
@@ -36,22 +55,7 @@ class _Policy(Labelled):
             raise DamagedPolicy(f"the exported bytes hash to {found}: must be {self.id}")
         return document
 
-    async def _session(
-        self,
-        *,
-        history: Returns | None = None,
-        kind: Kind | None = None,
-        choices: wire.Choices | None = None,
-        wealth: float | None = None,
-        holding: float | None = None,
-        holdings: Mapping[str, float] | None = None,
-        renew: wire.Renewing | None = None,
-        rolling: bool = False,
-        name: str | None = None,
-        notes: str | None = None,
-        tags: Sequence[str] | None = None,
-        idempotency_key: str | None = None,
-    ) -> wire.Session:
+    async def _session(self, **opening: Unpack[Opening]) -> wire.Session:
         """Opens a session of an investor.
 
         ``history`` is what the investor has seen, ``wealth`` what he has; by default both are the policy's own.
@@ -63,21 +67,15 @@ class _Policy(Labelled):
         again, even from another process, give the same session, at its first period; ``Session.refresh`` tells how far
         it is.
         """
-        request: wire.OpenSession = {
-            "policy": self.id,
-            "wealth": wealth,
-            "holding": holding,
-            "renew": renew,
-            "rolling": rolling,
-            "name": name,
-            "notes": notes,
-            "tags": None if tags is None else list(tags),
-        }
-        if holdings is not None:
-            request["holdings"] = dict(holdings)
-        if history is not None:
-            request["history"] = await self._known(history, kind, choices)
-        headers = idempotent(idempotency_key)
+        given: dict[str, Any] = {name: value for name, value in opening.items() if value is not None}
+        kind, choices, key = (given.pop(name, None) for name in ("kind", "choices", "idempotency_key"))
+        if "tags" in given:
+            given["tags"] = list(given["tags"])
+        if "holdings" in given:
+            given["holdings"] = dict(given["holdings"])
+        if "history" in given:
+            given["history"] = await self._known(given["history"], kind, choices)
+        request, headers = {"policy": self.id, **given}, idempotent(key)
         return cast(wire.Session, await self._transport.json("POST", "/sessions", body=request, headers=headers))
 
     async def _known(

@@ -217,18 +217,30 @@ def day(date: object) -> str:
 
 
 def per_period(name: str, values: Iterable[Any], returns: Returns, periods: int, kind: Kind) -> list[Any]:
-    """What was given for each entry of the returns, as one for each period: the first price has none.
+    """What was given for each entry of the returns, as one for each period: the first price has none, and neither have
+    entries before and after the numbers that hold none.
 
     Raises ``ValueError`` that names the argument and the rule: as many entries, and the same index where both have one.
     """
-    found, entries = list(values), periods + (kind == "price")
-    if len(found) != entries:
-        raise ValueError(f"{name} has {len(found)} entries: must have {entries}, one for each entry of returns")
+    found, (before, after) = list(values), _blank(returns)
+    last = before + (kind == "price") + periods
+    if len(found) != last + after:
+        raise ValueError(f"{name} has {len(found)} entries: must have {last + after}, one for each entry of returns")
     own: Any = getattr(values, "index", None)
     index: Any = getattr(returns, "index", None)
     if hasattr(own, "equals") and hasattr(index, "equals") and not own.equals(index):
         raise ValueError(f"{name} has another index than returns: align the two first")
-    return found[entries - periods :]
+    return found[last - periods : last]
+
+
+def _blank(returns: Returns) -> tuple[int, int]:
+    """How many entries of a pandas object before and after its numbers hold none, as the first of ``pct_change()``
+    does: the service leaves them out."""
+    if not hasattr(returns, "notna"):
+        return 0, 0
+    held = returns.notna()
+    rows: list[bool] = (held.any(axis="columns") if hasattr(held, "columns") else held).tolist()
+    return (rows.index(True), rows[::-1].index(True)) if any(rows) else (0, 0)
 
 
 def _number(value: Any, place: str) -> float:
