@@ -61,6 +61,8 @@ test("a return most likely mistyped is asked about, and a right one stands besid
   assert.match(row, /-2\.00 %\s+-3\.00 %/);
   const { corrections, wealth } = await call(ballast.url, `/sessions/${session}`);
   assert.equal(corrections, 1);
+  // Only the return was typed: the day of the period stays.
+  assert.equal((await call(ballast.url, `/sessions/${session}/history`)).observations[1].now.reported.date, "2008-02-28");
   assert.ok((await main()).includes(wealth.toFixed(2)));
 });
 
