@@ -143,6 +143,7 @@ test("a key that may not train is told so without an editor springing open", asy
 
 test("a session that is not there leads back to the list", async () => {
   await go("#/sessions/session_of_nobody");
+  await page.getByText(/^There is no session '?session_of_nobody'?\. It may have been deleted\./).waitFor();
   await page.getByRole("link", { name: "See the sessions" }).click();
   await page.getByRole("heading", { level: 1, name: "Overview" }).waitFor();
 });

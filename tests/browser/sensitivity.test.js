@@ -23,7 +23,7 @@ test("the sentences say what differs, in percent", () => {
   assert.equal(
     said(near),
     "Without its return of -8.6 % the advice would be 100 %. " +
-      "After a return of -7.0 % the advice would be 0 %, after one of 6.0 % 61.2 %. " +
+      "After a return of -7.0 % the advice would be 0 %; after one of 6.0 % it would be 61.2 %. " +
       "A coming return of -6.2 % would take the advice to the bank, and a higher one would not. " +
       "The record has paid 0.51 % a period beyond the bank; the advice leaves the bank at 0.44 %.",
   );
@@ -36,7 +36,7 @@ test("who is in the bank is told what it would take, and what never would", () =
       allocation: 0,
       sensitivity: {
         without_one: { lowest: at(0.03, 0), highest: at(0.03, 0) },
-        next_return: { ...next_return, to_bank: null },
+        next_return: { ...next_return, to_bank: null, high: at(0.06, 0) },
         premium: { present: 0.0051, needed, periods_more },
       },
     });
@@ -45,6 +45,7 @@ test("who is in the bank is told what it would take, and what never would", () =
   assert.match(banked(null), /No number of periods like those seen, up to 10,000, would do.$/);
   assert.match(banked(null, null), /no other mean near it/);
   assert.match(banked(37), /^No return of the record by itself makes a difference/);
+  assert.match(banked(37), /After a return of -7\.0 %, and after one of 6\.0 % too, it would stay at 0 %\./);
 });
 
 test("how near is said first, by what an unusual period would do", () => {

@@ -7,7 +7,7 @@ import { dashboardModule } from "./modules.js";
 import { plain } from "./page.js";
 
 const { allocation, figures, minus, percentTick, tick } = await dashboardModule("format.js");
-const { grain, ticks } = await dashboardModule("chart.js");
+const { extent, grain, ticks } = await dashboardModule("chart.js");
 const { typed } = await dashboardModule("number_text.js");
 const { SOURCES } = await dashboardModule("advice.js");
 const { problemWords, unusualWords } = await dashboardModule("problem_words.js");
@@ -44,6 +44,16 @@ test("labels of an axis are told apart, and from 0, also where it has one", () =
       assert.equal(new Set(labels).size, places.length, labels.join(", "));
       labels.forEach((label, index) => assert.equal(Number(label.replace(" %", "")) === 0, places[index] === 0, `${label} for ${places[index]}`));
     }
+});
+
+test("numbers that differ by rounding alone are drawn as one, by labels of few digits", () => {
+  const values = [102.426576795, 102.426576795 + 3e-11];
+  const places = ticks(...extent(values), 3);
+  const labels = places.map((place) => tick(place, grain(places)));
+  assert.ok(labels.length >= 2 && labels.every((label) => label.length <= 6), labels.join(", "));
+  assert.deepEqual(extent([0, 0]), [-0.5, 0.5]);
+  const near = [0.0002659, 0.0002672];
+  assert.ok(extent(near)[0] > 0.000265 && extent(near)[1] < 0.000268);
 });
 
 test("a number typed is one number or none", () => {

@@ -47,13 +47,18 @@ export function scale([low, high], [from, to]) {
   return map;
 }
 
+/** Numbers that differ by less of their size differ by rounding: drawn apart, they would have labels of twelve digits. */
+const ROUNDING = 1e-9;
+
 /** The range of finite `values`, widened by a twentieth and to hold `also`. */
 export function extent(values, also = []) {
   const finite = [...values, ...also].filter(Number.isFinite);
   if (finite.length === 0) return [0, 1];
   const [low, high] = [Math.min(...finite), Math.max(...finite)];
-  const room = high > low ? 0.05 * (high - low) : 0.05 * Math.abs(high) || 0.5;
-  if (high === low) return [also.includes(low) ? low : low - room, high + room];
+  const size = Math.max(Math.abs(low), Math.abs(high));
+  const isOne = high - low <= ROUNDING * size;
+  const room = isOne ? 0.05 * size || 0.5 : 0.05 * (high - low);
+  if (isOne) return [also.includes(low) ? low : low - room, high + room];
   return [also.includes(low) ? low : low - room, also.includes(high) ? high : high + room];
 }
 

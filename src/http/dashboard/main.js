@@ -104,9 +104,9 @@ function failed(error, view) {
   const again = h("button", { onclick: show }, "Try again");
   if (error.status === 404 && view) {
     const list = h("a", { href: `#/${view}` }, `See the ${view}`);
-    return { title: "It is not here", body: [h("p", { role: "alert" }, `${error.message} It may have been deleted. `, list, ".")] };
+    return { title: "It is not here", body: [h("p", { role: "alert" }, `${capital(error.message).replace(/\.?$/, ".")} It may have been deleted. `, list, ".")] };
   }
-  return { title: error.title ?? "This view failed", body: [h("p", { role: "alert" }, error.message), again] };
+  return { title: error.title ?? "This view failed", body: [h("p", { role: "alert" }, capital(error.message)), again] };
 }
 
 document.querySelector(".skip").addEventListener("click", (event) => {

@@ -44,7 +44,7 @@ export function headline({ allocation: told, sensitivity: { next_return } }, uni
 /** What an answer with its sensitivity says. */
 export function sentences(action, unit = "period") {
   const { without_one, next_return, premium } = action.sensitivity;
-  return [...lacking(action, without_one), ...coming(next_return), ...paying(premium, unit)];
+  return [...lacking(action, without_one), ...coming(action, next_return), ...paying(premium, unit)];
 }
 
 const simple = ({ simple_return }) => percent(simple_return);
@@ -56,8 +56,12 @@ function lacking({ allocation: told }, range) {
   return differs.map((end) => `Without its return of ${simple(end)} the advice would be ${allocation(end.allocation)}.`);
 }
 
-function coming({ to_bank, to_highest, low, high }) {
-  const after = `After a return of ${simple(low)} the advice would be ${allocation(low.allocation)}, after one of ${simple(high)} ${allocation(high.allocation)}.`;
+function coming({ allocation: told }, { to_bank, to_highest, low, high }) {
+  const [now, after_low, after_high] = [told, low.allocation, high.allocation].map(allocation);
+  const stays = now === after_low && now === after_high;
+  const after = stays
+    ? `After a return of ${simple(low)}, and after one of ${simple(high)} too, it would stay at ${now}.`
+    : `After a return of ${simple(low)} the advice would be ${after_low}; after one of ${simple(high)} it would be ${after_high}.`;
   return [
     after,
     to_bank && `A coming return of ${simple(to_bank)} would take the advice to the bank, and a higher one would not.`,
