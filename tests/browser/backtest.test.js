@@ -84,6 +84,8 @@ test("it is followed to its end, and what it says comes first", async () => {
   const shown = await cells("Strategies, by what a year of each is worth");
   const worths = shown.slice(1).map(([, worth]) => Number(worth));
   assert.equal(worths.length, report.strategies.length);
+  assert.equal(worths.length, 9);
+  assert.match(words, /which nobody knew beforehand: it is given no place among the others\./);
   assert.deepEqual(worths, [...worths].sort((one, other) => other - one));
   const mixed = report.strategies.find(({ strategy }) => strategy === "60/40");
   const row = shown.find(([name]) => name === "60/40");

@@ -8,6 +8,7 @@ import { plain } from "./page.js";
 
 const { allocation, figures, minus, percentTick, tick } = await dashboardModule("format.js");
 const { extent, grain, ticks } = await dashboardModule("chart.js");
+const { summary } = await dashboardModule("jobs.js");
 const { typed } = await dashboardModule("number_text.js");
 const { SOURCES } = await dashboardModule("advice.js");
 const { problemWords, unusualWords } = await dashboardModule("problem_words.js");
@@ -54,6 +55,15 @@ test("numbers that differ by rounding alone are drawn as one, by labels of few d
   assert.deepEqual(extent([0, 0]), [-0.5, 0.5]);
   const near = [0.0002659, 0.0002672];
   assert.ok(extent(near)[0] > 0.000265 && extent(near)[1] < 0.000268);
+});
+
+test("what is left of a job is told where it can be known", () => {
+  const told = (kind, phase, seconds_left, steps_done) =>
+    plain(summary({ kind, state: "running", progress: { phase, seconds_left, steps_done, steps_total: 73, step: 1, points_done: 30, points_total: 3000 } }));
+  assert.equal(told("train", "solving", 74.2, 2), "Step 3, solving: 30 of 3000 situations, about 74 s left");
+  assert.equal(told("train", "solving", 0.4, 2), "Step 3, solving: 30 of 3000 situations, under 1 s left");
+  assert.equal(told("train", "solving", 74.2, 1), "Step 2, solving: 30 of 3000 situations");
+  assert.equal(told("evaluate", "simulating", 0.4, 72), "Simulating: 30 of 3000 paths");
 });
 
 test("a number typed is one number or none", () => {

@@ -141,7 +141,7 @@ function apart({ lines }, main, quoted) {
 
 /** What is said of them, and what each came to. */
 function resultsOfOne(told) {
-  const more = ` \u201cHindsight\u201d holds what \u201c${mainOf(told).name}\u201d held on average, which nobody knew beforehand.`;
+  const more = ` \u201cHindsight\u201d holds what \u201c${mainOf(told).name}\u201d held on average, which nobody knew beforehand: it is given no place among the others.`;
   return results(told, conclusions(told), more);
 }
 

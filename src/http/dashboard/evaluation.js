@@ -2,7 +2,7 @@
 
 import { lineChart } from "./chart.js";
 import { disclosure, h, quantSection, section, table } from "./dom.js";
-import { count, counted, duration, figures, minus, percent, percentTick, significant, tick, wealth } from "./format.js";
+import { allocation, count, counted, duration, figures, minus, percent, percentTick, significant, tick, wealth } from "./format.js";
 import { histogram } from "./histogram.js";
 import { intervalChart } from "./interval_chart.js";
 import { unitOf } from "./periods.js";
@@ -168,7 +168,7 @@ function courses({ strategies, request }) {
   const x = { values: deciding[0].periods.map(({ period }) => period), label: unit[0].toUpperCase() + unit.slice(1), format: String, whole: true };
   return section(
     "What each held",
-    lineChart({ title: "Average share in stocks", x, y: { format: percent, tick: percentTick, also: [0] }, series }),
+    lineChart({ title: "Average share in stocks", x, y: { format: allocation, tick: percentTick, also: [0] }, series }),
   );
 }
 

@@ -137,7 +137,8 @@ function contents(card) {
   ].filter(Boolean);
 }
 
-function summary({ state, progress, error, kind }) {
+/** How far a job is, in a sentence. */
+export function summary({ state, progress, error, kind }) {
   if (state === "failed") return error ?? "No reason was recorded.";
   if (state === "queued") return "Waits for the jobs before it.";
   if (state === "cancelled") return `Stopped after ${progress.steps_done} of ${progress.steps_total} steps.`;
@@ -159,10 +160,11 @@ function summary({ state, progress, error, kind }) {
 /** Steps that must be done before they tell how long the others take: the first is another thing than those after it. */
 const TELLING = 2;
 
-/** What is left of a job, where that can be known: an evaluation simulates when all is trained, and says so only then. */
-function timeLeft(kind, { seconds_left, steps_done, phase }) {
-  if (seconds_left === null || steps_done < TELLING || (kind === "evaluate" && phase !== "simulating")) return "";
-  return `, about ${duration(seconds_left)} left`;
+/** What is left of a job, where that can be known: an evaluation ends with a simulation, which is not like the steps before it. */
+function timeLeft(kind, { seconds_left, steps_done }) {
+  if (seconds_left === null || steps_done < TELLING || kind === "evaluate") return "";
+  const left = duration(seconds_left);
+  return `, ${left.startsWith("under") ? "" : "about "}${left} left`;
 }
 
 function bar(job) {
