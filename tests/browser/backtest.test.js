@@ -79,6 +79,7 @@ test("it is followed to its end, and what it says comes first", async () => {
   const words = await main();
   assert.match(words, /8 ways to hold stocks, through 48 quarters, March 2006 to December 2017, for a balanced investor/);
   assert.match(words, /Every 4 quarters policies are trained on the 8 quarters before, and lived by until the next/);
+  assert.match(words, /Each of them rests on 8 returns: with fewer than 24, most of what the asset can do is yet unseen\./);
   const [, second] = report.strategies;
   assert.ok(words.includes(`was all in the bank in ${(100 * second.all_bank_share).toFixed(0)} % of the quarters`), words);
   const shown = await cells("Strategies, by what a year of each is worth");
@@ -159,6 +160,24 @@ test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, folds op
   await page.getByRole("table", { name: "Estimates with their ranges" }).waitFor();
   await usable(page, () => {});
   await usable(page, () => visitQuiet(page, `${ballast.url}/#/backtests/new`));
+});
+
+test("on paper the months of a year stand beside each other in its width", async () => {
+  const dates = Array.from({ length: 48 }, (_, k) => `${2004 + Math.floor(k / 12)}-${String((k % 12) + 1).padStart(2, "0")}`);
+  const log_returns = dates.map((_, k) => 0.008 + 0.1 * Math.sin(1.7 * k));
+  const { job } = await call(ballast.url, "/backtest", { log_returns, dates, rate: 0.002, window: 24, alpha: [0.5], count: 10 });
+  await visitQuiet(page, `${ballast.url}/#/backtests/${job}`);
+  await page.getByRole("heading", { name: "What each came to" }).waitFor();
+  assert.doesNotMatch(await main(), /most of what the asset can do|false/);
+  await page.emulateMedia({ media: "print" });
+  // A4 without its margins.
+  await page.setViewportSize({ width: 672, height: 1000 });
+  const map = page.locator(".map table");
+  assert.equal(await map.locator("thead th").count(), 14);
+  const [right, edge] = await map.evaluate((table) => [table.getBoundingClientRect().right, document.documentElement.clientWidth]);
+  assert.ok(right <= edge, `${right} of ${edge}`);
+  await page.emulateMedia({ media: "screen" });
+  await page.setViewportSize({ width: 1280, height: 900 });
 });
 
 const OTHER = Array.from({ length: QUARTERS }, (_, k) => Number((1.5 + 4 * Math.cos(2.9 * k)).toFixed(2)));

@@ -19,6 +19,8 @@ const FALLS = 5;
 const FEWEST_YEARS = 10;
 /** Years that roll through the record: the first that it holds twice. */
 const ROLLING = [5, 1];
+/** With fewer returns the service is careful with an advice. */
+const SHORT_RECORD = 24;
 const KNOWN = ["all-bank", "60/40", "all-stock"];
 
 /** The report with what is said and drawn of it. */
@@ -98,11 +100,13 @@ function walked({ choices, lines, unit, times }) {
   const investor = investorWords(risk_aversion === 1 ? { kind: "log" } : { kind: "power", risk_aversion });
   const cost = trading_cost > 0 ? `Trading costs ${percent(trading_cost, 2)} of what is traded.` : "Trading is free, so who trades much looks better than he would be.";
   const ahead = horizon === every ? "" : `, looking ${counted(horizon, unit)} ahead`;
+  const few = `Each of them rests on ${counted(window, "return")}: with fewer than ${SHORT_RECORD}, most of what the asset can do is yet unseen.`;
   return h(
     "div",
     { class: "words" },
     h("p", {}, `${count(lines.filter(({ hindsight }) => !hindsight).length)} ways to hold stocks, through ${counted(length, unit)}, ${times.name(1)} to ${times.name(length)}, for ${investor}.`),
     h("p", {}, `Every ${counted(every, unit)} policies are trained on the ${counted(window, unit)} before${ahead}, and lived by until the next: nothing later is used for what is held. ${cost}`),
+    window < SHORT_RECORD && h("p", { class: "note wrong" }, few),
   );
 }
 
