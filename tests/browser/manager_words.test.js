@@ -62,6 +62,16 @@ test("the first sentence of a policy says what it holds now, as a session of it 
   assert.ok(Math.abs(Number(about[1]) - 100 * there) <= 3, `${about} for ${there}`);
 });
 
+test("where every session knows the same record, what is held is said, and nothing is said as nothing", async () => {
+  const problem = { horizon: 1, history: HISTORY.map((value) => value + 0.01), radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } };
+  const one = async (rate_per_step) => {
+    await go(`#/policies/${await trained(ballast.url, { problem: { ...problem, rate_per_step }, design: { count: 10 } })}`);
+    return plain(await page.locator(".single").innerText());
+  };
+  assert.equal(await one(0.1), "Here every session of this policy knows the same record: hold nothing in stocks, for in its worst market nothing beats the bank.");
+  assert.match(await one(0.002), /: hold (\d+\.\d|100) % in stocks, worth [\d.]+ % more than the bank even in the worst market/);
+});
+
 test("no page says the paper's words outside a fold", async () => {
   const { session } = await call(ballast.url, "/sessions", { policy });
   for (const hash of ["#/jobs", "#/train", "#/policies", `#/policies/${policy}`, "#/sessions", "#/sessions/new", `#/sessions/${session}`, "#/report", "#/compare", "#/evaluations", "#/evaluations/new", "#/backtests/new"]) {

@@ -2,7 +2,7 @@
 
 import { lineChart } from "./chart.js";
 import { h } from "./dom.js";
-import { percent, percentFigures, percentTick, tick, wealth } from "./format.js";
+import { allocation, percent, percentFigures, percentTick, tick, wealth } from "./format.js";
 import { heatmap } from "./heatmap.js";
 import { shown } from "./key.js";
 import { unitOf } from "./periods.js";
@@ -119,14 +119,17 @@ function explorer({ horizon, periods_per_year }, ask) {
 const DRAWN = { single, line: alongOne, field: overTwo };
 
 function single({ band: [low, high], floor_gain }) {
-  const held = low === high ? [percent(low)] : [percent(low), " to ", percent(high)];
+  const here = "Here every session of this policy knows the same record: ";
+  const [least, most] = [low, high].map(allocation);
+  if (most === allocation(0)) return h("p", { class: "single" }, here, "hold ", h("strong", {}, "nothing"), " in stocks, for in its worst market nothing beats the bank.");
   return h(
     "p",
     { class: "single" },
-    "Here every session of this policy knows the same record: hold ",
-    h("strong", {}, held),
+    here,
+    "hold ",
+    h("strong", {}, least === most ? least : [least, " to ", most]),
     " in stocks, worth ",
-    h("strong", {}, percent(Math.expm1(floor_gain), 4)),
+    h("strong", {}, percentFigures(Math.expm1(floor_gain), 2)),
     " more than the bank even in the worst market, to who starts in the bank.",
   );
 }
