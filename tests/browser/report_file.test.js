@@ -77,6 +77,9 @@ test("the reproduction says in two columns what agrees and what differs", async 
   assert.ok(agrees > 0 && agrees + differs > 5, `${agrees} and ${differs}`);
   assert.doesNotMatch((await page.locator(".verdicts").allInnerTexts()).join(" "), /[\s[(]-\d/);
   for (const name of ["Figure 1", /Table 1 and Figure 2/, /Table 2 and Figure 2/, /frontier/, /Convergence/]) await page.getByRole("heading", { name }).waitFor();
+  // A band has its colour beside the line in the legend.
+  const banded = page.locator("figure", { has: page.locator("path.band") });
+  assert.equal(await banded.locator(".legend rect.band").count(), await banded.locator("path.band").count());
   await accessible(page, "reproduction");
 });
 

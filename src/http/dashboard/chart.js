@@ -159,11 +159,11 @@ const swatch = (index) =>
     { class: "swatch", width: 22, height: 8, "aria-hidden": "true" },
     s("line", { class: `line s${index}`, x1: 1, x2: 21, y1: 4, y2: 4 }),
   );
-export const block = (index) =>
+export const block = (index, shape = "bar") =>
   s(
     "svg",
     { class: "swatch", width: 12, height: 12, "aria-hidden": "true" },
-    s("rect", { class: `bar s${index}`, width: 12, height: 12 }),
+    s("rect", { class: `${shape} s${index}`, width: 12, height: 12 }),
   );
 
 /** Title, what is read off, the plot, and the same as a table. */
@@ -198,8 +198,8 @@ export function lineChart({ title, x, y, series: given, height = 190, note, star
     "span",
     { class: "legend" },
     here,
-    series.map(({ name, kind, colour }, index) =>
-      h("span", {}, name ? [kind === "bars" ? block(colour) : swatch(colour), `${name} `] : null, outputs[index]),
+    series.map(({ name, kind, colour, band }, index) =>
+      h("span", {}, name ? [kind === "bars" ? block(colour) : swatch(colour), band && block(colour, "band"), `${name} `] : null, outputs[index]),
     ),
   );
   const same = (value) => value;
