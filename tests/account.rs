@@ -63,13 +63,13 @@ async fn a_corrected_session_is_one_that_was_reported_right() {
     let mut app = opened().await;
     let wrong = [
         json!({ "price": 102.0, "previous_price": 100.0, "executed_allocation": 0.4 }),
-        json!({ "price": 10.3, "executed_allocation": 0.5, "confirm": true }),
+        json!({ "price": 10.3, "executed_allocation": 0.5, "date": "2026-02-27", "confirm": true }),
         json!({ "price": 104.0, "executed_allocation": 0.6, "confirm": true }),
     ];
     report_all(&app, &wrong).await;
     let before = standing(&app).await;
     // The price of the second period: with it change the returns of the second and of the third.
-    let right = json!({ "price": 103.0, "executed_allocation": 0.5 });
+    let mut right = json!({ "price": 103.0, "executed_allocation": 0.5 });
     let mut correction = right.clone();
     correction["period"] = json!(2);
     let (status, corrected) = correct(&app, 1, correction).await;
@@ -85,6 +85,7 @@ async fn a_corrected_session_is_one_that_was_reported_right() {
     let (second, third) = (&history["observations"][1], &history["observations"][2]);
     assert_eq!((&second["reported"]["price"], &second["now"]["reported"]["price"]), (&json!(10.3), &json!(103.0)));
     assert_eq!(number(&second["log_return"]), (10.3_f64 / 102.0).ln());
+    assert_eq!(second["now"]["reported"]["date"], "2026-02-27", "what no correction names stays");
     assert_eq!((&third["now"]["reported"], &third["reported"]["price"]), (&json!(null), &json!(104.0)));
     assert_eq!(third["now"]["wealth"], put_right["session"]["wealth"]);
     assert_eq!(third["wealth"], before["session"]["wealth"]);
@@ -92,6 +93,7 @@ async fn a_corrected_session_is_one_that_was_reported_right() {
     assert_eq!(history["corrections"][0]["reason"], "the index was revised");
 
     app.open().await;
+    right["date"] = json!("2026-02-27");
     report_all(&app, &[wrong[0].clone(), right, wrong[2].clone()]).await;
     assert_eq!(without_bet(standing(&app).await), without_bet(put_right), "as it was from the start");
     let (_, told) = app.get(&format!("/sessions/{}/history", app.session)).await;

@@ -347,7 +347,7 @@ mod tests {
             let choices = |Backtest { walk, .. }: Backtest| (walk.window, walk.every, walk.horizon);
             backtest.map(choices).map_err(|error| error.to_string())
         };
-        let short = "the file is 28 periods: must hold at least 84, the window and a year";
+        let short = "the file is 28 periods: must hold at least 84, the window of 80 and a year: a shorter window asks for less";
         assert_eq!(said(&[]), Err(short.into()));
         assert_eq!(said(&["--window", "20"]), Ok((20, 4, 4)));
         assert_eq!(said(&["--window", "20", "--every", "6"]), Ok((20, 6, 6)));
@@ -366,7 +366,10 @@ mod tests {
         assert_eq!(message(&["--every", "7", "--horizon", "6"]), format!("--every is 7: {every}"));
         let long = BacktestArgs { window: vec![Window::Last(50)], ..arguments(&[]) };
         let short = walk(&long, months(48)).err().unwrap().to_string();
-        assert_eq!(short, "the file is 48 periods: must hold at least 62, the window and a year");
+        assert_eq!(
+            short,
+            "the file is 48 periods: must hold at least 62, the window of 50 and a year: a shorter window asks for less"
+        );
         let few = BacktestArgs { count: Some(3), ..arguments(&[]) };
         let few = walk(&few, months(48)).err().unwrap().to_string();
         assert_eq!(few, "--count is 3: must lie in [10, 10000]");

@@ -205,7 +205,8 @@ impl Periods {
             return Err(FieldError::new("period", correction.period, rule));
         };
         self.corrections += 1;
-        period.report = correction.report();
+        let date = correction.date.or(period.report.date);
+        period.report = Report { date, ..correction.report() };
         period.is_corrected = true;
         self.all.iter_mut().skip(index).for_each(|period| period.stands = false);
         Ok(())

@@ -13,8 +13,8 @@ use crate::numerics::levelling::{Levelling, Phase};
 /// Newton steps for a local minimum, which it is approached from one side by; they double the digits from the third or so on.
 const NEWTON_STEPS: usize = 40;
 const NEWTON_TOLERANCE: f64 = 1e-13;
-/// The factor by which the level of a branch moves in a step, at most.
-const NEAR: f64 = 1.5;
+/// The logarithm of the level of a branch and its cost move by no more in a step.
+const NEAR: f64 = 0.4;
 /// At 1 a local minimum and a maximum meet.
 const MOST_FOLLOWED: f64 = 1.0 - 1e-4;
 
@@ -83,8 +83,8 @@ impl Branches {
         }
     }
 
-    /// Finds the branches at a point, and keeps beside them, as moves that stay, those of `before` that have gone and that
-    /// `counts` still: what is gone may come back, far below.
+    /// Finds the branches at a point, and keeps beside them, as moves that stay, those of `before` that none of now continues and
+    /// that `counts` still: what is gone may come back, far below.
     pub fn find_after(
         &mut self,
         step: &AssetsStep,
@@ -99,9 +99,9 @@ impl Branches {
             self.find_of(step, atom, allocation, price);
             let found = from + 1..self.all.len();
             for gone in before.of(atom).skip(1) {
-                let level = before.all[gone].level;
-                if counts(atom, gone) && !found.clone().any(|branch| near(self.all[branch].level, level)) {
-                    let (cost, row) = (before.all[gone].cost, before.excess(gone));
+                let goes_on = |branch: usize| before.nearest(atom, &self.all[branch]) == Some(gone);
+                if counts(atom, gone) && !found.clone().any(goes_on) {
+                    let (level, cost, row) = (before.all[gone].level, before.all[gone].cost, before.excess(gone));
                     self.push(step.utility, price, allocation, row.iter().copied(), cost, level);
                 }
             }
@@ -111,14 +111,21 @@ impl Branches {
 
     /// The branch of an atom `before` that this one of now continues.
     pub fn continued(&self, atom: usize, branch: usize, before: &Branches) -> Option<usize> {
-        let of = before.of(atom);
         if branch == self.first[atom] {
-            return Some(of.start);
+            return Some(before.first[atom]);
         }
-        let level = self.all[branch].level;
-        let apart = |other: &usize| (before.all[*other].level / level).max(level / before.all[*other].level);
-        let close = (of.start + 1..of.end).filter(|&other| near(before.all[other].level, level));
-        close.min_by(|left, right| apart(left).total_cmp(&apart(right)))
+        before.nearest(atom, &self.all[branch])
+    }
+
+    /// The moved branch of an atom that is nearest to another by level and cost, if it is as near as a step may take it. The level
+    /// alone does not tell them apart: what stays keeps its cost while the allocation changes under it.
+    fn nearest(&self, atom: usize, other: &Branch) -> Option<usize> {
+        let apart = |branch: &usize| {
+            let branch = &self.all[*branch];
+            (branch.level / other.level).ln().abs().max((branch.cost - other.cost).abs())
+        };
+        let moved = self.of(atom).skip(1).filter(|branch| apart(branch) < NEAR);
+        moved.min_by(|left, right| apart(left).total_cmp(&apart(right)))
     }
 
     fn start(&mut self, step: &AssetsStep) {
@@ -217,12 +224,6 @@ struct Inside {
     moving: f64,
     /// The utility and its slope there.
     utility: (f64, f64),
-}
-
-/// True for levels as near as those of one branch before and after a step. Two branches of an atom are often no further apart than
-/// the factor 2: were the one that has gone taken for the other, nothing would keep a step from where it comes back, far below.
-fn near(left: f64, right: f64) -> bool {
-    (1.0 / NEAR..NEAR).contains(&(left / right))
 }
 
 /// Tells the level of every local minimum of u(w) + price D along the phases, but for D = 0, whether it

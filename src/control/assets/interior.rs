@@ -23,7 +23,7 @@ const REDUCTIONS: [(f64, f64); 3] = [(0.9, 0.2), (0.5, 0.4), (0.0, 0.9)];
 /// Points at most.
 const STEP_LIMIT: usize = 100;
 /// Halvings of a step that falls far below what it foresaw, at most.
-const HALVINGS: usize = 6;
+const HALVINGS: usize = 10;
 /// How much of the barrier atoms may give way by, together, before a step is halved.
 const GIVING_WAY: f64 = 10.0;
 /// Of its slack before a branch keeps at least this, and one that is new this of the barrier.

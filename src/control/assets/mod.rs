@@ -40,7 +40,7 @@ const CONTENT: f64 = 1e-7;
 /// Of a mean of utilities: where a utility hardly grows any more, a value read back from above its rounding would be without end.
 const ROUNDING: f64 = 1e-14;
 /// First barriers of searches, in relative utility, and that of one near a similar step.
-const BARRIERS: [f64; 3] = [1e-3, 1e-2, 1e-1];
+const BARRIERS: [f64; 4] = [1e-3, 1e-4, 1e-2, 1e-1];
 const BARRIER_NEAR: f64 = 1e-6;
 /// Shares below this are rounding of a search that stays inside its bounds.
 const LEAST_SHARE: f64 = 1e-6;
@@ -114,8 +114,8 @@ impl AssetsStep {
 
     /// The best allocation. `near` is where the search starts: the solution of a similar step.
     ///
-    /// A search that does not bring its bounds together is followed by others, which start further inside; bounds of all of them
-    /// hold. Cost: some 20 to 60 evaluations, each O(n d ln d) with O(n d^2) of algebra, d the assets searched among; of 4 searches
+    /// A search that does not bring its bounds together is followed by others, which start further inside or out; bounds of all of them
+    /// hold. Cost: some 20 to 60 evaluations, each O(n d ln d) with O(n d^2) of algebra, d the assets searched among; of 5 searches
     /// at most.
     pub fn solve(&self, near: Option<&AssetsSolution>) -> AssetsSolution {
         let barrier = if near.is_some() { BARRIER_NEAR } else { BARRIERS[0] };

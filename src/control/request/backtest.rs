@@ -188,7 +188,9 @@ impl BacktestRequest {
         whole("window", window, &HISTORY_LENGTH)?;
         let (found, wanted) = (self.period_count(), window + year);
         if found < wanted {
-            let rule = format!("must hold at least {wanted}, the window and a year");
+            let rule = format!(
+                "must hold at least {wanted}, the window of {window} and a year: a shorter window asks for less"
+            );
             return Err(FieldError::new(self.returns().0, format!("{found} periods"), rule));
         }
         (self.every, self.horizon, self.window) = (Some(every), Some(horizon), Some(window));
