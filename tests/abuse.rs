@@ -193,7 +193,9 @@ async fn the_class_of_a_call_is_that_of_what_it_asks() {
     let mut app = App::configured(|config| config.limits = Limits::new([0, 2, 0], 4)).await;
     app.train(&specification(3)).await;
     app.open().await;
-    for question in ["mode=resolve", "mode=%72esolve", "explain=worst_case", "explain=%77orst_case"] {
+    let spellings =
+        ["mode=resolve", "mode=%72esolve", "explain=worst_case", "explain=%77orst_case", "sensitivity=%74rue"];
+    for question in spellings {
         let asked = join_all((0..20).map(|_| {
             let url = format!("{}/action?session={}&{question}", app.url, app.session);
             app.client.get(url).send()

@@ -588,3 +588,11 @@ fn comments_literals_and_tests_break_no_rule() {
     assert_eq!(functions, ["f"]);
     assert_eq!(faults_of("control/bellman.rs", &format!("{innocent}\nuse crate::http;")).len(), 1);
 }
+
+#[test]
+fn no_unsafe_code_is_allowed_anywhere() {
+    for root in ["src/lib.rs", "src/main.rs"] {
+        let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(root)).unwrap();
+        assert!(text.lines().any(|line| line == "#![forbid(unsafe_code)]"), "{root}");
+    }
+}

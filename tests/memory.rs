@@ -5,12 +5,15 @@ mod support;
 
 use std::fs;
 use std::process::{Child, Command};
+use std::time::Duration;
 
 use ballast::control::kept::Kept;
 use ballast::service::memory::MemoryLimit;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 use support::App;
+use tokio::io::AsyncWriteExt;
+use tokio::net::TcpSocket;
 
 /// The address space of the process under attack, in kibibytes: 900 MB.
 const ADDRESS_SPACE_KIB: usize = 900_000;
@@ -68,19 +71,21 @@ async fn a_job_larger_than_memory_is_refused_and_the_service_lives() {
     child.wait().unwrap();
 }
 
-/// The policy of [`support::specification`] with a second step of `points` design points of noise.
+/// The policy of [`support::specification`] with `points` design points of noise in every step but the first.
 fn inflated(policy: &[u8], points: usize, seed: u64) -> Value {
     let mut policy: Value = serde_json::from_slice(policy).unwrap();
     policy["specification"]["seed"] = json!(seed);
     let noise = |salt: usize| -> Vec<f64> {
         (0..points).map(|k| ((k * 7919 + salt * 104_729 + seed as usize) % 10_007) as f64 / 5003.5 - 1.0).collect()
     };
-    let solution = &mut policy["steps"][1]["solution"];
-    let inputs = solution["inputs"].as_array().unwrap().len();
-    solution["inputs"] = json!((0..inputs).map(noise).collect::<Vec<_>>());
-    for surrogate in ["value", "policy"] {
-        solution[surrogate]["weights"] = json!([noise(inputs)]);
-        solution[surrogate]["hyperparameters"]["noise_variance"] = json!(0.1);
+    for step in policy["steps"].as_array_mut().unwrap().iter_mut().skip(1) {
+        let solution = &mut step["solution"];
+        let inputs = solution["inputs"].as_array().unwrap().len();
+        solution["inputs"] = json!((0..inputs).map(noise).collect::<Vec<_>>());
+        for surrogate in ["value", "policy"] {
+            solution[surrogate]["weights"] = json!([noise(inputs)]);
+            solution[surrogate]["hyperparameters"]["noise_variance"] = json!(0.1);
+        }
     }
     policy
 }
@@ -121,6 +126,42 @@ async fn imported_policies_asked_once_each_stay_within_the_budget() {
     }
     assert!(part(&app, "factors").await > 8_000_000);
     assert!(resident(&child) < limit, "{} bytes resident", resident(&child));
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+/// Forty clients ask for a document of some 10 MB and read next to nothing of it; before, each kept all of it in memory.
+#[tokio::test(flavor = "multi_thread")]
+async fn answers_that_are_read_slowly_take_no_more_than_their_part() {
+    let (mut child, mut app) = confined(&["--memory-limit", "400MiB"]);
+    app.train(&support::specification(40)).await;
+    let large = inflated(&app.export().await, 1500, 1);
+    let (status, imported) = app.post("/policies/import", &large).await;
+    assert_eq!(status, StatusCode::CREATED, "{imported}");
+    let path = format!("/policies/{}/export", imported["policy"].as_str().unwrap());
+    let before = resident(&child);
+    let address = app.url.strip_prefix("http://").unwrap().parse().unwrap();
+    let mut held = Vec::new();
+    for _ in 0..40 {
+        let socket = TcpSocket::new_v4().unwrap();
+        socket.set_recv_buffer_size(4096).unwrap();
+        let mut stream = socket.connect(address).await.unwrap();
+        let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n");
+        stream.write_all(request.as_bytes()).await.unwrap();
+        held.push(stream);
+    }
+    tokio::time::sleep(Duration::from_secs(2)).await;
+    // One document at a time, twice while it is read, and what forty connections take.
+    let taken = resident(&child).saturating_sub(before);
+    assert!(taken < 60 << 20, "{taken} bytes for forty slow readers");
+    assert!(part(&app, "large_answers").await > 0);
+    app.open().await;
+    assert_eq!(app.observe(1, 0.01).await.0, StatusCode::OK);
+    assert_eq!(app.action().await.0, StatusCode::OK);
+    drop(held);
+    let (status, document) = app.get(&path).await;
+    assert_eq!(status, StatusCode::OK, "{document}");
+    assert!(document == large, "the document came whole");
     child.kill().unwrap();
     child.wait().unwrap();
 }

@@ -1,16 +1,21 @@
-//! The bytes that the bodies of requests under way may take together.
+//! The bytes that the bodies of requests under way may take together, and how a large answer leaves.
 //!
 //! A large body takes its part of one budget before its first byte is read, and gives it back when the call is answered:
 //! many callers who send large bodies at a time are told to come again, and the process never holds more of them than the
 //! budget. Small bodies are not counted; the connections bound them.
 
+use std::convert::Infallible;
 use std::sync::Arc;
 
+use axum::body::{Body, Bytes};
 use axum::extract::Request;
 use axum::http::header;
+use axum::response::{IntoResponse, Response};
+use futures_util::stream;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::problem::{Problem, ProblemKind};
+use crate::service::memory::Document;
 
 /// Bodies up to this size are not counted, and larger ones in units of it.
 const UNIT: usize = 64 << 10;
@@ -54,10 +59,20 @@ impl Bodies {
     }
 }
 
+/// A document as the answer, in parts: its memory is held until the last of them is taken from it, however slowly a client reads.
+pub fn sent(Document { bytes, room }: Document) -> Response {
+    let headers =
+        [(header::CONTENT_TYPE, "application/json".to_owned()), (header::CONTENT_LENGTH, bytes.len().to_string())];
+    let parts = stream::unfold((Bytes::from(bytes), room), async |(mut left, room)| {
+        let part = left.split_to(left.len().min(UNIT));
+        // A copy: the connection keeps what it has not sent yet, and would keep the whole document for a part of it.
+        (!part.is_empty()).then(|| (Ok::<_, Infallible>(Bytes::copy_from_slice(&part)), (left, room)))
+    });
+    (headers, Body::from_stream(parts)).into_response()
+}
+
 #[cfg(test)]
 mod tests {
-    use axum::body::Body;
-
     use super::*;
 
     fn request(headers: &[(&str, &str)]) -> Request {

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use axum::extract::State;
-use axum::http::{HeaderMap, header};
-use axum::response::{IntoResponse, Response};
+use axum::http::HeaderMap;
+use axum::response::Response;
 
 use super::access::{By, Heavy, Read};
+use super::bodies;
 use super::extract::{Id, JsonBody};
 use super::jobs::{Queueing, accepted, idempotency_key};
 use super::problem::Problem;
@@ -50,6 +51,5 @@ pub async fn report(
     By(caller, _): By<Read>,
     Id(id): Id,
 ) -> Result<Response, Problem> {
-    let report = service.jobs.report(&caller.tenant, &id).await?;
-    Ok(([(header::CONTENT_TYPE, "application/json")], report).into_response())
+    Ok(bodies::sent(service.jobs.report(&caller.tenant, &id).await?))
 }

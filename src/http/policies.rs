@@ -8,6 +8,7 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
 use super::access::{By, Heavy, Live, Read};
+use super::bodies;
 use super::decode;
 use super::extract::{Id, JsonBytes, Parameters};
 use super::page::{self, Page};
@@ -45,13 +46,13 @@ pub async fn get(
     By(caller, _): By<Read>,
     Id(id): Id,
 ) -> Result<Json<wire::PolicyDetail>, Problem> {
-    let row = service.policies.get(&caller.tenant, &id).await?;
+    let created_ms = service.policies.created_ms(&caller.tenant, &id).await?;
     let advisor = service.policies.advisor(&caller.tenant, &id).await?;
     let specification = advisor.specification().clone();
     Ok(Json(wire::PolicyDetail {
-        policy: row.policy,
         labels: service.names.of(&caller.tenant, &id).await?,
-        created_ms: row.created_ms,
+        policy: id,
+        created_ms,
         framework: specification.problem.framework,
         horizon: specification.problem.horizon,
         annualised: specification.problem.annualised(),
@@ -71,8 +72,7 @@ pub async fn export(
     By(caller, _): By<Read>,
     Id(id): Id,
 ) -> Result<Response, Problem> {
-    let row = service.policies.get(&caller.tenant, &id).await?;
-    Ok(([(header::CONTENT_TYPE, "application/json")], row.json).into_response())
+    Ok(bodies::sent(service.policies.document(&caller.tenant, &id).await?))
 }
 
 /// Store an exported policy.

@@ -10,7 +10,7 @@ use super::error::ServiceError;
 use super::idempotency;
 use super::identity;
 use super::keys::Caller;
-use super::memory::Memory;
+use super::memory::{Document, Memory};
 use super::progress::{Progress, ProgressBoard};
 use crate::control::estimate;
 use crate::control::evaluation::assets::AssetsBacktest;
@@ -226,9 +226,13 @@ impl Jobs {
     /// The report of a succeeded job that makes one, as JSON.
     ///
     /// # Errors
-    /// There is no such job, or it has no report (yet).
-    pub async fn report(&self, tenant: &Tenant, job: &str) -> Result<String, ServiceError> {
-        self.store.report(tenant, job).await?.ok_or_else(|| ServiceError::unknown("report", job))
+    /// There is no such job, or it has no report (yet); other large answers leave no room for it.
+    pub async fn report(&self, tenant: &Tenant, job: &str) -> Result<Document, ServiceError> {
+        let unknown = || ServiceError::unknown("report", job);
+        let bytes = self.store.report_bytes(tenant, job).await?.ok_or_else(unknown)?;
+        let room = self.memory.answers(bytes).await?;
+        let report = self.store.report(tenant, job).await?.ok_or_else(unknown)?;
+        Ok(Document { bytes: report.into_bytes(), room })
     }
 
     /// # Errors

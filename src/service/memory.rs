@@ -9,6 +9,7 @@ use std::fs;
 use std::path::Path;
 use std::str::FromStr;
 use std::sync::Arc;
+use std::time::Duration;
 
 use metrics::gauge;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -25,7 +26,14 @@ const EIGHTHS_KEPT: usize = 2;
 const EIGHTHS_FOR_SESSIONS: usize = 1;
 /// Share of what the system gives that is taken where nobody chose: the rest is for the kernel's own and for others.
 const PERCENT_TAKEN: u64 = 80;
-/// Bytes that a permit of the jobs' semaphore stands for: its permits are counted in 32 bits.
+/// Part of the limit that large answers may take together: half of what the process has for itself, as bodies have the other.
+const PART_FOR_ANSWERS: usize = 16;
+/// An answer is held twice while it is read: by the store's engine and by us.
+const COPIES_OF_AN_ANSWER: usize = 2;
+/// How long one waits for the others before its caller is told to come again.
+const LONGEST_WAIT: Duration = Duration::from_secs(5);
+/// Bytes that a permit of a semaphore stands for: its permits are counted in 32 bits. An answer of no more is not counted; the
+/// connections bound those.
 const UNIT: usize = 1 << 16;
 
 /// Where a limit comes from.
@@ -126,16 +134,21 @@ pub struct Memory {
     jobs: Arc<Semaphore>,
     /// Of that semaphore, when no job runs.
     permits: usize,
+    answers: Arc<Semaphore>,
+    /// Of that one, when nothing large is sent.
+    answer_permits: usize,
 }
 
-/// Bytes reserved by a job until this is dropped.
-pub(super) struct Reserved(#[expect(dead_code, reason = "held, not read")] OwnedSemaphorePermit);
+/// Bytes reserved by a job or an answer until this is dropped.
+pub struct Reserved(#[expect(dead_code, reason = "held, not read")] OwnedSemaphorePermit);
 
 impl Memory {
     pub fn new(limit: MemoryLimit) -> Self {
         let permits = (eighths(limit, EIGHTHS_FOR_JOBS) / UNIT).min(Semaphore::MAX_PERMITS);
         let kept = Kept::new(eighths(limit, EIGHTHS_KEPT));
-        Memory { limit, kept, jobs: Arc::new(Semaphore::new(permits)), permits }
+        let answer_permits = (limit.bytes / PART_FOR_ANSWERS / UNIT).clamp(1, u32::MAX as usize);
+        let [jobs, answers] = [permits, answer_permits].map(|permits| Arc::new(Semaphore::new(permits)));
+        Memory { limit, kept, jobs, permits, answers, answer_permits }
     }
 
     /// What is kept ready for requests.
@@ -177,12 +190,27 @@ impl Memory {
         Ok(Reserved(permits))
     }
 
+    /// Waits until the other large answers leave room for one of so many bytes; what is larger than all the room has it alone.
+    ///
+    /// # Errors
+    /// They do not within [`LONGEST_WAIT`].
+    pub(super) async fn answers(&self, bytes: usize) -> Result<Option<Reserved>, ServiceError> {
+        if bytes <= UNIT {
+            return Ok(None);
+        }
+        let permits = (COPIES_OF_AN_ANSWER * bytes).div_ceil(UNIT).min(self.answer_permits) as u32;
+        let room = tokio::time::timeout(LONGEST_WAIT, self.answers.clone().acquire_many_owned(permits)).await;
+        room.map_err(|_| ServiceError::Busy)?.map(Reserved).map(Some).map_err(ServiceError::internal)
+    }
+
     /// Tells the recorder how much each part takes now, `live_sessions` of them the sessions.
     pub(super) fn record(&self, live_sessions: usize) {
         gauge!(names::MEMORY, "part" => "live_sessions").set(live_sessions as f64);
         gauge!(names::MEMORY_LIMIT).set(self.limit.bytes as f64);
         let reserved = self.permits.saturating_sub(self.jobs.available_permits()) * UNIT;
         gauge!(names::MEMORY, "part" => "jobs_reserved").set(reserved as f64);
+        let sent = self.answer_permits.saturating_sub(self.answers.available_permits()) * UNIT;
+        gauge!(names::MEMORY, "part" => "large_answers").set(sent as f64);
         for (part, bytes) in self.kept.bytes() {
             let part = match part {
                 Part::Bridges => "bridges",
@@ -192,6 +220,12 @@ impl Memory {
             gauge!(names::MEMORY, "part" => part).set(bytes as f64);
         }
     }
+}
+
+/// A document to be sent, with the memory that it takes until it is.
+pub struct Document {
+    pub bytes: Vec<u8>,
+    pub room: Option<Reserved>,
 }
 
 impl fmt::Display for Memory {

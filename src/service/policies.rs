@@ -6,7 +6,7 @@ use tokio::sync::Semaphore;
 
 use super::error::ServiceError;
 use super::keys::Caller;
-use super::memory::Memory;
+use super::memory::{Document, Memory};
 use crate::control::error::FieldError;
 use crate::control::estimate::{self, Footprint};
 use crate::control::kept::{Kept, Key};
@@ -14,7 +14,7 @@ use crate::control::policy::advisor::Advisor;
 use crate::control::policy::one_period::OnePeriod;
 use crate::control::policy::{Policy, content_hash};
 use crate::control::request::specification::Specification;
-use crate::store::{DeletePolicy, PolicyRow, PolicySummary, Store, Tenant};
+use crate::store::{DeletePolicy, PolicyRow, PolicySummary, Store, Stored, Tenant};
 
 /// Policies read and prepared at a time: a document takes several times its bytes while it is read.
 const PREPARED_AT_A_TIME: usize = 2;
@@ -33,10 +33,31 @@ impl Policies {
         Policies { store, memory, kept, preparing: Semaphore::new(PREPARED_AT_A_TIME) }
     }
 
+    async fn get(&self, tenant: &Tenant, policy: &str) -> Result<PolicyRow, ServiceError> {
+        self.store.policy(tenant, policy).await?.ok_or_else(|| ServiceError::unknown("policy", policy))
+    }
+
+    /// When the tenant came by it.
+    ///
     /// # Errors
     /// There is no such policy.
-    pub async fn get(&self, tenant: &Tenant, policy: &str) -> Result<PolicyRow, ServiceError> {
-        self.store.policy(tenant, policy).await?.ok_or_else(|| ServiceError::unknown("policy", policy))
+    pub async fn created_ms(&self, tenant: &Tenant, policy: &str) -> Result<i64, ServiceError> {
+        Ok(self.stored(tenant, policy).await?.created_ms)
+    }
+
+    /// The portable document.
+    ///
+    /// # Errors
+    /// There is no such policy; other large answers leave no room for it.
+    pub async fn document(&self, tenant: &Tenant, policy: &str) -> Result<Document, ServiceError> {
+        let room = self.memory.answers(self.stored(tenant, policy).await?.bytes).await?;
+        let row = self.store.policy_to_send(tenant, policy).await?;
+        let row = row.ok_or_else(|| ServiceError::unknown("policy", policy))?;
+        Ok(Document { bytes: row.json, room })
+    }
+
+    async fn stored(&self, tenant: &Tenant, policy: &str) -> Result<Stored, ServiceError> {
+        self.store.policy_stored(tenant, policy).await?.ok_or_else(|| ServiceError::unknown("policy", policy))
     }
 
     /// The policy with what its evaluation needs prepared. Callers let go of it once they are answered: what is kept is

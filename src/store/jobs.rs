@@ -48,6 +48,16 @@ impl Store {
         self.list("reading a report", find, |rows| rows.first().map(|row| row.get("json")).transpose()).await
     }
 
+    /// Length of the report of a job.
+    pub async fn report_bytes(&self, tenant: &Tenant, job: &str) -> Result<Option<usize>, StoreError> {
+        let find = query(
+            "SELECT CAST(octet_length(json) AS BIGINT) AS bytes FROM job_reports JOIN jobs ON jobs.job = job_reports.job
+             WHERE jobs.job = $1 AND tenant = $2",
+        );
+        let find = find.bind(job).bind(tenant.as_str());
+        self.list("measuring a report", find, |rows| rows.first().map(|row| row.length("bytes")).transpose()).await
+    }
+
     /// Whether a user asked for the job to stop; false where there is no such job.
     pub async fn is_to_stop(&self, job: &str) -> Result<bool, StoreError> {
         let asked = query("SELECT cancel_requested FROM jobs WHERE job = $1").bind(job);

@@ -7,7 +7,7 @@ use super::audit::{self, Actor, Deed};
 use super::codec::to_sql;
 use super::error::Failure;
 use super::labels::{self, Labels};
-use super::query::{Connection, Row, query};
+use super::query::{Connection, Query, Row, query};
 use super::quotas::{self, Quotas, ROW_BYTES, Usage};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
@@ -19,6 +19,13 @@ pub struct PolicyRow {
     pub policy: String,
     pub created_ms: i64,
     pub json: Vec<u8>,
+}
+
+/// When a tenant came by a policy, and the length of its bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stored {
+    pub created_ms: i64,
+    pub bytes: usize,
 }
 
 /// A policy without its bytes.
@@ -78,19 +85,21 @@ impl Store {
     /// # Errors
     /// [`StoreError::Corrupt`] where the bytes no longer hash to their name.
     pub async fn policy(&self, tenant: &Tenant, id: &str) -> Result<Option<PolicyRow>, StoreError> {
-        let find = query(
-            "SELECT policies.policy, policy_owners.created_ms, json
-             FROM policies JOIN policy_owners ON policy_owners.policy = policies.policy
-             WHERE policies.policy = $1 AND tenant = $2",
-        );
-        let find = find.bind(id).bind(tenant.as_str());
-        self.read("reading a policy", find, |rows| {
-            let Some(row) = rows.first() else { return Ok(None) };
-            let json: Vec<u8> = row.get("json")?;
-            verify(id, &json)?;
-            Ok(Some(PolicyRow { policy: row.get("policy")?, created_ms: row.get("created_ms")?, json }))
-        })
-        .await
+        self.read("reading a policy", owned(OWNED, tenant, id), |rows| PolicyRow::verified(rows, id)).await
+    }
+
+    /// As [`Store::policy`], by the connections for what is listed and shown.
+    ///
+    /// # Errors
+    /// [`StoreError::Corrupt`] where the bytes no longer hash to their name.
+    pub async fn policy_to_send(&self, tenant: &Tenant, id: &str) -> Result<Option<PolicyRow>, StoreError> {
+        self.list("reading a policy to send", owned(OWNED, tenant, id), |rows| PolicyRow::verified(rows, id)).await
+    }
+
+    /// What is known of a policy without reading it.
+    pub async fn policy_stored(&self, tenant: &Tenant, id: &str) -> Result<Option<Stored>, StoreError> {
+        let decode = |row: &Row| Ok(Stored { created_ms: row.get("created_ms")?, bytes: row.length("bytes")? });
+        self.list("measuring a policy", owned(MEASURED, tenant, id), |rows| rows.first().map(decode).transpose()).await
     }
 
     /// At most `limit` policies of a tenant, newest first; `after` is the `sequence` of the last row of the page before.
@@ -102,7 +111,7 @@ impl Store {
     ) -> Result<Vec<PolicySummary>, StoreError> {
         let page = query(
             "SELECT policy_owners.sequence, policies.policy, policy_owners.created_ms,
-                    CAST(length(json) AS BIGINT) AS bytes, labels.name, labels.notes, labels.tags
+                    CAST(octet_length(json) AS BIGINT) AS bytes, labels.name, labels.notes, labels.tags
              FROM policy_owners JOIN policies ON policies.policy = policy_owners.policy
              LEFT JOIN labels ON labels.tenant = policy_owners.tenant AND labels.object = policies.policy
              WHERE policy_owners.tenant = $1 AND policy_owners.sequence < $2 ORDER BY policy_owners.sequence DESC LIMIT $3",
@@ -115,6 +124,15 @@ impl Store {
         let (tenant, id, actor) = (tenant.clone(), id.to_owned(), self.actor.clone());
         self.write("deleting a policy", move |connection| delete(connection, tenant, id, actor).boxed()).await
     }
+}
+
+const OWNED: &str = "SELECT policies.policy, policy_owners.created_ms, json
+     FROM policies JOIN policy_owners ON policy_owners.policy = policies.policy WHERE policies.policy = $1 AND tenant = $2";
+const MEASURED: &str = "SELECT policy_owners.created_ms, CAST(octet_length(json) AS BIGINT) AS bytes
+     FROM policies JOIN policy_owners ON policy_owners.policy = policies.policy WHERE policies.policy = $1 AND tenant = $2";
+
+fn owned(statement: &'static str, tenant: &Tenant, id: &str) -> Query {
+    query(statement).bind(id).bind(tenant.as_str())
 }
 
 pub(super) fn verify(id: &str, json: &[u8]) -> Result<(), Failure> {
@@ -204,13 +222,22 @@ async fn delete(
     Ok(DeletePolicy::Deleted)
 }
 
+impl PolicyRow {
+    fn verified(rows: &[Row], id: &str) -> Result<Option<Self>, Failure> {
+        let Some(row) = rows.first() else { return Ok(None) };
+        let json: Vec<u8> = row.get("json")?;
+        verify(id, &json)?;
+        Ok(Some(PolicyRow { policy: row.get("policy")?, created_ms: row.get("created_ms")?, json }))
+    }
+}
+
 impl PolicySummary {
     fn from_row(row: &Row) -> Result<Self, Failure> {
         Ok(PolicySummary {
             sequence: row.get("sequence")?,
             policy: row.get("policy")?,
             created_ms: row.get("created_ms")?,
-            bytes: row.get::<i64>("bytes")?.unsigned_abs(),
+            bytes: row.length("bytes")? as u64,
             labels: Labels::from_row(row)?,
         })
     }

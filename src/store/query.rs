@@ -5,10 +5,11 @@
 
 use std::borrow::Cow;
 
+use futures_util::TryStreamExt;
 use sqlx::postgres::{PgArguments, PgConnection, PgRow};
 use sqlx::query::Query as Statement;
 use sqlx::sqlite::{SqliteArguments, SqliteConnection, SqliteRow};
-use sqlx::{AssertSqlSafe, Database, Decode, Encode, Postgres, Row as _, Sqlite, Type};
+use sqlx::{AssertSqlSafe, Database, Decode, Either, Encode, Executor, Postgres, Row as _, Sqlite, Type};
 
 use super::error::Failure;
 
@@ -182,6 +183,10 @@ impl Row {
             Row::Postgres(row) => row.try_get(column).map_err(Failure::postgres),
         }
     }
+
+    pub(super) fn length(&self, column: &str) -> Result<usize, Failure> {
+        self.get::<i64>(column).map(|length| length.unsigned_abs() as usize)
+    }
 }
 
 /// A connection in the hands of one operation; for a write, in its transaction.
@@ -194,8 +199,16 @@ impl Connection<'_> {
     pub(super) async fn rows(&mut self, query: Query) -> Result<Vec<Row>, Failure> {
         match self {
             Connection::Sqlite(connection) => {
-                let rows = query.sqlite().fetch_all(&mut **connection).await.map_err(Failure::sqlite)?;
-                Ok(rows.into_iter().map(Row::Sqlite).collect())
+                let mut found = connection.fetch_many(query.sqlite());
+                let (mut rows, mut has_ended) = (Vec::new(), false);
+                while let Some(next) = found.try_next().await.map_err(Failure::sqlite)? {
+                    match next {
+                        Either::Left(_) => has_ended = true,
+                        Either::Right(row) => rows.push(Row::Sqlite(row)),
+                    }
+                }
+                // Where the engine's thread dies its rows end as if there were no more.
+                if has_ended { Ok(rows) } else { Err(Failure::sqlite(sqlx::Error::WorkerCrashed)) }
             }
             Connection::Postgres(connection) => {
                 let rows = query.postgres().fetch_all(&mut **connection).await.map_err(Failure::postgres)?;

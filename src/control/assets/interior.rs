@@ -13,6 +13,7 @@
 //! lower than the step foresaw, t_j gives way. Source: Boyd and Vandenberghe (2004), Convex Optimization, section 11.7.
 
 mod newton;
+mod price;
 
 use self::newton::Direction;
 use super::AssetsStep;
@@ -37,12 +38,6 @@ const OFF_CENTRE: f64 = 100.0;
 const LEAST_MASS: f64 = 1e-6;
 /// Shares of the start by which one near a similar step is drawn inside.
 const DRAWN_INSIDE: f64 = 0.002;
-/// Prices tried for the start at most, and how far its law may be, over the radius or under it.
-const PRICES: usize = 8;
-const SPREAD: f64 = 3.0;
-/// Factors by which the first prices tried are apart, near a similar step and elsewhere.
-const PRICE_NEAR: f64 = 1.03;
-const PRICE_FAR: f64 = 1.5;
 /// Room that the sum of the shares has at least.
 const LEAST_ROOM: f64 = 1e-6;
 
@@ -65,23 +60,6 @@ impl Bound {
 pub(super) struct Pair {
     pub slack: f64,
     pub multiplier: f64,
-}
-
-/// Of the dual, which is concave, at a price of distance.
-#[derive(Debug, Clone, Copy)]
-struct Tangent {
-    price: f64,
-    value: f64,
-    slope: f64,
-}
-
-impl Tangent {
-    /// The price at which this one, which rises, meets one at a higher price, which falls; halfway where there is no value.
-    fn meets(self, high: Tangent) -> f64 {
-        let along = (high.value - self.value - high.slope * (high.price - self.price)) / (self.slope - high.slope);
-        let between = (0.0..=high.price - self.price).contains(&along);
-        self.price + if between { along } else { 0.5 * (high.price - self.price) }
-    }
 }
 
 /// The search.
@@ -187,41 +165,9 @@ impl<'a> Interior<'a> {
             upper: f64::INFINITY,
             evaluations: 0,
         };
-        interior.price_the_start(if near.is_some() { PRICE_NEAR } else { PRICE_FAR });
+        interior.price_the_start(near.is_some());
         interior.open();
         interior
-    }
-
-    /// Finds a price at which the centred laws at the start are about as far away as the radius. The first prices are apart by
-    /// the factor `wider`, and further apart until one is too low and one too high; the next is where the tangents of the dual
-    /// at both meet, which finds the price at which all atoms begin to move however sharp it is.
-    fn price_the_start(&mut self, mut wider: f64) {
-        let assets = self.step.assets();
-        let (mut low, mut high): (Option<Tangent>, Option<Tangent>) = (None, None);
-        for _ in 0..PRICES {
-            let price = self.point[assets];
-            self.find();
-            let mut distance = 0.0;
-            for atom in 0..self.step.atoms() {
-                let top = top(&self.branches, atom, self.barrier);
-                for branch in &self.branches.all[self.branches.of(atom)] {
-                    distance += self.step.masses[atom] * self.barrier / (branch.payoff - top) * branch.cost;
-                }
-            }
-            if (self.step.radius / SPREAD..=SPREAD * self.step.radius).contains(&distance) {
-                return;
-            }
-            let (value, exact) = self.step.dual(&self.branches, price);
-            let tangent = Tangent { price, value, slope: exact - self.step.radius };
-            *(if tangent.slope > 0.0 { &mut low } else { &mut high }) = Some(tangent);
-            self.point[assets] = match (low, high) {
-                (Some(low), Some(high)) => low.meets(high),
-                (Some(_), None) => wider * price,
-                _ => price / wider,
-            };
-            wider *= wider;
-        }
-        self.find();
     }
 
     fn find(&mut self) {

@@ -137,10 +137,16 @@ impl Folder {
         query: Query,
     ) -> Result<Vec<Row>, StoreError> {
         let reading = async {
-            let mut reader = self.readers.of_purpose(purpose).acquire().await.map_err(Failure::sqlite)?;
-            Connection::Sqlite(&mut reader).rows(query).await
+            let acquired = self.readers.of_purpose(purpose).acquire().await;
+            let mut reader = acquired.map_err(|error| Failure::sqlite(error).during(doing))?;
+            let result = Connection::Sqlite(&mut reader).rows(query).await.map_err(|failure| failure.during(doing));
+            // Its thread may have died: one that failed is not used again.
+            if result.is_err() {
+                drop(reader.detach());
+            }
+            result
         };
-        let result = reading.await.map_err(|failure| failure.during(doing));
+        let result = reading.await;
         if let Err(error) = &result
             && error.is_fatal()
         {

@@ -54,7 +54,7 @@ async fn serve(
     let mut closed = Vec::new();
     while !waiting.is_empty() || receive(&mut requests, &mut waiting, &mut closed).await {
         if let Err(error) = commit_group(&mut connection, &mut waiting).await
-            && error.is_fatal()
+            && (error.is_fatal() || has_lost_its_engine(&error))
         {
             fatal.send_replace(Some(error));
             return;
@@ -66,6 +66,11 @@ async fn serve(
     for closed in closed {
         let _ = closed.send(());
     }
+}
+
+/// True where the thread that SQLite runs on has died: every write to come would fail.
+fn has_lost_its_engine(error: &StoreError) -> bool {
+    matches!(error, StoreError::Unavailable { source: Some(source), .. } if matches!(**source, sqlx::Error::WorkerCrashed))
 }
 
 /// Waits for a request and takes those behind it, a group at most. False once there will be no more.
