@@ -261,7 +261,7 @@ async fn what_several_assets_report_is_heavy_where_it_solves() {
             "radius": { "rule": "fixed", "radius": 0.01 }, "composition": composition }, "design": { "count": 20 } })
     };
     let report = json!({ "log_returns": { "stocks": 0.01, "bonds": 0.002 } });
-    // Opens a session and reports a period of it, again and again, until something is put off.
+    // Opens a session, reports a period of it and puts it right, again and again, until something is put off.
     let put_off = async |app: &mut App, rounds: usize| {
         for _ in 0..rounds {
             let (status, session) = app.post("/sessions", &json!({ "policy": app.policy })).await;
@@ -276,6 +276,13 @@ async fn what_several_assets_report_is_heavy_where_it_solves() {
                 return Some(observed);
             }
             assert_eq!(status, 200, "{observed}");
+            let mut right = json!({ "correction": 1, "period": 1, "reason": "the index was revised" });
+            right["log_returns"] = json!({ "stocks": 0.012, "bonds": 0.002 });
+            let (status, corrected) = app.post(&format!("/sessions/{}/corrections", app.session), &right).await;
+            if status == 429 {
+                return Some(corrected);
+            }
+            assert_eq!(status, 200, "{corrected}");
         }
         None
     };

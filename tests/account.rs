@@ -190,15 +190,16 @@ async fn a_correction_is_made_once_and_in_its_turn() {
         (2, json!({ "period": 1, "price": 3.0 }), 422, "previous_price"),
         (2, json!({ "period": 1, "log_return": 0.02, "flow": -101.0 }), 422, "flow"),
         (2, json!({ "period": 1, "log_return": 0.02, "price_now": 3.0 }), 422, "price_now"),
-        (2, json!({ "period": 2, "log_return": 0.02, "date": "2008-01-30" }), 200, ""),
-        (3, json!({ "period": 1, "log_return": 0.02, "date": "2008-01-31" }), 422, "date"),
+        (2, json!({ "period": 2, "log_return": 0.02, "date": "2008-01-30" }), 422, "date"),
+        (2, json!({ "period": 2, "log_return": 0.02, "date": "2008-02-29" }), 200, ""),
+        (3, json!({ "period": 1, "log_return": 0.02, "date": "2008-02-29" }), 422, "date"),
     ] {
         let (answered, answer) = correct(&app, number, correction.clone()).await;
         assert_eq!(answered.as_u16(), status, "{correction}: {answer}");
         assert!(status == 200 || answer["field"] == field, "{correction}: {answer}");
     }
     // What was put right in a later period is said to be of that period.
-    let (_, refused) = correct(&app, 3, json!({ "period": 1, "log_return": 0.02, "date": "2008-01-31" })).await;
+    let (_, refused) = correct(&app, 3, json!({ "period": 1, "log_return": 0.02, "date": "2008-02-29" })).await;
     assert!(refused["rule"].as_str().unwrap().starts_with("in period 2, with period 1 put right"), "{refused}");
     for reason in ["", "  ", "a\u{1}b", &"x".repeat(201)] {
         let body = json!({ "correction": 3, "period": 1, "log_return": 0.02, "reason": reason });

@@ -12,6 +12,10 @@ use crate::control::progress::{Phase, StepProgress};
 /// Watchers are woken at most this often for progress inside a step.
 const SHORTEST_PAUSE: Duration = Duration::from_millis(50);
 
+/// Steps behind before anything is said of the time left, or this share of all: the first ones prepare what all of them use.
+const FEWEST_STEPS: f64 = 2.0;
+const LEAST_SHARE: f64 = 0.25;
+
 /// Progress of one running job.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
@@ -135,6 +139,7 @@ impl Running {
         };
         let behind = (self.progress.steps_done - self.steps_at_start) as f64 + share;
         let ahead = self.progress.steps_total as f64 - self.progress.steps_done as f64 - share;
-        (behind > 0.0).then(|| self.started.elapsed().as_secs_f64() / behind * ahead.max(0.0))
+        let enough = FEWEST_STEPS.min(LEAST_SHARE * (behind + ahead));
+        (behind > 0.0 && behind >= enough).then(|| self.started.elapsed().as_secs_f64() / behind * ahead.max(0.0))
     }
 }
