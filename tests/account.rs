@@ -66,6 +66,7 @@ async fn a_corrected_session_is_one_that_was_reported_right() {
         json!({ "price": 10.3, "executed_allocation": 0.5, "date": "2026-02-27", "confirm": true }),
         json!({ "price": 104.0, "executed_allocation": 0.6, "confirm": true }),
     ];
+    let at_start = app.action().await.1["radius"].clone();
     report_all(&app, &wrong).await;
     let before = standing(&app).await;
     // The price of the second period: with it change the returns of the second and of the third.
@@ -82,6 +83,7 @@ async fn a_corrected_session_is_one_that_was_reported_right() {
     app.restart().await;
     assert_eq!(standing(&app).await, put_right, "replayed");
     let (_, history) = app.get(&format!("/sessions/{}/history", app.session)).await;
+    assert_eq!(history["initial_radius"], at_start);
     let (second, third) = (&history["observations"][1], &history["observations"][2]);
     assert_eq!((&second["reported"]["price"], &second["now"]["reported"]["price"]), (&json!(10.3), &json!(103.0)));
     assert_eq!(number(&second["log_return"]), (10.3_f64 / 102.0).ln());

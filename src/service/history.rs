@@ -31,6 +31,8 @@ pub struct History {
     pub initial_wealth: f64,
     /// Share of it in the risky asset.
     pub initial_holding: f64,
+    /// Radius of the uncertainty set before the first period, in the unit of an advice's.
+    pub initial_radius: f64,
     /// Names of the assets, where there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub assets: Option<Vec<String>>,
@@ -138,9 +140,9 @@ impl Sessions {
                 }),
             }
         }
+        let periods = Periods::of(&facts)?;
         if !corrections.is_empty() {
             turn.begin().await?;
-            let periods = Periods::of(&facts)?;
             let first = periods.first_corrected();
             let now = self.told_now(tenant, &periods, first).await?;
             for (observation, now) in observations.iter_mut().skip(first).zip(now) {
@@ -148,6 +150,9 @@ impl Sessions {
             }
         }
         let Plan { terms, assets, .. } = Plan::of(&facts.row)?;
+        let (first, start) =
+            (self.policies.advisor(tenant, &facts.row.policy).await?, periods.at_start(terms.learning));
+        let measured = tokio::task::spawn_blocking(move || first.radius(&start)).await;
         let (assets, composed) = assets.map(|planned| (planned.names, planned.composed)).unzip();
         let SessionRow { session, policy, initial_wealth, initial_holding, initial_history: history, .. } = facts.row;
         Ok(History {
@@ -156,6 +161,7 @@ impl Sessions {
             terms,
             initial_wealth,
             initial_holding,
+            initial_radius: measured.map_err(ServiceError::internal)?,
             history: KnownReturns::of(history, assets.as_ref().map(Vec::len)),
             assets,
             composed,

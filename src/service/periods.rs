@@ -18,6 +18,7 @@ use super::report::{Correct, Report};
 use super::standing::{Passed, Standing};
 use crate::control::error::FieldError;
 use crate::control::problem::state::State;
+use crate::control::request::learning::Learning;
 use crate::store::{EntryKind, SessionFacts};
 
 /// A period as its entries tell of it.
@@ -215,6 +216,11 @@ impl Periods {
     /// The first period that was put right, from 0; the number of periods where none was.
     pub(super) fn first_corrected(&self) -> usize {
         self.all.iter().position(|period| period.is_corrected).unwrap_or(self.all.len())
+    }
+
+    /// What the first advice rests on.
+    pub(super) fn at_start(&self, learning: Learning) -> State {
+        self.start.clone().with_law(learning).state
     }
 
     /// From the start, to be passed through period by period. Cost of each: a copy of the law.

@@ -130,9 +130,11 @@ impl Default for ProgressBoard {
 }
 
 impl Running {
-    /// Time per step so far times the steps left; a solving step counts by its share of design points done.
+    /// Time per step so far times the steps left; a solving step counts by its share of design points done. What is simulated takes
+    /// another time than what was solved before it, and nothing is said of it.
     fn seconds_left(&self) -> Option<f64> {
         let share = match self.progress.current {
+            Some(current) if current.phase == Phase::Simulating => return None,
             Some(current) if current.phase == Phase::Fitting => 0.9,
             Some(current) => 0.9 * current.done as f64 / current.total.max(1) as f64,
             None => 0.0,

@@ -112,7 +112,7 @@ export function holdings(shown, action) {
     series: [{ name: "Held", kind: "bars", values: values.map((k) => stands(k, "executed_allocation")) }, ...(costly ? ends : [advised])],
   });
   if (!isCautious(policy.specification.problem)) return [chart];
-  const radii = values.map((k) => (k === session.period - 1 && action ? action.radius : stands(k, "radius")));
+  const radii = values.map((k) => (k === session.period - 1 && action ? action.radius : k === 0 ? history.initial_radius : stands(k, "radius")));
   const perPoint = shown.cautionScale;
   const caution = lineChart({
     title: `Caution: the average return may be lower by so much a ${calendar.unit}`,

@@ -2579,6 +2579,8 @@ class History(TypedDict):
     initial_wealth: float
     initial_holding: float
     """Share of it in the risky asset."""
+    initial_radius: float
+    """Radius of the uncertainty set before the first period, in the unit of an advice's."""
     assets: NotRequired[list[str] | None]
     """Names of the assets, where there are several."""
     composed: NotRequired[Composed | None]
