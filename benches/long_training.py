@@ -2,10 +2,11 @@
 """Trains a year of days on twenty years of daily returns through the service, and prints what it first said of the time left.
 
     cargo build --release
-    benches/long_training.py [--horizon 250] [--returns 5000]
+    benches/long_training.py [--horizon 250] [--returns 5000] [--mean 0.0006]
 
-The returns are draws of a normal law, mean 0.06 % and deviation 1 % a day; everything else is the service's default: the power
-utility of relative risk aversion 3, the radius of alpha 0.1, an accuracy of 0.5 basis points. Needs Linux, for the memory.
+The returns are draws of a normal law with a deviation of 1 % a day, the bank pays 0.01 %, and the utility is power utility of risk
+aversion 3. Everything else is the service's default: the radius of alpha 0.1, an accuracy of 0.5 basis points. Needs Linux, for
+the memory.
 """
 import argparse
 import json
@@ -33,9 +34,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--horizon", type=int, default=250)
     parser.add_argument("--returns", type=int, default=5000)
+    parser.add_argument("--mean", type=float, default=0.0006)
     options = parser.parse_args()
     draw = random.Random(5)
-    history = [round(draw.gauss(0.0006, 0.01), 6) for _ in range(options.returns)]
+    history = [round(draw.gauss(options.mean, 0.01), 6) for _ in range(options.returns)]
     utility = {"kind": "power", "risk_aversion": 3}
     problem = {"horizon": options.horizon, "rate_per_step": 0.0001, "history": history, "utility": utility}
     ballast = os.environ.get("BALLAST", "target/release/ballast")

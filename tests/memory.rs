@@ -130,7 +130,7 @@ async fn imported_policies_asked_once_each_stay_within_the_budget() {
     child.wait().unwrap();
 }
 
-/// Forty clients ask for a document of some 10 MB and read next to nothing of it; before, each kept all of it in memory.
+/// Forty clients ask for a document of some 10 MB and read next to nothing of it: none keeps all of it in memory.
 #[tokio::test(flavor = "multi_thread")]
 async fn answers_that_are_read_slowly_take_no_more_than_their_part() {
     let (mut child, mut app) = confined(&["--memory-limit", "400MiB"]);

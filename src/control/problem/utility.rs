@@ -11,7 +11,8 @@ use crate::numerics::elementary::{exp_m1, ln};
 /// Largest exponent taken: exp(600) is finite, and a loss that deep is never chosen.
 const LARGEST_EXPONENT: f64 = 600.0;
 
-/// Whole risk aversions up to this are multiplied out above this wealth: `W^n - 1 = (W - 1) (1 + ... + W^(n-1))`.
+/// Whole risk aversions up to this are multiplied out above this wealth: `U(W) = (W - 1) (W^-1 + ... + W^(1-eta)) / (eta - 1)`, which
+/// is `(1 - W^(1-eta)) / (eta - 1)` without what cancels near 1.
 const MOST_MULTIPLIED: f64 = 16.0;
 const LEAST_MULTIPLIED: f64 = 1e-12;
 

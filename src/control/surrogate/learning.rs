@@ -235,6 +235,7 @@ impl Learning<'_> {
         }
         fitting.surrogates(solved, &start, guards)
     }
+
     fn features(&self, states: &impl Candidates, some: Range<usize>) -> Result<Vec<Features>, TrainError> {
         let problem = &self.specification.problem;
         let together = together(problem.history.len() + self.step, problem.radius_rule().paths());
