@@ -75,7 +75,7 @@ fn a_centre_mixed_with_the_law_itself_is_nearer_by_the_share_that_was_seen() {
 
 #[test]
 fn calibrated_balls_hold_a_law_that_no_record_was_smoothed_from() {
-    let law = DrawnLaw::Continuous(ContinuousLaw::GaussianMixture(vec![(1.0, 0.01, 0.1)]));
+    let law = DrawnLaw::Continuous(ContinuousLaw::mixture(vec![(1.0, 0.01, 0.1)]));
     let (alpha, paths, scale) = (0.1, 500, 1.0);
     let rules = vec![RadiusRule::Bridge { alpha, paths, scale }, RadiusRule::Calibrated { alpha, paths, scale }];
     let found = coverage(&law, &CoverageQuestion { records: 1000, ..question(rules) }).unwrap();

@@ -135,7 +135,7 @@ fn laws() -> Result<Vec<Named>, ReturnsError> {
     let variance: f64 = atoms.iter().zip(&masses).map(|(z, mass)| mass * (z - mean).powi(2)).sum();
     let deviation = variance.sqrt();
     let scale = (variance * (DEGREES_OF_FREEDOM - 2.0) / DEGREES_OF_FREEDOM).sqrt();
-    let normal = ContinuousLaw::GaussianMixture(vec![(1.0, mean, deviation)]);
+    let normal = ContinuousLaw::mixture(vec![(1.0, mean, deviation)]);
     let student = ContinuousLaw::StudentT { location: mean, scale, degrees_of_freedom: DEGREES_OF_FREEDOM };
     let market = Returns::bundled()?;
     let returns: Vec<f64> = market.rows().iter().map(|row| row.period().log_return).collect();

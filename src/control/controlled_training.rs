@@ -107,17 +107,18 @@ impl<P: Controlled> Simulated<'_, P> {
     /// Streams: ("controlled", t, index) for each step.
     fn state(&self, index: usize) -> (P::State, EmpiricalDistribution) {
         let (ControlledStep { problem, laws, .. }, mut state) = (&self.bellman, self.start.clone());
-        let mut law = self.history.clone();
-        let learns = laws.specification.problem.framework.learns();
+        let mut seen = Vec::with_capacity(self.bellman.step);
         for earlier in 0..self.bellman.step {
             let mut generator = stream(laws.specification.seed, "controlled", earlier, index);
             let actions = problem.actions(earlier, &state);
             let action = actions.lowest + (actions.highest - actions.lowest) * generator.random::<f64>();
             let log_return = admissible(self.law.draw(&mut generator), &laws.specification.problem);
             state = problem.next(earlier, &state, action, log_return);
-            if learns {
-                law.push(log_return);
-            }
+            seen.push(log_return);
+        }
+        let mut law = self.history.clone();
+        if laws.specification.problem.framework.learns() {
+            law.extend(&seen);
         }
         (state, law)
     }

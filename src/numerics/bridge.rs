@@ -11,7 +11,7 @@
 
 use std::ops::Range;
 
-use super::bridge_paths::{AbsoluteBridges, PATHS, Times};
+use super::bridge_paths::{AbsoluteBridges, PATHS, Times, deviation};
 use super::dispatch::dispatched;
 use super::empirical::EmpiricalDistribution;
 use super::scale_mixture::LastQuantile;
@@ -186,6 +186,8 @@ struct Weights<'a> {
     weights: Vec<f64>,
     /// Times outside have weight zero.
     touched: Range<usize>,
+    /// The graded time at or after the last one asked for: that of the next is often the same, or one on.
+    near: usize,
 }
 
 impl<'a> Weights<'a> {
@@ -195,7 +197,7 @@ impl<'a> Weights<'a> {
             assert_eq!(own, size + usize::from(which == Statistic::OneLater), "bridges of the sample size of the law");
         }
         let weights = vec![0.0; bridges.units.len()];
-        Weights { bridges, total, retention, which, weights, touched: 0..0 }
+        Weights { bridges, total, retention, which, weights, touched: 0..0, near: 0 }
     }
 
     /// Every gap of a law.
@@ -228,7 +230,8 @@ impl<'a> Weights<'a> {
         if time.min(1.0 - time) <= NO_MASS {
             return;
         }
-        match &self.bridges.times {
+        let bridges = self.bridges;
+        match &bridges.times {
             Times::Sample(own) => {
                 let size = *own as f64;
                 // With equal weights the ratio is 1, and the position a node, to the last bit.
@@ -237,23 +240,33 @@ impl<'a> Weights<'a> {
                 if node == position {
                     self.put(node as usize, length);
                 } else {
-                    self.interpolate(node as usize, [(node - 1.0) / size, node / size], time, length);
+                    let ends = [(node - 1.0) / size, node / size];
+                    self.interpolate(node as usize, ends, ends.map(deviation), time, length);
                 }
             }
-            Times::Graded(times) => {
-                let after = times.partition_point(|&known| known < time);
-                let known = |index: usize| times.get(index).copied().unwrap_or(1.0);
-                let around = [if after == 0 { 0.0 } else { known(after - 1) }, known(after)];
-                self.interpolate(after + 1, around, time, length);
+            Times::Graded { times, deviations } => {
+                let is_after = |&after: &usize| times[after - 1] < time && time <= times[after];
+                let near = (self.near.max(1)..times.len()).take(2).find(is_after);
+                let after = near.unwrap_or_else(|| times.partition_point(|&known| known < time));
+                self.near = after;
+                let ends = [after - 1, after];
+                self.interpolate(after, ends.map(|end| times[end]), ends.map(|end| deviations[end]), time, length);
             }
         }
     }
 
-    /// `length` at a time between time `after` - 1 and time `after`, which are `low` and `high`.
-    fn interpolate(&mut self, after: usize, [low, high]: [f64; 2], time: f64, length: f64) {
+    /// `length` at a time between time `after` - 1 and time `after`, which are `low` and `high`, with the deviations of a bridge
+    /// there.
+    fn interpolate(
+        &mut self,
+        after: usize,
+        [low, high]: [f64; 2],
+        [at_low, at_high]: [f64; 2],
+        time: f64,
+        length: f64,
+    ) {
         let share = (time - low) / (high - low);
-        let deviation = |time: f64| (time * (1.0 - time)).sqrt();
-        let interpolated = (1.0 - share) * deviation(low) + share * deviation(high);
+        let interpolated = (1.0 - share) * at_low + share * at_high;
         let scaled = length * deviation(time) / interpolated;
         self.put(after - 1, (1.0 - share) * scaled);
         self.put(after, share * scaled);

@@ -33,7 +33,17 @@ pub(super) enum Times {
     /// i/n, i = 1 to n - 1: for laws of one sample size n.
     Sample(usize),
     /// For laws of any size: these, between which `|B|` is interpolated.
-    Graded(Vec<f64>),
+    Graded {
+        /// With 0 before the first and 1 after the last.
+        times: Vec<f64>,
+        /// Of a bridge there.
+        deviations: Vec<f64>,
+    },
+}
+
+/// The standard deviation of a bridge at a time.
+pub(super) fn deviation(time: f64) -> f64 {
+    (time * (1.0 - time)).sqrt()
 }
 
 /// From this sample size on laws share the graded times: their nodes would lie closer than those.
@@ -149,7 +159,9 @@ impl AbsoluteBridges {
                 (path[distance], path[last - distance]) = (low, high);
             }
         };
-        AbsoluteBridges::gather(&times, Times::Graded(times.clone()), paths, divisor, path)
+        let with_ends: Vec<f64> = [0.0].into_iter().chain(times.iter().copied()).chain([1.0]).collect();
+        let deviations = with_ends.iter().copied().map(deviation).collect();
+        AbsoluteBridges::gather(&times, Times::Graded { times: with_ends, deviations }, paths, divisor, path)
     }
 
     /// Bytes that the paths of laws of `sample_size` values take.
@@ -176,7 +188,7 @@ impl AbsoluteBridges {
             // A value is no larger than its deviation times the length.
             Divisor::Length => (LARGEST / (at.len() as f64).sqrt()).min(1.0),
         };
-        let unit = |time: &f64| largest * (time * (1.0 - time)).sqrt() / f64::from(u16::MAX);
+        let unit = |time: &f64| largest * deviation(*time) / f64::from(u16::MAX);
         let units: Vec<f64> = at.iter().map(unit).collect();
         let mut values = vec![[0; PATHS]; at.len() * paths.div_ceil(PATHS)];
         let mut path = vec![0.0; at.len()];

@@ -48,7 +48,7 @@ impl SmoothedLaw {
         let total: f64 = weights.iter().sum();
         let nodes = normal_nodes();
         let spread: Vec<(f64, f64)> = match ContinuousLaw::smoothed_bootstrap(record, &weights) {
-            ContinuousLaw::GaussianMixture(components) => components
+            ContinuousLaw::GaussianMixture { components, .. } => components
                 .iter()
                 .flat_map(|&(weight, mean, deviation)| {
                     nodes.map(|node| (mean + deviation * node, weight / SPREAD as f64))
@@ -91,7 +91,7 @@ impl SmoothedLaw {
 
 /// The middles of as many equally likely parts of a standard normal law, brought to variance 1.
 fn normal_nodes() -> [f64; SPREAD] {
-    let normal = ContinuousLaw::GaussianMixture(vec![(1.0, 0.0, 1.0)]);
+    let normal = ContinuousLaw::mixture(vec![(1.0, 0.0, 1.0)]);
     let nodes: [f64; SPREAD] = std::array::from_fn(|part| normal.quantile((part as f64 + 0.5) / SPREAD as f64));
     let variance = nodes.iter().map(|node| node * node).sum::<f64>() / SPREAD as f64;
     nodes.map(|node| node / variance.sqrt())

@@ -48,6 +48,20 @@ impl EmpiricalDistribution {
         (self.total, self.squares) = one_more(self.total, self.squares, self.retention);
     }
 
+    /// Learns many, oldest first. Cost O(n) and a sort of the new.
+    pub fn extend(&mut self, values: &[f64]) {
+        for _ in values {
+            self.weights.iter_mut().for_each(|weight| *weight *= self.retention);
+            (self.total, self.squares) = one_more(self.total, self.squares, self.retention);
+        }
+        let known = self.sorted.iter().copied().zip(self.weights.iter().copied());
+        let new = values.iter().copied().zip(weights(values.len(), self.retention));
+        let mut all: Vec<(f64, f64)> = known.chain(new).collect();
+        // A sort that keeps what is in order already.
+        all.sort_by(|left, right| left.0.total_cmp(&right.0));
+        (self.sorted, self.weights) = all.into_iter().unzip();
+    }
+
     /// The atoms in ascending order, repeated where observed repeatedly.
     pub fn atoms(&self) -> &[f64] {
         &self.sorted
@@ -140,6 +154,9 @@ mod tests {
                 assert!((pushed.raw_moments(1)[0] - after).abs() < 1e-15);
             }
             assert_eq!(pushed, law, "one by one and the whole sample are one law");
+            let mut extended = EmpiricalDistribution::decaying(&SAMPLE[..2], retention);
+            extended.extend(&SAMPLE[2..]);
+            assert_eq!(extended, law, "many at once and the whole sample are one law");
             // By hand: the values in ascending order were seen 4, 1, 2, 5, 3 and 0 values ago.
             let ages = [4, 1, 2, 5, 3, 0].map(|age| retention.powi(age));
             for (found, expected) in law.weights().iter().zip(ages) {

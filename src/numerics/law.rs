@@ -8,8 +8,13 @@ use super::student::{normal_cdf, normal_density, student_cdf, student_density};
 /// A continuous law on the line.
 #[derive(Debug, Clone)]
 pub enum ContinuousLaw {
-    /// Components (weight, mean, standard deviation); weights sum to 1.
-    GaussianMixture(Vec<(f64, f64, f64)>),
+    /// Made by [`ContinuousLaw::mixture`].
+    GaussianMixture {
+        /// (weight, mean, standard deviation); weights sum to 1.
+        components: Vec<(f64, f64, f64)>,
+        /// The weight of each component and of all before it.
+        reached: Vec<f64>,
+    },
     /// Location, scale, degrees of freedom.
     StudentT {
         /// The mean.
@@ -30,6 +35,17 @@ const COARSE_STEP: f64 = 0.5;
 const MANY_COMPONENTS: usize = 16;
 
 impl ContinuousLaw {
+    /// Normals of these (weight, mean, standard deviation); weights sum to 1.
+    pub fn mixture(components: Vec<(f64, f64, f64)>) -> Self {
+        let mut sum = 0.0;
+        let weights = components.iter().map(|(weight, ..)| weight);
+        let reached = weights.map(|weight| {
+            sum += weight;
+            sum
+        });
+        ContinuousLaw::GaussianMixture { reached: reached.collect(), components }
+    }
+
     /// Smoothed bootstrap of a weighted sample: a normal of Silverman's bandwidth at the effective size around each value,
     /// shrunk towards the mean so that the mean and variance are the sample's own. Source: Silverman (1986), section 6.4.1.
     pub fn smoothed_bootstrap(sample: &[f64], weights: &[f64]) -> Self {
@@ -41,25 +57,19 @@ impl ContinuousLaw {
         let bandwidth = 1.06 * variance.sqrt() * size.powf(-0.2);
         let shrink = (1.0 + bandwidth * bandwidth / variance).sqrt().recip();
         let component = |(z, weight): (&f64, &f64)| (weight / total, mean + shrink * (z - mean), shrink * bandwidth);
-        ContinuousLaw::GaussianMixture(weighted().map(component).collect())
+        ContinuousLaw::mixture(weighted().map(component).collect())
     }
 
-    /// One draw.
+    /// One draw. Cost O(log components).
     pub fn draw(&self, generator: &mut impl Rng) -> f64 {
         match self {
-            ContinuousLaw::GaussianMixture(components) => {
+            ContinuousLaw::GaussianMixture { components, reached } => {
                 let uniform: f64 = generator.random();
                 let normal: f64 = generator.sample(StandardNormal);
-                let mut cumulative = 0.0;
-                let mut chosen = components.last().copied().unwrap_or((1.0, 0.0, 0.0));
-                for &component in components {
-                    cumulative += component.0;
-                    if uniform < cumulative {
-                        chosen = component;
-                        break;
-                    }
-                }
-                chosen.1 + chosen.2 * normal
+                // Rounding may leave the sum of all below the number drawn.
+                let chosen = components.get(reached.partition_point(|&sum| sum <= uniform)).or(components.last());
+                let (_, mean, deviation) = chosen.copied().unwrap_or((1.0, 0.0, 0.0));
+                mean + deviation * normal
             }
             ContinuousLaw::StudentT { location, scale, degrees_of_freedom } => match StudentT::new(*degrees_of_freedom)
             {
@@ -72,7 +82,7 @@ impl ContinuousLaw {
     /// `E[Z]`.
     pub fn mean(&self) -> f64 {
         match self {
-            ContinuousLaw::GaussianMixture(components) => components.iter().map(|c| c.0 * c.1).sum(),
+            ContinuousLaw::GaussianMixture { components, .. } => components.iter().map(|c| c.0 * c.1).sum(),
             ContinuousLaw::StudentT { location, .. } => *location,
         }
     }
@@ -80,7 +90,7 @@ impl ContinuousLaw {
     /// P(Z <= z), and the partial mean E[Z; Z <= z].
     pub fn cumulative(&self, z: f64) -> (f64, f64) {
         match self {
-            ContinuousLaw::GaussianMixture(components) => {
+            ContinuousLaw::GaussianMixture { components, .. } => {
                 let component = |(sum, mean_below): (f64, f64), &(weight, mean, deviation): &(f64, f64, f64)| {
                     let normal = (z - mean) / deviation;
                     let share = normal_cdf(normal);
@@ -119,7 +129,7 @@ impl ContinuousLaw {
     pub fn quadrature(&self) -> (Vec<f64>, Vec<f64>) {
         let mut nodes: Vec<(f64, f64)> = Vec::new();
         match self {
-            ContinuousLaw::GaussianMixture(components) => {
+            ContinuousLaw::GaussianMixture { components, .. } => {
                 let step = if components.len() > MANY_COMPONENTS { COARSE_STEP } else { NORMAL_STEP };
                 let reach = (NORMAL_NODES as f64 * NORMAL_STEP / step) as i32;
                 for &(weight, mean, deviation) in components {
@@ -155,8 +165,7 @@ mod tests {
 
     #[test]
     fn quadrature_has_the_moments_of_the_law() {
-        let mixture =
-            ContinuousLaw::GaussianMixture(vec![(0.4, 0.006, 0.016_f64.sqrt()), (0.6, 0.016, 0.00625_f64.sqrt())]);
+        let mixture = ContinuousLaw::mixture(vec![(0.4, 0.006, 0.016_f64.sqrt()), (0.6, 0.016, 0.00625_f64.sqrt())]);
         let (atoms, masses) = mixture.quadrature();
         let exact: f64 = 0.4 * (0.006_f64 + 0.008).exp() + 0.6 * (0.016_f64 + 0.003125).exp();
         let sum: f64 = atoms.iter().zip(&masses).map(|(z, p)| p * z.exp()).sum();

@@ -197,7 +197,7 @@ mod tests {
     }
 
     fn normal() -> ContinuousLaw {
-        ContinuousLaw::GaussianMixture(vec![(1.0, 0.0, 1.0)])
+        ContinuousLaw::mixture(vec![(1.0, 0.0, 1.0)])
     }
 
     #[test]
@@ -220,7 +220,7 @@ mod tests {
     fn mixtures_and_student_agree_with_adaptive_quadrature() {
         // scipy.integrate.quad of |F_n - F| between the atoms and the crossings of F.
         let (first, second) = (0.016_f64.sqrt(), 0.00625_f64.sqrt());
-        let mixture = ContinuousLaw::GaussianMixture(vec![(0.4, 0.006, first), (0.6, 0.016, second)]);
+        let mixture = ContinuousLaw::mixture(vec![(0.4, 0.006, first), (0.6, 0.016, second)]);
         let student = ContinuousLaw::StudentT { location: 0.01, scale: 0.05, degrees_of_freedom: 4.0 };
         let sample = [0.02, -0.05, 0.11, 0.04, 0.04, -0.3, 0.2];
         for (law, expected) in [(mixture, 0.04577174826500554), (student, 0.062448282185574695)] {

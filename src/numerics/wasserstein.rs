@@ -9,6 +9,8 @@
 
 use std::ops::Range;
 
+use super::dispatch::dispatched;
+
 /// A ball around a discrete law: `masses[k]` sits at `support[k]` (ascending, distinct), the masses sum to 1.
 #[derive(Debug, Clone, Copy)]
 pub struct WassersteinBall<'a> {
@@ -68,92 +70,93 @@ struct Edge {
     multiplier: f64,
 }
 
+/// Points side by side whose mass all goes to one other.
+#[derive(Debug, Clone)]
+struct Run {
+    points: Range<usize>,
+    to: usize,
+}
+
 /// A search for places at which `v + gamma distance` is least.
 struct Search<'a> {
     ball: &'a WassersteinBall<'a>,
     payoff: &'a [f64],
-    /// The atoms that may still move, for mass that stays at one multiplier stays at every greater one, and where the plan
-    /// found last sends them.
-    moving: Vec<(usize, usize)>,
-    /// Where they and all that they may move to lie.
+    /// Where mass lies that may still move, for what stays at one multiplier stays at every greater one.
+    from: Range<usize>,
+    /// Where that and all that it may move to lies.
     between: Range<usize>,
-    /// For every point the best at or below it, and the best at or above it.
-    below: Vec<usize>,
-    above: Vec<usize>,
+    /// What the plan found last moves, ascending.
+    runs: Vec<Run>,
+    /// What would move if all went down, ascending, and what if all went up, descending.
+    downs: Vec<Run>,
+    ups: Vec<Run>,
 }
 
 impl<'a> Search<'a> {
     fn new(ball: &'a WassersteinBall<'a>, payoff: &'a [f64]) -> Self {
-        let points = ball.support.len();
-        let atoms = (0..points).filter(|&point| ball.masses[point] > 0.0);
-        let moving = atoms.map(|atom| (atom, atom)).collect();
-        Search { ball, payoff, moving, between: 0..points, below: vec![0; points], above: vec![0; points] }
+        let has_mass = |mass: &f64| *mass > 0.0;
+        let first = ball.masses.iter().position(has_mass).unwrap_or(0);
+        let end = ball.masses.iter().rposition(has_mass).map_or(0, |last| last + 1);
+        let (from, between) = (first..end, 0..ball.support.len());
+        Search { ball, payoff, from, between, runs: Vec::new(), downs: Vec::new(), ups: Vec::new() }
     }
 
-    /// Cost O(points between): two scans.
+    /// What moves at a multiplier, and the better of two ways for it. Cost O(points between).
     fn look(&mut self, multiplier: f64) {
-        let Range { start, end } = self.between;
-        let (support, payoff) = (&self.ball.support[start..end], &self.payoff[start..end]);
-        let (below, above) = (&mut self.below[start..end], &mut self.above[start..end]);
-        let (mut low, mut low_at, mut high, mut high_at) = (f64::INFINITY, 0, f64::INFINITY, 0);
-        for up in 0..support.len() {
-            let down = support.len() - 1 - up;
-            let from_below = payoff[up] - multiplier * support[up];
-            let from_above = payoff[down] + multiplier * support[down];
-            low_at = if from_below <= low { up } else { low_at };
-            low = if from_below < low { from_below } else { low };
-            high_at = if from_above <= high { down } else { high_at };
-            high = if from_above < high { from_above } else { high };
-            (below[up], above[down]) = (start + low_at, start + high_at);
+        let (support, payoff) = (self.ball.support, self.payoff);
+        let Search { from, between, runs, downs, ups, .. } = self;
+        let levels = |slope: f64| Levels { support, payoff, slope };
+        dispatched!(levels(multiplier).downs(between, from, downs));
+        dispatched!(levels(-multiplier).ups(between, from, ups));
+        ups.reverse();
+        runs.clear();
+        let mut push = |points: Range<usize>, to: usize| {
+            if !points.is_empty() {
+                runs.push(Run { points, to });
+            }
+        };
+        let (mut downs, mut ups, mut at) = (downs.as_slice(), ups.as_slice(), from.start);
+        while at < from.end {
+            let ((below, end_below), (above, end_above)) = (passed(&mut downs, at), passed(&mut ups, at));
+            let end = from.end.min(end_below).min(end_above);
+            match (below, above) {
+                (None, None) => {}
+                (Some(to), None) | (None, Some(to)) => push(at..end, to),
+                (Some(below), Some(above)) => {
+                    let bound = payoff[above] - payoff[below] + multiplier * (support[above] + support[below]);
+                    let cut = at + support[at..end].partition_point(|point| 2.0 * multiplier * point <= bound);
+                    push(at..cut, below);
+                    push(cut..end, above);
+                }
+            }
+            at = end;
         }
-    }
-
-    /// Where the mass at `from` goes, how far, and what that takes off its payoff; it stays where nothing is better.
-    #[inline(always)]
-    fn best(&self, from: usize, multiplier: f64) -> (usize, f64, f64) {
-        let support = self.ball.support;
-        let (below, above) = (self.below[from], self.above[from]);
-        let [down, up] = [support[from] - support[below], support[above] - support[from]];
-        let [lost_below, lost_above] = [below, above].map(|to| self.payoff[from] - self.payoff[to]);
-        let [gain_below, gain_above] = [lost_below - multiplier * down, lost_above - multiplier * up];
-        let is_above = gain_above > gain_below || (gain_above == gain_below && up < down);
-        let pick = |above: f64, below: f64| if is_above { above } else { below };
-        let moves = pick(gain_above, gain_below) > 0.0;
-        let some = |value: f64| if moves { value } else { 0.0 };
-        let to = if is_above { above } else { below };
-        (if moves { to } else { from }, some(pick(up, down)), some(pick(lost_above, lost_below)))
     }
 
     /// The best plan at a multiplier. Cost O(points between).
     fn plan(&mut self, multiplier: f64) -> Plan {
         self.look(multiplier);
-        let (mut cost, mut loss) = (0.0, 0.0);
-        let mut moving = std::mem::take(&mut self.moving);
-        for (from, to) in &mut moving {
-            let (best, distance, lost) = self.best(*from, multiplier);
-            *to = best;
-            cost += self.ball.masses[*from] * distance;
-            loss += self.ball.masses[*from] * lost;
-        }
-        self.moving = moving;
-        Plan { multiplier, cost, loss }
+        let WassersteinBall { support, masses, .. } = *self.ball;
+        let beyond = |values: &[f64]| {
+            let of_run =
+                |Run { points, to }: &Run| sum_beyond(values[*to], &values[points.clone()], &masses[points.clone()]);
+            dispatched!(self.runs.iter().map(of_run).map(f64::abs).sum())
+        };
+        // Every point of a run moves the same way, and to where the payoff is less.
+        Plan { multiplier, cost: beyond(support), loss: beyond(self.payoff) }
     }
 
-    /// Leaves out the atoms that stay in the plan found last, whose multiplier is below the one sought.
+    /// Leaves out what stays in the plan found last, whose multiplier is below the one sought.
     fn narrow(&mut self) {
         let support = self.ball.support;
-        let (mut lowest, mut highest, mut kept) = (f64::INFINITY, f64::NEG_INFINITY, 0);
-        for index in 0..self.moving.len() {
-            let (from, to) = self.moving[index];
-            let distance = (support[to] - support[from]).abs();
-            self.moving[kept] = (from, to);
-            kept += usize::from(from != to);
+        let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
+        for Run { points, to } in &self.runs {
+            let [first, last, to] = [points.start, points.end - 1, *to].map(|point| support[point]);
             // What moved to one side may move less far to the other.
-            let [down, up] = [support[from] - distance, support[from] + distance];
-            lowest = if from != to && down < lowest { down } else { lowest };
-            highest = if from != to && up > highest { up } else { highest };
+            (lowest, highest) = (lowest.min(to).min(2.0 * first - to), highest.max(to).max(2.0 * last - to));
         }
-        self.moving.truncate(kept);
+        let ends = self.runs.first().zip(self.runs.last());
+        self.from = ends.map_or(0..0, |(first, last)| first.points.start..last.points.end);
         let first = support.partition_point(|&point| point < lowest);
         let last = support.partition_point(|&point| point <= highest);
         // A rounding may have left the farthest place out.
@@ -200,18 +203,124 @@ impl<'a> Search<'a> {
         Edge { near, far, multiplier: chord(near, far) }
     }
 
-    /// Where a plan sends the mass of the atoms that may move, and how far.
-    fn destinations(&mut self, plan: Plan) -> Vec<(usize, f64)> {
-        if plan.multiplier == f64::INFINITY {
-            return self.moving.iter().map(|&(from, _)| (from, 0.0)).collect();
+    /// Where a plan sends the mass of each point.
+    fn destinations(&mut self, plan: Plan) -> Vec<usize> {
+        let mut places: Vec<usize> = (0..self.payoff.len()).collect();
+        if plan.multiplier < f64::INFINITY {
+            self.look(plan.multiplier);
+            self.runs.iter().for_each(|Run { points, to }| places[points.clone()].fill(*to));
         }
-        self.look(plan.multiplier);
-        let place = |&(from, _): &(usize, usize)| {
-            let (to, distance, _) = self.best(from, plan.multiplier);
-            (to, distance)
-        };
-        self.moving.iter().map(place).collect()
+        places
     }
+}
+
+/// Where the run at a point goes, if there is one, and where that ends or the next begins. Runs that end before are left out.
+fn passed(runs: &mut &[Run], at: usize) -> (Option<usize>, usize) {
+    let before = runs.iter().take_while(|run| run.points.end <= at).count();
+    *runs = &runs[before..];
+    match runs.first() {
+        None => (None, usize::MAX),
+        Some(Run { points, to }) if points.start <= at => (Some(*to), points.end),
+        Some(Run { points, .. }) => (None, points.start),
+    }
+}
+
+/// `v - slope s` at every point. Mass that moves down at a multiplier goes to the least of it below, with the multiplier for its
+/// slope; mass that moves up goes to the least above, with the opposite. What rises from a least level is a run that goes there,
+/// until a level is as low.
+#[derive(Clone, Copy)]
+struct Levels<'a> {
+    support: &'a [f64],
+    payoff: &'a [f64],
+    slope: f64,
+}
+
+impl Levels<'_> {
+    #[inline(always)]
+    fn of(self, points: Range<usize>) -> impl Iterator<Item = f64> {
+        let Levels { support, payoff, slope } = self;
+        support[points.clone()].iter().zip(&payoff[points]).map(move |(point, value)| value - slope * point)
+    }
+
+    /// How many neighbours change in some way, and how many points are as low: no branch is taken for any of them.
+    #[inline(always)]
+    fn steps(self, pairs: Range<usize>, is: impl Fn(f64, f64) -> bool) -> usize {
+        let next = self.of(pairs.start + 1..pairs.end + 1);
+        self.of(pairs).zip(next).map(|(level, next)| usize::from(is(level, next))).sum()
+    }
+
+    #[inline(always)]
+    fn as_low(self, point: usize) -> impl Fn(Range<usize>) -> usize {
+        let least = self.payoff[point] - self.slope * self.support[point];
+        move |points| self.of(points).map(|level| usize::from(level <= least)).sum()
+    }
+
+    /// What of `from` goes down to a point of `between`.
+    #[inline(always)]
+    fn downs(self, between: &Range<usize>, from: &Range<usize>, downs: &mut Vec<Run>) {
+        downs.clear();
+        let (mut at, end) = (between.start, from.end);
+        let rises = |pairs| self.steps(pairs, |level, next| next > level);
+        while let Some(to) = first(at..end.saturating_sub(1), rises) {
+            at = first(to + 2..end, self.as_low(to)).unwrap_or(end);
+            let points = from.start.max(to + 1)..at;
+            if !points.is_empty() {
+                downs.push(Run { points, to });
+            }
+        }
+    }
+
+    /// What of `from` goes up to a point of `between`, from the highest on.
+    #[inline(always)]
+    fn ups(self, between: &Range<usize>, from: &Range<usize>, ups: &mut Vec<Run>) {
+        ups.clear();
+        let (start, mut end) = (from.start, between.end);
+        let falls = |pairs| self.steps(pairs, |level, next| level > next);
+        while let Some(highest) = last(start..end.saturating_sub(1), falls) {
+            let to = highest + 1;
+            end = last(start..highest, self.as_low(to)).map_or(start, |low| low + 1);
+            let points = end..from.end.min(to);
+            if !points.is_empty() {
+                ups.push(Run { points, to });
+            }
+        }
+    }
+}
+
+/// Points that are counted together before one of them is sought.
+const BLOCK: usize = 64;
+
+/// The first of `points` that counts.
+#[inline(always)]
+fn first(points: Range<usize>, count: impl Fn(Range<usize>) -> usize) -> Option<usize> {
+    let block = |start: usize| start..points.end.min(start + BLOCK);
+    let mut found = points.clone().step_by(BLOCK).map(block).filter(|some| count(some.clone()) > 0);
+    found.next().and_then(|mut some| some.find(|&point| count(point..point + 1) > 0))
+}
+
+/// The last of `points` that counts.
+#[inline(always)]
+fn last(points: Range<usize>, count: impl Fn(Range<usize>) -> usize) -> Option<usize> {
+    let block = |passed: usize| points.start.max((points.end - passed).saturating_sub(BLOCK))..points.end - passed;
+    let mut found = (0..points.len()).step_by(BLOCK).map(block).filter(|some| count(some.clone()) > 0);
+    found.next().and_then(|some| some.rev().find(|&point| count(point..point + 1) > 0))
+}
+
+/// Sums that are taken side by side.
+const LANES: usize = 8;
+
+/// `sum_k p_k (v_k - level)`, in an order of its own that no processor changes.
+#[inline(always)]
+fn sum_beyond(level: f64, values: &[f64], masses: &[f64]) -> f64 {
+    let ((values, last_values), (masses, last_masses)) = (values.as_chunks::<LANES>(), masses.as_chunks::<LANES>());
+    let mut sums = [0.0; LANES];
+    for (values, masses) in values.iter().zip(masses) {
+        for lane in 0..LANES {
+            sums[lane] += masses[lane] * (values[lane] - level);
+        }
+    }
+    let rest: f64 = last_values.iter().zip(last_masses).map(|(value, mass)| mass * (value - level)).sum();
+    sums.iter().sum::<f64>() + rest
 }
 
 impl WassersteinBall<'_> {
@@ -239,17 +348,14 @@ impl WassersteinBall<'_> {
         let edge = search.edge(guess);
         let [near, far] = [edge.near, edge.far].map(|plan| search.destinations(plan));
         let (mut budget, mut moves) = (self.radius - edge.near.cost, Vec::new());
-        let mut places = search.moving.iter().zip(near.iter().zip(&far)).peekable();
         for (from, &mass) in self.masses.iter().enumerate().filter(|(_, mass)| **mass > 0.0) {
-            let Some((_, (near, far))) = places.next_if(|((moving, _), _)| *moving == from) else {
-                push_move(&mut moves, from, from, mass);
-                continue;
-            };
-            let cost = mass * (far.1 - near.1);
-            let share = if near.0 == far.0 || cost <= budget { 1.0 } else { budget / cost };
+            let [near, far] = [near[from], far[from]];
+            let distance = |to: usize| (self.support[to] - self.support[from]).abs();
+            let cost = mass * (distance(far) - distance(near));
+            let share = if near == far || cost <= budget { 1.0 } else { budget / cost };
             budget = if share < 1.0 { 0.0 } else { budget - cost };
-            push_move(&mut moves, from, far.0, mass * share);
-            push_move(&mut moves, from, near.0, mass * (1.0 - share));
+            push_move(&mut moves, from, far, mass * share);
+            push_move(&mut moves, from, near, mass * (1.0 - share));
         }
         let (expectation, multiplier) = (self.expectation(payoff, &edge), edge.multiplier);
         WorstLaw { expectation, dual: self.dual(payoff, multiplier), multiplier, moves }
@@ -283,7 +389,7 @@ impl WassersteinBall<'_> {
 
     /// The expectation under the law in the middle of the ball.
     pub fn mean(&self, payoff: &[f64]) -> f64 {
-        payoff.iter().zip(self.masses).map(|(value, mass)| value * mass).sum()
+        dispatched!(sum_beyond(0.0, payoff, self.masses))
     }
 
     /// That of the law that spends the radius between two plans.
@@ -302,6 +408,29 @@ fn push_move(moves: &mut Vec<Move>, from: usize, to: usize, mass: f64) {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    /// Both bounds meet at a law that is one of the ball, whatever is guessed.
+    fn meet(ball: WassersteinBall<'_>, payoff: &[f64]) -> Result<(), TestCaseError> {
+        let WassersteinBall { support, radius, .. } = ball;
+        let worst = ball.worst_law(payoff);
+        // A dozen roundings of numbers below 2.
+        prop_assert!((worst.expectation - worst.dual).abs() < 1e-12);
+        let total: f64 = worst.moves.iter().map(|m| m.mass).sum();
+        let spent: f64 = worst.moves.iter().map(|m| m.mass * (support[m.to] - support[m.from]).abs()).sum();
+        let reached: f64 = worst.moves.iter().map(|m| m.mass * payoff[m.to]).sum();
+        prop_assert!((total - 1.0).abs() < 1e-12);
+        prop_assert!(spent <= radius + 1e-12);
+        prop_assert!((reached - worst.expectation).abs() < 1e-12);
+        prop_assert_eq!(ball.worst_expectation(payoff), (worst.expectation, worst.multiplier));
+        for factor in [0.5, 0.97, 1.0, 1.005, 1.3, 9.0] {
+            let near = ball.worst_law_near(payoff, factor * worst.multiplier);
+            prop_assert!((near.expectation - worst.expectation).abs() < 1e-12);
+            prop_assert!((near.dual - worst.expectation).abs() < 1e-12);
+        }
+        let sources: std::collections::BTreeSet<usize> = worst.moves.iter().map(|m| m.from).collect();
+        prop_assert!(worst.moves.len() <= sources.len() + 1, "at most one atom's mass is split");
+        Ok(())
+    }
 
     proptest! {
         #[test]
@@ -326,25 +455,26 @@ mod tests {
             let falls = (0..144).filter(|pair| masses[pair / 12] > 0.0 && pair / 12 != pair % 12);
             let steepest = falls.map(|pair| fall(pair / 12, pair % 12)).fold(0.0, f64::max);
             prop_assert!((centre.worst_expectation(&payoff).1 - steepest).abs() < 1e-9 * (1.0 + steepest));
-            let ball = WassersteinBall { radius, ..centre };
-            let worst = ball.worst_law(&payoff);
-            // A dozen roundings of numbers below 2.
-            prop_assert!((worst.expectation - worst.dual).abs() < 1e-12);
-            let total: f64 = worst.moves.iter().map(|m| m.mass).sum();
-            let spent: f64 = worst.moves.iter().map(|m| m.mass * (support[m.to] - support[m.from]).abs()).sum();
-            let reached: f64 = worst.moves.iter().map(|m| m.mass * payoff[m.to]).sum();
-            prop_assert!((total - 1.0).abs() < 1e-12);
-            prop_assert!(spent <= radius + 1e-12);
-            prop_assert!((reached - worst.expectation).abs() < 1e-12);
-            prop_assert_eq!(ball.worst_expectation(&payoff), (worst.expectation, worst.multiplier));
-            // Whatever is guessed; and at most one atom's mass is split.
-            for factor in [0.5, 0.97, 1.0, 1.005, 1.3, 9.0] {
-                let near = ball.worst_law_near(&payoff, factor * worst.multiplier);
-                prop_assert!((near.expectation - worst.expectation).abs() < 1e-12);
-                prop_assert!((near.dual - worst.expectation).abs() < 1e-12);
+            meet(WassersteinBall { radius, ..centre }, &payoff)?;
+        }
+
+        /// Waves that rise and fall over many points, with atoms at some of them.
+        #[test]
+        fn primal_and_dual_meet_over_many_points(
+            waves in proptest::collection::vec(-0.3_f64..0.3, 6),
+            has_mass in proptest::collection::vec(any::<bool>(), 2..400),
+            radius in 0.0_f64..0.3,
+        ) {
+            let points = has_mass.len();
+            let support: Vec<f64> = (0..points).map(|k| k as f64 / points as f64).collect();
+            let wave = |at: &f64| waves.iter().zip(1..).map(|(size, turns)| size * (f64::from(turns) * 4.0 * at).cos()).sum();
+            let payoff: Vec<f64> = support.iter().map(wave).collect();
+            let count = has_mass.iter().filter(|has| **has).count().max(1) as f64;
+            let mut masses: Vec<f64> = has_mass.iter().map(|&has| f64::from(u8::from(has)) / count).collect();
+            if !has_mass.contains(&true) {
+                masses[0] = 1.0;
             }
-            let sources: std::collections::BTreeSet<usize> = worst.moves.iter().map(|m| m.from).collect();
-            prop_assert!(worst.moves.len() <= sources.len() + 1);
+            meet(WassersteinBall { support: &support, masses: &masses, radius }, &payoff)?;
         }
     }
 }

@@ -16,7 +16,7 @@ pub fn continuous_law(law: &SamplingLaw, problem: &ProblemSpecification) -> Cont
         }
         SamplingLaw::GaussianMixture { components } => {
             let component = |c: &MixtureComponent| (c.weight, c.mean, c.variance.sqrt());
-            ContinuousLaw::GaussianMixture(components.iter().map(component).collect())
+            ContinuousLaw::mixture(components.iter().map(component).collect())
         }
     }
 }

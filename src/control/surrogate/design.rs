@@ -102,13 +102,15 @@ impl Design {
         } else {
             self.history.clone()
         };
+        let mut seen = Vec::with_capacity(step);
         for (earlier, dynamics) in self.periods[..step].iter().enumerate() {
             let mut generator = stream(self.seed, "design", earlier, index);
             let action = dynamics.highest_action(wealth, problem.action_interval[1]) * generator.random::<f64>();
             let log_return = admissible(self.law.draw(&mut generator), problem);
             (wealth, holding) = dynamics.next(wealth, holding, action, log_return);
-            law.push(log_return);
+            seen.push(log_return);
         }
+        law.extend(&seen);
         self.holding_half(wealth.max(self.periods[step].least_wealth()), law)
     }
 
