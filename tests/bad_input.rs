@@ -198,6 +198,93 @@ async fn every_field_out_of_range_is_named() {
     }
 }
 
+/// What the rules refuse the description refuses, but for what is decided together: by two fields, by which end of a range it is, or
+/// by what takes such a range.
+#[test]
+fn the_description_is_as_strict_as_the_rules_of_single_fields() {
+    let description: Value = serde_json::from_str(include_str!("../api/openapi.json")).unwrap();
+    let schemas = &description["components"]["schemas"];
+    let fits = |request: &Value| fits(request, &schemas["TrainQuestion"], schemas);
+    assert!(fits(&specification(2)));
+    let loose = faults().into_iter().filter(|(pointer, value, _)| fits(&with(pointer, value.clone())));
+    let loose: Vec<&str> = loose.map(|(.., field)| field).collect();
+    assert_eq!(loose, DECIDED_TOGETHER);
+}
+
+const DECIDED_TOGETHER: [&str; 20] = [
+    "problem.action_interval[0]",
+    "problem.action_interval[1]",
+    "problem.contributions",
+    "problem.contributions",
+    "problem.initial_wealth",
+    "problem.trading_cost",
+    "problem.utility.risk_aversion",
+    "problem.utility.risk_aversion_relative",
+    "problem.centre.law.kind",
+    "problem.centre.law",
+    "problem.centre.kind",
+    "problem.centre.law",
+    "problem.support.min",
+    "problem.support.max",
+    "problem.support.max",
+    "problem.law",
+    "problem.history",
+    "design.wealth.min",
+    "design.wealth.max",
+    "surrogate.bounds.signal_variance[1]",
+];
+
+/// Whether a value fits a schema, by the keywords that the description has.
+fn fits(value: &Value, schema: &Value, schemas: &Value) -> bool {
+    let fits = |value: &Value, schema: &Value| fits(value, schema, schemas);
+    let is = |kind: &str| match kind {
+        "null" => value.is_null(),
+        "boolean" => value.is_boolean(),
+        "string" => value.is_string(),
+        "array" => value.is_array(),
+        "object" => value.is_object(),
+        "number" => value.is_number(),
+        "integer" => value.as_f64().is_some_and(|number| number.fract() == 0.0),
+        kind => panic!("the type {kind}"),
+    };
+    let members = value.as_object();
+    let number = |holds: &dyn Fn(f64) -> bool| value.as_f64().is_none_or(holds);
+    let length = |holds: &dyn Fn(f64) -> bool| {
+        let length = value.as_array().map(Vec::len).or(value.as_str().map(|text| text.chars().count()));
+        length.is_none_or(|length| holds(length as f64))
+    };
+    let bound = |rule: &Value| rule.as_f64().unwrap();
+    let listed = |list: &Value| list.as_array().unwrap().clone();
+    schema.as_object().unwrap().iter().all(|(keyword, rule)| match keyword.as_str() {
+        "type" => rule.as_str().map_or_else(|| listed(rule).iter().any(|kind| is(kind.as_str().unwrap())), is),
+        "enum" => listed(rule).contains(value),
+        "$ref" => fits(value, &schemas[rule.as_str().unwrap().rsplit('/').next().unwrap()]),
+        "oneOf" => listed(rule).iter().filter(|schema| fits(value, schema)).count() == 1,
+        "minimum" => number(&|number| number >= bound(rule)),
+        "maximum" => number(&|number| number <= bound(rule)),
+        "exclusiveMinimum" => number(&|number| number > bound(rule)),
+        "minItems" | "minLength" => length(&|length| length >= bound(rule)),
+        "maxItems" | "maxLength" => length(&|length| length <= bound(rule)),
+        "uniqueItems" => {
+            value.as_array().is_none_or(|items| (1..items.len()).all(|end| !items[..end].contains(&items[end])))
+        }
+        "items" => value.as_array().is_none_or(|items| items.iter().all(|item| fits(item, rule))),
+        "required" => {
+            members.is_none_or(|members| listed(rule).iter().all(|name| members.contains_key(name.as_str().unwrap())))
+        }
+        "properties" => members.is_none_or(|members| {
+            members.iter().all(|(name, member)| rule.get(name).is_none_or(|schema| fits(member, schema)))
+        }),
+        "additionalProperties" => {
+            assert_eq!(rule, false);
+            let known = schema["properties"].as_object();
+            members.is_none_or(|members| members.keys().all(|name| known.is_some_and(|known| known.contains_key(name))))
+        }
+        "description" | "default" | "example" | "format" => true,
+        keyword => panic!("the keyword {keyword}"),
+    })
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_wrong_kind_is_refused() {
     let app = App::start().await;

@@ -71,6 +71,29 @@ async fn a_job_larger_than_memory_is_refused_and_the_service_lives() {
     child.wait().unwrap();
 }
 
+/// Bridges of 25,000 paths for 1,000 returns take 50 MB, and a quarter of 160 MiB is kept ready.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_cannot_be_kept_ready_is_refused_wherever_it_is_asked_for() {
+    let (mut child, mut app) = confined(&["--memory-limit", "160MiB"]);
+    let radius = json!({ "rule": "bridge", "alpha": 0.1, "paths": 25_000 });
+    let long: Vec<f64> = (0..1000).map(|k| 0.002 + 0.02 * (1.7 * f64::from(k)).sin()).collect();
+    let problem = json!({ "rate_per_step": 0.002, "history": long, "radius": radius });
+    for (path, field) in [("/frontier", "problem.radius.paths"), ("/advise", "problem.history")] {
+        let (status, refused) = app.post(path, &json!({ "problem": problem })).await;
+        assert_eq!((status, &refused["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!(field)), "{refused}");
+        assert!(refused["rule"].as_str().unwrap().contains("would take about"), "{refused}");
+    }
+    let mut short = support::specification(2);
+    short["problem"]["radius"] = radius;
+    app.train(&short).await;
+    let (status, refused) = app.post("/sessions", &json!({ "policy": app.policy, "history": long })).await;
+    assert_eq!((status, &refused["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!("history")), "{refused}");
+    app.open().await;
+    assert_eq!(app.action().await.0, StatusCode::OK);
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
 /// The policy of [`support::specification`] with `points` design points of noise in every step but the first.
 fn inflated(policy: &[u8], points: usize, seed: u64) -> Value {
     let mut policy: Value = serde_json::from_slice(policy).unwrap();

@@ -4,11 +4,12 @@ mod support;
 
 use std::time::Duration;
 
+use ballast::service::config::StoreLocation;
 use ballast::store::Quotas;
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
-use support::patience::patience;
-use support::{App, execute, specification};
+use support::patience::{patience, until};
+use support::{App, execute, postgres, specification};
 
 /// A training that takes longer than any test.
 fn endless() -> Value {
@@ -24,10 +25,22 @@ fn assert_refused((status, problem): (StatusCode, Value), expected: u16, option:
     assert!(rule.contains(&format!("at most {limit},")) && rule.contains(&format!("--{option}")), "{problem}");
 }
 
+const QUOTAS: Quotas = Quotas { queued_jobs: 2, sessions: 2, bytes: 150_000 };
+
 #[tokio::test]
 async fn what_a_tenant_may_keep_is_refused_with_the_numbers() {
-    let quotas = Quotas { queued_jobs: 2, sessions: 2, bytes: 150_000 };
-    let mut app = App::configured(|config| config.quotas = quotas).await;
+    is_refused_with_the_numbers(App::configured(|config| config.quotas = QUOTAS).await).await;
+}
+
+#[tokio::test]
+async fn so_is_it_over_a_database() {
+    let Some(url) = postgres::database().await else { return };
+    let store = StoreLocation::Postgres(url.parse().unwrap());
+    let app = App::configured(|config| (config.quotas, config.store) = (QUOTAS, store)).await;
+    is_refused_with_the_numbers(app).await;
+}
+
+async fn is_refused_with_the_numbers(mut app: App) {
     app.train(&specification(2)).await;
     for _ in 0..2 {
         app.open().await;
@@ -45,6 +58,9 @@ async fn what_a_tenant_may_keep_is_refused_with_the_numbers() {
     let running = app.queue(&endless()).await;
     app.until(&running, |job| job["state"] == "running").await;
     let queued = [app.queue(&endless()).await, app.queue(&endless()).await];
+    let age = async |state: &str| gauge(&app, &format!("ballast_oldest_job_age_seconds{{state=\"{state}\"}}")).await;
+    let both = async || (age("running").await > 0.0 && age("queued").await > 0.0).then_some(());
+    until("the oldest jobs to have an age", both).await;
     let refused = app.client.post(format!("{}/train", app.url)).json(&endless()).send().await.unwrap();
     assert!(refused.headers().contains_key("retry-after"));
     assert_refused(app.post("/train", &endless()).await, 429, "quota-queued-jobs", 3, 2);

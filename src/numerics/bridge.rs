@@ -47,7 +47,7 @@ impl AbsoluteBridges {
     ///
     /// Checked by: `many_laws_at_a_time_are_one_by_one_to_the_last_bit`.
     fn directional_statistics(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<Vec<f64>> {
-        let weights: Vec<Waiting> = laws.iter().map(|law| Weights::of(self, law, which).take()).collect();
+        let weights = self.waiting(laws, which);
         // Whole blocks of paths, of which the last may be longer than what there is of them.
         let mut statistics: Vec<_> = laws.iter().map(|_| vec![0.0; self.paths.next_multiple_of(PATHS)]).collect();
         for (index, block) in self.blocks().enumerate() {
@@ -57,6 +57,29 @@ impl AbsoluteBridges {
         }
         statistics.iter_mut().for_each(|statistic| statistic.truncate(self.paths));
         statistics
+    }
+
+    /// Every gap of each law. Where all values weigh the same, gaps of all laws count at the same times.
+    fn waiting(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<Waiting> {
+        let Some(first) = laws.first() else { return Vec::new() };
+        let (mut places, mut weights) = (Places::of_laws_like(self, first, which), Weights::new(self));
+        let mut shares = |law: &EmpiricalDistribution| -> Vec<[Share; 4]> {
+            let mut below = 0.0;
+            let gap = |weight: &f64| {
+                below += weight;
+                places.of(below)
+            };
+            law.weights().iter().take(law.sample_size() - 1).map(gap).collect()
+        };
+        let shared = shares(first);
+        let of_law = |law: &&EmpiricalDistribution| {
+            let own = (law.retention() < 1.0).then(|| shares(law));
+            for (pair, shares) in law.atoms().windows(2).zip(own.as_ref().unwrap_or(&shared)) {
+                weights.place(shares, pair[1] - pair[0]);
+            }
+            weights.take()
+        };
+        laws.iter().map(of_law).collect()
     }
 
     /// The (1 - alpha)-quantiles of a statistic of each of `laws`, which are of one size, at each of `alphas`, to 5e-6 of
@@ -100,7 +123,9 @@ impl AbsoluteBridges {
         alpha: f64,
     ) -> Vec<f64> {
         let (atoms, count, retention) = (law.atoms(), law.sample_size(), law.retention());
-        let mut weights = Weights::new(self, count + 1, law.total_weight() * retention + 1.0, retention, which);
+        let total = law.total_weight() * retention + 1.0;
+        let (mut places, mut weights) = (Places::new(self, count + 1, total, retention, which), Weights::new(self));
+        let mut place = |weights: &mut Weights, below: f64, length: f64| weights.place(&places.of(below), length);
         // Gap j lies between atoms j - 1 and j: below the value after the first j of them, above it after the value as well.
         let gap = |j: usize| atoms[j] - atoms[j - 1];
         let mut sum = 0.0;
@@ -109,25 +134,25 @@ impl AbsoluteBridges {
             retention * sum
         });
         let first: Vec<f64> = std::iter::once(0.0).chain(sums).collect();
-        (1..count).for_each(|j| weights.place(first[j] + 1.0, gap(j)));
+        (1..count).for_each(|j| place(&mut weights, first[j] + 1.0, gap(j)));
         let mut below = 0;
         let enter = |&value: &f64| {
             while below < count && atoms[below] <= value {
                 below += 1;
                 // The gap under the atom passed is below the value now; the one above it is to be cut in two.
                 if below >= 2 {
-                    weights.place(first[below - 1], gap(below - 1));
+                    place(&mut weights, first[below - 1], gap(below - 1));
                 }
                 if below < count {
-                    weights.place(first[below] + 1.0, -gap(below));
+                    place(&mut weights, first[below] + 1.0, -gap(below));
                 }
             }
             let carried = weights.take();
             if below > 0 {
-                weights.place(first[below], value - atoms[below - 1]);
+                place(&mut weights, first[below], value - atoms[below - 1]);
             }
             if below < count {
-                weights.place(first[below] + 1.0, atoms[below] - value);
+                place(&mut weights, first[below] + 1.0, atoms[below] - value);
             }
             [carried, weights.take()]
         };
@@ -176,73 +201,68 @@ const BYTES_TOGETHER: usize = 1 << 20;
 /// Mass below or above a gap that counts as none: the bridge is within 1e-7 of 0.
 const NO_MASS: f64 = 1e-14;
 
-/// What is yet to be added to a statistic of a law: a weight for each time of the bridges.
-struct Weights<'a> {
+/// A time of the bridges, and what of the length of a gap counts there, in the unit of the values at that time.
+type Share = (usize, f64);
+const NONE: Share = (0, 0.0);
+
+/// Where gaps of laws of one size and retention count.
+struct Places<'a> {
     bridges: &'a AbsoluteBridges,
-    /// Of all values of the law.
+    /// Of all values of a law.
     total: f64,
     retention: f64,
     which: Statistic,
-    weights: Vec<f64>,
-    /// Times outside have weight zero.
-    touched: Range<usize>,
     /// The graded time at or after the last one asked for: that of the next is often the same, or one on.
     near: usize,
 }
 
-impl<'a> Weights<'a> {
-    /// Of a law of `size` values whose weights sum to `total`.
+impl<'a> Places<'a> {
+    /// Of laws of `size` values whose weights sum to `total`.
     fn new(bridges: &'a AbsoluteBridges, size: usize, total: f64, retention: f64, which: Statistic) -> Self {
         if let Times::Sample(own) = bridges.times {
             assert_eq!(own, size + usize::from(which == Statistic::OneLater), "bridges of the sample size of the law");
         }
-        let weights = vec![0.0; bridges.units.len()];
-        Weights { bridges, total, retention, which, weights, touched: 0..0, near: 0 }
+        Places { bridges, total, retention, which, near: 0 }
     }
 
-    /// Every gap of a law.
-    fn of(bridges: &'a AbsoluteBridges, law: &EmpiricalDistribution, which: Statistic) -> Self {
-        let mut weights = Weights::new(bridges, law.sample_size(), law.total_weight(), law.retention(), which);
-        let mut below = 0.0;
-        for (pair, weight) in law.atoms().windows(2).zip(law.weights()) {
-            below += weight;
-            weights.place(below, pair[1] - pair[0]);
-        }
-        weights
+    fn of_laws_like(bridges: &'a AbsoluteBridges, law: &EmpiricalDistribution, which: Statistic) -> Self {
+        Places::new(bridges, law.sample_size(), law.total_weight(), law.retention(), which)
     }
 
-    /// A gap of the law, `length` wide, with values below it that weigh `below`.
-    fn place(&mut self, below: f64, length: f64) {
+    /// Of a gap with values below it that weigh `below`.
+    fn of(&mut self, below: f64) -> [Share; 4] {
         match self.which {
-            Statistic::Now => self.place_at(below, self.total, length),
+            Statistic::Now => {
+                let [first, second] = self.at(below, self.total);
+                [first, second, NONE, NONE]
+            }
             Statistic::OneLater => {
                 let share = below / self.total;
                 let (kept, total) = (below * self.retention, self.total * self.retention + 1.0);
-                self.place_at(kept, total, (1.0 - share) * length);
-                self.place_at(kept + 1.0, total, share * length);
+                let [first, second] = self.at(kept, total).map(|(time, part)| (time, (1.0 - share) * part));
+                let [third, fourth] = self.at(kept + 1.0, total).map(|(time, part)| (time, share * part));
+                [first, second, third, fourth]
             }
         }
     }
 
-    /// `length` at the time below/total.
-    fn place_at(&mut self, below: f64, total: f64, length: f64) {
+    /// At the time below/total.
+    fn at(&mut self, below: f64, total: f64) -> [Share; 2] {
         let time = below / total;
         if time.min(1.0 - time) <= NO_MASS {
-            return;
+            return [NONE; 2];
         }
-        let bridges = self.bridges;
-        match &bridges.times {
+        match &self.bridges.times {
             Times::Sample(own) => {
                 let size = *own as f64;
                 // With equal weights the ratio is 1, and the position a node, to the last bit.
                 let position = below * (size / total);
                 let node = position.ceil();
                 if node == position {
-                    self.put(node as usize, length);
-                } else {
-                    let ends = [(node - 1.0) / size, node / size];
-                    self.interpolate(node as usize, ends, ends.map(deviation), time, length);
+                    return [self.share(node as usize, 1.0), NONE];
                 }
+                let ends = [(node - 1.0) / size, node / size];
+                self.interpolated(node as usize, ends, ends.map(deviation), time)
             }
             Times::Graded { times, deviations } => {
                 let is_after = |&after: &usize| times[after - 1] < time && time <= times[after];
@@ -250,34 +270,46 @@ impl<'a> Weights<'a> {
                 let after = near.unwrap_or_else(|| times.partition_point(|&known| known < time));
                 self.near = after;
                 let ends = [after - 1, after];
-                self.interpolate(after, ends.map(|end| times[end]), ends.map(|end| deviations[end]), time, length);
+                self.interpolated(after, ends.map(|end| times[end]), ends.map(|end| deviations[end]), time)
             }
         }
     }
 
-    /// `length` at a time between time `after` - 1 and time `after`, which are `low` and `high`, with the deviations of a bridge
-    /// there.
-    fn interpolate(
-        &mut self,
-        after: usize,
-        [low, high]: [f64; 2],
-        [at_low, at_high]: [f64; 2],
-        time: f64,
-        length: f64,
-    ) {
+    /// At a time between time `after` - 1 and time `after`, which are `low` and `high`, with the deviations of a bridge there.
+    fn interpolated(&self, after: usize, [low, high]: [f64; 2], [at_low, at_high]: [f64; 2], time: f64) -> [Share; 2] {
         let share = (time - low) / (high - low);
-        let interpolated = (1.0 - share) * at_low + share * at_high;
-        let scaled = length * deviation(time) / interpolated;
-        self.put(after - 1, (1.0 - share) * scaled);
-        self.put(after, share * scaled);
+        let scale = deviation(time) / ((1.0 - share) * at_low + share * at_high);
+        [self.share(after - 1, (1.0 - share) * scale), self.share(after, share * scale)]
     }
 
     /// At time `time` of the bridges, from 1; at 0, and at 1 after the last, a bridge is 0.
-    fn put(&mut self, time: usize, weight: f64) {
-        let Some(time) = time.checked_sub(1).filter(|&time| time < self.weights.len()) else { return };
-        self.weights[time] += weight * self.bridges.units[time];
-        let Range { start, end } = self.touched;
-        self.touched = if start == end { time..time + 1 } else { start.min(time)..end.max(time + 1) };
+    fn share(&self, time: usize, part: f64) -> Share {
+        let units = &self.bridges.units;
+        time.checked_sub(1).and_then(|time| Some((time, part * units.get(time)?))).unwrap_or(NONE)
+    }
+}
+
+/// What is yet to be added to a statistic of a law: a weight for each time of the bridges.
+struct Weights {
+    weights: Vec<f64>,
+    /// Times outside have weight zero.
+    touched: Range<usize>,
+}
+
+impl Weights {
+    fn new(bridges: &AbsoluteBridges) -> Self {
+        Weights { weights: vec![0.0; bridges.units.len()], touched: 0..0 }
+    }
+
+    /// A gap `length` wide.
+    fn place(&mut self, shares: &[Share; 4], length: f64) {
+        for &(time, part) in shares {
+            if part > 0.0 {
+                self.weights[time] += length * part;
+                let Range { start, end } = self.touched;
+                self.touched = if start == end { time..time + 1 } else { start.min(time)..end.max(time + 1) };
+            }
+        }
     }
 
     /// What is waiting; nothing is any more.

@@ -48,18 +48,30 @@ impl EmpiricalDistribution {
         (self.total, self.squares) = one_more(self.total, self.squares, self.retention);
     }
 
-    /// Learns many, oldest first. Cost O(n) and a sort of the new.
+    /// Learns many, oldest first. Cost O(n) and a sort of the new; at a retention below 1, a pass over all for each of them.
     pub fn extend(&mut self, values: &[f64]) {
         for _ in values {
-            self.weights.iter_mut().for_each(|weight| *weight *= self.retention);
+            if self.retention < 1.0 {
+                self.weights.iter_mut().for_each(|weight| *weight *= self.retention);
+            }
             (self.total, self.squares) = one_more(self.total, self.squares, self.retention);
         }
-        let known = self.sorted.iter().copied().zip(self.weights.iter().copied());
-        let new = values.iter().copied().zip(weights(values.len(), self.retention));
-        let mut all: Vec<(f64, f64)> = known.chain(new).collect();
-        // A sort that keeps what is in order already.
-        all.sort_by(|left, right| left.0.total_cmp(&right.0));
-        (self.sorted, self.weights) = all.into_iter().unzip();
+        let mut new: Vec<(f64, f64)> = values.iter().copied().zip(weights(values.len(), self.retention)).collect();
+        new.sort_by(|left, right| left.0.total_cmp(&right.0));
+        let known = (std::mem::take(&mut self.sorted), std::mem::take(&mut self.weights));
+        let size = known.0.len() + values.len();
+        (self.sorted, self.weights) = (Vec::with_capacity(size), Vec::with_capacity(size));
+        let mut passed = 0;
+        for (value, weight) in new {
+            let position = passed + known.0[passed..].partition_point(|atom| atom.total_cmp(&value).is_le());
+            self.sorted.extend_from_slice(&known.0[passed..position]);
+            self.weights.extend_from_slice(&known.1[passed..position]);
+            self.sorted.push(value);
+            self.weights.push(weight);
+            passed = position;
+        }
+        self.sorted.extend_from_slice(&known.0[passed..]);
+        self.weights.extend_from_slice(&known.1[passed..]);
     }
 
     /// The atoms in ascending order, repeated where observed repeatedly.
