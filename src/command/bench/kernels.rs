@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+use ballast::numerics::cholesky::Cholesky;
 use ballast::numerics::elementary::exp;
 use ballast::numerics::gp::GaussianProcess;
 use ballast::numerics::gp_fit::{Bounds, fit};
@@ -38,6 +39,8 @@ const QUERIES: usize = 1000;
 const ATOMS: usize = 30;
 const SUPPORT: usize = 120;
 const SOLVES: usize = 2000;
+/// Numbers read from memory: far more than any cache holds.
+const NUMBERS: usize = 32 << 20;
 /// Exponentials timed: an array that stays in the first-level cache, this often.
 const EXPONENTIALS: (usize, usize) = (1000, 2000);
 
@@ -69,6 +72,10 @@ pub fn run(bench: &KernelsBench) -> Result<(), Box<dyn Error>> {
     let evaluations = (QUERIES * bench.rows) as f64 / predict_seconds;
     println!("mean at {QUERIES} queries: {predict_seconds:.5} s, {:.0} million kernels a second", evaluations / 1e6);
     println!("exponential alone: {:.0} million a second", exponentials_per_second(bench.runs) / 1e6);
+    let products = (bench.rows as f64).powi(3) / 6.0;
+    let factor_seconds = cholesky_seconds(bench.rows, bench.runs);
+    println!("Cholesky of {} rows: {:.1} billion products a second", bench.rows, products / factor_seconds / 1e9);
+    println!("memory read: {:.1} GB a second", bytes_read_per_second(bench.runs) / 1e9);
     println!("inner solve, {ATOMS} atoms, {SUPPORT} support points: {:.2} us", 1e6 * inner_solve_seconds(bench.runs));
     let inner = InnerProblem::new();
     for radius in [0.01, 0.05, 0.1] {
@@ -137,6 +144,19 @@ fn exponentials_per_second(runs: usize) -> f64 {
         }
     });
     (size * passes) as f64 / seconds
+}
+
+/// Seconds of one factorisation, n^3/6 products and as many sums.
+fn cholesky_seconds(rows: usize, runs: usize) -> f64 {
+    let entry = |row: usize, column: usize| (-(row as f64 - column as f64).abs() / rows as f64).exp();
+    let mut matrices = vec![DMatrix::from_fn(rows, rows, entry); runs.max(1)];
+    timed(runs, || drop(black_box(matrices.pop().map(Cholesky::factor))))
+}
+
+fn bytes_read_per_second(runs: usize) -> f64 {
+    let numbers: Vec<u64> = (0..NUMBERS as u64).collect();
+    let seconds = timed(runs, || _ = black_box(numbers.iter().fold(0, |all, number| all ^ number)));
+    (NUMBERS * size_of::<u64>()) as f64 / seconds
 }
 
 /// The inner problem that is timed: equally likely atoms in the middle of an even support, exponential payoff.
