@@ -65,8 +65,25 @@ enum Command {
     Openapi,
 }
 
+/// What a shell tells of a program whose reader went away.
+const NOBODY_READS: i32 = 141;
+
+/// Ends without a word where whoever reads what is printed has gone, as `head` does once it has read enough. Other panics are told
+/// as ever.
+fn end_where_nobody_reads() {
+    let tell = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        let said = panic.payload_as_str().unwrap_or_default();
+        if said.starts_with("failed printing to stdout") && said.contains("Broken pipe") {
+            std::process::exit(NOBODY_READS);
+        }
+        tell(panic);
+    }));
+}
+
 #[tokio::main]
 async fn main() -> ExitCode {
+    end_where_nobody_reads();
     let outcome = match CommandLine::parse().command {
         Command::Demo(arguments) => demo::run(arguments).await.map_err(Into::into),
         Command::Serve(arguments) => serve::run(arguments).await,

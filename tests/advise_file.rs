@@ -2,7 +2,7 @@
 
 mod support;
 
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 use serde_json::{Value, json};
 use support::App;
@@ -29,6 +29,17 @@ fn last(count: usize) -> Vec<[f64; 2]> {
         .map(|mut fields| [number(fields.next()), number(fields.next())])
         .collect();
     rows.split_off(rows.len() - count)
+}
+
+/// As `head` does, which has read enough: nothing is told of it.
+#[test]
+fn who_reads_no_further_is_no_fault() {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
+    command.current_dir(env!("CARGO_MANIFEST_DIR")).args(["advise", MARKET]);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), text(&output.stderr).contains("panicked")), (Some(141), false), "{output:?}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

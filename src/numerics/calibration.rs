@@ -11,9 +11,9 @@
 
 use rand::{Rng, RngExt};
 
-use super::bridge::Statistic;
 use super::bridge_paths::AbsoluteBridges;
 use super::empirical::{EmpiricalDistribution, weights};
+use super::gap_places::Statistic;
 use super::law::ContinuousLaw;
 use super::law_distance::distance_of_masses;
 use super::streams::stream;

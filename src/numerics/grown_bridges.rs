@@ -7,10 +7,10 @@
 //! table of sums along the base, of which there is one for each s: a law costs two reads a value learned, however many values
 //! the base has.
 
-use super::bridge::Statistic;
 use super::bridge_paths::{self, AbsoluteBridges, Times};
 use super::dispatch::dispatched;
 use super::empirical::EmpiricalDistribution;
+use super::gap_places::Statistic;
 
 /// Paths whose tables stay in the second-level cache: with 12 tables of 240 values, 0.7 MB.
 const PATHS: usize = 64;

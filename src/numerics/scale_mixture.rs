@@ -22,6 +22,8 @@ const HALF_WIDTH: f64 = 3.0;
 const BLOCK: usize = 256;
 /// Quantiles so far from where a search starts, as a share, are searched among the same draws.
 const REACH: f64 = 0.06;
+/// Draws are parted where one in this many is decided at least: parting takes as long as two or three sums over all.
+const PAYS: usize = 4;
 /// What a search may leave in ln q. After a step that is the step times the relative error of its slope, and a slope
 /// measured over the step before is off by about the length of that.
 const TOLERANCE: f64 = 1e-7;
@@ -184,17 +186,24 @@ impl ScaleMixture {
         let (least, most) = (among.low / high, if low > 0.0 { among.high / low } else { f64::INFINITY });
         among.reciprocals.clear();
         among.reciprocals.reserve(draws.len());
-        let mut staged = [0.0; BLOCK];
-        for block in draws.chunks(BLOCK) {
-            // Without a branch, which nobody could foretell.
-            let mut count = 0;
-            for &draw in block {
-                staged[count] = draw;
-                count += usize::from((draw > least) & (draw < most));
+        let decided = dispatched!(draws.iter().filter(|draw| (**draw <= least) | (**draw >= most)).count());
+        let mut beyond = 0;
+        if PAYS * decided < draws.len() {
+            (among.low, among.high) = (0.0, f64::INFINITY);
+            among.reciprocals.extend_from_slice(draws);
+        } else {
+            let mut staged = [0.0; BLOCK];
+            for block in draws.chunks(BLOCK) {
+                // Without a branch, which nobody could foretell.
+                let mut count = 0;
+                for &draw in block {
+                    staged[count] = draw;
+                    count += usize::from((draw > least) & (draw < most));
+                }
+                among.reciprocals.extend_from_slice(&staged[..count]);
             }
-            among.reciprocals.extend_from_slice(&staged[..count]);
+            beyond = dispatched!(draws.iter().filter(|draw| **draw >= most).count());
         }
-        let beyond = dispatched!(draws.iter().filter(|draw| **draw >= most).count());
         let undecided = &mut among.reciprocals;
         among.ends = [beyond as f64, (draws.len() - undecided.len() - beyond) as f64];
         dispatched!(undecided.iter_mut().for_each(|draw| *draw = 1.0 / *draw));

@@ -10,6 +10,7 @@
 use std::ops::Range;
 
 use super::dispatch::dispatched;
+use super::runs::{Levels, Run, passed};
 
 /// A ball around a discrete law: `masses[k]` sits at `support[k]` (ascending, distinct), the masses sum to 1.
 #[derive(Debug, Clone, Copy)]
@@ -70,13 +71,6 @@ struct Edge {
     multiplier: f64,
 }
 
-/// Points side by side whose mass all goes to one other.
-#[derive(Debug, Clone)]
-struct Run {
-    points: Range<usize>,
-    to: usize,
-}
-
 /// A search for places at which `v + gamma distance` is least.
 struct Search<'a> {
     ball: &'a WassersteinBall<'a>,
@@ -123,6 +117,7 @@ impl<'a> Search<'a> {
                 (None, None) => {}
                 (Some(to), None) | (None, Some(to)) => push(at..end, to),
                 (Some(below), Some(above)) => {
+                    // Down where `v(s) - v(below) - gamma (s - below)` is no less than `v(s) - v(above) - gamma (above - s)`.
                     let bound = payoff[above] - payoff[below] + multiplier * (support[above] + support[below]);
                     let cut = at + support[at..end].partition_point(|point| 2.0 * multiplier * point <= bound);
                     push(at..cut, below);
@@ -212,98 +207,6 @@ impl<'a> Search<'a> {
         }
         places
     }
-}
-
-/// Where the run at a point goes, if there is one, and where that ends or the next begins. Runs that end before are left out.
-fn passed(runs: &mut &[Run], at: usize) -> (Option<usize>, usize) {
-    let before = runs.iter().take_while(|run| run.points.end <= at).count();
-    *runs = &runs[before..];
-    match runs.first() {
-        None => (None, usize::MAX),
-        Some(Run { points, to }) if points.start <= at => (Some(*to), points.end),
-        Some(Run { points, .. }) => (None, points.start),
-    }
-}
-
-/// `v - slope s` at every point. Mass that moves down at a multiplier goes to the least of it below, with the multiplier for its
-/// slope; mass that moves up goes to the least above, with the opposite. What rises from a least level is a run that goes there,
-/// until a level is as low.
-#[derive(Clone, Copy)]
-struct Levels<'a> {
-    support: &'a [f64],
-    payoff: &'a [f64],
-    slope: f64,
-}
-
-impl Levels<'_> {
-    #[inline(always)]
-    fn of(self, points: Range<usize>) -> impl Iterator<Item = f64> {
-        let Levels { support, payoff, slope } = self;
-        support[points.clone()].iter().zip(&payoff[points]).map(move |(point, value)| value - slope * point)
-    }
-
-    /// How many neighbours change in some way, and how many points are as low: no branch is taken for any of them.
-    #[inline(always)]
-    fn steps(self, pairs: Range<usize>, is: impl Fn(f64, f64) -> bool) -> usize {
-        let next = self.of(pairs.start + 1..pairs.end + 1);
-        self.of(pairs).zip(next).map(|(level, next)| usize::from(is(level, next))).sum()
-    }
-
-    #[inline(always)]
-    fn as_low(self, point: usize) -> impl Fn(Range<usize>) -> usize {
-        let least = self.payoff[point] - self.slope * self.support[point];
-        move |points| self.of(points).map(|level| usize::from(level <= least)).sum()
-    }
-
-    /// What of `from` goes down to a point of `between`.
-    #[inline(always)]
-    fn downs(self, between: &Range<usize>, from: &Range<usize>, downs: &mut Vec<Run>) {
-        downs.clear();
-        let (mut at, end) = (between.start, from.end);
-        let rises = |pairs| self.steps(pairs, |level, next| next > level);
-        while let Some(to) = first(at..end.saturating_sub(1), rises) {
-            at = first(to + 2..end, self.as_low(to)).unwrap_or(end);
-            let points = from.start.max(to + 1)..at;
-            if !points.is_empty() {
-                downs.push(Run { points, to });
-            }
-        }
-    }
-
-    /// What of `from` goes up to a point of `between`, from the highest on.
-    #[inline(always)]
-    fn ups(self, between: &Range<usize>, from: &Range<usize>, ups: &mut Vec<Run>) {
-        ups.clear();
-        let (start, mut end) = (from.start, between.end);
-        let falls = |pairs| self.steps(pairs, |level, next| level > next);
-        while let Some(highest) = last(start..end.saturating_sub(1), falls) {
-            let to = highest + 1;
-            end = last(start..highest, self.as_low(to)).map_or(start, |low| low + 1);
-            let points = end..from.end.min(to);
-            if !points.is_empty() {
-                ups.push(Run { points, to });
-            }
-        }
-    }
-}
-
-/// Points that are counted together before one of them is sought.
-const BLOCK: usize = 64;
-
-/// The first of `points` that counts.
-#[inline(always)]
-fn first(points: Range<usize>, count: impl Fn(Range<usize>) -> usize) -> Option<usize> {
-    let block = |start: usize| start..points.end.min(start + BLOCK);
-    let mut found = points.clone().step_by(BLOCK).map(block).filter(|some| count(some.clone()) > 0);
-    found.next().and_then(|mut some| some.find(|&point| count(point..point + 1) > 0))
-}
-
-/// The last of `points` that counts.
-#[inline(always)]
-fn last(points: Range<usize>, count: impl Fn(Range<usize>) -> usize) -> Option<usize> {
-    let block = |passed: usize| points.start.max((points.end - passed).saturating_sub(BLOCK))..points.end - passed;
-    let mut found = (0..points.len()).step_by(BLOCK).map(block).filter(|some| count(some.clone()) > 0);
-    found.next().and_then(|some| some.rev().find(|&point| count(point..point + 1) > 0))
 }
 
 /// Sums that are taken side by side.

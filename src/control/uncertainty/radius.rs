@@ -9,12 +9,13 @@ use crate::control::request::framework::Framework;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::specification::Specification;
 use crate::control::uncertainty::centre::record;
-use crate::numerics::bridge::{Quantile, Statistic};
+use crate::numerics::bridge::Quantile;
 use crate::numerics::bridge_paths::{AbsoluteBridges, GRADED_FROM};
 use crate::numerics::calibration::calibration_factor;
 use crate::numerics::chebyshev::local_cubic;
 use crate::numerics::confidence_region;
 use crate::numerics::empirical::EmpiricalDistribution;
+use crate::numerics::gap_places::Statistic;
 
 /// Where the oldest return of the last law weighs at least this share of the newest, weights are taken to decay no more than
 /// rounding does: times lie within 1/8000 of i/n, and |B| is read off the bridges of n.

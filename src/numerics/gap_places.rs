@@ -1,0 +1,107 @@
+//! Where the gaps of a law count in a statistic over bridges: at which of their times, and how much.
+
+use super::bridge_paths::{AbsoluteBridges, Times, deviation};
+use super::empirical::EmpiricalDistribution;
+
+/// A statistic of a law of n values; of weights that decay, n stands for their sum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Statistic {
+    /// Of the law itself, over bridges of sample size n.
+    Now,
+    /// The mean over the laws that learn one of its values again, each with the mass of that value, over bridges of sample size
+    /// n + 1: what the statistic becomes, on average, when the next value comes from the law itself. With equal weights a value
+    /// doubled at rank j moves the gaps above it one node up, so that gap i lies at node i in n - i of the laws and at node i + 1
+    /// in the other i.
+    OneLater,
+}
+
+/// Mass below or above a gap that counts as none: the bridge is within 1e-7 of 0.
+const NO_MASS: f64 = 1e-14;
+
+/// A time of the bridges, and what of the length of a gap counts there, in the unit of the values at that time.
+pub(super) type Share = (usize, f64);
+const NONE: Share = (0, 0.0);
+
+/// Where gaps of laws of one size and retention count.
+pub(super) struct Places<'a> {
+    bridges: &'a AbsoluteBridges,
+    /// Of all values of a law.
+    total: f64,
+    retention: f64,
+    which: Statistic,
+    /// The graded time at or after the last one asked for: that of the next is often the same, or one on.
+    near: usize,
+}
+
+impl<'a> Places<'a> {
+    /// Of laws of `size` values whose weights sum to `total`.
+    pub fn new(bridges: &'a AbsoluteBridges, size: usize, total: f64, retention: f64, which: Statistic) -> Self {
+        if let Times::Sample(own) = bridges.times {
+            assert_eq!(own, size + usize::from(which == Statistic::OneLater), "bridges of the sample size of the law");
+        }
+        Places { bridges, total, retention, which, near: 0 }
+    }
+
+    pub fn of_laws_like(bridges: &'a AbsoluteBridges, law: &EmpiricalDistribution, which: Statistic) -> Self {
+        Places::new(bridges, law.sample_size(), law.total_weight(), law.retention(), which)
+    }
+
+    /// Of a gap with values below it that weigh `below`.
+    pub fn of(&mut self, below: f64) -> [Share; 4] {
+        match self.which {
+            Statistic::Now => {
+                let [first, second] = self.at(below, self.total);
+                [first, second, NONE, NONE]
+            }
+            Statistic::OneLater => {
+                let share = below / self.total;
+                let (kept, total) = (below * self.retention, self.total * self.retention + 1.0);
+                let [first, second] = self.at(kept, total).map(|(time, part)| (time, (1.0 - share) * part));
+                let [third, fourth] = self.at(kept + 1.0, total).map(|(time, part)| (time, share * part));
+                [first, second, third, fourth]
+            }
+        }
+    }
+
+    /// At the time below/total.
+    fn at(&mut self, below: f64, total: f64) -> [Share; 2] {
+        let time = below / total;
+        if time.min(1.0 - time) <= NO_MASS {
+            return [NONE; 2];
+        }
+        match &self.bridges.times {
+            Times::Sample(own) => {
+                let size = *own as f64;
+                // With equal weights the ratio is 1, and the position a node, to the last bit.
+                let position = below * (size / total);
+                let node = position.ceil();
+                if node == position {
+                    return [self.share(node as usize, 1.0), NONE];
+                }
+                let ends = [(node - 1.0) / size, node / size];
+                self.interpolated(node as usize, ends, ends.map(deviation), time)
+            }
+            Times::Graded { times, deviations } => {
+                let is_after = |&after: &usize| times[after - 1] < time && time <= times[after];
+                let near = (self.near.max(1)..times.len()).take(2).find(is_after);
+                let after = near.unwrap_or_else(|| times.partition_point(|&known| known < time));
+                self.near = after;
+                let ends = [after - 1, after];
+                self.interpolated(after, ends.map(|end| times[end]), ends.map(|end| deviations[end]), time)
+            }
+        }
+    }
+
+    /// At a time between time `after` - 1 and time `after`, which are `low` and `high`, with the deviations of a bridge there.
+    fn interpolated(&self, after: usize, [low, high]: [f64; 2], [at_low, at_high]: [f64; 2], time: f64) -> [Share; 2] {
+        let share = (time - low) / (high - low);
+        let scale = deviation(time) / ((1.0 - share) * at_low + share * at_high);
+        [self.share(after - 1, (1.0 - share) * scale), self.share(after, share * scale)]
+    }
+
+    /// At time `time` of the bridges, from 1; at 0, and at 1 after the last, a bridge is 0.
+    fn share(&self, time: usize, part: f64) -> Share {
+        let units = &self.bridges.units;
+        time.checked_sub(1).and_then(|time| Some((time, part * units.get(time)?))).unwrap_or(NONE)
+    }
+}
