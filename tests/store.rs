@@ -446,13 +446,13 @@ async fn what_was_seen_is_current_until_somebody_writes(place: &Place) {
     assert!(second.delete_session(&here, "s").await.unwrap());
     assert!(!store.is_as_seen("s", &mut seen).await.unwrap());
     assert!(store.session_facts(&here, "s").await.unwrap().is_none());
-    // Nobody waits for the answer, and still the write shows, once one that came after it is answered.
+    // Nobody waits for the answer, and still the write shows once it is stored. One that is under way may show before.
     with_session(&store, "later", &[0.1, 0.2]).await;
     let mut seen = store.session_facts(&here, "other").await.unwrap().unwrap().seen;
     drop(tokio::time::timeout(Duration::ZERO, store.append(observation("other", 2, "c"))).await);
     assert_eq!(store.append(observation("later", 1, "c")).await.unwrap(), Append::Appended);
     let is_written = store.entry("other", EntryKind::Observation, 2).await.unwrap().is_some();
-    assert_eq!(store.is_as_seen("other", &mut seen).await.unwrap(), !is_written);
+    assert!(!store.is_as_seen("other", &mut seen).await.unwrap() || !is_written);
 }
 
 async fn every_entry_is_stored_once_and_in_order(place: &Place) {
