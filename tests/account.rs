@@ -66,7 +66,10 @@ async fn a_corrected_session_is_one_that_was_reported_right() {
         json!({ "price": 10.3, "executed_allocation": 0.5, "date": "2026-02-27", "confirm": true }),
         json!({ "price": 104.0, "executed_allocation": 0.6, "confirm": true }),
     ];
-    let at_start = app.action().await.1["radius"].clone();
+    let at_start = standing(&app).await;
+    app.restart().await;
+    assert_eq!(standing(&app).await, at_start, "replayed before its first period");
+    let at_start = at_start["action"]["radius"].clone();
     report_all(&app, &wrong).await;
     let before = standing(&app).await;
     // The price of the second period: with it change the returns of the second and of the third.

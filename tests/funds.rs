@@ -85,6 +85,8 @@ async fn a_session_of_several_assets_is_lived_by_their_names(mut app: App) {
     assert!(number(&one_step["certainty_equivalent"]) >= 1001.0, "{one_step}");
     let parts: Vec<f64> = proposed.iter().map(|share| share / sum(&proposed)).collect();
     assert!(parts.iter().zip(&fund.composition).all(|(a, b)| (a - b).abs() < 1e-12), "{parts:?}");
+    app.restart().await;
+    assert_eq!(app.action().await.1, action, "replayed before its first period");
 
     // A period: what each asset made of what was advised.
     let z: [f64; 3] = [0.02, -0.005, 0.03];
@@ -410,9 +412,9 @@ fn identical_columns_are_one_asset() {
     let start = asset.initial_state(None, None).unwrap();
     for mode in [AdviceMode::Surrogate, AdviceMode::Resolve] {
         let (left, right) = (fund.advise(0, &state, mode), asset.advise(0, &start, mode));
-        // Returns differ by rounding, and with them where searches end.
+        // Returns differ by rounding, and with them where searches end: by 0.005 basis points of value at most.
         assert!((left.allocation - right.allocation).abs() < 1e-5, "{left:?} {right:?}");
-        assert!((left.certainty_equivalent / right.certainty_equivalent - 1.0).abs() < 1e-7, "{left:?} {right:?}");
+        assert!((left.certainty_equivalent / right.certainty_equivalent - 1.0).abs() < 5e-7, "{left:?} {right:?}");
     }
 }
 

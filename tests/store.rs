@@ -8,7 +8,7 @@ use std::time::Duration;
 use ballast::control::policy::content_hash;
 use ballast::store::{
     Append, AuditFilter, AuditRow, CreateJob, CreateSession, DeletePolicy, EntryKind, EntryRow, JobCounts, JobKind,
-    JobOutcome, JobRow, JobState, NewJob, NewKey, Relabel, RequestKey, Rotate, SessionQuery, SessionRow, Store,
+    JobOutcome, JobRow, JobState, NewJob, NewKey, Relabel, RequestKey, Rotate, Seen, SessionQuery, SessionRow, Store,
     StoreError, Successor, Tenant,
 };
 use futures_util::future::join_all;
@@ -80,7 +80,8 @@ async fn claimed(store: &Store, now_ms: i64) -> (String, i64) {
     (claimed.row.job, claimed.attempt)
 }
 
-async fn with_session(store: &Store, session: &str, history: &[f64]) {
+/// Opens a session, and gives what it was seen as before anybody could write to it.
+async fn with_session(store: &Store, session: &str, history: &[f64]) -> Seen {
     let policy = content_hash(POLICY);
     store.insert_policy(&Tenant::default(), &policy, POLICY, 1).await.unwrap();
     let new = SessionRow {
@@ -95,7 +96,9 @@ async fn with_session(store: &Store, session: &str, history: &[f64]) {
         due: None,
         created_ms: 5,
     };
+    let seen = store.about_to_open(&new);
     assert_eq!(store.create_session(new, Relabel::default(), None).await.unwrap(), CreateSession::Created);
+    seen
 }
 
 fn observation(session: &str, period: usize, content: &str) -> EntryRow {
@@ -420,8 +423,9 @@ async fn what_was_seen_is_current_until_somebody_writes(place: &Place) {
     let here = Tenant::default();
     let store = place.open().await;
     let second = place.second(&store).await;
-    with_session(&store, "s", &[0.1, 0.2]).await;
+    let mut new = with_session(&store, "s", &[0.1, 0.2]).await;
     with_session(&store, "other", &[0.1, 0.2]).await;
+    assert!(store.is_as_seen("s", &mut new).await.unwrap());
     assert!(store.session_facts(&tenant("south"), "s").await.unwrap().is_none());
     let facts = store.session_facts(&here, "s").await.unwrap().unwrap();
     let (mut seen, mut opened) = (facts.seen, facts.row.as_opened());
@@ -430,7 +434,7 @@ async fn what_was_seen_is_current_until_somebody_writes(place: &Place) {
     let mut next = seen.followed_by(&own);
     store.append(own).await.unwrap();
     store.append(observation("other", 1, "c")).await.unwrap();
-    for (seen, is_current) in [(&mut seen, false), (&mut opened, false), (&mut next, true)] {
+    for (seen, is_current) in [(&mut new, false), (&mut seen, false), (&mut opened, false), (&mut next, true)] {
         assert_eq!(store.is_as_seen("s", seen).await.unwrap(), is_current, "{seen:?}");
         assert_eq!(store.is_as_seen("s", seen).await.unwrap(), is_current, "{seen:?}, asked again");
     }

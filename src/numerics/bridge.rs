@@ -10,11 +10,12 @@
 //! law is chi, times the statistic over the direction, and the two are independent. Source: paper, section 2.1, (2.4).
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
-use super::bridge_paths::{AbsoluteBridges, PATHS};
+use super::bridge_paths::{AbsoluteBridges, PATHS, Share, Times};
 use super::dispatch::dispatched;
 use super::empirical::EmpiricalDistribution;
-use super::gap_places::{Places, Share, Statistic};
+use super::gap_places::{Places, Statistic};
 use super::scale_mixture::LastQuantile;
 
 /// A simulated quantile and the standard error of its simulation.
@@ -48,27 +49,33 @@ impl AbsoluteBridges {
         statistics
     }
 
-    /// Every gap of each law. Where all values weigh the same, gaps of all laws count at the same times.
+    /// Every gap of each law. Where all values weigh the same, gaps of all laws of a size count at the same times.
     fn waiting(&self, laws: &[&EmpiricalDistribution], which: Statistic) -> Vec<Waiting> {
-        let Some(first) = laws.first() else { return Vec::new() };
-        let (mut places, mut weights) = (Places::of_laws_like(self, first, which), Weights::new(self));
-        let mut shares = |law: &EmpiricalDistribution| -> Vec<[Share; 4]> {
-            let mut below = 0.0;
-            let gap = |weight: &f64| {
-                below += weight;
-                places.of(below)
-            };
-            law.weights().iter().take(law.sample_size() - 1).map(gap).collect()
+        let mut weights = Weights::new(self);
+        let of_these = OnceLock::new();
+        let of_all = match self.times {
+            Times::Sample(_) => &self.shares[which as usize],
+            Times::Graded { .. } => &of_these,
         };
-        let shared = shares(first);
         let of_law = |law: &&EmpiricalDistribution| {
-            let own = (law.retention() < 1.0).then(|| shares(law));
-            for (pair, shares) in law.atoms().windows(2).zip(own.as_ref().unwrap_or(&shared)) {
+            let own = (law.retention() < 1.0).then(|| self.shares_of(law, which));
+            let shares = own.as_ref().unwrap_or_else(|| of_all.get_or_init(|| self.shares_of(law, which)));
+            for (pair, shares) in law.atoms().windows(2).zip(shares) {
                 weights.place(shares, pair[1] - pair[0]);
             }
             weights.take()
         };
         laws.iter().map(of_law).collect()
+    }
+
+    /// Where each gap of a law counts.
+    fn shares_of(&self, law: &EmpiricalDistribution, which: Statistic) -> Vec<[Share; 4]> {
+        let (mut places, mut below) = (Places::of_laws_like(self, law, which), 0.0);
+        let gap = |weight: &f64| {
+            below += weight;
+            places.of(below)
+        };
+        law.weights().iter().take(law.sample_size() - 1).map(gap).collect()
     }
 
     /// The (1 - alpha)-quantiles of a statistic of each of `laws`, which are of one size, at each of `alphas`, to 5e-6 of
@@ -238,7 +245,7 @@ impl Waiting {
 const NODES: usize = 16;
 
 /// Paths whose sums stay in registers.
-const LANES: usize = 32;
+const LANES: usize = 64;
 
 /// Adds `gaps[i]` times node i of a block of paths to `sums`, [`NODES`] at a time. What is fused is written so, and the order is
 /// that of the nodes: the bits do not depend on the processor.

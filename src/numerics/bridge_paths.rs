@@ -4,6 +4,8 @@
 //! degrees of freedom and independent of the direction. A statistic that grows with the path as |B| does can therefore
 //! be simulated over directions alone, and its length be integrated out.
 
+use std::sync::OnceLock;
+
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
@@ -25,6 +27,8 @@ pub struct AbsoluteBridges {
     pub(super) units: Vec<f64>,
     /// The law of the lengths that the paths are divided by.
     pub(super) lengths: ScaleMixture,
+    /// Of laws of one size: where the gaps of one whose values weigh the same count in each statistic, once that was asked.
+    pub(super) shares: [OnceLock<Vec<[Share; 4]>>; 2],
 }
 
 /// The times at which paths are kept.
@@ -40,6 +44,9 @@ pub(super) enum Times {
         deviations: Vec<f64>,
     },
 }
+
+/// A time of the bridges, and what of the length of a gap counts there, in the unit of the values at that time.
+pub(super) type Share = (usize, f64);
 
 /// The standard deviation of a bridge at a time.
 pub(super) fn deviation(time: f64) -> f64 {
@@ -164,10 +171,11 @@ impl AbsoluteBridges {
         AbsoluteBridges::gather(&times, Times::Graded { times: with_ends, deviations }, paths, divisor, path)
     }
 
-    /// Bytes that the paths of laws of `sample_size` values take.
+    /// Bytes that the bridges of laws of `sample_size` values take.
     pub fn bytes_of(sample_size: usize, paths: usize) -> usize {
         let times = if sample_size < GRADED_FROM { sample_size } else { GRADED_CELLS + 2 * HALVINGS as usize };
-        size_of::<u16>().saturating_mul(times).saturating_mul(paths.saturating_add(PATHS - 1) / PATHS * PATHS)
+        let of_a_time = size_of::<u16>().saturating_mul(paths.saturating_add(PATHS - 1) / PATHS * PATHS);
+        of_a_time.saturating_add(2 * size_of::<[Share; 4]>()).saturating_mul(times)
     }
 
     /// The values of each block of paths, time by time.
@@ -203,7 +211,8 @@ impl AbsoluteBridges {
                 paths[index % PATHS] = (value.abs() / (divisor * unit)).round() as u16;
             }
         }
-        AbsoluteBridges { times, paths, values, units, lengths: ScaleMixture::chi(at.len().max(1)) }
+        let (lengths, shares) = (ScaleMixture::chi(at.len().max(1)), Default::default());
+        AbsoluteBridges { times, paths, values, units, lengths, shares }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Where the gaps of a law count in a statistic over bridges: at which of their times, and how much.
 
-use super::bridge_paths::{AbsoluteBridges, Times, deviation};
+use super::bridge_paths::{AbsoluteBridges, Share, Times, deviation};
 use super::empirical::EmpiricalDistribution;
 
 /// A statistic of a law of n values; of weights that decay, n stands for their sum.
@@ -18,8 +18,6 @@ pub enum Statistic {
 /// Mass below or above a gap that counts as none: the bridge is within 1e-7 of 0.
 const NO_MASS: f64 = 1e-14;
 
-/// A time of the bridges, and what of the length of a gap counts there, in the unit of the values at that time.
-pub(super) type Share = (usize, f64);
 const NONE: Share = (0, 0.0);
 
 /// Where gaps of laws of one size and retention count.

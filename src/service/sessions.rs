@@ -185,22 +185,25 @@ impl Sessions {
             due: renew.map(|renew| renew.every),
             created_ms: self.clock.now_milliseconds(),
         };
+        let new = self.store.about_to_open(&row);
         let opening = self.store.by(caller.actor());
         let opening = opening.create_session(row.clone(), labels, key.clone());
-        let row = match opening.instrument(spans::of_write("open a session")).await? {
-            CreateSession::Created => row,
+        let (row, seen, is_new) = match opening.instrument(spans::of_write("open a session")).await? {
+            CreateSession::Created => (row, new, true),
             // Of the same start: the state is the one above.
-            CreateSession::Repeated(earlier) => earlier,
+            CreateSession::Repeated(earlier) => {
+                let seen = earlier.as_opened();
+                (earlier, seen, false)
+            }
             CreateSession::KeyConflict => {
                 return Err(ServiceError::KeyConflict { key: key.map_or_else(String::new, |key| key.key) });
             }
             CreateSession::NoPolicy => return Err(ServiceError::unknown("policy", &row.policy)),
             CreateSession::Exists => return Err(ServiceError::internal("a session of this random name exists")),
         };
-        let seen = row.as_opened();
         let standing = Standing::at(&row.session, state, assets);
         let current = plan.stretch(row.policy.clone(), 0, plan.terms.clone(), None);
-        Ok(Live {
+        let live = Live {
             row: Arc::new(row),
             standing,
             observed: 0,
@@ -211,7 +214,12 @@ impl Sessions {
             seen,
             radius: None,
             advice: None,
-        })
+        };
+        if is_new {
+            self.hold(tenant, &live.row.session).await.put(live.clone());
+            self.weigh(&live);
+        }
+        Ok(live)
     }
 
     /// With the composition of several assets before the first period, and the state of their fund.

@@ -4,7 +4,7 @@ use super::codec::from_sql;
 use super::entries::EntryRow;
 use super::head::Head;
 use super::query::query;
-use super::{Engine, Store, StoreError};
+use super::{Engine, SessionRow, Store, StoreError};
 
 /// What tells later whether a session is still what was read of it.
 #[derive(Debug, Clone)]
@@ -39,6 +39,11 @@ impl Store {
             seen.change = change;
         }
         Ok(is_as_seen)
+    }
+
+    /// A session that is about to be stored, as it is until somebody writes to it.
+    pub fn about_to_open(&self, row: &SessionRow) -> Seen {
+        Seen { change: self.change(&row.session), ..row.as_opened() }
     }
 
     /// A number that is another after every write to `session`, where this process makes all of them.

@@ -26,6 +26,8 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 /// Pages of the log, of 4 KB, at which they are copied into the database: many observations change the same page of the
 /// index, which is then copied once for all of them. SQLite's own 1000 copies most of them a second time.
 const COPIED_AT: &str = "8000";
+/// Memory for the pages of a connection that writes, in KiB: the pages of the index that observations find their places in.
+const CACHE: &str = "-16384";
 /// A log that grew beyond this, in bytes, is cut back to it once it is copied into the database.
 const LOG_KEPT: &str = "67108864";
 /// Each read connection is a thread; reads are short. Advice has most of them, and lists as few as keep a processor busy.
@@ -196,6 +198,7 @@ pub(in crate::store) async fn connect(file: &Path) -> Result<SqliteConnection, S
         .auto_vacuum(SqliteAutoVacuum::Incremental)
         .pragma("journal_size_limit", LOG_KEPT)
         .pragma("wal_autocheckpoint", COPIED_AT)
+        .pragma("cache_size", CACHE)
         .journal_mode(SqliteJournalMode::Wal)
         .synchronous(SqliteSynchronous::Full)
         .foreign_keys(true)
