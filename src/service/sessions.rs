@@ -1,9 +1,9 @@
 //! Live sessions: an investor's wealth and the law learned so far.
 //!
-//! A session is its rows: the state in memory is a replay of them, out of memory while a write is under way, so memory
-//! never runs ahead of the disk. Before every use it is held against the store, and a state replayed from other rows is
-//! dropped: no process advises from a law that has been taken further, or that a restored database never had. One lock
-//! per session orders its observations in this process (see `super::slots`).
+//! A session is its rows: the state in memory is a replay of them, or the start from which a replay would begin, and out of
+//! memory while a write is under way, so memory never runs ahead of the disk. Before every use it is held against the store,
+//! and a state of other rows is dropped: no process advises from a law that has been taken further, or that a restored
+//! database never had. One lock per session orders its observations in this process (see `super::slots`).
 //!
 //! A session is its tenant's: to everybody else it does not exist. Slots are named by tenant and session, so nobody's
 //! call waits for, fills or empties the slot of another tenant.
