@@ -98,7 +98,9 @@ impl ScaleMixture {
         let mut last = LastQuantile::default();
         let quantile = self.quantile_within(TOLERANCE, share, draws, 0.0, &mut last);
         let Some(Found { ratio, slope, .. }) = last.found else { return (0.0, 0.0) };
-        let variance = self.mean(ratio, &last.over, |below| (below - share as f32).powi(2));
+        // Moved, as a dispatched closure must be.
+        let share = share as f32;
+        let variance = self.mean(ratio, &last.over, move |below| (below - share) * (below - share));
         (quantile, (variance / draws.len() as f64).sqrt() * quantile / slope)
     }
 
