@@ -41,6 +41,20 @@ test("the last period comes first, and the fields are those of their own form", 
   assert.equal(await page.evaluate(() => document.activeElement.form.textContent.includes("Put it right")), true);
 });
 
+test("the link below the last report opens the form at the first press, by mouse and by keyboard", async () => {
+  const link = page.getByRole("button", { name: "Put it right" }).first();
+  for (const press of [() => link.click(), () => link.press("Enter")]) {
+    await page.goto("about:blank");
+    await page.goto(`${ballast.url}/#/sessions/${session}`);
+    await link.waitFor();
+    await press();
+    await form().getByLabel("Period").waitFor();
+    assert.equal(await form().evaluate((form) => form.contains(document.activeElement)), true);
+    const seen = await form().evaluate((form) => form.getBoundingClientRect().top);
+    assert.ok(seen >= 0 && seen < 900, `the form begins at ${seen}`);
+  }
+});
+
 test("a return most likely mistyped is asked about, and a right one stands beside the wrong one", async () => {
   const questions = [];
   page.on("dialog", async (dialog) => {

@@ -45,6 +45,9 @@ test("who is in the bank is told what it would take, and what never would", () =
   assert.match(banked(null), /No number of periods like those seen, up to 10,000, would do.$/);
   assert.match(banked(null, null), /no other mean near it/);
   assert.match(banked(37), /^No return of the record by itself makes a difference/);
+  const held = (allocation, next) => said({ allocation, sensitivity: { ...near.sensitivity, next_return: { ...next_return, ...next } } });
+  assert.match(held(0, { to_bank: at(0.103) }), /The next period must return more than 10\.3 % before it leaves the bank\. The record/);
+  assert.match(held(1, { to_bank: null, to_highest: at(-0.02) }), /It stays there unless the next period returns less than -2\.0 %\./);
   assert.match(banked(37), /After a return of -7\.0 %, and after one of 6\.0 % too, it would stay at 0 %\./);
 });
 

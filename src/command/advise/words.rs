@@ -24,14 +24,14 @@ pub fn told(advised: &Advised, wealth: f64, frequency: Frequency) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "  {name:<22}{figure:>14}  {meaning}");
     }
-    for sentence in near(advised) {
+    for sentence in near(advised, noun) {
         text += &format!("\n{sentence}");
     }
     text.trim_end().to_owned()
 }
 
 /// How near the advice is to changing, where that was asked for, and what to be careful about.
-fn near(Advised { caution, sensitivity, warnings, .. }: &Advised) -> Vec<String> {
+fn near(Advised { advice, caution, sensitivity, warnings, .. }: &Advised, noun: &str) -> Vec<String> {
     let mut told: Vec<String> = warnings.iter().map(|warning| warning.message.clone()).collect();
     told.extend(caution.iter().map(|caution| caution.sentence.clone()));
     let Some(Sensitivity { without_one, next_return, premium, .. }) = sensitivity else { return told };
@@ -45,7 +45,13 @@ fn near(Advised { caution, sensitivity, warnings, .. }: &Advised) -> Vec<String>
     let crossing = |to: Option<Return>, what: &str| {
         to.map(|to| format!("A next return of {} would take it to {what}.", percent(to.simple_return, 1)))
     };
-    told.extend(crossing(next_return.to_bank, "the bank"));
+    let leaves = |to: Return| {
+        format!("The next {noun} must return more than {} before it leaves the bank.", percent(to.simple_return, 1))
+    };
+    told.extend(match advice.allocation {
+        0.0 => next_return.to_bank.map(leaves),
+        _ => crossing(next_return.to_bank, "the bank"),
+    });
     told.extend(crossing(next_return.to_highest, "the most that may be held"));
     if let Some(needed) = premium.needed {
         let present = percent(premium.present, 2);

@@ -67,8 +67,19 @@ export function table(caption, columns, rows) {
 /** Content that a reader opens; built when first opened. */
 export function disclosure(summary, build) {
   const details = h("details", {}, h("summary", {}, summary));
-  details.addEventListener("toggle", () => details.children.length === 1 && details.append(build()));
+  const fill = () => details.children.length === 1 && details.append(build());
+  details.addEventListener("toggle", fill);
+  // The event of opening comes later than whoever opens it by script goes on.
+  details.addEventListener("reveal", fill);
   return details;
+}
+
+/** Opens a disclosure, builds what is in it at once, and moves to its first field. */
+export function reveal(details) {
+  details.dispatchEvent(new Event("reveal"));
+  details.open = true;
+  details.scrollIntoView({ block: "center" });
+  details.querySelector("input, select, textarea")?.focus();
 }
 
 /** Figures that matter, each with its name: `[name, value, note]`. */

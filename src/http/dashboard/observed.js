@@ -5,7 +5,7 @@ import { falls, mixed, wealths } from "./comparators.js";
 import { correctionForm } from "./correction.js";
 import { besides } from "./course.js";
 import { csvText, hundred } from "./csv.js";
-import { disclosure, h, section, table } from "./dom.js";
+import { disclosure, h, reveal, section, table } from "./dom.js";
 import { addedIn, rateIn, standing } from "./flows.js";
 import { pressed } from "./form.js";
 import { allocation, count, figures, moment, percent, short, wealth } from "./format.js";
@@ -142,11 +142,7 @@ export function lastReport(shown) {
     const report = { missing: true, ...held, ...(date ? { date } : {}) };
     correct(target, shown, row.period, report, "The report was taken back", `The return of ${name} is taken back.`);
   };
-  const mend = () => {
-    shown.right.open = true;
-    shown.right.querySelector("form")?.scrollIntoView({ block: "center" });
-    requestAnimationFrame(() => shown.right.querySelector("form input")?.focus());
-  };
+  const mend = () => reveal(shown.right);
   const back = log_return === null ? "no return is known" : percent(Math.expm1(log_return), 2);
   const said = log_return !== null && history.assets ? `${back} of the assets together` : back;
   return h(

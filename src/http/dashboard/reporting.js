@@ -1,11 +1,11 @@
 // One return for many sessions at once: typed, pasted or out of a file, looked over, sent together, and told row by row.
 
 import { get, post } from "./api.js";
-import { announce, h, section, table } from "./dom.js";
+import { announce, disclosure, h, section, table } from "./dom.js";
 import { fileDrop } from "./file_drop.js";
 import { area, fieldset, input, refusal, select } from "./form.js";
 import { count, counted, percent, wealth } from "./format.js";
-import { headed } from "./naming.js";
+import { called, headed } from "./naming.js";
 import { all } from "./pages.js";
 import { dayOf } from "./periods.js";
 import { problemWords, unusualWords } from "./problem_words.js";
@@ -72,6 +72,7 @@ function reporting(sessions, chosen, leaving) {
   const unitWords = h("p", { class: "note wrong" });
   const doubt = h("div", { hidden: true, role: "group" }, unitWords, unit.element);
   const preview = h("div", {});
+  const standing = h("div", {});
   const outcome = h("div", {});
   const message = refusal();
   const button = h("button", { type: "submit" }, "Report");
@@ -95,7 +96,8 @@ function reporting(sessions, chosen, leaving) {
     isOpen = seems !== null && unit.control.value === "";
     button.disabled = ready === 0 || isOpen;
     button.textContent = ready === 0 ? "Report" : `Report for ${count(ready)}`;
-    preview.replaceChildren(rows.length > 0 ? section("Who gets what", looked(rows, ready), leftOut(read.unread), previewed(rows)) : "");
+    standing.replaceChildren(rows.length > 0 ? looked(rows, ready) : "");
+    preview.replaceChildren(rows.length > 0 ? section("Who gets what", leftOut(read.unread), withoutLine(sessions, rows), previewed(rows)) : "");
     const unknown = [...new Set(rows.flatMap(({ entry }) => (entry && policies.of(entry.policy) === undefined ? [entry.policy] : [])))];
     if (unknown.length > 0) policies.read(unknown).then((found) => found.length > 0 && look(), (error) => leaving.aborted || say(error.message));
   };
@@ -152,7 +154,7 @@ function reporting(sessions, chosen, leaving) {
     h("fieldset", {}, h("legend", {}, "Who"), drop, lines.element, doubt),
     preview,
     message,
-    h("p", { class: "send" }, button),
+    h("div", { class: "send held" }, standing, button),
   );
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
@@ -183,6 +185,15 @@ function tick(name, words, changed) {
 function looked(rows, ready) {
   const bad = rows.length - ready;
   return h("p", { class: "sentence", role: "status" }, `${counted(ready, "return is", "returns are")} ready${bad > 0 ? `, and ${counted(bad, "line is", "lines are")} not` : ""}.`);
+}
+
+/** The active sessions that no row reports, which a list may have left out by mistake. */
+function withoutLine(sessions, rows) {
+  const named = new Set(rows.map(({ entry }) => entry?.session));
+  const left = sessions.filter(({ session, state }) => state === "active" && !named.has(session));
+  if (left.length === 0) return "";
+  const names = () => h("p", { class: "note" }, left.map(({ session, name }, index) => [index > 0 ? ", " : "", h("a", { href: `#/sessions/${session}` }, called(session, name))]));
+  return disclosure(`${counted(left.length, "active session")} ${left.length === 1 ? "has" : "have"} no line`, names);
 }
 
 /** That nothing is read from some columns, and what would be. */
@@ -216,14 +227,14 @@ function besides({ report }) {
 
 const isBeside = ({ report }) => Object.keys(report).some((name) => !["simple_return", "simple_returns", "period"].includes(name));
 
+/** Lines that cannot be sent stand first, each with the reason below the name. */
 const previewed = (rows) =>
   table("Returns to report", [
-    { name: "Session", cell: who },
+    { name: "Session", cell: (row) => [h("div", { class: "said" }, who(row)), row.trouble ? wrongLine(row.line, row.trouble) : null] },
     { name: "Period", numeric: true, cell: ({ entry, report }) => (entry ? count(report.period ?? entry.period) : "\u2013") },
     { name: "Return", numeric: true, cell: returned },
-    ...(rows.some(isBeside) ? [{ name: "Beside", cell: besides }] : []),
-    { name: "Ready", cell: ({ line, trouble }) => (trouble ? wrongLine(line, trouble) : "yes") },
-  ], rows);
+    ...(rows.some(isBeside) ? [{ name: "Also", cell: besides }] : []),
+  ], [...rows].sort((one, other) => Number(one.trouble === null) - Number(other.trouble === null)));
 
 const outcomes = (told) =>
   table("Outcomes", [

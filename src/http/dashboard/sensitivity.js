@@ -44,7 +44,7 @@ export function headline({ allocation: told, sensitivity: { next_return } }, uni
 /** What an answer with its sensitivity says. */
 export function sentences(action, unit = "period") {
   const { without_one, next_return, premium } = action.sensitivity;
-  return [...lacking(action, without_one), ...coming(action, next_return), ...paying(premium, unit)];
+  return [...lacking(action, without_one), ...coming(action, next_return, unit), ...paying(premium, unit)];
 }
 
 const simple = ({ simple_return }) => percent(simple_return);
@@ -56,7 +56,7 @@ function lacking({ allocation: told }, range) {
   return differs.map((end) => `Without its return of ${simple(end)} the advice would be ${allocation(end.allocation)}.`);
 }
 
-function coming({ allocation: told }, { to_bank, to_highest, low, high }) {
+function coming({ allocation: told }, { to_bank, to_highest, low, high }, unit) {
   const [now, after_low, after_high] = [told, low.allocation, high.allocation].map(allocation);
   const stays = now === after_low && now === after_high;
   const after = stays
@@ -64,8 +64,10 @@ function coming({ allocation: told }, { to_bank, to_highest, low, high }) {
     : `After a return of ${simple(low)} the advice would be ${after_low}; after one of ${simple(high)} it would be ${after_high}.`;
   return [
     after,
-    to_bank && `A coming return of ${simple(to_bank)} would take the advice to the bank, and a higher one would not.`,
-    to_highest && `One of ${simple(to_highest)} would take it to the highest allocation, and a lower one would not.`,
+    to_bank && now === allocation(0) && `The next ${unit} must return more than ${simple(to_bank)} before it leaves the bank.`,
+    to_bank && now !== allocation(0) && `A coming return of ${simple(to_bank)} would take the advice to the bank, and a higher one would not.`,
+    to_highest && now === allocation(1) && `It stays there unless the next ${unit} returns less than ${simple(to_highest)}.`,
+    to_highest && now !== allocation(1) && `One of ${simple(to_highest)} would take it to the highest allocation, and a lower one would not.`,
   ].filter(Boolean);
 }
 
