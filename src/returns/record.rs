@@ -32,9 +32,9 @@ pub struct Record {
     /// How many periods make a year, where the dates say so.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub periods_per_year: Option<usize>,
-    /// Where there are no dates that tell: whether the first row was taken for the newest.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub newest_first: Option<bool>,
+    /// Whether the first row was the newest, so that the rows are turned round: as their dates tell, or as it was said where
+    /// there are none.
+    pub newest_first: bool,
     /// What the bank paid, where a column says so.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate: Option<BankRate>,
@@ -129,7 +129,7 @@ impl Found {
             dates: days.as_ref().map(|days| days.iter().map(shown).collect()),
             frequency,
             periods_per_year,
-            newest_first: days.is_none().then_some(is_turned),
+            newest_first: is_turned,
             rate,
             remarks,
         };
@@ -174,10 +174,10 @@ impl Record {
             [name] => format!(", as in column {name}"),
             _ => format!(", as in columns {}", names.join(", ")),
         };
-        let turned = match self.newest_first {
-            None => "",
-            Some(true) => ", without dates, taken newest first and turned round",
-            Some(false) => ", without dates, taken oldest first",
+        let turned = match (&self.dates, self.newest_first) {
+            (Some(_), _) => "",
+            (None, true) => ", without dates, taken newest first and turned round",
+            (None, false) => ", without dates, taken oldest first",
         };
         format!("{latest}{adjective} {what}{span}{place}{turned}.")
     }

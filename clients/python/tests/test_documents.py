@@ -27,7 +27,8 @@ def run(code: str, service: Service, folder: Path = HERE) -> subprocess.Complete
 
 def test_the_readme_of_the_client_runs(service: Service) -> None:
     first, quick_start, awaited, error = blocks((HERE / "README.md").read_text())
-    assert re.match(r"0\.39\d+ \[\]$", run(first, service, REPOSITORY).stdout)
+    read, advised = run(first, service, REPOSITORY).stdout.splitlines()
+    assert read.startswith("1109 monthly simple returns as fractions, ") and re.match(r"0\.39\d+ \[\]$", advised)
     lines = run(quick_start, service).stdout.splitlines()
     assert [line.split()[0] for line in lines[:3]] == ["1", "2", "3"]
     assert lines[0].endswith(" 100.0") and lines[3].count("'log_return'") == 3

@@ -9,11 +9,12 @@ import sys
 from collections.abc import Callable
 from inspect import signature
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import polars as pl
+import pyarrow as pa
 import pytest
 from conftest import RETURNS, Service, train
 
@@ -62,7 +63,10 @@ def test_kinds_agree() -> None:
         ([3.0, 0.0], "price", r"returns\[1\] is 0.0: must be above 0"),
         ([0.1], "prices", "kind is 'prices': must be"),
         (pd.DataFrame({"a": [0.1], "b": [0.2]}), "log", r"\(1, 2\), \['a', 'b'\]: must be one column"),
-        (pd.Series([1.0, 2.0], index=[2, 1]), "price", "must come oldest first"),
+        (pd.Series([1.0, 2.0], index=[2, 1]), "price", "index of returns begins with 2: must hold dates"),
+        (pd.Series(SIMPLE, index=["31.12.2024", "29.11.2024", "31.10.2024"]), "log", "begins with 31.12.2024: must"),
+        (pd.Series(SIMPLE, index=[20241231, 20241130, 20241031]), "log", "begins with 20241231: must hold dates"),
+        (pd.Series(SIMPLE, index=["a", "b", "c"]), "log", "begins with a: must hold dates"),
         (pd.Series([0.1, pd.NA]), "log", r"returns\[1\] is <NA>: must be a number"),
         ([0.1, "n/a"], "log", r"returns\[1\] is 'n/a': must be a number"),
         (pd.Series(SIMPLE, index=INDEX[::-1]), "simple", "has 2008-02-01 after 2008-03-01: dates must increase"),
@@ -83,7 +87,7 @@ def test_what_cannot_be_meant_of_several_assets_is_refused(ballast: Ballast) -> 
     months = pd.DataFrame({"stocks": [*SIMPLE, 0.03], "bonds": [0.01, 0.0, -0.01, 0.02]}, index=MONTHS[:4])
     said: dict[str, Any] = {"kind": "simple", "rate_per_step": 0.0}
     refused = {
-        "index of returns has 2005-01-31 after 2005-03-31": months.iloc[[2, 0, 1, 3]],
+        r"line 3: date is \"2005-01-31\": must be later than 2005-03-31": months.iloc[[2, 0, 1, 3]],
         r"returns: line 3: bonds is \"\": must be a number": months.assign(bonds=[0.1, math.nan, 0.2, 0.1]),
         "assets has 'stocks' twice": months.set_axis(["stocks", "stocks"], axis="columns"),
         r"returns\[1\] has 1 numbers: must have one for each of \['stocks', 'bonds'\]": [[0.1, 0.2], [0.1]],
@@ -103,13 +107,14 @@ def test_several_assets_are_the_same_in_rows_in_a_frame_and_in_a_file(ballast: B
     said: dict[str, Any] = {"kind": "simple", "rate_per_step": BANK[-1], "periods_per_year": 12.0, **ONCE}
     plain = ballast.advise_assets(rows, assets=["1", "2"], **said)
     assert set(plain["allocation"]) == {"1", "2"} and plain["sample_size"] == 24
-    assert ballast.advise_assets(table, rate_per_step=BANK[-1], **ONCE) == plain
-    assert ballast.advise_assets(table.assign(rf=BANK), assets=["1", "2"], **ONCE) == plain
-    assert ballast.advise_assets(table.rename(columns=int), rate_per_step=BANK[-1], **ONCE) == plain
+    assert plain.pop("read").startswith("24 simple returns as fractions, as in columns asset 1, asset 2")  # type: ignore[misc]
+    assert unread(ballast.advise_assets(table, rate_per_step=BANK[-1], **ONCE)) == plain
+    assert unread(ballast.advise_assets(table.assign(rf=BANK), assets=["1", "2"], **ONCE)) == plain
+    assert unread(ballast.advise_assets(table.rename(columns=int), rate_per_step=BANK[-1], **ONCE)) == plain
     named = table.set_axis(["one", "two"], axis="columns").assign(rf=BANK)
     named.to_csv(tmp_path / "named.csv")
-    polars = SimpleNamespace(columns=["1", "2"], to_numpy=lambda: np.array(rows))
-    assert ballast.advise_assets(polars, **said) == plain
+    for held in (pl.DataFrame(rows, schema=["1", "2"], orient="row"), pa.table({"1": table["1"], "2": table["2"]})):
+        assert unread(ballast.advise_assets(held, **said)) == plain
     # Dates and the rates of the bank are no assets, wherever they stand.
     for returns in (
         named,
@@ -146,8 +151,8 @@ def test_a_volatile_record_can_be_given_as_prices() -> None:
         (pd.period_range("2008Q1", periods=3, freq="Q"), ["2008-03-31", "2008-06-30", "2008-09-30"]),
         (pd.Index([date.date() for date in INDEX]), ["2008-01-01", "2008-02-01", "2008-03-01"]),
         (["2008-01", "2008-02", "2008-03"], ["2008-01", "2008-02", "2008-03"]),
-        (["a", "b", "c"], None),
-        ([2008, 2009, 2010], None),
+        ([2008, 2009, 2010], ["2008-12-31", "2009-12-31", "2010-12-31"]),
+        ([7, 8, 9], None),
         (None, None),
     ],
 )
@@ -170,8 +175,8 @@ def test_a_walk_forward_takes_dates_and_rates_from_pandas(ballast: Ballast) -> N
     assert plain == report
     # The first change of a price is none, and neither it nor what the bank paid beside it is a period.
     changes = prices.pct_change()
-    later = ballast.backtest(changes.dropna(), rate=rate[1:], **choices).report()
-    assert ballast.backtest(changes, rate=rate, **choices).report() == later
+    later = ballast.backtest(changes.dropna(), kind="simple", rate=rate[1:], **choices).report()
+    assert ballast.backtest(changes, kind="simple", rate=rate, **choices).report() == later
     table = pd.DataFrame({"stocks": changes, "bonds": 0.3 * changes.shift(-1)}).shift(-1)
     assert per_period("rate", range(13), table, 12, "simple") == list(range(12))
     with pytest.raises(ValueError, match="rate has another index than returns: align the two first"):
@@ -195,6 +200,12 @@ def test_a_text_a_file_and_a_table_are_read_alike(ballast: Ballast, tmp_path: Pa
     assert [question["asks"] for question in asked["questions"]] == ["unit"]
 
 
+def unread(answer: Any) -> dict[str, Any]:
+    """An answer without the sentence of what was read, which tells how it was given."""
+    assert answer["read"]
+    return {name: value for name, value in answer.items() if name != "read"}
+
+
 MONTHS = pd.period_range("2005-01", periods=24, freq="M")
 RECORD = [0.01 + 0.04 * math.sin(1.7 * month) for month in range(24)]
 BANK = [0.002 + 0.0001 * month for month in range(24)]
@@ -210,9 +221,14 @@ def test_what_a_quant_has_is_read_by_the_service(ballast: Ballast, tmp_path: Pat
     table.to_csv(path)
     said = {"rate_per_step": BANK[-1], **ONCE}
     plain = ballast.advise(RECORD, kind="simple", **said)
-    held = [RECORD, tuple(RECORD), np.array(RECORD), np.array(RECORD)[:, None], pd.Series(RECORD)]
-    held += [pd.Series(RECORD, MONTHS), table["fund"], pd.Series(RECORD, MONTHS.to_timestamp(), name="fund")]
+    held = [RECORD, tuple(RECORD), np.array(RECORD), np.array(RECORD)[:, None], pd.Series(RECORD), pl.Series(RECORD)]
+    held += [pd.Series(RECORD, MONTHS), pa.array(RECORD), pd.DataFrame(RECORD)]
     for returns in held:
+        with pytest.raises(UnclearReturns, match=r"kind='log': 24 (monthly )?log-returns as fractions"):
+            ballast.advise(returns, **said)
+        found = ballast.advise(returns, kind="simple", **said)
+        assert found["allocation"] == pytest.approx(plain["allocation"], abs=1e-9), returns
+    for returns in (table["fund"], pd.Series(RECORD, MONTHS.to_timestamp(), name="fund"), pl.Series("fund", RECORD)):
         found = ballast.advise(returns, **said)
         assert found["allocation"] == pytest.approx(plain["allocation"], abs=1e-9), returns
     days = pd.period_range("2004-12", periods=25, freq="M")
@@ -247,14 +263,16 @@ def test_what_can_be_read_in_two_ways_is_asked_by_name(ballast: Ballast) -> None
     refused: dict[str, Any] = {
         r"returns: line 1: column 2 is \"x\": must be a number": "0.1 x 0.3",
         "returns: The numbers do not vary": [-0.01, -0.01, -0.01],
+        r"returns: line 2: column 1 is \"NaN\": must be": pd.Series([0.1, math.nan, -0.2]),
+        r"returns: line 3: fund is \"NaN\": must be": pd.DataFrame({"fund": [0.1, None, -0.2], "rf": [0.0, None, 0.0]}),
     }
     for message, wrong in refused.items():
         with pytest.raises(ValueError, match=message):
             ballast.advise(wrong, rate_per_step=0.0)
     with pytest.raises(ValueError, match="rate_per_step is missing: must be given"):
-        ballast.advise(RECORD)
+        ballast.advise(RECORD, kind="simple")
     with pytest.raises(ValueError, match="rate is missing: must be given"):
-        ballast.backtest(RECORD)
+        ballast.backtest(RECORD, kind="simple")
 
 
 def test_a_calm_record_in_percent_is_asked_about_though_its_kind_is_said(ballast: Ballast) -> None:
@@ -278,7 +296,8 @@ def test_a_calm_record_in_percent_is_asked_about_though_its_kind_is_said(ballast
             assert [question["asks"] for question in caught.value.questions] == ["unit"]
             assert "choices={'unit': 'percent'}: " in str(caught.value)
     taken = ballast.advise(percent, kind="simple", choices={"unit": "percent"}, **said)
-    assert taken == ballast.advise([value / 100.0 for value in percent], kind="simple", **said)
+    fractions = ballast.advise([value / 100.0 for value in percent], kind="simple", **said)
+    assert unread(taken) == unread(fractions)
     of_both = ballast.advise_assets(table, kind="simple", choices={"unit": "percent"}, **said)
     assert of_both["allocation"] == pytest.approx(
         ballast.advise_assets(table / 100.0, kind="simple", **said)["allocation"], abs=1e-9
@@ -299,8 +318,8 @@ def test_it_is_read_alike_where_it_is_awaited(service: Service) -> None:
 
 
 def test_the_history_of_a_session_is_named(ballast: Ballast) -> None:
-    with pytest.raises(ValueError, match=r"^history: line 2: column 1 is .nan.: must be a number"):
-        ballast.policy("x").session(history=[0.1, math.nan])
+    with pytest.raises(ValueError, match=r"^history: line 2: column 1 is .NaN.: must be a number"):
+        ballast.policy("x").session(history=[0.1, math.nan, 0.2])
 
 
 def test_a_series_trains_as_its_list_does(ballast: Ballast) -> None:
@@ -325,8 +344,8 @@ def test_what_is_learned_from_is_read_everywhere_by_one_rule(ballast: Ballast) -
         defaults = {name: signature(call).parameters[name].default for name in ("kind", "choices")}
         assert defaults == {"kind": None, "choices": None}, call
     assert {"kind", "choices"} <= Opening.__optional_keys__
-    # Of numbers with losses simple returns are read, and log-returns where they are said to be.
     policy = train(ballast).policy()
-    for more, told in (({}, [math.log1p(value) for value in RETURNS]), ({"kind": "log"}, RETURNS)):
-        known = policy.session(history=RETURNS, **more).history()["history"]  # type: ignore[arg-type]
+    kinds: list[tuple[Kind, list[float]]] = [("simple", [math.log1p(value) for value in RETURNS]), ("log", RETURNS)]
+    for kind, told in kinds:
+        known = policy.session(history=RETURNS, kind=kind).history()["history"]
         np.testing.assert_allclose(known, told, atol=1e-15)

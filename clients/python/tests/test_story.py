@@ -89,9 +89,8 @@ def test_a_session_of_several_assets(ballast: Ballast) -> None:
         record, kind="log", rate_per_step=0.0, horizon=2, radius={"rule": "fixed", "radius": 1e-4}, design={"count": 20}
     )
     policy = training.policy()
-    moved = policy.session(history=record[["bonds", "stocks"]], holdings={"stocks": 0.5, "bonds": 0.0})
-    simple: list[list[float]] = [[math.log1p(value) for value in row] for row in record.values.tolist()]
-    np.testing.assert_allclose(moved.history()["history"], simple, atol=1e-15)
+    moved = policy.session(history=record[["bonds", "stocks"]], kind="log", holdings={"stocks": 0.5, "bonds": 0.0})
+    np.testing.assert_allclose(moved.history()["history"], record.to_numpy(), atol=1e-15)
     assert moved.assets_action()["holdings"]["stocks"] == 0.5
     with pytest.raises(ValueError, match="must have those of the policy"):
         policy.session(history=record.rename(columns={"bonds": "gold"}))
@@ -244,7 +243,7 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     ballast.read_returns("1.5 -2 3")
     training = train(ballast, seed=8)
     policy = training.policy()
-    own = policy.session(history=RETURNS[:5])
+    own = policy.session(history=RETURNS[:5], kind="simple")
     own.action(mode="resolve")
     own.what_if(radius_scale=0.5)
     own.observe(log_return=0.01).correct(1, "revised", log_return=0.02)

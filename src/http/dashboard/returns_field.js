@@ -201,7 +201,7 @@ function shown({ line, value }, area) {
 }
 
 /** Choices that read the same text otherwise. */
-function otherwise({ columns, series, newest_first, count: all }, said, say, several) {
+function otherwise({ columns, series, dates, newest_first, count: all }, said, say, several) {
   const [{ column, kind, unit }] = series;
   const taken = series.map(({ column }) => column);
   const values = columns.filter(({ name, holds }) => holds === "values" || taken.includes(name));
@@ -222,7 +222,7 @@ function otherwise({ columns, series, newest_first, count: all }, said, say, sev
     values.length > 1 && (several ? ticked(values, taken, (columns) => say(columns.length > 1 ? { columns, kind, ...(unit ? { unit } : {}) } : { columns })) : choice("columns", "Column", names, column, (name) => [name])),
     choice("kind", "They are", KINDS, kind),
     unit && choice("unit", "In", UNITS, unit),
-    newest_first !== undefined &&
+    dates === undefined &&
       choice("newest_first", "The first is", ORDERS, String(newest_first), (value) => value === "true"),
     field(`Latest returns used, of ${count(all)}`, latest),
   ];

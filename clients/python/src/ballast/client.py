@@ -6,7 +6,7 @@ import itertools
 import os
 from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 from types import TracebackType
-from typing import Any, Literal, TypeAlias, cast
+from typing import Any, Literal, TypeAlias, TypeVar, cast
 from urllib.parse import quote
 
 import httpx
@@ -28,24 +28,30 @@ from .jobs import (
 )
 from .labels import relabelled
 from .policy import AsyncPolicy, Policy
-from .returns import (
-    Kind,
-    Read,
-    Returns,
-    Table,
-    day,
-    per_period,
-    read,
-    read_assets,
-    text_of,
-)
+from .returns import Kind, Read, Returns, day, per_period, read, read_assets, reading_of
 from .session import AsyncSession, Session
+from .sheet import Table
 from .transport import RETRIED_STATUS, Awaiting, Transport, Waiting, growing_pause, idempotent
 
 #: What a list of sessions is in the order of; with ``-`` before it descending.
 SessionSort: TypeAlias = Literal[
     "created", "-created", "name", "-name", "wealth", "-wealth", "last_report", "-last_report"
 ]
+
+
+T = TypeVar("T")
+
+
+class Advised(wire.Advised):
+    """An advice, and the sentence of what was read for it."""
+
+    read: str
+
+
+class AssetsAdvised(wire.AssetsAdvised):
+    """An advice on several assets, and the sentence of what was read for it."""
+
+    read: str
 
 
 class _Ballast:
@@ -116,7 +122,8 @@ class _Ballast:
         }
         whole = {"problem": _given(problem), "design": design, "surrogate": surrogate, "seed": seed}
         specification = cast(wire.Specification, _given(whole))
-        return await self._submit(specification, name=name, notes=notes, tags=tags, idempotency_key=idempotency_key)
+        job = await self._submit(specification, name=name, notes=notes, tags=tags, idempotency_key=idempotency_key)
+        return _having_read(job, found)
 
     async def _advise(
         self,
@@ -130,7 +137,7 @@ class _Ballast:
         holding: float | None = None,
         sensitivity: bool | None = None,
         **problem: Any,
-    ) -> wire.Advised:
+    ) -> Advised:
         """What to hold through one period, given the returns seen so far. Nothing is trained or stored.
 
         ``returns``, ``kind``, ``choices`` and ``rate_per_step`` are as in ``train``, and so is every other field of the
@@ -146,7 +153,7 @@ class _Ballast:
             "holding": holding,
             "sensitivity": sensitivity,
         }
-        return cast(wire.Advised, await self._transport.json("POST", "/advise", body=_given(question)))
+        return _having_read(cast(Advised, await self._transport.json("POST", "/advise", body=_given(question))), found)
 
     async def _advise_assets(
         self,
@@ -159,7 +166,7 @@ class _Ballast:
         assets: Sequence[str] | None = None,
         wealth: float | None = None,
         **problem: Any,
-    ) -> wire.AssetsAdvised:
+    ) -> AssetsAdvised:
         """What to hold of each of several assets through one period. Nothing is trained or stored.
 
         ``returns`` has a column for each asset: a DataFrame, a text or the ``Path`` of a file, or rows of numbers with
@@ -168,9 +175,9 @@ class _Ballast:
         the bank pays may stand in a column that is not chosen. Every other field of the problem is given by name, such
         as ``ground_norm``, ``utility``, ``radius`` or ``support``.
         """
-        whole = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
+        whole, found = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
         question = _given({"problem": whole, "wealth": wealth})
-        return cast(wire.AssetsAdvised, await self._transport.json("POST", "/advise", body=question))
+        return _having_read(cast(AssetsAdvised, await self._transport.json("POST", "/advise", body=question)), found)
 
     async def _train_assets(
         self,
@@ -196,9 +203,10 @@ class _Ballast:
         is every other field of the problem that is given by name; also ``horizon``, ``trading_cost``,
         ``contributions`` and ``composition``. What else is given is as in ``train``.
         """
-        of_assets = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
+        of_assets, found = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
         whole = {"problem": of_assets, "design": design, "surrogate": surrogate, "seed": seed}
-        return await self._queued("/train", {**_given(whole), **relabelled(name, notes, tags)}, idempotency_key)
+        request = {**_given(whole), **relabelled(name, notes, tags)}
+        return _having_read(await self._queued("/train", request, idempotency_key), found)
 
     async def _one(self, returns: Returns, kind: Kind | None, choices: wire.Choices | None) -> Read:
         """Returns of one asset."""
@@ -215,22 +223,21 @@ class _Ballast:
         rate_per_step: float | None,
         assets: Sequence[str] | None,
         problem: Mapping[str, Any],
-    ) -> dict[str, Any]:
-        """The problem of several assets."""
+    ) -> tuple[dict[str, Any], Read]:
+        """The problem of several assets, and what was read for it."""
         names, found = await read_assets(self._transport, returns, kind, choices, assets)
         told = {"rate_per_step": _last_rate(found, rate_per_step), "periods_per_year": found.periods_per_year}
-        return {"assets": names, "history": found.rows, **_given(told), **_given(problem)}
+        return {"assets": names, "history": found.rows, **_given(told), **_given(problem)}, found
 
     async def _read_returns(self, source: str | os.PathLike[str] | Table, /, **choices: Any) -> wire.Reading:
         """What a text of returns or prices says: one record, or what must be asked, or where it is wrong.
 
-        ``source`` is a text, the ``Path`` of a file, a Series or DataFrame of pandas, an array or a list. ``choices``
-        say what the text does not, or answer what was asked: ``unit="percent"``, ``columns=["fund"]`` (several
+        ``source`` is a text, the ``Path`` of a file, a table of pandas, polars or pyarrow, an array or a list.
+        ``choices`` say what it does not, or answer what was asked: ``unit="percent"``, ``columns=["fund"]`` (several
         are several assets). Look at ``reading["outcome"]``: ``"read"`` has a ``sentence`` to check it by, and
         ``series``.
         """
-        body = {"text": text_of(source), "choices": choices}
-        return cast(wire.Reading, await self._transport.json("POST", "/returns", body=body))
+        return await reading_of(self._transport, source, None, cast(wire.Choices, choices), "source")
 
     async def _submit(
         self,
@@ -301,7 +308,7 @@ class _Ballast:
             "count": count,
             "seed": seed,
         }
-        return await self._queued("/backtest", _given(request), idempotency_key)
+        return _having_read(await self._queued("/backtest", _given(request), idempotency_key), found)
 
     async def _backtest_assets(
         self,
@@ -345,7 +352,7 @@ class _Ballast:
             "trading_cost": trading_cost,
             "seed": seed,
         }
-        return await self._queued("/backtest", _given(request), idempotency_key)
+        return _having_read(await self._queued("/backtest", _given(request), idempotency_key), found)
 
     async def _frontier(
         self,
@@ -376,7 +383,7 @@ class _Ballast:
             told = {"rate_per_step": _last_rate(found, rate_per_step), "periods_per_year": found.periods_per_year}
             whole = {"history": found.series[0], **_given(told), **_given(problem)}
         else:
-            whole = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
+            whole, found = await self._of_assets(returns, kind, choices, rate_per_step, assets, problem)
             if len(whole["assets"]) == 1:
                 # Of two columns one was of dates or of the bank.
                 del whole["assets"]
@@ -388,7 +395,7 @@ class _Ballast:
             "block": block,
             "seed": seed,
         }
-        return await self._queued("/frontier", _given(request), idempotency_key)
+        return _having_read(await self._queued("/frontier", _given(request), idempotency_key), found)
 
     async def _import_policy(self, document: bytes) -> str:
         """Stores an exported policy; one that the service knows already stays as it is."""
@@ -513,8 +520,8 @@ class Ballast(_Ballast):
     frontier_of = blocking_into(_Ballast._job, Frontier)
     import_policy = blocking_into(_Ballast._import_policy, Policy)
     session = blocking_into(_Ballast._session, Session)
-    advise = Answering(wire.Advised).blocking(_Ballast._advise)
-    advise_assets = Answering(wire.AssetsAdvised).blocking(_Ballast._advise_assets)
+    advise = Answering(Advised).blocking(_Ballast._advise)
+    advise_assets = Answering(AssetsAdvised).blocking(_Ballast._advise_assets)
     read_returns = blocking(_Ballast._read_returns)
     observe = blocking(_Ballast._observe)
     health = Answering(wire.Health).blocking(_Ballast._health)
@@ -623,13 +630,19 @@ def _beside(
     count = len(found.series[0])
     days = found.dates
     if dates is not None:
-        days = per_period("dates", [day(date) for date in dates], returns, count, found.kind)
+        days = per_period("dates", [day(date) for date in dates], returns, count, found.kind, found.is_turned)
     if isinstance(rate, Iterable):
-        rate = [float(paid) for paid in per_period("rate", rate, returns, count, found.kind)]
+        paid = per_period("rate", rate, returns, count, found.kind, found.is_turned)
+        rate = [float(each) for each in paid]
     rate = found.rates if rate is None else rate
     if rate is None:
         raise ValueError("rate is missing: must be given, as returns do not say what the bank paid")
     return {"rate": rate, "dates": days}
+
+
+def _having_read(answer: T, found: Read) -> T:
+    """The answer with the sentence of what was read for it."""
+    return cast(T, {**cast(Mapping[str, Any], answer), "read": found.sentence})
 
 
 def _amounts(contributions: float | Sequence[float] | None) -> float | list[float] | None:

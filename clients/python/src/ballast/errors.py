@@ -42,17 +42,22 @@ class UnclearReturns(BallastError, ValueError):
         self.questions = questions
 
     def __str__(self) -> str:
-        lines = [f"{self.argument} can be read in more than one way: say which by choices."]
+        lines: list[str] = []
+        by: dict[str, None] = {}
         for question in self.questions:
             lines.append(question["question"])
             for option in question["options"]:
-                read = option.get("sentence") or option["label"]
-                lines.append(f"  choices={option['choices']}: {read}")
+                choices = option["choices"]
+                name, value = ("kind", choices["kind"]) if set(choices) == {"kind"} else ("choices", choices)
+                by[name] = None
+                lines.append(f"  {name}={value!r}: {option.get('sentence') or option['label']}")
             if question["asks"] == "columns":
                 lines.append(
                     "  or all of them as several assets: advise_assets, train_assets, backtest_assets, frontier"
                 )
-        return "\n".join(lines)
+        return "\n".join(
+            [f"{self.argument} can be read in more than one way: say which by {' and '.join(by)}.", *lines]
+        )
 
 
 class JobEnded(BallastError):

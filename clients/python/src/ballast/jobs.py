@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from typing import TYPE_CHECKING, Any, cast
 from urllib.parse import quote
 
@@ -34,6 +34,8 @@ class _Job:
         self.job = job
         #: What in the request may be a mistake, as the service said when it took it; empty for a job found again.
         self.warnings: list[wire.Warning] = list(cast(wire.AcceptedJob, job).get("warnings", []))
+        #: The sentence of what was read for it; ``None`` where returns were not read, and for a job found again.
+        self.read: str | None = cast(dict[str, Any], job).get("read")
 
     @property
     def id(self) -> str:
@@ -159,10 +161,13 @@ class _Walk(_Job):
         raises, ``ValueError`` for another figure and ``ImportError`` without pandas."""
         return frames.periods(await self._ended(watch), figure)
 
-    async def _plot(self, ax: Axes | None = None, watch: Watch | None = None) -> Axes:
-        """Draws the wealth of every strategy (:func:`ballast.plots.walk_forward`). Waits as ``report`` does, and raises
-        what it raises, and ``ImportError`` without pandas and matplotlib."""
-        return plots.walk_forward(await self._ended(watch), ax)
+    async def _plot(
+        self, ax: Axes | None = None, watch: Watch | None = None, strategies: Sequence[str] | None = None
+    ) -> Axes:
+        """Draws the wealth of ``strategies``, or of those worth most, ten at the most
+        (:func:`ballast.plots.walk_forward`). Waits as ``report`` does, and raises what it raises, ``ValueError`` for a
+        strategy that there is not and ``ImportError`` without pandas and matplotlib."""
+        return plots.walk_forward(await self._ended(watch), ax, strategies)
 
 
 class _WalkForward(_Walk):

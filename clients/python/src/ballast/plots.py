@@ -7,6 +7,7 @@ what to install.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from . import frames, wire
@@ -15,15 +16,34 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def walk_forward(report: wire.BacktestReport | wire.AssetsBacktestReport, ax: Axes | None = None) -> Axes:
-    """The wealth of every strategy of a walk-forward from 100, over the periods, on a logarithmic scale."""
-    axes = _axes(ax)
-    frames.periods(report).plot(ax=axes, logy=True, linewidth=1.2)
+#: Lines that can be told apart by their colours.
+_LINES = 10
+_STYLES = ("-", "--", ":", "-.")
+
+
+def walk_forward(
+    report: wire.BacktestReport | wire.AssetsBacktestReport,
+    ax: Axes | None = None,
+    strategies: Sequence[str] | None = None,
+) -> Axes:
+    """The wealth of strategies of a walk-forward from 100, over the periods, on a logarithmic scale: those named, or
+    the ten that are worth most for certain, the best first. Raises ``ValueError`` for one that there is not."""
+    worth = frames.walk_forward(report)["yearly_certainty_equivalent"].sort_values(ascending=False, kind="stable")
+    wealth, title = frames.periods(report), None
+    if strategies is None:
+        strategies = list(worth.index[:_LINES])
+        title = f"the {_LINES} of {len(worth)} worth most" if len(worth) > _LINES else None
+    elif unknown := next((name for name in strategies if name not in wealth), None):
+        raise ValueError(f"strategies has {unknown!r}: must be of {', '.join(wealth)}")
+    axes = _axes(ax, (10.0, 5.0))
+    for place, name in enumerate(strategies):
+        style = _STYLES[place // _LINES % len(_STYLES)]
+        axes.plot(wealth.index, wealth[name], color=f"C{place % _LINES}", linestyle=style, linewidth=1.2, label=name)
+    axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_formatter("{x:g}")
     axes.set_ylabel("wealth, from 100")
-    # Beside the lines: of several assets there are ten strategies and more.
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small", title=title, frameon=False)
     return axes
 
 
@@ -89,11 +109,11 @@ def worst_case(advice: frames.Explained, ax: Axes | None = None) -> Axes:
     return axes
 
 
-def _axes(ax: Axes | None) -> Axes:
+def _axes(ax: Axes | None, size: tuple[float, float] | None = None) -> Axes:
     if ax is not None:
         return ax
     try:
         from matplotlib import pyplot
     except ImportError as error:
         raise ImportError("plots are drawn by matplotlib: pip install 'ballast-client[plots]'") from error
-    return pyplot.subplots(layout="constrained")[1]
+    return pyplot.subplots(layout="constrained", figsize=size)[1]

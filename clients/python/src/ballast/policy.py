@@ -13,15 +13,16 @@ from . import wire
 from .driving import Answering, awaiting_into, blocking, blocking_into
 from .errors import DamagedPolicy
 from .labels import Labelled
-from .returns import Kind, Returns, read, read_assets
+from .returns import Kind, LogReturns, Read, Returns, read, read_assets
 from .session import AsyncSession, Session
+from .sheet import Sheet, sheet_of
 from .transport import Transport, idempotent
 
 
 class Opening(TypedDict, total=False):
     """What a session may be opened with; :meth:`Policy.session` says what each means."""
 
-    history: Returns | None
+    history: Returns | wire.History | None
     kind: Kind | None
     choices: wire.Choices | None
     wealth: float | None
@@ -45,7 +46,10 @@ class _Policy(Labelled):
 
     async def _detail(self) -> wire.PolicyDetail:
         """The completed specification and the diagnostics of every step."""
-        return cast(wire.PolicyDetail, await self._transport.json("GET", self._path))
+        detail = cast(wire.PolicyDetail, await self._transport.json("GET", self._path))
+        problem = detail["specification"]["problem"]
+        problem["history"] = LogReturns(problem["history"])
+        return detail
 
     async def _export(self) -> bytes:
         """The portable document, as ``Ballast.import_policy`` takes it. Raises :class:`DamagedPolicy` where the bytes
@@ -58,37 +62,53 @@ class _Policy(Labelled):
     async def _session(self, **opening: Unpack[Opening]) -> wire.Session:
         """Opens a session of an investor.
 
-        ``history`` is what the investor has seen, ``wealth`` what he has; by default both are the policy's own.
-        ``history``, ``kind`` and ``choices`` are read as those of :meth:`Ballast.train <ballast.Ballast.train>`.
-        ``holding`` is the share of it in the risky asset, by default none; of several assets ``holdings`` says it of
-        each by its name, and ``history`` is a DataFrame with a column for each. With ``rolling`` the first step of the
-        policy, whose learning must be decay, advises up to 5200 periods. ``name``, ``notes`` and ``tags`` are what the
-        session is to be called. The same ``idempotency_key`` and arguments
-        again, even from another process, give the same session, at its first period; ``Session.refresh`` tells how far
-        it is.
+        ``history`` is what the investor has seen, ``wealth`` what there is; by default both are the policy's own.
+        ``history``, ``kind`` and ``choices`` are read as those of :meth:`Ballast.train <ballast.Ballast.train>`, but
+        ``kind`` must be given of all but files and texts: what the service calls a history is of log-returns. Those
+        that it told itself need no ``kind``, and what ``Session.history`` tells may be given whole: the session starts
+        as that one did, with its returns, its wealth and what it held. Of several assets ``history`` is a table with a
+        column for each, or rows in the order of the policy.
+
+        ``holding`` is the share of wealth in the risky asset, by default none; of several assets ``holdings`` says it
+        of each by its name. With ``rolling`` the first step of the policy, whose learning must be decay, advises up to
+        5200 periods. ``name``, ``notes`` and ``tags`` are what the session is to be called. The same
+        ``idempotency_key`` and arguments again, even from another process, give the same session, at its first period;
+        ``Session.refresh`` tells how far it is.
         """
         given: dict[str, Any] = {name: value for name, value in opening.items() if value is not None}
         kind, choices, key = (given.pop(name, None) for name in ("kind", "choices", "idempotency_key"))
         if "tags" in given:
             given["tags"] = list(given["tags"])
+        if "history" in given and isinstance(given["history"], Mapping):
+            given = {**_start(cast(wire.History, given["history"])), **given}
+            given["history"] = LogReturns(given["history"]["history"])
         if "holdings" in given:
             given["holdings"] = dict(given["holdings"])
+        found = None
         if "history" in given:
-            given["history"] = await self._known(given["history"], kind, choices)
+            found = await self._known(given["history"], kind, choices)
+            given["history"] = found.rows if len(found.series) > 1 else found.series[0]
         request, headers = {"policy": self.id, **given}, idempotent(key)
-        return cast(wire.Session, await self._transport.json("POST", "/sessions", body=request, headers=headers))
+        session = await self._transport.json("POST", "/sessions", body=request, headers=headers)
+        return cast(wire.Session, session if found is None else {**session, "read": found.sentence})
 
-    async def _known(
-        self, history: Returns, kind: Kind | None, choices: wire.Choices | None
-    ) -> list[float] | list[list[float]]:
-        """Returns known at the start; of a DataFrame of several assets the columns in the order of the policy."""
-        if len(getattr(history, "columns", ())) < 2:
-            return (await read(self._transport, history, kind, choices, "history")).series[0]
-        fund = (await self._detail())["specification"].get("fund")
-        names = [] if fund is None else fund["assets"]
-        if sorted(names) != sorted(str(name) for name in history.columns):
-            raise ValueError(f"history has the columns {list(history.columns)}: must have those of the policy, {names}")
-        return (await read_assets(self._transport, history, kind, choices, names, "history"))[1].rows
+    async def _known(self, history: Returns, kind: Kind | None, choices: wire.Choices | None) -> Read:
+        """Returns known at the start; of several assets the columns in the order of the policy."""
+        if isinstance(history, LogReturns):
+            return await read(self._transport, history, kind, choices, "history")
+        held = sheet_of(history, "history")
+        fund = None
+        if isinstance(held, str) or any(len(row) > 1 for row in held.rows):
+            fund = (await self._detail())["specification"].get("fund")
+        if fund is None:
+            found = await read(self._transport, held, kind, choices, "history")
+            if len(found.series) != 1:
+                raise ValueError("history has several columns: must be one, as the policy is of one asset")
+            return found
+        names = fund["assets"]
+        if isinstance(held, Sheet) and held.names is not None and not set(names) <= set(held.names):
+            raise ValueError(f"history has the columns {held.names}: must have those of the policy, {names}")
+        return (await read_assets(self._transport, held, kind, choices, names, "history"))[1]
 
     async def _delete(self) -> None:
         """Deletes it. Raises :class:`InUse` while sessions live by it, and :class:`NotFound` where there is none."""
@@ -96,6 +116,15 @@ class _Policy(Labelled):
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.id:.12}>"
+
+
+def _start(history: wire.History) -> dict[str, Any]:
+    """What a session had when it was opened."""
+    composed = history.get("composed")
+    wealth = {"wealth": history["initial_wealth"]}
+    if composed is None:
+        return {**wealth, "holding": history["initial_holding"]}
+    return {**wealth, "holdings": composed["holdings"]}
 
 
 class Policy(_Policy):

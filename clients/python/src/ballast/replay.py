@@ -9,7 +9,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from . import frames, wire
-from .returns import Kind, Returns, dates_of, day, log_returns, per_period
+from .returns import Kind, Returns, check_aligned, check_order, dates_of, day, log_returns, per_period
+from .sheet import Sheet, Table, sheet_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,11 +25,32 @@ def reports(
     dates: Iterable[object] | None,
     rate: Numbers | None,
     flow: Numbers | None,
-    executed_allocation: Numbers | None,
+    executed_allocation: Numbers | Table | None,
+    assets: Sequence[str] | None = None,
 ) -> list[wire.Report]:
-    """The report of each period. Raises ``ValueError`` that names the argument and the rule."""
-    record = log_returns(returns, kind)
-    fields: dict[str, list[Any]] = {"log_return": record}
+    """The report of each period, of ``assets`` where there are several. Raises ``ValueError`` that names the argument
+    and the rule."""
+    fields: dict[str, list[Any]] = {}
+    if assets is None:
+        record = log_returns(returns, kind)
+        fields["log_return"] = record
+    else:
+        columns = _by_asset("returns", returns, assets)
+        logs = {name: log_returns(column, kind, f"returns of {name}") for name, column in columns.items()}
+        record = logs[assets[0]]
+        fields["log_returns"] = [dict(zip(logs, row, strict=True)) for row in zip(*logs.values(), strict=True)]
+        if executed_allocation is not None:
+            check_aligned("executed_allocation", executed_allocation, returns)
+            held = _by_asset("executed_allocation", executed_allocation, assets)
+            shares = {
+                name: _numbers(f"executed_allocation of {name}", column, returns, len(record), kind)
+                for name, column in held.items()
+            }
+            executed_allocation = None
+            fields["executed_allocations"] = [
+                dict(zip(shares, row, strict=True)) for row in zip(*shares.values(), strict=True)
+            ]
+    check_order(returns)
     days = dates_of(returns) if dates is None else [day(date) for date in dates]
     if days is not None:
         fields["date"] = per_period("dates", map(_last_day, days), returns, len(record), kind)
@@ -39,6 +61,28 @@ def reports(
         if values is not None:
             fields[name] = _numbers(name, values, returns, len(record), kind)
     return [cast(wire.Report, dict(zip(fields, row, strict=True))) for row in zip(*fields.values(), strict=True)]
+
+
+def has_columns(returns: Returns) -> bool:
+    """Whether there is more than one column."""
+    if not hasattr(returns, "__len__") or isinstance(returns, str):
+        return False
+    held = sheet_of(returns)
+    return isinstance(held, Sheet) and any(len(row) > 1 for row in held.rows)
+
+
+def _by_asset(name: str, table: Table, assets: Sequence[str]) -> dict[str, list[Any]]:
+    """The columns of a table by the names of the assets, in their order."""
+    held = sheet_of(table, name)
+    assert isinstance(held, Sheet)
+    names = list(assets) if held.names is None else held.names
+    if sorted(names) != sorted(assets):
+        raise ValueError(f"{name} has the columns {names}: must have those of the session, {list(assets)}")
+    for number, row in enumerate(held.rows):
+        if len(row) != len(names):
+            raise ValueError(f"{name}[{number}] has {len(row)} numbers: must have one for each of {names}")
+    columns = dict(zip(names, map(list, zip(*held.rows, strict=True)), strict=True))
+    return {asset: columns[asset] for asset in assets}
 
 
 def told(history: wire.History, period: int, returns: Returns, kind: Kind, count: int) -> pd.DataFrame:

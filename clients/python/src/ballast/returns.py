@@ -9,13 +9,12 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from os import PathLike
-from pathlib import Path
 from statistics import pstdev
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, cast
 
 from . import wire
 from .errors import UnclearReturns
+from .sheet import Sheet, Table, counts_rows, heading, is_years, sheet_of
 
 if TYPE_CHECKING:
     from .transport import Transport
@@ -47,7 +46,7 @@ def log_returns(returns: Returns, kind: Kind, name: str = "returns") -> list[flo
             raise ValueError(f"{name}[{index}] is {number}: must be finite (drop missing values first)")
         if number <= above:
             raise ValueError(f"{name}[{index}] is {number}: must be above {above:g}, since kind is {kind!r}")
-    _check_order(returns, kind, name)
+    check_order(returns, name)
     if kind == "price":
         return [math.log(later / earlier) for earlier, later in pairwise(numbers)]
     if len(numbers) > 1 and (deviation := pstdev(numbers)) > LARGEST_DEVIATION:
@@ -58,62 +57,55 @@ def log_returns(returns: Returns, kind: Kind, name: str = "returns") -> list[flo
     return [math.log1p(number) for number in numbers] if kind == "simple" else numbers
 
 
-#: A DataFrame, a two-dimensional array, a list of rows: a column for each asset. Also a text, or the path of a file.
-Table: TypeAlias = Any
-
-
-def text_of(source: str | PathLike[str] | Table) -> str:
-    """A text as it is, that of a file (UTF-8, or UTF-16 where its first bytes say so; a line that ends as the name of
-    one does is its path), a table of pandas as CSV, with its index where that holds dates, or numbers, a row a line."""
-    if isinstance(source, str) and "\n" not in source and source.lower().endswith(_FILES):
-        source = Path(source)
-    if isinstance(source, PathLike):
-        content = Path(source).read_bytes()
-        return content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
-    if isinstance(source, str):
-        return source
-    if hasattr(source, "to_csv"):
-        named = getattr(source, "columns", [getattr(source, "name", None)])
-        headed = all(isinstance(name, str) for name in named)
-        days = dates_of(source)
-        dated = source if days is None else source.set_axis(days, axis="index")
-        return str(dated.to_csv(index=days is not None, header=headed))
-    held = source.to_numpy() if hasattr(source, "to_numpy") else source
-    rows = held.tolist() if hasattr(held, "tolist") else held
-    cells = [row if isinstance(row, Sequence) and not isinstance(row, str) else [row] for row in rows]
-    return "\n".join("\t".join(str(cell) for cell in row) for row in cells)
-
-
-def dates_of(returns: Returns) -> list[str] | None:
+def dates_of(returns: Returns, name: str = "returns") -> list[str] | None:
     """The dates in the index of a pandas object, one for each entry, as ``2008-01-31`` or ``2008-01``; of a span in a
-    PeriodIndex the last day. ``None`` where there is no index of dates."""
+    PeriodIndex the last day. ``None`` where the index only counts rows, or there is none.
+
+    Raises ``ValueError`` where it is something else: which row is the oldest would be anybody's guess.
+    """
     index: Any = getattr(returns, "index", None)
     kind = getattr(index, "inferred_type", None)
+    if kind is None:
+        return None
     if kind == "string" and len(index) and all(_DATE.match(text) for text in index):
         return [day(text) for text in index]
-    if kind not in _DATED:
+    if kind in _DATED:
+        return [day(date) for date in (index.asfreq("D", how="end") if hasattr(index, "to_timestamp") else index)]
+    if counts_rows(index, name):
         return None
-    return [day(date) for date in (index.to_timestamp(how="end") if hasattr(index, "to_timestamp") else index)]
+    if kind == "integer" and is_years(index):
+        return [f"{year}-12-31" for year in index]
+    raise ValueError(
+        f"the index of {name} begins with {index[0]}: must hold dates (pandas.to_datetime makes them), or count the "
+        "rows, oldest first (reset_index(drop=True))"
+    )
 
 
-#: How a line ends that is the path of a file, and no returns.
-_FILES = (".csv", ".tsv", ".txt")
 #: What pandas calls the values of an index of dates.
 _DATED = ("datetime64", "datetime", "date", "period")
 #: A month or a day, maybe with a time.
 _DATE = re.compile(r"\d{4}-\d{2}(-\d{2}([ T].*)?)?$")
 
 
+class LogReturns(list[Any]):
+    """Log-returns as the service told them, a number for each period or, of several assets, a row: they are taken as
+    they are, bit for bit, wherever returns are given."""
+
+
 class Read(NamedTuple):
     """Returns as the service's reader takes them, and what stands beside them."""
 
+    #: What was read, for a person to check.
+    sentence: str
     #: Log-returns, a list for each asset.
     series: list[list[float]]
     kind: Kind
-    dates: list[str] | None
-    periods_per_year: int | None
+    dates: list[str] | None = None
+    periods_per_year: int | None = None
     #: What the bank paid in each period, where a column says so.
-    rates: list[float] | None
+    rates: list[float] | None = None
+    #: Whether the newest came first, and the rows are turned round.
+    is_turned: bool = False
 
     @property
     def rows(self) -> list[list[float]]:
@@ -122,31 +114,97 @@ class Read(NamedTuple):
 
 
 async def read(
-    transport: Transport, source: Returns, kind: Kind | None, choices: wire.Choices | None, name: str = "returns"
+    transport: Transport,
+    source: Returns,
+    kind: Kind | None,
+    choices: wire.Choices | None,
+    name: str = "returns",
+    assets: Sequence[str] | None = None,
 ) -> Read:
     """What the service reads, where that is one reading.
 
-    ``kind`` and ``choices`` say what the source does not. Raises :class:`UnclearReturns` where it may be several
-    readings, and ``ValueError`` where it is none; both name the argument.
+    ``kind`` and ``choices`` say what the source does not, and ``assets`` heads its columns. Raises
+    :class:`UnclearReturns` where it may be several readings, and ``ValueError`` where it is none; both name the
+    argument.
     """
-    _check_order(source, kind, name)
-    reading = await _reading(transport, text_of(source), kind, choices)
+    if isinstance(source, LogReturns):
+        return _as_told(source, kind, name)
+    reading = await reading_of(transport, source, kind, choices, name, assets)
     if reading["outcome"] == "asked":
         raise UnclearReturns(name, reading["questions"])
     if reading["outcome"] == "refused":
         raise ValueError(f"{name}: {reading['sentence']}")
     series, paid = reading["series"], reading.get("rate")
     return Read(
+        reading["sentence"],
         [one["log_returns"] for one in series],
         series[0]["kind"],
         reading.get("dates"),
         reading.get("periods_per_year"),
         None if paid is None else paid["rates"],
+        reading["newest_first"],
     )
 
 
-async def _reading(transport: Transport, text: str, kind: Kind | None, choices: wire.Choices | None) -> wire.Reading:
-    said = {**(choices or {}), **({} if kind is None else {"kind": kind})}
+def _as_told(returns: LogReturns, kind: Kind | None, name: str) -> Read:
+    if kind not in (None, "log"):
+        raise ValueError(
+            f"kind is {kind!r}: must be 'log' or left out, as {name} are log-returns that the service told"
+        )
+    rows = [row if isinstance(row, list) else [row] for row in returns]
+    return Read(
+        f"{len(rows)} log-returns as fractions, as the service told them.",
+        [list(column) for column in zip(*rows, strict=True)],
+        "log",
+    )
+
+
+async def reading_of(
+    transport: Transport,
+    source: Returns,
+    kind: Kind | None,
+    choices: wire.Choices | None,
+    name: str = "returns",
+    assets: Sequence[str] | None = None,
+) -> wire.Reading:
+    """What the service makes of it. Of returns that no heading names it is also asked which they are, simple or log:
+    they look alike, and so does a ``history``, which the service tells in log-returns, under any heading."""
+    held = sheet_of(source, name)
+    text = held if isinstance(held, str) else held.text(assets)
+    said: wire.Choices = {**(choices or {})}
+    if kind is not None:
+        said["kind"] = kind
+    reading = await _reading(transport, text, said)
+    if isinstance(held, str) or "kind" in said or (held.is_headed and name != "history"):
+        return reading
+    if reading["outcome"] == "read":
+        questions: list[wire.Question] = []
+        is_open = reading["series"][0]["kind"] == "simple"
+    else:
+        questions = reading["questions"] if reading["outcome"] == "asked" else []
+        is_open = any(question["asks"] == "unit" for question in questions)
+    if not is_open:
+        return reading
+    options = [await _meaning(transport, text, said, "simple"), await _meaning(transport, text, said, "log")]
+    asked: wire.Question = {
+        "asks": "kind",
+        "question": "Are these simple returns, or log-returns? They look alike.",
+        "options": options,
+    }
+    columns = [] if reading["outcome"] == "refused" else reading["columns"]
+    return {"outcome": "asked", "questions": [asked, *questions], "columns": columns}
+
+
+async def _meaning(transport: Transport, text: str, said: wire.Choices, kind: Literal["simple", "log"]) -> wire.Answer:
+    """An answer to what the numbers are, and what would be read then."""
+    reading = await _reading(transport, text, {**said, "kind": kind})
+    answer: wire.Answer = {"label": {"simple": "Simple", "log": "Logarithms"}[kind], "choices": {"kind": kind}}
+    if reading["outcome"] == "read":
+        answer["sentence"] = reading["sentence"]
+    return answer
+
+
+async def _reading(transport: Transport, text: str, said: wire.Choices) -> wire.Reading:
     return cast(wire.Reading, await transport.json("POST", "/returns", body={"text": text, "choices": said}))
 
 
@@ -160,55 +218,45 @@ async def read_assets(
 ) -> tuple[list[str], Read]:
     """The names of several assets, and what the service reads of each, as :func:`read`.
 
-    ``assets`` names the columns of rows, or chooses among those of a DataFrame, of a text or of a file; by default all
-    that hold neither dates nor the rates of the bank.
+    ``assets`` names the columns of rows, or chooses among those of a table, of a text or of a file; by default all that
+    hold neither dates nor the rates of the bank.
     """
-    columns = getattr(source, "columns", None)
-    if columns is not None and not hasattr(source, "set_axis"):
-        # A table of polars: rows, and their names.
-        source, assets, columns = source.to_numpy(), list(columns) if assets is None else assets, None
+    held = source if isinstance(source, LogReturns) else sheet_of(source, name)
+    columns = held.names if isinstance(held, Sheet) else None
     if assets is None:
-        if columns is None and not isinstance(source, str | PathLike):
+        if isinstance(held, LogReturns) or (columns is None and not isinstance(held, str)):
             raise ValueError(f"assets is None: must name the columns where {name} is no DataFrame, text or file")
-        assets = await _assets_of(transport, source, kind, choices, name)
+        assets = await _assets_of(transport, held, kind, choices, name)
     names = [str(each) for each in assets]
     if twice := next((each for place, each in enumerate(names) if each in names[:place]), None):
         raise ValueError(f"assets has {twice!r} twice: each asset must have a name of its own")
-    if columns is not None:
-        source = source.set_axis([_heading(column) for column in columns], axis="columns")
-    elif not isinstance(source, str | PathLike):
-        rows = [list(row) for row in source]
-        for index, row in enumerate(rows):
+    if columns is None and not isinstance(held, str):
+        for index, row in enumerate(held if isinstance(held, LogReturns) else held.rows):
             if len(row) != len(names):
                 raise ValueError(f"{name}[{index}] has {len(row)} numbers: must have one for each of {names}")
-        source = text_of([[_heading(each) for each in names], *rows])
-    chosen: wire.Choices = {**(choices or {}), "columns": [_heading(each) for each in names]}
-    return names, await read(transport, source, kind, chosen, name)
+    if isinstance(held, LogReturns):
+        return names, await read(transport, held, kind, choices, name)
+    headings = [heading(each) for each in names]
+    chosen: wire.Choices = {**(choices or {}), "columns": headings}
+    if isinstance(held, str):
+        return names, await read(transport, held, kind, chosen, name)
+    own = headings if columns is None else [heading(each) for each in columns]
+    return names, await read(transport, held, kind, chosen, name, own)
 
 
 async def _assets_of(
-    transport: Transport, source: Table, kind: Kind | None, choices: wire.Choices | None, name: str
+    transport: Transport, held: Sheet | str, kind: Kind | None, choices: wire.Choices | None, name: str
 ) -> list[str]:
     """The columns that hold neither dates nor rates, as the service's reader tells them."""
-    columns = getattr(source, "columns", None)
-    if columns is None:
-        places, headed = None, source
-    else:
-        places = [str(column) for column in columns]
-        headed = source.set_axis([_heading(column) for column in columns], axis="columns")
-    reading = await _reading(transport, text_of(headed), kind, choices)
+    names = None if isinstance(held, str) else held.names
+    own = None if names is None else [heading(each) for each in names]
+    reading = await reading_of(transport, held, kind, choices, name, own)
     if reading["outcome"] == "refused":
         raise ValueError(f"{name}: {reading['sentence']}")
     found = [column["name"] for column in reading["columns"] if column["holds"] == "values"]
     if not found and reading["outcome"] == "asked":
         raise UnclearReturns(name, reading["questions"])
-    return found if places is None else [place for place in places if _heading(place) in found]
-
-
-def _heading(asset: object) -> str:
-    """The name of an asset as a heading, which a number alone would not be."""
-    name = str(asset)
-    return name if any(letter.isalpha() for letter in name) else f"asset {name}"
+    return found if names is None else [each for each in names if heading(each) in found]
 
 
 def day(date: object) -> str:
@@ -216,9 +264,11 @@ def day(date: object) -> str:
     return str(date)[:10]
 
 
-def per_period(name: str, values: Iterable[Any], returns: Returns, periods: int, kind: Kind) -> list[Any]:
-    """What was given for each entry of the returns, as one for each period: the first price has none, and neither have
-    entries before and after the numbers that hold none.
+def per_period(
+    name: str, values: Iterable[Any], returns: Returns, periods: int, kind: Kind, is_turned: bool = False
+) -> list[Any]:
+    """What was given for each entry of the returns, as one for each period, oldest first: the first price has none, and
+    neither have entries before and after the numbers that hold none.
 
     Raises ``ValueError`` that names the argument and the rule: as many entries, and the same index where both have one.
     """
@@ -226,21 +276,24 @@ def per_period(name: str, values: Iterable[Any], returns: Returns, periods: int,
     last = before + (kind == "price") + periods
     if len(found) != last + after:
         raise ValueError(f"{name} has {len(found)} entries: must have {last + after}, one for each entry of returns")
+    check_aligned(name, values, returns)
+    return found[before : before + periods][::-1] if is_turned else found[last - periods : last]
+
+
+def check_aligned(name: str, values: Any, returns: Returns) -> None:
+    """The same index, where both have one."""
     own: Any = getattr(values, "index", None)
     index: Any = getattr(returns, "index", None)
     if hasattr(own, "equals") and hasattr(index, "equals") and not own.equals(index):
         raise ValueError(f"{name} has another index than returns: align the two first")
-    return found[last - periods : last]
 
 
 def _blank(returns: Returns) -> tuple[int, int]:
-    """How many entries of a pandas object before and after its numbers hold none, as the first of ``pct_change()``
-    does: the service leaves them out."""
-    if not hasattr(returns, "notna"):
+    """How many entries before and after the numbers hold none: the service leaves them out."""
+    if isinstance(returns, LogReturns) or not hasattr(returns, "__len__"):
         return 0, 0
-    held = returns.notna()
-    rows: list[bool] = (held.any(axis="columns") if hasattr(held, "columns") else held).tolist()
-    return (rows.index(True), rows[::-1].index(True)) if any(rows) else (0, 0)
+    held = sheet_of(returns)
+    return (0, 0) if isinstance(held, str) else held.blank()
 
 
 def _number(value: Any, place: str) -> float:
@@ -250,13 +303,11 @@ def _number(value: Any, place: str) -> float:
         raise ValueError(f"{place} is {value!r}: must be a number") from None
 
 
-def _check_order(returns: Returns, kind: Kind | None, name: str) -> None:
-    """Dates increase; where the index has none, prices must still come in its order."""
+def check_order(returns: Returns, name: str = "returns") -> None:
+    """Dates increase, where the index holds them."""
     index: Any = getattr(returns, "index", None)
-    dates = dates_of(returns)
+    dates = dates_of(returns, name)
     if dates is None:
-        if kind == "price" and not getattr(index, "is_monotonic_increasing", True):
-            raise ValueError("the index of the prices is not increasing: prices must come oldest first")
         return
     for place, (earlier, later) in enumerate(pairwise(index), start=1):
         if earlier == later:

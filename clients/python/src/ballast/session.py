@@ -4,22 +4,32 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Literal, cast
+from datetime import datetime, timezone
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
 from urllib.parse import quote
 
 from typing_extensions import Self, Unpack
 
 from . import frames, plots, replay, wire
 from .driving import Answering, blocking
-from .errors import JobEnded
+from .errors import JobEnded, ReportConflict
 from .labels import Labelled
-from .returns import Kind, Returns
+from .returns import Kind, LogReturns, Returns
+from .sheet import Table
 from .transport import Transport, growing_pause
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+#: What a session counts.
+_Counted: TypeAlias = Literal["period", "correction", "renewal"]
+#: Where its history has them, the moment they were made, and what was done.
+_MADE: dict[_Counted, tuple[str, str, str]] = {
+    "period": ("observations", "observed_ms", "observed"),
+    "correction": ("corrections", "corrected_ms", "made"),
+    "renewal": ("renewals", "renewed_ms", "made"),
+}
 #: Longest pause between two looks at a renewal that is due, in seconds.
 _LOOK = 0.5
 
@@ -30,7 +40,7 @@ class _Session(Labelled):
     ``observe`` numbers its reports, which makes them exactly-once: a report whose answer was lost is sent again under
     the same number, and the service answers as it did the first time. Where ``observe`` raises :class:`Unreachable`,
     the period is still the old one here; call it again with the same arguments. One object is one investor's and is not
-    meant for several threads; after somebody else has observed for him, ``refresh`` catches up.
+    meant for several threads; after somebody else has observed or renewed, be it the service, ``refresh`` catches up.
     """
 
     def __init__(self, transport: Transport, session: wire.Session) -> None:
@@ -48,6 +58,9 @@ class _Session(Labelled):
         self.renewals = session["renewals"]
         #: Corrections made of what periods reported.
         self.corrections = session["corrections"]
+        #: The sentence of what was read as ``history``; ``None`` where that was the policy's own, and for a session
+        #: that is found again.
+        self.read: str | None = cast(dict[str, Any], session).get("read")
         #: The answer to the last ``observe``: wealth, sample size, moments, quantile, radius.
         self.observed: wire.Observed | None = None
 
@@ -95,7 +108,7 @@ class _Session(Labelled):
         """
         number = self.period if period is None else period
         body: wire.Observe = {"session": self.id, "period": number, "confirm": confirm, **_by_name(report)}
-        observed: wire.Observed = await self._transport.json("POST", "/observe", body=body)
+        observed: wire.Observed = await self._counted("/observe", body, "period" if period is None else None, number)
         self.observed = observed
         if observed["period"] >= self.period:
             self.period, self.wealth = observed["period"] + 1, observed["wealth"]
@@ -111,16 +124,17 @@ class _Session(Labelled):
         dates: Iterable[object] | None = None,
         rate: replay.Numbers | None = None,
         flow: replay.Numbers | None = None,
-        executed_allocation: replay.Numbers | None = None,
+        executed_allocation: replay.Numbers | Table | None = None,
         confirm: bool = False,
     ) -> pd.DataFrame:
         """Reports a record period by period, from ``period`` on, and answers what was advised and what became of
         wealth, a row for each.
 
-        ``returns`` and ``kind`` are as in :meth:`Ballast.train <ballast.Ballast.train>`. ``dates`` are the last days of
-        the periods, by default those of the index of a pandas object, as they stand there. ``rate``, ``flow`` and
-        ``executed_allocation`` are as in :meth:`observe`: one number for all periods, or one for each entry of
-        ``returns``, as ``dates`` are.
+        ``returns`` are fractions or prices, oldest first, and ``kind`` says which. Of several assets they are a table
+        with a column for each, or rows in their order, and so is ``executed_allocation``. ``dates`` are the last days
+        of the periods, by default those of the index of a pandas object, as they stand there. ``rate``, ``flow`` and
+        ``executed_allocation`` of one asset are as in :meth:`observe`: one number for all periods, or one for each
+        entry of ``returns``, as ``dates`` are.
 
         Each report carries the number of its period, so the same call again, be it after :class:`Unreachable`,
         reports nothing twice and answers the same. A record that goes on where the session stands has
@@ -133,7 +147,8 @@ class _Session(Labelled):
         a renewal fails; and what :meth:`observe` raises.
         """
         frames.require_pandas()
-        reports = replay.reports(returns, kind, dates, rate, flow, executed_allocation)
+        assets = (await self._history()).get("assets") if replay.has_columns(returns) else None
+        reports = replay.reports(returns, kind, dates, rate, flow, executed_allocation, assets)
         renewing = (await self._read()).get("renew") is not None
         for number, report in enumerate(reports, start=period):
             if renewing:
@@ -175,7 +190,8 @@ class _Session(Labelled):
             "confirm": confirm,
             **_by_name(report),
         }
-        corrected: wire.Corrected = await self._transport.json("POST", f"{self._path}/corrections", body=body)
+        counted: _Counted | None = "correction" if correction is None else None
+        corrected: wire.Corrected = await self._counted(f"{self._path}/corrections", body, counted, number)
         if number > self.corrections:
             self.corrections, self.wealth, self.holding = number, corrected["wealth"], corrected["holding"]
             self.period = corrected["observed"] + 1
@@ -188,11 +204,38 @@ class _Session(Labelled):
         """
         number = self.renewals + 1 if renewal is None else renewal
         body: wire.Renew = {"renewal": number, "policy": policy, "window": window}
-        renewed: wire.Renewed = await self._transport.json("POST", f"{self._path}/renewals", body=body)
+        counted: _Counted | None = "renewal" if renewal is None else None
+        renewed: wire.Renewed = await self._counted(f"{self._path}/renewals", body, counted, number)
         if number > self.renewals:
             self.renewals, self.policy, self.horizon = number, renewed["policy"], renewed["horizon"]
             self.period = renewed["period"]
         return renewed
+
+    async def _counted(
+        self, path: str, body: wire.Observe | wire.Correct | wire.Renew, counted: _Counted | None, number: int
+    ) -> Any:
+        """Sends what has a number. Where this object ``counted`` it, and somebody else has used it since, the refusal
+        says so, and when that was."""
+        try:
+            return await self._transport.json("POST", path, body=body)
+        except ReportConflict as conflict:
+            made = None if counted is None else await self._made(counted, number)
+            if made is None:
+                raise
+            told = f"{counted} {number} was {made}, which this object has not seen; refresh() catches up"
+            problem = cast(wire.Problem, {**conflict.args[0], "detail": told})
+            raise ReportConflict(problem, conflict.retry_after) from conflict
+
+    async def _made(self, counted: _Counted, number: int) -> str | None:
+        """When an entry of the session was made; of a renewal also whether the service makes them by itself."""
+        history, (name, moment, verb) = await self._history(), _MADE[counted]
+        for entry in cast(dict[str, list[dict[str, Any]]], history)[name]:
+            if entry[counted] == number:
+                at = datetime.fromtimestamp(entry[moment] / 1000.0, timezone.utc)
+                renew = (await self._transport.json("GET", self._path)).get("renew") if counted == "renewal" else None
+                by = "" if renew is None else f" (the service renews the session every {renew['every']} periods)"
+                return f"{verb} at {at:%Y-%m-%d %H:%M:%S} UTC{by}"
+        return None
 
     async def _what_if(
         self,
@@ -255,8 +298,12 @@ class _Session(Labelled):
         return cast(wire.AssetsWhatIfPoint, await self._transport.json("POST", "/what-if", body=body))
 
     async def _history(self) -> wire.History:
-        """Where the session started, what was reported and told, and what would be told now."""
-        return cast(wire.History, await self._transport.json("GET", f"{self._path}/history"))
+        """Where the session started, what was reported and told, and what would be told now.
+
+        ``Policy.session(history=...)`` takes it, and opens a session that starts as this one did."""
+        history = cast(wire.History, await self._transport.json("GET", f"{self._path}/history"))
+        history["history"] = LogReturns(history["history"])
+        return history
 
     async def _frame(self, as_of: Literal["now", "then"] = "now") -> pd.DataFrame:
         """The history as a DataFrame, a row for each period observed: dates, returns, what was advised and held, and

@@ -2245,8 +2245,11 @@ class Record(TypedDict):
     """`daily`, `weekly`, `monthly`, `quarterly` or `yearly`, where the dates say so."""
     periods_per_year: NotRequired[int | None]
     """How many periods make a year, where the dates say so."""
-    newest_first: NotRequired[bool | None]
-    """Where there are no dates that tell: whether the first row was taken for the newest."""
+    newest_first: bool
+    """
+    Whether the first row was the newest, so that the rows are turned round: as their dates tell, or as it was said where
+    there are none.
+    """
     rate: NotRequired[BankRate | None]
     remarks: list[str]
     """What was changed or passed over, in sentences; the last of `sentence`."""
