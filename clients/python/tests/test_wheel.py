@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import shutil
+import subprocess
+import sys
+import venv
 from importlib import metadata
 from pathlib import Path
 
-from conftest import REPOSITORY
+from conftest import BINARY, REPOSITORY
 
 import ballast
 
@@ -37,3 +42,43 @@ def test_what_the_package_needs_is_little_and_the_rest_is_chosen() -> None:
     readme = (HERE / "README.md").read_text()
     assert extras == {"pandas", "plots", "progress", "sklearn", "skfolio", "test"}
     assert extras - {"test"} <= set(re.findall(r"\[(\w+)\]", readme))
+
+
+def test_one_wheel_brings_the_program_and_the_client(tmp_path: Path) -> None:
+    """Into an environment with nothing but Python, as on a machine without Rust."""
+    program = tmp_path / "ballast"
+    shutil.copy(BINARY, program)
+    if strip := shutil.which("strip"):
+        # What is packed here is the build of the tests, whose symbols weigh more than the program.
+        subprocess.run([strip, program], check=True)
+    environment = {**os.environ, "BALLAST_PROGRAM": str(program)}
+    build = [sys.executable, "-m", "build", "--wheel", "--outdir", str(tmp_path), str(HERE)]
+    subprocess.run(build, env=environment, check=True, capture_output=True)
+    (wheel,) = tmp_path.glob("*.whl")
+    assert re.match(r"ballast_client-[0-9.]+-py3-none-(?!any)\w+\.whl$", wheel.name)
+    venv.create(tmp_path / "empty", with_pip=True)
+    scripts = tmp_path / "empty/bin"
+    subprocess.run([scripts / "pip", "install", "--quiet", wheel], check=True)
+    advise: list[str | Path] = [scripts / "ballast", "advise", REPOSITORY / "data/us_market_monthly.csv", "--json"]
+    told = json.loads(subprocess.run(advise, check=True, capture_output=True, text=True).stdout)
+    code = (
+        "import subprocess, sys\n"
+        "from ballast import Ballast\n"
+        "arguments = ['ballast', 'serve', '--listen', '127.0.0.1:0', '--data', sys.argv[1]]\n"
+        "service = subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True)\n"
+        "url = service.stdout.readline().removeprefix('listening on ').strip()\n"
+        "print(Ballast(url).advise(sys.argv[2])['allocation'])\n"
+        "service.terminate()\n"
+    )
+    arguments: list[str | Path] = [
+        scripts / "python",
+        "-c",
+        code,
+        tmp_path / "data",
+        REPOSITORY / "data/us_market_monthly.csv",
+    ]
+    # Nothing is there but what the wheel brought.
+    asked = subprocess.run(
+        arguments, check=True, capture_output=True, text=True, env={"PATH": str(scripts)}, cwd=tmp_path
+    )
+    assert float(asked.stdout) == told["allocation"]
