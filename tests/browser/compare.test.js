@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { browser, call, service, trained } from "./ballast.js";
+import { dashboardModule } from "./modules.js";
 import { plain, usable, visitQuiet } from "./page.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
@@ -44,15 +45,31 @@ test("two sessions ticked are told side by side", async () => {
   await tick("sessions", [one, other]);
   await page.getByRole("heading", { level: 1, name: "Two sessions" }).waitFor();
   const told = await rows();
-  assert.deepEqual(told["100 has become"].slice(0, 2), ["100.20", (100 * (1 - 0.003) * 1.02 * 0.9).toFixed(2)]);
-  assert.deepEqual(told["Money added, less taken"], ["0.00", "50.00", "+50.00"]);
-  assert.deepEqual(told["Worst fall"], ["0.0 %", "-10.0 %", "-10.0 points"]);
+  // Of the second the first period alone: the first has lived no more.
+  assert.deepEqual(told["100 has become since the start"].slice(0, 2), ["100.20", (100 * (1 - 0.003) * 1.02).toFixed(2)]);
+  // The money of one less that of the other means nothing.
+  assert.deepEqual(told["Money added, less taken"], ["0.00", "50.00", "differs"]);
+  assert.deepEqual(told.Wealth[2], "differs");
+  assert.deepEqual(told["Worst fall"], ["0.0 %", "-10.0 %", "differs"]);
   assert.deepEqual(told["Last period"].slice(0, 2), ["28 Jan 2008", "February 2008"]);
   const actions = await Promise.all([one, other].map((session) => call(ballast.url, `/action?session=${session}`)));
   for (const [index, { allocation }] of actions.entries()) assert.ok(Math.abs(Number.parseFloat(told["To hold in stocks"][index]) - 100 * allocation) <= 0.05);
   const chart = page.getByRole("slider", { name: "What 100 has become" });
   await chart.press("Home");
   assert.match(plain(await chart.getAttribute("aria-valuetext")), /At the start: A 100\.00, B 100\.00/);
+});
+
+test("two sessions of other months are lined up by their dates, from where both are on", async () => {
+  const { lined, common } = await dashboardModule("compare_sessions.js");
+  const { calendar } = await dashboardModule("periods.js");
+  const lived = (dates) => ({ grown: [100, ...dates.map((_, k) => 101 + k)], calendar: calendar({ observations: dates.map((date, k) => ({ period: k + 1, reported: { date } })) }, 12) });
+  const both = [lived(["2026-03-31", "2026-04-30", "2026-05-31"]), lived(["2026-05-31", "2026-06-30"])];
+  const line = lined(both);
+  assert.deepEqual(line.places.map(({ name }) => name), ["February 2026", "March 2026", "April 2026", "May 2026", "June 2026"]);
+  assert.deepEqual(both.map(line.of), [[0, 1, 2, 3, null], [null, null, 0, 1, 2]]);
+  assert.deepEqual(common(both, line), [2, 3]);
+  const apart = [both[0], lived(["2027-01-31", "2027-02-28"])];
+  assert.equal(common(apart, lined(apart)), null);
 });
 
 test("policies that differ are never said to be the same", async () => {

@@ -1,4 +1,4 @@
-// Two sessions: what each is advised now, and how they went.
+// Two sessions: what each is advised now, and how they went, by the calendar where both have one.
 
 import { heldInAll, orders } from "./advised.js";
 import { get } from "./api.js";
@@ -16,10 +16,12 @@ import { worstFalls } from "./track.js";
 
 export async function sessionsBeside(ids, leaving) {
   const both = await Promise.all(ids.map((id) => read(id, leaving)));
-  const table = beside("Two sessions side by side", "sessions", "Session", ids, both.map(({ session }) => session.name), rows(both));
+  const line = lined(both);
+  const span = common(both, line);
+  const table = beside("Two sessions side by side", "sessions", "Session", ids, both.map(({ session }) => session.name), rows(both, line, span));
   const specifications = both.map(({ policy }) => policy.specification);
   const policies = both[0].policy.policy === both[1].policy.policy ? "" : h("p", { class: "sentence" }, differences(specifications, "Their policies"));
-  return [h("p", { class: "lead" }, sentence(both)), policies, table, courses(both)];
+  return [h("p", { class: "lead" }, sentence(both, line, span)), policies, table, courses(both, line, span)];
 }
 
 async function read(id, leaving) {
@@ -44,19 +46,55 @@ function grown(history) {
 /** What the two hold beside the bank, in words. */
 const besideBank = (both) => risky(both.find(({ history }) => history.assets)?.history ?? both[0].history);
 
-function sentence([one, other]) {
-  const [first, second] = [one.grown.at(-1), other.grown.at(-1)];
-  const after = ({ session }) => `${count(session.period - 1)} period${session.period === 2 ? "" : "s"}`;
-  const held = [one, other].every(({ action }) => action)
-    ? ` A is to hold ${allocation(heldInAll(one.action))} in ${besideBank([one, other])} now, B ${allocation(heldInAll(other.action))}.`
+/** The periods of both on one line, by their dates where both have such of one unit, else by their numbers: `{isDated, places, of(one)}`, each
+ * place `{name, brief}`, and `of` the period of a session at each place, null where it has none. */
+export function lined(both) {
+  const isDated = both.every(({ calendar, grown }) => calendar.dated && grown.every((_, k) => calendar.date(k) !== null)) && new Set(both.map(({ calendar }) => calendar.unit)).size === 1;
+  const nameOf = ({ calendar }, k) => (isDated ? calendar.name(k) : k === 0 ? "Start" : `Period ${k}`);
+  const found = new Map();
+  for (const one of both)
+    one.grown.forEach((_, k) => {
+      const name = nameOf(one, k);
+      if (!found.has(name)) found.set(name, { name, order: isDated ? one.calendar.date(k) : k, brief: isDated && k > 0 ? one.calendar.brief(k) : String(k) });
+    });
+  const places = [...found.values()].sort((a, b) => (a.order < b.order ? -1 : Number(a.order > b.order)));
+  const of = (one) => {
+    const periods = new Map(one.grown.map((_, k) => [nameOf(one, k), k]));
+    return places.map(({ name }) => periods.get(name) ?? null);
+  };
+  return { isDated, places, of };
+}
+
+/** The first and the last place at which both are, or null where they have fewer than two in common. */
+export function common(both, { of, places }) {
+  const periods = both.map(of);
+  const shared = places.map((_, at) => at).filter((at) => periods.every((one) => one[at] !== null));
+  return shared.length < 2 ? null : [shared[0], shared.at(-1)];
+}
+
+/** What 100 at a place has become at each. */
+function levels(one, line, from) {
+  const periods = line.of(one);
+  const start = one.grown[periods[from] ?? 0];
+  return periods.map((k) => (k === null ? null : (100 * one.grown[k]) / start));
+}
+
+function sentence(both, line, span) {
+  const [one, other] = both;
+  const held = both.every(({ action }) => action)
+    ? ` A is to hold ${allocation(heldInAll(one.action))} in ${besideBank(both)} now, B ${allocation(heldInAll(other.action))}.`
     : "";
-  return `100 in A has become ${wealth(first)} in ${after(one)}, and in B ${wealth(second)} in ${after(other)}.${held}`;
+  if (span === null) return `They have no period in common, so what became of their money cannot be compared.${held}`;
+  const [first, second] = both.map((one) => levels(one, line, span[0])[span[1]]);
+  const periods = span[1] - span[0];
+  const when = line.isDated ? `From the end of ${line.places[span[0]].name} to that of ${line.places[span[1]].name}, which both have lived,` : `In their first ${periods === 1 ? "period" : `${count(periods)} periods`}`;
+  return `${when} 100 in A has become ${wealth(first)}, and in B ${wealth(second)}.${held}`;
 }
 
 /** Rows of the policies that are told also where they do not differ. */
 const ALWAYS = ["Investor", "Caution"];
 
-function rows(both) {
+function rows(both, line, span) {
   const row = (name, read, apart) => {
     const values = both.map(read);
     return { name, cells: values.map((value) => (typeof value === "object" && value !== null ? value.words : (value ?? "\u2013"))), apart: apart && values.every((value) => value !== null) ? apart(values[1].size - values[0].size) : undefined };
@@ -67,16 +105,18 @@ function rows(both) {
   const trade = ({ action, session, problem }) => orders(action, session.wealth, problem.trading_cost).join(", ").toLowerCase();
   const deepest = ({ history }) => worstFalls(falls(history), 1)[0]?.depth ?? 0;
   const active = (read) => (one) => (one.action ? read(one) : null);
+  // Of the money of two nobody asks the difference.
+  const since = span && (line.isDated ? ` since the end of ${line.places[span[0]].name}` : " since the start");
   const last = ({ calendar, session }) => (session.period === 1 ? "none yet" : calendar.name(session.period - 1));
   return [
     row(`To hold in ${besideBank(both)}`, active(({ action }) => share(heldInAll(action))), signed(points)),
     row("To trade", active(trade)),
-    row("Worth as much as a sure", active(({ action }) => money(action.certainty_equivalent)), signed(wealth)),
-    row("All in the bank", active(({ action }) => money(action.floor)), signed(wealth)),
-    row("Wealth", ({ session }) => money(session.wealth), signed(wealth)),
-    row("100 has become", (one) => money(one.grown.at(-1)), signed(wealth)),
-    row("Money added, less taken", ({ history }) => money(netAdded(history)), signed(wealth)),
-    row("Worst fall", (one) => ({ size: deepest(one), words: percent(deepest(one)) }), signed(points)),
+    row("Worth as much as a sure", active(({ action }) => money(action.certainty_equivalent))),
+    row("All in the bank", active(({ action }) => money(action.floor))),
+    row("Wealth", ({ session }) => money(session.wealth)),
+    ...(span ? [row(`100 has become${since}`, (one) => money(levels(one, line, span[0])[span[1]]), signed(wealth))] : []),
+    row("Money added, less taken", ({ history }) => money(netAdded(history))),
+    row("Worst fall", (one) => ({ size: deepest(one), words: percent(deepest(one)) })),
     row("Last period", last),
     row("Returns seen", ({ session }) => ({ size: session.sample_size, words: count(session.sample_size) }), signed(count)),
     row("Policy", ({ policy }) => called(policy.policy, policy.name)),
@@ -84,27 +124,30 @@ function rows(both) {
   ];
 }
 
-/** Growth and holdings, by the calendar where both have the same one. */
-function courses(both) {
-  const long = both.reduce((longest, one) => (one.grown.length > longest.grown.length ? one : longest));
-  if (long.grown.length < 2) return "";
-  const values = long.grown.map((_, k) => k);
-  const together = values.slice(1).every((k) => new Set(both.filter(({ grown }) => grown.length > k).map(({ calendar }) => calendar.name(k))).size === 1);
-  const name = (k) => (together ? long.calendar.name(k) : `Period ${k}`);
+/** Growth and holdings on one line of time, what 100 has become from where both are on. */
+function courses(both, line, span) {
+  const { places } = line;
+  if (places.length < 2) return "";
+  const values = places.map((_, at) => at);
+  const name = (at) => places[at].name;
   const x = {
     values,
     label: "Period",
-    format: (k) => (k === 0 ? "Start" : name(k)),
-    here: (k) => (k === 0 ? "At the start" : `After ${name(k).replace(/^P(?=eriod)/, "p")}`),
-    tick: together ? long.calendar.brief : String,
+    format: name,
+    here: (at) => (line.isDated ? `At the end of ${name(at)}` : at === 0 ? "At the start" : `After ${name(at).replace(/^P/, "p")}`),
+    tick: (at) => places[at].brief,
     whole: true,
   };
-  const series = (of, more) => both.map((one, index) => ({ name: LETTERS[index], kind: "line", values: values.map((k) => of(one)[k] ?? null), ...more }));
+  const series = (of, more) => both.map((one, index) => ({ name: LETTERS[index], kind: "line", values: of(one), ...more }));
+  const at = (one, of) => line.of(one).map((k) => (k === null ? null : (of[k] ?? null)));
   const held = ({ history }) => [null, ...history.observations.map((row) => (row.now ?? row).executed_allocation)];
+  const from = span ? span[0] : 0;
+  const note = span ? [] : [h("p", { class: "note" }, "They have no period in common: each line starts from 100 of its own.")];
   return section(
     "How they went",
-    lineChart({ title: "What 100 has become", gutter: 64, height: 220, x, y: { format: wealth, tick }, series: series(({ grown }) => grown) }),
-    lineChart({ title: "Below the highest so far", gutter: 64, height: 130, x, y: { format: percent, tick: percentTick, also: [0, -LEAST_FALL] }, series: series(({ history }) => falls(history)) }),
-    lineChart({ title: `Share held in ${besideBank(both)}`, gutter: 64, height: 150, x: { ...x, here: name, between: true }, y: { format: allocation, tick: percentTick, also: [0, LEAST_SHARE] }, series: series(held, { kind: "levels" }) }),
+    note,
+    lineChart({ title: span && from > 0 ? `What 100 at the end of ${name(from)} has become` : "What 100 has become", gutter: 64, height: 220, x, y: { format: wealth, tick }, series: series((one) => levels(one, line, from)) }),
+    lineChart({ title: "Below the highest so far", gutter: 64, height: 130, x, y: { format: percent, tick: percentTick, also: [0, -LEAST_FALL] }, series: series((one) => at(one, falls(one.history))) }),
+    lineChart({ title: `Share held in ${besideBank(both)}`, gutter: 64, height: 150, x: { ...x, here: name, between: true }, y: { format: allocation, tick: percentTick, also: [0, LEAST_SHARE] }, series: series((one) => at(one, held(one)), { kind: "levels" }) }),
   );
 }

@@ -65,7 +65,7 @@ function rhythm(dated) {
 
 /**
  * The calendar of a session: `unit` is what a period is called, `name(k)` period k from 1, `brief(k)` the same on an axis,
- * `after(k)` its end, `next` the last day that the coming period most likely has, or null. `dated` says whether there are dates.
+ * `after(k)` its end, `date(k)` its last day or null, `next` the last day that the coming period most likely has, or null. `dated` says whether there are dates.
  */
 export function calendar(history, periods_per_year) {
   const dated = history.observations
@@ -103,5 +103,9 @@ export function calendar(history, periods_per_year) {
   const after = (period) => (period === 0 ? "At the start" : `After ${inText(period)}`);
   const last = dated.at(-1);
   const coming = last?.period === history.observations.length ? moved(last.time, 1) : null;
-  return { unit, name, inText, brief, after, dated: dated.length > 0, next: coming && written(coming) };
+  const date = (period) => {
+    const time = end(period);
+    return time === null ? null : written(time);
+  };
+  return { unit, name, inText, brief, after, date, dated: dated.length > 0, next: coming && written(coming) };
 }
