@@ -53,7 +53,8 @@ test("what is asked for is the record as it was read, and few choices", async ()
   await page.getByText("How it walks, and for the quant").click();
   await page.getByLabel("Trained on").fill("600");
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
-  await page.locator(".error").getByText(/must hold at least 604, the window of \d+ and a year/).waitFor();
+  const refused = page.locator(".error").getByText(/must hold at least 604, the window of \d+ and a year/);
+  await refused.waitFor();
   await page.getByLabel("Trained on").fill(String(WINDOW));
   await page.getByLabel("Trained anew every").fill("9");
   await page.getByLabel("Looking ahead").fill("4");

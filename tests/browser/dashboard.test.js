@@ -52,6 +52,7 @@ test("an empty service says what to do first", async () => {
 
 test("a refusal is told at the field it names", async () => {
   await page.getByLabel("Returns or prices").fill("0.01 -0.02 0.03");
+  await page.getByLabel("Periods a year").selectOption("none");
   await page.getByRole("button", { name: "Train", exact: true }).click();
   await page.getByText(/^Bank return per period is blank; it must be a number/).waitFor();
   await page.getByLabel("Bank return per period").fill("0,2 %");
@@ -105,7 +106,7 @@ test("a training from a file, watched to its end", async () => {
 });
 
 test("a policy is told in words, drawn, and read by keyboard", async () => {
-  await page.getByText("It looks 4 periods ahead for an investor with exponential utility").waitFor();
+  await page.getByText("It looks 4 months ahead for an investor with exponential utility").waitFor();
   const map = page.getByRole("application", { name: /Share held in stocks/ });
   await map.focus();
   const read = page.locator("figure output").first();

@@ -26,6 +26,7 @@ test("a policy is trained with what is added and withdrawn as the form says", as
   await page.goto(`${ballast.url}/#/train`);
   await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
   await page.getByLabel("Periods ahead").fill("3");
+  await page.getByLabel("Periods a year").selectOption("none");
   await page.getByLabel("Bank return per period").fill("0.2 %");
   await page.getByLabel("Trading cost").fill("1 %");
   await page.getByLabel("Added each period").fill("12 500; -20; 3,5");
@@ -95,6 +96,7 @@ test("a policy that forgets is asked for by the form, and sessions by it renew t
   await page.goto(`${ballast.url}/#/train`);
   await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
   await page.getByLabel("Periods ahead").fill("2");
+  await page.getByLabel("Periods a year").selectOption("none");
   await page.getByLabel("Bank return per period").fill("0.2 %");
   await page.getByLabel("Half-life of returns").fill("1");
   const sent = page.waitForRequest((request) => request.url().endsWith("/train"));

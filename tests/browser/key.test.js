@@ -29,7 +29,7 @@ test("a key is asked for, and a wrong one is refused", async () => {
   await page.getByRole("heading", { level: 1, name: "A key is needed" }).waitFor();
   await page.getByLabel("Key", { exact: true }).fill("ballast_wrong");
   await page.getByRole("button", { name: "Use this key" }).click();
-  await page.getByText("the key is not one in force").waitFor();
+  await page.getByText("The key is not one in force here").waitFor();
 });
 
 test("with the key the page works, and its streams and files show it too", async () => {

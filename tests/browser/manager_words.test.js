@@ -30,7 +30,7 @@ const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
 async function askFor({ rate, cost }) {
   await go("#/train");
   await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
-  await page.getByLabel("Periods a year").fill("12");
+  await page.getByLabel("Periods a year").selectOption("12");
   await page.getByLabel("Months ahead").fill("2");
   await page.getByLabel("Bank return per month, %").fill(rate);
   await page.getByLabel("Trading cost, %").fill(cost);
@@ -116,7 +116,10 @@ test("what may be a mistake is asked about in percent", async () => {
 
 test("a refusal is the page's own sentence, in the unit of its field and beside it", async () => {
   await go("#/train");
+  await page.getByRole("button", { name: "Start anew" }).click();
+  await page.getByText("This is what you had typed here before.").waitFor({ state: "detached" });
   await page.getByLabel("Returns or prices").fill(HISTORY.join("\n"));
+  await page.getByLabel("Periods a year").selectOption("none");
   const bank = page.getByLabel("Bank return per period");
   const train = page.getByRole("button", { name: "Train", exact: true });
   const refused = async (words) => {

@@ -28,6 +28,7 @@ const short = (id) => id.replace(/^[a-z]+_/, "").slice(0, 10);
 test("a training is named, and so is what it gives", async () => {
   await go("#/train");
   await page.getByLabel("Returns or prices").fill(HISTORY.map((value) => 100 * value).join("\n"));
+  await page.getByLabel("Periods a year").selectOption("none");
   await page.getByLabel("Bank return per period, %").fill("0.2");
   await page.getByLabel("Periods ahead").fill("1");
   await page.getByLabel("Name", { exact: true }).fill("World & bills");

@@ -21,16 +21,21 @@ after(async () => {
 const area = () => page.locator('textarea[name="problem.history"]');
 const note = () => page.locator("#f-problem-history-note");
 
+/** The form without what was typed in it before. */
+async function afresh() {
+  await page.goto(`${ballast.url}/livez`);
+  await page.evaluate(() => sessionStorage.clear());
+  await page.goto(`${ballast.url}/#/train`);
+}
+
 /** The form afresh, with a text in its field as if pasted. */
 async function pasted(text) {
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/#/train`);
+  await afresh();
   await area().fill(text);
 }
 
 async function chosen(name, text) {
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/#/train`);
+  await afresh();
   await page.locator('input[type="file"]').setInputFiles({ name, mimeType: "text/csv", buffer: Buffer.from(text) });
 }
 
@@ -83,8 +88,7 @@ test("a file that is newest first is turned round, said and drawn", async () => 
 });
 
 test("a file in UTF-16 is read", async () => {
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/#/train`);
+  await afresh();
   const buffer = Buffer.from("\ufeffdate\tr\r\n2020-01\t0.01\r\n2020-02\t-0.02\r\n", "utf16le");
   await page.locator('input[type="file"]').setInputFiles({ name: "excel.txt", mimeType: "text/plain", buffer });
   await note().getByText("2 monthly simple returns as fractions, January 2020 to February 2020").waitFor();
@@ -153,8 +157,7 @@ test("a deviation above 30 % a period is not taken without a word", async () => 
 });
 
 test("the example says what it takes", async () => {
-  await page.goto("about:blank");
-  await page.goto(`${ballast.url}/#/train`);
+  await afresh();
   await page.getByRole("button", { name: /^Use the example/ }).click();
   await note()
     .getByText(

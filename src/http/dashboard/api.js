@@ -1,7 +1,7 @@
 // The service's own interface, as /docs describes it.
 
 import { minus } from "./format.js";
-import { held, shown } from "./key.js";
+import { held, refusedWords, shown } from "./key.js";
 
 /** A stream that broke off is opened again after so long, in milliseconds. */
 const RECONNECT = 1000;
@@ -36,7 +36,14 @@ async function send(method, path, body, signal, headers = {}) {
     status: response.status,
     detail: `The service answered ${response.status}.`,
   };
-  throw new Problem(await response.json().catch(() => fallback));
+  const problem = new Problem(await response.json().catch(() => fallback));
+  if (problem.status === 401 && held()) {
+    problem.message = refusedWords(problem, method !== "GET");
+    // It is said of the key and not of a field; what was typed stays while another is pasted.
+    problem.field = problem.rule = undefined;
+    if (method !== "GET") dispatchEvent(new CustomEvent("key-refused", { detail: problem.message }));
+  }
+  throw problem;
 }
 
 const parsed = async (answer) => (await answer).json();

@@ -1,12 +1,13 @@
 // The form that asks for a backtest of a record, on a page of its own.
 
 import { post } from "./api.js";
+import { bankRate } from "./bank_rate.js";
 import { announce, h } from "./dom.js";
 import { fieldset, input, refusal, select, sending } from "./form.js";
 import { fraction, typed } from "./number_text.js";
 import { unitOf } from "./periods.js";
 import { returnsField } from "./returns_field.js";
-import { INVESTORS, investorChoices, investorNote, queued } from "./specification.js";
+import { INVESTORS, investorChoices, investorNote, meant } from "./specification.js";
 
 /** The windows of several assets: periods, or all. */
 const windowsOf = (text) => text.split(";").map((part) => (part.trim() === "all" ? null : typed(part.trim())));
@@ -35,7 +36,8 @@ function asking() {
     },
   });
   const percentField = (name, label, note, value) => input({ name, label, note, value, unit: "percent" });
-  const rate = percentField("rate", "Bank return per period, %", "The same in all.");
+  const bank = bankRate({ name: "rate", note: "The same in all." });
+  const { rate } = bank;
   const yearly = input({ name: "periods_per_year", label: "Periods a year", note: "12 of months; the record has no dates that tell." });
   const cost = percentField("trading_cost", "Trading cost, %", "Of what is traded; 0 is free.", "0.1");
   const investor = select({
@@ -68,8 +70,8 @@ function asking() {
     }
     if (Object.values(LEVELS).includes(levels.control.value)) levels.control.value = LEVELS[isSeveral()];
     const unit = unitOf(record?.periods_per_year);
-    rate.element.querySelector("label").textContent = `Bank return per ${unit}, %`;
-    rate.element.querySelector(".note").textContent = record?.rate ? `Blank: what ${record.rate.column} says, ${unit} by ${unit}.` : "The same in all; 3 % a year are 0.247 % a month.";
+    bank.named(unit);
+    rate.element.querySelector(".note").textContent = record?.rate ? `Blank: what ${record.rate.column} says, ${unit} by ${unit}.` : "The same in all, such as 0.25, or \u201c3 % a year\u201d.";
     yearly.element.hidden = record === null || Boolean(record.periods_per_year);
   };
   shown();
@@ -79,18 +81,19 @@ function asking() {
     "form",
     { novalidate: true },
     h("fieldset", {}, h("legend", {}, "The record"), source.element),
-    fieldset("The investor", [investor, aversion, rate, yearly, cost]),
+    fieldset("The investor", [investor, aversion, yearly, ...bank.parts, cost]),
     more,
     refusal(),
     h("p", { class: "send" }, send, h("span", { class: "note" }, "Runs in the background. Ten years of months take a minute or two.")),
   );
   const text = ({ control }) => control.value.trim();
+  const a_year = () => record.periods_per_year ?? typed(text(yearly));
   const compose = () => {
     const { series, dates } = record;
     const request = isSeveral()
       ? { assets: series.map(({ column }) => column), log_returns: series[0].log_returns.map((_, date) => series.map(({ log_returns }) => log_returns[date])), dates }
       : { log_returns: series[0].log_returns, dates };
-    request.rate = text(rate) === "" ? record.rate?.rates : (fraction(text(rate)) ?? text(rate));
+    request.rate = bank.read(a_year()) ?? record.rate?.rates;
     request.risk_aversion = investor.control.value === OWN ? typed(text(aversion)) : INVESTORS[investor.control.value];
     request.trading_cost = fraction(text(cost)) ?? text(cost);
     request.alpha = text(levels).split(";").map((part) => (fraction(part) === null ? part : Number((1 - fraction(part)).toPrecision(12))));
@@ -106,12 +109,12 @@ function asking() {
     const trouble = await source.trouble();
     if (trouble) throw { field: "log_returns", message: trouble };
     if (text(rate) === "" && !record.rate) throw { field: "rate", message: "What the bank paid is needed: a number here, or a column of the record." };
+    if (bank.read(a_year()) === undefined) throw { field: yearly.name, message: "What the bank pays in a year needs the periods a year." };
     const request = compose();
     const { job, warnings } = await post("/backtest", request);
     announce("The backtest is queued.");
-    const at = `#/backtests/${job}`;
-    if (warnings.length > 0) form.replaceWith(queued("backtest", at, warnings, { ...request, rate_per_step: request.rate }));
-    else location.hash = at;
+    const problem = { ...request, rate_per_step: request.rate, periods_per_year: a_year() };
+    meant(form, { noun: "backtest", job, warnings, problem }, () => (location.hash = `#/backtests/${job}`));
   };
   sending(form, send, ask, { told: (error) => error.field === "windows" && (error.field = window.name) });
   return form;

@@ -77,11 +77,11 @@ export function rows(asked) {
   const [one, other] = problems;
   const less = (read, words) => words(read(other) - read(one));
   const signed = (value, words) => `${value > 0 ? "+" : ""}${words(value)}`;
-  const records = problems.map(({ history }) => moments(history));
+  const records = problems.map(({ history }) => moments(history.map(Math.expm1)));
   const changed = (field) => JSON.stringify(one[field]) !== JSON.stringify(other[field]);
   const added = problems.map((problem) => flowsInWords(problem) || "None");
   const record = ({ history }) => {
-    const { mean, deviation } = moments(history);
+    const { mean, deviation } = moments(history.map(Math.expm1));
     return `${counted(history.length, "return")}: mean ${percent(mean, 2)}, deviation ${percent(deviation, 2)}`;
   };
   return [

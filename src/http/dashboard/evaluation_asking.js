@@ -25,7 +25,7 @@ function asking(policies, asked) {
     choices,
   });
   policy.element.classList.add("broad");
-  if (asked in choices) policy.control.value = asked;
+  if (policies.some(({ policy }) => policy === asked)) policy.control.value = asked;
   const paths = input({ name: "paths", label: "Futures per record", note: "100 to 100,000.", value: "1000" });
   const histories = select({
     name: "histories.kind",

@@ -1,6 +1,7 @@
 // The key this page shows to the service. It lives in this tab's session storage: gone with the tab, seen by no other page.
 
 import { h } from "./dom.js";
+import { moment } from "./format.js";
 
 const PLACE = "ballast-key";
 
@@ -8,6 +9,24 @@ export const held = () => sessionStorage.getItem(PLACE);
 
 /** What goes with every request. */
 export const shown = () => (held() ? { authorization: `Bearer ${held()}` } : {});
+
+/** Why the key held was refused, and what to do: it expired, or it is none in force. */
+export function refusedWords({ value }, isKept) {
+  const [, at] = /^a key that expired at (\S+)$/.exec(value ?? "") ?? [];
+  const why = at ? `Your key expired at ${moment(Date.parse(at))}.` : "The key is not one in force here: it may have been revoked, or pasted in part.";
+  return `${why} Paste a new one${isKept ? ": what you typed is kept" : ""}.`;
+}
+
+/** Asks for another key over the page, which stays as it is; once there is one, what was refused can be sent again. */
+export function askForKey(words) {
+  if (document.querySelector("dialog[open]")) return;
+  const dialog = h("dialog", { class: "asking", "aria-labelledby": "key-asked" }, h("h2", { id: "key-asked" }, "Another key is needed"), h("p", { class: "sentence" }, words));
+  const close = () => dialog.close();
+  dialog.append(keyForm(close), h("p", {}, h("button", { class: "link", onclick: close }, "Go back to the page")));
+  dialog.addEventListener("close", () => dialog.remove());
+  document.body.append(dialog);
+  dialog.showModal();
+}
 
 /** A form that takes a key, or gives up the one held; `done()` hears of either. */
 export function keyForm(done) {

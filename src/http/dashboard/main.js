@@ -9,9 +9,10 @@ import * as evaluations from "./evaluations.js";
 import { holderWords, lacking, lackWords } from "./holder.js";
 import { ofBacktest, ofEvaluation, ofFrontier } from "./job_report.js";
 import * as jobs from "./jobs.js";
-import { held, keyForm } from "./key.js";
+import { askForKey, held, keyForm } from "./key.js";
 import * as policies from "./policies.js";
 import * as policy from "./policy.js";
+import * as renewing from "./renewing.js";
 import * as reporting from "./reporting.js";
 import * as session from "./session.js";
 import * as sessionOpening from "./session_opening.js";
@@ -27,6 +28,7 @@ const ROUTES = [
   [/^#\/policies\/([^/]+)$/, policy.view, "policies"],
   [/^#\/(?:sessions)?(?:\?.*)?$/, sessions.view, "sessions"],
   [/^#\/report(?:\?(.*))?$/, reporting.view, "sessions", "operate"],
+  [/^#\/renew(?:\?(.*))?$/, renewing.view, "sessions", "operate"],
   [/^#\/sessions\/new(?:\?(.*))?$/, sessionOpening.view, "sessions", "operate"],
   [/^#\/sessions\/([^/]+)$/, session.view, "sessions"],
   [/^#\/evaluations$/, evaluations.view, "evaluations"],
@@ -117,6 +119,7 @@ addEventListener("hashchange", () => {
   announce("");
   show();
 });
+addEventListener("key-refused", ({ detail }) => askForKey(detail));
 offers("/evaluate").then((offered) => {
   document.querySelector("nav [data-view=evaluations]").parentElement.hidden = !offered;
 });

@@ -26,7 +26,7 @@ const HINT = "With dates, or oldest first. Separated by spaces, commas, semicolo
 const FOLLOWS = { columns: ["kind", "unit", "large_deviation", "decimal_comma"], kind: ["unit", "large_deviation"] };
 
 /**
- * `{element, show(history, assets), trouble()}`; `changed(series, answer)` at every change, with the series that were read, `{column,
+ * `{element, show(history, assets), trouble(), typed(), restore(typed)}`; `changed(series, answer)` at every change, with the series that were read, `{column,
  * log_returns}`, and all that the service answered; with none and null while the text is not one reading. With `several` more than
  * one column may be chosen. `trouble()` waits for what is still being read, and says why there are no returns, or null. `name` is the
  * request's field; `blank` is what an empty field means, where it may be empty; `example` what is said of the bundled returns
@@ -113,6 +113,9 @@ export function returnsField({ name, label, blank = null, example = null, severa
     area.value = assets ? [assets, ...history].map((row) => row.join("\t")).join("\n") : history.join(" ");
     reading = judge();
   };
+  /** What was typed and said of it, as `restore` takes it. */
+  const typed = () => ({ text: area.value, said });
+  const restore = ({ text, said }) => open(text, said);
   const element = h(
     "div",
     {},
@@ -120,7 +123,7 @@ export function returnsField({ name, label, blank = null, example = null, severa
     h("div", { class: "field wide" }, h("label", { for: id }, label), area, note, asked),
   );
   judge();
-  return { element, show, trouble };
+  return { element, show, trouble, typed, restore };
 }
 
 const words = ({ sentence, questions }) => {

@@ -7,13 +7,14 @@ import { holdings, wealthCourse, worstFallFact } from "./course.js";
 import { announce, facts, h, section } from "./dom.js";
 import { banked, netAdded, standing } from "./flows.js";
 import { pressed } from "./form.js";
-import { allocation, count, counted, percent, points, wealth } from "./format.js";
+import { allocation, count, counted, percent, points, short, wealth } from "./format.js";
 import { asking } from "./frontier.js";
 import { labelled, titled } from "./naming.js";
 import { observeForm } from "./observe.js";
 import { lastReport, observed, righting } from "./observed.js";
-import { calendar } from "./periods.js";
+import { calendar, day, isoDay } from "./periods.js";
 import { nearness } from "./sensitivity.js";
+import { recordOf } from "./renewing.js";
 import { severalAdvice, severalHeld, severalWorst } from "./several.js";
 import { hasBall, isCautious, isParametric, moments, utility } from "./specification.js";
 import { conservatism } from "./what_if.js";
@@ -57,8 +58,15 @@ export async function view(id, leaving) {
     h("a", { href: `#/policies/${session.policy}` }, titled("Policy", session.policy, policy.name)),
     `, ${utility(policy.specification.problem.utility)}`,
   );
-  return { title: titled("Session", id, session.name), trail, under: labelled("Session", `/sessions/${id}`, id, session), body: [holder, deletion(id)] };
+  return { title: titled("Session", id, session.name), trail, under: [labelled("Session", `/sessions/${id}`, id, session), letterhead(policy)], body: [holder, h("p", { class: "printed note" }, DISCLAIMER), h("p", { class: "end" }, session.state === "active" ? goOn(id) : null, deletion(id, titled("Session", id, session.name)))] };
 }
+
+/** What stands at the end of the page on paper. */
+const DISCLAIMER = "This is computed from past returns, which do not tell what is to come. What is said of the worst market holds for the markets that the record allows, and for no others.";
+
+/** What the page says on paper alone: of what day it is, and by which policy. */
+const letterhead = ({ policy, name, specification: { problem, fund } }) =>
+  h("p", { class: "printed note" }, `${day(isoDay(new Date()))}. ${fund ? `${fund.assets.join(", ")}. ` : ""}By ${name ? `\u201c${name}\u201d` : `policy ${short(policy)}`}, for ${utility(problem.utility)}.`);
 
 /** What one unit of the radius takes from the average return: of a normal law it counts in standard deviations. */
 const cautionScale = (problem) => (isParametric(problem.framework) ? moments(problem.history).deviation : 1);
@@ -76,6 +84,7 @@ async function fill(holder, told) {
   holder.replaceChildren(
     changed(shown),
     due(shown),
+    ending(shown),
     h("div", { class: "columns" }, advice, wealthCourse(shown)),
     figures(shown, action),
     ...found,
@@ -152,7 +161,16 @@ function changed({ session: { drift } }) {
   return h("p", { class: "note wrong" }, words);
 }
 
-function completed({ session, history }) {
+/** The way to another policy for the session, from the coming period on. */
+const goOn = (id, words = "Go on with another policy") => h("a", { class: "button quiet", href: `#/renew?sessions=${id}` }, words);
+
+/** That the policy advises no later period, and nothing follows by itself. */
+function ending({ id, session, calendar }) {
+  if (session.renew || session.rolling || session.period < session.horizon) return "";
+  return h("p", { class: "note wrong" }, `${calendar.name(session.horizon)} is the last period that its policy advises. `, h("a", { href: `#/renew?sessions=${id}` }, "Go on with another"), ".");
+}
+
+function completed({ id, session, history }) {
   const bank = banked(history, session.horizon).at(-1);
   return section(
     "Completed",
@@ -161,7 +179,7 @@ function completed({ session, history }) {
       { class: "advice", id: "advice", tabindex: -1 },
       h("p", { class: "big" }, h("span", {}, "It ended with "), h("strong", {}, wealth(session.wealth))),
       h("p", { class: "sentence" }, `The bank alone would have reached ${wealth(bank)}.`),
-      h("p", {}, h("a", { class: "button", href: `#/sessions/new?policy=${session.policy}` }, "Open another session")),
+      h("p", { class: "actions" }, goOn(id), h("a", { class: "button quiet", href: `#/sessions/new?policy=${session.policy}` }, "Open another session")),
     ),
   );
 }
@@ -183,12 +201,8 @@ const held = (shown, action) => section("What it held", h("div", { class: "duo" 
 
 /** What more or less caution would lose, where the policy has a ball. */
 function frontier({ session, policy, history, canTry }) {
-  const { problem, fund } = policy.specification;
+  const { problem } = policy.specification;
   if (!canTry || !hasBall(problem)) return "";
-  const inOrder = (returns) => returns && fund.assets.map((name) => returns[name]);
-  const stands = (row) => row.now ?? row;
-  const returnOf = (row) => (fund ? (inOrder(stands(row).assets.log_returns) ?? null) : stands(row).log_return);
-  const seen = history.observations.map(returnOf).filter((value) => value !== null);
   const element = section(
     "How much caution",
     h(
@@ -196,19 +210,19 @@ function frontier({ session, policy, history, canTry }) {
       { class: "note" },
       "What other amounts of caution would lose on many records drawn like this one, a period at a time: without a trading cost, without forgetting, and without money that comes and goes.",
     ),
-    h("p", {}, asking(policy.specification, [...history.history, ...seen], session.wealth)),
+    h("p", {}, asking(policy.specification, recordOf(history), session.wealth)),
   );
   element.classList.add("asked-for");
   element.dataset.needs = "train";
   return element;
 }
 
-function deletion(id) {
+function deletion(id, name) {
   const button = h("button", { class: "quiet danger", "data-needs": "operate" }, "Delete");
   const act = async () => {
     await remove(`/sessions/${id}`);
     location.hash = "#/sessions";
   };
-  button.addEventListener("click", () => confirm("Delete this session and all it observed?") && pressed(button, act));
-  return h("p", { class: "end" }, button);
+  button.addEventListener("click", () => confirm(`Delete ${name.replace(/^S(?=ession)/, "s")} and all it observed, for good?`) && pressed(button, act));
+  return button;
 }

@@ -19,7 +19,9 @@ export async function view(query, leaving) {
 
 function opening(policies, asked, leaving) {
   const labels = labelFields();
-  const policy = select({ name: "policy", label: "Policy", choices: policyChoices(policies) });
+  // Of several nobody knows which is meant.
+  const unchosen = policies.length > 1 ? [["", "To be chosen"]] : [];
+  const policy = select({ name: "policy", label: "Policy", choices: [...unchosen, ...policyChoices(policies)] });
   if (policies.some(({ policy }) => policy === asked)) policy.control.value = asked;
   const stake = input({ name: "wealth", label: "Wealth", note: "Blank: the policy\u2019s initial wealth." });
   const holding = input({
@@ -32,11 +34,11 @@ function opening(policies, asked, leaving) {
     name: "rolling",
     label: "How it goes on",
     choices: { ends: "To the horizon of the policy", renews: "Renewed by itself", rolls: "Rolling" },
-    note: "Renewed, it goes on by policies trained on what was seen by then. Rolling needs a policy to which older returns count less.",
+    note: "Renewed, it goes on by policies trained on what was seen by then.",
     changed: (choice) => [every, window].forEach(({ element }) => (element.hidden = choice !== "renews")),
   });
   for (const { element } of [policy, going]) element.classList.add("broad");
-  const every = input({ name: "renew.every", label: "Periods by each policy", value: "12" });
+  const every = input({ name: "renew.every", label: "Periods by each policy", note: "Fewer than it looks ahead." });
   const window = input({ name: "renew.window", label: "Returns it is trained on", note: "The last ones. Blank: all." });
   every.element.hidden = window.element.hidden = true;
   let known = [];
@@ -49,11 +51,28 @@ function opening(policies, asked, leaving) {
   });
   let assets = null;
   const shares = h("div", { class: "fields", hidden: true });
+  let usual = "";
+  const goingNote = going.element.querySelector(".note");
+  /** Greys what the policy cannot do, and says why. */
+  const allow = ({ problem, design }) => {
+    const reasons = cannot(problem, design);
+    for (const option of going.control.options) {
+      option.disabled = option.value in reasons;
+      if (option.disabled && option.selected) going.control.value = "ends";
+    }
+    const { horizon } = problem;
+    if (every.control.value === usual) every.control.value = usual = String(Math.max(1, Math.floor(horizon / 2)));
+    every.element.querySelector(".note").textContent = `1 to ${horizon - 1}: this policy looks ${horizon} ahead.`;
+    for (const { element } of [every, window]) element.hidden = going.control.value !== "renews";
+    goingNote.textContent = ["Renewed, it goes on by policies trained on what was seen by then.", ...Object.values(reasons)].join(" ");
+  };
   const chosen = async () => {
     const asked = policy.control.value;
+    if (asked === "") return;
     const { specification } = await get(`/policies/${asked}`, leaving);
     if (asked !== policy.control.value) return;
     assets = specification.fund?.assets ?? null;
+    allow(specification);
     holding.element.hidden = assets !== null;
     shares.hidden = assets === null;
     const field = (name, index) => input({ within: `asset-${index}-`, name: `holdings.${name}`, label: `${name} held already, %`, note: "Of wealth. Blank: nothing.", unit: "percent" });
@@ -86,6 +105,7 @@ function opening(policies, asked, leaving) {
   sending(form, open, async () => {
     const trouble = await history.trouble();
     if (trouble) throw { field: "history", message: trouble };
+    if (policy.control.value === "") throw { field: policy.name, message: "Choose the policy that this session is to live by." };
     if (!(await choosing) && !(await choose())) return;
     const request = { policy: policy.control.value, ...labels.read() };
     if (known.length > 0) request.history = assets ? byDate(known, assets) : known[0].log_returns;
@@ -112,8 +132,22 @@ function byDate(series, assets) {
   return columns[0].log_returns.map((_, date) => columns.map(({ log_returns }) => log_returns[date]));
 }
 
-/** Policies to choose from, by what tells them apart. */
-export const policyChoices = (policies) =>
-  Object.fromEntries(
-    policies.map(({ policy, name, created_ms }) => [policy, `${name ? `${name} (${short(policy)})` : short(policy)}, stored ${moment(created_ms)}`]),
-  );
+/** Why a session by a policy cannot be renewed by itself, or roll, by the ways to go on. */
+function cannot({ horizon, contributions, learning, utility }, { initial_laws }) {
+  const flows = [contributions ?? 0].flat();
+  const reasons = {};
+  if (horizon < 2) reasons.renews = "This policy looks one period ahead, so that nothing is left of it to be renewed.";
+  else if (Array.isArray(contributions)) reasons.renews = "It is not renewed by itself: this policy has a list of contributions, which ends with it.";
+  if (learning?.kind !== "decay") reasons.rolls = "Rolling needs a policy to which older returns count less, and to this one all count the same.";
+  else if (initial_laws !== "resampled") reasons.rolls = "Rolling needs a policy trained for other records than its own.";
+  else if (utility.kind === "exponential" || flows.some((amount) => amount !== 0)) reasons.rolls = "Rolling needs a policy whose advice does not depend on wealth.";
+  return reasons;
+}
+
+/** Policies to choose from, by what tells them apart: those that nobody trained by hand come last. */
+export const policyChoices = (policies) => {
+  const isRenewed = ({ tags }) => Number(tags.includes("renewed"));
+  return [...policies]
+    .sort((one, other) => isRenewed(one) - isRenewed(other))
+    .map(({ policy, name, created_ms }) => [policy, `${name ? `${name} (${short(policy)})` : short(policy)}, stored ${moment(created_ms)}`]);
+};

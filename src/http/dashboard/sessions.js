@@ -62,8 +62,10 @@ function overview(chosen, first, leaving) {
   const beyond = h("span", {});
   const advice = advised(leaving, () => tellBeyond());
   const ticks = ticking("sessions", {
-    at: "#/report",
-    words: (ticked) => `Report for the ${count(ticked)}`,
+    links: [
+      { at: "#/report", words: (ticked) => `Report for the ${count(ticked)}` },
+      { at: "#/renew", words: (ticked) => `Go on with the ${count(ticked)}` },
+    ],
     asked: (ticked) => `Delete ${counted(ticked, "session")} and all that was observed?`,
     remove: (id) => remove(`/sessions/${id}`),
     removed: async () => {
@@ -73,7 +75,7 @@ function overview(chosen, first, leaving) {
   });
   const tags = h("datalist", { id: "tags" });
   const known = new Set();
-  const holder = h("div", {});
+  const holder = h("div", { class: "listing" });
   const line = h("p", { class: "note", role: "status" });
   const more = h("button", { class: "quiet" }, "Show more");
   let [entries, page, asking] = [[], first, new AbortController()];

@@ -1,7 +1,9 @@
 // A training request in words.
 
+import { post } from "./api.js";
 import { h } from "./dom.js";
 import * as flows from "./flows.js";
+import { pressed } from "./form.js";
 import { count, counted, percent, significant, wealth } from "./format.js";
 import { unitOf } from "./periods.js";
 
@@ -93,7 +95,7 @@ function radiusRule(radius) {
   }
 }
 
-/** Mean and standard deviation of log-returns. */
+/** Mean and standard deviation of returns. */
 export function moments(values) {
   const mean = values.reduce((sum, value) => sum + value, 0) / values.length;
   const variance = values.reduce((sum, value) => sum + (value - mean) ** 2, 0) / values.length;
@@ -130,15 +132,23 @@ export function warningList(warnings, problem) {
   return warnings.map(({ code, field }) => h("p", { class: "note wrong" }, WARNED[code](problem, field)));
 }
 
-/** What stands in the place of a form once a job is queued, on the page `at`, whose problem may be a mistake. */
-export function queued(noun, at, warnings, problem) {
-  return h(
-    "div",
-    { class: "words", role: "status" },
-    h("p", {}, `The ${noun} is queued. Is this meant?`),
-    warningList(warnings, problem),
-    h("p", {}, "If not, cancel it ", h("a", { href: at }, "where it is listed"), " and ask anew."),
+/** Asks in a form about what may be a mistake in the problem of a job that was queued, if anything may; `yes()` goes on from it. Where it is
+ * not meant the job is cancelled, and the form stands as it was. */
+export function meant(form, { noun, job, warnings, problem }, yes) {
+  form.querySelector(".meant")?.remove();
+  if (warnings.length === 0) return yes();
+  const go = h("button", { type: "button", onclick: yes }, "Yes, go on");
+  const change = h("button", { type: "button", class: "quiet" }, "No, I change it");
+  change.addEventListener("click", () =>
+    pressed(change, async () => {
+      await post(`/jobs/${job}/cancel`);
+      question.remove();
+      form.querySelector(`[name="${CSS.escape(warnings[0].field)}"]`)?.focus();
+    }),
   );
+  const question = h("div", { class: "words meant", role: "group", "aria-label": "Is this meant?", tabindex: -1 }, h("p", {}, `The ${noun} is queued. Is this meant?`), warningList(warnings, problem), h("p", { class: "actions" }, go, change));
+  form.querySelector(":scope > .send").before(question);
+  question.focus();
 }
 
 /** How cautious a policy is, in a few words. */
@@ -167,7 +177,7 @@ export function centreInWords({ kind, bandwidth, half_life, weight } = {}, unit 
 
 /** What was asked for, a sentence a choice; `annualised` is what the service says by the year, where it does. */
 export function inWords({ problem }, annualised) {
-  const { mean, deviation } = moments(problem.history);
+  const { mean, deviation } = moments(problem.history.map(Math.expm1));
   const limit = problem.action_interval[1];
   const unit = unitOf(problem.periods_per_year);
   const guarded = caution(problem) === "none" ? "" : ` Its caution: ${caution(problem)}.`;
@@ -179,7 +189,7 @@ export function inWords({ problem }, annualised) {
   return [
     `${MEANINGS[problem.framework]}${guarded}${forgets}${centred && ` ${centred}`}`,
     `It looks ${counted(problem.horizon, unit)} ahead for ${investorWords(problem.utility)}; the bank pays ${percent(problem.rate_per_step, 2)} a ${unit}${annualised ? ` (${percent(annualised.rate, 2)} a year)` : ""}, and ${all} of wealth may be in stocks. It starts with ${wealth(problem.initial_wealth)}. ${trading(problem)} ${flows.inWords(problem)}`.trim(),
-    `The record holds ${counted(problem.history.length, "return")}: mean ${percent(mean, 2)}, standard deviation ${percent(deviation, 2)} a ${unit}.${annualised ? ` By the year stocks returned ${percent(annualised.mean_return)} on average, with a standard deviation of ${percent(annualised.deviation)}.` : ""}`,
+    `The record holds ${counted(problem.history.length, "return")}: mean ${percent(mean, 2)}, standard deviation ${percent(deviation, 2)} a ${unit}.${annualised ? ` That is ${percent(annualised.mean_return, 2)} a year, compounded, with a deviation of ${percent(annualised.deviation, 2)}.` : ""}`,
   ];
 }
 
@@ -188,7 +198,7 @@ export function inPaperWords({ problem, design, surrogate, seed }) {
   const ball = hasBall(problem) ? `the radius of the ball is ${radiusRule(problem.radius)}` : isParametric(problem.framework) ? `the uncertainty set is ${radiusRule(problem.radius)}` : "there is no uncertainty set";
   const laws = design.initial_laws === "resampled" ? "starting from resampled histories" : "starting from this history";
   return [
-    `${PAPER[problem.framework]}: ${ball}. The utility is ${problem.utility.kind}; mean and standard deviation above are of log-returns.`,
+    `${PAPER[problem.framework]}: ${ball}. The utility is ${problem.utility.kind}; mean and standard deviation above are of simple returns.`,
     `Each step was solved at ${counted(design.count, "state")} simulated under ${law(design.sampling_law)}, ${laws}; surrogates of the ${surrogate.target === "value" ? "value" : "gain over the floor"} on ${surrogate.features === "raw_moments" ? "raw" : "standardised"} features. Seed ${count(seed)}.`,
   ];
 }

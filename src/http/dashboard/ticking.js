@@ -9,15 +9,15 @@ const NAMED = 20;
 
 /**
  * `{box(id, name), link}` of a list of `kind`, "sessions" or "policies": the tick of a row, and what can be done with those ticked. Two
- * may be ticked, or any number where there is something for `many`: `{words(count), at, asked(count), remove(id), removed()}`, a link to
- * the address `at`, and what is asked before each is removed and done afterwards.
+ * may be ticked, or any number where there is something for `many`: `{links: [{words(count), at}], asked(count), remove(id), removed()}`, links
+ * to the addresses `at`, and what is asked before each is removed and done afterwards.
  */
 export function ticking(kind, many = null) {
   let ticked = [];
   const [boxes, names] = [new Map(), new Map()];
   const note = h("span", { class: "note", role: "status", tabindex: -1 });
   const go = h("a", { class: "button quiet", hidden: true }, "Compare the two");
-  const all = many && h("a", { class: "button quiet", hidden: true });
+  const links = (many?.links ?? []).map((link) => ({ ...link, element: h("a", { class: "button quiet", hidden: true }) }));
   const deletion = many && h("button", { class: "quiet danger", hidden: true, "data-needs": "operate" });
   const tell = () => {
     for (const [id, box] of boxes) box.checked = ticked.includes(id);
@@ -26,9 +26,12 @@ export function ticking(kind, many = null) {
     go.href = `#/compare?${query}`;
     note.textContent = ["Tick two to compare them.", "Tick one more to compare the two."][ticked.length] ?? "";
     if (!many) return;
-    all.hidden = deletion.hidden = ticked.length === 0;
-    all.href = `${many.at}?${query}`;
-    all.textContent = many.words(ticked.length);
+    deletion.hidden = ticked.length === 0;
+    for (const { element, at, words } of links) {
+      element.hidden = ticked.length === 0;
+      element.href = `${at}?${query}`;
+      element.textContent = words(ticked.length);
+    }
     deletion.textContent = `Delete the ${count(ticked.length)}`;
   };
   const box = (id, name) => {
@@ -64,5 +67,5 @@ export function ticking(kind, many = null) {
     if (confirm(`${many.asked(ticked.length)}\n\n${listed}${rest > 0 ? ` and ${count(rest)} more` : ""}`)) pressed(deletion, removeAll);
   });
   tell();
-  return { box, link: h("span", { class: "comparing" }, note, go, all, deletion) };
+  return { box, link: h("span", { class: "comparing" }, note, go, links.map(({ element }) => element), deletion) };
 }

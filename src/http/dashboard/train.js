@@ -2,10 +2,11 @@
 
 import { get, post } from "./api.js";
 import { announce, h } from "./dom.js";
+import { draft } from "./draft.js";
 import { fieldset, refusal, sending } from "./form.js";
 import { labelFields, policyLink } from "./naming.js";
 import { returnsField } from "./returns_field.js";
-import { queued } from "./specification.js";
+import { meant } from "./specification.js";
 import { put, radiusFor, trainFields, UTILITY } from "./train_fields.js";
 
 /** What the form starts from; what is null is to be filled in, or may be left out. */
@@ -29,9 +30,8 @@ const initial = () => ({
 /** What changes which fields there are, or what they are called. */
 const REDRAWN = ["problem.framework", "problem.periods_per_year"];
 
-/** The request that another policy was trained by; of several assets by their names. */
-async function like(policy, leaving) {
-  const { specification } = await get(`/policies/${policy}`, leaving);
+/** The request that a policy was trained by; of several assets by their names. */
+export function requestOf(specification) {
   if (!specification.fund) return structuredClone(specification);
   const { radius_factor, support, ...named } = specification.fund;
   const { framework, learning, centre, radius, support: ofFund, ...problem } = specification.problem;
@@ -63,22 +63,27 @@ function taken({ problem }, series) {
 export async function view(query, leaving) {
   const asked = new URLSearchParams(query ?? "");
   const origin = asked.get("from") ?? asked.get("newer");
-  let request = origin ? await like(origin, leaving) : initial();
+  const drafts = draft(`#/train?${query ?? ""}`);
+  const kept = drafts.read();
+  let request = origin ? requestOf((await get(`/policies/${origin}`, leaving)).specification) : initial();
   const json = h("textarea", { id: "json", rows: 18, spellcheck: "false", "aria-describedby": "json-note json-error" });
   const jsonError = h("p", { id: "json-error", class: "error", hidden: true });
+  // Whether the periods a year that stand there are those of a record's dates.
+  let isOfDates = false;
   const source = returnsField({
     name: "problem.history",
     label: "Returns or prices",
     example: { latest: 240 },
     several: true,
-    changed: (series) => {
+    changed: (series, answer) => {
       taken(request, series);
+      if (answer) fields.periods(answer.periods_per_year ?? (isOfDates ? null : request.problem.periods_per_year));
+      if (answer) isOfDates = Boolean(answer.periods_per_year);
       fields.show(request);
       written();
     },
-    bank: (rate, periods) => {
+    bank: (rate) => {
       put(request, "problem.rate_per_step", rate);
-      if (periods) put(request, "problem.periods_per_year", periods);
       fields.show(request);
       written();
     },
@@ -99,9 +104,31 @@ export async function view(query, leaving) {
   const written = () => {
     json.value = compact(request);
     jsonError.hidden = true;
+    keep();
+  };
+  let untouched = null;
+  const keep = () => {
+    const content = { json: json.value, record: source.typed(), choices: fields.choices() };
+    if (untouched === null) return;
+    if (JSON.stringify(content) === untouched) drafts.drop();
+    else drafts.keep(content);
+  };
+  const restore = ({ json: text, record, choices }) => {
+    json.value = text;
+    try {
+      request = JSON.parse(text);
+    } catch {
+      // It was left in the midst of being edited.
+      advanced.open = true;
+    }
+    fields.choose(choices);
+    fields.show(request);
+    labels.show(request);
+    source.restore(record);
   };
   const showRecord = () => source.show([request.problem?.history ?? []].flat(), request.problem?.assets);
   json.addEventListener("input", () => {
+    keep();
     try {
       request = JSON.parse(json.value);
       jsonError.hidden = true;
@@ -141,24 +168,33 @@ export async function view(query, leaving) {
       "p",
       { class: "send" },
       send,
-      h("span", { class: "note" }, "Trains in the background; the job list shows how far it is."),
+      h("span", { class: "note" }, "Trains in the background; the job list shows how far it is. What is typed here is kept while this tab is open."),
     ),
   );
   const ask = async () => {
     const trouble = await source.trouble();
     if (trouble) throw { field: "problem.history", message: trouble };
-    const job = await post("/train", json.value);
-    announce(`Training ${job.job} is queued.`);
-    if (job.warnings.length > 0) form.replaceWith(queued("training", "#/jobs", job.warnings, request.problem));
-    else location.hash = "#/jobs";
+    const open = fields.trouble();
+    if (open) throw open;
+    const { job, warnings } = await post("/train", json.value);
+    announce(`Training ${job} is queued.`);
+    meant(form, { noun: "training", job, warnings, problem: request.problem }, () => {
+      drafts.drop();
+      location.hash = "#/jobs";
+    });
   };
   sending(form, send, ask, { otherwise: json, told: (error) => error.field === "body" && (advanced.open = true) });
+  // A policy of no calendar is cloned as one.
+  if (origin && !request.problem.periods_per_year) fields.choose({ told: "period", periods: "none" });
   fields.show(request);
   if (origin) showRecord();
   written();
+  untouched = JSON.stringify({ json: json.value, record: source.typed(), choices: fields.choices() });
+  if (kept) restore(kept);
   const trail = h("p", { class: "trail" }, origin ? ["Like ", policyLink(origin)] : h("a", { href: "#/jobs" }, "Jobs"));
   const newer = asked.has("newer");
-  return { title: newer ? "Train on newer returns" : "Train a policy", trail, body: [origin ? told(newer) : "", form] };
+  const again = () => dispatchEvent(new HashChangeEvent("hashchange"));
+  return { title: newer ? "Train on newer returns" : "Train a policy", trail, body: [origin ? told(newer) : "", kept ? drafts.note(again) : "", form] };
 }
 
 /** What a form that is filled from a policy asks for. */

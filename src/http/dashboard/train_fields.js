@@ -1,5 +1,6 @@
 // The fields of a training: the investor and his caution in a manager's words and in percent, the paper's behind a fold.
 
+import { bankRate } from "./bank_rate.js";
 import { h } from "./dom.js";
 import { fieldset, input, select } from "./form.js";
 import { fraction, typed } from "./number_text.js";
@@ -54,7 +55,14 @@ const READING = {
 
 const capital = (word) => word[0].toUpperCase() + word.slice(1);
 
-/** `{elements, show(request)}`; `changed(path, value)` at every edit. */
+const PERIODS = "problem.periods_per_year";
+const RATE = "problem.rate_per_step";
+/** How often there is a period. */
+const CALENDARS = [["", "To be chosen"], ["12", "12: months"], ["52", "52: weeks"], ["252", "252: trading days"], ["4", "4: quarters"], ["1", "1: years"], ["none", "None: periods of another kind"]];
+
+/** `{elements, show(request), periods(count), trouble(), choices(), choose(choices)}`; `changed(path, value)` at every edit. `periods` takes how
+ * many periods a year the dates of a record tell, or null; `trouble()` is what is still to be chosen, as a refusal, or null; `choices()` is
+ * what was chosen that the request does not say. */
 export function trainFields(changed) {
   const readings = {};
   const field = (path, label, note, unit = "plain") => {
@@ -73,8 +81,36 @@ export function trainFields(changed) {
     },
   });
   const horizon = field("problem.horizon", "Periods ahead", "Until the money is needed, 1 to 520.");
-  const rate = field("problem.rate_per_step", "Bank return per period, %", "3 % a year are 0.247 % a month.", "percent");
-  const yearly = field("problem.periods_per_year", "Periods a year", "May be blank. 12 of months; rates are then told a year, too.");
+  const known = () => Number(yearly.control.value) || null;
+  const paid = () => {
+    const value = bank.read(known());
+    changed(RATE, value === undefined ? null : value);
+  };
+  const bank = bankRate({ name: RATE, note: "Such as 0.25, or \u201c3 % a year\u201d.", changed: paid });
+  const yearly = select({
+    name: PERIODS,
+    label: "Periods a year",
+    note: "A year told in advice and rates, and the day of the next report, follow from it.",
+    choices: CALENDARS,
+    changed: () => periods(known()),
+  });
+  const offer = (count) => {
+    const value = String(count);
+    if (![...yearly.control.options].some((option) => option.value === value)) yearly.control.append(h("option", { value }, `${value} periods`));
+    yearly.control.value = value;
+  };
+  const periods = (count) => {
+    if (count) offer(count);
+    else if (yearly.control.value !== "none") yearly.control.value = "";
+    changed(PERIODS, count);
+    if (bank.isYearly()) paid();
+  };
+  const trouble = () => {
+    if (yearly.element.hidden) return null;
+    if (yearly.control.value === "") return { field: PERIODS, message: "The record has no dates that tell it: choose how many periods make a year." };
+    if (bank.isYearly() && bank.read(known()) === undefined) return { field: RATE, message: "What the bank pays in a year needs the periods a year: choose them, or tell what it pays in one period." };
+    return null;
+  };
   const start = field("problem.initial_wealth", "Wealth at the start", "In any currency.");
   const cost = field("problem.trading_cost", "Trading cost, %", "Of what is traded; 0 is free.", "percent");
   const flow = input({
@@ -123,7 +159,7 @@ export function trainFields(changed) {
     field("seed", "Seed", "The same request and seed give the same policy."),
   ];
   const quant = h("details", {}, h("summary", {}, "For the quant"), fieldset("Utility and precision", paper));
-  const parts = [horizon, rate, yearly, start, cost, flow, framework, composition, confidence, caution, halfLife, ...paper];
+  const parts = [horizon, start, cost, flow, framework, composition, confidence, caution, halfLife, ...paper];
   const show = (request) => {
     for (const part of parts) {
       const found = at(request, part.name);
@@ -132,6 +168,11 @@ export function trainFields(changed) {
       if (part.control !== document.activeElement) part.control.value = shown.join("; ");
       part.element.hidden = value === undefined;
     }
+    const a_year = at(request, PERIODS);
+    yearly.element.hidden = a_year === undefined;
+    if (a_year) offer(a_year);
+    else if (yearly.control.value !== "none") yearly.control.value = "";
+    for (const { element } of bank.parts) element.hidden = at(request, RATE) === undefined;
     const given = request.problem?.framework;
     if (given in FRAMEWORKS && !(given in OFFERED) && framework.control.value !== given) {
       framework.control.append(h("option", { value: given }, FRAMEWORKS[given]));
@@ -140,14 +181,20 @@ export function trainFields(changed) {
     investor.control.value = presetOf(request.problem?.utility ?? {}) ?? OWN;
     const unit = unitOf(request.problem?.periods_per_year);
     horizon.element.querySelector("label").textContent = `${capital(unit)}s ahead`;
-    rate.element.querySelector("label").textContent = `Bank return per ${unit}, %`;
+    bank.named(unit);
+    bank.show(at(request, RATE), a_year);
   };
   const elements = [
-    fieldset("The investor", [investor, horizon, rate, yearly, start, cost, flow]),
+    fieldset("The investor", [investor, horizon, yearly, ...bank.parts, start, cost, flow]),
     fieldset("What he guards against", [framework, composition, confidence, caution, halfLife]),
     quant,
   ];
-  return { elements, show };
+  const choices = () => ({ told: bank.per.control.value, periods: yearly.control.value });
+  const choose = ({ told, periods }) => {
+    bank.per.control.value = told;
+    if (periods === "none") yearly.control.value = periods;
+  };
+  return { elements, show, periods, trouble, choices, choose };
 }
 
 /** The rule of caution that goes with a kind of policy. */

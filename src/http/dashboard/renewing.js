@@ -1,0 +1,120 @@
+// Sessions that go on by another policy from their coming periods: one that is there, or the same trained anew on the returns seen.
+
+import { follow, get, isOver, post } from "./api.js";
+import { announce, h, table } from "./dom.js";
+import { fieldset, refusal, select, sending } from "./form.js";
+import { count, counted, wealth } from "./format.js";
+import { called, headed } from "./naming.js";
+import { all } from "./pages.js";
+import { standing } from "./flows.js";
+import { policyChoices } from "./session_opening.js";
+import { requestOf } from "./train.js";
+
+/** The choice to train the policy of each session anew. */
+const ANEW = "anew";
+/** Letters of a name that the service takes. */
+const LONGEST_NAME = 100;
+
+/** `query`: `sessions=A,B`. */
+export async function view(query, leaving) {
+  const ids = (new URLSearchParams(query ?? "").get("sessions") ?? "").split(",").filter(Boolean);
+  const trail = h("p", { class: "trail" }, h("a", { href: "#/sessions" }, "Overview"));
+  const title = "Go on with another policy";
+  if (ids.length === 0) return { title, trail, body: h("p", {}, "Tick the sessions in the ", h("a", { href: "#/sessions" }, "overview"), " first.") };
+  const [policies, sessions] = await Promise.all([all("/policies", "policies", leaving), Promise.all(ids.map((id) => get(`/sessions/${id}`, leaving)))]);
+  return { title, trail, body: renewing(sessions, policies, leaving) };
+}
+
+/** All returns that a session has seen, its record's first; of several assets date by date. */
+export function recordOf({ history, observations, assets }) {
+  const stands = (row) => row.now ?? row;
+  const returns = (row) => (assets ? assets.map((name) => stands(row).assets.log_returns?.[name] ?? null) : stands(row).log_return);
+  return [...history, ...observations.map(returns).filter((one) => ![one].flat().includes(null))];
+}
+
+/** What a policy is called that is trained anew of another. */
+function renewedName(name, now) {
+  const month = now.toLocaleDateString("en-GB", { month: "short", year: "numeric" });
+  const stem = name.split(" (renewed ")[0];
+  const when = `renewed ${month}`;
+  return stem === "" ? `R${when.slice(1)}` : `${[...stem].slice(0, LONGEST_NAME - when.length - 3).join("")} (${when})`;
+}
+
+/** The training of the policy of a session on all that it has seen, at the wealth it has reached, if that matters to the policy. */
+export function anew(session, history, { specification, name }, now) {
+  const request = requestOf(specification);
+  const { problem, design } = request;
+  problem.history = recordOf(history);
+  const rates = history.observations.map((row) => standing(row).rate).filter((rate) => rate !== null && rate !== undefined);
+  problem.rate_per_step = rates.at(-1) ?? problem.rate_per_step;
+  const flows = [problem.contributions ?? 0].flat();
+  if (problem.utility.kind === "exponential" || flows.some((amount) => amount !== 0)) {
+    const factor = session.wealth / problem.initial_wealth;
+    problem.initial_wealth = session.wealth;
+    if (design.wealth) design.wealth = { min: design.wealth.min * factor, max: design.wealth.max * factor };
+  }
+  return { ...request, name: renewedName(name ?? "", now), tags: ["renewed"] };
+}
+
+function renewing(sessions, policies, leaving) {
+  const choice = select({
+    name: "policy",
+    label: "Go on by",
+    note: "A policy trained anew is the same in all but its record: every return seen by now, the last ones too.",
+    choices: [["", "To be chosen"], [ANEW, "The same policy, trained anew on the returns seen"], ...policyChoices(policies)],
+  });
+  choice.element.classList.add("broad");
+  const outcomes = new Map(sessions.map(({ session }) => [session, h("span", { class: "under" })]));
+  const policyName = (id) => called(id, policies.find(({ policy }) => policy === id)?.name);
+  const rows = table("Sessions that go on", [
+    { name: "Session", cell: ({ session, name }) => h("div", { class: "said" }, headed(`#/sessions/${session}`, session, name), outcomes.get(session)) },
+    { name: "Policy now", cell: ({ policy }) => h("a", { href: `#/policies/${policy}` }, policyName(policy)) },
+    { name: "Periods", numeric: true, cell: ({ period, horizon, rolling }) => (rolling ? count(period - 1) : `${count(period - 1)} of ${count(horizon)}`) },
+    { name: "Wealth", numeric: true, cell: ({ wealth: now }) => wealth(now) },
+  ], sessions);
+  const line = h("p", { class: "note", role: "status", tabindex: -1 });
+  const button = h("button", { type: "submit" }, sessions.length === 1 ? "Go on" : `Go on with the ${count(sessions.length)}`);
+  const form = h("form", { novalidate: true }, fieldset("From the coming period", [choice]), rows, refusal(), h("div", { class: "send" }, button, line));
+  const tell = ({ session }, words, wrong = false) => {
+    outcomes.get(session).textContent = words;
+    outcomes.get(session).classList.toggle("wrong", wrong);
+  };
+  /** Trainings by what they are asked, so that sessions of one record and one policy share one. */
+  const trainings = new Map();
+  const trained = async (session) => {
+    const [history, policy] = await Promise.all([get(`/sessions/${session.session}/history`, leaving), get(`/policies/${session.policy}`, leaving)]);
+    const asked = JSON.stringify(anew(session, history, policy, new Date()));
+    if (!trainings.has(asked)) trainings.set(asked, train(asked));
+    tell(session, "its policy is being trained\u2026");
+    return trainings.get(asked);
+  };
+  const train = async (asked) => {
+    let now = await post("/train", asked);
+    await follow(now.job, (job) => (now = job), leaving);
+    if (!isOver(now)) now = await get(`/jobs/${now.job}`, leaving);
+    if (now.state !== "succeeded") throw new Error(`the training ${now.state}${now.error ? `: ${now.error}` : ""}`);
+    return now.policy;
+  };
+  const goneOn = new Set();
+  const one = async (session) => {
+    const policy = choice.control.value === ANEW ? await trained(session) : choice.control.value;
+    const { renewals } = await get(`/sessions/${session.session}`, leaving);
+    const { period, horizon } = await post(`/sessions/${session.session}/renewals`, { renewal: renewals + 1, policy });
+    goneOn.add(session.session);
+    tell(session, `goes on: its new policy advises periods ${count(period)} to ${count(horizon)}`);
+  };
+  sending(form, button, async () => {
+    if (choice.control.value === "") throw { field: choice.name, message: "Choose what to go on by." };
+    const left = sessions.filter(({ session }) => !goneOn.has(session));
+    trainings.clear();
+    if (choice.control.value === ANEW) line.textContent = "Stay on this page until the sessions have gone on: a session does so once its policy is trained.";
+    await Promise.all(left.map((session) => one(session).catch((error) => leaving.aborted || tell(session, error.message, true))));
+    if (leaving.aborted) return;
+    const words = `${counted(goneOn.size, "session goes", "sessions go")} on by another policy${goneOn.size < sessions.length ? `, and ${count(sessions.length - goneOn.size)} as before` : ""}.`;
+    line.textContent = words;
+    announce(words);
+    line.focus();
+    if (goneOn.size === sessions.length) button.remove();
+  });
+  return form;
+}
