@@ -290,6 +290,40 @@ fn all_in_is_worth_nothing_to_power_utility_and_the_radius_less_to_log_utility()
     assert!((worth(RelativeUtility::Log) - (mean - 1.002_f64.ln() - 0.02)).abs() < 1e-9);
 }
 
+/// Log-returns and risk aversions drawn over what may be asked: an allocation is the best within a hundredth of a basis point, or
+/// the answer warns; and no allocation tried is worth more than the bound.
+#[test]
+fn whatever_the_risk_aversion_the_best_is_found_or_the_answer_warns() {
+    let mut warned = Vec::new();
+    for case in 0..120 {
+        let mut random = stream(17, "risk aversions", case, 0);
+        let mut draw = |low: f64, high: f64| low * (high / low).powf(random.random::<f64>());
+        let (assets, dates) = (draw(2.0, 8.99) as usize, draw(12.0, 120.0) as usize);
+        let (eta, scale) = (draw(2.0, 200.0), draw(0.1, 3.0));
+        let returns = sample(assets, dates, 100 + case);
+        let ground = if case % 2 == 0 { Ground::Sup } else { Ground::Weighted(inverse_volatility(&returns)) };
+        let utility =
+            if case % 3 == 0 { RelativeUtility::Exponential { k: eta } } else { RelativeUtility::Power { eta } };
+        let step = without_floor(&returns, &ground, utility, scale * 0.05 / (dates as f64).sqrt());
+        let solution = step.solve(None);
+        let gap = solution.bound - solution.value;
+        assert!(gap >= 0.0, "{case}: {solution:?}");
+        assert_eq!(solution.caution().is_some(), gap > 0.01 * BP, "{case}: {solution:?}");
+        if gap > 0.01 * BP {
+            warned.push((case, eta, assets, dates, gap / BP));
+        }
+        // Small shares of all, which is where the best lies at a high risk aversion.
+        for share in [0.003, 0.01, 0.03, 0.1, 0.3] {
+            let tried = step.worth(&vec![share / assets as f64; assets]);
+            assert!(
+                tried.value <= solution.value.max(solution.bound) + 1e-9,
+                "{case}, {share}: {tried:?} {solution:?}"
+            );
+        }
+    }
+    assert!(warned.len() <= 6, "{} of 120: {warned:?}", warned.len());
+}
+
 #[test]
 fn the_bounds_hold_between_the_bounds_of_the_total_and_with_a_floor() {
     let returns = sample(3, 50, 4);
@@ -439,4 +473,41 @@ fn the_joint_factor_agrees_with_an_independent_simulation() {
         // The search finds more funds than these.
         assert!(bridges.joint_factor(alpha).value > 0.98 * case["joint_factor"].as_f64().unwrap());
     }
+}
+
+/// Fifteen hundred funds differ by more than the search of the joint factor sees where assets are independent: a quantile over
+/// more funds is higher, which is what the documentation of the factor says.
+#[test]
+fn the_joint_factor_of_independent_assets_errs_low() {
+    let factors = |common: f64| {
+        let mut random = stream(23, "joint factor", 0, 0);
+        let mut normal = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+        let row = |_| {
+            let all = normal();
+            (0..12).map(|_| 0.04 * (common.sqrt() * all + (1.0 - common).sqrt() * normal())).collect()
+        };
+        let returns: Vec<Vec<f64>> = (0..60).map(row).collect();
+        let mut random = stream(24, "funds", 0, 0);
+        // Even draws among funds of few assets and of many.
+        let fund = |index: usize| {
+            let shares: Vec<f64> = (0..12)
+                .map(|_| {
+                    if random.random::<f64>() < 0.2 + 0.2 * (index % 5) as f64 {
+                        -random.random::<f64>().ln()
+                    } else {
+                        0.0
+                    }
+                })
+                .collect();
+            let total: f64 = shares.iter().sum();
+            (total > 0.0).then(|| shares.iter().map(|share| share / total).collect::<Vec<f64>>())
+        };
+        let funds: Vec<Vec<f64>> = (0..1500).filter_map(fund).collect();
+        let bridges = FundBridges::simulate(&returns, 1000, 3);
+        (bridges.joint_factor(0.1).value, bridges.factor_among(&funds, 0.1).value)
+    };
+    let (independent, among) = factors(0.0);
+    assert!((1.05..1.25).contains(&(among / independent)), "{independent} {among}");
+    let (together, among) = factors(0.6);
+    assert!(among / together < 1.05, "{together} {among}");
 }

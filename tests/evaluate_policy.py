@@ -210,18 +210,22 @@ def evaluate(policy, question):
         # Under power and log utility of a wealth of 1, for whose multiples the policy is the same.
         unit = 1.0 if sees_wealth(problem) else wealth
         value = math.log(certainty_equivalent(problem["utility"], value) * unit / (wealth * bank))
+    is_cut = value > solution["largest_gain"]
     gain = min(max(value, 0.0), solution["largest_gain"]) + beyond
     free = 1 - reserve / (question["wealth"] * (1 - cost))
     low, high = 0.0, max(0.0, min(problem["action_interval"][1], free))
     share = question["wealth"] / (question["wealth"] + later)
     deviation = math.sqrt(predicted_variance(solution["value"]["hyperparameters"], points, x))
     band = [min(max(end / share, low), high) for end in predictions(solution["policy"], points, x)]
+    # A radius of 0, which a fixed rule may have, ruins nobody.
+    has_ball = problem["framework"] in ("adaptive", "static") and problem["radius"].get("radius") != 0
+    ruined = has_ball and problem.get("support") is None and problem["utility"]["kind"] == "power" and max(band) >= 1.0
     return {
         "allocation": into([band[0], max(band[-1], band[0])], holding),
         "floor_gain": gain,
         "certainty_equivalent": liquidated * bank * math.exp(gain),
         "deviation": deviation,
-        "in_design": deviation <= solution["deviation_limit"],
+        "in_design": deviation <= solution["deviation_limit"] and not is_cut and not ruined,
     }
 
 

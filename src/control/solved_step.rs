@@ -45,8 +45,10 @@ pub struct StepDiagnostics {
     pub policy: Option<SurrogateDiagnostics>,
 }
 
-/// Root mean square errors of the value that a step serves, over the design's own law of its states, in basis points of the
-/// certainty equivalent.
+/// Root mean square errors of the value that a step serves, in basis points of the certainty equivalent: over the design's own law
+/// of its states, at the holdings it was solved at. They say nothing of states that this law seldom visits, such as those after a
+/// return beyond the record, where the value may be off by a hundred times as much, nor of the first step of a design that starts
+/// at one law.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExpectedError {

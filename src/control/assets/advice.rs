@@ -28,7 +28,8 @@ pub struct AssetsAdvice {
     pub floor: f64,
     /// Radius of the ball, in log-return.
     pub radius: f64,
-    /// What of it is there for all funds at once: the radius of the fund of inverse volatilities is multiplied by it.
+    /// Factor by which the radius of the fund of inverse volatilities is widened to hold for all funds at once. It errs low: by little
+    /// where assets move together, by more than a tenth for a dozen that are independent.
     pub radius_factor: f64,
     /// Number of dates seen.
     pub sample_size: usize,
@@ -49,6 +50,9 @@ pub struct OneStep {
     pub bound: f64,
     /// What the worst law makes of each asset.
     pub worst_means: BTreeMap<String, WorstMean>,
+    /// What to know before the allocation is followed; left out where there is nothing.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub caution: Vec<Caution>,
 }
 
 /// The mean of an asset's log-return.

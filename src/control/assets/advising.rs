@@ -85,7 +85,10 @@ impl AssetsAdvice {
             radius_factor,
             sample_size: rows.len(),
             worst_means: worst_means(&problem.assets, rows, &solution),
-            caution: Caution::short_record(rows.len(), rows.len() as f64).into_iter().collect(),
+            caution: Caution::short_record(rows.len(), rows.len() as f64)
+                .into_iter()
+                .chain(solution.caution())
+                .collect(),
         }
     }
 }

@@ -199,6 +199,7 @@ impl Fund {
             certainty_equivalent: floor * solution.value.exp(),
             bound: floor * solution.bound.exp(),
             worst_means: worst_means(names, &self.rows, solution),
+            caution: solution.caution().into_iter().collect(),
         }
     }
 }

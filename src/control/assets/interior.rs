@@ -38,6 +38,8 @@ const OFF_CENTRE: f64 = 100.0;
 const LEAST_MASS: f64 = 1e-6;
 /// Shares of the start by which one near a similar step is drawn inside.
 const DRAWN_INSIDE: f64 = 0.002;
+/// Shares of a start sum to this over the risk aversion at most, above the least they may sum to.
+const SHARE_AT_START: f64 = 0.5;
 /// Room that the sum of the shares has at least.
 const LEAST_ROOM: f64 = 1e-6;
 
@@ -127,7 +129,10 @@ impl<'a> Interior<'a> {
         let assets = step.assets();
         let highest = step.total.highest;
         let lowest = step.total.lowest.min(highest - LEAST_ROOM);
-        let middle = 0.5 * (lowest + highest);
+        // Halfway between the bounds of the sum, or where a loss of all that is held still weighs little: deeper in, utilities of
+        // a risk aversion of 20 and more are so large that rounding takes what a step could gain.
+        let weighs_little = SHARE_AT_START / step.utility.relative_risk_aversion();
+        let middle = (0.5 * (lowest + highest)).min(lowest + weighs_little);
         let even = middle / assets as f64;
         let mut point = vec![even; assets];
         if let Some((shares, _)) = &near {

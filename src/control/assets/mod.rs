@@ -28,6 +28,7 @@ pub mod worst;
 
 use self::branches::Branches;
 use self::interior::Interior;
+use crate::control::policy::caution::Caution;
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::assets::MOST_ASSETS;
@@ -86,6 +87,13 @@ pub struct AssetsSolution {
     pub mean_moves: Vec<f64>,
     /// Points at which the adversary's answer was found.
     pub evaluations: usize,
+}
+
+impl AssetsSolution {
+    /// Warns where the search ended before its bounds met.
+    pub fn caution(&self) -> Option<Caution> {
+        Caution::not_certified(self.bound - self.value)
+    }
 }
 
 impl AssetsStep {

@@ -15,6 +15,7 @@ use crate::control::kept::Kept;
 use crate::control::policy::worst_case::WorstCase;
 use crate::control::problem::actions::Band;
 use crate::control::problem::state::{Realised, State};
+use crate::control::request::framework::Framework;
 use crate::control::request::specification::{Specification, UtilitySpecification};
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
 use crate::control::uncertainty::radius::Measure;
@@ -299,14 +300,27 @@ impl Advisor {
                 let prediction = holdings.at(&predictions, state.holding);
                 let total = dynamics.total(state.wealth, holdings.within(state.holding));
                 let gain = value.clamped_gain(prediction, total) + holdings.beyond(dynamics, state.holding, in_hand);
+                // Beyond the largest gain that was solved the prediction is cut, and what is cut is not known.
+                let cut = value.beyond_solved(prediction, total);
+                let spread = value.gain_spread(prediction, deviation * stored.value.scale, total).max(cut);
+                let is_solved = cut <= 0.0 && !self.is_ruined(radius, &ends);
                 Prediction {
                     band: Band::of(&ends),
                     floor_gain: gain.min(largest),
-                    deviation: value.gain_spread(prediction, deviation * stored.value.scale, total).min(largest),
-                    in_design: deviation <= stored.deviation_limit && is_finite && self.pays(step, state),
+                    deviation: spread.min(largest),
+                    in_design: deviation <= stored.deviation_limit && is_finite && is_solved && self.pays(step, state),
                 }
             }
         }
+    }
+
+    /// Whether some law in the ball takes all that an end of the band holds: all wealth, under power utility and without a least
+    /// return. A process that is off by little may say so, and the step solved anew never does.
+    fn is_ruined(&self, radius: f64, ends: &[f64]) -> bool {
+        let problem = &self.specification().problem;
+        let has_ball = matches!(problem.framework, Framework::Adaptive | Framework::Static) && radius > 0.0;
+        let is_power = matches!(problem.utility, UtilitySpecification::Power { .. });
+        has_ball && problem.support.is_none() && is_power && ends.iter().any(|end| *end >= 1.0)
     }
 
     /// Whether `state` is the one state that a single-state step was solved at.

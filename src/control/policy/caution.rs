@@ -1,13 +1,17 @@
 //! What to know before an advice is followed.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// A record with fewer returns, by its effective size, is short: two years of months.
 const SHORT_RECORD: usize = 24;
 
+/// Basis points between value and bound up to which an allocation counts as the best, and from which the bound says nothing.
+const CERTIFIED: f64 = 0.01;
+const BEYOND_USE: f64 = 100.0;
+
 /// A reason to be careful with an advice.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Caution {
     /// For programs.
     pub code: CautionCode,
@@ -16,7 +20,7 @@ pub struct Caution {
 }
 
 /// The reasons.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CautionCode {
     /// The record has fewer than 24 returns, by its effective size.
@@ -24,6 +28,8 @@ pub enum CautionCode {
     /// Without one of its returns the advice would move by more than half of the action interval, or between the bank alone and
     /// holding something. Told where the sensitivity is asked for.
     OneReturn,
+    /// The search for the best allocation of several assets ended before its two bounds met within a hundredth of a basis point.
+    NotCertified,
 }
 
 impl Caution {
@@ -40,6 +46,21 @@ impl Caution {
             "The advice rests on {sample_size} returns{worth}: with fewer than {SHORT_RECORD}, each of them weighs much, and most of what the asset can do is yet unseen."
         );
         Some(Caution { code: CautionCode::ShortRecord, sentence })
+    }
+
+    /// Warns that another allocation may be worth more than the one advised: `gap` is the log certainty equivalent between the value
+    /// of the advice and the bound of all.
+    pub fn not_certified(gap: f64) -> Option<Self> {
+        let basis_points = 1e4 * gap;
+        let sentence = match basis_points {
+            within if within <= CERTIFIED => return None,
+            some if some < BEYOND_USE => format!(
+                "The search for the best allocation ended early: another allocation could be worth up to {some:.2} basis points more."
+            ),
+            _ => "The search for the best allocation failed: how much better another allocation is, nobody knows. Do not follow this advice."
+                .to_owned(),
+        };
+        Some(Caution { code: CautionCode::NotCertified, sentence })
     }
 
     /// Of a return without which the advice would be another.

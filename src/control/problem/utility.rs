@@ -133,10 +133,11 @@ impl RelativeUtility {
         }
     }
 
-    /// The log gain whose utility is `value`: the log certainty equivalent over the floor.
+    /// The log gain whose utility is `value`: the log certainty equivalent over the floor; minus infinity where no wealth above 0 has
+    /// so low a utility.
     pub fn inverse(self, value: f64) -> f64 {
         match self {
-            RelativeUtility::Exponential { k } => (-(-k * value).ln_1p() / k).ln_1p(),
+            RelativeUtility::Exponential { k } => (-(-k * value).ln_1p() / k).max(-1.0).ln_1p(),
             RelativeUtility::Power { eta } => ((1.0 - eta) * value).ln_1p() / (1.0 - eta),
             RelativeUtility::Log => value,
         }

@@ -95,6 +95,11 @@ impl ValueSurrogate {
         if spread.is_finite() { spread } else { self.largest_gain }
     }
 
+    /// By how much the predicted floor gain exceeds the largest that was solved; 0 where it does not.
+    pub fn beyond_solved(&self, prediction: f64, total: f64) -> f64 {
+        (self.target.gain(prediction, total) - self.largest_gain).max(0.0)
+    }
+
     /// The floor gain of a predicted target at total wealth, clamped to what is true (0) and seen (the largest).
     pub fn clamped_gain(&self, prediction: f64, total: f64) -> f64 {
         self.target.gain(prediction, total).clamp(0.0, self.largest_gain)
