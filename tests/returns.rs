@@ -138,6 +138,40 @@ async fn a_text_beyond_all_bounds_is_refused_and_one_within_is_read_in_time() {
     assert_eq!((status.as_u16(), &problem["field"]), (413, &json!("body")));
 }
 
+/// `tests/data/inputs/table.json`: files as vendors and programs write them, what is chosen of each, and how its answer begins.
+/// Every question has an answer that leads to a record.
+#[test]
+fn every_file_of_a_vendor_is_read_asked_about_or_refused_as_it_must_be() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/inputs");
+    let rows: Vec<Value> = serde_json::from_str(&std::fs::read_to_string(folder.join("table.json")).unwrap()).unwrap();
+    let named: BTreeSet<String> = rows.iter().map(|row| row["file"].as_str().unwrap().to_owned()).collect();
+    let files = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let files: BTreeSet<String> = files.filter(|name| name != "table.json").collect();
+    assert!(files.len() >= 30 && files == named, "{:?}", files.symmetric_difference(&named));
+    for row in rows {
+        let bytes = std::fs::read(folder.join(row["file"].as_str().unwrap())).unwrap();
+        let said = if row["choices"].is_object() { row["choices"].clone() } else { json!({}) };
+        let reading = match decoded(&bytes) {
+            Ok(text) => read(&text, &serde_json::from_value(said).unwrap()),
+            Err(sentence) => Reading::Refused { sentence, place: None },
+        };
+        let (outcome, says) = match &reading {
+            Reading::Read(record) => ("read", record.sentence.clone()),
+            Reading::Asked { questions, .. } => ("asked", questions[0].question.clone()),
+            Reading::Refused { sentence, .. } => ("refused", sentence.clone()),
+        };
+        assert_eq!(row["outcome"], outcome, "{row}\n{says}");
+        assert!(says.starts_with(row["says"].as_str().unwrap()), "{row}\n{says}");
+        let contains = row["contains"].as_str().unwrap_or_default();
+        assert!(says.contains(contains), "{row}\n{says}");
+        if let Reading::Asked { questions, .. } = reading {
+            for question in questions {
+                assert!(question.options.iter().any(|option| option.sentence.is_some()), "{row}\n{question:?}");
+            }
+        }
+    }
+}
+
 /// A generator of its own, so that a failure can be repeated.
 struct Random(u32);
 
@@ -252,6 +286,57 @@ fn a_cell_out_of_place_is_never_passed_over() {
         let found = read(&rows.join("\n"), &Choices::default());
         assert!(!matches!(found, Reading::Read(_)), "seed {seed}: {found:?}\n{}", rows.join("\n"));
     }
+}
+
+/// Records of every kind under a heading that says nothing, with one cell that cannot be: the others mean what they did, so
+/// nothing is read of them in another kind or unit.
+#[test]
+fn one_impossible_cell_never_changes_what_the_others_are() {
+    let (mut refused, mut asked) = (0, 0);
+    for seed in 1..=1000 {
+        let mut random = Random(seed + 5_000_000);
+        let count = 6 + random.below(60);
+        let size = random.one(&[0.006, 0.01, 0.04, 0.08]);
+        let mut price = random.one(&[1.3, 9.0, 30.0, 250.0, 4000.0]);
+        let kind = random.one(&["price", "fraction", "percent"]);
+        let mut cells: Vec<String> = (0..count)
+            .map(|_| {
+                let gain = (random.next() + random.next() + random.next() - 1.45) * size;
+                price *= 1.0 + gain;
+                match kind {
+                    "price" => format!("{price:.3}"),
+                    "fraction" => format!("{gain:.5}"),
+                    _ => format!("{:.4}", 100.0 * gain),
+                }
+            })
+            .collect();
+        let text = |cells: &[String]| {
+            let row = |(month, cell): (i32, &String)| format!("{},{cell}\n", date(0, 12 * 2001 + month, 1));
+            (0..).zip(cells).map(row).fold("month,fund\n".to_owned(), |text, row| text + &row)
+        };
+        let whole = read(&text(&cells), &Choices::default());
+        let at = random.below(count);
+        let odd: &[&str] = match kind {
+            "price" => &["0", "-37.63", "-1", "0.00"],
+            "fraction" => &["-1", "-1.99", "-66.0", "-100"],
+            _ => &["-100", "-150", "-999"],
+        };
+        odd.iter().for_each(|odd| {
+            (*odd).clone_into(&mut cells[at]);
+            match (read(&text(&cells), &Choices::default()), &whole) {
+                (Reading::Refused { place: Some(place), .. }, _) => {
+                    assert_eq!((place.line, place.value.as_str()), (at + 2, *odd), "seed {seed}");
+                    refused += 1;
+                }
+                (Reading::Asked { .. }, _) => asked += 1,
+                (Reading::Refused { sentence, .. }, _) => panic!("seed {seed}: {sentence}"),
+                (Reading::Read(record), whole) => {
+                    panic!("seed {seed}: {odd} in {kind}: {}\nwithout: {whole:?}", record.sentence)
+                }
+            }
+        });
+    }
+    assert!(refused > 1500 && asked < refused / 2, "{refused} {asked}");
 }
 
 #[test]

@@ -2,11 +2,11 @@
 
 use super::cells::Cell;
 use super::choices::{Choices, RateUnit, Unit};
-use super::kind::{is_coarse, names_percent};
 use super::number::{Mark, has_percent, number};
 use super::outcome::Stop;
 use super::record::BankRate;
 use super::sheet::Column;
+use super::unit::{is_coarse, names_percent};
 use super::words::percent;
 
 /// Of what the bank pays a period; as `problem.rate_per_step`.
@@ -47,10 +47,14 @@ impl Bank<'_> {
     /// It must be asked what they are counted in.
     pub fn rates(&self, used: usize, unit: Option<Unit>, said: &Choices) -> Result<Result<BankRate, String>, Stop> {
         let cells = &self.cells[self.cells.len() - used..];
+        let is_percent = self.says_percent() || unit == Some(Unit::Percent);
         let by_hundred = match said.rate_unit {
             Some(RateUnit::Unused) => return Ok(Err("it is left out as was said".to_owned())),
             Some(said) => said == RateUnit::Percent,
-            None if self.says_percent() || unit == Some(Unit::Percent) => true,
+            None if is_percent && self.middle(cells) * self.periods / 100.0 > LARGEST_RATE => {
+                return Err(self.ask(cells));
+            }
+            None if is_percent => true,
             None if self.may_be_percent(cells) => return Err(self.ask(cells)),
             None => false,
         };

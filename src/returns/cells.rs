@@ -32,6 +32,16 @@ pub struct Cell<'a> {
 }
 
 impl Cell<'_> {
+    /// The heading of a column that the text does not have.
+    pub fn heading(text: &'static str) -> Cell<'static> {
+        Cell { text: Cow::Borrowed(text), line: 1, column: 1 }
+    }
+
+    /// Another text at this place.
+    pub fn with_text<'a>(&self, text: String) -> Cell<'a> {
+        Cell { text: Cow::Owned(text), line: self.line, column: self.column }
+    }
+
     /// The cell breaks a rule, under the name of its column where it has one.
     pub fn refused(&self, name: &str, rule: &str) -> Stop {
         let place = self.place();

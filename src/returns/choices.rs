@@ -14,6 +14,10 @@ pub enum Kind {
     Log,
     /// Prices or levels, of which each pair gives a return.
     Price,
+    /// What 1 becomes in a period: 1.012 is a gain of 1.2 %.
+    Gross,
+    /// Gains since the start of the record, of which each pair gives a return.
+    Cumulated,
 }
 
 /// What returns are counted in.
@@ -82,10 +86,15 @@ pub struct Choices {
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gaps: Option<bool>,
-    /// Whether a standard deviation above 30 % a period is right
+    /// Whether what is unusual of an asset is right: a deviation above 30 % a period or 150 % a year, a mean above 100 % a year,
+    /// or a return far from all others
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub large_deviation: Option<bool>,
+    pub unusual: Option<bool>,
+    /// Whether the returns are those beyond the bank, to which what its column says is added
+    #[arg(long)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub excess: Option<bool>,
     /// How many of the last returns count; all of them unless given
     #[arg(skip)]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -107,8 +116,21 @@ impl Choices {
             comma_parts: more.comma_parts.or(self.comma_parts),
             one_record: more.one_record.or(self.one_record),
             gaps: more.gaps.or(self.gaps),
-            large_deviation: more.large_deviation.or(self.large_deviation),
+            unusual: more.unusual.or(self.unusual),
+            excess: more.excess.or(self.excess),
             latest: more.latest.or(self.latest),
         }
+    }
+}
+
+impl From<Kind> for Choices {
+    fn from(kind: Kind) -> Self {
+        Choices { kind: Some(kind), ..Choices::default() }
+    }
+}
+
+impl From<Unit> for Choices {
+    fn from(unit: Unit) -> Self {
+        Choices { unit: Some(unit), ..Choices::default() }
     }
 }

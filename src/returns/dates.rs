@@ -108,6 +108,18 @@ fn name(rest: &mut &str) -> Option<i16> {
     found.filter(|_| count >= 3).and_then(|index| i16::try_from(index + 1).ok())
 }
 
+/// The month from 1 that `text` alone names.
+pub fn month(text: &str) -> Option<usize> {
+    let mut rest = text.trim();
+    let found = name(&mut rest)?;
+    usize::try_from(found).ok().filter(|_| rest.is_empty())
+}
+
+/// Tells whether `text` alone can be a year.
+pub fn is_year(text: &str) -> bool {
+    YEAR.date(text).is_some()
+}
+
 /// Whether `text` alone is a date that nobody would take for a number.
 pub fn could_be_date(text: &str) -> bool {
     text.len() >= SHORTEST && FORMS.iter().any(|form| !form.is_digits() && form.date(text).is_some())

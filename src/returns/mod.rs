@@ -9,12 +9,18 @@ mod bank;
 mod cells;
 mod choices;
 mod dates;
+mod doubt;
+mod excess;
+mod heading;
 mod kind;
+mod moments;
+mod months;
 mod number;
 mod outcome;
 mod reading;
 mod record;
 mod sheet;
+mod unit;
 mod words;
 
 pub use choices::{Choices, Kind, RateUnit, Unit};

@@ -1,4 +1,5 @@
-//! Numbers as people and programs write them: either decimal mark, thousands apart or not, a percent sign, any minus.
+//! Numbers as people and programs write them: either decimal mark, thousands apart or not, a percent sign, any minus
+//! before or after or parentheses in its place, and a mark of money.
 //!
 //! No number here starts with a zero before another digit: 012 is what is left of 0,012 when a comma was taken for something
 //! else, and -0 likewise.
@@ -22,14 +23,69 @@ impl Mark {
     }
 }
 
-/// Without a percent sign and a plus; whether a minus stood before it.
-fn bare(text: &str) -> (bool, &str) {
+/// Marks and codes of money, before a number or after it, the longer first.
+const MONEY: [&str; 19] = [
+    "US$", "CHF", "EUR", "USD", "GBP", "GBX", "JPY", "CAD", "AUD", "SEK", "NOK", "DKK", "PLN", "z\u{142}", "Fr.", "$",
+    "\u{20ac}", "\u{a3}", "\u{a5}",
+];
+const MINUS: [char; 3] = ['-', '\u{2212}', '\u{2013}'];
+
+/// A number without its sign, percent sign and mark of money.
+struct Bare<'a> {
+    is_negative: bool,
+    money: Option<&'static str>,
+    rest: &'a str,
+}
+
+/// A sign may stand before or after the number or its mark of money, or parentheses around both; a second one is left.
+fn bare(text: &str) -> Bare<'_> {
+    let without_percent = |text: &'_ str| -> usize { text.strip_suffix('%').map_or(text, str::trim_end).len() };
     let text = text.trim();
-    let text = text.strip_suffix('%').map_or(text, str::trim_end);
-    match text.strip_prefix(['-', '\u{2212}', '\u{2013}']) {
-        Some(rest) => (true, rest),
-        None => (false, text.strip_prefix('+').unwrap_or(text)),
+    let text = &text[..without_percent(text)];
+    let bracketed = text.strip_prefix('(').and_then(|text| text.strip_suffix(')')).map(str::trim);
+    let text = bracketed.unwrap_or(text);
+    let text = &text[..without_percent(text)];
+    let mut is_signed = bracketed.is_some();
+    let mut is_negative = is_signed;
+    let mut rest = text;
+    let mut sign = |rest: &mut &str| {
+        if let Some(after) = rest.strip_prefix(MINUS).filter(|_| !is_signed) {
+            (is_signed, is_negative, *rest) = (true, true, after);
+        } else if let Some(after) = rest.strip_prefix('+').filter(|_| !is_signed) {
+            (is_signed, *rest) = (true, after);
+        } else if let Some(before) =
+            rest.strip_suffix(MINUS).filter(|before| !is_signed && before.ends_with(|last: char| last.is_ascii_digit()))
+        {
+            (is_signed, is_negative, *rest) = (true, true, before);
+        }
+    };
+    sign(&mut rest);
+    let starts = |mark: &str| rest.get(..mark.len()).is_some_and(|start| start.eq_ignore_ascii_case(mark));
+    let ends = |mark: &str| {
+        let at = rest.len().checked_sub(mark.len());
+        at.and_then(|at| rest.get(at..)).is_some_and(|end| end.eq_ignore_ascii_case(mark))
+    };
+    let before = MONEY.into_iter().find(|mark| starts(mark));
+    let after = if before.is_some() { None } else { MONEY.into_iter().find(|mark| ends(mark)) };
+    if let Some(mark) = before {
+        rest = rest[mark.len()..].trim_start();
+    } else if let Some(mark) = after {
+        rest = rest[..rest.len() - mark.len()].trim_end();
     }
+    if before.or(after).is_some() {
+        sign(&mut rest);
+    }
+    Bare { is_negative, money: before.or(after), rest }
+}
+
+/// The mark of money that `text` carries.
+pub fn money(text: &str) -> Option<&'static str> {
+    bare(text).money
+}
+
+/// The digits and marks of `text`.
+pub fn significant(text: &str) -> &str {
+    bare(text).rest
 }
 
 fn is_digits(text: &str) -> bool {
@@ -39,7 +95,7 @@ fn is_digits(text: &str) -> bool {
 /// The number that `text` is by this decimal mark, infinite where it is beyond all numbers; `None` where it is none. A percent
 /// sign does not divide it.
 pub fn number(text: &str, mark: Mark) -> Option<f64> {
-    let (is_negative, rest) = bare(text);
+    let Bare { is_negative, rest, .. } = bare(text);
     let (digits, exponent) = rest.split_once(['e', 'E']).unwrap_or((rest, "0"));
     if !is_digits(exponent.strip_prefix(['+', '-']).unwrap_or(exponent)) {
         return None;
@@ -75,7 +131,7 @@ pub fn is_number(text: &str) -> bool {
 
 /// Whether `text` is meant as a number, well formed or not: digits and marks alone.
 pub fn looks_numeric(text: &str) -> bool {
-    let (_, rest) = bare(text);
+    let rest = significant(text);
     let (digits, exponent) = rest.split_once(['e', 'E']).unwrap_or((rest, "0"));
     let is_mark = |letter: char| matches!(letter, '.' | ',') || APART.contains(&letter);
     digits.contains(|letter: char| letter.is_ascii_digit())
@@ -84,7 +140,7 @@ pub fn looks_numeric(text: &str) -> bool {
 }
 
 pub fn has_percent(text: &str) -> bool {
-    text.trim_end().ends_with('%')
+    text.trim_end_matches([')', ' ']).ends_with('%')
 }
 
 #[cfg(test)]
@@ -105,6 +161,25 @@ mod tests {
             ("1,234", Some(1234.0), Some(1.234)),
             ("3e-2", Some(0.03), Some(0.03)),
             ("+5.", Some(5.0), None),
+            ("(3.2)", Some(-3.2), None),
+            ("(1.2 %)", Some(-1.2), None),
+            ("(1.2)%", Some(-1.2), None),
+            ("5.2-", Some(-5.2), None),
+            ("$250.69", Some(250.69), None),
+            ("-$1,250.50", Some(-1250.5), None),
+            ("$-3.5", Some(-3.5), None),
+            ("($3.5)", Some(-3.5), None),
+            ("1994,99 \u{20ac}", None, Some(1994.99)),
+            ("\u{a3} 12.5", Some(12.5), None),
+            ("CHF 1'234.50", Some(1234.5), None),
+            ("12.5 usd", Some(12.5), None),
+            ("EUR", None, None),
+            ("$", None, None),
+            ("--5", None, None),
+            ("(-5)", None, None),
+            ("-5-", None, None),
+            ("0,-", None, None),
+            ("$5 EUR", None, None),
             ("1e400", Some(f64::INFINITY), Some(f64::INFINITY)),
             ("012", None, None),
             ("-0", None, None),

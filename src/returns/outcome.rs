@@ -51,11 +51,31 @@ impl Stop {
         Stop::Refused { sentence: sentence.into(), place: None }
     }
 
+    /// Names the column in what does not name its cell.
+    pub fn about(self, column: &str) -> Self {
+        match self {
+            Stop::Refused { sentence, place: None } if !names_a_column(&sentence) => {
+                Stop::refused(format!("Column {column}: {sentence}"))
+            }
+            Stop::Asked(mut questions) => {
+                for Question { question, .. } in questions.iter_mut().filter(|one| !names_a_column(&one.question)) {
+                    *question = format!("Column {column}: {question}");
+                }
+                Stop::Asked(questions)
+            }
+            refused @ Stop::Refused { .. } => refused,
+        }
+    }
+
     pub fn asked(asks: &'static str, question: impl Into<String>, options: Vec<(String, Choices)>) -> Self {
         let option = |(label, choices)| Answer { label, choices, sentence: None };
         let options = options.into_iter().map(option).collect();
         Stop::Asked(vec![Question { asks, question: question.into(), options }])
     }
+}
+
+fn names_a_column(sentence: &str) -> bool {
+    sentence.starts_with("Column ") || sentence.starts_with("line ")
 }
 
 /// Both results, and the questions of both where both ask; a refusal counts before a question.

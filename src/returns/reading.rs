@@ -8,7 +8,8 @@ use super::bank::Bank;
 use super::cells::{Cell, mark};
 use super::choices::{Choices, Unit};
 use super::dates::{are_dates, form};
-use super::kind::{Beside, Numbers, Returns};
+use super::excess;
+use super::kind::{Beside, Numbers, Returns, called};
 use super::number::{Mark, number};
 use super::outcome::{Answer, Place, Question, Stop, both};
 use super::record::{Found, Order, Record};
@@ -113,10 +114,17 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
         Bank { column, cells, mark, periods: beside.periods }
     });
     beside.bank = bank.as_ref().filter(|_| said.rate_unit.is_none()).and_then(Bank::beyond);
-    let returns = numbers.iter().map(|numbers| numbers.returns(said, &beside)).collect::<Result<Vec<Returns>, Stop>>();
+    let is_one = numbers.len() == 1;
+    let of = |numbers: &Numbers| {
+        let read = numbers
+            .returns(said, &beside)
+            .and_then(|returns| excess::whole(numbers.name, returns, bank.as_ref(), said));
+        read.map_err(|stop| if is_one { stop } else { stop.about(numbers.name) })
+    };
+    let returns = numbers.iter().map(of).collect::<Result<Vec<Returns>, Stop>>();
     let (order, returns) = both(order, returns)?;
     let count = returns[0].simple.len();
-    alike(&returns, said)?;
+    alike(&chosen, &returns, said)?;
     if count < FEWEST {
         return Err(Stop::refused("Two prices make one return: at least two returns are needed."));
     }
@@ -126,6 +134,9 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
         let name = bank.as_ref().map_or("", |bank| bank.column.name.as_str());
         found.map_err(|reason| remarks.push(format!("Column {name} is not used: {reason}."))).ok()
     });
+    if let Some(name) = bank.as_ref().map(|bank| &bank.column.name).filter(|_| said.excess == Some(true)) {
+        remarks.push(format!("What the bank paid, in column {name}, is added to returns beyond it."));
+    }
     if order.is_turned && order.dates.is_some() {
         remarks.push("The rows came newest first and are turned round.".to_owned());
     }
@@ -141,22 +152,29 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
 }
 
 /// Columns that are read together are of one kind and in one unit.
-fn alike(returns: &[Returns], said: &Choices) -> Result<(), Stop> {
-    if returns.iter().any(|other| other.simple.len() != returns[0].simple.len()) {
-        return Err(Stop::refused(
-            "Some of the columns are prices and some are returns: say what they are, of all alike.",
-        ));
+fn alike(chosen: &[&Column], returns: &[Returns], said: &Choices) -> Result<(), Stop> {
+    let first = &returns[0];
+    let other = |differs: &dyn Fn(&Returns) -> bool| returns.iter().position(differs);
+    if let Some(index) = other(&|other| other.simple.len() != first.simple.len()) {
+        let what = |index: usize| called(returns[index].kind, returns[index].unit);
+        return Err(Stop::refused(format!(
+            "Column {} reads as {} and column {} as {}: read them one at a time, or make them alike.",
+            chosen[0].name,
+            what(0),
+            chosen[index].name,
+            what(index)
+        )));
     }
-    if said.unit.is_some() || returns.iter().all(|other| other.unit == returns[0].unit) {
-        return Ok(());
-    }
+    let odd = other(&|other| other.unit != first.unit).filter(|_| said.unit.is_none());
+    let Some(odd) = odd else { return Ok(()) };
     let option = |label: &str, unit| (label.to_owned(), Choices { unit: Some(unit), ..Choices::default() });
     let options = vec![option("Percent, all of them", Unit::Percent), option("Fractions, all of them", Unit::Fraction)];
-    Err(Stop::asked(
-        "unit",
-        "Some of the columns look like percent and some like fractions. What are they all?",
-        options,
-    ))
+    let (percent, fractions) = if first.unit == Some(Unit::Percent) { (0, odd) } else { (odd, 0) };
+    let question = format!(
+        "Column {} looks like percent and column {} like fractions. What are they all?",
+        chosen[percent].name, chosen[fractions].name
+    );
+    Err(Stop::asked("unit", question, options))
 }
 
 /// The rows from the first number to the last; a blank cell among them is a hole in the record.

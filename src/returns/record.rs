@@ -6,7 +6,8 @@ use utoipa::ToSchema;
 
 use super::choices::{Kind, Unit};
 use super::dates::told;
-use super::kind::{Returns, called, moments};
+use super::kind::{Returns, called};
+use super::moments::moments;
 use super::sheet::ColumnFound;
 use super::words::percent;
 use crate::control::request::frequency::Frequency;

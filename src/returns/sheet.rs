@@ -10,6 +10,8 @@ use utoipa::ToSchema;
 use super::cells::{Cell, MOST_LINES, Rows};
 use super::choices::Choices;
 use super::dates::are_dates;
+use super::heading::{VALUES, aside, core};
+use super::months::MonthsOfYears;
 use super::number::{is_number, looks_numeric};
 use super::outcome::Stop;
 
@@ -29,23 +31,6 @@ const DATES: [&str; 14] = [
     "datum",
     "monat",
     "jahr",
-];
-/// Headings of the risky asset, the best first: what counts dividends before what may not. Programs write these, and nothing
-/// is asked beside them.
-const VALUES: [&str; 13] = [
-    "return",
-    "returns",
-    "riskyreturn",
-    "marketreturn",
-    "simplereturn",
-    "totalreturn",
-    "ret",
-    "adjclose",
-    "adjustedclose",
-    "close",
-    "closelast",
-    "price",
-    "nav",
 ];
 /// Headings of the bank.
 const BANKS: [&str; 6] = ["riskfreereturn", "riskfreerate", "riskfree", "bankreturn", "rf", "rate"];
@@ -98,6 +83,15 @@ impl Column<'_> {
         let given = self.given();
         !given.is_empty()
             && 2 * given.iter().filter(|text| looks_numeric(text) || is_number(text)).count() > given.len()
+    }
+
+    /// The first cell that is no number, refused.
+    fn unread(&self) -> Stop {
+        let is_odd = |cell: &&Cell| !cell.text.is_empty() && !is_number(&cell.text);
+        match self.cells.iter().find(is_odd) {
+            Some(cell) => cell.refused(&self.name, "must be a number"),
+            None => Stop::refused(format!("Column {} holds no numbers.", self.name)),
+        }
     }
 
     /// Words with digits, another in every row: dates in a form that is not known here, most likely.
@@ -153,8 +147,16 @@ impl<'a> Sheet<'a> {
         self.columns.iter().find(|column| column.holds == holds)
     }
 
-    /// The columns that are read: those said, the only one there is, or the one whose heading is the best.
+    /// The columns that are read: those said, the one whose heading is the best, or the only one there is.
     pub fn chosen(&self, said: &Choices) -> Result<Vec<&Column<'a>>, Stop> {
+        let chosen = self.meant(said)?;
+        match chosen.iter().find_map(|column| Some((column, aside(&column.name)?))) {
+            Some((column, reason)) => Err(set_aside(&column.name, reason)),
+            None => Ok(chosen),
+        }
+    }
+
+    fn meant(&self, said: &Choices) -> Result<Vec<&Column<'a>>, Stop> {
         if said.columns.len() > self.columns.len() {
             let (named, there) = (said.columns.len(), self.columns.len());
             return Err(Stop::refused(format!("{named} columns are named: there are {there}.")));
@@ -167,16 +169,29 @@ impl<'a> Sheet<'a> {
                 None => Ok(named),
             };
         }
+        // No other column stands in for one whose heading is known.
+        if let Some(best) = self.best() {
+            return if best.holds == Holds::Values { Ok(vec![best]) } else { Err(best.unread()) };
+        }
         let values: Vec<&Column> = self.columns.iter().filter(|column| column.holds == Holds::Values).collect();
-        let best = |wanted: &str| values.iter().copied().find(|column| plain(&column.name) == wanted);
         match values[..] {
             [] => Err(self.without_numbers()),
             [only] => Ok(vec![only]),
-            _ => match VALUES.iter().find_map(|wanted| best(wanted)) {
-                Some(best) => Ok(vec![best]),
-                None => Err(ask(&values)),
-            },
+            _ => Err(ask(&values)),
         }
+    }
+
+    /// The column of the best known heading; a blank one only where there is no other.
+    fn best(&self) -> Option<&Column<'a>> {
+        let may_be = |column: &&Column| column.holds == Holds::Values || column.holds == Holds::Other;
+        let of = |is_blank: bool| {
+            let named = |wanted: &&str| {
+                let is = |column: &&Column| column.given().is_empty() == is_blank && core(&column.name) == **wanted;
+                self.columns.iter().filter(may_be).find(is)
+            };
+            VALUES.iter().find_map(named)
+        };
+        of(false).or_else(|| of(true))
     }
 
     fn named(&self, name: &str) -> Result<&Column<'a>, Stop> {
@@ -189,6 +204,10 @@ impl<'a> Sheet<'a> {
     }
 
     fn without_numbers(&self) -> Stop {
+        if let Some((name, reason)) = self.columns.iter().find_map(|column| Some((&column.name, aside(&column.name)?)))
+        {
+            return set_aside(name, reason);
+        }
         let others = self.columns.iter().filter(|column| column.holds != Holds::Dates);
         let cell = others.flat_map(|column| column.cells.iter().map(|cell| (cell, column.name.as_str())));
         match cell.clone().find(|(cell, _)| !cell.text.is_empty()) {
@@ -240,6 +259,12 @@ fn columns<'a>(rows: Vec<Vec<Cell<'a>>>, heading: Option<Vec<Cell>>) -> Result<V
     if width > MOST_COLUMNS {
         return Err(Stop::refused(format!("The text has {width} columns: must have at most {MOST_COLUMNS}.")));
     }
+    if let Some(heading) = &heading
+        && let Some(months) = MonthsOfYears::of(heading, &rows)?
+    {
+        let (heading, rows) = months.unfolded(rows);
+        return columns(rows, Some(heading));
+    }
     let mut columns: Vec<Column> = Vec::with_capacity(width);
     for index in 0..width {
         let own = heading.as_ref().map(|heading| heading[index].text.to_string());
@@ -258,7 +283,7 @@ fn columns<'a>(rows: Vec<Vec<Cell<'a>>>, heading: Option<Vec<Cell>>) -> Result<V
 fn judge(columns: &mut [Column]) {
     let is_date = |column: &Column| {
         let given = column.given();
-        !given.is_empty() && are_dates(&given, false)
+        !given.is_empty() && !VALUES.contains(&core(&column.name).as_str()) && are_dates(&given, false)
     };
     let is_dates: Vec<bool> = columns.iter().map(is_date).collect();
     // What looks like dates in no known form is set aside where nothing else is dates.
@@ -266,7 +291,9 @@ fn judge(columns: &mut [Column]) {
         DATES.contains(&plain(&column.name).as_str()) || (!column.is_mostly_numbers() && column.is_labels())
     };
     let dates = is_dates.iter().position(|is| *is).or_else(|| columns.iter().position(&named));
-    let is_numbers = |(column, is_dates): (&Column, &bool)| !is_dates && !named(column) && column.is_mostly_numbers();
+    let is_numbers = |(column, is_dates): (&Column, &bool)| {
+        !is_dates && !named(column) && aside(&column.name).is_none() && column.is_mostly_numbers()
+    };
     let mut values: Vec<bool> = columns.iter().zip(&is_dates).map(is_numbers).collect();
     let many = |values: &[bool]| values.iter().filter(|is| **is).count() > 1;
     if many(&values) && values[0] && columns[0].counts() {
@@ -282,6 +309,10 @@ fn judge(columns: &mut [Column]) {
     if let Some(dates) = dates {
         columns[dates].holds = Holds::Dates;
     }
+}
+
+fn set_aside(name: &str, reason: &str) -> Stop {
+    Stop::refused(format!("Column {name} {reason}: name another column, or head it otherwise if it is an asset."))
 }
 
 fn ask(values: &[&Column]) -> Stop {

@@ -117,16 +117,19 @@ test("questions are answered by the keyboard alone, and nothing is trained befor
 });
 
 test("two columns of numbers are asked about, and another answer reads the file anew", async () => {
-  await chosen("two.csv", "month,fund,index\n2020-01,1.5,100\n2020-02,-2.5,99\n2020-03,3,101\n");
+  await chosen("two.csv", "month,fund,bonds\n2020-01,1.5,-0.4\n2020-02,-2.5,1.9\n2020-03,3,-1.2\n");
   await page.getByRole("checkbox", { name: /^fund / }).check();
   await page.getByRole("button", { name: "Read it so" }).click();
   await note().getByText("3 monthly simple returns in percent, January 2020 to March 2020, as in column fund.").waitFor();
   const column = (name) => page.getByRole("group", { name: "Columns" }).getByLabel(name).click();
-  await column("index");
-  await note().getByText("as in columns fund, index").waitFor();
+  await column("bonds");
+  await note().getByText("as in columns fund, bonds").waitFor();
   await column("fund");
-  await note().getByText("2 monthly returns of prices, February 2020 to March 2020, as in column index.").waitFor();
-  close(await history(), [Math.log(99 / 100), Math.log(101 / 99)]);
+  await note().getByText("3 monthly simple returns in percent, January 2020 to March 2020, as in column bonds.").waitFor();
+  close(
+    await history(),
+    [-0.4, 1.9, -1.2].map((value) => Math.log1p(value / 100)),
+  );
 });
 
 test("a bad cell is named and shown, and the numbers before it are no longer in force", async () => {
@@ -148,7 +151,7 @@ test("what a file says of the bank is taken where that is wanted", async () => {
 
 test("a deviation above 30 % a period is not taken without a word", async () => {
   await pasted("500 -60 90 -30");
-  await note().getByText("standard deviation of 258.26 % a period. Is that right?").waitFor();
+  await note().getByText("standard deviation of 258.26 % a period and a mean of 1500.00 % a year").waitFor();
   assert.deepEqual(await history(), []);
   await page.getByRole("radio", { name: /^Yes, take them so/ }).check();
   await page.getByRole("button", { name: "Read it so" }).click();

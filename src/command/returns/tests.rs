@@ -169,3 +169,14 @@ fn columns_that_nothing_tells_apart_are_assets_and_a_known_heading_is_one() {
     let AnyReturns::Several(turned) = parse("energy,return", &["return", "energy"]) else { panic!("one asset") };
     assert_eq!(turned.record.assets, ["return", "energy"]);
 }
+
+#[test]
+fn volumes_and_other_prices_of_a_day_are_no_assets() {
+    let text = "Date,Open,High,Low,Last,Volume\n2008-01,99,102,98,100,1200\n2008-02,100,103,99,101,900\n2008-03,101,104,97,99,1500\n";
+    let found = AnyReturns::parse(text, &Choices::default(), Some(0.001), None).unwrap();
+    assert!(matches!(&found, AnyReturns::One(returns) if returns.column == "Last"), "{found:?}");
+    let columns = ["Open", "Last"].map(str::to_owned).to_vec();
+    let said = Choices { columns, ..Choices::default() };
+    let refused = AnyReturns::parse(text, &said, Some(0.001), None).unwrap_err().to_string();
+    assert!(refused.starts_with("Column Open is no return and not the last price of its period"), "{refused}");
+}

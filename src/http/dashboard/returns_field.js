@@ -8,7 +8,13 @@ import { fileDrop } from "./file_drop.js";
 import { pressed } from "./form.js";
 import { count, minus, percent, percentTick } from "./format.js";
 
-const KINDS = { simple: "Simple returns", log: "Log-returns", price: "Prices" };
+const KINDS = {
+  simple: "Simple returns",
+  log: "Log-returns",
+  price: "Prices",
+  gross: "What 1 becomes (1.012)",
+  cumulated: "Gains since the start",
+};
 const UNITS = { percent: "Percent (1.2)", fraction: "Fractions (0.012)" };
 const ORDERS = { false: "The oldest", true: "The newest" };
 /** Numbers are not judged while they are being typed, for so long, in milliseconds. */
@@ -23,7 +29,10 @@ const EXAMPLE = "/dashboard/us_market_monthly.csv";
 const LINES = 7;
 const HINT = "With dates, or oldest first. Separated by spaces, commas, semicolons, tabs or lines.";
 /** What was said of these is asked anew once another column or kind is chosen. */
-const FOLLOWS = { columns: ["kind", "unit", "large_deviation", "decimal_comma"], kind: ["unit", "large_deviation"] };
+const FOLLOWS = {
+  columns: ["kind", "unit", "unusual", "excess", "decimal_comma"],
+  kind: ["unit", "unusual", "excess"],
+};
 
 /**
  * `{element, show(history, assets), trouble(), typed(), restore(typed)}`; `changed(series, answer)` at every change, with the series that were read, `{column,
@@ -109,7 +118,7 @@ export function returnsField({ name, label, blank = null, example = null, severa
     return answer.outcome === "asked" ? `To be answered first: ${words(answer)}` : words(answer);
   };
   const show = (history, assets = null) => {
-    said = { kind: "log", unit: "fraction", large_deviation: true, ...(assets ? { columns: assets } : {}) };
+    said = { kind: "log", unit: "fraction", unusual: true, excess: false, ...(assets ? { columns: assets } : {}) };
     area.value = assets ? [assets, ...history].map((row) => row.join("\t")).join("\n") : history.join(" ");
     reading = judge();
   };

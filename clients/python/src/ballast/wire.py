@@ -502,7 +502,7 @@ class KeyHolder(TypedDict):
     """When the key ends, in milliseconds since 1970; null where that is not set."""
 
 
-Kind: TypeAlias = Literal["simple", "log", "price"]
+Kind: TypeAlias = Literal["simple", "log", "price", "gross", "cumulated"]
 """What the numbers are."""
 
 
@@ -1340,8 +1340,13 @@ class Choices(TypedDict):
     """Whether numbers in several columns are one record, line by line"""
     gaps: NotRequired[bool | None]
     """Whether a record from which periods are missing is taken as it is"""
-    large_deviation: NotRequired[bool | None]
-    """Whether a standard deviation above 30 % a period is right"""
+    unusual: NotRequired[bool | None]
+    """
+    Whether what is unusual of an asset is right: a deviation above 30 % a period or 150 % a year, a mean above 100 % a year,
+    or a return far from all others
+    """
+    excess: NotRequired[bool | None]
+    """Whether the returns are those beyond the bank, to which what its column says is added"""
     latest: NotRequired[int | None]
     """How many of the last returns count; all of them unless given"""
 

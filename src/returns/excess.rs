@@ -1,0 +1,55 @@
+//! Returns beyond the bank, as research files have them: what the bank paid is added, as it is the whole return that is advised
+//! on.
+
+use super::bank::Bank;
+use super::choices::{Choices, Kind};
+use super::heading::ColumnHeading;
+use super::kind::Returns;
+use super::outcome::Stop;
+
+/// The whole returns of the column `name`: asked for where its heading says that they are those beyond the bank.
+///
+/// # Errors
+/// It must be asked, there is no column of the bank to add, or a cell of it breaks a rule.
+pub fn whole(name: &str, returns: Returns, bank: Option<&Bank>, said: &Choices) -> Result<Returns, Stop> {
+    let is_return = returns.kind == Kind::Simple || returns.kind == Kind::Log;
+    match said.excess {
+        None if is_return && ColumnHeading::of(name).is_excess => Err(ask(name, bank)),
+        Some(true) if is_return => added(name, returns, bank, said),
+        _ => Ok(returns),
+    }
+}
+
+fn ask(name: &str, bank: Option<&Bank>) -> Stop {
+    let excess = |excess| Choices { excess: Some(excess), ..Choices::default() };
+    let add = bank.map(|bank| (format!("Yes: add column {}", bank.column.name), excess(true)));
+    let options = add.into_iter().chain([("No: they are whole returns".to_owned(), excess(false))]).collect();
+    let question = match bank {
+        Some(bank) => format!(
+            "Column {name} is headed as returns beyond the bank, which column {} has. Add the bank\u{2019}s?",
+            bank.column.name
+        ),
+        None => format!(
+            "Column {name} is headed as returns beyond the bank, and no column such as rf says what that paid, to be added. Are they \
+             whole returns all the same?"
+        ),
+    };
+    Stop::asked("excess", question, options)
+}
+
+fn added(name: &str, returns: Returns, bank: Option<&Bank>, said: &Choices) -> Result<Returns, Stop> {
+    let Some(bank) = bank else {
+        return Err(Stop::refused(format!(
+            "Column {name} holds returns beyond the bank, and no column such as rf says what that paid: add one."
+        )));
+    };
+    let paid = bank.rates(returns.simple.len(), returns.unit, said)?;
+    let paid = paid.map_err(|reason| Stop::refused(format!("Column {} is not added: {reason}.", bank.column.name)))?;
+    let simple: Vec<f64> = returns.simple.iter().zip(&paid.rates).map(|(beyond, rate)| beyond + rate).collect();
+    if let Some(index) = simple.iter().position(|simple| *simple <= -1.0) {
+        let cell = bank.cells[bank.cells.len() - simple.len() + index].called(&bank.column.name);
+        return Err(Stop::refused(format!("{cell}: with it {name} would lose all and more.")));
+    }
+    let logarithmic = simple.iter().map(|simple| simple.ln_1p()).collect();
+    Ok(Returns { simple, logarithmic, ..returns })
+}
