@@ -256,6 +256,11 @@ async def _assets_of(
     found = [column["name"] for column in reading["columns"] if column["holds"] == "values"]
     if not found and reading["outcome"] == "asked":
         raise UnclearReturns(name, reading["questions"])
+    if reading["outcome"] == "read":
+        # A heading that is known says which column is the one asset, as in a file.
+        read = [one["column"] for one in reading["series"]]
+        if len(read) < len(found) and len(read) == 1:
+            raise ValueError(f"{name} holds one asset, in column {read[0]}: assets must name several columns")
     return found if names is None else [each for each in names if heading(each) in found]
 
 
@@ -273,7 +278,7 @@ def per_period(
     Raises ``ValueError`` that names the argument and the rule: as many entries, and the same index where both have one.
     """
     found, (before, after) = list(values), _blank(returns)
-    last = before + (kind == "price") + periods
+    last = before + (kind in ("price", "cumulated")) + periods
     if len(found) != last + after:
         raise ValueError(f"{name} has {len(found)} entries: must have {last + after}, one for each entry of returns")
     check_aligned(name, values, returns)
