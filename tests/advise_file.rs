@@ -105,8 +105,11 @@ fn more_days_than_a_radius_is_simulated_for_need_a_window() {
     let refused = ballast(&asked);
     assert_eq!(
         text(&refused.stderr),
-        "ballast: --window is 15000 returns: must be fewer: the radius is not simulated for so many\n"
+        "ballast: the file is 15000 returns: must be at most 14999, as the radius is not simulated for more: --window 14999 \
+         uses the last ones\n"
     );
+    let named = ballast(&[&asked[..], &["--window", "15000"]].concat());
+    assert!(text(&named.stderr).starts_with("ballast: --window is 15000 returns: must be at most 14999"), "{named:?}");
     let answered = ballast(&[&asked[..], &["--window", "14999"]].concat());
     assert!(text(&answered.stdout).starts_with("14999 daily returns, 1970-01-02 to 2011-01-25, "), "{answered:?}");
 }

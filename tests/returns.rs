@@ -4,7 +4,6 @@
 mod support;
 
 use std::collections::BTreeSet;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -147,7 +146,9 @@ fn every_file_of_a_vendor_is_read_asked_about_or_refused_as_it_must_be() {
     let named: BTreeSet<String> = rows.iter().map(|row| row["file"].as_str().unwrap().to_owned()).collect();
     let files = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
     let files: BTreeSet<String> = files.filter(|name| name != "table.json").collect();
-    assert!(files.len() >= 30 && files == named, "{:?}", files.symmetric_difference(&named));
+    let odd: Vec<&String> = files.symmetric_difference(&named).collect();
+    assert!(files.len() >= 30 && odd.is_empty(), "{odd:?}");
+    let mut wrong = Vec::new();
     for row in rows {
         let bytes = std::fs::read(folder.join(row["file"].as_str().unwrap())).unwrap();
         let said = if row["choices"].is_object() { row["choices"].clone() } else { json!({}) };
@@ -160,16 +161,25 @@ fn every_file_of_a_vendor_is_read_asked_about_or_refused_as_it_must_be() {
             Reading::Asked { questions, .. } => ("asked", questions[0].question.clone()),
             Reading::Refused { sentence, .. } => ("refused", sentence.clone()),
         };
-        assert_eq!(row["outcome"], outcome, "{row}\n{says}");
-        assert!(says.starts_with(row["says"].as_str().unwrap()), "{row}\n{says}");
         let contains = row["contains"].as_str().unwrap_or_default();
-        assert!(says.contains(contains), "{row}\n{says}");
+        let periods = match &reading {
+            Reading::Read(record) => json!(record.periods_per_year),
+            _ => Value::Null,
+        };
+        let is_right = row["outcome"] == outcome
+            && says.starts_with(row["says"].as_str().unwrap())
+            && says.contains(contains)
+            && (row["periods"].is_null() || row["periods"] == periods);
+        if !is_right {
+            wrong.push(format!("{row}\n{outcome}: {says} {periods}"));
+        }
         if let Reading::Asked { questions, .. } = reading {
             for question in questions {
                 assert!(question.options.iter().any(|option| option.sentence.is_some()), "{row}\n{question:?}");
             }
         }
     }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
 }
 
 /// A generator of its own, so that a failure can be repeated.
@@ -273,18 +283,28 @@ fn records_are_read_as_they_were_written_or_asked_about() {
     assert!(records > 2000 && asked > 0, "{records} {asked}");
 }
 
+/// A word that says there is no number leaves out the last row with a remark; everywhere else, and any other word, stops.
 #[test]
 fn a_cell_out_of_place_is_never_passed_over() {
     for seed in 1..=500 {
-        let (text, _) = written(seed);
+        let (text, truth) = written(seed);
         let mut random = Random(seed + 1_000_000);
         let mut rows: Vec<String> = text.lines().map(str::to_owned).collect();
         let at = 1 + random.below(rows.len() - 1);
         let start = rows[at].rfind([';', ',', '\t']).filter(|_| !rows[at].ends_with('"')).map_or(0, |last| last + 1);
         rows[at].truncate(start);
-        let _ = write!(rows[at], "{}", random.one(&["NA", "n/a", "#N/A", "x", "-", "null"]));
+        let word = random.one(&["NA", "n/a", "#N/A", "x", "-", "null"]);
+        rows[at].push_str(word);
         let found = read(&rows.join("\n"), &Choices::default());
-        assert!(!matches!(found, Reading::Read(_)), "seed {seed}: {found:?}\n{}", rows.join("\n"));
+        let Reading::Read(record) = &found else { continue };
+        let is_told = record.remarks.iter().any(|remark| remark == "1 blank row before or after the numbers left out.");
+        let is_at_an_end = at == rows.len() - 1 || at == 1;
+        // The row was one quoted cell: without a date it stands below the table.
+        let is_below =
+            record.remarks.iter().any(|remark| remark.starts_with(&format!("Line {} after the table", at + 1)));
+        let is_right = is_below || (word != "x" && is_told && is_at_an_end);
+        assert!(is_right, "seed {seed}: {found:?}\n{}", rows.join("\n"));
+        assert_eq!(record.count + 1, truth.len(), "seed {seed}");
     }
 }
 
@@ -337,6 +357,23 @@ fn one_impossible_cell_never_changes_what_the_others_are() {
         });
     }
     assert!(refused > 1500 && asked < refused / 2, "{refused} {asked}");
+}
+
+/// Texts of the most lines whose rows look like dates of many forms, or like none, are answered in time.
+#[test]
+fn hostile_tables_are_answered_in_time() {
+    let forms =
+        ["2020-01-02", "01/02/20", "Jan 2020", "2020 Q1", "20200102", "2020.1", "1580428800", "2020", "Mai 2020"];
+    let row = |index: usize| format!("{},{},{}\n", forms[index % 9], forms[index / 9 % 9], index % 13);
+    let mixed: String = (0..190_000).map(row).collect();
+    let words: String = (0..190_000).map(|_| "Northern,Lights,fund\n").collect::<String>() + "2020-01,1,2\n";
+    let footers = "2020-01,1\n2020-02,2\n2020-03,-1\n".to_owned() + &"Total 2020,5\n".repeat(190_000);
+    let headings = "a,b\n".repeat(190_000) + "2020-01,0.1\n2020-02,0.2\n2020-03,-0.1\n";
+    let started = Instant::now();
+    for text in [mixed, words, footers, headings] {
+        read(&text, &Choices::default());
+    }
+    assert!(started.elapsed() < Duration::from_secs(30), "{:?}", started.elapsed());
 }
 
 #[test]

@@ -5,6 +5,7 @@ use std::error::Error;
 
 use ballast::control::error::FieldError;
 use ballast::control::request::learning::Learning;
+use ballast::control::request::rules::largest_sample;
 use ballast::control::request::specification::{ProblemSpecification, default_seed};
 use ballast::service::advise::Advise;
 use clap::Args;
@@ -51,8 +52,8 @@ const OPTIONS: [(&str, &str); 6] = [
 pub fn run(arguments: &AdviseArgs) -> Result<(), Box<dyn Error>> {
     let returns = arguments.record.read()?;
     let count = returns.rows().len();
-    let advised = arguments.question(&returns).answer().map_err(|error| by_option(error, count))?;
-    let told = || words::told(&advised, arguments.wealth, returns.frequency);
+    let advised = arguments.question(&returns).answer().map_err(|error| by_option(error, count, &arguments.record))?;
+    let told = || words::told(&advised, arguments.wealth, returns.noun());
     Ok(show(&returns.sentence(), arguments.json, &advised, told)?)
 }
 
@@ -73,11 +74,14 @@ impl AdviseArgs {
     }
 }
 
-/// The same error of a question about `count` returns, under the name by which the user knows the field.
-fn by_option(error: FieldError, count: usize) -> FieldError {
+/// The error of a question about `count` returns, under the name by which the user knows the field.
+fn by_option(error: FieldError, count: usize, record: &Record) -> FieldError {
     if error.field == "problem.radius.paths" {
-        let rule = "must be fewer: the radius is not simulated for so many";
-        return FieldError::new("--window", format!("{count} returns"), rule);
+        let most = error.value.parse().map_or(0, largest_sample);
+        let rule = format!(
+            "must be at most {most}, as the radius is not simulated for more: --window {most} uses the last ones"
+        );
+        return FieldError::new(record.source(), format!("{count} returns"), rule);
     }
     match OPTIONS.iter().find(|(field, _)| *field == error.field) {
         Some((_, option)) => FieldError { field: (*option).into(), ..error },

@@ -147,7 +147,8 @@ fn page(
     sentences: &[String],
 ) -> Result<String, FileError> {
     let date = |date: Option<&String>| date.cloned().unwrap_or_default();
-    let title = format!("{name}, {} to {}", date(dates.first()), date(dates.last()));
+    let span = if dates.is_empty() { "" } else { &format!(", {} to {}", date(dates.first()), date(dates.last())) };
+    let title = format!("{name}{span}");
     report::html(dashboard::embedded, module, &title, read, sentences)
 }
 
@@ -191,7 +192,7 @@ impl BacktestArgs {
             log_returns: None,
             simple_returns: Some(rows.iter().map(|row| row.risky_return).collect()),
             rate: Rates::Listed(rows.iter().map(|row| row.risk_free_return).collect()),
-            dates: Some(rows.iter().map(|row| row.date.clone()).collect()),
+            dates: returns.frequency.map(|_| rows.iter().map(|row| row.date.clone()).collect()),
             periods_per_year: Some(returns.periods_per_year),
             window,
             every: self.every,

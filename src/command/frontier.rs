@@ -47,7 +47,8 @@ pub fn run(arguments: &FrontierArgs) -> Result<(), Box<dyn Error>> {
         AnyReturns::One(returns) => returns.sentence(),
         AnyReturns::Several(returns) => returns.sentence.clone(),
     };
-    let question = arguments.request(&returns).question().map_err(by_option)?;
+    let question = arguments.request(&returns).question();
+    let question = question.map_err(|error| by_option(error, arguments.record.source()))?;
     let report = Frontier::new(question, Kept::default()).run(&Watch::unwatched())?;
     Ok(show(&read, arguments.json, &report, || told(&report))?)
 }
@@ -68,13 +69,13 @@ impl FrontierArgs {
     }
 }
 
-/// The same error under the option by which the user knows the field.
-fn by_option(error: FieldError) -> FieldError {
+/// Names the option by which the user knows the field; `source` says how many returns are used.
+fn by_option(error: FieldError, source: &'static str) -> FieldError {
     let option = match error.field.as_str() {
         "resamples" => "--resamples",
         "block" => "--block",
         "problem.radius.alpha" => "--alpha",
-        "problem.history" => "--window",
+        "problem.history" => source,
         "problem.periods_per_year" => "--periods-per-year",
         field if field.starts_with("scales") => "--scales",
         _ => return error,

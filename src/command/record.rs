@@ -52,6 +52,11 @@ impl Record {
         Err(FieldError::new("--risk-aversion", self.risk_aversion, "must lie in [1, 100]"))
     }
 
+    /// What says how many returns are used: an option if it is given, else the file.
+    pub fn source(&self) -> &'static str {
+        if self.window.is_some() { "--window" } else { "the file" }
+    }
+
     fn last(&self, returns: Returns) -> Result<Returns, ReturnsError> {
         self.window.map_or(Ok(returns.clone()), |window| returns.last(window))
     }

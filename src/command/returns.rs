@@ -9,20 +9,18 @@ use ballast::control::evaluation::account::Annual;
 use ballast::control::evaluation::assets::AssetsRecord;
 use ballast::control::evaluation::rolling::Period;
 pub use ballast::control::request::frequency::Frequency;
-use ballast::returns::{Choices, Holds, Kind, Reading, Record, Series, Unit, decoded, read};
+use ballast::returns::{Choices, Holds, Kind, Question, Reading, Record, Series, Unit, decoded, read};
 use clap::Args;
 
+use calendar::{Calendar, SEVERAL, check};
 pub use error::ReturnsError;
 
+mod calendar;
 mod error;
 #[cfg(test)]
 mod tests;
 
 const CSV: &str = include_str!("../../data/us_market_monthly.csv");
-/// Of periods in a year: a day at the shortest.
-const PERIODS_PER_YEAR: std::ops::RangeInclusive<usize> = 1..=366;
-/// Of what the bank pays a period; as `problem.rate_per_step`.
-const RATE: std::ops::RangeInclusive<f64> = -0.5..=0.5;
 
 /// Where the returns of a command come from.
 #[derive(Debug, Clone, Args)]
@@ -42,7 +40,7 @@ pub struct ReturnsFile {
 /// One period: returns as fractions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Of the end of the period, in ISO 8601, as fine as the frequency: `2008-01` of a month.
+    /// Of the end of the period, in ISO 8601, as fine as the frequency: `2008-01` of a month; the number of the row without dates.
     pub date: String,
     pub log_return: f64,
     pub risky_return: f64,
@@ -53,7 +51,8 @@ pub struct Row {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Returns {
     rows: Vec<Row>,
-    pub frequency: Frequency,
+    /// `None` if the dates do not tell one.
+    pub frequency: Option<Frequency>,
     pub periods_per_year: usize,
     /// What the column of the risky asset holds, and its name.
     what: &'static str,
@@ -81,16 +80,6 @@ pub enum AnyReturns {
     Several(SeveralReturns),
 }
 
-/// What is known of the periods themselves.
-struct Calendar {
-    dates: Vec<String>,
-    frequency: Frequency,
-    periods_per_year: usize,
-    /// What the bank paid, and where that is said.
-    rates: Vec<f64>,
-    bank: String,
-}
-
 impl Row {
     pub fn period(&self) -> Period {
         Period { log_return: self.log_return, bank_return: self.risk_free_return }
@@ -110,6 +99,11 @@ impl ReturnsFile {
     /// As [`Self::read`].
     pub fn read_any(&self) -> Result<AnyReturns, ReturnsError> {
         AnyReturns::parse(&self.text()?, &self.choices, self.rate, self.periods_per_year)
+    }
+
+    /// Whether options say which columns are read.
+    pub fn names_columns(&self) -> bool {
+        !self.choices.columns.is_empty()
     }
 
     fn text(&self) -> Result<String, ReturnsError> {
@@ -161,6 +155,11 @@ impl Returns {
         &self.rows
     }
 
+    /// One period, in a word.
+    pub fn noun(&self) -> &'static str {
+        self.frequency.map_or("period", Frequency::noun)
+    }
+
     /// The last `count` periods.
     ///
     /// # Errors
@@ -178,7 +177,7 @@ impl Returns {
     /// The `count` periods before `date`, oldest first.
     pub fn before(&self, date: &str, count: usize) -> Result<&[Row], ReturnsError> {
         let end = self.rows.partition_point(|row| row.date.as_str() < date);
-        let noun = self.frequency.noun();
+        let noun = self.noun();
         let too_short = || ReturnsError::TooShort { date: date.into(), wanted: count, noun, found: end };
         let start = end.checked_sub(count).ok_or_else(too_short)?;
         Ok(&self.rows[start..end])
@@ -206,13 +205,13 @@ impl Returns {
     pub fn sentence(&self) -> String {
         let Annual { mean, volatility, .. } = self.annual();
         let date = |row: Option<&Row>| row.map_or(String::new(), |row| row.date.clone());
-        let noun = self.frequency.noun();
+        let noun = self.noun();
+        let adjective = self.frequency.map_or(String::new(), |frequency| format!("{} ", frequency.adjective()));
         let remarks: String = self.remarks.iter().map(|remark| format!(" {remark}")).collect();
         format!(
-            "{} {} {}, {} to {}, as in column {}.\nA year of {} {noun}{} has a mean of {:.1} % and a deviation of {:.1} %. \
+            "{} {adjective}{}, {} to {}, as in column {}.\nA year of {} {noun}{} has a mean of {:.1} % and a deviation of {:.1} %. \
              The bank pays {:.3} % a {noun}, {:.1} % a year, by {}.{remarks}",
             self.rows.len(),
-            self.frequency.adjective(),
             self.what,
             date(self.rows.first()),
             date(self.rows.last()),
@@ -251,7 +250,9 @@ impl AnyReturns {
             return Returns::of(record, rate, periods_per_year).map(AnyReturns::One);
         }
         let calendar = Calendar::of(&record, rate, periods_per_year)?;
-        let Calendar { dates, frequency, periods_per_year, rates, .. } = calendar;
+        let Calendar { dates, frequency: Some(frequency), periods_per_year, rates, .. } = calendar else {
+            return Err(ReturnsError::NoFrequency { rule: SEVERAL });
+        };
         let row = |period: usize| record.series.iter().map(|series| series.log_returns[period]).collect();
         let by_option = rate.map_or(String::new(), |rate| format!(" The bank pays {:.3} % by --rate.", 100.0 * rate));
         Ok(AnyReturns::Several(SeveralReturns {
@@ -290,36 +291,17 @@ fn record(
     }
     match reading {
         Reading::Read(record) => Ok(record),
-        Reading::Asked { questions, .. } => Err(ReturnsError::asked(&questions)),
+        Reading::Asked { questions, .. } => {
+            let needs_year = periods_per_year.is_none() && leaves_frequency_open(text, choices, &questions);
+            Err(ReturnsError::asked(&questions, needs_year))
+        }
         Reading::Refused { sentence, .. } => Err(ReturnsError::Refused { said: sentence }),
     }
 }
 
-impl Calendar {
-    fn of(record: &Record, rate: Option<f64>, periods_per_year: Option<usize>) -> Result<Self, ReturnsError> {
-        let (Some(frequency), Some(dates), Some(periods)) =
-            (record.frequency, record.dates.clone(), record.periods_per_year)
-        else {
-            return Err(ReturnsError::NoFrequency);
-        };
-        let (bank, rates) = match (rate, &record.rate) {
-            (Some(rate), _) => ("--rate".to_owned(), vec![rate; dates.len()]),
-            (None, Some(column)) => (format!("the last row of column {}", column.column), column.rates.clone()),
-            (None, None) => return Err(ReturnsError::NoBank { remarks: format!("\n{}", record.remarks.join(" ")) }),
-        };
-        Ok(Calendar { dates, frequency, periods_per_year: periods_per_year.unwrap_or(periods), rates, bank })
-    }
-}
-
-/// The rules of the options.
-fn check(rate: Option<f64>, periods_per_year: Option<usize>) -> Result<(), ReturnsError> {
-    if let Some(rate) = rate.filter(|rate| !RATE.contains(rate)) {
-        let rule = "must be a fraction a period from -0.5 to 0.5: 0.002 is 0.2 %";
-        return Err(ReturnsError::Option { option: "--rate", value: rate.to_string(), rule });
-    }
-    if let Some(periods) = periods_per_year.filter(|periods| !PERIODS_PER_YEAR.contains(periods)) {
-        let (option, rule) = ("--periods-per-year", "must be 1 to 366");
-        return Err(ReturnsError::Option { option, value: periods.to_string(), rule });
-    }
-    Ok(())
+/// Whether the first answer to each question gives a record of which the dates do not say what a period is.
+fn leaves_frequency_open(text: &str, choices: &Choices, questions: &[Question]) -> bool {
+    let answers = questions.iter().filter_map(|question| question.options.first());
+    let choices = answers.fold(choices.clone(), |choices, answer| choices.with(&answer.choices));
+    matches!(read(text, &choices), Reading::Read(Record { frequency: None, .. }))
 }

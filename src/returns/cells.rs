@@ -18,10 +18,13 @@ const COMMA: char = ',';
 const BLANK: char = ' ';
 /// Lines by which the meaning of a comma is told: it is the same in all of them.
 const FIRST: usize = 200;
+/// Words that stand where a number is missing, and the most letters of them.
+const MISSING: [&str; 11] = ["n/a", "na", "#n/a", "#na", "nan", "null", "none", "<na>", "-", "--", "."];
+const LONGEST_MISSING: usize = 4;
 /// Letters of a value that are shown.
 const SHOWN: usize = 60;
 pub const SPREADSHEET: &str = "This is a spreadsheet file. Save it as CSV, or copy the column and paste it.";
-pub const NO_TEXT: &str = "This is no text in UTF-8 or UTF-16. Save it as CSV in UTF-8.";
+pub const NO_TEXT: &str = "This is no text in UTF-8, UTF-16 or Windows-1252. Save it as CSV in UTF-8.";
 
 /// What stands between two separators.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,6 +51,17 @@ impl Cell<'_> {
         Stop::Refused { sentence: format!("{}: {rule}", self.called(name)), place: Some(place) }
     }
 
+    /// Whether the cell is blank, or says in a word that there is no number.
+    pub fn is_missing(&self) -> bool {
+        self.text.is_empty()
+            || (self.text.len() <= LONGEST_MISSING && MISSING.contains(&self.text.to_ascii_lowercase().as_str()))
+    }
+
+    /// From 1.
+    pub fn line(&self) -> u32 {
+        self.line
+    }
+
     /// Where the cell stands and what it holds, in words.
     pub fn called(&self, name: &str) -> String {
         let Place { line, column, value } = self.place();
@@ -55,12 +69,16 @@ impl Cell<'_> {
         format!("line {line}: {name} is {value:?}")
     }
 
-    fn place(&self) -> Place {
-        let value = match self.text.char_indices().nth(SHOWN) {
+    /// The text, shortened if it is long.
+    pub fn shown(&self) -> String {
+        match self.text.char_indices().nth(SHOWN) {
             Some((end, _)) => format!("{}\u{2026}", &self.text[..end]),
             None => self.text.to_string(),
-        };
-        Place { line: self.line as usize, column: self.column as usize, value }
+        }
+    }
+
+    fn place(&self) -> Place {
+        Place { line: self.line as usize, column: self.column as usize, value: self.shown() }
     }
 }
 
@@ -82,16 +100,19 @@ impl<'a> Rows<'a> {
     /// The text is none, too long, or a comma in it can be meant in two ways.
     pub fn of(text: &'a str, said: &Choices) -> Result<Self, Stop> {
         let text = text.trim_start_matches('\u{feff}');
-        check(text)?;
+        let end = if text.contains('\n') { '\n' } else { '\r' };
+        check(text, end)?;
         let number =
             |(index, text): (usize, &'a str)| Line { text, number: u32::try_from(index + 1).unwrap_or(u32::MAX) };
         let given: Vec<Line> =
-            text.split('\n').enumerate().map(number).filter(|line| !line.text.trim().is_empty()).collect();
-        let lines: Vec<Line> = given.iter().copied().filter(|line| !is_remark(line.text)).collect();
+            text.split(end).enumerate().map(number).filter(|line| !line.text.trim().is_empty()).collect();
+        let declared = given.first().and_then(|line| declared(line.text));
+        let from = usize::from(declared.is_some());
+        let lines: Vec<Line> = given[from..].iter().copied().filter(|line| !is_remark(line.text)).collect();
         if lines.is_empty() {
             return Err(Stop::refused("There are no numbers in the text."));
         }
-        let separator = separator(&lines, said)?;
+        let separator = declared.map_or_else(|| separator(&lines, said), Ok)?;
         let mut rows = lines.iter().map(|line| cells(*line, separator)).collect::<Result<Vec<_>, Stop>>()?;
         let filled = |row: &Vec<Cell>| row.iter().rposition(|cell| !cell.text.is_empty()).map_or(0, |last| last + 1);
         rows.retain(|row| filled(row) > 0);
@@ -105,10 +126,10 @@ impl<'a> Rows<'a> {
     }
 }
 
-fn check(text: &str) -> Result<(), Stop> {
+fn check(text: &str, end: char) -> Result<(), Stop> {
     let bounds = [
         (text.len(), MOST_BYTES, "bytes"),
-        (text.bytes().filter(|byte| *byte == b'\n').count(), MOST_LINES, "lines"),
+        (text.matches(end).count(), MOST_LINES, "lines"),
         (text.chars().filter(|letter| letter.is_whitespace() || ",;|".contains(*letter)).count(), MOST_CELLS, "cells"),
     ];
     if let Some((found, most, what)) = bounds.into_iter().find(|(found, most, _)| found > most) {
@@ -120,20 +141,44 @@ fn check(text: &str) -> Result<(), Stop> {
     if text.contains(['\0', '\u{fffd}']) { Err(Stop::refused(NO_TEXT)) } else { Ok(()) }
 }
 
-/// #N/A is what a spreadsheet leaves where a number is missing.
+/// A spreadsheet leaves #N/A where a number is missing: that is no remark.
 fn is_remark(line: &str) -> bool {
     let line = line.trim_start();
-    line.starts_with('#') && !line.get(..4).is_some_and(|start| start.eq_ignore_ascii_case("#N/A"))
+    line.starts_with('#') && !line.get(..3).is_some_and(|start| ["#N/", "#NA"].contains(&&*start.to_ascii_uppercase()))
+}
+
+/// The separator that a first line such as `sep=;` declares to a spreadsheet.
+fn declared(line: &str) -> Option<char> {
+    let mut rest = line.trim_matches(['"', '\r']).strip_prefix("sep=")?.chars();
+    let separator = rest.next()?;
+    ((separator == COMMA || SEPARATORS.contains(&separator)) && rest.next().is_none()).then_some(separator)
+}
+
+/// Lines that end in a number, but for separators: what parts their cells is told by them, and not by words around a table.
+fn numeric<'a>(lines: &[Line<'a>]) -> Vec<Line<'a>> {
+    let ends_in_number = |line: &Line| {
+        let rest = line.text.trim_end_matches(|letter: char| letter.is_whitespace() || "\",;|%)".contains(letter));
+        rest.ends_with(|letter: char| letter.is_ascii_digit() || letter == '.')
+    };
+    // The line above the first of them may be its heading.
+    let from = lines.iter().position(ends_in_number).unwrap_or(0).saturating_sub(1);
+    let is_shown = |(index, line): &(usize, &Line)| *index == from || ends_in_number(line);
+    let found: Vec<Line> = lines.iter().enumerate().filter(is_shown).map(|(_, line)| *line).collect();
+    if found.len() < 2 { lines.to_vec() } else { found }
 }
 
 fn separator(lines: &[Line], said: &Choices) -> Result<char, Stop> {
-    let outside = |wanted: char| {
-        lines.iter().any(|line| line.text.split('"').step_by(2).any(|unquoted| unquoted.contains(wanted)))
+    let lines = &numeric(lines)[..];
+    let holding = |wanted: char| {
+        let outside = |line: &&Line| line.text.split('"').step_by(2).any(|unquoted| unquoted.contains(wanted));
+        lines.iter().filter(outside).count()
     };
-    if let Some(plain) = SEPARATORS.into_iter().find(|separator| outside(*separator)) {
+    let counts = SEPARATORS.map(|separator| (holding(separator), separator));
+    let (count, plain) = counts.into_iter().rev().max().unwrap_or((0, COMMA));
+    if count > 0 && 2 * count >= lines.len() {
         return Ok(plain);
     }
-    if outside(COMMA) {
+    if holding(COMMA) > 0 {
         return match said.comma_parts {
             Some(parts) => Ok(if parts { COMMA } else { BLANK }),
             None => comma(lines),

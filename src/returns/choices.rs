@@ -82,7 +82,7 @@ pub struct Choices {
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub one_record: Option<bool>,
-    /// Whether a record from which periods are missing is taken as it is
+    /// Whether a record from which periods are missing is taken as it is, without the rows that have no number
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gaps: Option<bool>,

@@ -1,8 +1,10 @@
 //! Dates of a record's rows: in one form for the whole column, never guessed row by row, and never taken for numbers.
 
-use jiff::civil::Date;
+use jiff::civil::{Date, ISOWeekDate, Weekday};
 
 use super::choices::Choices;
+use super::month_names;
+use super::numbered_dates::{epoch, go_one_way, serial};
 use super::outcome::Stop;
 use crate::control::request::frequency::Frequency;
 
@@ -20,6 +22,30 @@ const MONTHS: [&str; 12] = [
     "November",
     "December",
 ];
+/// Headings of columns that are dates even if their cells are not understood.
+const HEADINGS: [&str; 21] = [
+    "date",
+    "dates",
+    "datetime",
+    "observationdate",
+    "tradedate",
+    "timestamp",
+    "time",
+    "opentime",
+    "unix",
+    "unixtime",
+    "epoch",
+    "day",
+    "week",
+    "month",
+    "quarter",
+    "year",
+    "periodending",
+    "datum",
+    "fecha",
+    "monat",
+    "jahr",
+];
 /// Of records of returns; what lies outside is a number that looks like a date.
 const YEARS: std::ops::RangeInclusive<i16> = 1700..=2200;
 /// 1-2020 and Jan-99 are the shortest dates that are no numbers.
@@ -30,20 +56,23 @@ const PIVOT: i16 = 69;
 const FIRST: usize = 50;
 /// A column is one of dates where so many of its cells are: written apart by marks, or in digits that might be numbers.
 const MARKED: f64 = 0.5;
-const IN_DIGITS: f64 = 0.9;
+pub const IN_DIGITS: f64 = 0.9;
 
 /// How dates are written: `y` is a year of four digits and `u` one of two, `m` and `d` one or two digits, `A` and `B` a month and
-/// a day of two, `n` a month's name, `q` a quarter, `t` the time of day or nothing, `_` any marks and blanks or none, `/` a mark
-/// between numbers, `-` one of those that are no decimal point; other letters stand for themselves.
+/// a day of two, `n` a month's name, `q` a quarter, `w` a week, `o` a month after a decimal point, of which 1 is October; `t` the
+/// time of day or nothing, `_` any marks and blanks or none, `/` a mark between numbers, `-` one of those that are no decimal
+/// point, `#` the day number of a spreadsheet, `@` seconds since 1970; other letters stand for themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Form(&'static str);
 
-const FORMS: [Form; 16] = [
+pub const FORMS: [Form; 22] = [
     Form("y/m/dt"),
     Form("y-mt"),
     Form("yMm"),
     DAY_FIRST,
     MONTH_FIRST,
+    SHORT_DAY_FIRST,
+    SHORT_MONTH_FIRST,
     Form("m/y"),
     Form("d_n_y"),
     Form("n_d_y"),
@@ -51,23 +80,51 @@ const FORMS: [Form; 16] = [
     Form("y_n"),
     Form("y_Qq"),
     Form("Qq_y"),
+    Form("y_Ww"),
     Form("d_n_u"),
     Form("n_u"),
     Form("yAB"),
     Form("yA"),
+    DECIMAL_MONTH,
+    EPOCH,
+    YEAR,
 ];
 const DAY_FIRST: Form = Form("d/m/yt");
 const MONTH_FIRST: Form = Form("m-d-yt");
-const YEAR: Form = Form("y");
+const SHORT_DAY_FIRST: Form = Form("d/m/ut");
+const SHORT_MONTH_FIRST: Form = Form("m-d-ut");
+/// 1871.01 to 1871.09, 1871.1, 1871.11 and 1871.12.
+const DECIMAL_MONTH: Form = Form("y.o");
+const EPOCH: Form = Form("@");
+/// Five digits may be a price: they are dates under a heading of dates alone.
+const SERIAL: Form = Form("#");
+pub const YEAR: Form = Form("y");
 
 impl Form {
-    fn is_digits(self) -> bool {
-        matches!(self.0, "yAB" | "yA" | "y")
+    /// Whether its dates could be plain numbers as well.
+    pub fn is_digits(self) -> bool {
+        matches!(self.0, "yAB" | "yA" | "y.o" | "@" | "#" | "y")
+    }
+
+    /// Whether numbers that could be dates in this form go on as dates do.
+    fn goes_on(self, texts: &[&str]) -> bool {
+        let dates = || texts.iter().filter_map(|text| self.date(text)).collect::<Vec<Date>>();
+        let months = |date: &Date| 12 * i32::from(date.year()) + i32::from(date.month());
+        match self {
+            EPOCH | SERIAL => go_one_way(&dates()),
+            DECIMAL_MONTH => dates().windows(2).all(|pair| (months(&pair[1]) - months(&pair[0])).abs() == 1),
+            _ => true,
+        }
     }
 
     /// The day that `text` is in this form, the first of a month or a year, or the last month's of a quarter.
     pub fn date(self, text: &str) -> Option<Date> {
-        let (mut year, mut month, mut day, mut rest) = (0, 1, 1, text.trim());
+        let (mut year, mut month, mut day, mut week, mut rest) = (0, 1, 1, None, without_weekday(text.trim()));
+        match self {
+            SERIAL => return serial(rest),
+            EPOCH => return epoch(rest),
+            _ => {}
+        }
         for letter in self.0.chars() {
             match letter {
                 'y' => year = digits(&mut rest, 4, 4)?,
@@ -78,6 +135,8 @@ impl Form {
                 'B' => day = digits(&mut rest, 2, 2)?,
                 'q' => month = digits(&mut rest, 1, 1).filter(|quarter| (1..=4).contains(quarter))? * 3,
                 'n' => month = name(&mut rest)?,
+                'w' => week = Some(digits(&mut rest, 2, 2)?),
+                'o' => month = decimal_month(&mut rest)?,
                 't' => rest = rest.strip_suffix('Z').unwrap_or(rest),
                 '_' => rest = rest.trim_start_matches([' ', '.', ',', '-']),
                 '/' => rest = rest.strip_prefix(['/', '-', '.'])?,
@@ -86,7 +145,10 @@ impl Form {
             }
         }
         let is_time = |rest: &str| self.0.ends_with('t') && rest.starts_with(['T', ' ']) && rest.contains(':');
-        let date = Date::new(year, i8::try_from(month).ok()?, i8::try_from(day).ok()?).ok()?;
+        let date = match week {
+            Some(week) => ISOWeekDate::new(year, i8::try_from(week).ok()?, Weekday::Friday).ok()?.date(),
+            None => Date::new(year, i8::try_from(month).ok()?, i8::try_from(day).ok()?).ok()?,
+        };
         ((rest.is_empty() || is_time(rest)) && YEARS.contains(&year)).then_some(date)
     }
 }
@@ -98,14 +160,38 @@ fn digits(rest: &mut &str, least: usize, most: usize) -> Option<i16> {
     if count < least { None } else { number.parse().ok() }
 }
 
-/// A month by three letters of its name or more.
+/// A month by three letters of its name or more; a Spanish `de` may stand on both sides.
 fn name(rest: &mut &str) -> Option<i16> {
-    let count = rest.bytes().take_while(u8::is_ascii_alphabetic).count();
-    let (word, after) = rest.split_at(count);
-    *rest = after.strip_prefix('.').unwrap_or(after);
-    let starts = |name: &str| name.get(..count).is_some_and(|start| start.eq_ignore_ascii_case(word));
-    let found = if word.eq_ignore_ascii_case("sept") { Some(8) } else { MONTHS.iter().position(|name| starts(name)) };
-    found.filter(|_| count >= 3).and_then(|index| i16::try_from(index + 1).ok())
+    let start = rest.strip_prefix("de ").unwrap_or(rest);
+    let (word, after) = start.split_at(start.find(|letter: char| !letter.is_alphabetic()).unwrap_or(start.len()));
+    let after = after.strip_prefix('.').unwrap_or(after);
+    *rest = after.strip_prefix(" de ").unwrap_or(after);
+    month_names::month(word)
+}
+
+/// Two digits, or the one that is left of 10.
+fn decimal_month(rest: &mut &str) -> Option<i16> {
+    if *rest == "1" {
+        *rest = "";
+        return Some(10);
+    }
+    digits(rest, 2, 2)
+}
+
+/// Without the name of a weekday before the date.
+fn without_weekday(text: &str) -> &str {
+    const DAYS: [&str; 7] = ["mon", "tue", "wed", "thu", "fri", "sat", "sun"];
+    let is_day = |start: &str| DAYS.iter().any(|day| start.eq_ignore_ascii_case(day));
+    if !text.get(..3).is_some_and(is_day) {
+        return text;
+    }
+    text.trim_start_matches(char::is_alphabetic).trim_start_matches([',', '.', ' '])
+}
+
+/// Whether a heading says that its column holds dates.
+pub fn heads_dates(name: &str) -> bool {
+    let plain: String = name.to_lowercase().chars().filter(|letter| letter.is_alphanumeric()).collect();
+    HEADINGS.contains(&plain.as_str())
 }
 
 /// The month from 1 that `text` alone names.
@@ -134,7 +220,8 @@ fn best(texts: &[&str]) -> Vec<Form> {
     };
     let shares = FORMS.iter().map(|form| (*form, share(form)));
     let fits = |(form, share): &(Form, f64)| *share >= if form.is_digits() { IN_DIGITS } else { MARKED };
-    let fitting: Vec<(Form, f64)> = shares.filter(fits).collect();
+    let fitting: Vec<(Form, f64)> =
+        shares.filter(fits).filter(|(form, _)| *form != YEAR && form.goes_on(texts)).collect();
     let most = fitting.iter().map(|(_, share)| *share).fold(0.0, f64::max);
     fitting.into_iter().filter(|(_, share)| *share == most).map(|(form, _)| form).collect()
 }
@@ -142,6 +229,28 @@ fn best(texts: &[&str]) -> Vec<Form> {
 /// Whether a column holds dates; where it `stands_alone`, years may as well be prices.
 pub fn are_dates(texts: &[&str], stands_alone: bool) -> bool {
     !best(texts).is_empty() || (!stands_alone && are_years(texts))
+}
+
+/// Whether a column that is headed as dates holds some that are understood.
+pub fn are_understood(texts: &[&str]) -> bool {
+    are_dates(texts, false) || are_serials(texts)
+}
+
+/// Whole numbers that a spreadsheet shows as days, one after the other.
+fn are_serials(texts: &[&str]) -> bool {
+    !texts.is_empty() && texts.iter().all(|text| SERIAL.date(text).is_some()) && SERIAL.goes_on(texts)
+}
+
+/// What numbers that stand for dates are taken for, as a sentence.
+pub fn numbered(form: Form, texts: &[&str]) -> Option<String> {
+    let what = match form {
+        SERIAL => "the day numbers of a spreadsheet",
+        EPOCH => "counted from 1970",
+        DECIMAL_MONTH => "years with a month after the point",
+        _ => return None,
+    };
+    let first = texts.first()?;
+    Some(format!("The dates are {what}: {first} is {}.", told(form.date(first)?, None)))
 }
 
 /// Whole numbers of four digits that go up or down by one.
@@ -155,20 +264,25 @@ fn are_years(texts: &[&str]) -> bool {
 /// The form of a column of dates: asked for where day and month can change places.
 pub fn form(texts: &[&str], said: &Choices) -> Result<Form, Stop> {
     let found = best(texts);
-    let first = found.first().copied().unwrap_or(YEAR);
-    if first != DAY_FIRST || !found.contains(&MONTH_FIRST) {
+    let first = found.first().copied().unwrap_or(if are_serials(texts) { SERIAL } else { YEAR });
+    let month_first = match first {
+        DAY_FIRST => MONTH_FIRST,
+        SHORT_DAY_FIRST => SHORT_MONTH_FIRST,
+        _ => return Ok(first),
+    };
+    if !found.contains(&month_first) {
         return Ok(first);
     }
     if let Some(day_first) = said.day_first {
-        return Ok(if day_first { DAY_FIRST } else { MONTH_FIRST });
+        return Ok(if day_first { first } else { month_first });
     }
-    let differs = |text: &&&str| DAY_FIRST.date(text) != MONTH_FIRST.date(text);
+    let differs = |text: &&&str| first.date(text) != month_first.date(text);
     let Some(doubtful) = texts.iter().find(differs) else { return Ok(first) };
     let option = |form: Form, day_first| {
         let words = form.date(doubtful).map_or(String::new(), |date| told(date, None));
         (words, Choices { day_first: Some(day_first), ..Choices::default() })
     };
-    let options = vec![option(DAY_FIRST, true), option(MONTH_FIRST, false)];
+    let options = vec![option(first, true), option(month_first, false)];
     Err(Stop::asked("day_first", format!("Which day is {doubtful}?"), options))
 }
 
@@ -209,6 +323,14 @@ mod tests {
             ("Q4-2020", date(12, 1)),
             ("31-Jan-20", date(1, 31)),
             ("jan-20", date(1, 1)),
+            ("01/31/20", date(1, 31)),
+            ("31.1.20", date(1, 31)),
+            ("Friday, January 31, 2020", date(1, 31)),
+            ("31. J\u{e4}nner 2020", date(1, 31)),
+            ("31 janv. 2020", date(1, 31)),
+            ("31 de enero de 2020", date(1, 31)),
+            ("M\u{e4}r 2020", date(3, 1)),
+            ("2020-W05", date(1, 31)),
             ("20200131", None),
             ("2020.01", None),
             ("2020-13", None),
@@ -222,6 +344,8 @@ mod tests {
             assert_eq!(found, expected, "{text}");
         }
         assert_eq!((Form("yAB").date("20200131"), Form("yA").date("202002")), (date(1, 31), date(2, 1)));
+        assert_eq!((DECIMAL_MONTH.date("2020.1"), DECIMAL_MONTH.date("2020.01")), (date(10, 1), date(1, 1)));
+        assert_eq!((DECIMAL_MONTH.date("2020.2"), DECIMAL_MONTH.date("2020.011")), (None, None));
         assert_eq!(Form("n_u").date("Jan-99"), Some(Date::constant(1999, 1, 1)));
     }
 }

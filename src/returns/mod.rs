@@ -12,15 +12,21 @@ mod dates;
 mod doubt;
 mod excess;
 mod heading;
+mod kept;
 mod kind;
 mod moments;
+mod month_names;
 mod months;
 mod number;
+mod numbered_dates;
+mod order;
 mod outcome;
 mod reading;
 mod record;
 mod sheet;
+mod table;
 mod unit;
+mod windows_1252;
 mod words;
 
 pub use choices::{Choices, Kind, RateUnit, Unit};
@@ -29,7 +35,7 @@ pub use reading::{Reading, read};
 pub use record::{BankRate, Record, Series};
 pub use sheet::{ColumnFound, Holds};
 
-/// The text of a file: UTF-8, or UTF-16 where its first bytes say so.
+/// The text of a file: UTF-16 if its first bytes say so, else UTF-8, else Windows-1252, which spreadsheets in Europe save.
 ///
 /// # Errors
 /// What kind of file it is instead, as a sentence.
@@ -40,6 +46,7 @@ pub fn decoded(bytes: &[u8]) -> Result<String, String> {
         [0xfe, 0xff, ..] => Some(units(u16::from_be_bytes)),
         _ => None,
     };
-    let text = utf_16.map_or_else(|| String::from_utf8(bytes.to_vec()).ok(), |units| String::from_utf16(&units).ok());
+    let eight_bits = || String::from_utf8(bytes.to_vec()).ok().or_else(|| windows_1252::decoded(bytes));
+    let text = utf_16.map_or_else(eight_bits, |units| String::from_utf16(&units).ok());
     text.ok_or_else(|| if bytes.starts_with(b"PK") { cells::SPREADSHEET } else { cells::NO_TEXT }.to_owned())
 }

@@ -1,20 +1,19 @@
 //! A text in, one reading out: what was read, what must be asked, or what is refused.
 
-use jiff::civil::Date;
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::bank::Bank;
 use super::cells::{Cell, mark};
-use super::choices::{Choices, Unit};
-use super::dates::{are_dates, form};
+use super::choices::{Choices, Kind, Unit};
 use super::excess;
+use super::kept::KeptRows;
 use super::kind::{Beside, Numbers, Returns, called};
 use super::number::{Mark, number};
+use super::order::{is_newest_first, ordered};
 use super::outcome::{Answer, Place, Question, Stop, both};
 use super::record::{Found, Order, Record};
 use super::sheet::{Column, ColumnFound, Holds, Sheet};
-use super::words::counted;
 use crate::control::request::frequency::Frequency;
 
 /// What a service takes.
@@ -89,15 +88,17 @@ fn outcome(text: &str, said: &Choices) -> (Result<Record, Stop>, Vec<ColumnFound
 
 fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
     let chosen = sheet.chosen(said)?;
-    let rows = filled(&chosen)?;
-    let blank = chosen[0].cells.len() - rows.len();
-    let mark = mark(chosen.iter().flat_map(|column| &column.cells[rows.clone()]), said)?;
-    let numbers = chosen.iter().map(|column| numbers(column, &column.cells[rows.clone()], mark));
+    let dates = sheet.column(Holds::Dates);
+    let mut kept = KeptRows::of(&chosen, is_newest_first(dates, said))?;
+    let mark = mark(chosen.iter().flat_map(|column| column.at(&kept.rows)), said)?;
+    let numbers = chosen.iter().map(|column| numbers(column, column.at(&kept.rows), mark));
     let mut numbers = numbers.collect::<Result<Vec<Numbers>, Stop>>()?;
-    if rows.len() < FEWEST {
+    if kept.rows.len() < FEWEST {
         return Err(Stop::refused("One number is no record of returns: at least two are needed."));
     }
-    let order = order(sheet.column(Holds::Dates), rows.clone(), said);
+    // Whether holes may be is asked before whether periods that are missing with them may be.
+    let lenient = Choices { gaps: Some(true), ..said.clone() };
+    let order = ordered(dates, sheet.times(), &kept.rows, if kept.holes.is_empty() { said } else { &lenient });
     let is_turned = order.as_ref().is_ok_and(|order| order.is_turned);
     if is_turned {
         numbers.iter_mut().for_each(|numbers| {
@@ -105,9 +106,9 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
             numbers.cells.reverse();
         });
     }
-    let mut beside = Beside::of(order.as_ref().ok().and_then(Order::periods_per_year), rows.len());
+    let mut beside = Beside::of(order.as_ref().ok().and_then(Order::periods_per_year), kept.rows.len());
     let bank = sheet.column(Holds::Rate).map(|column| {
-        let mut cells: Vec<&Cell> = column.cells[rows.clone()].iter().collect();
+        let mut cells = column.at(&kept.rows);
         if is_turned {
             cells.reverse();
         }
@@ -122,7 +123,12 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
         read.map_err(|stop| if is_one { stop } else { stop.about(numbers.name) })
     };
     let returns = numbers.iter().map(of).collect::<Result<Vec<Returns>, Stop>>();
-    let (order, returns) = both(order, returns)?;
+    let (mut order, returns) = both(order, returns)?;
+    if !kept.holes.is_empty() {
+        let are_prices = returns.iter().all(|returns| returns.kind == Kind::Price);
+        kept.check_holes(&chosen, are_prices && order.frequency == Some(Frequency::Daily), said)?;
+        order = ordered(dates, sheet.times(), &kept.rows, said)?;
+    }
     let count = returns[0].simple.len();
     alike(&chosen, &returns, said)?;
     if count < FEWEST {
@@ -140,12 +146,7 @@ fn record(sheet: &Sheet, said: &Choices) -> Result<Record, Stop> {
     if order.is_turned && order.dates.is_some() {
         remarks.push("The rows came newest first and are turned round.".to_owned());
     }
-    if blank > 0 {
-        remarks.push(format!("{} before or after the numbers left out.", counted(blank, "blank row")));
-    }
-    if sheet.remarks > 0 {
-        remarks.push(format!("{} of remarks passed over.", counted(sheet.remarks, "line")));
-    }
+    remarks.extend(order.remark.take().into_iter().chain(kept.remarks).chain(sheet.remarks.iter().cloned()));
     let found =
         Found { names: chosen.iter().map(|column| column.name.clone()).collect(), order, returns, rate, used, remarks };
     Ok(found.record(sheet.found()))
@@ -177,82 +178,18 @@ fn alike(chosen: &[&Column], returns: &[Returns], said: &Choices) -> Result<(), 
     Err(Stop::asked("unit", question, options))
 }
 
-/// The rows from the first number to the last; a blank cell among them is a hole in the record.
-fn filled(chosen: &[&Column]) -> Result<std::ops::Range<usize>, Stop> {
-    let is_given = |row: &usize| chosen.iter().any(|column| !column.cells[*row].text.is_empty());
-    let mut given = (0..chosen[0].cells.len()).filter(is_given);
-    let Some(first) = given.next() else {
-        return Err(Stop::refused(format!("Column {} is blank.", chosen[0].name)));
-    };
-    Ok(first..given.next_back().unwrap_or(first) + 1)
-}
-
-fn numbers<'a>(column: &'a Column, cells: &'a [Cell<'a>], mark: Mark) -> Result<Numbers<'a>, Stop> {
-    let value = |cell: &Cell| {
+fn numbers<'a>(column: &'a Column, cells: Vec<&'a Cell<'a>>, mark: Mark) -> Result<Numbers<'a>, Stop> {
+    let value = |cell: &&Cell| {
         let rule = match number(&cell.text, mark) {
             Some(value) if value.is_finite() => return Ok(value),
             Some(_) => "must be a finite number",
             None if mark == Mark::Comma && number(&cell.text, Mark::Point).is_some() => {
                 "must be a number with a decimal comma, as the others are"
             }
-            None if cell.text.is_empty() => "must be a number, as a record has no holes",
             None => "must be a number",
         };
         Err(cell.refused(&column.name, rule))
     };
     let values = cells.iter().map(value).collect::<Result<Vec<f64>, Stop>>()?;
-    Ok(Numbers { name: &column.name, values, cells: cells.iter().collect() })
-}
-
-/// Rows that go down in time are turned round; rows that go neither way, a date given twice and a date of another form are
-/// refused; and where periods are missing between them it is asked whether that is right.
-fn order(column: Option<&Column>, rows: std::ops::Range<usize>, said: &Choices) -> Result<Order, Stop> {
-    let undated = Order { dates: None, is_turned: said.newest_first == Some(true), frequency: None };
-    let Some(column) = column else { return Ok(undated) };
-    let texts = column.texts();
-    let given: Vec<&str> = texts.iter().copied().filter(|text| !text.is_empty()).collect();
-    if !are_dates(&given, false) {
-        let option = |label: &str, newest_first| {
-            (label.to_owned(), Choices { newest_first: Some(newest_first), ..Choices::default() })
-        };
-        let question =
-            format!("The dates are not understood, such as {}. Which row is the oldest?", given.first().unwrap_or(&""));
-        let options = vec![option("The first row", false), option("The last row", true)];
-        return if said.newest_first.is_some() {
-            Ok(undated)
-        } else {
-            Err(Stop::asked("newest_first", question, options))
-        };
-    }
-    let form = form(&given, said)?;
-    let mut cells: Vec<&Cell> = column.cells[rows].iter().collect();
-    let date = |cell: &&Cell| {
-        form.date(&cell.text).ok_or_else(|| cell.refused(&column.name, "must be a date in the form of the others"))
-    };
-    let mut dates = cells.iter().map(date).collect::<Result<Vec<Date>, Stop>>()?;
-    let falling = dates.windows(2).filter(|pair| pair[1] < pair[0]).count();
-    let is_turned = 2 * falling > dates.len() - 1;
-    let broken = |pair: &[Date]| if is_turned { pair[1] >= pair[0] } else { pair[1] <= pair[0] };
-    if let Some(at) = dates.windows(2).position(broken) {
-        let (than, order) =
-            if is_turned { ("earlier", "newest to the oldest") } else { ("later", "oldest to the newest") };
-        let before = &cells[at].text;
-        let rule = format!("must be {than} than {before}, the row before: rows go from the {order}, one a date");
-        return Err(cells[at + 1].refused(&column.name, &rule));
-    }
-    if is_turned {
-        dates.reverse();
-        cells.reverse();
-    }
-    let written: Vec<&str> = cells.iter().map(|cell| cell.text.as_ref()).collect();
-    let frequency = match Frequency::of(&dates, &written) {
-        Ok(frequency) => Some(frequency),
-        Err(_) if said.gaps == Some(true) => Frequency::typical(&dates),
-        Err(found) => {
-            let question = format!("{}: {}", cells[found.index].called(&column.name), found.rule);
-            let choices = Choices { gaps: Some(true), ..Choices::default() };
-            return Err(Stop::asked("gaps", question, vec![("Take the rows as they are".to_owned(), choices)]));
-        }
-    };
-    Ok(Order { dates: Some(dates), is_turned, frequency })
+    Ok(Numbers { name: &column.name, values, cells })
 }

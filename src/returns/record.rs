@@ -90,6 +90,8 @@ pub struct Order {
     /// Whether the newest row came first.
     pub is_turned: bool,
     pub frequency: Option<Frequency>,
+    /// What numbers that stand for dates are taken for.
+    pub remark: Option<String>,
 }
 
 impl Order {
@@ -117,7 +119,7 @@ impl Found {
     pub fn record(self, columns: Vec<ColumnFound>) -> Record {
         let Found { names, order, returns, rate, used, remarks } = self;
         let (count, periods_per_year) = (returns[0].simple.len(), order.periods_per_year());
-        let Order { dates, is_turned, frequency } = order;
+        let Order { dates, is_turned, frequency, .. } = order;
         let series =
             names.into_iter().zip(returns).map(|(column, returns)| Series::of(column, returns, used, periods_per_year));
         let days = dates.map(|dates| dates[dates.len() - used..].to_vec());

@@ -9,33 +9,16 @@ use utoipa::ToSchema;
 
 use super::cells::{Cell, MOST_LINES, Rows};
 use super::choices::Choices;
-use super::dates::are_dates;
+use super::dates::{are_dates, heads_dates};
 use super::heading::{VALUES, aside, core};
 use super::months::MonthsOfYears;
 use super::number::{is_number, looks_numeric};
 use super::outcome::Stop;
+use super::table::Table;
+use super::words::counted;
 
-/// Headings of columns that are dates even where their cells are not understood.
-const DATES: [&str; 14] = [
-    "date",
-    "dates",
-    "datetime",
-    "timestamp",
-    "time",
-    "day",
-    "week",
-    "month",
-    "quarter",
-    "year",
-    "periodending",
-    "datum",
-    "monat",
-    "jahr",
-];
 /// Headings of the bank.
 const BANKS: [&str; 6] = ["riskfreereturn", "riskfreerate", "riskfree", "bankreturn", "rf", "rate"];
-/// What stands where a number is missing: never the name of a column.
-const MISSING: [&str; 9] = ["n/a", "na", "#n/a", "#na", "nan", "null", "none", "-", "."];
 /// Columns that a question shows.
 const OFFERED: usize = 50;
 const MOST_COLUMNS: usize = 1000;
@@ -75,8 +58,13 @@ impl Column<'_> {
         self.cells.iter().map(|cell| cell.text.as_ref()).collect()
     }
 
+    /// The cells of some rows.
+    pub fn at(&self, rows: &[usize]) -> Vec<&Cell<'_>> {
+        rows.iter().map(|row| &self.cells[*row]).collect()
+    }
+
     fn given(&self) -> Vec<&str> {
-        self.texts().into_iter().filter(|text| !text.is_empty()).collect()
+        self.cells.iter().filter(|cell| !cell.is_missing()).map(|cell| cell.text.as_ref()).collect()
     }
 
     fn is_mostly_numbers(&self) -> bool {
@@ -87,7 +75,7 @@ impl Column<'_> {
 
     /// The first cell that is no number, refused.
     fn unread(&self) -> Stop {
-        let is_odd = |cell: &&Cell| !cell.text.is_empty() && !is_number(&cell.text);
+        let is_odd = |cell: &&Cell| !cell.is_missing() && !is_number(&cell.text);
         match self.cells.iter().find(is_odd) {
             Some(cell) => cell.refused(&self.name, "must be a number"),
             None => Stop::refused(format!("Column {} holds no numbers.", self.name)),
@@ -111,7 +99,8 @@ impl Column<'_> {
 /// A text as columns of one length.
 pub struct Sheet<'a> {
     pub columns: Vec<Column<'a>>,
-    pub remarks: usize,
+    /// What was passed over, in sentences.
+    pub remarks: Vec<String>,
 }
 
 pub fn plain(name: &str) -> String {
@@ -122,12 +111,15 @@ impl<'a> Sheet<'a> {
     /// # Errors
     /// Lines of different lengths, no numbers, or it is not clear whether they are columns.
     pub fn of(text: &'a str, said: &Choices) -> Result<Self, Stop> {
-        let Rows { mut rows, remarks } = Rows::of(text, said)?;
-        let heading = is_heading(&rows).then(|| rows.remove(0));
+        let Rows { rows, remarks: lines } = Rows::of(text, said)?;
+        let Table { heading, rows, mut remarks } = Table::of(rows)?;
+        if lines > 0 {
+            remarks.push(format!("{} of remarks passed over.", counted(lines, "line")));
+        }
         let widths: HashSet<usize> = rows.iter().map(Vec::len).collect();
         let is_narrow = widths.len() == 1 && widths.contains(&1);
         let is_plain =
-            heading.is_none() && rows.iter().flatten().all(|cell| cell.text.is_empty() || is_number(&cell.text));
+            heading.is_none() && rows.iter().flatten().all(|cell| cell.is_missing() || is_number(&cell.text));
         let is_run = heading.is_none() && rows.len() == 1;
         if is_narrow || is_run || (is_plain && (widths.len() > 1 || said.one_record == Some(true))) {
             return run(rows, heading).map(|column| Sheet { columns: vec![column], remarks });
@@ -145,6 +137,16 @@ impl<'a> Sheet<'a> {
 
     pub fn column(&self, holds: Holds) -> Option<&Column<'a>> {
         self.columns.iter().find(|column| column.holds == holds)
+    }
+
+    /// The column that says the hour of each row, as in 09:30.
+    pub fn times(&self) -> Option<&Column<'a>> {
+        let is_time = |text: &&str| text.len() <= 8 && text.find(':').is_some_and(|at| (1..=2).contains(&at));
+        let holds_times = |column: &&Column| {
+            let given = column.given();
+            column.holds != Holds::Dates && !given.is_empty() && given.iter().all(is_time)
+        };
+        self.columns.iter().find(holds_times)
     }
 
     /// The columns that are read: those said, the one whose heading is the best, or the only one there is.
@@ -217,20 +219,6 @@ impl<'a> Sheet<'a> {
     }
 }
 
-/// The first row names the columns where it holds words alone, or nothing above a column of dates.
-fn is_heading(rows: &[Vec<Cell>]) -> bool {
-    let [first, rest @ ..] = rows else { return false };
-    let is_word = |cell: &Cell| {
-        let is_missing = MISSING.contains(&cell.text.to_lowercase().as_str());
-        let has_letters = cell.text.is_empty() || cell.text.contains(char::is_alphabetic);
-        has_letters && !is_number(&cell.text) && !is_missing && !are_dates(&[cell.text.as_ref()], true)
-    };
-    let below =
-        |index: usize| rest.iter().filter_map(|row| row.get(index)).map(|cell| cell.text.as_ref()).collect::<Vec<_>>();
-    let is_above_dates = |(index, cell): (usize, &Cell)| cell.text.is_empty() && are_dates(&below(index), false);
-    !rest.is_empty() && (first.iter().all(is_word) || first.iter().enumerate().any(is_above_dates))
-}
-
 /// Numbers one after the other, line by line.
 fn run<'a>(rows: Vec<Vec<Cell<'a>>>, heading: Option<Vec<Cell>>) -> Result<Column<'a>, Stop> {
     let name = heading.and_then(|heading| heading.first().map(|cell| cell.text.to_string())).unwrap_or_default();
@@ -287,9 +275,7 @@ fn judge(columns: &mut [Column]) {
     };
     let is_dates: Vec<bool> = columns.iter().map(is_date).collect();
     // What looks like dates in no known form is set aside where nothing else is dates.
-    let named = |column: &Column| {
-        DATES.contains(&plain(&column.name).as_str()) || (!column.is_mostly_numbers() && column.is_labels())
-    };
+    let named = |column: &Column| heads_dates(&column.name) || (!column.is_mostly_numbers() && column.is_labels());
     let dates = is_dates.iter().position(|is| *is).or_else(|| columns.iter().position(&named));
     let is_numbers = |(column, is_dates): (&Column, &bool)| {
         !is_dates && !named(column) && aside(&column.name).is_none() && column.is_mostly_numbers()

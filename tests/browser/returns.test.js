@@ -94,6 +94,15 @@ test("a file in UTF-16 is read", async () => {
   await note().getByText("2 monthly simple returns as fractions, January 2020 to February 2020").waitFor();
 });
 
+test("a file as a spreadsheet in Europe saves it is read, and what stands above its table is named", async () => {
+  await page.goto("about:blank");
+  await page.goto(`${ballast.url}/#/train`);
+  const buffer = Buffer.from("Depot M\u00fcller\r\nDatum;Kurs\r\n28.01.2020;100,5\r\n28.02.2020;101,5\r\n28.03.2020;99,5\r\n", "latin1");
+  await page.locator('input[type="file"]').setInputFiles({ name: "depot.csv", mimeType: "text/csv", buffer });
+  await note().getByText("2 monthly returns of prices, February 2020 to March 2020, as in column Kurs.").waitFor();
+  await note().getByText('Line 1 before the table is left out: "Depot M\u00fcller".').waitFor();
+});
+
 test("questions are answered by the keyboard alone, and nothing is trained before the answer", async () => {
   await pasted("01/02/2020,0.2\n01/03/2020,-0.15\n01/04/2020,0.3\n01/05/2020,-0.1");
   await note().getByText("Are the returns fractions or percent?").waitFor();
@@ -135,11 +144,11 @@ test("two columns of numbers are asked about, and another answer reads the file 
 test("a bad cell is named and shown, and the numbers before it are no longer in force", async () => {
   await pasted("1.5 -2 3");
   await note().getByText("3 simple returns in percent").waitFor();
-  await chosen("bad.csv", "month,fund\n2020-01,1.5\n2020-02,NA\n2020-03,3\n");
-  await note().getByText('Line 3: fund is "NA": must be a number').waitFor();
+  await chosen("bad.csv", "month,fund\n2020-01,1.5\n2020-02,abc\n2020-03,3\n");
+  await note().getByText('Line 3: fund is "abc": must be a number').waitFor();
   assert.deepEqual(await history(), []);
   await page.getByRole("button", { name: "Show the place" }).click();
-  assert.equal(await area().evaluate(({ value, selectionStart, selectionEnd }) => value.slice(selectionStart, selectionEnd)), "NA");
+  assert.equal(await area().evaluate(({ value, selectionStart, selectionEnd }) => value.slice(selectionStart, selectionEnd)), "abc");
 });
 
 test("what a file says of the bank is taken where that is wanted", async () => {

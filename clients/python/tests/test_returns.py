@@ -88,7 +88,7 @@ def test_what_cannot_be_meant_of_several_assets_is_refused(ballast: Ballast) -> 
     said: dict[str, Any] = {"kind": "simple", "rate_per_step": 0.0}
     refused = {
         r"line 3: date is \"2005-01-31\": must be later than 2005-03-31": months.iloc[[2, 0, 1, 3]],
-        r"returns: line 3: bonds is \"\": must be a number": months.assign(bonds=[0.1, math.nan, 0.2, 0.1]),
+        r"line 3: bonds is \"\": there is no number in 1 of 4 rows": months.assign(bonds=[0.1, math.nan, 0.2, 0.1]),
         "assets has 'stocks' twice": months.set_axis(["stocks", "stocks"], axis="columns"),
         r"returns\[1\] has 1 numbers: must have one for each of \['stocks', 'bonds'\]": [[0.1, 0.2], [0.1]],
         "assets is None: must name the columns where returns is no DataFrame, text or file": months.to_numpy(),
@@ -327,8 +327,8 @@ def test_it_is_read_alike_where_it_is_awaited(service: Service) -> None:
 
 
 def test_the_history_of_a_session_is_named(ballast: Ballast) -> None:
-    with pytest.raises(ValueError, match=r"^history: line 2: column 1 is .NaN.: must be a number"):
-        ballast.policy("x").session(history=[0.1, math.nan, 0.2])
+    with pytest.raises(ValueError, match=r"^history: line 2: column 1 is .inf.: must be a number"):
+        ballast.policy("x").session(history=[0.1, math.inf])
 
 
 def test_a_series_trains_as_its_list_does(ballast: Ballast) -> None:

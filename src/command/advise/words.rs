@@ -7,14 +7,12 @@ use ballast::control::policy::sensitivity::{NextAdvice, Return, Sensitivity};
 use ballast::control::policy::worst_case::WorstCase;
 use ballast::service::advise::Advised;
 
-use crate::command::returns::Frequency;
-
 /// Less than this is not traded: what is printed would not show it.
 const SMALLEST_TRADE: f64 = 5e-4;
 
 /// What to do, why, and the figures.
-pub fn told(advised: &Advised, wealth: f64, frequency: Frequency) -> String {
-    let (advice, noun) = (&advised.advice, frequency.noun());
+pub fn told(advised: &Advised, wealth: f64, noun: &str) -> String {
+    let advice = &advised.advice;
     let mut text = format!("{} {}\n", hold(advice, noun), trade(advice, wealth));
     if advice.source == AdviceSource::Unsolved {
         return text + &advised.worst_case.sentence;
@@ -189,7 +187,7 @@ mod tests {
 
     #[test]
     fn what_to_do_stands_first() {
-        let told = |history: &[f64], holding, cost| told(&advised(history, holding, cost), 2000.0, Frequency::Weekly);
+        let told = |history: &[f64], holding, cost| told(&advised(history, holding, cost), 2000.0, "week");
         let falling = told(&[-0.01, -0.03], 0.5, 0.0);
         let first = "Hold nothing in the risky asset through the coming week: keep all wealth in the bank. Sell for \
                      1000.00: 50.0 % is held now.\nAgainst the worst law that the 2 returns do not rule out, nothing beats \

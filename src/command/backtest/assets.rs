@@ -66,7 +66,13 @@ impl BacktestArgs {
             trading_cost: self.trading_cost()?,
             seed: self.seed,
         };
-        Ok(AssetsBacktest::new(record, choices)?)
+        let names_columns = self.returns.names_columns();
+        AssetsBacktest::new(record, choices).map_err(|error| match BacktestError::from(error) {
+            BacktestError::Option { option, value, rule } if option == "--column" && !names_columns => {
+                refused("the file", value, &format!("{rule}: --column takes one of them, and given again another"))
+            }
+            error => error,
+        })
     }
 }
 

@@ -19,11 +19,8 @@ pub enum ReturnsError {
          given, as a fraction a period (0.002 is 0.2 %){remarks}"
     )]
     NoBank { remarks: String },
-    #[error(
-        "the file does not say what a period is: must have a column of dates, which are daily, weekly, monthly, quarterly \
-         or yearly"
-    )]
-    NoFrequency,
+    #[error("the file does not say what a period is: {rule}")]
+    NoFrequency { rule: &'static str },
     #[error("--column is {found} columns: must be one")]
     Several { found: usize },
     #[error("{option} is {value}: {rule}")]
@@ -33,8 +30,8 @@ pub enum ReturnsError {
 }
 
 impl ReturnsError {
-    /// Each question, and the options of the command that answer it.
-    pub fn asked(questions: &[Question]) -> Self {
+    /// Each question, and the options of the command that answer it; `needs_year` if they leave open what a period is.
+    pub fn asked(questions: &[Question], needs_year: bool) -> Self {
         let mut lines = Vec::new();
         for Question { question, options, .. } in questions {
             lines.push(question.clone());
@@ -43,21 +40,32 @@ impl ReturnsError {
                 lines.push(format!("  {}: {}{sentence}", flags(&option.choices), option.label));
             }
         }
+        if needs_year {
+            lines.push("  with --periods-per-year, such as 12, as the dates do not say what a period is".to_owned());
+        }
         ReturnsError::Asked { questions: lines.join("\n") }
     }
 }
 
-/// Choices as the options that make them.
+/// Choices as the options that make them, as a shell takes them.
 fn flags(choices: &Choices) -> String {
-    let flag = |(name, value): (&String, &Value)| {
-        let (name, value) = match value {
-            Value::Array(columns) => ("column".to_owned(), columns.first().unwrap_or(value)),
-            value => (name.replace('_', "-"), value),
-        };
-        format!("--{name} {}", value.as_str().map_or_else(|| value.to_string(), str::to_owned))
+    let flag = |(name, value): (&String, &Value)| match value {
+        Value::Array(columns) => columns.iter().map(|column| option("column", column)).collect::<Vec<_>>().join(" "),
+        value => option(&name.replace('_', "-"), value),
     };
     match serde_json::to_value(choices) {
         Ok(Value::Object(said)) => said.iter().map(flag).collect::<Vec<_>>().join(" "),
         _ => String::new(),
     }
+}
+
+fn option(name: &str, value: &Value) -> String {
+    let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+    let is_plain = |letter: char| letter.is_alphanumeric() || "-_./:,%+=@".contains(letter);
+    // A value that begins with a hyphen would be an option of its own.
+    let equals = if value.starts_with('-') { '=' } else { ' ' };
+    if !value.is_empty() && value.chars().all(is_plain) {
+        return format!("--{name}{equals}{value}");
+    }
+    format!("--{name}{equals}'{}'", value.replace('\'', "'\\''"))
 }

@@ -7,7 +7,7 @@ fn read(text: &str) -> Result<Returns, ReturnsError> {
 #[test]
 fn the_bundled_file_is_whole() {
     let market = Returns::bundled().unwrap();
-    assert_eq!((market.rows.len(), market.frequency, market.periods_per_year), (1109, Frequency::Monthly, 12));
+    assert_eq!((market.rows.len(), market.frequency, market.periods_per_year), (1109, Some(Frequency::Monthly), 12));
     assert_eq!(market.year("2008").len(), 12);
     let history = market.before("2008-01", 240).unwrap();
     assert_eq!((history[0].date.as_str(), history[239].date.as_str()), ("1988-01", "2007-12"));
@@ -66,9 +66,40 @@ fn what_the_file_does_not_say_is_asked_with_the_options_that_say_it() {
 }
 
 #[test]
-fn without_dates_of_a_frequency_there_are_no_periods() {
-    let error = Returns::parse("return\n0.01\n-0.02\n", &Choices::default(), Some(0.0), None).unwrap_err().to_string();
-    assert!(error.starts_with("the file does not say what a period is"), "{error}");
+fn a_frequency_that_the_dates_do_not_say_is_an_option() {
+    let parse = |text: &str, choices: &Choices, periods| Returns::parse(text, choices, Some(0.0), periods);
+    let plain = "return\n0.01\n-0.02\n";
+    let error = parse(plain, &Choices::default(), None).unwrap_err().to_string();
+    assert!(
+        error.starts_with("the file does not say what a period is: give --periods-per-year, such as 12"),
+        "{error}"
+    );
+    let read = parse(plain, &Choices::default(), Some(4)).unwrap();
+    let sentence = "2 returns, row 1 to row 2, as in column return.\nA year of 4 periods has a mean of -2.0 % and";
+    assert!(read.sentence().starts_with(sentence), "{}", read.sentence());
+    let halves = "date,ret\n2000-06-30,0.04\n2000-12-31,-0.02\n2001-06-30,0.05\n2001-12-31,0.03\n";
+    let asked = parse(halves, &Choices::default(), None).unwrap_err().to_string();
+    assert!(asked.contains("\n  --gaps true: ") && asked.ends_with(YEAR), "{asked}");
+    let gaps = Choices { gaps: Some(true), ..Choices::default() };
+    let read = parse(halves, &gaps, Some(2)).unwrap();
+    assert!(read.sentence().starts_with("4 returns, 2000-06-30 to 2001-12-31, "), "{}", read.sentence());
+    // Without --periods-per-year each answer would be refused.
+    for dates in ["week A1,0.01\nweek A2,0.02\nweek A3,-0.02\n", halves] {
+        let asked = parse(dates, &Choices::default(), None).unwrap_err().to_string();
+        assert!(asked.ends_with(YEAR), "{asked}");
+        assert!(!parse(dates, &Choices::default(), Some(12)).unwrap_err().to_string().ends_with(YEAR));
+    }
+}
+
+const YEAR: &str = "\n  with --periods-per-year, such as 12, as the dates do not say what a period is";
+
+/// What is printed can be typed: in quotes if a shell would part it.
+#[test]
+fn an_option_is_printed_as_a_shell_takes_it() {
+    let text = "date,S&P 500,Investor's own\n2020-01,0.01,0.02\n2020-02,-0.01,0.01\n2020-03,0.02,-0.03\n";
+    let asked = Returns::parse(text, &Choices::default(), Some(0.0), None).unwrap_err().to_string();
+    assert!(asked.contains("\n  --column 'S&P 500': "), "{asked}");
+    assert!(asked.contains("\n  --column 'Investor'\\''s own': "), "{asked}");
 }
 
 #[test]

@@ -47,6 +47,44 @@ fn gaps(dates: &[Date]) -> Vec<i32> {
     dates.windows(2).map(|pair| pair[0].until(pair[1]).map_or(0, |span| span.get_days())).collect()
 }
 
+/// Of so few days a weekday may be missing by chance.
+const FEW_DAYS: usize = 14;
+/// Days a week has often where it has one in fourteen of all: half of what each of seven has.
+const OFTEN: usize = 14;
+
+/// Special sessions on a weekend now and then do not count.
+fn days_a_year(dates: &[Date]) -> usize {
+    let on = |day: Weekday| dates.iter().filter(|date| date.weekday() == day).count();
+    if dates.len() < FEW_DAYS {
+        let is_whole = on(Weekday::Saturday) > 0 && on(Weekday::Sunday) > 0;
+        return if is_whole { 365 } else { 252 };
+    }
+    match Weekday::Monday.cycle_forward().take(7).filter(|day| OFTEN * on(*day) >= dates.len()).count() {
+        7 => 365,
+        6 => 300,
+        _ => 252,
+    }
+}
+
+/// Where weeks begin: on Mondays, or on Sundays if most of a record's dates are those.
+struct Week {
+    first: Weekday,
+}
+
+impl Week {
+    fn of(dates: &[Date]) -> Self {
+        let sundays = dates.iter().filter(|date| date.weekday() == Weekday::Sunday).count();
+        Week { first: if 2 * sundays > dates.len() { Weekday::Sunday } else { Weekday::Monday } }
+    }
+
+    /// Whether one week has both dates, of which the second is later.
+    fn holds_both(&self, before: Date, date: Date) -> bool {
+        let days = before.until(date).map_or(0, |span| span.get_days());
+        let since = i32::from(self.first.until(before.weekday()));
+        days + since < 7
+    }
+}
+
 impl Frequency {
     /// The one that the median distance of dates tells, where they increase.
     pub fn typical(dates: &[Date]) -> Option<Self> {
@@ -76,7 +114,9 @@ impl Frequency {
             let (gap, before) = (gaps[index], written[index]);
             return refused(index, format!("is {gap} days after {before}, the row before, {rule}"));
         };
-        match dates.windows(2).position(|pair| !frequency.follows(pair[0], pair[1])) {
+        let week = Week::of(dates);
+        let is_again = |pair: &[Date]| frequency == Weekly && week.holds_both(pair[0], pair[1]);
+        match dates.windows(2).position(|pair| is_again(pair) || !frequency.follows(pair[0], pair[1])) {
             None => Ok(frequency),
             Some(index) => {
                 let (noun, adjective) = (frequency.noun(), frequency.adjective());
@@ -129,12 +169,11 @@ impl Frequency {
         }
     }
 
-    /// Periods in a year. Of days: those on which exchanges are open, or all where both days of the weekend are among the dates.
+    /// Periods in a year. Of days: those on which exchanges are open, 252; about 300 if one day of the weekend is among the days
+    /// as often as others are; all of them if both are.
     pub fn periods_per_year(self, dates: &[Date]) -> usize {
-        let has = |day: Weekday| dates.iter().any(|date| date.weekday() == day);
         match self {
-            Daily if has(Weekday::Saturday) && has(Weekday::Sunday) => 365,
-            Daily => 252,
+            Daily => days_a_year(dates),
             Weekly => 52,
             Monthly => 12,
             Quarterly => 4,

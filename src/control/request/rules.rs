@@ -56,6 +56,11 @@ pub const FIXED_RADIUS: (f64, f64) = (0.0, 10.0);
 
 /// Checks every rule.
 ///
+/// The most returns of which a radius is simulated for one step by so many paths.
+pub fn largest_sample(paths: usize) -> usize {
+    (BRIDGE_NUMBERS / paths.max(1)).saturating_sub(1)
+}
+
 /// # Errors
 /// The first field, in the order of the request, that breaks its rule.
 pub fn check(specification: &Specification) -> Result<(), FieldError> {

@@ -2,12 +2,16 @@
 
 import { h } from "./dom.js";
 
-/** The text of a file: UTF-16 where its first bytes say so. */
+/** The text of a file: UTF-16 if its first bytes say so, else UTF-8, else Windows-1252, which spreadsheets in Europe save. */
 async function content(file) {
   const bytes = await file.arrayBuffer();
   const [first, second] = new Uint8Array(bytes);
   const wide = { "255 254": "utf-16le", "254 255": "utf-16be" }[`${first} ${second}`];
-  return new TextDecoder(wide ?? "utf-8").decode(bytes);
+  try {
+    return new TextDecoder(wide ?? "utf-8", { fatal: true }).decode(bytes);
+  } catch {
+    return new TextDecoder(wide ?? "windows-1252").decode(bytes);
+  }
 }
 
 /** Where a file is chosen or dropped; `open(text)` takes what is in it. `id` is that of the field which shows the text. */

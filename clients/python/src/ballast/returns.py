@@ -99,7 +99,7 @@ class Read(NamedTuple):
     sentence: str
     #: Log-returns, a list for each asset.
     series: list[list[float]]
-    kind: Kind
+    kind: wire.Kind
     dates: list[str] | None = None
     periods_per_year: int | None = None
     #: What the bank paid in each period, where a column says so.
@@ -270,7 +270,7 @@ def day(date: object) -> str:
 
 
 def per_period(
-    name: str, values: Iterable[Any], returns: Returns, periods: int, kind: Kind, is_turned: bool = False
+    name: str, values: Iterable[Any], returns: Returns, periods: int, kind: wire.Kind, is_turned: bool = False
 ) -> list[Any]:
     """What was given for each entry of the returns, as one for each period, oldest first: the first price has none, and
     neither have entries before and after the numbers that hold none.

@@ -1339,7 +1339,7 @@ class Choices(TypedDict):
     one_record: NotRequired[bool | None]
     """Whether numbers in several columns are one record, line by line"""
     gaps: NotRequired[bool | None]
-    """Whether a record from which periods are missing is taken as it is"""
+    """Whether a record from which periods are missing is taken as it is, without the rows that have no number"""
     unusual: NotRequired[bool | None]
     """
     Whether what is unusual of an asset is right: a deviation above 30 % a period or 150 % a year, a mean above 100 % a year,

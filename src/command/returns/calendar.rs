@@ -1,0 +1,58 @@
+//! When the periods of a record ended, how many make a year, and what the bank paid in them.
+
+use ballast::control::request::frequency::Frequency;
+use ballast::returns::Record;
+
+use super::error::ReturnsError;
+
+/// What says how long a period is: of one asset, and of several.
+const ONE: &str =
+    "give --periods-per-year, such as 12, or a column of dates that are daily, weekly, monthly, quarterly or yearly";
+pub const SEVERAL: &str = "several assets need a column of dates that are daily, weekly, monthly, quarterly or yearly";
+/// Of periods in a year: a day at the shortest.
+const PERIODS_PER_YEAR: std::ops::RangeInclusive<usize> = 1..=366;
+/// Of what the bank pays a period; as `problem.rate_per_step`.
+const RATE: std::ops::RangeInclusive<f64> = -0.5..=0.5;
+
+/// What is known of the periods themselves.
+pub struct Calendar {
+    pub dates: Vec<String>,
+    pub frequency: Option<Frequency>,
+    pub periods_per_year: usize,
+    /// What the bank paid, and where that is said.
+    pub rates: Vec<f64>,
+    pub bank: String,
+}
+
+impl Calendar {
+    /// # Errors
+    /// Neither the record nor an option says what a period is, or what the bank pays.
+    pub fn of(record: &Record, rate: Option<f64>, periods_per_year: Option<usize>) -> Result<Self, ReturnsError> {
+        let Some(periods_per_year) = periods_per_year.or(record.periods_per_year) else {
+            return Err(ReturnsError::NoFrequency { rule: ONE });
+        };
+        let count = record.series.first().map_or(0, |series| series.log_returns.len());
+        let numbered = || (1..=count).map(|row| format!("row {row}")).collect();
+        let (dates, frequency) = (record.dates.clone().unwrap_or_else(numbered), record.frequency);
+        let (bank, rates) = match (rate, &record.rate) {
+            (Some(rate), _) => ("--rate".to_owned(), vec![rate; dates.len()]),
+            (None, Some(column)) => (format!("the last row of column {}", column.column), column.rates.clone()),
+            (None, None) => return Err(ReturnsError::NoBank { remarks: format!("\n{}", record.remarks.join(" ")) }),
+        };
+        Ok(Calendar { dates, frequency, periods_per_year, rates, bank })
+    }
+}
+
+/// # Errors
+/// An option breaks its rule.
+pub fn check(rate: Option<f64>, periods_per_year: Option<usize>) -> Result<(), ReturnsError> {
+    if let Some(rate) = rate.filter(|rate| !RATE.contains(rate)) {
+        let rule = "must be a fraction a period from -0.5 to 0.5: 0.002 is 0.2 %";
+        return Err(ReturnsError::Option { option: "--rate", value: rate.to_string(), rule });
+    }
+    if let Some(periods) = periods_per_year.filter(|periods| !PERIODS_PER_YEAR.contains(periods)) {
+        let (option, rule) = ("--periods-per-year", "must be 1 to 366");
+        return Err(ReturnsError::Option { option, value: periods.to_string(), rule });
+    }
+    Ok(())
+}

@@ -1,0 +1,108 @@
+//! The order of a record's rows in time.
+
+use jiff::civil::Date;
+
+use super::cells::Cell;
+use super::choices::Choices;
+use super::dates::{Form, are_understood, form, numbered};
+use super::outcome::Stop;
+use super::record::Order;
+use super::sheet::Column;
+use crate::control::request::frequency::Frequency;
+
+/// Rows that go down in time are turned round; rows that go neither way, a date given twice and a date of another form are
+/// refused; and where periods are missing between them it is asked whether that is right.
+///
+/// # Errors
+/// What is asked or refused; `times` are the hours of the rows, if a column has them.
+pub fn ordered(column: Option<&Column>, times: Option<&Column>, rows: &[usize], said: &Choices) -> Result<Order, Stop> {
+    let undated = Order { dates: None, is_turned: said.newest_first == Some(true), frequency: None, remark: None };
+    let Some(column) = column else { return Ok(undated) };
+    let given = given(column);
+    if !are_understood(&given) {
+        return if said.newest_first.is_some() { Ok(undated) } else { Err(ask_the_end(&given)) };
+    }
+    let form = form(&given, said)?;
+    let mut cells = column.at(rows);
+    let date = |cell: &&Cell| {
+        form.date(&cell.text).ok_or_else(|| cell.refused(&column.name, "must be a date in the form of the others"))
+    };
+    let mut dates = cells.iter().map(date).collect::<Result<Vec<Date>, Stop>>()?;
+    let is_turned = falls(&dates);
+    let times = times.map_or_else(|| cells.clone(), |times| times.at(rows));
+    check_days(column, &cells, &dates, &times)?;
+    check_order(column, &cells, &dates, is_turned)?;
+    if is_turned {
+        dates.reverse();
+        cells.reverse();
+    }
+    let written: Vec<&str> = cells.iter().map(|cell| cell.text.as_ref()).collect();
+    let frequency = match Frequency::of(&dates, &written) {
+        Ok(frequency) => Some(frequency),
+        Err(_) if said.gaps == Some(true) => Frequency::typical(&dates),
+        Err(found) => {
+            let question = format!("{}: {}", cells[found.index].called(&column.name), found.rule);
+            let choices = Choices { gaps: Some(true), ..Choices::default() };
+            return Err(Stop::asked("gaps", question, vec![("Take the rows as they are".to_owned(), choices)]));
+        }
+    };
+    Ok(Order { remark: numbered(form, &written), dates: Some(dates), is_turned, frequency })
+}
+
+/// Whether the newest row comes first, as far as dates or what is said tell.
+pub fn is_newest_first(column: Option<&Column>, said: &Choices) -> bool {
+    let Some(column) = column else { return said.newest_first == Some(true) };
+    let given = given(column);
+    match form(&given, said) {
+        Ok(form) if are_understood(&given) => falls(&read_as(form, &given)),
+        _ => said.newest_first == Some(true),
+    }
+}
+
+fn given<'a>(column: &'a Column) -> Vec<&'a str> {
+    column.cells.iter().filter(|cell| !cell.is_missing()).map(|cell| cell.text.as_ref()).collect()
+}
+
+fn read_as(form: Form, texts: &[&str]) -> Vec<Date> {
+    texts.iter().filter_map(|text| form.date(text)).collect()
+}
+
+fn falls(dates: &[Date]) -> bool {
+    2 * dates.windows(2).filter(|pair| pair[1] < pair[0]).count() + 1 > dates.len()
+}
+
+fn ask_the_end(given: &[&str]) -> Stop {
+    let option = |label: &str, newest_first| {
+        (label.to_owned(), Choices { newest_first: Some(newest_first), ..Choices::default() })
+    };
+    let question =
+        format!("The dates are not understood, such as {}. Which row is the oldest?", given.first().unwrap_or(&""));
+    Stop::asked("newest_first", question, vec![option("The first row", false), option("The last row", true)])
+}
+
+/// # Errors
+/// Rows of one day that differ by the hour.
+fn check_days(column: &Column, cells: &[&Cell], dates: &[Date], times: &[&Cell]) -> Result<(), Stop> {
+    let is_time = |cell: &Cell| cell.text.contains(':') || cell.text.bytes().all(|byte| byte.is_ascii_digit());
+    let is_finer = |index: &usize| {
+        let (before, time) = (times[*index], times[index + 1]);
+        dates[*index] == dates[index + 1] && before.text != time.text && is_time(time)
+    };
+    let Some(index) = (0..dates.len().saturating_sub(1)).find(is_finer) else { return Ok(()) };
+    let (before, time) = (&times[index].text, &times[index + 1].text);
+    let rule = format!(
+        "{time} is of the same day as {before}, the row before: rows finer than a day are not read, give one row a day"
+    );
+    Err(cells[index + 1].refused(&column.name, &rule))
+}
+
+/// # Errors
+/// A row that is not in the order of the others, or is of the same day.
+fn check_order(column: &Column, cells: &[&Cell], dates: &[Date], is_turned: bool) -> Result<(), Stop> {
+    let broken = |pair: &[Date]| if is_turned { pair[1] >= pair[0] } else { pair[1] <= pair[0] };
+    let Some(at) = dates.windows(2).position(broken) else { return Ok(()) };
+    let (than, order) = if is_turned { ("earlier", "newest to the oldest") } else { ("later", "oldest to the newest") };
+    let before = &cells[at].text;
+    let rule = format!("must be {than} than {before}, the row before: rows go from the {order}, one a date");
+    Err(cells[at + 1].refused(&column.name, &rule))
+}

@@ -1,0 +1,326 @@
+//! The one table of a text: its headings and rows, and what stands above, between and below them.
+//!
+//! Rows of a table begin with dates in one form, line after line. What is above the headings and below the last row is
+//! left out and named; a row that only looks odd stays, so that it is refused and not passed over.
+
+use jiff::civil::Date;
+
+use super::cells::Cell;
+use super::dates::{FORMS, Form, IN_DIGITS, YEAR, are_dates, heads_dates};
+use super::kind::names_percent;
+use super::number::is_number;
+use super::outcome::Stop;
+use super::words::counted;
+
+type Row<'a> = Vec<Cell<'a>>;
+
+/// Columns in which dates are looked for, and rows by which a form is known to occur in one.
+const COLUMNS: usize = 8;
+const FIRST: usize = 200;
+/// First words of rows that sum up others.
+const TOTALS: [&str; 30] = [
+    "total",
+    "sum",
+    "average",
+    "avg",
+    "mean",
+    "median",
+    "min",
+    "max",
+    "minimum",
+    "maximum",
+    "std",
+    "stdev",
+    "deviation",
+    "volatility",
+    "annual",
+    "annualised",
+    "annualized",
+    "cagr",
+    "ytd",
+    "summe",
+    "gesamt",
+    "mittel",
+    "mittelwert",
+    "durchschnitt",
+    "moyenne",
+    "somme",
+    "promedio",
+    "media",
+    "suma",
+    "copyright",
+];
+/// What a row of dates has in the place of a price, after a number.
+const EVENTS: [&str; 2] = ["dividend", "split"];
+
+/// A table, and sentences about what is left out around it.
+pub struct Table<'a> {
+    pub heading: Option<Row<'a>>,
+    pub rows: Vec<Row<'a>>,
+    pub remarks: Vec<String>,
+}
+
+/// Rows one after the other that have a date of one form in one column.
+struct Block {
+    column: usize,
+    form: Form,
+    start: usize,
+    end: usize,
+    count: usize,
+    first: Date,
+    last: Date,
+}
+
+impl<'a> Table<'a> {
+    /// # Errors
+    /// There are no numbers, or lines that are no rows part the table.
+    pub fn of(rows: Vec<Row<'a>>) -> Result<Self, Stop> {
+        if !rows.iter().flatten().any(|cell| has_digit(&cell.text)) {
+            let word = rows.iter().flatten().find(|cell| !cell.text.is_empty()).map_or(String::new(), Cell::shown);
+            return Err(Stop::refused(format!(
+                "There are no numbers in the text: it has words alone, such as {word:?}."
+            )));
+        }
+        match Block::longest(&rows) {
+            Some(block) => dated(rows, &block),
+            None => Ok(undated(rows)),
+        }
+    }
+}
+
+/// What parts the rows of `block` from the lines around them.
+fn dated<'a>(mut rows: Vec<Row<'a>>, block: &Block) -> Result<Table<'a>, Stop> {
+    let mut remarks = Vec::new();
+    let after = rows.split_off(block.end);
+    if let Some(first) = after.first() {
+        block.check_end(first, &after)?;
+        remarks.push(told_after(&after));
+    }
+    let start =
+        block.start - rows[..block.start].iter().rev().take_while(|row| block.is_misdated(row, numbers(row))).count();
+    let mut body = rows.split_off(start);
+    let levels = block.levels(&rows, body.first().map_or(0, Vec::len));
+    let levels = rows.split_off(rows.len() - levels);
+    if !rows.is_empty() {
+        remarks.insert(0, left_out(&rows, "before the table"));
+    }
+    let events: Vec<Row> = body.extract_if(.., |row| event(row).is_some()).collect();
+    if let Some(cell) = events.first().and_then(|row| event(row)) {
+        let what = counted(events.len(), "line");
+        remarks.push(format!(
+            "{what} of dividends or splits left out, the first of them line {}: {:?}.",
+            cell.line(),
+            cell.shown()
+        ));
+    }
+    Ok(Table { heading: joined(levels, block.column), rows: body, remarks })
+}
+
+/// Without dates the last of the lines that hold words alone is the heading.
+fn undated(mut rows: Vec<Row>) -> Table {
+    let words = rows.iter().take_while(|row| row.iter().all(is_word)).count();
+    let mut remarks = Vec::new();
+    if words > 1 && words < rows.len() {
+        let from = words - usize::from(rows[words - 1].len() == rows[words].len());
+        let table = rows.split_off(from);
+        remarks.push(left_out(&rows, "before the table"));
+        rows = table;
+    }
+    let heading = is_heading(&rows).then(|| rows.remove(0));
+    Table { heading, rows, remarks }
+}
+
+/// The first row names the columns if it holds words alone, or nothing above a column of dates.
+fn is_heading(rows: &[Row]) -> bool {
+    let [first, rest @ ..] = rows else { return false };
+    let below =
+        |index: usize| rest.iter().filter_map(|row| row.get(index)).map(|cell| cell.text.as_ref()).collect::<Vec<_>>();
+    let is_above_dates = |(index, cell): (usize, &Cell)| cell.text.is_empty() && are_dates(&below(index), false);
+    !rest.is_empty() && (first.iter().all(is_word) || first.iter().enumerate().any(is_above_dates))
+}
+
+/// Whether a cell can be a part of a heading.
+fn is_word(cell: &Cell) -> bool {
+    let has_letters = cell.text.is_empty() || cell.text.contains(char::is_alphabetic);
+    has_letters
+        && !is_number(&cell.text)
+        && (cell.text.is_empty() || !cell.is_missing())
+        && !are_dates(&[cell.text.as_ref()], true)
+}
+
+fn has_digit(text: &str) -> bool {
+    text.contains(|letter: char| letter.is_ascii_digit())
+}
+
+fn numbers(row: &Row) -> usize {
+    row.iter().filter(|cell| is_number(&cell.text)).count()
+}
+
+fn filled(row: &Row) -> usize {
+    row.iter().filter(|cell| !cell.text.is_empty()).count()
+}
+
+/// The cell of a row that tells of a dividend or a split instead of a price.
+fn event<'r, 'a>(row: &'r Row<'a>) -> Option<&'r Cell<'a>> {
+    row.iter().find(|cell| {
+        let text = cell.text.to_ascii_lowercase();
+        text.starts_with(|letter: char| letter.is_ascii_digit()) && EVENTS.iter().any(|event| text.contains(event))
+    })
+}
+
+fn is_total(text: &str) -> bool {
+    let word = text.split(|letter: char| !letter.is_alphabetic()).next().unwrap_or_default().to_lowercase();
+    TOTALS.contains(&word.as_str())
+}
+
+/// "Lines 1 to 3 before the table are left out, from "Fund: Northern Lights" on."
+fn left_out(rows: &[Row], place: &str) -> String {
+    let line = |row: Option<&Row>| row.and_then(|row| row.first()).map_or(0, Cell::line);
+    let (first, last) = (line(rows.first()), line(rows.last()));
+    let words = rows.iter().flatten().find(|cell| !cell.text.is_empty()).map_or(String::new(), Cell::shown);
+    if first == last {
+        return format!("Line {first} {place} is left out: {words:?}.");
+    }
+    format!("Lines {first} to {last} {place} are left out, from {words:?} on.")
+}
+
+/// A second table has rows of its own: a number or a date, and a number beside it.
+fn told_after(after: &[Row]) -> String {
+    let is_row = |row: &&Row| {
+        let starts = row.first().is_some_and(|cell| has_digit(&cell.text) && !is_total(&cell.text));
+        starts && row[1..].iter().any(|cell| is_number(&cell.text))
+    };
+    if after.iter().filter(is_row).count() < 2 {
+        return left_out(after, "after the table");
+    }
+    let line = after[0].first().map_or(0, Cell::line);
+    format!("A second table begins at line {line} and is left out.")
+}
+
+impl Block {
+    /// The longest of all in the text; of equal ones the first form and the first column.
+    fn longest(rows: &[Row]) -> Option<Self> {
+        let width = rows.iter().map(Vec::len).max().filter(|width| *width > 1)?;
+        let numbers: Vec<usize> = rows.iter().map(numbers).collect();
+        let numeric = numbers.iter().filter(|count| **count > 0).count();
+        let mut best: Option<Block> = None;
+        for form in FORMS {
+            for column in 0..width.min(COLUMNS) {
+                let occurs = |row: &Row| row.get(column).is_some_and(|cell| form.date(&cell.text).is_some());
+                if !rows.iter().take(FIRST).any(occurs) {
+                    continue;
+                }
+                // Years are numbers as others are, unless most rows have one.
+                // Numbers are dates only if nearly all rows have one, and years only if those are most of the text.
+                let is_most = |found: &Block| {
+                    let share = found.count as f64 / (found.end - found.start) as f64;
+                    (!form.is_digits() || share >= IN_DIGITS) && (form != YEAR || 2 * found.count >= numeric)
+                };
+                best = longer(best, Block::in_column(rows, &numbers, column, form).filter(is_most));
+            }
+        }
+        best.filter(|best| best.count > 1)
+    }
+
+    fn in_column(rows: &[Row], numbers: &[usize], column: usize, form: Form) -> Option<Self> {
+        let (mut best, mut current): (Option<Block>, Option<Block>) = (None, None);
+        for (index, row) in rows.iter().enumerate() {
+            let date = row.get(column).filter(|_| row.len() > 1).and_then(|cell| form.date(&cell.text));
+            match (date, &mut current) {
+                (Some(date), Some(block)) if form != YEAR || (date.year() - block.last.year()).abs() == 1 => {
+                    (block.end, block.count, block.last) = (index + 1, block.count + 1, date);
+                }
+                (Some(date), _) => {
+                    let block = Block { column, form, start: index, end: index + 1, count: 1, first: date, last: date };
+                    best = longer(best, current.replace(block));
+                }
+                (None, Some(block)) if block.is_misdated(row, numbers[index]) => block.end = index + 1,
+                (None, _) => best = longer(best, current.take()),
+            }
+        }
+        longer(best, current)
+    }
+
+    /// Whether a row of so many numbers has one beside what stands in the place of the date, which may be one in another form.
+    fn is_misdated(&self, row: &Row, numbers: usize) -> bool {
+        let is_one = |cell: &Cell| has_digit(&cell.text) && !is_total(&cell.text);
+        let date = row.get(self.column).filter(|cell| is_one(cell));
+        date.is_some_and(|cell| numbers > usize::from(is_number(&cell.text)))
+    }
+
+    /// # Errors
+    /// Rows go on below the first line that is none.
+    fn check_end(&self, first: &Row, after: &[Row]) -> Result<(), Stop> {
+        let date = |row: &Row| Some((self.form.date(&row.get(self.column)?.text)?, row[self.column].line()));
+        let Some((next, line)) = after.iter().filter(|row| row.len() > 1).find_map(date) else { return Ok(()) };
+        let goes_on = if self.first <= self.last { next > self.last } else { next < self.last };
+        let Some(cell) = first.get(self.column).or(first.first()).filter(|_| goes_on) else { return Ok(()) };
+        let rule = format!(
+            "must be a date in the form of the others, as rows go on in line {line}: remove the line if it is no row"
+        );
+        Err(cell.refused("", &rule))
+    }
+
+    /// How many of the last rows before the table are its headings, one above the other.
+    fn levels(&self, before: &[Row], width: usize) -> usize {
+        let is_words = |row: &Row| row.iter().all(is_word) && (filled(row) > 1 || width < 2);
+        let Some(last) = before.last() else { return 0 };
+        // The name of the dates alone, or above them that or nothing: what the other columns are called may be a number.
+        let is_index = row_is_index(last, self.column) && last.len() == width;
+        let heads = |cell: &Cell| cell.text.is_empty() || heads_dates(&cell.text);
+        let is_headed = last.len() == width && filled(last) > 0 && last.get(self.column).is_some_and(heads);
+        if !(is_index || is_headed || is_words(last)) {
+            return 0;
+        }
+        let mut count = 1;
+        while let Some(above) = before.len().checked_sub(count + 1).map(|index| &before[index]) {
+            let below = &before[before.len() - count];
+            let has_room = is_index || below.iter().any(|cell| cell.text.is_empty());
+            if !has_room || above.len() != width || !is_words(above) {
+                break;
+            }
+            count += 1;
+        }
+        count
+    }
+}
+
+/// Whether only the column of dates is named.
+fn row_is_index(row: &Row, column: usize) -> bool {
+    filled(row) == 1 && row.get(column).is_some_and(|cell| !cell.text.is_empty() && is_word(cell))
+}
+
+fn longer(one: Option<Block>, other: Option<Block>) -> Option<Block> {
+    match (one, other) {
+        (Some(one), Some(other)) => Some(if other.count > one.count { other } else { one }),
+        (one, other) => one.or(other),
+    }
+}
+
+/// One heading of several: of each column what differs from the others, and units.
+fn joined(mut levels: Vec<Row>, dates: usize) -> Option<Row> {
+    let mut heading = levels.pop()?;
+    if levels.is_empty() {
+        return Some(heading);
+    }
+    levels.push(heading.clone());
+    let text = |level: &Row, index: usize| level.get(index).map_or(String::new(), |cell| cell.text.to_string());
+    let differs = |level: &Row| {
+        let mut names = level.iter().enumerate().filter(|(index, _)| *index != dates).map(|(_, cell)| &cell.text);
+        let first = names.next();
+        names.any(|name| Some(name) != first)
+    };
+    let kept: Vec<bool> = levels.iter().map(differs).collect();
+    for (index, cell) in heading.iter_mut().enumerate().filter(|(index, _)| *index != dates) {
+        let names: Vec<String> = levels.iter().map(|level| text(level, index)).collect();
+        let is_kept = |(name, kept): &(&String, &bool)| !name.is_empty() && (**kept || says_unit(name));
+        let found: Vec<&str> = names.iter().zip(&kept).filter(is_kept).map(|(name, _)| name.as_str()).collect();
+        let first = names.iter().find(|name| !name.is_empty());
+        cell.text = if found.is_empty() { first.cloned().unwrap_or_default() } else { found.join(" ") }.into();
+    }
+    Some(heading)
+}
+
+fn says_unit(name: &str) -> bool {
+    names_percent(name) || name.to_lowercase().contains("log")
+}
