@@ -243,6 +243,7 @@ async fn streams_are_bounded_in_number_and_age_and_go_on_where_they_were() {
     let job = app.queue(&long).await;
     let url = format!("{}/jobs/{job}/events", app.url);
     let (first, second) = (app.client.get(&url).send().await.unwrap(), app.client.get(&url).send().await.unwrap());
+    assert_eq!(first.headers()["x-accel-buffering"], "no", "a proxy would keep events back");
     let third = app.client.get(&url).send().await.unwrap();
     assert_eq!((second.status().as_u16(), third.headers()["retry-after"].to_str().unwrap()), (200, "1"));
     let (status, problem) = support::read(third).await;

@@ -34,6 +34,8 @@ use crate::store::JobState;
 /// A change made by another process is noticed within this time.
 const POLL: Duration = Duration::from_secs(1);
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
+/// Asks proxies that collect answers to pass on each event as it comes; nginx collects unless told so.
+const UNBUFFERED: [(&str, &str); 1] = [("x-accel-buffering", "no")];
 
 struct JobStream {
     service: Arc<Service>,
@@ -70,7 +72,8 @@ pub async fn follow(
     let caller = caller.caller;
     let events = JobStream { service, caller, job, changes, last_id, last_state: None, place };
     let events = stream::unfold(Some(events), |events| async { events?.next().await });
-    Ok(Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE)).into_response())
+    let stream = Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE));
+    Ok((UNBUFFERED, stream).into_response())
 }
 
 impl JobStream {
