@@ -5,7 +5,7 @@ mod support;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::os::unix::fs::PermissionsExt;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 
 use support::patience::patience;
 
@@ -43,4 +43,46 @@ async fn the_demo_tells_both_acts_and_opens_its_page() {
     assert!(Command::new("kill").args(["-INT", &demo.id().to_string()]).status().unwrap().success());
     let ended = tokio::task::spawn_blocking(move || demo.wait().unwrap());
     assert!(tokio::time::timeout(patience(), ended).await.unwrap().unwrap().success());
+}
+
+/// The blocks of text that the README shows, line by line.
+fn shown() -> Vec<Vec<String>> {
+    let page = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
+    let blocks = page.split("```text\n").skip(1).map(|block| block.split("```").next().unwrap());
+    blocks.map(|block| block.lines().map(str::to_owned).collect()).collect()
+}
+
+#[test]
+fn the_readme_shows_what_advise_prints() {
+    let mut advise = Command::new(env!("CARGO_BIN_EXE_ballast"));
+    let advise = advise.current_dir(env!("CARGO_MANIFEST_DIR")).args(["advise", "data/us_market_monthly.csv"]);
+    let printed = String::from_utf8(advise.output().unwrap().stdout).unwrap();
+    assert_eq!(shown()[0], printed.lines().collect::<Vec<_>>());
+}
+
+/// Ends the demo when the test does.
+struct Ended(Child);
+
+impl Drop for Ended {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// The demo as the README tells to run it, as far as the README shows it: to the end of its first act.
+#[test]
+fn the_readme_shows_what_the_demo_prints() {
+    let mut demo = Command::new(env!("CARGO_BIN_EXE_ballast"));
+    let mut demo = Ended(demo.arg("demo").stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap());
+    let mut printed = BufReader::new(demo.0.stdout.take().unwrap()).lines().map(Result::unwrap);
+    let mut last = String::new();
+    // The README leaves lines out, and says so.
+    for line in shown()[1].iter().filter(|line| *line != "...") {
+        let found = printed.find(|printed| {
+            last.clone_from(printed);
+            printed.trim_end() == line
+        });
+        assert!(found.is_some(), "the demo prints no line {line:?} there; it ended with {last:?}");
+    }
 }
