@@ -4,8 +4,11 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use ballast::control::request::specification::Specification;
+use jiff::ToSpan;
+use jiff::civil::Date;
 use serde_json::{Value, json};
 
 const README_BYTES: usize = 10_000;
@@ -363,4 +366,50 @@ fn the_defaults_are_those_of_a_training() {
     all.retain(|name| !said_in_words.contains(&name.as_str()));
     let missing: Vec<&String> = all.iter().filter(|name| !compared.contains(*name)).collect();
     assert!(missing.is_empty(), "no default of {missing:?}");
+}
+
+/// The code that the sections of `docs/measurements.md` measure, and when.
+fn measured() -> Vec<(String, Date, Vec<String>)> {
+    let page = read("docs/measurements.md");
+    let sections = page.split("\n## ").skip(1).map(|section| {
+        let (heading, rest) = section.split_once("\n\n").unwrap();
+        let line = rest.lines().next().unwrap();
+        let said = line.strip_prefix("Measured ").and_then(|line| line.split_once(": "));
+        let (date, code) = said.unwrap_or_else(|| panic!("{heading}: {line:?} must be `Measured DATE: CODE`"));
+        let date = date.parse().unwrap_or_else(|error| panic!("{heading}: {date}: {error}"));
+        (heading.to_owned(), date, spans(code))
+    });
+    sections.collect()
+}
+
+/// The day of the last commit that changed `paths`; `None` without a history.
+fn changed(paths: &[String]) -> Option<Date> {
+    let mut git = Command::new("git");
+    let git = git.current_dir(env!("CARGO_MANIFEST_DIR")).args(["log", "-1", "--format=%as", "--"]).args(paths);
+    let day = git.output().ok().filter(|output| output.status.success())?;
+    String::from_utf8(day.stdout).ok()?.trim().parse().ok()
+}
+
+/// Whether code that changed on a day leaves a measurement behind. Some days pass between a change and its measurement, and
+/// changes that come one after the other are measured once.
+fn is_outdated(measured: Date, changed: Date) -> bool {
+    measured.checked_add(30.days()).unwrap() < changed
+}
+
+/// By the days of commits and not by today: what holds once holds until the code is changed.
+#[test]
+fn no_measurement_is_older_than_the_code_it_measures() {
+    let measured = measured();
+    assert!(measured.len() >= 13, "{measured:?}");
+    for (heading, date, code) in measured {
+        assert!(!code.is_empty() && code.iter().all(|path| exists(path)), "{heading}: {code:?}");
+        let Some(changed) = changed(&code) else { continue };
+        assert!(
+            !is_outdated(date, changed),
+            "docs/measurements.md, {heading}: measured on {date}, and {code:?} changed on {changed}: measure again, or look \
+             whether the change can matter, and write the day of that"
+        );
+    }
+    let day = |text: &str| text.parse::<Date>().unwrap();
+    assert!(!is_outdated(day("2026-11-01"), day("2026-12-01")) && is_outdated(day("2026-11-01"), day("2026-12-02")));
 }
