@@ -51,8 +51,9 @@ pub struct AssetsAction {
 
 impl ActionAnswer {
     pub fn new(session: String, action: ServiceAction) -> Self {
-        let ServiceAction { period, advice, assets, worst_case, sensitivity } = action;
-        let caution = cautions(&advice, sensitivity.as_ref());
+        let ServiceAction { period, advice, assets, worst_case, sensitivity, waiting } = action;
+        let mut caution = cautions(&advice, sensitivity.as_ref());
+        caution.extend(waiting.map(|horizon| Caution::waiting(period, horizon)));
         match assets {
             None => ActionAnswer::Asset(Box::new(Action { session, period, advice, worst_case, caution, sensitivity })),
             Some(assets) => {

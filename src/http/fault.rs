@@ -32,6 +32,11 @@ impl From<ServiceError> for Problem {
             ServiceError::Conflict { what, number } => {
                 problem(Kind::ReportConflict).naming(what, number, "must come with the content first reported for it")
             }
+            ServiceError::RenewedAlready { number, .. } => {
+                let next = number + 1;
+                let rule = format!("must be {next} to renew it once more: renewal {number} is made");
+                problem(Kind::ReportConflict).naming("renewal", number, rule)
+            }
             ServiceError::Gap { what, given, expected } => {
                 problem(Kind::ReportGap).naming(what, given, format!("must be {expected}"))
             }

@@ -39,8 +39,8 @@ pub struct Asked {
 #[serde(rename_all = "snake_case")]
 enum Is {
     Active,
+    Waiting,
     Completed,
-    Due,
     Care,
     Overdue,
     Renewal,
@@ -84,8 +84,6 @@ pub struct SessionEntry {
     /// Standard deviation of the log-returns learned; of several assets, of their fund. Null before the first report, or where the
     /// policy tells fewer than two moments.
     pub deviation: Option<f64>,
-    /// Whether its next policy is to be trained.
-    pub due: bool,
     /// Whether the returns still come as they came.
     pub drift: DriftLevel,
     pub created_ms: i64,
@@ -95,7 +93,7 @@ impl From<Listed> for SessionEntry {
     fn from(Listed { row, stands, next, care }: Listed) -> Self {
         SessionEntry {
             period: row.observations + 1,
-            state: session_state(row.observations, row.horizon),
+            state: session_state(row.observations, row.horizon, row.is_due),
             wealth: stands.map_or(row.initial_wealth, |stands| stands.wealth),
             holding: stands.map_or(row.initial_holding, |stands| stands.holding),
             wealth_change: stands.map(|stands| stands.wealth_change),
@@ -112,7 +110,6 @@ impl From<Listed> for SessionEntry {
             next,
             care: care.into_iter().map(CareReason::from).collect(),
             deviation: stands.and_then(|stands| stands.deviation),
-            due: row.is_due,
             created_ms: row.created_ms,
         }
     }
@@ -124,7 +121,7 @@ impl From<Listed> for SessionEntry {
 pub enum CareReason {
     /// Its next report is late.
     Overdue,
-    /// Its next policy failed to be trained, or is not there after an hour.
+    /// It waits for its next policy.
     Renewal,
     /// Its returns have changed.
     Alarm,
@@ -149,7 +146,7 @@ pub struct CareCount {
     pub any: usize,
     /// Their next report is late.
     pub overdue: usize,
-    /// Their next policy failed to be trained, or is not there after an hour.
+    /// They wait for their next policies.
     pub renewal: usize,
     /// Their returns have changed.
     pub alarm: usize,
@@ -177,7 +174,7 @@ pub struct SessionPage {
 #[utoipa::path(get, path = "/sessions", tag = "sessions",
     params(("search" = Option<String>, Query, max_length = 100, description = "Part of a name, of a tag, of the session's or its policy's identifier or of the policy's name, whatever the case."),
            ("tag" = Option<String>, Query, max_length = 50, description = "One that they have."),
-           ("state" = inline(Option<Is>), Query, description = "`due`: to be renewed by itself; `care`: in need of care, for any of the reasons `overdue`, `renewal` and `alarm`."),
+           ("state" = inline(Option<Is>), Query, description = "`waiting`: for the next policy; `care`: in need of care, for any of the reasons `overdue`, `renewal` and `alarm`."),
            ("sort" = Option<String>, Query, description = "`created`, `name`, `wealth` or `last_report`, with `-` before it for descending; default `-created`."),
            ("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
            ("after" = Option<String>, Query, description = "The `next` of the page before, of the same `sort`.")),
@@ -223,8 +220,8 @@ impl Asked {
         };
         let is = self.state.map(|state| match state {
             Is::Active => SessionIs::Active,
+            Is::Waiting => SessionIs::Waiting,
             Is::Completed => SessionIs::Completed,
-            Is::Due => SessionIs::Due,
             Is::Care => SessionIs::Needing(None),
             Is::Overdue => SessionIs::Needing(Some(Care::Overdue)),
             Is::Renewal => SessionIs::Needing(Some(Care::Renewal)),

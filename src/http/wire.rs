@@ -201,7 +201,9 @@ pub struct OpenSession {
 #[serde(rename_all = "snake_case")]
 pub enum SessionState {
     Active,
-    /// The horizon is reached.
+    /// Its next policy is to be trained; until it is there the session goes on by the one it has.
+    Waiting,
+    /// The horizon is reached, and no policy is to follow.
     Completed,
 }
 
@@ -243,15 +245,19 @@ pub struct Session {
     pub created_ms: i64,
 }
 
-pub fn session_state(observed: usize, horizon: usize) -> SessionState {
-    if observed >= horizon { SessionState::Completed } else { SessionState::Active }
+pub fn session_state(observed: usize, horizon: usize, is_due: bool) -> SessionState {
+    match observed < horizon {
+        _ if is_due => SessionState::Waiting,
+        true => SessionState::Active,
+        false => SessionState::Completed,
+    }
 }
 
 impl From<Live> for Session {
     fn from(live: Live) -> Self {
         Session {
             period: live.observed + 1,
-            state: session_state(live.observed, live.horizon()),
+            state: session_state(live.observed, live.horizon(), live.is_due()),
             date: live.standing.date,
             wealth: live.standing.state.wealth,
             holding: live.standing.state.holding,

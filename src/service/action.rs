@@ -23,6 +23,8 @@ pub struct Action {
     pub assets: Option<Box<Assets>>,
     pub worst_case: Option<WorstCase>,
     pub sensitivity: Option<Sensitivity>,
+    /// The last period that its policy was trained for, of a session whose next policy is to come.
+    pub waiting: Option<usize>,
 }
 
 /// How an action is asked for.
@@ -50,18 +52,18 @@ impl Sessions {
         let mut held = self.hold(tenant, session).await;
         let live = held.current(&self.rows(tenant, session)).await?;
         live.goes_on()?;
-        let period = live.observed + 1;
+        let (period, waiting) = (live.observed + 1, live.is_due().then(|| live.horizon()));
         let Question { mode, explain, sensitivity } = question;
         let surrogate = mode == AdviceMode::Surrogate && !explain;
         if let Some(advice) = live.advice.clone().filter(|_| surrogate && !sensitivity) {
             let assets = live.standing.assets.clone();
-            return Ok(Action { period, advice, assets, worst_case: None, sensitivity: None });
+            return Ok(Action { period, advice, assets, worst_case: None, sensitivity: None, waiting });
         }
         let means = self.means(tenant, live, turn).await?;
         if surrogate && !sensitivity {
             let advice = live.surrogate_advice(&means).await?.clone();
             let assets = live.standing.assets.clone();
-            return Ok(Action { period, advice, assets, worst_case: None, sensitivity: None });
+            return Ok(Action { period, advice, assets, worst_case: None, sensitivity: None, waiting });
         }
         let advisor = means.advisor;
         let (mut state, step, assets) = (live.standing.state.clone(), live.step(), live.standing.assets.clone());
@@ -82,7 +84,7 @@ impl Sessions {
             };
             let mode = if explain { AdviceMode::Resolve } else { mode };
             let sensitivity = record.map(|record| advisor.sensitivity(step, &state, &record, (&advice, mode)));
-            Action { period, advice, assets, worst_case, sensitivity }
+            Action { period, advice, assets, worst_case, sensitivity, waiting }
         });
         solving.await
     }

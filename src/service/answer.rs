@@ -34,7 +34,7 @@ pub struct Observed {
     /// The last day that was reported, of this period or of one before.
     #[schema(value_type = Option<String>, format = Date)]
     pub date: Option<Date>,
-    /// Whether the horizon is reached.
+    /// Whether the horizon is reached, and no policy is to follow.
     pub completed: bool,
     /// Whether the returns still come as they came.
     pub drift: Drift,

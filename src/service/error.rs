@@ -22,6 +22,8 @@ pub enum ServiceError {
     JobNotEnded { job: String },
     #[error("{what} {number} was reported with other content")]
     Conflict { what: &'static str, number: usize },
+    #[error("renewal {number} was made by {by} at {at}, with other content: read the session again")]
+    RenewedAlready { number: usize, by: String, at: String },
     #[error("{what} {given} is not the one expected: report {what} {expected}")]
     Gap { what: &'static str, given: usize, expected: usize },
     #[error(transparent)]

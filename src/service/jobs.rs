@@ -21,7 +21,9 @@ use crate::control::request::evaluation::EvaluationRequest;
 use crate::control::request::frontier::FrontierRequest;
 use crate::control::request::specification::Specification;
 use crate::control::request::warnings::Warning;
-use crate::store::{Actor, CreateJob, DeleteJob, JobKind, JobRow, NewJob, Relabel, Store, Tenant};
+use crate::store::{
+    Actor, CreateJob, DeleteJob, JobKind, JobRow, NewJob, Relabel, SessionTraining, Store, Tenant, TrainingRequest,
+};
 
 /// A job as stored, and how far it is where it runs in this process.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,20 +95,40 @@ impl Jobs {
         Ok(Accepted { job, warnings: completed.problem.warnings() })
     }
 
-    /// Queues a training of the service's own. The same key again gives the same job, whatever it is to train.
+    /// Finds or queues the training that a session requests: all sessions of a tenant that need one policy share its job. The
+    /// same request again gives the same job, whatever it is to train.
     ///
     /// # Errors
     /// As [`Self::train`].
-    pub(super) async fn train_by_key(
+    pub(super) async fn train_for_session(
         &self,
         tenant: &Tenant,
-        by: Actor,
         specification: Specification,
-        key: String,
-    ) -> Result<Job, ServiceError> {
-        let sent = key.clone();
-        let queued = self.queue_training((tenant, by), specification, Relabel::default(), sent.as_bytes(), Some(key));
-        Ok(queued.await?.0)
+        request: TrainingRequest,
+    ) -> Result<SessionTraining, ServiceError> {
+        let completed = self.admitted(specification)?;
+        let (key, steps_total, labels) = (request.key(), completed.problem.horizon, Relabel::default());
+        let sent = key.as_bytes();
+        let training = Request { kind: JobKind::Train, sent, completed: &completed, steps_total, labels };
+        let new = self.new_job(tenant, training, None)?;
+        let by = Actor::service(self.clock.now_milliseconds());
+        let training = self.store.by(by).train_for_session(new, request).await?;
+        self.board.ring();
+        Ok(training)
+    }
+
+    /// Cancels the trainings made for sessions that none requests any more.
+    ///
+    /// # Errors
+    /// The store does not answer.
+    pub(super) async fn cancel_unrequested(&self) -> Result<(), ServiceError> {
+        let now_ms = self.clock.now_milliseconds();
+        for job in self.store.by(Actor::service(now_ms)).cancel_unrequested(now_ms).await? {
+            tracing::info!(job, "a training that no session requests any more is cancelled");
+            self.board.stop(&job);
+            self.board.ring();
+        }
+        Ok(())
     }
 
     async fn queue_training(
@@ -117,12 +139,18 @@ impl Jobs {
         sent: &[u8],
         key: Option<String>,
     ) -> Result<(Job, Specification), ServiceError> {
-        let completed = specification.completed()?;
-        self.memory.admits(&estimate::training(&completed, self.threads))?;
-        self.memory.keeps(&estimate::advising(&completed))?;
+        let completed = self.admitted(specification)?;
         let steps = completed.problem.horizon;
         let request = Request { kind: JobKind::Train, sent, completed: &completed, steps_total: steps, labels };
         Ok((self.queue(of, request, key).await?, completed))
+    }
+
+    /// Completes a specification that there is memory to train by, and to advise by its policy.
+    fn admitted(&self, specification: Specification) -> Result<Specification, ServiceError> {
+        let completed = specification.completed()?;
+        self.memory.admits(&estimate::training(&completed, self.threads))?;
+        self.memory.keeps(&estimate::advising(&completed))?;
+        Ok(completed)
     }
 
     /// Queues an evaluation, whose policies the caller has looked at. The same key and request again give the same job.
@@ -194,25 +222,34 @@ impl Jobs {
         Ok(Accepted { job, warnings: question.fund.problem.warnings() })
     }
 
-    /// Queues what was `sent`, as it was completed.
-    async fn queue(
+    fn new_job(
         &self,
-        (tenant, by): (&Tenant, Actor),
+        tenant: &Tenant,
         Request { kind, sent, completed, steps_total, labels }: Request<'_, impl Serialize>,
-        key: Option<String>,
-    ) -> Result<Job, ServiceError> {
-        key.as_deref().map_or(Ok(()), idempotency::check)?;
-        let new = NewJob {
+        idempotency_key: Option<String>,
+    ) -> Result<NewJob, ServiceError> {
+        Ok(NewJob {
             job: identity::new_id("job")?,
             tenant: tenant.clone(),
             kind,
             request_json: serde_json::to_string(completed).map_err(ServiceError::internal)?,
             request_hash: content_hash(sent),
-            idempotency_key: key.clone(),
+            idempotency_key,
             steps_total,
             labels,
             created_ms: self.clock.now_milliseconds(),
-        };
+        })
+    }
+
+    /// Queues what was `sent`, as it was completed.
+    async fn queue(
+        &self,
+        (tenant, by): (&Tenant, Actor),
+        request: Request<'_, impl Serialize>,
+        key: Option<String>,
+    ) -> Result<Job, ServiceError> {
+        key.as_deref().map_or(Ok(()), idempotency::check)?;
+        let new = self.new_job(tenant, request, key.clone())?;
         match self.store.by(by).create_job(new).await? {
             CreateJob::Created(row) => {
                 self.board.ring();

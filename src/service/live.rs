@@ -94,7 +94,7 @@ impl Live {
     /// # Errors
     /// Every period of the horizon is observed.
     pub(super) fn goes_on(&self) -> Result<(), ServiceError> {
-        let horizon = self.horizon();
+        let horizon = self.last_period();
         if self.observed < horizon {
             return Ok(());
         }
@@ -106,10 +106,23 @@ impl Live {
         self.current.horizon()
     }
 
-    /// Whether the next policy is to be trained.
+    /// Whether the next policy is to be trained. Until it is there the session goes on by the one it has.
     pub fn is_due(&self) -> bool {
-        let due = self.renew.and_then(|renew| renew.due(self.renewals, &self.current));
-        due.is_some_and(|due| self.observed >= due)
+        self.is_due_after(self.observed)
+    }
+
+    fn is_due_after(&self, observed: usize) -> bool {
+        self.current.is_due(observed, self.renew, self.renewals)
+    }
+
+    /// Whether it is advised of a period after `observed` ones.
+    fn goes_on_after(&self, observed: usize) -> bool {
+        observed < self.horizon() || self.is_due_after(observed)
+    }
+
+    /// The last period that it may report: of one that waits for its next policy, as many past the horizon as that has.
+    fn last_period(&self) -> usize {
+        self.horizon() + if self.is_due() { self.current.terms.horizon } else { 0 }
     }
 
     /// The step of its policy that advises the coming period.
@@ -120,11 +133,11 @@ impl Live {
     /// The step that advises the period after the coming one, if one does.
     pub(super) fn following(&self) -> Option<usize> {
         let observed = self.observed + 1;
-        (observed < self.horizon()).then(|| self.current.step(observed))
+        self.goes_on_after(observed).then(|| self.current.step(observed))
     }
 
     pub(super) fn expects(&self, period: usize) -> Result<(), ServiceError> {
-        let horizon = self.horizon();
+        let horizon = self.last_period();
         if self.observed >= horizon {
             return Err(ServiceError::PastHorizon { given: period, horizon });
         }
@@ -177,7 +190,8 @@ impl Live {
         let passed = self.standing.after(dynamics, observe.period, report, allocation)?;
         let Passed { seen, log_return, executed_allocation, executed, standing } = passed;
         let advised = self.standing.assets.as_ref().map(|assets| assets.shares(allocation));
-        let next = self.current.step(observe.period);
+        let goes_on = self.goes_on_after(observe.period);
+        let next = self.current.step_from(observe.period, self.renew, self.renewals);
         let (standing, uncertainty) = measured(means, &self.row.tenant, next, standing).await?;
         let answer = Observed {
             session: observe.session.clone(),
@@ -196,7 +210,7 @@ impl Live {
             }),
             wealth_change: standing.state.wealth - self.standing.state.wealth,
             date: standing.date,
-            completed: observe.period == self.horizon(),
+            completed: !goes_on,
             drift: standing.bet.told(),
             uncertainty,
         };

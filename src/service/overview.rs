@@ -43,7 +43,7 @@ impl Sessions {
         let today = day_of(now_ms);
         let calendars = self.store.calendars(tenant).await?;
         let first_days = calendars.into_iter().filter_map(|periods| first_day(today?, periods)).collect();
-        let asked = SessionQuery { today: Today { now_ms, first_days }, ..asked };
+        let asked = SessionQuery { today: Today { first_days }, ..asked };
         let counted = async {
             match asked.after {
                 None => self.store.care(tenant, &asked).await.map(Some),
@@ -55,11 +55,11 @@ impl Sessions {
             let stands: Option<Stands> = row.last.as_ref().map(|(answer, _)| read(answer)).transpose()?;
             let said = stands.and_then(|stands| stands.date);
             let from = said.or_else(|| day_of(row.last.as_ref().map_or(row.created_ms, |(_, reported)| *reported)));
-            let is_active = row.observations < row.horizon;
+            let is_active = row.observations < row.horizon || row.is_due;
             let next = row.periods_per_year.filter(|_| is_active).and_then(|periods| next_day(from?, periods));
             let needs = |care: &Care| match care {
                 Care::Overdue => next.zip(today).is_some_and(|(next, today)| next < today),
-                Care::Renewal => row.is_stuck,
+                Care::Renewal => row.is_due,
                 Care::Alarm => stands.is_some_and(|stands| stands.drift.level == DriftLevel::Alarm),
             };
             let care = Care::ALL.into_iter().filter(|care| is_active && needs(care)).collect();

@@ -209,9 +209,23 @@ impl Stretch {
         Err(FieldError::new("period", period, rule))
     }
 
-    /// The step of its policy that advises the period after `observed` periods of the session.
+    /// The step of its policy that advises the period after `observed` periods of the session. The last step, which looks one
+    /// period ahead, also advises those past the horizon, until the next policy is there.
     pub(super) fn step(&self, observed: usize) -> usize {
-        if self.rolling { 0 } else { observed - self.after }
+        if self.rolling { 0 } else { (observed - self.after).min(self.terms.horizon.saturating_sub(1)) }
+    }
+
+    /// Whether a session by its policy that was renewed so many times is due to be renewed by itself.
+    pub(super) fn is_due(&self, observed: usize, renew: Option<Renewing>, renewals: usize) -> bool {
+        renew.and_then(|renew| renew.due(renewals, self)).is_some_and(|due| observed >= due)
+    }
+
+    /// The step that advises after `observed` periods; past every step of the policy if the session ends there.
+    pub(super) fn step_from(&self, observed: usize, renew: Option<Renewing>, renewals: usize) -> usize {
+        match observed < self.horizon() || self.rolling || self.is_due(observed, renew, renewals) {
+            true => self.step(observed),
+            false => self.terms.horizon,
+        }
     }
 
     /// What becomes of money in that period.

@@ -3,6 +3,7 @@
 //! An entry is decided on all entries before it, and appended as the one after them. Where another process wrote meanwhile it
 //! is not, and is decided anew on what is there now: observations and corrections of all processes have one order.
 
+use jiff::Timestamp;
 use tracing::Instrument;
 
 use super::allowance::HeavyTurn;
@@ -106,7 +107,7 @@ impl Sessions {
             let put_right = move || periods.put_right(&putting);
             let PutRight { before, standing, log_return, wealth_change } =
                 self.advising.run(tenant, put_right).await??;
-            let step = current.step(observed);
+            let step = current.step_from(observed, Plan::of(&facts.row)?.renew, renewals);
             let (standing, uncertainty) = measured(&self.means_of(advisor, Some(turn)), tenant, step, standing).await?;
             let answer = Corrected {
                 session: session.to_owned(),
@@ -163,6 +164,12 @@ impl Sessions {
     ) -> Result<String, ServiceError> {
         match self.store.entry(session, kind, number).await? {
             Some(row) if row.content_json == content => Ok(row.answer_json),
+            Some(row) if kind == EntryKind::Renewal => Err(ServiceError::RenewedAlready {
+                number,
+                by: if row.key.is_empty() { "the service".to_owned() } else { format!("the key {}", row.key) },
+                at: Timestamp::from_millisecond(row.created_ms)
+                    .map_or_else(|_| "?".to_owned(), |at| format!("{at:.0}")),
+            }),
             _ => Err(ServiceError::Conflict { what: kind.counted(), number }),
         }
     }

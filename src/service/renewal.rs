@@ -55,6 +55,10 @@ impl Sessions {
             held.clear();
             let appended = store.renew(new, onto).instrument(spans::of_write("append an entry")).await?;
             if let Some(answer_json) = self.settled(&mut held, appended, answer_json, next)? {
+                if turn.is_some() {
+                    // By a caller: what the session requested is requested no more.
+                    let _ = self.due.try_send((tenant.clone(), session.to_owned()));
+                }
                 return Ok(answer_json);
             }
         }

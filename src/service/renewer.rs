@@ -1,13 +1,12 @@
 //! Sessions that are renewed by themselves: the next policy is trained on the returns seen, and the session goes on by it.
 //!
 //! What is to be done is found in the store each time anew, so that it goes on after a kill between any two steps, and on
-//! every replica alike. A session is due by its entries; the job that trains its next policy is found by its idempotency key,
-//! which no caller can send and which says of which session and renewal it is, and the how-manieth attempt; and the renewal
-//! has a number. Whoever does a step that another did already finds that it was done.
+//! every replica alike. A session is due by its entries; the job that trains its next policy is found by the session's request
+//! ([`TrainingRequest`]), which names session, renewal and attempt; and the renewal has a number. Whoever does a step that
+//! another did already finds that it was done. Sessions of a tenant that need one policy wait for one job.
 //!
 //! An attempt that fails leaves the session as it is, and is followed by the next after a while that doubles each time.
 
-use std::collections::{BTreeMap, HashMap};
 use std::time::Duration;
 
 use futures_util::StreamExt;
@@ -18,6 +17,7 @@ use tokio::time::MissedTickBehavior;
 use utoipa::ToSchema;
 
 use self::turns::Turns;
+use self::waiting::Waiting;
 use super::clock::Clock;
 use super::error::ServiceError;
 use super::jobs::Jobs;
@@ -31,7 +31,7 @@ use super::shutdown::Shutdown;
 use crate::control::error::FieldError;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::specification::{Interval, Specification};
-use crate::store::{Actor, JobRow, JobState, Store, Tenant};
+use crate::store::{Actor, JobRow, JobState, SessionTraining, Store, TrainingRequest};
 
 /// Between two looks at jobs that train next policies.
 const PAUSE: Duration = Duration::from_millis(500);
@@ -45,12 +45,14 @@ const LONGEST_DELAY: Duration = Duration::from_hours(24);
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Sessions read in one step of a round.
 const PAGE: usize = 256;
-/// Renewals of one tenant under way at a time in this process, and begun with in one round.
-const OF_ONE: usize = 256;
+/// Sessions of one tenant that are renewed at a time in this process: a bound of memory, half a megabyte. Those beyond it
+/// follow.
+const OF_ONE: usize = 4096;
 /// Sessions told of that are not looked at yet; of more a round finds out.
 pub(super) const TOLD: usize = 1024;
 
 mod turns;
+mod waiting;
 
 /// Where a renewal is that is due.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
@@ -89,7 +91,7 @@ struct Attempts {
 impl Attempts {
     async fn of(store: &Store, live: &Live) -> Result<Self, ServiceError> {
         let (number, mut last, mut count) = (live.renewals + 1, None, 0);
-        while let Some(job) = store.job_by_key(&live.row.tenant, &key(&live.row.session, number, count)).await? {
+        while let Some(job) = store.job_by_key(&live.row.tenant, &request(live, number, count).key()).await? {
             (last, count) = (Some(job), count + 1);
         }
         Ok(Attempts { number, count, last })
@@ -107,9 +109,8 @@ impl Attempts {
     }
 }
 
-/// No header has a line break, so it is nobody's own.
-fn key(session: &str, renewal: usize, attempt: usize) -> String {
-    format!("renewal\n{session}\n{renewal}\n{attempt}")
+fn request(live: &Live, renewal: usize, attempt: usize) -> TrainingRequest {
+    TrainingRequest { session: live.row.session.clone(), renewal, attempt }
 }
 
 impl Sessions {
@@ -125,14 +126,13 @@ impl Sessions {
     }
 }
 
-/// The sessions whose next policies are trained, and the jobs that train them.
-type UnderWay = BTreeMap<Name, String>;
-
 /// What is left to do for a session.
 enum Left {
     Nothing,
     /// Once the job has ended.
     Job(String),
+    /// Once the queue has room for its training.
+    Room,
 }
 
 pub(super) struct Renewer {
@@ -142,32 +142,61 @@ pub(super) struct Renewer {
     pub jobs: Jobs,
 }
 
+/// The sessions under way.
+#[derive(Default)]
+struct UnderWay {
+    turns: Turns,
+    waiting: Waiting,
+    /// The session before the first that a round left out, as many of its tenant being under way as may be.
+    left_after: Option<i64>,
+}
+
 impl Renewer {
     /// Renews sessions until the shutdown begins.
     pub(super) async fn run(self, mut told: Receiver<Name>, shutdown: Shutdown) {
-        let (mut under_way, mut turns, mut steps) = (UnderWay::new(), Turns::default(), FuturesUnordered::new());
+        let (mut under_way, mut steps) = (UnderWay::default(), FuturesUnordered::new());
         let (mut round, mut look) = (tokio::time::interval(ROUND), tokio::time::interval(PAUSE));
         look.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
-            while let Some(name) = turns.next() {
+            while let Some(name) = under_way.turns.next() {
                 steps.push(self.go_on(name));
             }
             tokio::select! {
                 () = shutdown.begun() => return,
-                Some(name) = told.recv() => begin(name, &under_way, &mut turns),
-                Some((name, job)) = steps.next(), if !steps.is_empty() => {
-                    turns.done(&name);
-                    job.map(|job| under_way.insert(name, job));
+                Some(name) = told.recv() => self.hear(name, &mut under_way).await,
+                Some((name, left)) = steps.next(), if !steps.is_empty() => {
+                    under_way.stepped(name, left);
+                    if under_way.left_after.is_some() && under_way.turns.is_empty() {
+                        self.find(&mut under_way).await;
+                    }
                 }
-                _ = look.tick(), if !under_way.is_empty() => self.follow(&mut under_way, &mut turns).await,
-                _ = round.tick() => self.find(&under_way, &mut turns).await,
+                _ = look.tick(), if !under_way.waiting.is_empty() => self.follow(&mut under_way).await,
+                _ = round.tick() => {
+                    self.sweep().await;
+                    under_way.retry();
+                    self.find(&mut under_way).await;
+                }
             }
         }
     }
 
-    /// Begins with all sessions that are due.
-    async fn find(&self, under_way: &UnderWay, turns: &mut Turns) {
-        let (mut after, mut begun) = (0, HashMap::<Tenant, usize>::new());
+    /// Begins with a session that became due, or was renewed or deleted: what it requested may be requested no more.
+    async fn hear(&self, name: Name, under_way: &mut UnderWay) {
+        if under_way.waiting.contains(&name) {
+            self.sweep().await;
+        }
+        under_way.begin(name);
+    }
+
+    async fn sweep(&self) {
+        if let Err(error) = self.jobs.cancel_unrequested().await {
+            tracing::warn!(error = &error as &dyn std::error::Error, "trainings that no session requests go on");
+        }
+    }
+
+    /// Begins with all sessions that are due, from where the last round left some out.
+    async fn find(&self, under_way: &mut UnderWay) {
+        let mut after = under_way.left_after.take().unwrap_or_default();
         loop {
             let page = match self.store.due_sessions(PAGE, after).await {
                 Ok(page) => page,
@@ -176,59 +205,64 @@ impl Renewer {
                     return;
                 }
             };
-            let Some((last, ..)) = page.last() else { return };
-            after = *last;
-            for (_, tenant, session) in page {
-                let of_one = begun.entry(tenant.clone()).or_default();
-                *of_one += 1;
-                if *of_one <= OF_ONE {
-                    begin((tenant, session), under_way, turns);
+            if page.is_empty() {
+                return;
+            }
+            for (sequence, tenant, session) in page {
+                if !under_way.begin((tenant, session)) {
+                    under_way.left_after.get_or_insert(after);
                 }
+                after = sequence;
             }
         }
     }
 
     /// Looks at the jobs under way.
-    async fn follow(&self, under_way: &mut UnderWay, turns: &mut Turns) {
-        let names: Vec<Name> = under_way.keys().cloned().collect();
-        for name in names {
-            let Some(job) = under_way.remove(&name) else { continue };
+    async fn follow(&self, under_way: &mut UnderWay) {
+        for job in under_way.waiting.jobs() {
             match self.store.job(&job).await {
-                Ok(Some(row)) if matches!(row.state, JobState::Queued | JobState::Running) => {
-                    under_way.insert(name, job);
-                }
+                Ok(Some(row)) if matches!(row.state, JobState::Queued | JobState::Running) => {}
                 Ok(Some(row)) if matches!(row.state, JobState::Failed | JobState::Cancelled) => {
-                    metrics::counter!(RENEWALS, "outcome" => "failed").increment(1);
-                    tracing::warn!(session = name.1, job, error = row.error, "a renewal failed");
+                    for name in under_way.ended(&job) {
+                        if self.sessions.get(&name.0, &name.1).await.is_ok_and(|live| live.is_due()) {
+                            metrics::counter!(RENEWALS, "outcome" => "failed").increment(1);
+                            tracing::warn!(session = name.1, job, error = row.error, "a renewal failed");
+                        }
+                    }
                 }
-                _ => turns.queue(name),
+                _ => {
+                    for name in under_way.ended(&job) {
+                        under_way.turns.queue(name);
+                    }
+                }
             }
         }
     }
 
-    /// Does the next step for a session, and gives the job that it then waits for; a step that fails is done again in a later
-    /// round.
-    async fn go_on(&self, name: Name) -> (Name, Option<String>) {
+    /// Does the next step for a session; one that fails is done again in a later round.
+    async fn go_on(&self, name: Name) -> (Name, Left) {
         let step = tokio::time::timeout(PATIENCE, self.step(&name)).await;
-        let job = match step.unwrap_or(Err(ServiceError::Busy)) {
-            Ok(Left::Nothing) => None,
-            Ok(Left::Job(job)) => Some(job),
-            Err(error) => {
-                metrics::counter!(RENEWALS, "outcome" => "failed").increment(1);
-                tracing::warn!(session = name.1, error = &error as &dyn std::error::Error, "a session was not renewed");
-                None
-            }
-        };
-        (name, job)
+        let left = step.unwrap_or(Err(ServiceError::Busy)).unwrap_or_else(|error| {
+            metrics::counter!(RENEWALS, "outcome" => "failed").increment(1);
+            tracing::warn!(session = name.1, error = &error as &dyn std::error::Error, "a session was not renewed");
+            Left::Nothing
+        });
+        (name, left)
     }
 
     async fn step(&self, (tenant, session): &Name) -> Result<Left, ServiceError> {
         let live = match self.sessions.get(tenant, session).await {
             Ok(live) => live,
-            Err(ServiceError::Unknown { .. }) => return Ok(Left::Nothing),
+            Err(ServiceError::Unknown { .. }) => {
+                self.jobs.cancel_unrequested().await?;
+                return Ok(Left::Nothing);
+            }
             Err(error) => return Err(error),
         };
-        let Some(renew) = live.renew.filter(|_| live.is_due()) else { return Ok(Left::Nothing) };
+        let Some(renew) = live.renew.filter(|_| live.is_due()) else {
+            self.jobs.cancel_unrequested().await?;
+            return Ok(Left::Nothing);
+        };
         let attempts = Attempts::of(&self.store, &live).await?;
         let Some(last) = &attempts.last else { return self.train(&live, renew, &attempts).await };
         match (last.state, &last.policy) {
@@ -269,7 +303,9 @@ impl Renewer {
                 Ok(())
             }
             // Somebody else renewed it meanwhile, or deleted it.
-            Err(ServiceError::Conflict { .. } | ServiceError::Gap { .. }) => Ok(()),
+            Err(ServiceError::RenewedAlready { .. } | ServiceError::Conflict { .. } | ServiceError::Gap { .. }) => {
+                Ok(())
+            }
             Err(ServiceError::Unknown { what: "session", .. }) => Ok(()),
             Err(error) => Err(error),
         }
@@ -288,22 +324,67 @@ impl Renewer {
             Ok::<_, ServiceError>(next(advisor.specification(), &record, renew.window, rate, wealth)?)
         };
         let specification = self.sessions.resolving.run(tenant, specify).await??;
-        let (by, key) = (Actor::service(self.clock.now_milliseconds()), key(session, attempts.number, attempts.count));
-        let job = self.jobs.train_by_key(tenant, by, specification, key).await?;
-        tracing::info!(
-            session,
-            job = job.row.job,
-            renewal = attempts.number,
-            "the next policy of a session is trained"
-        );
-        Ok(Left::Job(job.row.job))
+        let request = request(live, attempts.number, attempts.count);
+        Ok(match self.jobs.train_for_session(tenant, specification, request).await? {
+            SessionTraining::Job(row) => {
+                let (job, renewal) = (row.job, attempts.number);
+                tracing::info!(session, job, renewal, "the next policy of a session is trained");
+                Left::Job(job)
+            }
+            SessionTraining::Later => Left::Room,
+            SessionTraining::Obsolete => Left::Nothing,
+        })
     }
 }
 
-/// Begins with a session, unless as many of its tenant are under way as may be.
-fn begin(name: Name, under_way: &UnderWay, turns: &mut Turns) {
-    if of_tenant(&name.0, under_way) + turns.waiting(&name.0) < OF_ONE && !under_way.contains_key(&name) {
-        turns.queue(name);
+impl UnderWay {
+    /// Begins with a session; false if as many of its tenant are under way as may be.
+    fn begin(&mut self, name: Name) -> bool {
+        if self.waiting.contains(&name) {
+            return true;
+        }
+        if self.turns.waiting(&name.0) + self.waiting.count(&name.0) >= OF_ONE {
+            return false;
+        }
+        self.turns.queue(name);
+        true
+    }
+
+    /// A session's step is done. One that needed no room in the queue may leave some to the next in line.
+    fn stepped(&mut self, name: Name, left: Left) {
+        self.turns.done(&name);
+        let next = match left {
+            Left::Room => {
+                self.waiting.for_room(name);
+                None
+            }
+            Left::Job(job) => {
+                let next = self.waiting.next_in_line(&name.0);
+                self.waiting.for_job(job, name);
+                next
+            }
+            Left::Nothing => self.waiting.next_in_line(&name.0),
+        };
+        if let Some(name) = next {
+            self.turns.queue(name);
+        }
+    }
+
+    /// The sessions that waited for a job, which has ended: the queue has room for the next in line.
+    fn ended(&mut self, job: &str) -> Vec<Name> {
+        let names = self.waiting.ended(job);
+        let next = names.first().and_then(|(tenant, _)| self.waiting.next_in_line(tenant));
+        if let Some(name) = next {
+            self.turns.queue(name);
+        }
+        names
+    }
+
+    /// Looks again whether the queue has room, for each tenant.
+    fn retry(&mut self) {
+        for name in self.waiting.first_in_line() {
+            self.turns.queue(name);
+        }
     }
 }
 
@@ -335,12 +416,6 @@ fn next(
     }
 }
 
-/// Renewals of a tenant under way, counted up to as many as may be.
-fn of_tenant(tenant: &Tenant, under_way: &UnderWay) -> usize {
-    let from = (tenant.clone(), String::new());
-    under_way.range(from..).take_while(|((of, _), _)| of == tenant).take(OF_ONE).count()
-}
-
 /// Before the attempt after `count` of them.
 fn delay_ms(count: usize) -> i64 {
     let doublings = u32::try_from(count.saturating_sub(1)).unwrap_or(u32::MAX).min(20);
@@ -351,19 +426,6 @@ fn delay_ms(count: usize) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_is_under_way_is_counted_tenant_by_tenant() {
-        let tenant = |name: &str| name.parse::<Tenant>().unwrap();
-        let mut under_way = UnderWay::new();
-        for (name, count) in [("alpha", 2), ("beta", 3), ("gamma", OF_ONE + 1)] {
-            under_way
-                .extend((0..count).map(|session| ((tenant(name), format!("session_{session}")), "job".to_owned())));
-        }
-        let counted =
-            ["aaa", "alpha", "beta", "betas", "gamma", "zeta"].map(|name| of_tenant(&tenant(name), &under_way));
-        assert_eq!(counted, [0, 2, 3, 0, OF_ONE, 0]);
-    }
 
     #[test]
     fn attempts_follow_each_other_ever_more_slowly_up_to_a_day() {

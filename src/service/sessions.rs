@@ -266,7 +266,12 @@ impl Sessions {
         let deleting = self.store.by(caller.actor());
         let deleting = deleting.delete_session(&caller.tenant, session);
         let deleted = deleting.instrument(spans::of_write("delete a session")).await?;
-        if deleted { Ok(()) } else { Err(ServiceError::unknown("session", session)) }
+        if !deleted {
+            return Err(ServiceError::unknown("session", session));
+        }
+        // What it requested is requested no more.
+        let _ = self.due.try_send((caller.tenant.clone(), session.to_owned()));
+        Ok(())
     }
 
     /// The policy of a session, made ready.

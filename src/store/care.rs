@@ -3,19 +3,16 @@
 use super::codec::from_sql;
 use super::error::Failure;
 use super::query::{Row, query};
-use super::statement::{OBSERVATIONS, Statement};
+use super::statement::{IS_WAITING, Statement};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
-
-/// A policy that is to follow is there within this, in milliseconds, unless something keeps it.
-const TRAINED_MS: i64 = 3_600_000;
 
 /// Why a session needs care.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Care {
     /// Its next report is late, by the calendar of its policy.
     Overdue,
-    /// Its next policy fails to come.
+    /// It waits for its next policy.
     Renewal,
     /// Its returns have changed.
     Alarm,
@@ -25,10 +22,9 @@ impl Care {
     pub const ALL: [Care; 3] = [Care::Overdue, Care::Renewal, Care::Alarm];
 }
 
-/// The moment at which care is judged, and what is late at it.
+/// What is late at the moment at which care is judged.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Today {
-    pub now_ms: i64,
     pub first_days: Vec<FirstDay>,
 }
 
@@ -80,17 +76,7 @@ pub(super) fn needs(statement: &mut Statement, care: Care, today: &Today) {
     match care {
         Care::Alarm => statement
             .and("coalesce(json_extract(json_extract(last.answer_json, '$.drift'), '$.level') = 'alarm', 1 = 0)", []),
-        // The first attempt's job is found by its key, as `service::renewer` makes it.
-        Care::Renewal => statement.and(
-            &format!(
-                "coalesce(sessions.due <= {OBSERVATIONS}, 1 = 0) AND (coalesce(last.created_ms, sessions.created_ms) < ?
-                 OR EXISTS (SELECT 1 FROM idempotency_keys JOIN jobs ON jobs.job = idempotency_keys.job
-                    WHERE idempotency_keys.tenant = sessions.tenant AND jobs.state IN ('failed', 'cancelled')
-                    AND idempotency_keys.idempotency_key = ? || sessions.session || ?
-                        || CAST(coalesce(renewals.number, 0) + 1 AS TEXT) || ?))"
-            ),
-            [(today.now_ms - TRAINED_MS).into(), "renewal\n".into(), "\n".into(), "\n0".into()],
-        ),
+        Care::Renewal => statement.and(IS_WAITING, []),
         Care::Overdue if today.first_days.is_empty() => statement.and("1 = 0", []),
         Care::Overdue => {
             statement.and("coalesce(CASE", []);

@@ -11,7 +11,7 @@ use super::labels::Relabel;
 use super::query::{Connection, Row, query};
 use super::quotas::{self, Quotas, ROW_BYTES, Usage};
 use super::tenant::Tenant;
-use super::{Store, StoreError, turns};
+use super::{Store, StoreError, training_names, turns};
 
 impl Store {
     /// Queues a job and records its idempotency key, both or neither.
@@ -133,6 +133,25 @@ async fn create(
         return Ok(earlier);
     }
     quotas::admit_job(connection, &new.tenant, quotas).await?;
+    let bytes = insert(connection, &new).await?;
+    if let Some(key) = &new.idempotency_key {
+        let take = query(
+            "INSERT INTO idempotency_keys (tenant, idempotency_key, request_hash, job) VALUES ($1, $2, $3, $4)
+             ON CONFLICT (tenant, idempotency_key) DO NOTHING",
+        );
+        let take = take.bind(new.tenant.as_str()).bind(key.as_str()).bind(new.request_hash.as_str());
+        if connection.execute(take.bind(new.job.as_str())).await? == 0 {
+            // A session took the key in the meantime.
+            connection.execute(query("DELETE FROM jobs WHERE job = $1").bind(new.job)).await?;
+            return Ok(CreateJob::KeyConflict);
+        }
+    }
+    training_names::name_training(connection, &new).await?;
+    count(connection, &new, bytes, quotas, actor).await.map(CreateJob::Created)
+}
+
+/// Inserts a job and its request; the bytes that they take.
+pub(super) async fn insert(connection: &mut Connection<'_>, new: &NewJob) -> Result<i64, Failure> {
     let insert =
         query("INSERT INTO jobs (job, kind, state, steps_total, created_ms, tenant) VALUES ($1, $2, $3, $4, $5, $6)");
     let insert = insert
@@ -143,28 +162,27 @@ async fn create(
         .bind(new.created_ms)
         .bind(new.tenant.as_str());
     connection.execute(insert).await?;
-    let parts = [new.request_json, labels_json(&new.labels)?];
-    let bytes = Usage::of_bytes(ROW_BYTES + parts.iter().map(|part| quotas::length(part.as_bytes())).sum::<i64>());
-    let [request_json, labels] = parts;
+    let labels = labels_json(&new.labels)?;
+    let bytes = ROW_BYTES + quotas::length(new.request_json.as_bytes()) + quotas::length(labels.as_bytes());
     let request = query("INSERT INTO job_requests (job, json, labels_json) VALUES ($1, $2, $3)");
-    connection.execute(request.bind(new.job.as_str()).bind(request_json).bind(labels)).await?;
-    if let Some(key) = new.idempotency_key {
-        let take = query(
-            "INSERT INTO idempotency_keys (tenant, idempotency_key, request_hash, job) VALUES ($1, $2, $3, $4)
-             ON CONFLICT (tenant, idempotency_key) DO NOTHING",
-        );
-        let take = take.bind(new.tenant.as_str()).bind(key).bind(new.request_hash).bind(new.job.as_str());
-        if connection.execute(take).await? == 0 {
-            // A session took the key in the meantime.
-            connection.execute(query("DELETE FROM jobs WHERE job = $1").bind(new.job)).await?;
-            return Ok(CreateJob::KeyConflict);
-        }
-    }
-    quotas::take(connection, &new.tenant, bytes, quotas).await?;
+    let request = request.bind(new.job.as_str()).bind(new.request_json.as_str()).bind(labels);
+    connection.execute(request).await?;
+    Ok(bytes)
+}
+
+/// Counts what a new job takes, and tells of it in the audit.
+pub(super) async fn count(
+    connection: &mut Connection<'_>,
+    new: &NewJob,
+    bytes: i64,
+    quotas: Quotas,
+    actor: Actor,
+) -> Result<JobRow, Failure> {
+    quotas::take(connection, &new.tenant, Usage::of_bytes(bytes), quotas).await?;
     let outcome = format!("queued, {}", new.kind.as_str());
     audit::record(connection, &actor, &new.tenant, Deed::QueueJob, &new.job, &outcome).await?;
     let row = find(connection, &new.job).await?;
-    row.map(CreateJob::Created).ok_or_else(|| Failure::Corrupt(format!("the new job {}", new.job)))
+    row.ok_or_else(|| Failure::Corrupt(format!("the new job {}", new.job)))
 }
 
 /// What an idempotency key used before answers; `None` for a new key.
@@ -193,7 +211,7 @@ pub(super) async fn find(connection: &mut Connection<'_>, job: &str) -> Result<O
     connection.row(find).await?.as_ref().map(JobRow::from_row).transpose()
 }
 
-async fn cancel(
+pub(super) async fn cancel(
     mut connection: Connection<'_>,
     job: String,
     actor: Actor,

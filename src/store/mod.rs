@@ -47,10 +47,12 @@ mod quotas;
 mod renewals;
 mod retention;
 mod seen;
+mod session_trainings;
 mod sessions;
 mod sqlite;
 mod statement;
 mod tenant;
+mod training_names;
 mod turns;
 
 use std::path::Path;
@@ -80,8 +82,10 @@ pub use quotas::{Quotas, Usage};
 pub use renewals::Onto;
 pub use retention::{DeleteJob, Room};
 pub use seen::Seen;
+pub use session_trainings::SessionTraining;
 pub use sessions::{CreateSession, SessionFacts, SessionRow};
 pub use tenant::Tenant;
+pub use training_names::TrainingRequest;
 
 /// The durable facts of one folder or one database. Clones share the connections.
 ///

@@ -9,7 +9,7 @@ use super::codec::{from_sql, to_sql};
 use super::error::Failure;
 use super::labels::Labels;
 use super::query::{Query, Row};
-use super::statement::{HORIZON, OBSERVATIONS, Statement, TABLES};
+use super::statement::{HORIZON, IS_WAITING, OBSERVATIONS, Statement, TABLES};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 
@@ -30,12 +30,13 @@ pub enum SessionOrder {
 /// Which sessions are listed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SessionIs {
+    /// Advised by its policy.
     Active,
-    /// At its horizon.
+    /// Its next policy is to be trained.
+    Waiting,
+    /// At its horizon, and no policy is to follow.
     Completed,
-    /// To be renewed by itself.
-    Due,
-    /// Active, and in need of care for this reason, or for any.
+    /// Not completed, and in need of care for this reason, or for any.
     Needing(Option<Care>),
 }
 
@@ -91,10 +92,8 @@ pub struct SessionSummary {
     pub created_ms: i64,
     /// Number of periods observed.
     pub observations: usize,
-    /// Whether it is to be renewed by itself.
+    /// Whether its next policy is to be trained.
     pub is_due: bool,
-    /// Whether that fails, as [`Care::Renewal`] says.
-    pub is_stuck: bool,
     /// The last observation or correction: what was answered to it, and when.
     pub last: Option<(String, i64)>,
     pub place: SessionPlace,
@@ -132,15 +131,13 @@ impl SessionQuery {
     fn page(&self, tenant: &Tenant) -> Query {
         let key = self.order.key();
         let columns = format!(
-            " THEN 1 ELSE 0 END AS BIGINT) AS stuck, sessions.sequence, sessions.session, sessions.initial_wealth, sessions.initial_holding,
+            "SELECT sessions.sequence, sessions.session, sessions.initial_wealth, sessions.initial_holding,
                     sessions.created_ms, labels.name, labels.notes, labels.tags,
                     coalesce(renewals.policy, sessions.policy) AS policy, called.name AS policy_name,
                     policies.periods_per_year, {HORIZON} AS horizon, {OBSERVATIONS} AS observations, sessions.due,
                     last.answer_json, last.created_ms AS reported_ms, {key} AS sort_key {TABLES}"
         );
-        let mut statement = Statement::of("SELECT CAST(CASE WHEN ");
-        needs(&mut statement, Care::Renewal, &self.today);
-        statement.and(&columns, []);
+        let mut statement = Statement::of(&columns);
         statement.and(" WHERE sessions.tenant = ?", [tenant.as_str().into()]);
         self.only_matching(&mut statement);
         let (order, beyond) = if self.descending { ("DESC", '<') } else { ("ASC", '>') };
@@ -188,7 +185,7 @@ impl SessionQuery {
         let all = SessionQuery { is: None, ..self.clone() };
         statement.and(" WHERE sessions.tenant = ?", [tenant.as_str().into()]);
         all.only_matching(&mut statement);
-        statement.and(&format!(" AND {OBSERVATIONS} < {HORIZON}) AS flags) AS counted"), []);
+        statement.and(&format!(" AND ({OBSERVATIONS} < {HORIZON} OR {IS_WAITING})) AS flags) AS counted"), []);
         statement.query()
     }
 
@@ -211,7 +208,7 @@ impl SessionQuery {
             statement.and(" AND replace(labels.tags, ?, '') <> labels.tags", [format!("\n{tag}\n").into()]);
         }
         if let Some(SessionIs::Needing(_)) = self.is {
-            statement.and(&format!(" AND {OBSERVATIONS} < {HORIZON}"), []);
+            statement.and(&format!(" AND ({OBSERVATIONS} < {HORIZON} OR {IS_WAITING})"), []);
         }
         match self.is {
             None => {}
@@ -220,9 +217,13 @@ impl SessionQuery {
                 statement.and(" AND ", []);
                 needs(statement, care, &self.today);
             }
-            Some(SessionIs::Active) => statement.and(&format!(" AND {OBSERVATIONS} < {HORIZON}"), []),
-            Some(SessionIs::Completed) => statement.and(&format!(" AND {OBSERVATIONS} >= {HORIZON}"), []),
-            Some(SessionIs::Due) => statement.and(&format!(" AND sessions.due <= {OBSERVATIONS}"), []),
+            Some(SessionIs::Active) => {
+                statement.and(&format!(" AND {OBSERVATIONS} < {HORIZON} AND NOT {IS_WAITING}"), [])
+            }
+            Some(SessionIs::Waiting) => statement.and(&format!(" AND {IS_WAITING}"), []),
+            Some(SessionIs::Completed) => {
+                statement.and(&format!(" AND {OBSERVATIONS} >= {HORIZON} AND NOT {IS_WAITING}"), []);
+            }
         }
     }
 }
@@ -270,7 +271,6 @@ impl SessionSummary {
             created_ms: row.get("created_ms")?,
             observations,
             is_due: due.is_some_and(|due| due <= observations),
-            is_stuck: row.get::<i64>("stuck")? != 0,
             last: answer.zip(reported_ms),
             place: order.place(row)?,
         })

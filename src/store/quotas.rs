@@ -2,7 +2,7 @@
 //!
 //! What a tenant keeps is a row of totals, changed in the transaction that changes what they are the totals of, as its last
 //! statement: whoever waits for the row waits for a commit and no more. Queued jobs are counted where they stand, up to
-//! the quota.
+//! the quota; those made for sessions have a bound of their own (`super::session_trainings`).
 //!
 //! Bytes are those of requests, reports, policies, histories and labels, and [`ROW_BYTES`] for each job, policy and session. A
 //! session takes the room of all its observations when it is opened: no return that an investor reports is ever refused
@@ -12,9 +12,9 @@
 
 use super::codec::to_sql;
 use super::error::{Failure, OverQuota, Quota};
-use super::job_state::JobState;
 use super::query::{Connection, query};
 use super::tenant::Tenant;
+use super::training_names::queued_by_callers;
 use super::{Store, StoreError};
 
 /// What a row of jobs, policies or sessions takes with its index entries, beside what is counted by its length.
@@ -83,17 +83,12 @@ impl Store {
 }
 
 /// # Errors
-/// The tenant has as many jobs queued as it may.
+/// The tenant's callers have as many jobs queued as they may.
 pub(super) async fn admit_job(connection: &mut Connection<'_>, tenant: &Tenant, quotas: Quotas) -> Result<(), Failure> {
     if quotas.queued_jobs == 0 {
         return Ok(());
     }
-    let count = query(
-        "SELECT count(*) AS queued
-         FROM (SELECT 1 AS one FROM jobs WHERE tenant = $1 AND state = $2 LIMIT $3) AS waiting",
-    );
-    let count = count.bind(tenant.as_str()).bind(JobState::Queued.as_str()).bind(i64::from(quotas.queued_jobs));
-    let queued: i64 = connection.row(count).await?.map_or(Ok(0), |row| row.get("queued"))?;
+    let queued = queued_by_callers(connection, tenant, quotas.queued_jobs).await?;
     within(Quota::QueuedJobs, queued, 1, quotas.queued_jobs.into())
 }
 

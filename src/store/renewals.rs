@@ -9,6 +9,7 @@ use super::error::Failure;
 use super::query::{Connection, Row, query};
 use super::quotas::Quotas;
 use super::tenant::Tenant;
+use super::training_names::withdraw;
 use super::{Store, StoreError, policies};
 
 /// What a renewal leads to.
@@ -64,6 +65,7 @@ async fn renew(
     let (append, tenant) = entries::append_next(connection, &new).await?;
     if append == Append::Appended {
         refer(connection, &new, &onto).await?;
+        withdraw(connection, &tenant, &new.session, new.number).await?;
         let outcome = format!("renewal {} onto policy {}", new.number, onto.policy);
         let room = 1 + to_sql(onto.periods);
         entries::take_room(connection, &tenant, &new.session, room, by, (Deed::Renew, &outcome)).await?;

@@ -13,6 +13,7 @@ use super::query::{Connection, Row, query};
 use super::quotas::{self, Quotas, Usage};
 use super::seen::Seen;
 use super::tenant::Tenant;
+use super::training_names::withdraw_all;
 use super::{Store, StoreError, policies};
 
 /// What became of a session to open.
@@ -199,6 +200,7 @@ async fn delete(
     actor: Actor,
 ) -> Result<bool, Failure> {
     let connection = &mut connection;
+    withdraw_all(connection, &tenant, &session).await?;
     let count = query("SELECT count(*) AS entries FROM entries WHERE session = $1").bind(session.as_str());
     let entries: i64 = connection.row(count).await?.map_or(Ok(0), |row| row.get("entries"))?;
     let delete = query(

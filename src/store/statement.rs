@@ -19,6 +19,10 @@ pub(super) const HORIZON: &str = "coalesce(renewals.horizon, sessions.horizon)";
 pub(super) const OBSERVATIONS: &str =
     "coalesce((SELECT number FROM entries AS made WHERE made.session = sessions.session
     AND kind = 'observation' ORDER BY entry DESC LIMIT 1), 0)";
+/// Whether the next policy of a session is to be trained. Until it is there the session goes on, past its horizon too.
+pub(super) const IS_WAITING: &str = "(sessions.due IS NOT NULL AND sessions.due <=
+    coalesce((SELECT number FROM entries AS made WHERE made.session = sessions.session
+    AND kind = 'observation' ORDER BY entry DESC LIMIT 1), 0))";
 
 /// A statement under way: its text and its values.
 pub(super) struct Statement {

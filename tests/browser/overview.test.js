@@ -134,7 +134,7 @@ test("what needs care is told where it is so", async () => {
   await page.route("**/sessions?*", async (route) => {
     const response = await route.fetch();
     const answer = await response.json();
-    const more = { Ada: { drift: "alarm", care: ["overdue", "alarm"] }, Grace: { drift: "warning" }, Emmy: { due: true, care: ["renewal"] } };
+    const more = { Ada: { drift: "alarm", care: ["overdue", "alarm"] }, Grace: { drift: "warning" }, Emmy: { state: "waiting", care: ["renewal"] } };
     for (const row of answer.sessions) Object.assign(row, more[row.name]);
     Object.assign(answer.care, { any: 2, renewal: 1, alarm: 1 });
     await route.fulfill({ response, json: answer });
@@ -143,7 +143,7 @@ test("what needs care is told where it is so", async () => {
   const told = await Promise.all(NAMES.map(async (name) => (await cells(name))[6]));
   assert.match(told[0], /Returns have changed$/);
   assert.match(told[1], /Returns may have changed$/);
-  assert.match(told[2], /Due for renewal$/);
+  assert.match(told[2], /waiting\s+\d+ of \d+\s+for its next policy$/);
   await page.getByText("2 of 3 active sessions need care: 1 is overdue, 1 waits for its next policy, 1 has returns that have changed.").waitFor();
   await page.unrouteAll();
   await go("");

@@ -30,6 +30,8 @@ pub enum CautionCode {
     OneReturn,
     /// The search for the best allocation of several assets ended before its two bounds met within a hundredth of a basis point.
     NotCertified,
+    /// The policy that is to follow is not there yet, and the one before it advises.
+    Waiting,
 }
 
 impl Caution {
@@ -61,6 +63,19 @@ impl Caution {
                 .to_owned(),
         };
         Some(Caution { code: CautionCode::NotCertified, sentence })
+    }
+
+    /// Of the advice for `period` by a policy that was trained up to `horizon`, while the next one is to come.
+    pub fn waiting(period: usize, horizon: usize) -> Self {
+        let sentence = match period > horizon {
+            true => format!(
+                "The next policy is not trained yet, and the last one ended with period {horizon}: its last step, which looks one period ahead, gives this advice, from all returns reported so far."
+            ),
+            false => format!(
+                "The next policy is not trained yet: the one before it, which lasts to period {horizon}, gives this advice, from all returns reported so far."
+            ),
+        };
+        Caution { code: CautionCode::Waiting, sentence }
     }
 
     /// Of a return without which the advice would be another.

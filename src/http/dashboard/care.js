@@ -1,15 +1,13 @@
-// Which sessions need care: those whose report is overdue, whose next policy fails to come, or whose returns have changed. The service
+// Which sessions need care: those whose report is overdue, that wait for their next policies, or whose returns have changed. The service
 // tells of each, and how many there are.
 
 import { counted, count } from "./format.js";
 import { daysLate, isoDay } from "./periods.js";
 
-/** `{next, late, stuck}` of a session: when its next report is due, by how many days that is overdue, and whether its next policy
- * fails to come. */
+/** `{next, late}` of a session: when its next report is due, and by how many days that is overdue. */
 export const care = ({ next, care }) => ({
   next,
   late: care.includes("overdue") ? Math.max(1, daysLate(next, isoDay(new Date()))) : 0,
-  stuck: care.includes("renewal"),
 });
 
 const REASONS = {

@@ -29,7 +29,7 @@ async function read(id, leaving) {
   const [history, policy, action] = await Promise.all([
     get(`/sessions/${id}/history`, leaving),
     get(`/policies/${session.policy}`, leaving),
-    session.state === "active" ? get(`/action?session=${id}`, leaving) : null,
+    session.state !== "completed" ? get(`/action?session=${id}`, leaving) : null,
   ]);
   const { problem } = policy.specification;
   return { session, history, policy, problem, action, calendar: calendar(history, problem.periods_per_year), grown: grown(history) };

@@ -75,7 +75,7 @@ async function fill(holder, told) {
   const { id, session, history, leaving } = told;
   const shown = { ...told, right: null };
   shown.right = history.observations.length > 0 ? righting(shown) : null;
-  if (session.state !== "active") {
+  if (session.state === "completed") {
     const ended = [h("div", {}, completed(shown), lastReport(shown)), wealthCourse(shown)];
     return holder.replaceChildren(h("div", { class: "columns" }, ended), figures(shown, null), history.assets ? severalHeld(shown) : held(shown, null), observed(shown));
   }
@@ -114,7 +114,7 @@ function ofSeveral(shown, action, rest) {
 function place({ session, history, policy, calendar }, { period }) {
   const { trading_cost, horizon } = policy.specification.problem;
   const name = calendar.name(period);
-  const which = session.rolling ? "" : ` of ${session.horizon}`;
+  const which = session.rolling || period > session.horizon ? "" : ` of ${session.horizon}`;
   const last = standing(history.observations.at(-1));
   return {
     heading: name === `Period ${period}` ? `${name}${which}` : `${name}, period ${period}${which}`,

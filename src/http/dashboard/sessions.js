@@ -17,7 +17,7 @@ import { welcome } from "./welcome.js";
 const PAGE = 50;
 /** Nothing is asked for while a word is being typed, for so long, in milliseconds. */
 const PAUSE = 250;
-const STATES = { "": "All", active: "Active", completed: "Completed", due: "Due for renewal", care: "Needs care", overdue: "Overdue", renewal: "Waits for its next policy", alarm: "Returns have changed" };
+const STATES = { "": "All", active: "Active", waiting: "Waits for its next policy", completed: "Completed", care: "Needs care", overdue: "Overdue", alarm: "Returns have changed" };
 const NEWEST = "-created";
 /** What is asked for, as it stands in the address, and what it is where nothing is said. */
 const CHOICES = { search: "", tag: "", state: "", sort: NEWEST };
@@ -184,7 +184,7 @@ function listed(entries, { ticks, advice, sorted, sort }) {
     { ...by("Last report", "last_report"), cell: (entry) => lastReport(entry, care(entry)) },
     { name: "To hold", numeric: true, cell: (entry) => advice.of(entry).hold },
     { name: "To trade", numeric: true, cell: (entry) => advice.of(entry).trade },
-    { name: "State", cell: (entry) => standing(entry, care(entry)) },
+    { name: "State", cell: (entry) => standing(entry) },
     { ...by("Opened", "created"), cell: ({ created_ms, policy, policy_name }) => [moment(created_ms).split(",")[0], h("span", { class: "under" }, "by ", h("a", { href: `#/policies/${policy}` }, called(policy, policy_name)))] },
   ], entries);
 }
@@ -205,12 +205,12 @@ function lastReport({ date, last_report_ms }, { next, late }) {
 }
 
 /** Its state, how far it is, and what needs care. */
-function standing({ state, period, horizon, due, drift }, { stuck }) {
+function standing({ state, period, horizon, drift }) {
   const drifting = { warning: "Returns may have changed", alarm: "Returns have changed" }[drift];
   return [
     h("span", { class: `state ${state}` }, state),
     h("span", { class: "under" }, `${count(period - 1)} of ${count(horizon)}`),
-    due ? h("span", { class: stuck ? "under wrong" : "under" }, "Due for renewal") : null,
+    state === "waiting" ? h("span", { class: "under wrong" }, "for its next policy") : null,
     drifting ? h("span", { class: "under wrong" }, drifting) : null,
   ];
 }

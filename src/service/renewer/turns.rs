@@ -58,6 +58,11 @@ impl Turns {
         }
     }
 
+    /// Whether no session waits or is looked at.
+    pub fn is_empty(&self) -> bool {
+        self.known.is_empty()
+    }
+
     /// Sessions of a tenant that wait.
     pub fn waiting(&self, tenant: &Tenant) -> usize {
         self.waiting.get(tenant).map_or(0, VecDeque::len)

@@ -442,7 +442,7 @@ class _Ballast:
         *,
         search: str | None = None,
         tag: str | None = None,
-        state: Literal["active", "completed", "due"] | None = None,
+        state: Literal["active", "waiting", "completed"] | None = None,
         sort: SessionSort | None = None,
     ) -> AsyncIterator[wire.SessionEntry]:
         """All sessions, or those that match, each with what it is called and where it stands; newest first unless told.

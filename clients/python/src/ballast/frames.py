@@ -163,7 +163,6 @@ _LISTED = (
     "period",
     "horizon",
     "state",
-    "due",
     "drift",
     "initial_wealth",
     "wealth",

@@ -51,6 +51,8 @@ class _Session(Labelled):
         self.horizon = session["horizon"]
         #: The coming period, from 1; ``horizon + 1`` once completed.
         self.period = session["period"]
+        #: ``waiting`` while its next policy is trained: until then it goes on by the one it has, past the horizon too.
+        self.state: wire.SessionState = session["state"]
         self.wealth = session["wealth"]
         #: Share of it in the risky asset, before trading.
         self.holding = session["holding"]
@@ -66,7 +68,8 @@ class _Session(Labelled):
 
     @property
     def completed(self) -> bool:
-        return self.period > self.horizon
+        """Whether the horizon is reached, and no policy is to follow."""
+        return self.state == "completed"
 
     async def _action(
         self,
@@ -79,7 +82,8 @@ class _Session(Labelled):
 
         ``mode="resolve"`` solves the robust step anew at the exact state; ``explain="worst_case"`` does too, and shows
         the law it is robust against. ``sensitivity=True`` says how near the allocation is to changing. Raises
-        :class:`SessionCompleted` after the horizon.
+        :class:`SessionCompleted` after the horizon. A session that waits for its next policy is advised by the last step of
+        the one it has, which the answer's ``caution`` says.
         """
         params = {"session": self.id, "mode": mode, "explain": explain, "sensitivity": "true" if sensitivity else None}
         return cast(wire.Action, await self._transport.json("GET", "/action", params=params))
@@ -113,6 +117,7 @@ class _Session(Labelled):
         if observed["period"] >= self.period:
             self.period, self.wealth = observed["period"] + 1, observed["wealth"]
             self.holding = observed["holding"]
+            self.state = "completed" if observed["completed"] else self.state
         return self
 
     async def _replay(
@@ -208,7 +213,7 @@ class _Session(Labelled):
         renewed: wire.Renewed = await self._counted(f"{self._path}/renewals", body, counted, number)
         if number > self.renewals:
             self.renewals, self.policy, self.horizon = number, renewed["policy"], renewed["horizon"]
-            self.period = renewed["period"]
+            self.period, self.state = renewed["period"], "active"
         return renewed
 
     async def _counted(
@@ -341,6 +346,7 @@ class _Session(Labelled):
         self.renewals, self.policy, self.horizon = session["renewals"], session["policy"], session["horizon"]
         self.corrections = session["corrections"]
         self.period, self.wealth, self.holding = session["period"], session["wealth"], session["holding"]
+        self.state = session["state"]
         return session
 
     async def _delete(self) -> None:

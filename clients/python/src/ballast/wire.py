@@ -212,7 +212,7 @@ class CareCount(TypedDict):
     overdue: int
     """Their next report is late."""
     renewal: int
-    """Their next policy failed to be trained, or is not there after an hour."""
+    """They wait for their next policies."""
     alarm: int
     """Their returns have changed."""
 
@@ -221,7 +221,7 @@ CareReason: TypeAlias = Literal["overdue", "renewal", "alarm"]
 """Why a session needs care."""
 
 
-CautionCode: TypeAlias = Literal["short_record", "one_return"]
+CautionCode: TypeAlias = Literal["short_record", "one_return", "waiting"]
 """The reasons."""
 
 
@@ -957,7 +957,7 @@ SamplingLaw: TypeAlias = SamplingLaw1 | SamplingLaw2 | SamplingLaw3
 """A law of log-returns that can be drawn from."""
 
 
-SessionState: TypeAlias = Literal["active", "completed"]
+SessionState: TypeAlias = Literal["active", "waiting", "completed"]
 
 
 class Spread(TypedDict):
@@ -1655,8 +1655,6 @@ class SessionEntry(Labels):
     Standard deviation of the log-returns learned; of several assets, of their fund. Null before the first report, or where the
     policy tells fewer than two moments.
     """
-    due: bool
-    """Whether its next policy is to be trained."""
     drift: DriftLevel
     """Whether the returns still come as they came."""
     created_ms: int
@@ -2481,7 +2479,7 @@ class Observed(Uncertainty):
     date: NotRequired[str | None]
     """The last day that was reported, of this period or of one before."""
     completed: bool
-    """Whether the horizon is reached."""
+    """Whether the horizon is reached, and no policy is to follow."""
     drift: Drift
     """Whether the returns still come as they came."""
 
