@@ -166,6 +166,42 @@ fn the_known_law_promises_its_value_and_keeps_it() {
     assert!(mean.low < promised && promised < mean.high, "{promised} outside {mean:?}");
 }
 
+/// Terminal wealth is counted in bins of its own, and what ends as the bank does by itself: a quantile lies where its share of the
+/// paths is, be it at a point.
+#[test]
+fn wealth_is_counted_in_its_own_bins_and_at_the_bank() {
+    let cautious = json!({ "problem": { "radius": { "scale": 0.55 } }, "paths": 400 });
+    let report = reported(small(cautious));
+    let edges = &report.wealth_edges;
+    assert!(edges.len() == 41 && edges.is_sorted() && (report.banked - 100.0 * 1.002_f64.powi(4)).abs() < 1e-9);
+    let mut points = 0;
+    for strategy in &report.strategies {
+        let wealth = &strategy.wealth;
+        let (counts, at_bank) = (&wealth.histogram, wealth.at_bank);
+        assert_eq!(counts.iter().sum::<usize>() + at_bank, 400, "{}", strategy.strategy);
+        assert!(edges[0] <= wealth.min.value && wealth.max.value <= edges[40], "{}", strategy.strategy);
+        let [low, high] = [wealth.quantile_20.value, wealth.quantile_90.value];
+        // Bins that end below a quantile hold no more than its share, and those up to it no less.
+        for (quantile, share) in [(low, 0.2), (high, 0.9)] {
+            let up_to = |most: f64| {
+                edges[1..].iter().zip(counts).filter(|(edge, _)| **edge <= most).map(|(_, count)| count).sum::<usize>()
+            };
+            let width = edges[1] - edges[0];
+            let banked = |is_below: bool| if is_below { at_bank } else { 0 };
+            let below = up_to(quantile) + banked(report.banked < quantile - width);
+            let through = up_to(quantile + width) + banked(report.banked <= quantile + width);
+            assert!(below <= (share * 400.0) as usize + 1, "{}: {below} below {quantile}", strategy.strategy);
+            assert!(through + 1 >= (share * 400.0) as usize, "{}: {through} to {quantile}", strategy.strategy);
+        }
+        if high - low < 1e-9 * report.banked {
+            assert!(at_bank >= 280, "{}: {at_bank} at the bank, between {low} and {high}", strategy.strategy);
+            points += usize::from(at_bank < 400);
+        }
+    }
+    assert!(points > 0, "no strategy is mostly, and not always, in the bank");
+    assert_eq!(report.strategy("all_bank").unwrap().wealth.at_bank, 400);
+}
+
 #[test]
 fn the_own_mix_is_what_a_constant_mix_of_the_average_allocation_earns() {
     let costly = json!({ "trading_cost": 0.01 });

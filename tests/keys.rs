@@ -402,10 +402,16 @@ async fn keys_expire_and_are_rotated_without_a_gap() {
     assert_eq!((rows[1][0], rows[1][5], &rows[1][1..3]), (old_name.as_str(), "-", &rows[2][1..3]), "{listed}");
     assert!(rows[2][4] > rows[1][4] && rows[1][4] < "2100", "as long as the one before was made for: {listed}");
 
-    // What expired and what was revoked are told the same.
+    // What expired says since when, to who holds it; what was revoked is a key like any other that is not in force.
     assert_eq!(ballast(&["keys", "revoke", &revoked_name, "--data", &data]).0, Some(0));
     until("the key to be turned away", async || shown(&mut app, &revoked).await.0 == 401).await;
-    assert_eq!(shown(&mut app, &revoked).await, shown(&mut app, &old).await);
+    let (_, expired) = shown(&mut app, &old).await;
+    let value = expired["value"].as_str().unwrap();
+    let at: jiff::Timestamp = value.strip_prefix("a key that expired at ").unwrap().parse().unwrap();
+    assert!(at < jiff::Timestamp::now() && expired["detail"] == format!("the key expired at {at}"), "{expired}");
+    let (_, gone) = shown(&mut app, &revoked).await;
+    assert_eq!(gone["value"], "another key");
+    assert_eq!(gone, shown(&mut app, "ballast_0").await.1);
     let (code, _, said) = ballast(&["keys", "rotate", &old_name, "--data", &data]);
     assert!(code == Some(1) && said.contains("must be in force"), "{said}");
     for wrong in [["--expires-in", "0d"], ["--expires-on", "tomorrow"], ["--expires-on", "2001-01-01"]] {

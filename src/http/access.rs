@@ -154,6 +154,7 @@ fn admitted(service: &Service, access: Access, headers: &HeaderMap) -> Result<Ar
     let caller = service.keys.admit(bearer(headers)).map_err(|turned| {
         let tenant = match &turned {
             Turned::WrongKey { of } => of.clone(),
+            Turned::Expired { of, .. } => Some(of.clone()),
             Turned::NoKey => None,
         };
         Box::new((Asker { tenant, key: "".into() }, unauthenticated(turned)))
@@ -179,8 +180,12 @@ fn bearer(headers: &HeaderMap) -> Option<&str> {
 /// What was shown may be a key with one letter wrong, so it is not shown back.
 fn unauthenticated(turned: Turned) -> Problem {
     let (detail, value) = match turned {
-        Turned::NoKey => ("the call needs a key", "no key"),
-        Turned::WrongKey { .. } => ("the key is not one in force", "another key"),
+        Turned::NoKey => ("the call needs a key".to_owned(), "no key".to_owned()),
+        Turned::WrongKey { .. } => ("the key is not one in force".to_owned(), "another key".to_owned()),
+        Turned::Expired { expires_ms, .. } => {
+            let at = jiff::Timestamp::from_millisecond(expires_ms).map_or(String::new(), |at| format!(" at {at:.0}"));
+            (format!("the key expired{at}"), format!("a key that expired{at}"))
+        }
     };
     let rule = format!("must be `Bearer {PREFIX}...`, with a key that was made here, not revoked and not expired");
     Problem::new(ProblemKind::Unauthenticated, detail).naming("Authorization", value, rule)

@@ -99,7 +99,6 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "sessions.js": SCRIPT,
         "share_prices.js": SCRIPT,
         "specification.js": SCRIPT,
-        "spread.js": SCRIPT,
         "stacked.js": SCRIPT,
         "strategies.js": SCRIPT,
         "surface.js": SCRIPT,

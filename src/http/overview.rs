@@ -45,6 +45,7 @@ enum Is {
     Overdue,
     Renewal,
     Alarm,
+    Ending,
 }
 
 /// A session in a list.
@@ -125,6 +126,8 @@ pub enum CareReason {
     Renewal,
     /// Its returns have changed.
     Alarm,
+    /// It is completed, or in its last period and not renewed by itself.
+    Ending,
 }
 
 impl From<Care> for CareReason {
@@ -133,6 +136,7 @@ impl From<Care> for CareReason {
             Care::Overdue => CareReason::Overdue,
             Care::Renewal => CareReason::Renewal,
             Care::Alarm => CareReason::Alarm,
+            Care::Ending => CareReason::Ending,
         }
     }
 }
@@ -140,8 +144,8 @@ impl From<Care> for CareReason {
 /// How many sessions need care, and why; one may have several reasons.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct CareCount {
-    /// Those that are not completed, of which the others are.
-    pub active: usize,
+    /// Those that are found.
+    pub sessions: usize,
     /// In need of care for any of the reasons.
     pub any: usize,
     /// Their next report is late.
@@ -150,11 +154,13 @@ pub struct CareCount {
     pub renewal: usize,
     /// Their returns have changed.
     pub alarm: usize,
+    /// Completed, or in their last period and not renewed by themselves.
+    pub ending: usize,
 }
 
 impl From<CareCounts> for CareCount {
-    fn from(CareCounts { active, any, overdue, renewal, alarm }: CareCounts) -> Self {
-        CareCount { active, any, overdue, renewal, alarm }
+    fn from(CareCounts { sessions, any, overdue, renewal, alarm, ending }: CareCounts) -> Self {
+        CareCount { sessions, any, overdue, renewal, alarm, ending }
     }
 }
 
@@ -174,7 +180,7 @@ pub struct SessionPage {
 #[utoipa::path(get, path = "/sessions", tag = "sessions",
     params(("search" = Option<String>, Query, max_length = 100, description = "Part of a name, of a tag, of the session's or its policy's identifier or of the policy's name, whatever the case."),
            ("tag" = Option<String>, Query, max_length = 50, description = "One that they have."),
-           ("state" = inline(Option<Is>), Query, description = "`waiting`: for the next policy; `care`: in need of care, for any of the reasons `overdue`, `renewal` and `alarm`."),
+           ("state" = inline(Option<Is>), Query, description = "`waiting`: for the next policy; `care`: in need of care, for any of the reasons `overdue`, `renewal`, `alarm` and `ending`."),
            ("sort" = Option<String>, Query, description = "`created`, `name`, `wealth` or `last_report`, with `-` before it for descending; default `-created`."),
            ("limit" = Option<usize>, Query, minimum = 1, maximum = 1000, description = "1 to 1000; default 50."),
            ("after" = Option<String>, Query, description = "The `next` of the page before, of the same `sort`.")),
@@ -226,6 +232,7 @@ impl Asked {
             Is::Overdue => SessionIs::Needing(Some(Care::Overdue)),
             Is::Renewal => SessionIs::Needing(Some(Care::Renewal)),
             Is::Alarm => SessionIs::Needing(Some(Care::Alarm)),
+            Is::Ending => SessionIs::Needing(Some(Care::Ending)),
         });
         let search = self.search.filter(|search| !search.is_empty());
         let asked = SessionQuery { search, tag: self.tag, is, order, descending, limit, ..SessionQuery::default() };

@@ -104,10 +104,11 @@ impl Jobs {
         &self,
         tenant: &Tenant,
         specification: Specification,
+        labels: Relabel,
         request: TrainingRequest,
     ) -> Result<SessionTraining, ServiceError> {
         let completed = self.admitted(specification)?;
-        let (key, steps_total, labels) = (request.key(), completed.problem.horizon, Relabel::default());
+        let (key, steps_total) = (request.key(), completed.problem.horizon);
         let sent = key.as_bytes();
         let training = Request { kind: JobKind::Train, sent, completed: &completed, steps_total, labels };
         let new = self.new_job(tenant, training, None)?;

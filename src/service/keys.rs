@@ -179,9 +179,21 @@ pub enum Turned {
     NoKey,
     /// None that is in force.
     WrongKey {
-        /// Whose it was until it expired or was revoked; that is for the operator's eyes.
+        /// Whose it was until it was revoked; that is for the operator's eyes.
         of: Option<Tenant>,
     },
+    /// One that was in force until then. Only who holds its text is told.
+    Expired { of: Tenant, expires_ms: i64 },
+}
+
+impl Turned {
+    /// Of a key of the tenant that ended.
+    fn of(tenant: &Tenant, expires_ms: Option<i64>, is_revoked: bool) -> Self {
+        match expires_ms.filter(|_| !is_revoked) {
+            Some(expires_ms) => Turned::Expired { of: tenant.clone(), expires_ms },
+            None => Turned::WrongKey { of: Some(tenant.clone()) },
+        }
+    }
 }
 
 /// The keys in force, as of the last look into the store.
@@ -235,11 +247,11 @@ impl Keys {
                 caller.note_use();
                 Ok(caller.clone())
             }
-            Some(ended) => Err(Turned::WrongKey { of: Some(ended.tenant.clone()) }),
-            None => {
-                let ended = known.ended.get(&start(&shown)).filter(is_shown);
-                Err(Turned::WrongKey { of: ended.map(|key| key.tenant.clone()) })
-            }
+            Some(ended) => Err(Turned::of(&ended.tenant, ended.expires_ms(), ended.revoked.load(Ordering::Relaxed))),
+            None => match known.ended.get(&start(&shown)).filter(is_shown) {
+                Some(key) => Err(Turned::of(&key.tenant, key.expires_ms, key.revoked_ms.is_some())),
+                None => Err(Turned::WrongKey { of: None }),
+            },
         }
     }
 
@@ -418,7 +430,7 @@ mod tests {
         assert_eq!((figures.expires_ms, figures.used_ms), (Some(10_000), Some(9_999)));
         now.store(10_000, Ordering::Relaxed);
         assert!(holder.has_ended());
-        let of_north = Turned::WrongKey { of: Some("north".parse().unwrap()) };
+        let of_north = Turned::Expired { of: "north".parse().unwrap(), expires_ms: 10_000 };
         assert_eq!(keys.admit(Some("a")).unwrap_err(), of_north);
         known(&keys, vec![expiring(Some(10_000)), row("b", "north", None)]);
         assert_eq!(keys.admit(Some("a")).unwrap_err(), of_north);

@@ -57,12 +57,15 @@ impl Sessions {
             let from = said.or_else(|| day_of(row.last.as_ref().map_or(row.created_ms, |(_, reported)| *reported)));
             let is_active = row.observations < row.horizon || row.is_due;
             let next = row.periods_per_year.filter(|_| is_active).and_then(|periods| next_day(from?, periods));
+            let is_last = row.observations + 1 >= row.horizon && !row.is_renewed;
             let needs = |care: &Care| match care {
+                Care::Ending => !is_active || is_last,
+                _ if !is_active => false,
                 Care::Overdue => next.zip(today).is_some_and(|(next, today)| next < today),
                 Care::Renewal => row.is_due,
                 Care::Alarm => stands.is_some_and(|stands| stands.drift.level == DriftLevel::Alarm),
             };
-            let care = Care::ALL.into_iter().filter(|care| is_active && needs(care)).collect();
+            let care = Care::ALL.into_iter().filter(needs).collect();
             Ok(Listed { row, stands, next, care })
         };
         let sessions = sessions.into_iter().map(listed).collect::<Result<_, ServiceError>>()?;

@@ -16,6 +16,7 @@ use tokio::sync::mpsc::Receiver;
 use tokio::time::MissedTickBehavior;
 use utoipa::ToSchema;
 
+use self::naming::next_labels;
 use self::turns::Turns;
 use self::waiting::Waiting;
 use super::clock::Clock;
@@ -51,6 +52,7 @@ const OF_ONE: usize = 4096;
 /// Sessions told of that are not looked at yet; of more a round finds out.
 pub(super) const TOLD: usize = 1024;
 
+mod naming;
 mod turns;
 mod waiting;
 
@@ -325,7 +327,9 @@ impl Renewer {
         };
         let specification = self.sessions.resolving.run(tenant, specify).await??;
         let request = request(live, attempts.number, attempts.count);
-        Ok(match self.jobs.train_for_session(tenant, specification, request).await? {
+        let parent = self.store.labels(tenant, &live.current.policy).await?;
+        let labels = next_labels(&parent.name, self.clock.now_milliseconds());
+        Ok(match self.jobs.train_for_session(tenant, specification, labels, request).await? {
             SessionTraining::Job(row) => {
                 let (job, renewal) = (row.job, attempts.number);
                 tracing::info!(session, job, renewal, "the next policy of a session is trained");

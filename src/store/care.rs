@@ -3,7 +3,7 @@
 use super::codec::from_sql;
 use super::error::Failure;
 use super::query::{Row, query};
-use super::statement::{IS_WAITING, Statement};
+use super::statement::{HORIZON, IS_WAITING, OBSERVATIONS, Statement};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 
@@ -16,10 +16,12 @@ pub enum Care {
     Renewal,
     /// Its returns have changed.
     Alarm,
+    /// It is completed, or in its last period without a renewal to follow by itself.
+    Ending,
 }
 
 impl Care {
-    pub const ALL: [Care; 3] = [Care::Overdue, Care::Renewal, Care::Alarm];
+    pub const ALL: [Care; 4] = [Care::Overdue, Care::Renewal, Care::Alarm, Care::Ending];
 }
 
 /// What is late at the moment at which care is judged.
@@ -38,14 +40,15 @@ pub struct FirstDay {
     pub begin_ms: i64,
 }
 
-/// How many of the sessions that match are active, need care, and why; one may have several reasons.
+/// How many sessions match, how many of them need care, and why; one may have several reasons.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CareCounts {
-    pub active: usize,
+    pub sessions: usize,
     pub any: usize,
     pub overdue: usize,
     pub renewal: usize,
     pub alarm: usize,
+    pub ending: usize,
 }
 
 impl Store {
@@ -67,13 +70,24 @@ impl Care {
             Care::Overdue => "overdue",
             Care::Renewal => "renewal",
             Care::Alarm => "alarm",
+            Care::Ending => "ending",
         }
     }
 }
 
-/// Adds the condition that an active session needs this care.
+/// Adds the condition that a session needs this care. A completed one needs it for its end alone.
 pub(super) fn needs(statement: &mut Statement, care: Care, today: &Today) {
+    if care != Care::Ending {
+        statement.and(&format!("({OBSERVATIONS} < {HORIZON} OR {IS_WAITING}) AND "), []);
+    }
     match care {
+        Care::Ending => statement.and(
+            &format!(
+                "(({OBSERVATIONS} >= {HORIZON} AND NOT {IS_WAITING})
+                  OR ({OBSERVATIONS} + 1 >= {HORIZON} AND sessions.due IS NULL))"
+            ),
+            [],
+        ),
         Care::Alarm => statement
             .and("coalesce(json_extract(json_extract(last.answer_json, '$.drift'), '$.level') = 'alarm', 1 = 0)", []),
         Care::Renewal => statement.and(IS_WAITING, []),
@@ -92,7 +106,7 @@ pub(super) fn needs(statement: &mut Statement, care: Care, today: &Today) {
     }
 }
 
-/// Adds the condition that an active session needs care for any reason.
+/// Adds the condition that a session needs care for any reason.
 pub(super) fn needs_any(statement: &mut Statement, today: &Today) {
     statement.and(" AND (", []);
     for (place, care) in Care::ALL.into_iter().enumerate() {
@@ -108,11 +122,12 @@ impl CareCounts {
         let Some(row) = rows.first() else { return Ok(CareCounts::default()) };
         let count = |column: &str| from_sql(row.get::<i64>(column)?);
         Ok(CareCounts {
-            active: count("active")?,
+            sessions: count("sessions")?,
             any: count("any_of_them")?,
             overdue: count("overdue")?,
             renewal: count("renewal")?,
             alarm: count("alarm")?,
+            ending: count("ending")?,
         })
     }
 }

@@ -36,7 +36,7 @@ pub enum SessionIs {
     Waiting,
     /// At its horizon, and no policy is to follow.
     Completed,
-    /// Not completed, and in need of care for this reason, or for any.
+    /// In need of care for this reason, or for any.
     Needing(Option<Care>),
 }
 
@@ -94,6 +94,8 @@ pub struct SessionSummary {
     pub observations: usize,
     /// Whether its next policy is to be trained.
     pub is_due: bool,
+    /// Whether it is renewed by itself at some time.
+    pub is_renewed: bool,
     /// The last observation or correction: what was answered to it, and when.
     pub last: Option<(String, i64)>,
     pub place: SessionPlace,
@@ -167,13 +169,13 @@ impl SessionQuery {
     }
 
     fn caring(&self, tenant: &Tenant) -> Query {
-        let mut statement = Statement::of("SELECT count(*) AS active");
+        let mut statement = Statement::of("SELECT count(*) AS sessions");
         let sum = |word: &str| format!(", coalesce(sum({word}), 0) AS {word}");
-        for part in ["any_of_them", "overdue", "renewal", "alarm"].map(sum) {
+        for part in ["any_of_them", "overdue", "renewal", "alarm", "ending"].map(sum) {
             statement.and(&part, []);
         }
         statement.and(
-            " FROM (SELECT flags.*, CASE WHEN overdue + renewal + alarm > 0 THEN 1 ELSE 0 END AS any_of_them FROM (SELECT ",
+            " FROM (SELECT flags.*, CASE WHEN overdue + renewal + alarm + ending > 0 THEN 1 ELSE 0 END AS any_of_them FROM (SELECT ",
             [],
         );
         for (place, care) in Care::ALL.into_iter().enumerate() {
@@ -185,7 +187,7 @@ impl SessionQuery {
         let all = SessionQuery { is: None, ..self.clone() };
         statement.and(" WHERE sessions.tenant = ?", [tenant.as_str().into()]);
         all.only_matching(&mut statement);
-        statement.and(&format!(" AND ({OBSERVATIONS} < {HORIZON} OR {IS_WAITING})) AS flags) AS counted"), []);
+        statement.and(") AS flags) AS counted", []);
         statement.query()
     }
 
@@ -206,9 +208,6 @@ impl SessionQuery {
         if let Some(tag) = &self.tag {
             // What has the tag is another text without it.
             statement.and(" AND replace(labels.tags, ?, '') <> labels.tags", [format!("\n{tag}\n").into()]);
-        }
-        if let Some(SessionIs::Needing(_)) = self.is {
-            statement.and(&format!(" AND ({OBSERVATIONS} < {HORIZON} OR {IS_WAITING})"), []);
         }
         match self.is {
             None => {}
@@ -271,6 +270,7 @@ impl SessionSummary {
             created_ms: row.get("created_ms")?,
             observations,
             is_due: due.is_some_and(|due| due <= observations),
+            is_renewed: due.is_some(),
             last: answer.zip(reported_ms),
             place: order.place(row)?,
         })

@@ -53,8 +53,14 @@ test("what is asked for is the record as it was read, and few choices", async ()
   await page.getByText("How it walks, and for the quant").click();
   await page.getByLabel("Trained on").fill("600");
   await page.getByRole("button", { name: "Backtest", exact: true }).click();
-  const refused = page.locator(".error").getByText(/must hold at least 604, the window of \d+ and a year/);
+  // The refusal stands at the field, and opens the fold it is in.
+  const refused = page.locator(".error").getByText(/^Trained on is 600; it must be at most \d+: the record has \d+ periods, of which a year of 4 is lived through\.$/);
   await refused.waitFor();
+  const fold = page.locator("details", { has: page.getByLabel("Trained on") });
+  await fold.evaluate((details) => (details.open = false));
+  await page.getByRole("button", { name: "Backtest", exact: true }).click();
+  await refused.waitFor();
+  assert.equal(await fold.evaluate((details) => details.open), true);
   await page.getByLabel("Trained on").fill(String(WINDOW));
   await page.getByLabel("Trained anew every").fill("9");
   await page.getByLabel("Looking ahead").fill("4");

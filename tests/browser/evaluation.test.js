@@ -36,26 +36,6 @@ after(async () => {
   await ballast?.stop();
 });
 
-test("chances of a spread are those of its outcomes", async () => {
-  const { binned, chanceBelow, pieces } = await dashboardModule("spread.js");
-  // Log utility: a thousand outcomes, even over wealth from 50 to 150, in bins even in utility.
-  const outcomes = Array.from({ length: 100_000 }, (_, k) => 50 + (k + 0.5) / 1000);
-  const [low, high] = [Math.log(50), Math.log(150)];
-  const edges = Array.from({ length: 41 }, (_, k) => low + ((high - low) * k) / 40);
-  const counts = Array(40).fill(0);
-  for (const wealth of outcomes) counts[Math.floor((40 * (Math.log(wealth) - low)) / (high - low))]++;
-  const utility = { min: { value: low }, max: { value: high }, mean: { value: 4.5 } };
-  const spread = pieces({ histogram: counts, utility }, edges, { kind: "log" });
-  const near = (found, wanted, by) => assert.ok(Math.abs(found - wanted) < by, `${found} is not ${wanted}`);
-  near(chanceBelow(spread, 100), 0.5, 1e-3);
-  near(chanceBelow(spread, 60), 0.1, 1e-3);
-  const shares = binned(spread, [50, 150], 20);
-  near(shares.reduce((sum, share) => sum + share), 1, 1e-12);
-  for (const share of shares) near(share, 0.05, 1e-3);
-  const sure = pieces({ histogram: counts, utility: { ...utility, min: { value: low }, max: { value: low }, mean: { value: low } } }, edges, { kind: "log" });
-  assert.deepEqual([chanceBelow(sure, 50.1), chanceBelow(sure, 49.9)], [1, 0]);
-});
-
 test("what was compared, on which policy and for whom, comes first, and then what came of it", async () => {
   const words = plain(await page.locator("main").innerText());
   const [first] = words.split("What each is worth");
@@ -89,6 +69,23 @@ test("at most four histograms stand, on one scale of wealth and of height", asyn
   await page.getByText(`The other ${varying.length - 4}`).click();
   await charts.nth(varying.length - 1).waitFor();
   assert.equal(await charts.count(), varying.length);
+});
+
+test("what ends as the bank does is a bar of its own, of as many futures as ended there", async () => {
+  const { outcomes } = await dashboardModule("evaluation.js");
+  const ends = (histogram, at_bank) => ({ framework: "adaptive", certainty_equivalent: { value: 1 }, wealth: { histogram, at_bank } });
+  // Three quarters of all futures end at the bank, so that the fifth and the ninetieth hundredth are the same.
+  const [one] = outcomes({ strategies: [ends([50, 0, 0, 200], 750)] });
+  assert.deepEqual([one.shares, one.banked], [[0.05, 0, 0, 0.2], 0.75]);
+  for (const { wealth } of report.strategies) assert.equal(wealth.histogram.reduce((sum, count) => sum + count, wealth.at_bank), 400);
+  const charts = page.locator("section", { hasText: "How wealth spreads at the end" });
+  const name = { adaptive: "Cautious, learns", static: "Cautious, fixed", plug_in: "Trusts the record" };
+  const banked = report.strategies.find(({ framework, wealth }) => framework && wealth.at_bank > 0 && wealth.at_bank < 400);
+  assert.ok(banked, "no strategy is in the bank on some paths alone");
+  const rows = charts.getByRole("table", { name: name[banked.framework], exact: true, includeHidden: true });
+  await page.evaluate(() => document.querySelectorAll("figure details, figure button[aria-expanded]").forEach((element) => element.open !== undefined && (element.open = true)));
+  const text = plain(await rows.innerText());
+  assert.ok(text.includes(`${report.banked.toFixed(2)}, as all in the bank`) && text.includes(`${(banked.wealth.at_bank / 4).toFixed(1)} %`), text);
 });
 
 test("a strategy has one colour in every chart", async () => {

@@ -74,7 +74,7 @@ test("those that need care are counted among all, and shown without a wait", asy
   const overview = async () => {
     await visitQuiet(page, `${ballast.url}/#/jobs`);
     await visitQuiet(page, `${ballast.url}/#/`);
-    await page.getByText("100 of 10,000 active sessions need care: 100 are overdue.").waitFor();
+    await page.getByText("100 of 10,000 sessions need care: 100 are overdue.").waitFor();
   };
   await taking(t, overview, '[...document.querySelectorAll("button")].find(({ textContent }) => textContent === "Show them").click()', 'document.querySelector(".foot .note").textContent === "50 of 100"');
   assert.match(page.url(), /state=care/);

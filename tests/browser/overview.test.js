@@ -37,7 +37,7 @@ test("where nothing is, a visit is welcomed; where only a policy is, a session i
   await go("");
   await page.getByRole("link", { name: "Train the first policy" }).waitFor();
   policy = await trained(ballast.url, {
-    problem: { horizon: 2, rate_per_step: 0.002, periods_per_year: 52, history: HISTORY, trading_cost: 0.01, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } },
+    problem: { horizon: 3, rate_per_step: 0.002, periods_per_year: 52, history: HISTORY, trading_cost: 0.01, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } },
     design: { count: 40 },
     name: "World, weekly",
   });
@@ -68,7 +68,7 @@ test("a row tells wealth, holding, the last period, how late the report is, the 
   const size = action.allocation * whole - session.wealth * action.holding;
   const told = Math.abs(action.trade) < 0.0005 ? "Nothing" : `${size > 0 ? "Buy" : "Sell"} ${Math.abs(size).toFixed(2)}`;
   assert.equal(trade, told);
-  assert.match(state, /active\s+1 of 2/);
+  assert.match(state, /active\s+1 of 3/);
   assert.match(opened, /by World, weekly/);
   assert.match((await cells("Grace"))[3], /next \d/);
   assert.match((await cells("Emmy"))[3], /^None yet\s+next about \d/);
@@ -147,7 +147,7 @@ test("what needs care is told where it is so", async () => {
   await page.getByText("2 of 3 active sessions need care: 1 is overdue, 1 waits for its next policy, 1 has returns that have changed.").waitFor();
   await page.unrouteAll();
   await go("");
-  await page.getByText("1 of 3 active sessions needs care: 1 is overdue.").waitFor();
+  await page.getByText("1 of 3 sessions needs care: 1 is overdue.").waitFor();
   await page.getByRole("button", { name: "Show them" }).click();
   await shown("1 of 1");
   assert.deepEqual(await names(), ["Ada"]);
@@ -177,8 +177,9 @@ test("a session where its policy was not trained for says so, and how many do", 
 
 test("who needs care is told in a sentence", async () => {
   const { careWords } = await dashboardModule("care.js");
-  assert.equal(careWords({ active: 3, any: 2, overdue: 1, renewal: 2, alarm: 0 }), "2 of 3 active sessions need care: 1 is overdue, 2 wait for their next policies.");
-  assert.equal(careWords({ active: 1, any: 0, overdue: 0, renewal: 0, alarm: 0 }), "None of 1 active session needs care.");
+  assert.equal(careWords({ sessions: 3, any: 2, overdue: 1, renewal: 2, alarm: 0, ending: 0 }), "2 of 3 sessions need care: 1 is overdue, 2 wait for their next policies.");
+  assert.equal(careWords({ sessions: 1, any: 0, overdue: 0, renewal: 0, alarm: 0, ending: 0 }), "None of 1 session needs care.");
+  assert.equal(careWords({ sessions: 4, any: 2, overdue: 0, renewal: 0, alarm: 0, ending: 2 }), "2 of 4 sessions need care: 2 are completed or in their last period.");
 });
 
 test("those ticked are deleted at once after one question, and what stays is named", async () => {

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { browser, call, service, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
-import { usable, visitQuiet } from "./page.js";
+import { plain, usable, visitQuiet } from "./page.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002, 0.03, -0.02];
 
@@ -48,7 +48,8 @@ test("a completed session goes on by a policy that is there", async () => {
 
 test("those ticked that end go on by their policy trained anew, one training for one record", async () => {
   const sessions = [await opened("Last A", [0.01]), await opened("Last B", [0.01])];
-  await go("#/?sort=name");
+  await go("#/?state=ending&sort=name");
+  assert.match(plain(await page.getByRole("row", { name: /Last A/ }).innerText()), /In its last period/);
   for (const name of ["Last A", "Last B"]) await page.getByRole("checkbox", { name: `Tick session ${name}` }).check();
   await page.getByRole("link", { name: "Go on with the 2" }).click();
   await page.getByLabel("Go on by").selectOption("anew");

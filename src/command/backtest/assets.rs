@@ -41,7 +41,7 @@ impl BacktestArgs {
         if let Some((option, value)) = of_training.into_iter().find_map(|(option, value)| Some((option, value?))) {
             return Err(refused(option, value, "must be left out of several assets, for which nothing is trained"));
         }
-        let usual = AssetsChoices::usual(record.periods_per_year);
+        let usual = AssetsChoices::usual(record.periods_per_year, record.rows.len());
         let window = |window: &Window| match window {
             Window::Last(periods) => Some(*periods),
             Window::All => None,

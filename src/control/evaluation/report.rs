@@ -23,6 +23,10 @@ pub struct EvaluationReport {
     pub strategies: Vec<StrategyReport>,
     /// Common bin edges of terminal utility, ascending.
     pub histogram_edges: Vec<f64>,
+    /// Common bin edges of terminal wealth, ascending and evenly apart.
+    pub wealth_edges: Vec<f64>,
+    /// Terminal wealth of all in the bank.
+    pub banked: f64,
     /// In the order they were drawn.
     pub histories: Vec<HistoryReport>,
     /// What the figures say of each framework that changes its allocation.
@@ -105,6 +109,10 @@ pub struct WealthReport {
     pub min: Estimate,
     /// The mean of the worst twentieth of the paths.
     pub worst_twentieth: Estimate,
+    /// Counts of the bins between `wealth_edges`, without the paths that end as all in the bank does.
+    pub histogram: Vec<usize>,
+    /// Paths that end as all in the bank does, to a billionth of it.
+    pub at_bank: usize,
     /// Share of the paths that end with less than was put in: the initial wealth and all contributions.
     pub chance_of_loss: Estimate,
     /// Mean over paths of the largest fall on the way below the highest so far, as a share of it; what is added or withdrawn is

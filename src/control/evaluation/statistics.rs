@@ -17,6 +17,8 @@ use crate::numerics::summary::{Clustered, Estimate, interpolated_quantile};
 
 /// Bins of the histograms.
 const BINS: usize = 40;
+/// Wealth this near to that of the bank, as a share of it, is the bank's: it differs by rounding alone.
+const AT_BANK: f64 = 1e-9;
 /// Share of the paths that are the worst.
 const WORST: f64 = 0.05;
 
@@ -40,7 +42,7 @@ impl EvaluationReport {
         let kind = request.problem.utility;
         let utilities: Vec<Vec<f64>> =
             wealth.iter().map(|wealth| wealth.iter().map(|&wealth| utility(kind, wealth)).collect()).collect();
-        let edges = edges(&utilities);
+        let (edges, wealth_edges) = (edges(&utilities), edges(&wealth));
         let reference = request.frameworks.iter().position(|&framework| framework == Framework::Adaptive).unwrap_or(0);
         let table = Table {
             evaluation,
@@ -50,8 +52,10 @@ impl EvaluationReport {
             wealth: &wealth,
             utilities: &utilities,
             edges: &edges,
+            wealth_edges: &wealth_edges,
             reference,
         };
+        let (_, banked) = table.relative_utility();
         let strategies = (0..count).into_par_iter().map(|index| table.strategy(index));
         let strategies: Vec<StrategyReport> = strategies.collect::<serde_json::Result<_>>()?;
         Ok(EvaluationReport {
@@ -63,6 +67,8 @@ impl EvaluationReport {
             request: request.clone(),
             costs,
             histogram_edges: edges,
+            wealth_edges,
+            banked,
         })
     }
 }
@@ -77,10 +83,22 @@ impl Costs {
     }
 }
 
-fn edges(utilities: &[Vec<f64>]) -> Vec<f64> {
-    let all = || utilities.iter().flatten().copied();
+/// Edges of [`BINS`] even bins from the least of all values to the most.
+fn edges(values: &[Vec<f64>]) -> Vec<f64> {
+    let all = || values.iter().flatten().copied();
     let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
     (0..=BINS).map(|bin| low + (high - low) * bin as f64 / BINS as f64).collect()
+}
+
+/// How many of the values lie in each bin between even edges.
+fn binned(values: impl Iterator<Item = f64>, edges: &[f64]) -> Vec<usize> {
+    let (low, high) = (edges[0], edges[BINS]);
+    let mut counts = vec![0; BINS];
+    for value in values {
+        let position = if high > low { (value - low) / (high - low) * BINS as f64 } else { 0.0 };
+        counts[(position as usize).min(BINS - 1)] += 1;
+    }
+    counts
 }
 
 /// Everything simulated, strategy by strategy.
@@ -92,6 +110,7 @@ struct Table<'a> {
     wealth: &'a [Vec<f64>],
     utilities: &'a [Vec<f64>],
     edges: &'a [f64],
+    wealth_edges: &'a [f64],
     reference: usize,
 }
 
@@ -114,7 +133,7 @@ impl Table<'_> {
             own_mix: follower.map(|_| self.own_mix(index)),
             wealth: self.wealth(index),
             difference: (index != self.reference).then(|| self.difference(index)),
-            histogram: self.histogram(utilities),
+            histogram: binned(utilities.iter().copied(), self.edges),
             periods: follower.map(|_| self.periods(index)),
             coverage: follower.filter(|follower| has_ball(follower.framework)).map(|_| self.coverage(index)),
             resolved_share: follower.map(|_| share(self.lived(index), |lived| lived.resolved)),
@@ -126,6 +145,9 @@ impl Table<'_> {
         let sorted = ascending(wealth);
         let put_in =
             problem.initial_wealth + (0..problem.horizon).map(|step| problem.contributions.at(step)).sum::<f64>();
+        let (_, banked) = self.relative_utility();
+        let is_beyond = |wealth: &f64| (wealth - banked).abs() > AT_BANK * banked;
+        let histogram = binned(wealth.iter().copied().filter(is_beyond), self.wealth_edges);
         let falls: Vec<f64> = self.outcomes.outcomes.iter().map(|outcome| outcome.ended[index].fall).collect();
         WealthReport {
             mean: self.sample.mean(wealth),
@@ -136,6 +158,8 @@ impl Table<'_> {
             worst_twentieth: self.sample.lowest(wealth, WORST),
             chance_of_loss: self.sample.share(wealth, |wealth| *wealth < put_in),
             max_drawdown: self.sample.mean(&falls),
+            at_bank: wealth.len() - histogram.iter().sum::<usize>(),
+            histogram,
         }
     }
 
@@ -206,16 +230,6 @@ impl Table<'_> {
     fn relative_utilities(&self, wealth: &[f64]) -> Vec<f64> {
         let (relative, floor) = self.relative_utility();
         wealth.iter().map(|wealth| relative.value((wealth / floor).ln())).collect()
-    }
-
-    fn histogram(&self, utilities: &[f64]) -> Vec<usize> {
-        let (low, high) = (self.edges[0], self.edges[BINS]);
-        let mut counts = vec![0; BINS];
-        for value in utilities {
-            let position = if high > low { (value - low) / (high - low) * BINS as f64 } else { 0.0 };
-            counts[(position as usize).min(BINS - 1)] += 1;
-        }
-        counts
     }
 
     /// Every step of a framework, path by path.

@@ -47,7 +47,7 @@ pub struct BacktestRequest {
     /// Default: what `dates` tell; required without them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub periods_per_year: Option<usize>,
-    /// Periods of history that each policy is trained on. Default: 20 years of them.
+    /// Periods of history that each policy is trained on. Default: 20 years of them, or half of a record that has no year beside.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub window: Option<usize>,
     /// Periods from one training to the next. Default: a year of them, at most `horizon`.
@@ -137,6 +137,19 @@ impl Rates {
     }
 }
 
+/// So many periods where a record of `found` leaves a year beside them, else half of it.
+pub fn usual_window(wanted: usize, found: usize, year: usize) -> usize {
+    if wanted + year <= found { wanted } else { found / 2 }
+}
+
+/// Refuses a window that was asked for and leaves no year of the record to live through.
+pub fn too_long(window: usize, found: usize, year: usize) -> FieldError {
+    let most = found.saturating_sub(year);
+    let rule =
+        format!("must be at most {most}: the record has {found} periods, of which a year of {year} is lived through");
+    FieldError::new("window", window, rule)
+}
+
 /// Between which returns lie, simple ones or log-returns.
 pub fn bounds(are_simple: bool) -> (f64, f64) {
     let bound = rules::LOG_RETURN;
@@ -179,7 +192,7 @@ impl BacktestRequest {
         self.check_strategies()?;
         let every = self.every.unwrap_or_else(|| self.horizon.map_or(year, |horizon| year.min(horizon)));
         let horizon = self.horizon.unwrap_or(every);
-        let window = self.window.unwrap_or(WINDOW_YEARS * year);
+        let window = self.window.unwrap_or_else(|| usual_window(WINDOW_YEARS * year, self.period_count(), year));
         if !(1..=horizon).contains(&every) {
             let rule = "must be at least 1, and at most horizon: a policy is lived by until the next is trained";
             return Err(FieldError::new("every", every, rule));
@@ -188,10 +201,9 @@ impl BacktestRequest {
         whole("window", window, &HISTORY_LENGTH)?;
         let (found, wanted) = (self.period_count(), window + year);
         if found < wanted {
-            let rule = format!(
-                "must hold at least {wanted}, the window of {window} and a year: a shorter window asks for less"
-            );
-            return Err(FieldError::new(self.returns().0, format!("{found} periods"), rule));
+            let rule = format!("must hold at least {wanted}, the window of {window} and a year");
+            let short = FieldError::new(self.returns().0, format!("{found} periods"), rule);
+            return Err(self.window.map_or(short, |window| too_long(window, found, year)));
         }
         (self.every, self.horizon, self.window) = (Some(every), Some(horizon), Some(window));
         self.check_size(every, horizon, window)?;

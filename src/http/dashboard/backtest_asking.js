@@ -50,7 +50,7 @@ function asking() {
   investor.control.value = "balanced";
   const aversion = input({ name: "risk_aversion", label: "Risk aversion", note: "Relative, 1 to 100.", value: "3" });
   aversion.element.hidden = true;
-  const window = input({ name: "window", label: "Trained on", note: "Periods before. Blank: 20 years." });
+  const window = input({ name: "window", label: "Trained on", note: "Periods before. Blank: 20 years, or half of a record too short for them." });
   const every = input({ name: "every", label: "Trained anew every", note: "Periods. Blank: a year." });
   const horizon = input({ name: "horizon", label: "Looking ahead", note: "Periods. Blank: until the next training." });
   const levels = input({ name: "alpha", label: "Confidence, %", note: "One to three, apart by semicolons; most is said of the second.", value: LEVELS.false, unit: "confidence" });
@@ -61,8 +61,8 @@ function asking() {
   const shown = () => {
     for (const { element } of [horizon, points, blind]) element.hidden = isSeveral();
     const asked = isSeveral()
-      ? { window: ["Known of the past", "Periods, or all; several apart by semicolons. Blank: 10 years, 20 years and all."], alpha: ["Confidence, %", "One level."] }
-      : { window: ["Trained on", "Periods before. Blank: 20 years."], alpha: ["Confidence, %", "One to three, apart by semicolons; most is said of the second."] };
+      ? { window: ["Known of the past", "Periods, or all; several apart by semicolons. Blank: 10 years, 20 years, as far as the record allows, and all."], alpha: ["Confidence, %", "One level."] }
+      : { window: ["Trained on", "Periods before. Blank: 20 years, or half of a record too short for them."], alpha: ["Confidence, %", "One to three, apart by semicolons; most is said of the second."] };
     for (const field of [window, levels]) {
       const [label, note] = asked[field.name];
       field.element.querySelector("label").textContent = label;

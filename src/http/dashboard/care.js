@@ -1,4 +1,4 @@
-// Which sessions need care: those whose report is overdue, that wait for their next policies, or whose returns have changed. The service
+// Which sessions need care: those whose report is overdue, whose next policy fails to come, whose returns have changed, or that end. The service
 // tells of each, and how many there are.
 
 import { counted, count } from "./format.js";
@@ -14,12 +14,13 @@ const REASONS = {
   overdue: ["is overdue", "are overdue"],
   renewal: ["waits for its next policy", "wait for their next policies"],
   alarm: ["has returns that have changed", "have returns that have changed"],
+  ending: ["is completed or in its last period", "are completed or in their last period"],
 };
 
-/** How many of the active sessions need care, and why, in a sentence. */
-export function careWords({ active, any, ...reasons }) {
-  if (any === 0) return `None of ${counted(active, "active session")} needs care.`;
+/** How many of the sessions need care, and why, in a sentence. */
+export function careWords({ sessions, any, ...reasons }) {
+  if (any === 0) return `None of ${counted(sessions, "session")} needs care.`;
   const parts = Object.entries(REASONS).filter(([reason]) => reasons[reason] > 0);
   const why = parts.map(([reason, [one, many]]) => `${count(reasons[reason])} ${reasons[reason] === 1 ? one : many}`).join(", ");
-  return `${count(any)} of ${counted(active, "active session")} ${any === 1 ? "needs" : "need"} care: ${why}.`;
+  return `${count(any)} of ${counted(sessions, "session")} ${any === 1 ? "needs" : "need"} care: ${why}.`;
 }

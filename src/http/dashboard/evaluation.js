@@ -7,13 +7,11 @@ import { histogram } from "./histogram.js";
 import { intervalChart } from "./interval_chart.js";
 import { unitOf } from "./periods.js";
 import { FRAMEWORKS, investorWords, PAPER } from "./specification.js";
-import { binned, pieces } from "./spread.js";
 import { colourOf, colourOfMix } from "./strategies.js";
 import { changing, interval, ordinal } from "./verdict.js";
 
 /** Histograms shown at once. */
 const SHOWN = 4;
-const BINS = 36;
 
 /** `policyLink(id)` is how a policy is named. */
 export function body(report, policyLink) {
@@ -35,11 +33,15 @@ function putIn({ initial_wealth, contributions, horizon }) {
   return initial_wealth + all;
 }
 
-/** Every strategy with its name, its colour and how its wealth spreads, what it is worth the most first. */
-function outcomes({ strategies, histogram_edges, request }) {
-  const { utility } = request.problem;
+/** Every strategy with its name, its colour and how its wealth spreads, what it is worth the most first: `shares` of the bins of
+ * wealth, and what ends as all in the bank does. */
+export function outcomes({ strategies }) {
+  const spread = ({ wealth: { histogram, at_bank } }) => {
+    const total = histogram.reduce((sum, count) => sum + count, at_bank);
+    return { shares: histogram.map((count) => count / total), banked: at_bank / total };
+  };
   return strategies
-    .map((strategy) => ({ ...strategy, name: named(strategy), colour: coloured(strategy), spread: pieces(strategy, histogram_edges, utility) }))
+    .map((strategy) => ({ ...strategy, name: named(strategy), colour: coloured(strategy), ...spread(strategy) }))
     .sort((one, other) => other.certainty_equivalent.value - one.certainty_equivalent.value);
 }
 
@@ -136,21 +138,21 @@ function foremost(ended, reference) {
   return [...new Set([...wanted, ...rest].filter(Boolean))].slice(0, SHOWN);
 }
 
-/** A histogram a strategy, all on one scale of wealth; who ends alike on every path is a mark in all of them. */
-function spreads({ request, reference }, ended) {
-  const spread = ended.filter(({ spread }) => spread.length > 1);
+/** A histogram a strategy, in the bins that wealth was counted in, all on one scale; what ends as the bank does is a bar of its own,
+ * and where every path does there is nothing to draw. */
+function spreads({ request, reference, wealth_edges: edges, banked }, ended) {
+  const spread = ended.filter((one) => one.banked < 1);
   if (spread.length === 0) return "";
-  const domain = [Math.min(...spread.map(({ spread }) => spread[0].from)), Math.max(...spread.map(({ spread }) => spread.at(-1).to))];
-  const shares = new Map(spread.map((one) => [one, binned(one.spread, domain, BINS)]));
+  const domain = [edges[0], edges.at(-1)];
   const shown = foremost(spread, reference);
   const rest = spread.filter((one) => !shown.includes(one));
-  const top = Math.max(...shown.flatMap((one) => shares.get(one)));
-  const bank = ended.find(({ constant_mix }) => constant_mix === 0);
-  const marks = bank ? [{ name: bank.name, at: bank.certainty_equivalent.value }] : [];
-  const drawn = (some, highest) =>
-    h("div", { class: "duo" }, some.map((one) => histogram({ title: one.name, shares: shares.get(one), domain, top: highest, colour: one.colour, marks })));
-  const dashed = bank ? ` The dashed line is all in the bank, ${wealth(bank.certainty_equivalent.value)}.` : "";
-  const others = () => drawn(rest, Math.max(top, ...rest.flatMap((one) => shares.get(one))));
+  const highest = (some) => Math.max(...some.flatMap((one) => [...one.shares, one.banked]));
+  const top = highest(shown);
+  const marks = [{ name: "All in the bank", at: banked }];
+  const drawn = (some, top) =>
+    h("div", { class: "duo" }, some.map((one) => histogram({ title: one.name, shares: one.shares, point: { at: banked, share: one.banked, name: "as all in the bank" }, domain, top, colour: one.colour, marks })));
+  const dashed = ` The dashed line is all in the bank, ${wealth(banked)}; futures that end there are a bar of their own.`;
+  const others = () => drawn(rest, Math.max(top, highest(rest)));
   return section(
     "How wealth spreads at the end",
     h("p", { class: "note" }, `How often wealth ends where, after ${counted(request.problem.horizon, unitOf(request.problem.periods_per_year))}: one scale for all.${dashed}`),

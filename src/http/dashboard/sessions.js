@@ -17,7 +17,7 @@ import { welcome } from "./welcome.js";
 const PAGE = 50;
 /** Nothing is asked for while a word is being typed, for so long, in milliseconds. */
 const PAUSE = 250;
-const STATES = { "": "All", active: "Active", waiting: "Waits for its next policy", completed: "Completed", care: "Needs care", overdue: "Overdue", alarm: "Returns have changed" };
+const STATES = { "": "All", active: "Active", waiting: "Waits for its next policy", completed: "Completed", care: "Needs care", overdue: "Overdue", alarm: "Returns have changed", ending: "Completed, or in the last period" };
 const NEWEST = "-created";
 /** What is asked for, as it stands in the address, and what it is where nothing is said. */
 const CHOICES = { search: "", tag: "", state: "", sort: NEWEST };
@@ -205,12 +205,13 @@ function lastReport({ date, last_report_ms }, { next, late }) {
 }
 
 /** Its state, how far it is, and what needs care. */
-function standing({ state, period, horizon, drift }) {
+function standing({ state, period, horizon, drift, care }) {
   const drifting = { warning: "Returns may have changed", alarm: "Returns have changed" }[drift];
   return [
     h("span", { class: `state ${state}` }, state),
     h("span", { class: "under" }, `${count(period - 1)} of ${count(horizon)}`),
     state === "waiting" ? h("span", { class: "under wrong" }, "for its next policy") : null,
+    care.includes("ending") && state === "active" ? h("span", { class: "under wrong" }, "In its last period") : null,
     drifting ? h("span", { class: "under wrong" }, drifting) : null,
   ];
 }

@@ -18,7 +18,7 @@ class Annualised(TypedDict):
     mean_return: float
     """What the asset paid, compounded: `m^p - 1`, m the mean of `e^z` over the log-returns z of the history."""
     deviation: float
-    """Standard deviation of the history's log-returns, of independent periods: `sqrt(p)` times that of one."""
+    """Standard deviation of the history's simple returns, of independent periods: `sqrt(p)` times that of one."""
 
 
 Asset: TypeAlias = str
@@ -205,8 +205,8 @@ class BootstrapEstimate(TypedDict):
 class CareCount(TypedDict):
     """How many sessions need care, and why; one may have several reasons."""
 
-    active: int
-    """Those that are not completed, of which the others are."""
+    sessions: int
+    """Those that are found."""
     any: int
     """In need of care for any of the reasons."""
     overdue: int
@@ -215,9 +215,11 @@ class CareCount(TypedDict):
     """They wait for their next policies."""
     alarm: int
     """Their returns have changed."""
+    ending: int
+    """Completed, or in their last period and not renewed by themselves."""
 
 
-CareReason: TypeAlias = Literal["overdue", "renewal", "alarm"]
+CareReason: TypeAlias = Literal["overdue", "renewal", "alarm", "ending"]
 """Why a session needs care."""
 
 
@@ -1117,6 +1119,10 @@ class WealthReport(TypedDict):
     """Of the paths of one history, averaged over histories."""
     worst_twentieth: Estimate
     """The mean of the worst twentieth of the paths."""
+    histogram: list[int]
+    """Counts of the bins between `wealth_edges`, without the paths that end as all in the bank does."""
+    at_bank: int
+    """Paths that end as all in the bank does, to a billionth of it."""
     chance_of_loss: Estimate
     """Share of the paths that end with less than was put in: the initial wealth and all contributions."""
     max_drawdown: Estimate
@@ -2019,7 +2025,7 @@ class BacktestRequest(TypedDict):
     periods_per_year: NotRequired[int | None]
     """Default: what `dates` tell; required without them."""
     window: NotRequired[int | None]
-    """Periods of history that each policy is trained on. Default: 20 years of them."""
+    """Periods of history that each policy is trained on. Default: 20 years of them, or half of a record that has no year beside."""
     every: NotRequired[int | None]
     """Periods from one training to the next. Default: a year of them, at most `horizon`."""
     horizon: NotRequired[int | None]
@@ -2417,6 +2423,10 @@ class EvaluationReport(TypedDict):
     """Frameworks first, then constant mixes, in the order of the request."""
     histogram_edges: list[float]
     """Common bin edges of terminal utility, ascending."""
+    wealth_edges: list[float]
+    """Common bin edges of terminal wealth, ascending and evenly apart."""
+    banked: float
+    """Terminal wealth of all in the bank."""
     histories: list[HistoryReport]
     """In the order they were drawn."""
     sentences: list[str]

@@ -27,7 +27,7 @@ impl AssetsBacktest {
             frequency,
             periods_per_year,
         };
-        let usual = AssetsChoices::usual(periods_per_year);
+        let usual = AssetsChoices::usual(periods_per_year, request.dates.len());
         let choices = AssetsChoices {
             windows: request.windows.clone().unwrap_or(usual.windows),
             every: request.every.unwrap_or(usual.every),

@@ -15,7 +15,7 @@ use crate::control::evaluation::resampling::INITIAL_WEALTH;
 use crate::control::pool;
 use crate::control::progress::Watch;
 use crate::control::request::assets::{DATES, check_names, check_rows};
-use crate::control::request::backtest::{ALPHA, RELATIVE, defaults};
+use crate::control::request::backtest::{ALPHA, RELATIVE, defaults, too_long, usual_window};
 use crate::control::request::frequency::Frequency;
 use crate::control::request::rules::{TRADING_COST, whole, within};
 use crate::control::request::specification::{UtilitySpecification, default_seed};
@@ -95,9 +95,15 @@ impl AssetsRecord {
 }
 
 impl AssetsChoices {
-    /// Those that count where nothing is said, of so many periods a year.
-    pub fn usual(periods_per_year: usize) -> Self {
-        let windows = WINDOW_YEARS.map(|years| Some(years * periods_per_year));
+    /// Those that count where nothing is said, of so many periods a year and `found` in all: the windows that leave a year of the
+    /// record, else half of it.
+    pub fn usual(periods_per_year: usize, found: usize) -> Self {
+        let long = WINDOW_YEARS.map(|years| years * periods_per_year);
+        let mut windows: Vec<_> =
+            long.into_iter().filter(|window| window + periods_per_year <= found).map(Some).collect();
+        if windows.is_empty() {
+            windows.push(Some(usual_window(long[0], found, periods_per_year)));
+        }
         AssetsChoices {
             windows: windows.into_iter().chain([None]).collect(),
             every: periods_per_year,
@@ -137,11 +143,9 @@ impl AssetsBacktest {
         check_names("assets", &record.assets)?;
         let (found, year) = (record.rows.len(), record.periods_per_year);
         let longest = choices.windows.iter().flatten().max();
-        let first = longest.copied().unwrap_or(WINDOW_YEARS[1] * year);
-        let wanted = first + year;
-        if found < wanted {
-            let rule = format!("must hold at least {wanted}, the longest window and a year");
-            return Err(FieldError::new("simple_returns", format!("{found} periods"), rule));
+        let first = longest.copied().unwrap_or(usual_window(WINDOW_YEARS[1] * year, found, year));
+        if found < first + year {
+            return Err(too_long(first, found, year));
         }
         let backtest = AssetsBacktest { record, choices, first };
         for window in &backtest.choices.windows {
@@ -302,7 +306,7 @@ mod tests {
             windows: vec![Some(12), None],
             alpha: 0.9,
             trading_cost: COST,
-            ..AssetsChoices::usual(record.periods_per_year)
+            ..AssetsChoices::usual(record.periods_per_year, record.rows.len())
         };
         AssetsBacktest::new(record, choices).unwrap().run(&Watch::unwatched(), &|| ()).unwrap()
     }
@@ -424,12 +428,16 @@ mod tests {
     #[test]
     fn choices_and_records_that_break_a_rule_are_named() {
         let record = |periods| record(2, periods, log_return);
-        let usual = AssetsChoices { windows: vec![Some(8)], ..AssetsChoices::usual(4) };
+        let usual = AssetsChoices { windows: vec![Some(8)], ..AssetsChoices::usual(4, 200) };
         let message = |record, choices| AssetsBacktest::new(record, choices).err().unwrap().to_string();
         let windows = |windows: &[Option<usize>]| AssetsChoices { windows: windows.to_vec(), ..usual.clone() };
         assert_eq!(message(record(30), windows(&[None, None])), "window is all: must not be named twice");
         assert_eq!(message(record(30), windows(&[Some(1)])), "window is 1: must lie in [2, 2000]");
-        let short = "simple_returns is 11 periods: must hold at least 12, the longest window and a year";
+        let usual_windows = |found| AssetsChoices::usual(4, found).windows;
+        assert_eq!(usual_windows(84), [Some(40), Some(80), None]);
+        assert_eq!(usual_windows(48), [Some(40), None]);
+        assert_eq!(usual_windows(30), [Some(15), None]);
+        let short = "window is 8: must be at most 7: the record has 11 periods, of which a year of 4 is lived through";
         assert_eq!(message(record(11), usual.clone()), short);
         assert_eq!(
             message(record(30), AssetsChoices { every: 0, ..usual.clone() }),
