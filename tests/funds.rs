@@ -156,7 +156,9 @@ async fn what_several_assets_report_is_put_right_and_renewed(mut app: App) {
     app.report(1, report(0.03)).await;
     let expected = app.action().await.1;
     app.open().await;
-    app.report(1, report(0.13)).await;
+    let mut slip = report(0.13);
+    slip["confirm"] = json!(true);
+    app.report(1, slip).await;
     let mut correction = report(0.03);
     (correction["correction"], correction["period"]) = (json!(1), json!(1));
     correction["reason"] = json!("a slip");

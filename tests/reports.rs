@@ -64,7 +64,7 @@ async fn elements_are_as_calls(mut app: App, north: String, south: String) {
         assert_eq!(answer.as_object().unwrap().len(), 4, "{answer}");
     }
     let kind = |index: usize| answers[index]["problem"]["type"].as_str().unwrap();
-    assert_eq!([3, 5, 6].map(kind), ["/problems/report-gap", "/problems/unusual-return", "/problems/invalid-field"]);
+    assert_eq!([3, 5, 6].map(kind), ["/problems/report-gap", "/problems/unconfirmed", "/problems/invalid-field"]);
 
     // Refused as a whole, and nothing of it is recorded.
     let twice = json!([report(&sessions[2], 1, 0.01), report(&sessions[3], 1, 0.0), report(&sessions[2], 2, 0.01)]);

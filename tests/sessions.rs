@@ -145,7 +145,8 @@ async fn a_session_whose_wealth_does_not_last_is_not_opened_and_one_that_comes_t
     app.open_with(json!({ "holding": 1.0 })).await;
     app.open_with(json!({ "wealth": 80.0 })).await;
     // Everything held in an asset that falls, whatever was advised: what is left is recorded, and stays in the bank.
-    let (status, observed) = app.report(1, json!({ "log_return": -0.2, "executed_allocation": 1.0 })).await;
+    let (status, observed) =
+        app.report(1, json!({ "log_return": -0.2, "confirm": true, "executed_allocation": 1.0 })).await;
     assert_eq!(status, 200, "{observed}");
     let left = 80.0 * 0.95 * (-0.2_f64).exp() - 40.0;
     assert!((number(&observed["wealth"]) - left).abs() < 1e-12 && number(&observed["holding"]) == 1.0, "{observed}");
@@ -157,9 +158,9 @@ async fn a_session_whose_wealth_does_not_last_is_not_opened_and_one_that_comes_t
         "{action}"
     );
     // What no contributions can explain must be told.
-    let (status, problem) = app.report(2, json!({ "log_return": -0.2 })).await;
+    let (status, problem) = app.report(2, json!({ "log_return": -0.2, "confirm": true })).await;
     assert_eq!((status.as_u16(), &problem["field"]), (422, &json!("wealth")), "{problem}");
-    let (status, observed) = app.report(2, json!({ "log_return": -0.2, "wealth": 15.0 })).await;
+    let (status, observed) = app.report(2, json!({ "log_return": -0.2, "confirm": true, "wealth": 15.0 })).await;
     assert_eq!((status.as_u16(), number(&observed["wealth"])), (200, 15.0), "{observed}");
     let (_, action) = app.action().await;
     assert!(number(&action["certainty_equivalent"]) >= 15.0, "nothing more is withdrawn: {action}");

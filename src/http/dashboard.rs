@@ -54,6 +54,7 @@ static ASSETS: LazyLock<Vec<Asset>> = LazyLock::new(|| {
         "course.js": SCRIPT,
         "csv.js": SCRIPT,
         "dom.js": SCRIPT,
+        "doubts.js": SCRIPT,
         "draft.js": SCRIPT,
         "evaluation.js": SCRIPT,
         "evaluation_asking.js": SCRIPT,

@@ -6,6 +6,7 @@ use super::problem::{Problem, ProblemKind};
 use super::telemetry;
 use crate::service::allowance::{Refused, TooMany};
 use crate::service::error::ServiceError;
+use crate::service::gate::Doubts;
 use crate::service::metrics as names;
 use crate::store::{OverQuota, Quota, StoreError};
 
@@ -40,7 +41,12 @@ impl From<ServiceError> for Problem {
             ServiceError::Gap { what, given, expected } => {
                 problem(Kind::ReportGap).naming(what, given, format!("must be {expected}"))
             }
-            ServiceError::UnusualReturn(field) => Problem::of_field(Kind::UnusualReturn, field),
+            ServiceError::Unconfirmed(Doubts(doubts)) => {
+                let problem = problem(Kind::Unconfirmed);
+                let Some(first) = doubts.first() else { return problem };
+                let named = problem.naming(first.field.clone(), first.value.clone(), first.rule());
+                Problem { doubts: Some(doubts.into()), ..named }
+            }
             ServiceError::PastHorizon { given, horizon } => {
                 problem(Kind::SessionCompleted).naming("period", given, format!("must be at most {horizon}"))
             }

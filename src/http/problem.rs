@@ -13,6 +13,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
+use crate::service::gate::Doubt;
 use crate::service::metrics::PROBLEMS;
 
 /// What went wrong, chosen by what the client should do next.
@@ -31,7 +32,7 @@ pub enum ProblemKind {
     JobNotEnded,
     ReportConflict,
     ReportGap,
-    UnusualReturn,
+    Unconfirmed,
     SessionCompleted,
     BodyTooLarge,
     QuotaExceeded,
@@ -61,7 +62,7 @@ impl ProblemKind {
         ProblemKind::JobNotEnded,
         ProblemKind::ReportConflict,
         ProblemKind::ReportGap,
-        ProblemKind::UnusualReturn,
+        ProblemKind::Unconfirmed,
         ProblemKind::SessionCompleted,
         ProblemKind::BodyTooLarge,
         ProblemKind::QuotaExceeded,
@@ -94,7 +95,7 @@ impl ProblemKind {
             Self::JobNotEnded => ("job-not-ended", S::CONFLICT, "The job is queued or runs"),
             Self::ReportConflict => ("report-conflict", S::CONFLICT, "It was reported with other content"),
             Self::ReportGap => ("report-gap", S::CONFLICT, "It is not the one expected"),
-            Self::UnusualReturn => ("unusual-return", S::CONFLICT, "The return is far from the record"),
+            Self::Unconfirmed => ("unconfirmed", S::CONFLICT, "The report is most likely a slip"),
             Self::SessionCompleted => ("session-completed", S::CONFLICT, "The session has reached its horizon"),
             Self::BodyTooLarge => ("body-too-large", S::PAYLOAD_TOO_LARGE, "The body is too large"),
             Self::QuotaExceeded => ("quota-exceeded", S::PAYLOAD_TOO_LARGE, "The tenant keeps as much as it may"),
@@ -138,6 +139,10 @@ pub struct Problem {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<String>, example = "must lie in [1, 520]")]
     pub rule: Option<Box<str>>,
+    /// All that is doubted in a report; with `confirm` it is recorded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<Vec<Doubt>>)]
+    pub doubts: Option<Box<[Doubt]>>,
     /// When to ask again, where that is known; shown as `Retry-After`.
     #[serde(skip)]
     pub retry_after: Option<Duration>,
@@ -168,6 +173,7 @@ impl Problem {
             field: None,
             value: None,
             rule: None,
+            doubts: None,
             retry_after: None,
         }
     }

@@ -96,7 +96,7 @@ pub struct ElementAnswered {
     responses(
         (status = 200, description = "Recorded; the same period and content again give the same answer. Of a list, the answer to each element with a status of its own.", body = ReportsAnswered),
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "Other content, a gap, past the horizon, or an unusual return that nobody confirms.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "Other content, a gap, past the horizon, or most likely a slip that nobody confirms.", body = Problem, content_type = "application/problem+json"),
         (status = 422, description = "A field breaks a rule, or a list names a session twice.", body = Problem, content_type = "application/problem+json")))]
 pub async fn observe(
     State(service): State<Arc<Service>>,

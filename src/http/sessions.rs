@@ -86,7 +86,8 @@ pub async fn history(
     Ok(Json(service.sessions.history(&caller.tenant, &id, &caller.turn).await?))
 }
 
-/// Put right what a period reported: exactly once, durable before it is answered. What was reported and told stays on record.
+/// Report a period anew, put in one that was skipped or take one out: exactly once, durable before it is answered. What was
+/// reported and told stays on record.
 #[utoipa::path(post, path = "/sessions/{id}/corrections", tag = "sessions",
     params(("id" = String, Path, description = "The session.")),
     request_body(content = Correct, example = json!({
@@ -95,7 +96,7 @@ pub async fn history(
     responses(
         (status = 200, description = "Recorded; the same correction and content again give the same answer.", body = Corrected),
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
-        (status = 409, description = "Other content, not the next correction, or an unusual return that nobody confirms.", body = Problem, content_type = "application/problem+json"),
+        (status = 409, description = "Other content, not the next correction, or most likely a slip that nobody confirms.", body = Problem, content_type = "application/problem+json"),
         (status = 422, description = "A field breaks a rule.", body = Problem, content_type = "application/problem+json")))]
 pub async fn correct(
     State(service): State<Arc<Service>>,

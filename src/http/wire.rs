@@ -220,9 +220,13 @@ pub struct Session {
     /// The last period that the policy advises.
     pub horizon: usize,
     pub state: SessionState,
-    /// The last day of the last period that was reported with one.
+    /// The last day of the last period: as reported, else the next one due after those before it. Null where no day is known.
     #[schema(value_type = Option<String>, format = Date)]
     pub date: Option<Date>,
+    /// The last day of the coming period, by the policy's periods a year, else by the days reported; a report without a day
+    /// takes it. Null where that is not known, or it is completed.
+    #[schema(value_type = Option<String>, format = Date)]
+    pub next: Option<Date>,
     pub wealth: f64,
     /// Share of wealth in the risky asset, before trading; of several assets in all of them.
     pub holding: f64,
@@ -258,7 +262,8 @@ impl From<Live> for Session {
         Session {
             period: live.observed + 1,
             state: session_state(live.observed, live.horizon(), live.is_due()),
-            date: live.standing.date,
+            date: live.standing.days.last,
+            next: live.next_day(),
             wealth: live.standing.state.wealth,
             holding: live.standing.state.holding,
             assets: live.standing.assets.as_ref().map(|assets| assets.composed()),

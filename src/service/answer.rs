@@ -31,7 +31,7 @@ pub struct Observed {
     pub assets: Option<ObservedAssets>,
     /// Change of wealth by the period, what was added or reached otherwise included.
     pub wealth_change: f64,
-    /// The last day that was reported, of this period or of one before.
+    /// The last day of the period: as reported, else the next one due, or where that is not known of a period before.
     #[schema(value_type = Option<String>, format = Date)]
     pub date: Option<Date>,
     /// Whether the horizon is reached, and no policy is to follow.
@@ -47,11 +47,11 @@ pub struct Observed {
 pub struct Corrected {
     pub session: String,
     pub correction: usize,
-    /// The period put right.
+    /// The period put right, put in or taken out.
     pub period: usize,
-    /// What it is now; null where it is missing.
+    /// What it is now; null where it is missing or taken out.
     pub log_return: Option<f64>,
-    /// Periods observed, which is as before.
+    /// Periods observed now.
     pub observed: usize,
     /// Wealth now.
     pub wealth: f64,
@@ -62,7 +62,7 @@ pub struct Corrected {
     pub assets: Option<Composed>,
     /// Change of wealth by the last period observed, as it stands now.
     pub wealth_change: f64,
-    /// The last day that is reported now.
+    /// The last day of the last period, where it is known.
     #[schema(value_type = Option<String>, format = Date)]
     pub date: Option<Date>,
     /// Whether the returns, as they stand, come as they came.

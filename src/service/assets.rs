@@ -166,6 +166,14 @@ impl Assets {
         report.log_returns(&self.names, self.prices.as_deref())
     }
 
+    /// Mean and standard deviation of the log-returns of an asset.
+    pub(super) fn moments(&self, asset: usize) -> (f64, f64) {
+        let rows = &self.fund.rows;
+        let average = |of: &dyn Fn(f64) -> f64| rows.iter().map(|row| of(row[asset])).sum::<f64>() / rows.len() as f64;
+        let mean = average(&|log_return| log_return);
+        (mean, average(&|log_return| (log_return - mean).powi(2)).sqrt())
+    }
+
     /// The mean log-return of each date, which no composition changes.
     pub(super) fn means(rows: &[Vec<f64>]) -> EmpiricalDistribution {
         EmpiricalDistribution::new(&rows.iter().map(|row| mean(row)).collect::<Vec<f64>>())

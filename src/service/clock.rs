@@ -4,6 +4,10 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use jiff::Timestamp;
+use jiff::civil::Date;
+use jiff::tz::TimeZone;
+
 /// Where the service reads the time; tests put their own in.
 #[derive(Clone)]
 pub struct Clock(Arc<dyn Fn() -> i64 + Send + Sync>);
@@ -31,4 +35,14 @@ impl Clock {
     pub fn now_milliseconds(&self) -> i64 {
         (self.0)()
     }
+
+    /// The day in UTC. Nothing lies in the future of a clock that has left the calendar.
+    pub(super) fn today(&self) -> Date {
+        day_of(self.now_milliseconds()).unwrap_or(Date::MAX)
+    }
+}
+
+/// The day in UTC of a moment, in milliseconds since 1970.
+pub(super) fn day_of(milliseconds: i64) -> Option<Date> {
+    Some(Timestamp::from_millisecond(milliseconds).ok()?.to_zoned(TimeZone::UTC).date())
 }

@@ -8,7 +8,7 @@ use crate::store::FirstDay;
 
 const DAYS_A_YEAR: f64 = 365.25;
 /// Trading days in a year are this many or more.
-const DAILY: f64 = 200.0;
+pub(super) const DAILY: f64 = 200.0;
 /// Nothing is late for longer: so many periods a year have a period of more days.
 const LONGEST_DAYS: f64 = 3_650.0;
 

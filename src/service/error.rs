@@ -5,6 +5,7 @@ use std::net::SocketAddr;
 use thiserror::Error;
 
 use super::allowance::Refused;
+use super::gate::Doubts;
 use crate::control::error::FieldError;
 use crate::store::StoreError;
 
@@ -26,8 +27,8 @@ pub enum ServiceError {
     RenewedAlready { number: usize, by: String, at: String },
     #[error("{what} {given} is not the one expected: report {what} {expected}")]
     Gap { what: &'static str, given: usize, expected: usize },
-    #[error(transparent)]
-    UnusualReturn(FieldError),
+    #[error("{0}")]
+    Unconfirmed(Doubts),
     #[error("period {given} lies past the horizon of {horizon} periods")]
     PastHorizon { given: usize, horizon: usize },
     #[error("the session '{session}' has observed all {horizon} periods of its horizon")]

@@ -2,23 +2,26 @@
 
 use std::collections::BTreeMap;
 
+use jiff::civil::Date;
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::allowance::HeavyTurn;
 use super::answer::{Corrected, Observed};
-use super::assets::Composed;
+use super::assets::{Composed, ObservedAssets};
 use super::content::read;
 use super::error::ServiceError;
 use super::known::KnownReturns;
-use super::periods::{Passage, Periods, Step};
+use super::periods::{Passage, Period, Periods, Step};
 use super::plan::{Plan, Renew, Renewed};
 use super::report::{Correct, Report};
 use super::sessions::Sessions;
+use super::standing::Standing;
 use crate::control::assets::advice::named;
+use crate::control::policy::advice::{Advice, Uncertainty};
 use crate::control::policy::advisor::AdviceMode;
 use crate::control::request::terms::Terms;
-use crate::store::{EntryKind, SessionRow, Tenant};
+use crate::store::{EntryKind, SessionFacts, SessionRow, Tenant};
 
 /// Where a session started, and everything recorded of it.
 #[derive(Debug, Serialize, ToSchema)]
@@ -47,16 +50,19 @@ pub struct History {
     pub renewals: Vec<Renewal>,
 }
 
-/// One observed period.
+/// One period, observed or put in later.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct Observation {
-    /// What was answered when it was reported.
+    /// What was answered when it was reported, with the number that it has now.
     #[serde(flatten)]
     pub told: Observed,
     /// What was reported first.
     pub reported: Report,
     pub observed_ms: i64,
-    /// What would be told now; from the first period on that was put right.
+    /// Numbers of the corrections that put it in or reported it anew.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub corrections: Vec<usize>,
+    /// What would be told now; from the first period on that a correction changed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub now: Option<Now>,
 }
@@ -79,6 +85,9 @@ pub struct Now {
     pub wealth: f64,
     /// Share of it in the risky asset.
     pub holding: f64,
+    /// Its last day, where it is known.
+    #[schema(value_type = Option<String>, format = Date)]
+    pub date: Option<Date>,
     /// Radius of the uncertainty set after it, in the unit of an advice's.
     pub radius: f64,
 }
@@ -119,15 +128,10 @@ impl Sessions {
     /// There is no such session; too much is solved already.
     pub async fn history(&self, tenant: &Tenant, session: &str, turn: &HeavyTurn) -> Result<History, ServiceError> {
         let facts = self.facts(tenant, session).await?;
-        let (mut observations, mut corrections, mut renewals) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut corrections, mut renewals) = (Vec::new(), Vec::new());
         for entry in &facts.entries {
             match entry.kind {
-                EntryKind::Observation => observations.push(Observation {
-                    told: read(&entry.answer_json)?,
-                    reported: read(&entry.content_json)?,
-                    observed_ms: entry.created_ms,
-                    now: None,
-                }),
+                EntryKind::Observation => {}
                 EntryKind::Correction => corrections.push(Correction {
                     correction: read(&entry.content_json)?,
                     told: read(&entry.answer_json)?,
@@ -141,14 +145,15 @@ impl Sessions {
             }
         }
         let periods = Periods::of(&facts)?;
-        if !corrections.is_empty() {
-            turn.begin().await?;
-            let first = periods.first_corrected();
-            let now = self.told_now(tenant, &periods, first).await?;
-            for (observation, now) in observations.iter_mut().skip(first).zip(now) {
-                observation.now = Some(now);
+        let first = periods.first_changed();
+        let changed = match first < periods.all.len() {
+            true => {
+                turn.begin().await?;
+                self.changed(tenant, session, &periods, first).await?
             }
-        }
+            false => Vec::new(),
+        };
+        let observations = observations(&facts, &periods, first, changed)?;
         let Plan { terms, assets, .. } = Plan::of(&facts.row)?;
         let (first, start) =
             (self.policies.advisor(tenant, &facts.row.policy).await?, periods.at_start(terms.learning));
@@ -171,42 +176,113 @@ impl Sessions {
         })
     }
 
-    /// Of each period from `first` on, the first that was put right. Each waits its turn to be advised by itself, so that a long session
-    /// starves nobody, and a caller who goes away stops it.
-    async fn told_now(&self, tenant: &Tenant, periods: &Periods, first: usize) -> Result<Vec<Now>, ServiceError> {
-        let (mut passage, mut told): (Passage<'_>, Vec<Now>) = (periods.passage()?, Vec::new());
+    /// Of each period from `first` on, the first that is not as it was acknowledged. Each waits its turn to be advised by itself, so
+    /// that a long session starves nobody, and a caller who goes away stops it.
+    async fn changed(
+        &self,
+        tenant: &Tenant,
+        session: &str,
+        periods: &Periods,
+        first: usize,
+    ) -> Result<Vec<Changed>, ServiceError> {
+        let (mut passage, mut changed): (Passage<'_>, Vec<Changed>) = (periods.passage()?, Vec::new());
         for (step, period) in periods.all.iter().enumerate() {
             let stretch = passage.stretch();
             let passed = passage.next().map_err(ServiceError::of_recorded)?;
-            let Some(Step { before, seen, log_return, executed_allocation }) = passed else { break };
-            if step >= first {
-                let assets = before
-                    .assets
-                    .as_ref()
-                    .map(|assets| AssetsNow { log_returns: seen.row().map(|row| named(&assets.names, row)) });
-                let (advising, local) = (self.policies.advisor(tenant, &stretch.policy).await?, stretch.step(step));
-                let before = before.with_law(stretch.terms.learning).state;
-                let advise = move || advising.advise(local, &before, AdviceMode::Surrogate);
-                let advice = self.resolving.run(tenant, advise).await?;
-                // The radius after a period is the one that the next advice is within.
-                told.last_mut().into_iter().for_each(|before| before.radius = advice.radius);
-                let then = &passage.standing.state;
-                told.push(Now {
-                    reported: period.is_corrected.then(|| period.report.clone()),
-                    log_return,
-                    assets,
-                    advised_allocation: advice.allocation,
-                    executed_allocation,
-                    wealth: then.wealth,
-                    holding: then.holding,
-                    radius: f64::NAN,
-                });
-            }
+            let Some(passed) = passed.filter(|_| step >= first) else { continue };
+            let (advising, local) = (self.policies.advisor(tenant, &stretch.policy).await?, stretch.step(step));
+            let before = passed.before.clone().with_law(stretch.terms.learning).state;
+            let (law, after) = (advising.clone(), passage.stands().state);
+            let advise = move || advising.advise(local, &before, AdviceMode::Surrogate);
+            let advice = self.resolving.run(tenant, advise).await?;
+            // The radius after a period is the one that the next advice is within.
+            changed.last_mut().into_iter().for_each(|(before, _)| before.radius = advice.radius);
+            let inserted = match period.is_inserted() {
+                true => {
+                    let uncertainty = self.resolving.run(tenant, move || law.uncertainty(&after)).await?;
+                    let name = (session, step + 1);
+                    Some(inserted(name, &passed, &passage.standing, (&advice, uncertainty)))
+                }
+                false => None,
+            };
+            changed.push((now(period, passed, &passage.standing, &advice), inserted));
         }
         let (measuring, policy) = (passage.stands().state, &periods.current().policy);
         let advisor = self.policies.advisor(tenant, policy).await?;
         let radius = self.resolving.run(tenant, move || advisor.radius(&measuring)).await?;
-        told.last_mut().into_iter().for_each(|last| last.radius = radius);
-        Ok(told)
+        changed.last_mut().into_iter().for_each(|(last, _)| last.radius = radius);
+        Ok(changed)
+    }
+}
+
+/// A period as it stands now, and of one that was put in later what stands in the place of an answer to its observation.
+type Changed = (Now, Option<Observed>);
+
+/// Every period; `changed` holds those from `first` on.
+fn observations(
+    facts: &SessionFacts,
+    periods: &Periods,
+    first: usize,
+    changed: Vec<Changed>,
+) -> Result<Vec<Observation>, ServiceError> {
+    let mut changed = changed.into_iter();
+    let row = |(index, period): (usize, &Period)| {
+        let entry = &facts.entries[period.entry];
+        let (now, inserted) = if index >= first { changed.next() } else { None }.unzip();
+        let (told, reported) = match inserted.flatten() {
+            Some(observed) => (observed, read::<Correct>(&entry.content_json)?.report()),
+            None => (read::<Observed>(&entry.answer_json)?, read(&entry.content_json)?),
+        };
+        let (told, corrections) = (Observed { period: index + 1, ..told }, period.corrections.clone());
+        Ok(Observation { told, reported, observed_ms: entry.created_ms, corrections, now })
+    };
+    periods.all.iter().enumerate().map(row).collect()
+}
+
+/// A period after which the session stands so.
+fn now(period: &Period, passed: Step, after: &Standing, advice: &Advice) -> Now {
+    let Step { before, seen, log_return, executed_allocation, .. } = passed;
+    let names = before.assets.as_ref().map(|assets| &assets.names);
+    Now {
+        reported: (!period.corrections.is_empty()).then(|| period.report.clone()),
+        log_return,
+        assets: names.map(|names| AssetsNow { log_returns: seen.row().map(|row| named(names, row)) }),
+        advised_allocation: advice.allocation,
+        executed_allocation,
+        wealth: after.state.wealth,
+        holding: after.state.holding,
+        date: after.days.last,
+        radius: f64::NAN,
+    }
+}
+
+/// A period that was put in later, as if it had been observed so; what was held counts as advised, since nothing was.
+fn inserted(
+    (session, period): (&str, usize),
+    passed: &Step,
+    after: &Standing,
+    (advice, uncertainty): (&Advice, Uncertainty),
+) -> Observed {
+    let assets = passed.before.assets.as_ref().map(|assets| ObservedAssets {
+        log_returns: passed.seen.row().map(|row| named(&assets.names, row)),
+        advised_allocations: named(&assets.names, &passed.executed),
+        executed_allocations: named(&assets.names, &passed.executed),
+        composed: assets.composed(),
+    });
+    Observed {
+        session: session.to_owned(),
+        period,
+        log_return: passed.log_return,
+        band: advice.band,
+        advised_allocation: passed.executed_allocation,
+        executed_allocation: passed.executed_allocation,
+        wealth: after.state.wealth,
+        holding: after.state.holding,
+        assets,
+        wealth_change: after.state.wealth - passed.before.state.wealth,
+        date: after.days.last,
+        completed: false,
+        drift: after.bet.told(),
+        uncertainty,
     }
 }

@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
+use jiff::civil::Date;
+
 use super::allowance::HeavyTurn;
 use super::answer::Observed;
 use super::assets::{Assets, ObservedAssets};
 use super::bounded::Bounded;
 use super::error::ServiceError;
+use super::gate::{self, Doubt, Doubts};
 use super::periods::Periods;
 use super::plan::{Plan, Renewing, Stretch};
 use super::report::{Observe, Report};
@@ -136,6 +139,25 @@ impl Live {
         self.goes_on_after(observed).then(|| self.current.step(observed))
     }
 
+    /// The last day of the coming period, where it is known.
+    pub fn next_day(&self) -> Option<Date> {
+        self.standing.days.next(self.current.terms.periods_per_year).filter(|_| self.goes_on_after(self.observed))
+    }
+
+    /// # Errors
+    /// The report breaks a rule, or it is doubted and nobody confirms it.
+    fn check_meant(&self, observe: &Observe, report: &Report, today: Date) -> Result<(), ServiceError> {
+        let seen = self.standing.read(report)?;
+        if observe.confirm {
+            return Ok(());
+        }
+        let of_day = gate::of_day(&self.standing.days, report.date, self.current.terms.periods_per_year, today);
+        let of_return = self.standing.return_doubts(report, &seen);
+        let doubts: Vec<Doubt> =
+            of_day.into_iter().chain(of_return).chain(observe.peer_doubts.iter().cloned()).collect();
+        if doubts.is_empty() { Ok(()) } else { Err(ServiceError::Unconfirmed(Doubts(doubts))) }
+    }
+
     pub(super) fn expects(&self, period: usize) -> Result<(), ServiceError> {
         let horizon = self.last_period();
         if self.observed >= horizon {
@@ -182,12 +204,13 @@ impl Live {
         &mut self,
         observe: &Observe,
         report: &Report,
-        means: &Means<'_>,
+        (means, today): (&Means<'_>, Date),
     ) -> Result<(Standing, Observed), ServiceError> {
-        self.standing.usual(report, &self.standing.read(report)?, observe.confirm)?;
+        self.check_meant(observe, report, today)?;
         let Advice { allocation, band, .. } = *self.surrogate_advice(means).await?;
         let dynamics = self.current.dynamics(self.observed);
-        let passed = self.standing.after(dynamics, observe.period, report, allocation)?;
+        let periods_per_year = self.current.terms.periods_per_year;
+        let passed = self.standing.after(dynamics, observe.period, report, (allocation, periods_per_year))?;
         let Passed { seen, log_return, executed_allocation, executed, standing } = passed;
         let advised = self.standing.assets.as_ref().map(|assets| assets.shares(allocation));
         let goes_on = self.goes_on_after(observe.period);
@@ -209,7 +232,7 @@ impl Live {
                 composed: assets.composed(),
             }),
             wealth_change: standing.state.wealth - self.standing.state.wealth,
-            date: standing.date,
+            date: standing.days.last,
             completed: !goes_on,
             drift: standing.bet.told(),
             uncertainty,

@@ -3,6 +3,7 @@
 //! [`Service`] is what a transport needs: the store, the jobs and their trainer, the policies made ready to answer,
 //! and the live sessions. Everything acknowledged is in the store first; memory only saves recomputing.
 
+mod acknowledged;
 pub mod action;
 pub mod advise;
 pub mod advise_assets;
@@ -11,13 +12,17 @@ pub mod answer;
 pub mod assets;
 pub mod audit;
 mod bounded;
+pub mod change;
 pub mod clock;
 pub mod config;
 mod content;
+mod corrections;
+mod days;
 pub mod drift;
 mod due;
 pub mod error;
 pub mod fund_advice;
+pub mod gate;
 pub mod history;
 mod idempotency;
 mod identity;
@@ -29,6 +34,7 @@ pub mod live;
 pub mod memory;
 pub mod metrics;
 pub mod overview;
+mod peers;
 pub mod periods;
 pub mod plan;
 pub mod policies;

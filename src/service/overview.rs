@@ -1,10 +1,9 @@
 //! Sessions as an overview shows them.
 
-use jiff::Timestamp;
 use jiff::civil::Date;
-use jiff::tz::TimeZone;
 
 use super::answer::Stands;
+use super::clock::day_of;
 use super::content::read;
 use super::drift::DriftLevel;
 use super::due::{first_day, next_day};
@@ -71,9 +70,4 @@ impl Sessions {
         let sessions = sessions.into_iter().map(listed).collect::<Result<_, ServiceError>>()?;
         Ok(Overview { sessions, total, care })
     }
-}
-
-/// The day in UTC.
-fn day_of(milliseconds: i64) -> Option<Date> {
-    Some(Timestamp::from_millisecond(milliseconds).ok()?.to_zoned(TimeZone::UTC).date())
 }

@@ -6,10 +6,10 @@
 
 use std::collections::BTreeMap;
 
-use serde::Deserialize;
-
+use super::acknowledged::Acknowledged;
 use super::answer::Corrected;
-use super::assets::{Assets, Composed, ObservedAssets, PlannedAssets};
+use super::assets::{Assets, Composed, PlannedAssets};
+use super::change::Change;
 use super::content::read;
 use super::error::ServiceError;
 use super::plan::{Plan, Renew, Renewed, Stretch};
@@ -26,12 +26,14 @@ use crate::store::{EntryKind, SessionFacts};
 pub struct Period {
     /// As reported last.
     pub report: Report,
-    /// As understood when it came; what was advised stays so whatever is put right.
-    told: Told,
-    /// Whether what was told of it stands: no correction of it, or of a period before it, came after it.
+    /// As understood when it came; what was advised stays so whatever is put right. `None` of a period that was put in later.
+    acknowledged: Option<Acknowledged>,
+    /// Whether what was acknowledged of it stands: no correction of it, or of a period before it, came after it.
     stands: bool,
-    /// Whether that is not what was reported first.
-    pub is_corrected: bool,
+    /// Index of the entry that first reported it.
+    pub entry: usize,
+    /// Numbers of the corrections that put it in or reported it anew.
+    pub corrections: Vec<usize>,
 }
 
 /// All periods of a session, and the policies that it lives them by.
@@ -69,58 +71,14 @@ pub struct Step {
     /// `None` where it is missing; of several assets that of what was held.
     pub log_return: Option<f64>,
     pub executed_allocation: f64,
+    /// Shares of wealth held in several assets; none of one.
+    pub executed: Vec<f64>,
 }
 
-/// What a correction makes of a session.
-pub struct PutRight {
-    /// Where it stood.
-    pub before: Standing,
-    /// Where it stands now.
-    pub standing: Standing,
-    /// Of the period put right; `None` where it is missing.
-    pub log_return: Option<f64>,
-    /// By the last period, as it stands now.
-    pub wealth_change: f64,
-}
-
-/// What is read of the answer to an observation.
-#[derive(Debug, Clone, Deserialize)]
-struct Told {
-    log_return: Option<f64>,
-    advised_allocation: f64,
-    executed_allocation: f64,
-    wealth: f64,
-    assets: Option<ObservedAssets>,
-}
-
-impl Told {
-    /// The report in the numbers that were acknowledged, which no other processor or library computes otherwise.
-    fn report(&self, reported: &Report) -> Report {
-        let Report { date, rate, flow, .. } = *reported;
-        let common = Report { wealth: Some(self.wealth), date, rate, flow, ..Report::default() };
-        match &self.assets {
-            Some(assets) => Report {
-                log_returns: assets.log_returns.clone(),
-                missing: assets.log_returns.is_none(),
-                executed_allocations: Some(assets.executed_allocations.clone()),
-                ..common
-            },
-            None => Report {
-                log_return: self.log_return,
-                missing: self.log_return.is_none(),
-                executed_allocation: Some(self.executed_allocation),
-                ..common
-            },
-        }
-    }
-
-    /// The report, of several assets with what was advised for those that were held as advised.
-    fn held_as_advised(&self, reported: &Report) -> Report {
-        let mut report = reported.clone();
-        if let Some(assets) = &self.assets {
-            report.executed_allocations.get_or_insert_with(|| assets.advised_allocations.clone());
-        }
-        report
+impl Period {
+    /// Whether a correction put it in.
+    pub(super) fn is_inserted(&self) -> bool {
+        self.acknowledged.is_none()
     }
 }
 
@@ -152,15 +110,17 @@ impl Periods {
             history,
             composed: BTreeMap::new(),
         };
-        for entry in entries {
+        for (index, entry) in entries.iter().enumerate() {
             match entry.kind {
-                EntryKind::Observation => {
-                    let report = read(&entry.content_json)?;
-                    let told: Told = read(&entry.answer_json)?;
-                    periods.all.push(Period { report, told, stands: true, is_corrected: false });
-                }
+                EntryKind::Observation => periods.all.push(Period {
+                    report: read(&entry.content_json)?,
+                    acknowledged: Some(read(&entry.answer_json)?),
+                    stands: true,
+                    entry: index,
+                    corrections: Vec::new(),
+                }),
                 EntryKind::Correction => {
-                    periods.correct(&read(&entry.content_json)?)?;
+                    periods.correct(&read(&entry.content_json)?, index)?;
                     let told = read::<Corrected>(&entry.answer_json)?.assets;
                     periods.tell(told);
                 }
@@ -191,11 +151,11 @@ impl Periods {
         self.stretches.len() - 1
     }
 
-    /// Puts the correction in the place of what was reported.
+    /// Makes the change of a correction, which is the entry with this index.
     ///
     /// # Errors
     /// It is of no period that was observed.
-    pub(super) fn correct(&mut self, correction: &Correct) -> Result<(), FieldError> {
+    pub(super) fn correct(&mut self, correction: &Correct, entry: usize) -> Result<(), FieldError> {
         let observed = self.all.len();
         let index = correction.period.wrapping_sub(1);
         let Some(period) = self.all.get_mut(index) else {
@@ -206,16 +166,37 @@ impl Periods {
             return Err(FieldError::new("period", correction.period, rule));
         };
         self.corrections += 1;
-        let date = correction.date.or(period.report.date);
-        period.report = Report { date, ..correction.report() };
-        period.is_corrected = true;
+        match correction.change {
+            Change::Replace => {
+                let date = correction.date.or(period.report.date);
+                period.report = Report { date, ..correction.report() };
+                period.corrections.push(self.corrections);
+            }
+            Change::Insert => {
+                let (report, corrections) = (correction.report(), vec![self.corrections]);
+                self.all.insert(index, Period { report, acknowledged: None, stands: false, entry, corrections });
+                self.move_composed(index, |after| after + 1);
+            }
+            Change::Remove => {
+                self.all.remove(index);
+                self.move_composed(index, |after| after - 1);
+            }
+        }
         self.all.iter_mut().skip(index).for_each(|period| period.stands = false);
         Ok(())
     }
 
-    /// The first period that was put right, from 0; the number of periods where none was.
-    pub(super) fn first_corrected(&self) -> usize {
-        self.all.iter().position(|period| period.is_corrected).unwrap_or(self.all.len())
+    /// Keeps what was told of several assets after more than `index` periods beside the periods that it followed.
+    fn move_composed(&mut self, index: usize, moved: impl Fn(usize) -> usize) {
+        for (after, composed) in std::mem::take(&mut self.composed) {
+            let after = if after > index { moved(after) } else { after };
+            self.composed.entry(after).or_default().extend(composed);
+        }
+    }
+
+    /// The first period that is not as it was acknowledged, from 0; the number of periods where all are.
+    pub(super) fn first_changed(&self) -> usize {
+        self.all.iter().position(|period| !period.stands).unwrap_or(self.all.len())
     }
 
     /// What the first advice rests on.
@@ -232,41 +213,6 @@ impl Periods {
         let mut passage = Passage { periods: self, standing, record, step: 0, stretch: 0 };
         passage.renew(None)?;
         Ok(passage)
-    }
-
-    /// Puts the correction in its place, and passes through all.
-    ///
-    /// # Errors
-    /// It is of no period that was observed, makes a period break a rule, or gives one an unusual return that nobody confirms.
-    pub(super) fn put_right(&mut self, correction: &Correct) -> Result<PutRight, ServiceError> {
-        let (mut stood, mut passage) = (Vec::with_capacity(self.all.len()), self.passage()?);
-        while let Some(step) = passage.next().map_err(ServiceError::of_recorded)? {
-            stood.push(step.seen);
-        }
-        let before = passage.standing;
-        self.correct(correction)?;
-        let (mut corrected, mut wealth_before, mut passage) = (None, f64::NAN, self.passage()?);
-        for (period, stood) in (1..).zip(stood) {
-            let passed = passage.next().map_err(|(period, error)| in_period(period, correction, error))?;
-            let Some(Step { before, seen, log_return, .. }) = passed else { break };
-            wealth_before = before.state.wealth;
-            if period == correction.period {
-                corrected = log_return;
-            }
-            // Of a price that is put right, the return after it is another too.
-            if stood != seen {
-                let report = &self.all[period - 1].report;
-                before.usual(report, &seen, correction.confirm).map_err(|error| match error {
-                    ServiceError::UnusualReturn(field) => {
-                        ServiceError::UnusualReturn(in_period(period, correction, field))
-                    }
-                    other => other,
-                })?;
-            }
-        }
-        let standing = passage.stands();
-        let wealth_change = standing.state.wealth - wealth_before;
-        Ok(PutRight { before, standing, log_return: corrected, wealth_change })
     }
 
     /// Where the session stands after all of them.
@@ -287,19 +233,27 @@ impl<'a> Passage<'a> {
     /// # Errors
     /// A report that breaks a rule where it now stands, with the number of its period.
     pub(super) fn next(&mut self) -> Result<Option<Step>, (usize, FieldError)> {
-        let Some(Period { report, told, stands, .. }) = self.periods.all.get(self.step) else { return Ok(None) };
+        let Some(Period { report, acknowledged, stands, .. }) = self.periods.all.get(self.step) else {
+            return Ok(None);
+        };
         let (dynamics, period) = (self.stretch().dynamics(self.step), self.step + 1);
-        let report_told = if *stands { told.report(report) } else { told.held_as_advised(report) };
-        let passed = self.standing.after(dynamics, period, &report_told, told.advised_allocation);
+        let (completed, advised) = match acknowledged {
+            Some(acknowledged) if *stands => (acknowledged.report(report), acknowledged.advised_allocation),
+            Some(acknowledged) => (acknowledged.held_as_advised(report), acknowledged.advised_allocation),
+            // Nothing was advised for it, so nothing was traded.
+            None => (self.standing.held_on(report), self.standing.state.holding),
+        };
+        let passed =
+            self.standing.after(dynamics, period, &completed, (advised, self.stretch().terms.periods_per_year));
         let passed = passed.map_err(|error| (period, error))?;
-        let Passed { seen, log_return, executed_allocation, mut standing, .. } = passed;
+        let Passed { seen, log_return, executed_allocation, executed, mut standing } = passed;
         standing.price_as(report);
         let before = std::mem::replace(&mut self.standing, standing);
         self.record.learn(&seen);
         self.step = period;
-        let told = told.assets.as_ref().map(|assets| &assets.composed);
-        self.renew(told).map_err(|error| (period, error))?;
-        Ok(Some(Step { before, seen, log_return, executed_allocation }))
+        let composed = acknowledged.as_ref().and_then(|acknowledged| acknowledged.composed());
+        self.renew(composed).map_err(|error| (period, error))?;
+        Ok(Some(Step { before, seen, log_return, executed_allocation, executed }))
     }
 
     /// Where it stands, with the law of several assets' fund, which is not kept up on the way.
@@ -326,13 +280,4 @@ impl<'a> Passage<'a> {
         let told_later = self.periods.composed.get(&self.step);
         told_later.into_iter().flatten().try_for_each(|told| self.standing.take(told))
     }
-}
-
-/// A field that breaks a rule in some period once another is put right.
-fn in_period(period: usize, correction: &Correct, error: FieldError) -> FieldError {
-    if period == correction.period {
-        return error;
-    }
-    let rule = format!("in period {period}, with period {} put right: {}", correction.period, error.rule);
-    FieldError { rule, ..error }
 }

@@ -9,11 +9,12 @@ use tracing::Instrument;
 use super::allowance::HeavyTurn;
 use super::answer::Corrected;
 use super::content::json;
-use super::drift;
+use super::corrections::PutRight;
+use super::drift::{self, DriftLevel};
 use super::error::ServiceError;
 use super::keys::Caller;
 use super::live::{Live, measured};
-use super::periods::{Periods, PutRight};
+use super::periods::Periods;
 use super::plan::Plan;
 use super::report::{Correct, Observe};
 use super::sessions::{Name, Sessions};
@@ -41,7 +42,7 @@ impl Sessions {
             }
             live.expects(period)?;
             let means = self.means(tenant, live, turn).await?;
-            let (standing, answer) = live.after(observe, &report, &means).await?;
+            let (standing, answer) = live.after(observe, &report, (&means, self.clock.today())).await?;
             let new = EntryRow {
                 session: session.clone(),
                 entry: live.seen.entries() + 1,
@@ -65,13 +66,7 @@ impl Sessions {
                 radius: Some(answer.uncertainty.radius),
                 advice: None,
             };
-            let is_due = next.is_due();
-            if let Some(answer_json) = self.append(&self.store, &mut held, new, next).await? {
-                drift::count(levels.0, levels.1);
-                if is_due {
-                    // Where too many are told of already, a round finds it.
-                    let _ = self.due.try_send((tenant.clone(), session.clone()));
-                }
+            if let Some(answer_json) = self.append(&self.store, &mut held, new, next, levels).await? {
                 return Ok(answer_json);
             }
         }
@@ -100,12 +95,13 @@ impl Sessions {
             if is_repeat(EntryKind::Correction, number, periods.corrections)? {
                 return self.repeat(session, EntryKind::Correction, number, &content).await;
             }
-            let (observed, renewals, current) = (periods.all.len(), periods.renewals(), periods.current().clone());
+            let (renewals, current) = (periods.renewals(), periods.current().clone());
             let advisor = self.policies.advisor(tenant, &current.policy).await?;
             current.follows(correct.period, advisor.specification().problem.framework)?;
-            let putting = correct.clone();
-            let put_right = move || periods.put_right(&putting);
-            let PutRight { before, standing, log_return, wealth_change } =
+            current.check_change(correct, periods.all.len())?;
+            let (putting, entry, today) = (correct.clone(), facts.entries.len(), self.clock.today());
+            let put_right = move || periods.put_right(&putting, entry, today);
+            let PutRight { before, standing, observed, log_return, wealth_change } =
                 self.advising.run(tenant, put_right).await??;
             let step = current.step_from(observed, Plan::of(&facts.row)?.renew, renewals);
             let (standing, uncertainty) = measured(&self.means_of(advisor, Some(turn)), tenant, step, standing).await?;
@@ -119,7 +115,7 @@ impl Sessions {
                 holding: standing.state.holding,
                 assets: standing.assets.as_ref().map(|assets| assets.composed()),
                 wealth_change,
-                date: standing.date,
+                date: standing.days.last,
                 drift: standing.bet.told(),
                 uncertainty,
             };
@@ -147,8 +143,7 @@ impl Sessions {
                 advice: None,
             };
             let store = self.store.by(caller.actor());
-            if let Some(answer_json) = self.append(&store, &mut held, new, next).await? {
-                drift::count(levels.0, levels.1);
+            if let Some(answer_json) = self.append(&store, &mut held, new, next, levels).await? {
                 return Ok(answer_json);
             }
         }
@@ -174,7 +169,7 @@ impl Sessions {
         }
     }
 
-    /// Appends the entry that leads to `next`, and gives its answer; `None` where another process wrote meanwhile. Memory is
+    /// Appends the entry that leads to `next` from one level of drift to another, and gives its answer; `None` where another process wrote meanwhile. Memory is
     /// empty while it is under way, so that it never runs ahead of the disk.
     async fn append(
         &self,
@@ -182,11 +177,19 @@ impl Sessions {
         held: &mut Held<Name, Live>,
         new: EntryRow,
         next: Live,
+        levels: (DriftLevel, DriftLevel),
     ) -> Result<Option<String>, ServiceError> {
         held.clear();
         let answer_json = new.answer_json.clone();
+        let due = next.is_due().then(|| (next.row.tenant.clone(), next.row.session.clone()));
         let appended = store.append(new).instrument(spans::of_write("append an entry")).await?;
-        self.settled(held, appended, answer_json, next)
+        let answer = self.settled(held, appended, answer_json, next)?;
+        if answer.is_some() {
+            drift::count(levels.0, levels.1);
+            // Where too many are to be renewed already, a round finds it.
+            due.map(|name| self.due.try_send(name));
+        }
+        Ok(answer)
     }
 
     /// As [`Self::append`], of an entry that the store has decided on.

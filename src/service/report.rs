@@ -7,6 +7,8 @@ use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::change::Change;
+use super::gate::Doubt;
 use crate::control::error::FieldError;
 use crate::control::request::rules;
 
@@ -95,28 +97,33 @@ reporting! {
         /// Number of the period, from 1.
         #[schema(example = 1)]
         period: usize,
-        /// The return is meant, however unusual it is.
+        /// The report is meant, whatever is doubted in it.
         #[serde(default, skip_serializing_if = "never_recorded")]
         confirm: bool,
         /// The name of the key that reports it, which no body says; empty where none was asked for.
         #[serde(skip)]
         reported_by: Arc<str>,
+        /// Doubts that the other reports of its list raise.
+        #[serde(skip)]
+        peer_doubts: Vec<Doubt>,
     }
 }
 
 reporting! {
-    /// What a period that passed reported, put right: all of it, in the place of what was reported before.
+    /// A change of the periods that passed: a period is reported anew, all of it, is put in between others, or is taken out.
     Correct {
         /// Number of the correction, from 1.
         #[schema(example = 1)]
         correction: usize,
-        /// The period that is put right.
+        /// The period that is put right or taken out, or that the new one is put in before.
         #[schema(example = 3)]
         period: usize,
+        #[serde(default, skip_serializing_if = "Change::is_replace")]
+        change: Change,
         /// Why, in at most 200 letters.
         #[schema(example = "the index was revised", max_length = 200)]
         reason: String,
-        /// The return is meant, however unusual it is.
+        /// The correction is meant, whatever is doubted in it.
         #[serde(default, skip_serializing_if = "never_recorded")]
         confirm: bool,
     }
@@ -321,21 +328,4 @@ fn between(field: &str, price: f64, (named, before): (&str, f64)) -> Result<f64,
     let rule = format!("must give a log-return in [-{0}, {0}] from {before}", rules::LOG_RETURN);
     rules::log_return(field, log_return).map_err(|_| FieldError::new(field, price, rule))?;
     Ok(log_return)
-}
-
-impl Correct {
-    /// # Errors
-    /// A number past the most, a reason that is empty or long.
-    pub(super) fn check(&self) -> Result<(), FieldError> {
-        if self.correction > MOST_CORRECTIONS {
-            let rule = format!("must be at most {MOST_CORRECTIONS}: open a session on the record as it is now");
-            return Err(FieldError::new("correction", self.correction, rule));
-        }
-        let letters = self.reason.chars().count();
-        if self.reason.trim().is_empty() || letters > LONGEST_REASON || self.reason.contains(char::is_control) {
-            let rule = format!("must say in 1 to {LONGEST_REASON} letters why, without control characters");
-            return Err(FieldError::new("reason", format!("{letters} letters"), rule));
-        }
-        Ok(())
-    }
 }

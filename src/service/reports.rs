@@ -1,4 +1,5 @@
-//! Reports of many sessions at once: each element of a list is what a call of its own would be.
+//! Reports of many sessions at once: each element of a list is what a call of its own would be, but for the doubts that its
+//! peers raise.
 //!
 //! There is no transaction over a list, and none is needed: each element is recorded exactly once, so the same list sent
 //! again is answered as it was, and goes on where an earlier one was cut off. What a list saves is the call around each
@@ -56,7 +57,9 @@ impl Sessions {
     pub async fn report_all(&self, caller: &Caller, reports: Vec<Observe>) -> Result<Vec<Reported>, ServiceError> {
         check(&reports)?;
         let lane = Arc::new(Semaphore::new(self.resolving.places()));
-        let elements = reports.into_iter().enumerate().map(|(index, report)| {
+        let doubts = self.peer_doubts(caller, &reports).await;
+        let elements = reports.into_iter().zip(doubts).enumerate().map(|(index, (report, peer_doubts))| {
+            let report = Observe { peer_doubts, ..report };
             let turn = HeavyTurn::in_lane(caller.allowance.clone(), lane.clone());
             async move {
                 let (session, period) = (report.session.clone(), report.period);

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use jiff::civil::Date;
-
 use super::assets::{Assets, Composed, mean};
+use super::days::Days;
 use super::drift::Bet;
-use super::error::ServiceError;
+use super::gate::{self, Doubt};
 use super::record::{Record, Seen};
 use super::report::{Report, by_name};
+use crate::control::assets::advice::named;
 use crate::control::error::FieldError;
 use crate::control::policy::advisor::Advisor;
 use crate::control::problem::dynamics::Dynamics;
@@ -28,8 +28,8 @@ pub struct Standing {
     pub assets: Option<Box<Assets>>,
     /// The price reported for the last period, if one was.
     pub price: Option<f64>,
-    /// The last date reported.
-    pub date: Option<Date>,
+    /// The last days of the periods.
+    pub days: Days,
     /// Against the returns' coming as they came.
     pub bet: Bet,
     /// All returns seen, where the law is of the last of them alone; of several assets always, their mean date by date.
@@ -53,7 +53,15 @@ impl Standing {
     /// At the start of `session`.
     pub(super) fn at(session: &str, state: State, assets: Option<Box<Assets>>) -> Self {
         let seen = assets.as_ref().map(|assets| Assets::means(&assets.fund.rows));
-        Standing { state, assets, price: None, date: None, bet: Bet::default(), seen, session: session.into() }
+        Standing {
+            state,
+            assets,
+            price: None,
+            days: Days::default(),
+            bet: Bet::default(),
+            seen,
+            session: session.into(),
+        }
     }
 
     /// The same with the law that the last `window` dates of `record` teach, which holds all that were seen.
@@ -80,8 +88,8 @@ impl Standing {
             Some(_) => Some(Assets::means(&record.rows_of(record.all()))),
             None => (last.len() < record.all().len()).then(|| EmpiricalDistribution::new(record.all())),
         };
-        let Standing { price, date, bet, .. } = *self;
-        Ok(Standing { state, assets, price, date, bet, seen, session: self.session.clone() })
+        let Standing { price, days, bet, .. } = *self;
+        Ok(Standing { state, assets, price, days, bet, seen, session: self.session.clone() })
     }
 
     /// What `report` tells of the coming period.
@@ -90,7 +98,7 @@ impl Standing {
     /// A field breaks a rule; the date is none after the last.
     pub(super) fn read(&self, report: &Report) -> Result<Seen, FieldError> {
         report.check()?;
-        if let (Some(date), Some(last)) = (report.date, self.date)
+        if let (Some(date), Some(last)) = (report.date, self.days.last)
             && date <= last
         {
             return Err(FieldError::new("date", date, format!("must be later than {last}, that of a period before")));
@@ -101,7 +109,8 @@ impl Standing {
         }
     }
 
-    /// After `period`, of which `report` tells, and for which `advised` was advised of all assets.
+    /// After `period`, of which `report` tells, and for which `advised` was advised of all assets; a report without a day takes
+    /// the next one due where `periods_per_year` of them are a year.
     ///
     /// # Errors
     /// As [`Standing::read`]; wealth leaves the range that is taken.
@@ -110,7 +119,7 @@ impl Standing {
         dynamics: Dynamics,
         period: usize,
         report: &Report,
-        advised: f64,
+        (advised, periods_per_year): (f64, Option<f64>),
     ) -> Result<Passed, FieldError> {
         let seen = self.read(report)?;
         let (executed, traded) = match &self.assets {
@@ -139,11 +148,20 @@ impl Standing {
         };
         let Standing { assets, bet, seen: known, session, .. } = self;
         let (assets, seen_before, session) = (assets.clone(), known.clone(), session.clone());
-        let date = report.date.or(self.date);
-        let mut standing = Standing { state, assets, price: None, date, bet: *bet, seen: seen_before, session };
+        let days = self.days.after(report.date, periods_per_year);
+        let mut standing = Standing { state, assets, price: None, days, bet: *bet, seen: seen_before, session };
         standing.learn(&seen, &executed, period);
         standing.price_as(report);
         Ok(Passed { seen, log_return, executed_allocation, executed, standing })
+    }
+
+    /// The report of a period in which nothing is traded unless it says so.
+    pub(super) fn held_on(&self, reported: &Report) -> Report {
+        let mut report = reported.clone();
+        if let Some(assets) = &self.assets {
+            report.executed_allocations.get_or_insert_with(|| named(&assets.names, &assets.fund.holdings));
+        }
+        report
     }
 
     /// The record, the bet and the holdings after a period.
@@ -209,61 +227,26 @@ impl Standing {
         self.state.law.sample_size() + seen + of_assets
     }
 
-    /// Asks about a return z that lies far from a record of mean m and standard deviation s: `|z - m| > 8 s` and
-    /// `|e^z - 1| > 0.2`; of several assets about each.
-    /// Checked by: `tests/account.rs::a_return_that_is_most_likely_a_slip_is_asked_about`.
-    ///
-    /// # Errors
-    /// It is most likely a slip, and nobody confirms it.
-    pub(super) fn usual(&self, report: &Report, seen: &Seen, is_confirmed: bool) -> Result<(), ServiceError> {
+    /// Doubts about the returns of a report, each beside the record of its asset.
+    pub(super) fn return_doubts(&self, report: &Report, seen: &Seen) -> Vec<Doubt> {
         match (seen, &self.assets) {
-            _ if is_confirmed => Ok(()),
             (Seen::One(Some(log_return)), _) => {
                 let (field, value) = report.given();
-                usual(field, value, || CentralMoments::of(&self.state.law), *log_return)
+                let record = CentralMoments::of(&self.state.law);
+                let moments = (record.mean(), record.variance().sqrt());
+                gate::of_return(field, value, moments, *log_return).into_iter().collect()
             }
             (Seen::Several(Some(row)), Some(assets)) => {
-                for (asset, (name, log_return)) in assets.names.iter().zip(row).enumerate() {
+                let of_asset = |(asset, (name, log_return)): (usize, (&String, &f64))| {
                     let (field, value) = report.given_of(name);
-                    let column = || {
-                        let column: Vec<f64> = assets.fund.rows.iter().map(|row| row[asset]).collect();
-                        CentralMoments::of(&EmpiricalDistribution::new(&column))
-                    };
-                    usual(&field, value.unwrap_or(*log_return), column, *log_return)?;
-                }
-                Ok(())
+                    let moments = assets.moments(asset);
+                    gate::of_return(&field, value.unwrap_or(*log_return), moments, *log_return)
+                };
+                assets.names.iter().zip(row).enumerate().filter_map(of_asset).collect()
             }
-            _ => Ok(()),
+            _ => Vec::new(),
         }
     }
-}
-
-/// Returns further from the record than so many of its standard deviations are unusual, where they are also large.
-const UNUSUAL_DEVIATIONS: f64 = 8.0;
-/// Of a simple return, either way: what is smaller is never unusual.
-const UNUSUAL_RETURN: f64 = 0.2;
-
-/// Whether a log-return is usual in a record of these moments.
-fn usual(
-    field: &str,
-    value: f64,
-    record: impl FnOnce() -> CentralMoments,
-    log_return: f64,
-) -> Result<(), ServiceError> {
-    let simple_return = log_return.exp_m1();
-    if simple_return.abs() <= UNUSUAL_RETURN {
-        return Ok(());
-    }
-    let moments = record();
-    let deviations = (log_return - moments.mean()).abs() / moments.variance().sqrt();
-    if deviations <= UNUSUAL_DEVIATIONS {
-        return Ok(());
-    }
-    let percent = 100.0 * simple_return;
-    let rule = format!(
-        "must come with \"confirm\": true where it is meant: a return of {percent:.1} % lies {deviations:.1} standard deviations from the record"
-    );
-    Err(ServiceError::UnusualReturn(FieldError::new(field, value, rule)))
 }
 
 /// Wealth as return, allocation and flow give it.

@@ -106,11 +106,12 @@ impl Supposition {
         let (mut period, mut log_returns) = (observed + 1, None);
         if let (Some((field, report)), Some(following)) = (report, following) {
             let advised = advisor.advise(step, &standing.state, AdviceMode::Surrogate).allocation;
-            let passed =
-                standing.after(dynamics, period, &report, advised).map_err(|error| match error.field.as_str() {
+            let passed = standing.after(dynamics, period, &report, (advised, None)).map_err(|error| {
+                match error.field.as_str() {
                     "wealth" => FieldError { field: field.into(), ..error },
                     _ => error,
-                })?;
+                }
+            })?;
             log_returns = passed.seen.row().map(<[f64]>::to_vec);
             (standing, step, period) = (passed.standing, following, period + 1);
             standing.compose(advisor, step);

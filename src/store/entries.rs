@@ -101,13 +101,16 @@ impl Store {
         }
     }
 
-    /// The entry of a kind and number.
+    /// The newest entry of a kind and number: a period that is observed again after it was taken out is in another.
     ///
     /// # Errors
     /// [`StoreError::Corrupt`] where the row is not what was written.
     pub async fn entry(&self, session: &str, kind: EntryKind, number: usize) -> Result<Option<EntryRow>, StoreError> {
         // No entry stands before as many of its kind.
-        let find = query("SELECT * FROM entries WHERE session = $1 AND entry >= $2 AND number = $2 AND kind = $3");
+        let find = query(
+            "SELECT * FROM entries WHERE session = $1 AND entry >= $2 AND number = $2 AND kind = $3
+             ORDER BY entry DESC LIMIT 1",
+        );
         let find = find.bind(session).bind(to_sql(number)).bind(kind.as_str());
         self.read("reading an entry", find, |rows| rows.first().map(EntryRow::from_row).transpose()).await
     }

@@ -39,7 +39,9 @@ impl Store {
     pub async fn due_sessions(&self, limit: usize, after: i64) -> Result<Vec<(i64, Tenant, String)>, StoreError> {
         let page = query(
             "SELECT sequence, tenant, session FROM sessions WHERE due IS NOT NULL AND sequence > $1
-             AND due <= (SELECT number FROM entries WHERE entries.session = sessions.session AND kind = 'observation'
+             AND due <= (SELECT CASE kind WHEN 'observation' THEN number
+                                ELSE CAST(json_extract(answer_json, '$.observed') AS BIGINT) END
+                         FROM entries WHERE entries.session = sessions.session AND kind <> 'renewal'
                          ORDER BY entry DESC LIMIT 1)
              ORDER BY sequence LIMIT $2",
         );

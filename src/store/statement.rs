@@ -16,13 +16,13 @@ pub(super) const TABLES: &str = "FROM sessions
          AND last.entry = (SELECT entry FROM entries AS made WHERE made.session = sessions.session
                            AND kind <> 'renewal' ORDER BY entry DESC LIMIT 1)";
 pub(super) const HORIZON: &str = "coalesce(renewals.horizon, sessions.horizon)";
-pub(super) const OBSERVATIONS: &str =
-    "coalesce((SELECT number FROM entries AS made WHERE made.session = sessions.session
-    AND kind = 'observation' ORDER BY entry DESC LIMIT 1), 0)";
+/// Periods observed, as the last entry that moved the session says.
+pub(super) const OBSERVATIONS: &str = "coalesce(CASE last.kind WHEN 'observation' THEN last.number
+    ELSE CAST(json_extract(last.answer_json, '$.observed') AS BIGINT) END, 0)";
 /// Whether the next policy of a session is to be trained. Until it is there the session goes on, past its horizon too.
 pub(super) const IS_WAITING: &str = "(sessions.due IS NOT NULL AND sessions.due <=
-    coalesce((SELECT number FROM entries AS made WHERE made.session = sessions.session
-    AND kind = 'observation' ORDER BY entry DESC LIMIT 1), 0))";
+    coalesce(CASE last.kind WHEN 'observation' THEN last.number
+    ELSE CAST(json_extract(last.answer_json, '$.observed') AS BIGINT) END, 0))";
 
 /// A statement under way: its text and its values.
 pub(super) struct Statement {

@@ -21,7 +21,7 @@ before(async () => {
   [one, other] = await Promise.all([careful, bold].map(async (policy) => (await call(ballast.url, "/sessions", { policy })).session));
   for (const [session, held, wealth] of [[one, 0, [0.02]], [other, 1, [0.02, -0.1]]]) {
     for (const [index, simple_return] of wealth.entries())
-      await call(ballast.url, "/observe", { session, period: index + 1, simple_return, executed_allocation: held, flow: index === 1 ? 50 : 0, date: `2008-0${index + 1}-28` });
+      await call(ballast.url, "/observe", { session, period: index + 1, simple_return, executed_allocation: held, confirm: true, flow: index === 1 ? 50 : 0, date: `2008-0${index + 1}-28` });
   }
 });
 

@@ -52,8 +52,8 @@ test("a row tells wealth, holding, the last period, how late the report is, the 
   for (const [index, name] of NAMES.entries())
     sessions.push((await call(ballast.url, "/sessions", { policy, wealth: 1000 * (index + 1), name, tags: index === 1 ? ["pension"] : [] })).session);
   const now = Date.now();
-  await call(ballast.url, "/observe", { session: sessions[0], period: 1, simple_return: 0.1, executed_allocation: 1, date: isoDay(now - 17 * DAY) });
-  await call(ballast.url, "/observe", { session: sessions[1], period: 1, simple_return: -0.1, executed_allocation: 0, date: isoDay(now - DAY) });
+  await call(ballast.url, "/observe", { session: sessions[0], period: 1, simple_return: 0.1, executed_allocation: 1, confirm: true, date: isoDay(now - 17 * DAY) });
+  await call(ballast.url, "/observe", { session: sessions[1], period: 1, simple_return: -0.1, executed_allocation: 0, confirm: true, date: isoDay(now - DAY) });
   await go("");
   const session = await call(ballast.url, `/sessions/${sessions[0]}`);
   const action = await call(ballast.url, `/action?session=${sessions[0]}`);

@@ -45,7 +45,7 @@ try {
   for (let period = 1; period <= LIVED; period++) {
     // The last day of a month is the one before the first of the next.
     const date = new Date(Date.UTC(2008, period, 0)).toISOString().slice(0, 10);
-    await call(url, "/observe", { session, period, simple_return: returns[start + period - 1], date });
+    await call(url, "/observe", { session, period, simple_return: returns[start + period - 1], date, confirm: true });
   }
   await shot(`#/sessions/${session}`, "light", "slider", "docs/images/session.png", 1080);
   await shot(`#/policies/${policy}`, "dark", "application", "docs/images/policy.png");

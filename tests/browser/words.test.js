@@ -11,7 +11,8 @@ const { extent, grain, ticks } = await dashboardModule("chart.js");
 const { summary } = await dashboardModule("jobs.js");
 const { typed } = await dashboardModule("number_text.js");
 const { SOURCES } = await dashboardModule("advice.js");
-const { problemWords, unusualWords } = await dashboardModule("problem_words.js");
+const { problemWords } = await dashboardModule("problem_words.js");
+const { doubtWords } = await dashboardModule("doubts.js");
 const { WARNED } = await dashboardModule("specification.js");
 
 test("neighbours on an axis have different labels", () => {
@@ -93,10 +94,14 @@ test("every warning of the service has words here, and names the record it is ab
   assert.equal(WARNED.rate_high({ rate_per_step: [0.03, 0.04], periods_per_year: 12 }), "The bank pays more than banks do. Is that what it pays in one month, or in a year?");
 });
 
-test("an unusual return is told in percent, with its asset where there are several", () => {
-  const rule = 'must come with "confirm": true where it is meant: a return of 90.0 % lies 24.8 standard deviations from the record';
-  assert.equal(unusualWords({ field: "simple_return", rule }), "A return of 90.0 % lies 24.8 standard deviations from the record.");
-  assert.equal(unusualWords({ field: "simple_returns.Bonds A/B", rule }), "Bonds A/B: a return of 90.0 % lies 24.8 standard deviations from the record.");
+test("a doubt is told in a sentence, with its asset where there are several, and its periods where they are missing", () => {
+  const sentence = "a return of 90.00 % lies 24.8 standard deviations from the record";
+  const one = (doubt) => doubtWords({ doubts: [doubt] })[0];
+  assert.equal(one({ reason: "unusual_return", field: "simple_return", sentence }), "A return of 90.00 % lies 24.8 standard deviations from the record.");
+  assert.equal(one({ reason: "unusual_return", field: "simple_returns.Bonds A/B", sentence }), "Bonds A/B: a return of 90.00 % lies 24.8 standard deviations from the record.");
+  const gap = (missing) => one({ reason: "missing_periods", field: "date", value: "2026-11-30", sentence, missing });
+  assert.equal(gap(["2026-10-31"]), "The period to 31 Oct 2026 is missing before 30 Nov 2026.");
+  assert.equal(gap(["2026-09-30", "2026-10-31"]), "2 periods are missing before 30 Nov 2026: those to 30 Sept 2026 up to 31 Oct 2026.");
 });
 
 test("a refusal names the field, the value and the rule in the unit of the field", () => {

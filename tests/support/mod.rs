@@ -313,8 +313,9 @@ impl App {
         self.session = session["session"].as_str().expect("a session").to_owned();
     }
 
+    /// Observes a return that is meant, whatever the record.
     pub async fn observe(&self, period: usize, log_return: f64) -> (StatusCode, Value) {
-        self.report(period, json!({ "log_return": log_return })).await
+        self.report(period, json!({ "log_return": log_return, "confirm": true })).await
     }
 
     /// Observes what `report` says of the period.

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from conftest import REPOSITORY, RETURNS, Network, train
 
-from ballast import Ballast, JobEnded, ReportConflict, Session, SessionCompleted, Unreachable, UnusualReturn
+from ballast import Ballast, JobEnded, ReportConflict, Session, SessionCompleted, Unreachable
 
 REALISED = pd.Series([0.02, -0.05, 0.01], index=pd.date_range("2008-01-31", periods=3, freq="ME"))
 
@@ -79,9 +79,12 @@ def test_what_cannot_be_replayed_is_refused_before_anything_is_sent(session: Ses
     with pytest.raises(ValueError, match="flow of period 2 is nan: must be finite"):
         session.replay([0.01, 0.02], kind="log", flow=[1.0, math.nan])
     assert len(network.sent) == sent
-    with pytest.raises(UnusualReturn):
-        session.replay([1.2], kind="log")
-    assert session.replay([1.2], kind="log", confirm=True)["log_return"].tolist() == [1.2]
+
+
+def test_a_record_is_meant_as_it_is(session: Session) -> None:
+    """Neither a return far from the record nor a gap in its dates is doubted."""
+    lived = session.replay([1.2, 0.01, 0.02], kind="log", dates=["2008-01-31", "2008-02-29", "2008-07-31"])
+    assert lived["log_return"].tolist() == [1.2, 0.01, 0.02]
 
 
 def test_a_session_that_renews_itself_is_replayed_as_the_walk_forward_walks(ballast: Ballast) -> None:

@@ -138,7 +138,7 @@ def test_prices_and_what_was_really_done(session: Session) -> None:
 def test_what_was_reported_is_put_right(session: Session) -> None:
     session.observe(log_return=0.01, executed_allocation=0.5, date="2008-01-31", rate=0.002, flow=5.0)
     session.observe(missing=True)
-    with pytest.raises(package.UnusualReturn):
+    with pytest.raises(package.Unconfirmed, match="standard deviations"):
         session.correct(1, "typed twice", log_return=1.2)
     corrected = session.correct(1, "the index was revised", log_return=0.02, executed_allocation=0.5)
     assert (session.corrections, session.period) == (1, 3)
@@ -154,6 +154,21 @@ def test_what_was_reported_is_put_right(session: Session) -> None:
     # An answer from before the correction does not bring back what was wrong.
     session.observe(missing=True, period=2)
     assert session.wealth == corrected["wealth"]
+
+
+def test_what_was_skipped_is_reported_or_put_in(session: Session) -> None:
+    session.observe(log_return=0.01, date="2008-01-31").observe(log_return=0.01, date="2008-02-29")
+    with pytest.raises(package.Unconfirmed) as refused:
+        session.observe(log_return=0.01, date="2008-04-30")
+    [doubt] = refused.value.doubts
+    assert (doubt["reason"], doubt.get("missing")) == ("missing_periods", ["2008-03-31"])
+    session.observe(log_return=0.01, date="2008-04-30", confirm=True)
+    session.correct(3, "the whole quarter came", change="remove")
+    assert session.period == 3
+    session.correct(2, "it was skipped", change="insert", missing=True, date="2008-02-15")
+    rows = session.history()["observations"]
+    assert [row["reported"].get("date") for row in rows] == ["2008-01-31", "2008-02-15", "2008-02-29"]
+    assert (session.period, session.refresh().period) == (4, 4)
 
 
 def test_a_session_is_found_again_where_it_was(ballast: Ballast, session: Session) -> None:

@@ -54,7 +54,7 @@ impl Case {
             let specification = paper::specification(20, bench.horizon, bench.count, InitialLaws::Given);
             // Returns spread evenly over what the mixture gives nine times in ten.
             let spread = |call: usize| -0.15 + 0.3 * (call as f64 * 0.618_033_988_75).fract();
-            let returns = (0..bench.calls).map(|call| json!({ "log_return": spread(call) })).collect();
+            let returns = (0..bench.calls).map(|call| json!({ "log_return": spread(call), "confirm": true })).collect();
             return Ok(Case { specification: serde_json::to_value(&specification)?, returns });
         }
         let rows = assets::read(&bench.file)?;

@@ -126,7 +126,7 @@ pub async fn advice<T: DeserializeOwned>(api: &ApiClient, session: &str, explain
     read("GET /action", api.get(&format!("/action?session={session}{explain}")).await?)
 }
 
-/// Reports what came of a period, `returns` by the name that they have in the call; the wealth it led to.
+/// Reports what came of a period, `returns` by the name that they have in the call, as it is on record; the wealth it led to.
 pub async fn observe(
     api: &ApiClient,
     session: &str,
@@ -137,7 +137,7 @@ pub async fn observe(
     struct Observed {
         wealth: f64,
     }
-    let report = json!({ "session": session, "period": period, name: returns });
+    let report = json!({ "session": session, "period": period, name: returns, "confirm": true });
     let observed: Observed = read("POST /observe", api.post("/observe", &report).await?)?;
     Ok(observed.wealth)
 }

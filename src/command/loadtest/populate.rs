@@ -68,7 +68,7 @@ impl World {
     /// A session's `period`; `index` is the session's place among those of the scenario.
     fn report(&self, session: &str, index: usize, period: usize) -> String {
         let log_return = self.returns[(index + 61 * period) % RETURNS];
-        format!(r#"{{"session":"{session}","period":{period},"log_return":{log_return}}}"#)
+        format!(r#"{{"session":"{session}","period":{period},"log_return":{log_return},"confirm":true}}"#)
     }
 
     /// The call that reports `period` of these sessions: one of them as it is, several as a list.

@@ -21,6 +21,9 @@ pub struct Terms {
     pub contributions: Contributions,
     /// What older returns weigh.
     pub learning: Learning,
+    /// By which a period without a day takes the next one due.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub periods_per_year: Option<f64>,
 }
 
 impl Terms {
@@ -32,6 +35,7 @@ impl Terms {
             trading_cost: problem.trading_cost,
             contributions: problem.contributions.clone(),
             learning: problem.learning,
+            periods_per_year: problem.periods_per_year,
         }
     }
 

@@ -10,8 +10,8 @@ const RECONNECT = 1000;
 export class Problem extends Error {
   constructor(document) {
     super(minus(document.detail || document.title));
-    const { type, title, status, field, value, rule } = document;
-    Object.assign(this, { type, title, status, field, value, rule });
+    const { type, title, status, field, value, rule, doubts } = document;
+    Object.assign(this, { type, title, status, field, value, rule, doubts });
   }
 
   /** Whether the request may have gone through unheard, or may do so later: sending it again is what to do. */

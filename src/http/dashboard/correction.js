@@ -6,6 +6,8 @@ import { input, refusal, select } from "./form.js";
 import { reportFields, sendReports } from "./report_fields.js";
 import { severalFields } from "./several_fields.js";
 
+const CHANGES = { replace: "It was reported wrongly", insert: "A period before it was skipped", remove: "It is to be taken out" };
+
 /** The form for a session with observed periods. */
 export function correctionForm({ id, session, history, policy, calendar, refresh }) {
   const within = "correction-";
@@ -21,6 +23,18 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
   const blank = { within, advised: null, rate: rate_per_step, contribution };
   const fields = history.assets ? severalFields(history.assets, blank) : reportFields({ ...blank, label: "Return, %" });
   fill(history.observations.length);
+  const change = select({
+    within,
+    name: "change",
+    label: "What is wrong",
+    choices: CHANGES,
+    changed: (value) => {
+      fields.element.hidden = value !== "replace";
+      skipped.hidden = value !== "insert";
+    },
+  });
+  const isReplaced = () => change.control.value === "replace";
+  const skipped = h("p", { class: "note", hidden: true }, "The period that was skipped is put in with no return known. Put that right once you know it.");
   const reason = input({
     within,
     name: "reason",
@@ -35,18 +49,21 @@ export function correctionForm({ id, session, history, policy, calendar, refresh
     "form",
     { class: "observe", novalidate: true },
     h("p", { class: "note" }, "The fields hold what stands now. What was reported before stays on record beside it."),
-    h("div", { class: "fields" }, period.element, reason.element),
+    h("div", { class: "fields" }, period.element, change.element, reason.element),
+    skipped,
     fields.element,
     message,
     h("p", { class: "send" }, button),
   );
   const compose = () => {
     const about = { correction: session.corrections + 1, period: Number(period.control.value), reason: reason.control.value };
-    return { ...about, ...fields.report() };
+    if (isReplaced()) return { ...about, ...fields.report() };
+    return { ...about, change: change.control.value, ...(change.control.value === "insert" ? { missing: true } : {}) };
   };
+  const trouble = () => (isReplaced() ? fields.trouble() : null);
   const once = "a correction counts once.";
   const path = `/sessions/${id}/corrections`;
   const done = "The period is put right.";
-  sendReports(form, { button, message, fields, path, compose, once, done, session, refresh });
+  sendReports(form, { button, message, fields: { trouble }, path, compose, once, done, session, calendar, refresh });
   return form;
 }

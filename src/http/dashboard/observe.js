@@ -13,7 +13,7 @@ export function observeForm(action, { id, session, history: { assets }, policy, 
     const read = fields.read();
     preview.textContent = read === null ? "" : foretold(read, { wealth: session.wealth, before, cost: trading_cost });
   };
-  const blank = { advised: action.allocation, rate: rate_per_step, contribution: action.contribution, date: calendar.next, changed: foretell };
+  const blank = { advised: action.allocation, rate: rate_per_step, contribution: action.contribution, date: session.next, changed: foretell };
   const fields = assets ? severalFields(assets, blank) : reportFields({ ...blank, label: `Return in ${calendar.inText(action.period)}, %` });
   const message = h("p", { class: "error", role: "alert", tabindex: -1, hidden: true });
   const button = h("button", { type: "submit" }, `Report ${calendar.inText(action.period)}`);
@@ -27,6 +27,7 @@ export function observeForm(action, { id, session, history: { assets }, policy, 
   );
   const compose = () => ({ session: id, period: action.period, ...fields.report() });
   const once = "a period counts once.";
-  sendReports(form, { button, message, fields, path: "/observe", compose, once, session, refresh });
+  const numbered = (report, count) => ({ ...report, period: report.period + count });
+  sendReports(form, { button, message, fields, path: "/observe", compose, once, numbered, session, calendar, refresh });
   return form;
 }

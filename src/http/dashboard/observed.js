@@ -84,7 +84,7 @@ export function csv({ history, calendar, policy, cautionScale }) {
   const isCostly = policy.specification.problem.trading_cost > 0;
   const simple = (log_return) => hundred(Number.isFinite(log_return ?? Number.NaN) ? Math.expm1(log_return) : null);
   const at = (milliseconds) => (milliseconds === undefined ? null : new Date(milliseconds).toISOString());
-  const madeIn = ({ period }) => corrections.filter((made) => made.period === period);
+  const madeIn = (row) => corrections.filter(({ correction }) => row.corrections?.includes(correction));
   /** A number of a row as it stands, and where anything was put right as it was told first. */
   const both = (name, unit, of) => [[`${name}${unit}`, (row) => of(row.now ?? row)], isCorrected && [`${name} told first${unit}`, of]];
   /** What heads each column, what stands in it for a row, and for the start. */
@@ -118,7 +118,7 @@ const ONE = ["log_return", "simple_return", "price", "previous_price", "executed
 const REPORT = [...ONE, ...ONE.map((name) => `${name}s`), "missing", "date", "rate", "flow", "wealth"];
 const reportOf = (said) => Object.fromEntries(REPORT.filter((name) => (said[name] ?? false) !== false).map((name) => [name, said[name]]));
 
-/** Sends a correction that was said before, or that takes a return away, as a press of `button`. */
+/** Sends a correction that was said before, or that takes something away, as a press of `button`. */
 function correct(button, { id, session, refresh }, period, report, reason, news) {
   const request = { correction: session.corrections + 1, period, reason, confirm: true, ...report };
   return pressed(button, async () => {
@@ -142,6 +142,10 @@ export function lastReport(shown) {
     const report = { missing: true, ...held, ...(date ? { date } : {}) };
     correct(target, shown, row.period, report, "The report was taken back", `The return of ${name} is taken back.`);
   };
+  const takeOut = ({ target }) => {
+    const words = `Take ${name} out?\n\nIt counts as never reported, and can be reported again. What was reported stays on record.`;
+    if (confirm(words)) correct(target, shown, row.period, { change: "remove" }, "The period was taken out", `${calendar.name(row.period)} is taken out.`);
+  };
   const mend = () => reveal(shown.right);
   const back = log_return === null ? "no return is known" : percent(Math.expm1(log_return), 2);
   const said = log_return !== null && history.assets ? `${back} of the assets together` : back;
@@ -149,7 +153,7 @@ export function lastReport(shown) {
     "p",
     { class: "note last" },
     `Last report, ${name}: ${said}. `,
-    h("span", { "data-needs": "operate" }, h("button", { class: "link", onclick: mend }, "Put it right"), log_return === null ? "" : [" or ", h("button", { class: "link", onclick: undo }, "take it back")]),
+    h("span", { "data-needs": "operate" }, h("button", { class: "link", onclick: mend }, "Put it right"), log_return === null ? "" : [", ", h("button", { class: "link", onclick: undo }, "take it back")], " or ", h("button", { class: "link", onclick: takeOut }, "take the period out")),
   );
 }
 
@@ -164,11 +168,19 @@ export function righting(shown) {
 function corrections(shown) {
   const { history, calendar } = shown;
   if (history.corrections.length === 0) return "";
-  const words = ({ period, reason, corrected_ms }) =>
-    `${calendar.name(period)} was put right on ${moment(corrected_ms)}: ${reason}`;
+  const done = { replace: "put right", insert: "put in", remove: "taken out" };
+  /** The period as it is numbered now; one that was taken out as it was then. */
+  const now = ({ correction, period }) => history.observations.find(({ corrections }) => corrections?.includes(correction))?.period ?? period;
+  const words = (made) => {
+    const change = made.change ?? "replace";
+    const name = change === "remove" ? `Period ${made.period}` : calendar.name(now(made));
+    return `${name} was ${done[change]} on ${moment(made.corrected_ms)}: ${made.reason}`;
+  };
   const undo = (button, made) => {
-    const earlier = history.corrections.filter(({ period, correction }) => period === made.period && correction < made.correction).at(-1);
-    const said = earlier ?? history.observations[made.period - 1].reported;
+    if (made.change === "insert") return correct(button, shown, made.period, { change: "remove" }, `Correction ${made.correction} was undone`, `Period ${made.period} is taken out again.`);
+    const row = history.observations[made.period - 1];
+    const earlier = history.corrections.filter(({ correction }) => row.corrections.includes(correction) && correction < made.correction).at(-1);
+    const said = earlier ?? row.reported;
     const news = `${calendar.name(made.period)} is as it was before.`;
     return correct(button, shown, made.period, reportOf(said), `Correction ${made.correction} was undone`, news);
   };
@@ -176,7 +188,7 @@ function corrections(shown) {
   return h(
     "ul",
     { class: "corrections" },
-    made.map((one, index) => h("li", {}, words(one), index === 0 ? [" ", h("button", { class: "link", "data-needs": "operate", onclick: ({ target }) => undo(target, one) }, "Undo")] : null)),
+    made.map((one, index) => h("li", {}, words(one), index === 0 && one.change !== "remove" ? [" ", h("button", { class: "link", "data-needs": "operate", onclick: ({ target }) => undo(target, one) }, "Undo")] : null)),
   );
 }
 

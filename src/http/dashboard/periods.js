@@ -52,6 +52,24 @@ function later(time, months) {
 /** The day that it is where the reader is, as 2008-09-30. */
 export const isoDay = (now) => [now.getFullYear(), now.getMonth() + 1, now.getDate()].map((part) => String(part).padStart(2, "0")).join("-");
 
+/** The last day that ended a period, so many of which are a year, on `today` or before it; null where no calendar is told. */
+export function lastEnd(periods_per_year, today) {
+  const [unit, now] = [unitOf(periods_per_year), new Date(parsed(today))];
+  const [year, month, weekday] = [now.getUTCFullYear(), now.getUTCMonth(), now.getUTCDay()];
+  const ends = {
+    day: () => parsed(today) - DAY * [2, 0, 0, 0, 0, 0, 1][weekday],
+    week: () => parsed(today) - DAY * ((weekday + 2) % 7),
+    month: () => Date.UTC(year, month, 0),
+    quarter: () => Date.UTC(year, month - (month % 3), 0),
+    year: () => Date.UTC(year, 0, 0),
+  };
+  if (!(unit in ends)) return null;
+  // A month that ends today has ended.
+  const tomorrow = new Date(parsed(today) + DAY);
+  const isOver = { month: tomorrow.getUTCDate() === 1, quarter: tomorrow.getUTCDate() === 1 && tomorrow.getUTCMonth() % 3 === 0, year: tomorrow.getUTCDate() === 1 && tomorrow.getUTCMonth() === 0 };
+  return isOver[unit] ? today : written(ends[unit]());
+}
+
 /** By how many days `today` is later than `next`. */
 export const daysLate = (next, today) => Math.max(0, Math.round((parsed(today) - parsed(next)) / DAY));
 
@@ -65,11 +83,14 @@ function rhythm(dated) {
 
 /**
  * The calendar of a session: `unit` is what a period is called, `name(k)` period k from 1, `brief(k)` the same on an axis,
- * `after(k)` its end, `date(k)` its last day or null, `next` the last day that the coming period most likely has, or null. `dated` says whether there are dates.
+ * `after(k)` its end, `date(k)` its last day or null. `dated` says whether there are dates.
  */
 export function calendar(history, periods_per_year) {
+  const known = (row) => (row?.now ?? row)?.date;
+  // A period without a day of its own takes the next one due; where that is not known the day is that of a period before.
+  const dayIn = (row, index, rows) => standing(row).date ?? (known(row) === known(rows[index - 1]) ? null : known(row));
   const dated = history.observations
-    .map((row) => ({ period: row.period, date: standing(row).date }))
+    .map((row, index, rows) => ({ period: row.period, date: dayIn(row, index, rows) }))
     .filter(({ date }) => date)
     .map(({ period, date }) => ({ period, time: parsed(date) }));
   const said = periods_per_year ? UNITS.find(({ unit }) => unit === unitOf(periods_per_year)) : null;
@@ -101,11 +122,9 @@ export function calendar(history, periods_per_year) {
   };
   const inText = (period) => name(period).replace(/^[PWQY](?=eriod|eek|uarter|ear)/, (letter) => letter.toLowerCase());
   const after = (period) => (period === 0 ? "At the start" : `After ${inText(period)}`);
-  const last = dated.at(-1);
-  const coming = last?.period === history.observations.length ? moved(last.time, 1) : null;
   const date = (period) => {
     const time = end(period);
     return time === null ? null : written(time);
   };
-  return { unit, name, inText, brief, after, date, dated: dated.length > 0, next: coming && written(coming) };
+  return { unit, name, inText, brief, after, date, dated: dated.length > 0 };
 }

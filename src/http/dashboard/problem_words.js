@@ -32,13 +32,6 @@ export function problemWords({ value, rule }, label, unit, ahead) {
   return /^must\b/.test(words) ? `${name} ${given(value, unit)}; it ${words}.` : `${name}: ${words}.`;
 }
 
-/** What is unusual about a return, and of which asset where there are several; the rule ends with that, in percent. */
-export function unusualWords({ field, rule }) {
-  const words = rule.split(": ").at(-1);
-  const asset = field.slice(field.indexOf(".") + 1);
-  return asset === field ? `A${words.slice(1)}.` : `${asset}: ${words}.`;
-}
-
 function given(value, unit) {
   if (value === null || value === undefined || value === "") return "is blank";
   if (typeof value === "object") return "is not as it must be";

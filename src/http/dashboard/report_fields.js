@@ -2,12 +2,13 @@
 
 import { get, post } from "./api.js";
 import { h } from "./dom.js";
-import { clear, input, select, showProblem } from "./form.js";
+import { question, UNCONFIRMED } from "./doubts.js";
+import { clear, input, pressed, select, showProblem } from "./form.js";
 import { endWords } from "./flows.js";
 import { allocation, percent, wealth } from "./format.js";
 import { fraction, typed } from "./number_text.js";
 import { dayOf } from "./periods.js";
-import { problemWords, unusualWords } from "./problem_words.js";
+import { problemWords } from "./problem_words.js";
 
 const KINDS = { simple_return: "Gain or loss", log_return: "Log-return", missing: "None is known" };
 
@@ -131,15 +132,19 @@ export function foretold(read, { wealth: now, before, cost }) {
 
 /**
  * Sends what `compose` makes of the form to `path`, once at a time, and then has the session shown anew by `refresh`. What is
- * sent again after a failure is the very same request; `once` says why that is safe. An unusual return is sent again with
- * `confirm` where the user says that it is meant.
+ * sent again after a failure is the very same request; `once` says why that is safe. What the service doubts is asked below the
+ * form, and `numbered(request, count)` is the request once so many periods were reported as missing before it. What somebody else
+ * reported meanwhile stays on the page beside what was typed.
  */
-export function sendReports(form, { button, message, fields, path, compose, once, done, session, refresh }) {
+export function sendReports(form, { button, message, fields, path, compose, once, done, numbered, session, calendar, refresh }) {
   let request = null;
   const label = button.textContent;
+  const place = h("div", {});
+  message.after(place);
   const freed = () => {
     request = null;
     button.textContent = label;
+    place.replaceChildren();
   };
   form.addEventListener("input", freed);
   form.addEventListener("change", freed);
@@ -156,6 +161,7 @@ export function sendReports(form, { button, message, fields, path, compose, once
     if (button.disabled) return;
     clear(form);
     message.hidden = true;
+    place.replaceChildren();
     const trouble = fields.trouble();
     if (trouble) return showProblem(form, message, trouble);
     request ??= compose();
@@ -163,6 +169,12 @@ export function sendReports(form, { button, message, fields, path, compose, once
     await send();
     button.disabled = false;
   });
+  /** Reports the missing periods one by one, each once, and then the one that was typed. */
+  const fill = (refusal) => async (days) => {
+    for (const [index, date] of days.entries()) await post(path, { session: refusal.session, period: refusal.period + index, missing: true, date });
+    request = numbered(refusal, days.length);
+    await send();
+  };
   const refused = async (error) => {
     if (error.passing) {
       button.textContent = "Send again";
@@ -171,17 +183,52 @@ export function sendReports(form, { button, message, fields, path, compose, once
     }
     const refusal = request;
     request = null;
+    if (error.type === UNCONFIRMED) {
+      const meant = () => {
+        request = { ...refusal, confirm: true };
+        return send();
+      };
+      const asked = question(error, { meant, filled: numbered && fill(refusal) });
+      place.replaceChildren(asked);
+      return asked.focus();
+    }
     if (error.status === 409) {
       const now = await get(`/sessions/${session.session}`).catch(() => null);
-      if (now && (now.period !== session.period || now.corrections !== session.corrections))
-        return refresh("Somebody else reported meanwhile.");
-    }
-    if (error.type === "/problems/unusual-return") {
-      if (!window.confirm(`${unusualWords(error)}\n\nIs it meant?`)) return;
-      request = { ...refusal, confirm: true };
-      return send();
+      if (now && (now.period !== session.period || now.corrections !== session.corrections)) return refresh(null, overtaken(refusal, now, { calendar, refresh }));
     }
     const field = ["log_return", "simple_return"].includes(error.field) ? "return" : error.field;
     showProblem(form, message, { ...error, message: error.message, field });
   };
 }
+
+/** What a report says of its return. */
+function returnWords({ simple_return, log_return, simple_returns, missing }) {
+  if (missing) return "a missing period";
+  if (simple_returns) return Object.entries(simple_returns).map(([name, back]) => `${name} ${percent(back, 2)}`).join(", ");
+  return percent(simple_return ?? Math.expm1(log_return), 2);
+}
+
+/** That a report was not recorded, since somebody else was faster: what stands, what was typed, and a button that puts it right.
+ * `show(history)` gives it once the session is read anew. */
+const overtaken = (refusal, now, { calendar, refresh }) => ({ observations }) => {
+  const { session, correction, confirm, reason, ...report } = refusal;
+  const row = observations[report.period - 1];
+  const { log_return } = row?.now ?? row ?? { log_return: null };
+  const stands = log_return === null ? "as missing" : `as ${percent(Math.expm1(log_return), 2)}`;
+  const words = correction
+    ? `Not recorded: ${calendar.inText(report.period)} was corrected by somebody else a moment ago, and stands ${stands}. `
+    : `Not recorded: ${calendar.inText(report.period)} was reported ${stands} a moment ago. `;
+  const place = h("div", {});
+  const right = (confirmed) => async () => {
+    const request = { correction: now.corrections + 1, reason: reason ?? "It was reported twice, and this was meant", ...report, ...confirmed };
+    try {
+      await post(`/sessions/${now.session}/corrections`, request);
+    } catch (error) {
+      if (error.type !== UNCONFIRMED) throw error;
+      return place.replaceChildren(question(error, { meant: right({ confirm: true }) }));
+    }
+    await refresh("The period is put right.");
+  };
+  const button = h("button", { type: "button", onclick: ({ target }) => pressed(target, right({})) }, "Correct it");
+  return h("div", { class: "doubts", role: "alert" }, h("p", { class: "error" }, `${words}You typed ${returnWords(report)}. `), place, h("p", { class: "send" }, button));
+};

@@ -1,14 +1,16 @@
 // One return for many sessions at once: typed, pasted or out of a file, looked over, sent together, and told row by row.
 
+import { advised } from "./advised.js";
 import { get, post } from "./api.js";
 import { announce, disclosure, h, section, table } from "./dom.js";
+import { doubtWords, missingDays, UNCONFIRMED } from "./doubts.js";
 import { fileDrop } from "./file_drop.js";
-import { area, fieldset, input, refusal, select } from "./form.js";
+import { area, fieldset, input, pressed, refusal, select } from "./form.js";
 import { count, counted, percent, wealth } from "./format.js";
 import { called, headed } from "./naming.js";
 import { all } from "./pages.js";
-import { dayOf } from "./periods.js";
-import { problemWords, unusualWords } from "./problem_words.js";
+import { dayOf, isoDay, lastEnd } from "./periods.js";
+import { problemWords } from "./problem_words.js";
 import { finder, HEADS, inUnit, LATELY, otherUnit, readLines, written } from "./report_lines.js";
 
 /** The service takes so many reports in one call. */
@@ -50,8 +52,9 @@ function reporting(sessions, chosen, leaving) {
   const find = finder(sessions);
   const policies = policiesRead(leaving);
   let [rows, header, isOpen] = [[], null, false];
-  // The returns that were last refused as unusual, by session: those alone can be meant.
-  let unusual = new Map();
+  // What was doubted in the last list, by session: it alone can be meant, and as it is it is not sent without that.
+  const doubted = new Map();
+  const isDoubted = ({ entry, report }) => doubted.get(entry.session) === said(report);
   const lines = area({
     name: "lines",
     label: "Sessions and their returns, %",
@@ -65,8 +68,8 @@ function reporting(sessions, chosen, leaving) {
     look();
   });
   const common = input({ name: "common", label: "Return of the others, %", note: "Of those that have none of their own. May be blank.", unit: "percent", changed: () => soon() });
-  const date = input({ name: "date", label: "Last day", note: "Of all that say none, such as 2008-09-30. May be blank.", inputmode: "text", changed: () => soon() });
-  const [meant, sure] = tick("confirm", "The returns are meant, however unusual");
+  const date = input({ name: "date", label: "Last day", note: "Of all that say none, such as 2008-09-30. May be blank.", inputmode: "text", value: likelyDay(chosen.length > 0 ? chosen : sessions, isoDay(new Date())) ?? "", changed: () => soon() });
+  const [meant, sure] = tick("confirm", "What is doubted is meant", () => look());
   const [next, again] = tick("next", "Of those reported within the hour, the next period is meant", () => look());
   const unit = select({ name: "unit", label: "These returns are", choices: UNITS, changed: () => look() });
   const unitWords = h("p", { class: "note wrong" });
@@ -90,7 +93,10 @@ function reporting(sessions, chosen, leaving) {
     doubt.hidden = seems === null;
     unitWords.textContent = seems === null ? "" : DOUBTS[seems];
     const read = as(unit.control.value || "percent");
-    [rows, header] = [read.rows, read.header];
+    const held = (row) => row.trouble === null && !meant.checked && isDoubted(row);
+    rows = read.rows.map((row) => (held(row) ? { ...row, trouble: "is doubted: change it, or say above that it is meant" } : row));
+    header = read.header;
+    sure.hidden = !rows.some((row) => row.entry && isDoubted(row));
     again.hidden = !rows.some(({ entry, report }) => entry && isLate(entry) && !report.date && report.period === undefined);
     const ready = rows.filter(({ trouble }) => trouble === null).length;
     isOpen = seems !== null && unit.control.value === "";
@@ -111,9 +117,10 @@ function reporting(sessions, chosen, leaving) {
     message.hidden = true;
     const sent = rows.filter(({ trouble }) => trouble === null);
     const reports = sent.map(({ entry, report }) => {
-      const isMeant = meant.checked && unusual.get(entry.session) === returnsOf(report);
+      const isMeant = meant.checked && isDoubted({ entry, report });
       return { session: entry.session, period: entry.period, ...report, ...(isMeant ? { confirm: true } : {}) };
     });
+    for (const { entry } of sent) doubted.delete(entry.session);
     const told = [];
     const recorded = new Set();
     try {
@@ -124,9 +131,7 @@ function reporting(sessions, chosen, leaving) {
           told.push({ ...row, answer });
           if (answer.status !== 200) continue;
           recorded.add(row);
-          const { entry } = row;
-          const { wealth, date, completed } = answer.answer;
-          Object.assign(entry, { period: Math.max(entry.period, answer.period + 1), wealth, date, last_report_ms: Date.now(), state: completed ? "completed" : entry.state });
+          follow(row.entry, answer);
         }
       }
     } finally {
@@ -134,18 +139,40 @@ function reporting(sessions, chosen, leaving) {
       const left = rows.filter((row) => !recorded.has(row)).map(({ text }) => text);
       lines.control.value = (left.length > 0 && header !== null ? [header, ...left] : left).join("\n");
       next.checked = false;
+      meant.checked = false;
+      for (const { entry, report, answer } of told) if (answer.problem?.type === UNCONFIRMED) doubted.set(entry.session, said(report));
       look();
     }
     const failed = told.filter(({ answer }) => answer.status !== 200);
-    const odd = failed.filter(({ answer }) => answer.problem.type === "/problems/unusual-return");
-    unusual = new Map(odd.map(({ entry, report }) => [entry.session, returnsOf(report)]));
-    meant.checked = false;
-    sure.hidden = odd.length === 0;
     const words = `${counted(told.length - failed.length, "return is", "returns are")} recorded${rows.length > 0 ? `, and ${count(rows.length)} left above for another try` : ""}.`;
     const heading = h("p", { class: "sentence", tabindex: -1 }, words);
-    outcome.replaceChildren(section("What came of it", heading, outcomes(told)));
+    outcome.replaceChildren(section("What came of it", heading, filling(failed), outcomes(told, advised(leaving))));
     heading.focus();
     announce(words);
+  };
+  /** Reports the periods that are missing before some reports as missing, one of each session at a time, and then those reports. */
+  const fill = async (gaps) => {
+    const most = Math.max(...gaps.map(({ days }) => days.length));
+    for (let index = 0; index < most; index += 1) {
+      const some = gaps.filter(({ days }) => days.length > index);
+      for (let start = 0; start < some.length; start += AT_ONCE) {
+        const part = some.slice(start, start + AT_ONCE);
+        const answers = await post("/observe", part.map(({ entry, first, days }) => ({ session: entry.session, period: first + index, missing: true, date: days[index] })));
+        const wrong = answers.find(({ status }) => status !== 200);
+        for (const [place, answer] of answers.entries()) if (answer.status === 200) follow(part[place].entry, answer);
+        if (wrong) throw new Error(refused(wrong.problem));
+      }
+    }
+    for (const { entry } of gaps) doubted.delete(entry.session);
+    look();
+    await send();
+  };
+  const filling = (failed) => {
+    const gaps = failed.filter(({ answer }) => answer.problem.type === UNCONFIRMED).map(({ entry, answer }) => ({ entry, first: answer.period, days: missingDays(answer.problem) })).filter(({ days }) => days.length > 0);
+    if (gaps.length === 0) return "";
+    const all = gaps.reduce((sum, { days }) => sum + days.length, 0);
+    const words = `Report the ${counted(all, "missing period")} of ${counted(gaps.length, "session")} as missing, and then what is left`;
+    return h("p", { class: "send" }, h("button", { type: "button", onclick: ({ target }) => pressed(target, () => fill(gaps), ({ message }) => message) }, words));
   };
   const form = h(
     "form",
@@ -203,8 +230,22 @@ function leftOut(columns) {
   return h("p", { class: "note wrong" }, `Nothing is read from ${columns.length === 1 ? "the column" : "the columns"} ${names}. A column is called ${HEADS.join(", ")} or like an asset of the sessions named, and each is there once.`);
 }
 
-/** The returns of a report, to tell whether they are others. */
-const returnsOf = ({ simple_return, simple_returns }) => JSON.stringify([simple_return, simple_returns]);
+/** What is said of a period, to tell whether it is something else. */
+const said = ({ simple_return, simple_returns, date }) => JSON.stringify([simple_return, simple_returns, date]);
+
+/** Where a session stands after an answer. */
+const follow = (entry, { period, answer: { wealth, date, completed } }) =>
+  Object.assign(entry, { period: Math.max(entry.period, period + 1), wealth, date, last_report_ms: Date.now(), state: completed ? "completed" : entry.state });
+
+/** The day that most of the sessions have next, unless it is still to come; of those that never said a day the end of the last period. */
+function likelyDay(sessions, today) {
+  const counts = new Map();
+  for (const { state, date, next, periods_per_year } of sessions) {
+    const day = state !== "active" ? null : date ? next : lastEnd(periods_per_year, today);
+    if (day && day <= today) counts.set(day, (counts.get(day) ?? 0) + 1);
+  }
+  return [...counts].sort(([one, some], [other, more]) => more - some || (one < other ? 1 : -1))[0]?.[0] ?? null;
+}
 
 const who = ({ entry, text }) => (entry ? headed(`#/sessions/${entry.session}`, entry.session, entry.name) : text);
 
@@ -236,12 +277,17 @@ const previewed = (rows) =>
     ...(rows.some(isBeside) ? [{ name: "Also", cell: besides }] : []),
   ], [...rows].sort((one, other) => Number(one.trouble === null) - Number(other.trouble === null)));
 
-const outcomes = (told) =>
-  table("Outcomes", [
+const outcomes = (told, advice) => {
+  const isRecorded = ({ answer }) => answer.status === 200;
+  const now = (name) => (row) => (isRecorded(row) ? advice.of(row.entry)[name] : "\u2013");
+  return table("Outcomes", [
     { name: "Session", cell: who },
     { name: "Return", numeric: true, cell: returned },
     { name: "Outcome", cell: ({ line, answer }) => (answer.status === 200 ? `recorded as period ${count(answer.period)}` : wrongLine(line, refused(answer.problem))) },
+    { name: "To hold", numeric: true, cell: now("hold") },
+    { name: "To trade", numeric: true, cell: now("trade") },
   ], told);
+};
 
 const wrongLine = (line, words) => h("span", { class: "under wrong" }, `Line ${count(line)}: ${words}`);
 
@@ -258,8 +304,9 @@ const FIELDS = {
 };
 
 /** Why a report was refused, in the words and the unit of the form. */
-function refused({ type, title, detail, field, value, rule }) {
-  if (type === "/problems/unusual-return") return unusualWords({ field, rule });
+function refused(problem) {
+  const { type, title, detail, field, value, rule } = problem;
+  if (type === UNCONFIRMED) return doubtWords(problem).join(" ");
   const [name, asset] = (field ?? "").split(/\.(.*)/);
   if (!(name in FIELDS) || !rule) return detail ?? title;
   const [label, unit] = FIELDS[name];

@@ -38,15 +38,14 @@ export async function view(id, leaving) {
     calendar: calendar(history, policy.specification.problem.periods_per_year),
     cautionScale: cautionScale(policy.specification.problem),
   });
-  const refresh = async (news) => {
+  /** Shows the session anew, with what came of a report: that it is recorded, or what `alert(history)` makes of it. */
+  const refresh = async (news, alert) => {
     const now = known(...(await Promise.all([get(`/sessions/${id}`, leaving), get(`/sessions/${id}/history`, leaving)])));
-    await fill(holder, now);
-    const { session, calendar } = now;
-    announce(
-      session.state === "completed"
-        ? `The session is completed with wealth ${wealth(session.wealth)}.`
-        : `${news ?? `${calendar.name(session.period - 1)} is recorded.`} Wealth ${wealth(session.wealth)}.`,
-    );
+    const { session, calendar, history } = now;
+    const ended = session.state === "completed" ? "The session is completed with wealth" : "Wealth";
+    const words = `${news ?? `${calendar.name(session.period - 1)} is recorded.`} ${ended} ${wealth(session.wealth)}.`;
+    await fill(holder, { ...now, notice: alert ? alert(history) : h("p", { class: "note receipt" }, words) });
+    if (!alert) announce(words);
     holder.querySelector("#advice")?.focus();
   };
   await fill(holder, known(session, history));
@@ -76,11 +75,11 @@ async function fill(holder, told) {
   const shown = { ...told, right: null };
   shown.right = history.observations.length > 0 ? righting(shown) : null;
   if (session.state === "completed") {
-    const ended = [h("div", {}, completed(shown), lastReport(shown)), wealthCourse(shown)];
+    const ended = [h("div", {}, completed(shown), shown.notice ?? "", lastReport(shown)), wealthCourse(shown)];
     return holder.replaceChildren(h("div", { class: "columns" }, ended), figures(shown, null), history.assets ? severalHeld(shown) : held(shown, null), observed(shown));
   }
   const action = await get(`/action?session=${id}`, leaving);
-  const { advice, found } = (history.assets ? ofSeveral : ofOne)(shown, action, [observeForm(action, shown), lastReport(shown)]);
+  const { advice, found } = (history.assets ? ofSeveral : ofOne)(shown, action, [shown.notice ?? "", observeForm(action, shown), lastReport(shown)]);
   holder.replaceChildren(
     changed(shown),
     due(shown),

@@ -42,8 +42,8 @@ from .errors import (
     TooManyRequests,
     Unauthenticated,
     UnclearReturns,
+    Unconfirmed,
     Unreachable,
-    UnusualReturn,
 )
 from .jobs import (
     AssetsWalkForward,
@@ -105,8 +105,8 @@ __all__ = [
     "Training",
     "Unauthenticated",
     "UnclearReturns",
+    "Unconfirmed",
     "Unreachable",
-    "UnusualReturn",
     "WalkForward",
     "frames",
     "plots",

@@ -136,8 +136,14 @@ class ReportGap(ProblemError, slug="report-gap"):
     """The period, or the correction, is not the one expected; ``rule`` names that one."""
 
 
-class UnusualReturn(ProblemError, slug="unusual-return"):
-    """The return is far from the record; send it with ``confirm=True`` where it is meant."""
+class Unconfirmed(ProblemError, slug="unconfirmed"):
+    """The report is most likely a slip: ``doubts`` says all that is doubted in it. If it is meant, send it with
+    ``confirm=True``. A doubt of missing periods lists their last days as ``missing``: report each of them with
+    ``missing=True`` and its ``date``, and then the period itself."""
+
+    def __init__(self, problem: wire.Problem, retry_after: float | None = None) -> None:
+        super().__init__(problem, retry_after)
+        self.doubts: list[wire.Doubt] = problem.get("doubts") or []
 
 
 class SessionCompleted(ProblemError, slug="session-completed"):

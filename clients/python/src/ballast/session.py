@@ -107,7 +107,7 @@ class _Session(Labelled):
         policy's; ``wealth`` what was really reached; ``date`` the last day. Of several assets ``log_returns``,
         ``simple_returns``, ``prices`` and ``executed_allocations`` are a dict or a Series by their names. ``period``
         is the coming one unless given: an earlier one with the content first reported for it gets its first answer
-        again. Raises :class:`UnusualReturn` for a return far from the record, unless ``confirm`` says that it is
+        again. Raises :class:`Unconfirmed` for a report that is most likely a slip, unless ``confirm`` says that it is
         meant, and :class:`ReportConflict`, :class:`ReportGap` and :class:`SessionCompleted`.
         """
         number = self.period if period is None else period
@@ -130,7 +130,6 @@ class _Session(Labelled):
         rate: replay.Numbers | None = None,
         flow: replay.Numbers | None = None,
         executed_allocation: replay.Numbers | Table | None = None,
-        confirm: bool = False,
     ) -> pd.DataFrame:
         """Reports a record period by period, from ``period`` on, and answers what was advised and what became of
         wealth, a row for each.
@@ -141,9 +140,9 @@ class _Session(Labelled):
         ``executed_allocation`` of one asset are as in :meth:`observe`: one number for all periods, or one for each
         entry of ``returns``, as ``dates`` are.
 
-        Each report carries the number of its period, so the same call again, be it after :class:`Unreachable`,
-        reports nothing twice and answers the same. A record that goes on where the session stands has
-        ``period=session.period``. A session that renews itself is waited for wherever a renewal is due: what is
+        What is on record is meant, so no report of it is doubted. Each carries the number of its period, so the same
+        call again, be it after :class:`Unreachable`, reports nothing twice and answers the same. A record that goes on
+        where the session stands has ``period=session.period``. A session that renews itself is waited for wherever a renewal is due: what is
         advised does not depend on how long trainings take.
 
         The rows have the index of ``returns`` where that is a pandas object, and else the periods. The columns are
@@ -158,7 +157,7 @@ class _Session(Labelled):
         for number, report in enumerate(reports, start=period):
             if renewing:
                 await self._await_renewal()
-            await self._observe(period=number, confirm=confirm, **report)
+            await self._observe(period=number, confirm=True, **report)
         return replay.told(await self._history(), period, returns, kind, len(reports))
 
     async def _await_renewal(self) -> None:
@@ -178,10 +177,13 @@ class _Session(Labelled):
         reason: str,
         *,
         correction: int | None = None,
+        change: wire.Change = "replace",
         confirm: bool = False,
         **report: Unpack[wire.Report],
     ) -> wire.Corrected:
-        """Puts right what a period that passed reported: all of it, in the place of what was reported before.
+        """Puts right what a period that passed reported: all of it, in the place of what was reported before. With
+        ``change="insert"`` the report is of a period that was skipped before this one, and with ``change="remove"``,
+        without a report, the period is taken out.
 
         What was reported and told stays on record; every advice from now on rests on the correction. Exactly once as
         :meth:`observe` is: ``correction`` is the number after the last one made unless given, and one whose answer was
@@ -192,6 +194,7 @@ class _Session(Labelled):
             "correction": number,
             "period": period,
             "reason": reason,
+            "change": change,
             "confirm": confirm,
             **_by_name(report),
         }

@@ -259,6 +259,10 @@ class CentreSpecification3(TypedDict):
 HistoryItem1: TypeAlias = float
 
 
+Change: TypeAlias = Literal["replace", "insert", "remove"]
+"""Changes of the periods that passed."""
+
+
 class CompositionRule1(TypedDict):
     """These shares, in the order of the assets, which sum to 1."""
 
@@ -275,16 +279,17 @@ Contributions: TypeAlias = float | list[float]
 
 
 class Correct(TypedDict):
-    """What a period that passed reported, put right: all of it, in the place of what was reported before."""
+    """A change of the periods that passed: a period is reported anew, all of it, is put in between others, or is taken out."""
 
     correction: int
     """Number of the correction, from 1."""
     period: int
-    """The period that is put right."""
+    """The period that is put right or taken out, or that the new one is put in before."""
+    change: NotRequired[Change]
     reason: str
     """Why, in at most 200 letters."""
     confirm: NotRequired[bool]
-    """The return is meant, however unusual it is."""
+    """The correction is meant, whatever is doubted in it."""
     log_return: NotRequired[float | None]
     simple_return: NotRequired[float | None]
     """`price / previous price - 1`."""
@@ -325,6 +330,10 @@ class Costs(TypedDict):
     """Seconds of the simulation."""
     resolve_seconds: NotRequired[float | None]
     """Mean of one re-solved step; null where there was none."""
+
+
+DoubtReason: TypeAlias = Literal["missing_periods", "early_day", "future_day", "unusual_return", "differs_from_peers"]
+"""Why a report is doubted."""
 
 
 DriftLevel: TypeAlias = Literal["none", "warning", "alarm"]
@@ -590,7 +599,7 @@ class Observe(TypedDict):
     period: int
     """Number of the period, from 1."""
     confirm: NotRequired[bool]
-    """The return is meant, however unusual it is."""
+    """The report is meant, whatever is doubted in it."""
     log_return: NotRequired[float | None]
     simple_return: NotRequired[float | None]
     """`price / previous price - 1`."""
@@ -710,23 +719,6 @@ class Premium(TypedDict):
     the radius times sqrt(n / (n + m)) advises anything. 0 where it has left already; null where it does not within 10000
     periods, or the radius rule is `fixed`.
     """
-
-
-class Problem(TypedDict):
-    """A problem document (RFC 9457)."""
-
-    type: str
-    """Stable reference of the kind of problem: `/problems/<slug>`."""
-    title: str
-    status: int
-    detail: str
-    """This occurrence, in one sentence."""
-    field: NotRequired[str | None]
-    """Dotted path of the offending field, header or parameter; every problem that the client can mend names it."""
-    value: NotRequired[Any]
-    """What the field held."""
-    rule: NotRequired[str | None]
-    """What the field must be."""
 
 
 HistoryItem3: TypeAlias = float
@@ -1021,6 +1013,8 @@ class Terms(TypedDict):
     """C, money added at the end of each period."""
     learning: Learning
     """What older returns weigh."""
+    periods_per_year: NotRequired[float | None]
+    """By which a period without a day takes the next one due."""
 
 
 class TransportedMass(TypedDict):
@@ -1401,6 +1395,20 @@ class Difference(TypedDict):
     """Of the certainty equivalent, in terminal wealth."""
 
 
+class Doubt(TypedDict):
+    """Something in a report that is most likely a slip."""
+
+    reason: DoubtReason
+    field: str
+    """Dotted path of the field."""
+    value: Any
+    """Content of the field."""
+    sentence: str
+    """The doubt, in one sentence."""
+    missing: NotRequired[list[str]]
+    """Last days of the periods missing before the one reported, unless they are more than 120."""
+
+
 class Drift(TypedDict):
     """
     A bet that the order of the returns means something. It wins where new returns lie further from the median of all than those
@@ -1485,6 +1493,8 @@ class Now(TypedDict):
     """Wealth at its end."""
     holding: float
     """Share of it in the risky asset."""
+    date: NotRequired[str | None]
+    """Its last day, where it is known."""
     radius: float
     """Radius of the uncertainty set after it, in the unit of an advice's."""
 
@@ -1537,6 +1547,25 @@ class PeriodReport(TypedDict):
     all_bank_share: float
     """Share of paths that held nothing in the risky asset."""
     radius: NotRequired[RadiusSpread | None]
+
+
+class Problem(TypedDict):
+    """A problem document (RFC 9457)."""
+
+    type: str
+    """Stable reference of the kind of problem: `/problems/<slug>`."""
+    title: str
+    status: int
+    detail: str
+    """This occurrence, in one sentence."""
+    field: NotRequired[str | None]
+    """Dotted path of the offending field, header or parameter; every problem that the client can mend names it."""
+    value: NotRequired[Any]
+    """What the field held."""
+    rule: NotRequired[str | None]
+    """What the field must be."""
+    doubts: NotRequired[list[Doubt] | None]
+    """All that is doubted in a report; with `confirm` it is recorded."""
 
 
 class ProblemSpecification(TypedDict):
@@ -2064,11 +2093,11 @@ class Corrected(Uncertainty):
     session: str
     correction: int
     period: int
-    """The period put right."""
+    """The period put right, put in or taken out."""
     log_return: NotRequired[float | None]
-    """What it is now; null where it is missing."""
+    """What it is now; null where it is missing or taken out."""
     observed: int
-    """Periods observed, which is as before."""
+    """Periods observed now."""
     wealth: float
     """Wealth now."""
     holding: float
@@ -2077,7 +2106,7 @@ class Corrected(Uncertainty):
     wealth_change: float
     """Change of wealth by the last period observed, as it stands now."""
     date: NotRequired[str | None]
-    """The last day that is reported now."""
+    """The last day of the last period, where it is known."""
     drift: Drift
     """Whether the returns, as they stand, come as they came."""
 
@@ -2291,7 +2320,12 @@ class Session(Labels):
     """The last period that the policy advises."""
     state: SessionState
     date: NotRequired[str | None]
-    """The last day of the last period that was reported with one."""
+    """The last day of the last period: as reported, else the next one due after those before it. Null where no day is known."""
+    next: NotRequired[str | None]
+    """
+    The last day of the coming period, by the policy's periods a year, else by the days reported; a report without a day
+    takes it. Null where that is not known, or it is completed.
+    """
     wealth: float
     holding: float
     """Share of wealth in the risky asset, before trading; of several assets in all of them."""
@@ -2487,7 +2521,7 @@ class Observed(Uncertainty):
     wealth_change: float
     """Change of wealth by the period, what was added or reached otherwise included."""
     date: NotRequired[str | None]
-    """The last day that was reported, of this period or of one before."""
+    """The last day of the period: as reported, else the next one due, or where that is not known of a period before."""
     completed: bool
     """Whether the horizon is reached, and no policy is to follow."""
     drift: Drift
@@ -2572,11 +2606,13 @@ class ElementAnswered(TypedDict):
 
 
 class Observation(Observed):
-    """One observed period."""
+    """One period, observed or put in later."""
 
     reported: Report
     """What was reported first."""
     observed_ms: int
+    corrections: NotRequired[list[int]]
+    """Numbers of the corrections that put it in or reported it anew."""
     now: NotRequired[Now | None]
 
 

@@ -1,0 +1,40 @@
+// What the service doubts in a report, as a question: each doubt in a sentence, and what can be done about all of them.
+
+import { h } from "./dom.js";
+import { pressed } from "./form.js";
+import { counted } from "./format.js";
+import { day } from "./periods.js";
+
+export const UNCONFIRMED = "/problems/unconfirmed";
+
+/** Every doubt of a problem, a sentence each. */
+export const doubtWords = ({ doubts }) => doubts.map(inWords);
+
+function inWords({ reason, field, value, sentence, missing = [] }) {
+  if (missing.length === 1) return `The period to ${day(missing[0])} is missing before ${day(value)}.`;
+  if (missing.length > 1) return `${missing.length} periods are missing before ${day(value)}: those to ${day(missing[0])} up to ${day(missing.at(-1))}.`;
+  const asset = reason === "unusual_return" || reason === "differs_from_peers" ? field.slice(field.indexOf(".") + 1) : field;
+  return asset === field ? `${sentence[0].toUpperCase()}${sentence.slice(1)}.` : `${asset}: ${sentence}.`;
+}
+
+/** The last days of the periods that are missing before a report. */
+export const missingDays = ({ doubts }) => doubts.flatMap(({ missing = [] }) => missing);
+
+/** The question. `meant()` sends the report as it is; `filled(days)`, where it is offered, reports the missing periods as missing first. */
+export function question(problem, { meant, filled }) {
+  const days = filled ? missingDays(problem) : [];
+  const button = (words, act) => h("button", { type: "button", onclick: ({ target }) => pressed(target, act) }, words);
+  const element = h(
+    "div",
+    { class: "doubts", role: "alert", tabindex: -1 },
+    h("p", { class: "error" }, "Not recorded yet."),
+    h("ul", {}, doubtWords(problem).map((words) => h("li", {}, words))),
+    h(
+      "p",
+      { class: "send" },
+      days.length > 0 ? button(`Report ${counted(days.length, "period")} as missing, then this one`, () => filled(days)) : null,
+      button("It is meant: record it", meant),
+    ),
+  );
+  return element;
+}

@@ -1,0 +1,52 @@
+//! What a period's observation was acknowledged with, as far as a replay reads it.
+
+use serde::Deserialize;
+
+use super::assets::{Composed, ObservedAssets};
+use super::report::Report;
+
+/// The numbers of the answer to an observation.
+#[derive(Debug, Clone, Deserialize)]
+pub(super) struct Acknowledged {
+    log_return: Option<f64>,
+    pub advised_allocation: f64,
+    executed_allocation: f64,
+    wealth: f64,
+    assets: Option<ObservedAssets>,
+}
+
+impl Acknowledged {
+    /// The report in the numbers that were acknowledged, which no other processor or library computes otherwise.
+    pub(super) fn report(&self, reported: &Report) -> Report {
+        let Report { date, rate, flow, .. } = *reported;
+        let common = Report { wealth: Some(self.wealth), date, rate, flow, ..Report::default() };
+        match &self.assets {
+            Some(assets) => Report {
+                log_returns: assets.log_returns.clone(),
+                missing: assets.log_returns.is_none(),
+                executed_allocations: Some(assets.executed_allocations.clone()),
+                ..common
+            },
+            None => Report {
+                log_return: self.log_return,
+                missing: self.log_return.is_none(),
+                executed_allocation: Some(self.executed_allocation),
+                ..common
+            },
+        }
+    }
+
+    /// The report, of several assets with what was advised for those that were held as advised.
+    pub(super) fn held_as_advised(&self, reported: &Report) -> Report {
+        let mut report = reported.clone();
+        if let Some(assets) = &self.assets {
+            report.executed_allocations.get_or_insert_with(|| assets.advised_allocations.clone());
+        }
+        report
+    }
+
+    /// The composition of several assets that was answered.
+    pub(super) fn composed(&self) -> Option<&Composed> {
+        self.assets.as_ref().map(|assets| &assets.composed)
+    }
+}

@@ -1,0 +1,145 @@
+//! A correction decided: the periods with its change, passed through from the start.
+
+use jiff::civil::Date;
+
+use super::change::Change;
+use super::error::ServiceError;
+use super::gate::{self, Doubt, Doubts};
+use super::periods::{Periods, Step};
+use super::plan::Stretch;
+use super::report::{Correct, LONGEST_REASON, MOST_CORRECTIONS, Report};
+use super::standing::Standing;
+use crate::control::error::FieldError;
+
+/// What a correction makes of a session.
+pub(super) struct PutRight {
+    /// Where it stood.
+    pub before: Standing,
+    /// Where it stands now.
+    pub standing: Standing,
+    /// Periods now.
+    pub observed: usize,
+    /// Of the period put right or in; `None` where it is missing, or taken out.
+    pub log_return: Option<f64>,
+    /// By the last period, as it stands now.
+    pub wealth_change: f64,
+}
+
+impl Correct {
+    /// # Errors
+    /// A number past the most, a reason that is empty or long.
+    pub(super) fn check(&self) -> Result<(), FieldError> {
+        if self.correction > MOST_CORRECTIONS {
+            let rule = format!("must be at most {MOST_CORRECTIONS}: open a session on the record as it is now");
+            return Err(FieldError::new("correction", self.correction, rule));
+        }
+        let letters = self.reason.chars().count();
+        if self.reason.trim().is_empty() || letters > LONGEST_REASON || self.reason.contains(char::is_control) {
+            let rule = format!("must say in 1 to {LONGEST_REASON} letters why, without control characters");
+            return Err(FieldError::new("reason", format!("{letters} letters"), rule));
+        }
+        if self.change == Change::Remove && self.report() != Report::default() {
+            return Err(FieldError::new("change", "remove", "must come without a report: the period is taken out"));
+        }
+        Ok(())
+    }
+}
+
+impl Periods {
+    /// Makes the change of the correction, the entry with this index, and passes through all periods.
+    ///
+    /// # Errors
+    /// It is of no period that was observed, makes a period break a rule, or leaves a doubt that nobody confirms.
+    pub(super) fn put_right(
+        &mut self,
+        correction: &Correct,
+        entry: usize,
+        today: Date,
+    ) -> Result<PutRight, ServiceError> {
+        let (mut stood, mut passage) = (Vec::with_capacity(self.all.len() + 1), self.passage()?);
+        while let Some(step) = passage.next().map_err(ServiceError::of_recorded)? {
+            stood.push(Some((step.seen, passage.standing.days.last)));
+        }
+        let before = passage.standing;
+        self.correct(correction, entry)?;
+        match correction.change {
+            Change::Replace => {}
+            Change::Insert => stood.insert(correction.period - 1, None),
+            Change::Remove => drop(stood.remove(correction.period - 1)),
+        }
+        let (mut log_return, mut doubts, mut passage) = (None, Vec::new(), self.passage()?);
+        let mut wealth_before = passage.standing.state.wealth;
+        for (period, stood) in (1..).zip(stood) {
+            let periods_per_year = passage.stretch().terms.periods_per_year;
+            let passed = passage.next().map_err(|(period, error)| in_period(period, correction, error))?;
+            let Some(Step { before, seen, log_return: now, .. }) = passed else { break };
+            wealth_before = before.state.wealth;
+            let report = &self.all[period - 1].report;
+            let (seen_before, day_before) = stood.unzip();
+            if period == correction.period && correction.change != Change::Remove {
+                log_return = now;
+                if day_before != Some(passage.standing.days.last) {
+                    doubts.extend(gate::of_day(&before.days, report.date, periods_per_year, today));
+                }
+            }
+            // Of a price that is put right, the return after it is another too.
+            if seen_before.as_ref() != Some(&seen) {
+                doubts.extend(
+                    before.return_doubts(report, &seen).into_iter().map(|doubt| later(period, correction, doubt)),
+                );
+            }
+        }
+        if !doubts.is_empty() && !correction.confirm {
+            return Err(ServiceError::Unconfirmed(Doubts(doubts)));
+        }
+        let standing = passage.stands();
+        let wealth_change = standing.state.wealth - wealth_before;
+        Ok(PutRight { before, standing, observed: self.all.len(), log_return, wealth_change })
+    }
+}
+
+impl Stretch {
+    /// Whether the periods of the session, `observed` of them, may be changed so under this policy.
+    ///
+    /// # Errors
+    /// The change moves periods by the policies before this one, or there is no room for a period more.
+    pub(super) fn check_change(&self, correction: &Correct, observed: usize) -> Result<(), FieldError> {
+        let Correct { period, change, .. } = *correction;
+        if change.is_replace() {
+            return Ok(());
+        }
+        if period <= self.after {
+            let rule = format!(
+                "must be later than {}, after which the session was renewed: a period by an earlier policy is reported as missing instead",
+                self.after
+            );
+            return Err(FieldError::new("period", period, rule));
+        }
+        if change == Change::Insert && observed >= self.horizon() {
+            let rule = format!(
+                "must leave at most {} periods, and {observed} are observed: renew the session first",
+                self.horizon()
+            );
+            return Err(FieldError::new("change", "insert", rule));
+        }
+        Ok(())
+    }
+}
+
+/// A field that breaks a rule in some period once another is put right.
+fn in_period(period: usize, correction: &Correct, error: FieldError) -> FieldError {
+    if period == correction.period {
+        return error;
+    }
+    let rule = format!("in period {period}, with period {} put right: {}", correction.period, error.rule);
+    FieldError { rule, ..error }
+}
+
+/// A doubt about some period once another is put right.
+fn later(period: usize, correction: &Correct, doubt: Doubt) -> Doubt {
+    if period == correction.period {
+        return doubt;
+    }
+    let sentence = format!("in period {period}, with period {} put right: {}", correction.period, doubt.sentence);
+    Doubt { sentence, ..doubt }
+}

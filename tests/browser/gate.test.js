@@ -1,0 +1,125 @@
+// What is reported is asked about before it is recorded wrongly, and what was not recorded says so.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { browser, call, service, trained } from "./ballast.js";
+import { dashboardModule } from "./modules.js";
+import { plain, usable, visitQuiet } from "./page.js";
+
+const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
+
+let ballast, chromium, page, policy;
+
+before(async () => {
+  [ballast, chromium] = await Promise.all([service(), browser()]);
+  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  page.setDefaultTimeout(20_000);
+  policy = await trained(ballast.url, { problem: { horizon: 12, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY }, design: { count: 12 } });
+});
+
+after(async () => {
+  await chromium?.close();
+  await ballast?.stop();
+});
+
+const open = async (name) => (await call(ballast.url, "/sessions", { policy, name })).session;
+const report = (session, period, more) => call(ballast.url, "/observe", { session, period, ...more });
+const observed = async (session) => (await call(ballast.url, `/sessions/${session}/history`)).observations;
+const go = (hash, on = page) => visitQuiet(on, `${ballast.url}/${hash}`);
+const main = async (on = page) => plain(await on.locator("main").innerText());
+
+test("a skipped month is asked about, and reported as missing in one click", async () => {
+  const session = await open("Quentin");
+  await report(session, 1, { simple_return: 0.01, date: "2019-05-31" });
+  await go(`#/sessions/${session}`);
+  assert.equal(await page.getByLabel("Last day").first().inputValue(), "2019-06-30");
+  await page.getByLabel("Return in June 2019, %").fill("2");
+  await page.getByLabel("Last day").first().fill("2019-11-30");
+  await page.getByRole("button", { name: "Report June 2019" }).click();
+  await page.getByText("5 periods are missing before 30 Nov 2019: those to 30 Jun 2019 up to 31 Oct 2019.").waitFor();
+  assert.equal((await observed(session)).length, 1);
+  await page.getByRole("button", { name: "Report 5 periods as missing, then this one" }).click();
+  await page.getByRole("heading", { name: "December 2019, period 8 of 12" }).waitFor();
+  assert.match(await main(), /November 2019 is recorded\. Wealth [\d.,]+\./);
+  const rows = await observed(session);
+  assert.deepEqual(rows.map(({ log_return, date }) => [log_return === null, date.slice(0, 7)]), [[false, "2019-05"], ...["06", "07", "08", "09", "10"].map((month) => [true, `2019-${month}`]), [false, "2019-11"]]);
+});
+
+test("a report that somebody else was faster with stays on the page, beside what was typed, and is put right by a press", async () => {
+  const session = await open("Ada");
+  await report(session, 1, { simple_return: 0.01, date: "2019-05-31" });
+  const other = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  await go(`#/sessions/${session}`, other);
+  await report(session, 2, { simple_return: 0.017, date: "2019-06-30" });
+  await other.getByLabel("Return in June 2019, %").fill("-5");
+  await other.getByRole("button", { name: "Report June 2019" }).click();
+  const alert = other.getByRole("alert").filter({ hasText: "Not recorded" });
+  await alert.waitFor();
+  assert.match(plain(await alert.innerText()), /^Not recorded: June 2019 was reported as 1\.70 % a moment ago\. You typed -5\.00 %\./);
+  await alert.getByRole("button", { name: "Correct it" }).click();
+  await other.getByText("The period is put right.", { exact: false }).first().waitFor();
+  const [, june] = await observed(session);
+  assert.ok(Math.abs(june.now.log_return - Math.log(0.95)) < 1e-12);
+  await other.close();
+});
+
+test("a period is put in by the form for corrections, and the last one is taken out", async () => {
+  const session = await open("Ida");
+  await report(session, 1, { simple_return: 0.01, date: "2019-05-31" });
+  await report(session, 2, { simple_return: 0.02, date: "2019-07-31", confirm: true });
+  await go(`#/sessions/${session}`);
+  const fold = page.getByText("Put a period right");
+  await fold.click();
+  const form = page.locator("form", { has: page.getByLabel("What is wrong") });
+  await form.getByLabel("What is wrong").selectOption("A period before it was skipped");
+  await form.getByLabel("Why").fill("June was skipped");
+  await form.getByRole("button", { name: "Put it right" }).click();
+  await page.getByText(/June 2019 was put in on .*: June was skipped/).waitFor();
+  assert.deepEqual((await observed(session)).map(({ date }) => date), ["2019-05-31", "2019-06-30", "2019-07-31"]);
+  page.once("dialog", (dialog) => dialog.accept());
+  await page.getByRole("button", { name: "take the period out" }).click();
+  await page.getByRole("heading", { name: "July 2019, period 3 of 12" }).waitFor();
+  assert.equal((await observed(session)).length, 2);
+});
+
+test("a batch proposes the day, asks about what differs, fills gaps and says what is to be done", async () => {
+  const names = ["Alma", "Bo", "Cleo", "Dina"];
+  const sessions = [];
+  for (const name of names) sessions.push(await open(name));
+  for (const [index, session] of sessions.entries()) await report(session, 1, { simple_return: 0.01, date: index === 3 ? "2019-04-30" : "2019-05-31" });
+  await go(`#/report?sessions=${sessions.join(",")}`);
+  const day = page.getByLabel("Last day");
+  assert.equal(await day.inputValue(), "2019-06-30");
+  await page.getByLabel("Sessions and their returns, %").fill("Alma 2.13\nBo 2.13\nCleo 5\nDina 2.13");
+  await page.getByRole("button", { name: "Report for 4" }).click();
+  const outcomes = page.getByRole("table", { name: "Outcomes" });
+  await outcomes.getByText(/3 of the 4 reports for this policy and day say 2\.13 %, and this one 5\.00 %/).waitFor();
+  await outcomes.getByText("The period to 31 May 2019 is missing before 30 Jun 2019.", { exact: false }).waitFor();
+  await outcomes.getByText(/^(Buy|Sell) [\d.]+$|^Nothing$/).first().waitFor();
+  await page.getByRole("button", { name: "Report the 1 missing period of 1 session as missing, and then what is left" }).click();
+  await page.getByText("1 return is recorded, and 1 left above for another try.").first().waitFor();
+  assert.deepEqual((await observed(sessions[3])).map(({ log_return }) => log_return === null), [false, true, false]);
+  // Neither a press nor a list without the others makes it pass.
+  assert.equal(await page.getByRole("button", { name: "Report", exact: true }).isDisabled(), true);
+  await page.getByLabel("What is doubted is meant").check();
+  await page.getByRole("button", { name: "Report for 1" }).click();
+  await page.getByText("1 return is recorded.").first().waitFor();
+  assert.equal((await observed(sessions[2])).length, 2);
+});
+
+test("the day proposed is the end of the last period", async () => {
+  const { lastEnd } = await dashboardModule("periods.js");
+  const ends = [[12, "2026-11-25", "2026-10-31"], [12, "2026-11-30", "2026-11-30"], [4, "2026-11-25", "2026-09-30"], [4, "2026-12-31", "2026-12-31"], [1, "2026-11-25", "2025-12-31"], [52, "2026-11-25", "2026-11-20"], [252, "2026-11-22", "2026-11-20"], [null, "2026-11-25", null]];
+  for (const [periods, today, end] of ends) assert.equal(lastEnd(periods, today), end, `${periods} ${today}`);
+});
+
+test("axe finds nothing in what is asked", async () => {
+  const session = await open("Eve");
+  await report(session, 1, { simple_return: 0.01, date: "2019-05-31" });
+  await usable(page, async () => {
+    await go(`#/sessions/${session}`);
+    await page.getByLabel("Return in June 2019, %").fill("50");
+    await page.getByRole("button", { name: "Report June 2019" }).click();
+    await page.getByText("Not recorded yet.").waitFor();
+  });
+});
