@@ -5,7 +5,7 @@ use std::error::Error;
 
 use ballast::control::error::FieldError;
 use ballast::control::request::learning::Learning;
-use ballast::control::request::rules::largest_sample;
+use ballast::control::request::rules::BRIDGE_NUMBERS;
 use ballast::control::request::specification::{ProblemSpecification, default_seed};
 use ballast::service::advise::Advise;
 use clap::Args;
@@ -77,7 +77,8 @@ impl AdviseArgs {
 /// The error of a question about `count` returns, under the name by which the user knows the field.
 fn by_option(error: FieldError, count: usize, record: &Record) -> FieldError {
     if error.field == "problem.radius.paths" {
-        let most = error.value.parse().map_or(0, largest_sample);
+        // Of one step: the returns and one more.
+        let most = error.value.parse().map_or(0, |paths: usize| BRIDGE_NUMBERS / paths.max(1) - 1);
         let rule = format!(
             "must be at most {most}, as the radius is not simulated for more: --window {most} uses the last ones"
         );

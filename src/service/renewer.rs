@@ -2,7 +2,7 @@
 //!
 //! What is to be done is found in the store each time anew, so that it goes on after a kill between any two steps, and on
 //! every replica alike. A session is due by its entries; the job that trains its next policy is found by the session's request
-//! ([`TrainingRequest`]), which names session, renewal and attempt; and the renewal has a number. Whoever does a step that
+//! ([`crate::store::TrainingRequest`]), which names session, renewal and attempt; and the renewal has a number. Whoever does a step that
 //! another did already finds that it was done. Sessions of a tenant that need one policy wait for one job.
 //!
 //! An attempt that fails leaves the session as it is, and is followed by the next after a while that doubles each time.
@@ -11,14 +11,12 @@ use std::time::Duration;
 
 use futures_util::StreamExt;
 use futures_util::stream::FuturesUnordered;
-use serde::Serialize;
 use tokio::sync::mpsc::Receiver;
 use tokio::time::MissedTickBehavior;
-use utoipa::ToSchema;
 
+use self::attempts::{Attempts, request};
 use self::naming::next_labels;
-use self::turns::Turns;
-use self::waiting::Waiting;
+use self::under_way::{Left, UnderWay};
 use super::clock::Clock;
 use super::error::ServiceError;
 use super::jobs::Jobs;
@@ -32,7 +30,7 @@ use super::shutdown::Shutdown;
 use crate::control::error::FieldError;
 use crate::control::request::assets::AssetsProblem;
 use crate::control::request::specification::{Interval, Specification};
-use crate::store::{Actor, JobRow, JobState, SessionTraining, Store, TrainingRequest};
+use crate::store::{Actor, JobRow, JobState, SessionTraining, Store};
 
 /// Between two looks at jobs that train next policies.
 const PAUSE: Duration = Duration::from_millis(500);
@@ -46,111 +44,22 @@ const LONGEST_DELAY: Duration = Duration::from_hours(24);
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Sessions read in one step of a round.
 const PAGE: usize = 256;
-/// Sessions of one tenant that are renewed at a time in this process: a bound of memory, half a megabyte. Those beyond it
-/// follow.
-const OF_ONE: usize = 4096;
 /// Sessions told of that are not looked at yet; of more a round finds out.
 pub(super) const TOLD: usize = 1024;
 
+mod attempts;
 mod naming;
 mod turns;
+mod under_way;
 mod waiting;
 
-/// Where a renewal is that is due.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-pub struct RenewalDue {
-    /// Its number.
-    pub renewal: usize,
-    pub state: RenewalState,
-    /// The job that trains the policy, or last did; null before there is one.
-    pub job: Option<String>,
-    /// Why the last attempt failed.
-    pub error: Option<String>,
-    /// Jobs so far.
-    pub attempts: usize,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum RenewalState {
-    /// Its policy is about to be trained.
-    Due,
-    /// Its policy is trained.
-    Training,
-    /// The last attempt failed; the next one comes by itself. Until then the session goes on by its policy.
-    Failed,
-    /// Its policy is there, and about to be gone on by.
-    Trained,
-}
-
-/// The jobs that train the next policy of a session that is due.
-struct Attempts {
-    number: usize,
-    count: usize,
-    last: Option<JobRow>,
-}
-
-impl Attempts {
-    async fn of(store: &Store, live: &Live) -> Result<Self, ServiceError> {
-        let (number, mut last, mut count) = (live.renewals + 1, None, 0);
-        while let Some(job) = store.job_by_key(&live.row.tenant, &request(live, number, count).key()).await? {
-            (last, count) = (Some(job), count + 1);
-        }
-        Ok(Attempts { number, count, last })
-    }
-
-    fn told(self) -> RenewalDue {
-        let state = match self.last.as_ref().map(|job| job.state) {
-            None => RenewalState::Due,
-            Some(JobState::Queued | JobState::Running) => RenewalState::Training,
-            Some(JobState::Failed | JobState::Cancelled) => RenewalState::Failed,
-            Some(JobState::Succeeded) => RenewalState::Trained,
-        };
-        let (job, error) = self.last.map_or((None, None), |row| (Some(row.job), row.error));
-        RenewalDue { renewal: self.number, state, job, error, attempts: self.count }
-    }
-}
-
-fn request(live: &Live, renewal: usize, attempt: usize) -> TrainingRequest {
-    TrainingRequest { session: live.row.session.clone(), renewal, attempt }
-}
-
-impl Sessions {
-    /// Where the next renewal of a session is; `None` where it is not due.
-    ///
-    /// # Errors
-    /// The store does not answer.
-    pub async fn renewal(&self, live: &Live) -> Result<Option<RenewalDue>, ServiceError> {
-        if !live.is_due() {
-            return Ok(None);
-        }
-        Ok(Some(Attempts::of(&self.store, live).await?.told()))
-    }
-}
-
-/// What is left to do for a session.
-enum Left {
-    Nothing,
-    /// Once the job has ended.
-    Job(String),
-    /// Once the queue has room for its training.
-    Room,
-}
+pub use self::attempts::{RenewalDue, RenewalState};
 
 pub(super) struct Renewer {
     pub store: Store,
     pub clock: Clock,
     pub sessions: Sessions,
     pub jobs: Jobs,
-}
-
-/// The sessions under way.
-#[derive(Default)]
-struct UnderWay {
-    turns: Turns,
-    waiting: Waiting,
-    /// The session before the first that a round left out, as many of its tenant being under way as may be.
-    left_after: Option<i64>,
 }
 
 impl Renewer {
@@ -338,57 +247,6 @@ impl Renewer {
             SessionTraining::Later => Left::Room,
             SessionTraining::Obsolete => Left::Nothing,
         })
-    }
-}
-
-impl UnderWay {
-    /// Begins with a session; false if as many of its tenant are under way as may be.
-    fn begin(&mut self, name: Name) -> bool {
-        if self.waiting.contains(&name) {
-            return true;
-        }
-        if self.turns.waiting(&name.0) + self.waiting.count(&name.0) >= OF_ONE {
-            return false;
-        }
-        self.turns.queue(name);
-        true
-    }
-
-    /// A session's step is done. One that needed no room in the queue may leave some to the next in line.
-    fn stepped(&mut self, name: Name, left: Left) {
-        self.turns.done(&name);
-        let next = match left {
-            Left::Room => {
-                self.waiting.for_room(name);
-                None
-            }
-            Left::Job(job) => {
-                let next = self.waiting.next_in_line(&name.0);
-                self.waiting.for_job(job, name);
-                next
-            }
-            Left::Nothing => self.waiting.next_in_line(&name.0),
-        };
-        if let Some(name) = next {
-            self.turns.queue(name);
-        }
-    }
-
-    /// The sessions that waited for a job, which has ended: the queue has room for the next in line.
-    fn ended(&mut self, job: &str) -> Vec<Name> {
-        let names = self.waiting.ended(job);
-        let next = names.first().and_then(|(tenant, _)| self.waiting.next_in_line(tenant));
-        if let Some(name) = next {
-            self.turns.queue(name);
-        }
-        names
-    }
-
-    /// Looks again whether the queue has room, for each tenant.
-    fn retry(&mut self) {
-        for name in self.waiting.first_in_line() {
-            self.turns.queue(name);
-        }
     }
 }
 

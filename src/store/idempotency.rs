@@ -6,6 +6,10 @@ use super::error::Failure;
 use super::query::{Connection, query};
 use super::tenant::Tenant;
 
+/// Before the specification of a training that was made for sessions. No caller can send such a key: no header has a line
+/// break.
+pub(super) const FOR_SESSIONS: &str = "shared\n";
+
 /// What tells a repeated request from a new one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RequestKey {

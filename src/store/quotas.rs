@@ -12,9 +12,10 @@
 
 use super::codec::to_sql;
 use super::error::{Failure, OverQuota, Quota};
+use super::idempotency::FOR_SESSIONS;
+use super::job_state::JobState;
 use super::query::{Connection, query};
 use super::tenant::Tenant;
-use super::training_names::queued_by_callers;
 use super::{Store, StoreError};
 
 /// What a row of jobs, policies or sessions takes with its index entries, beside what is counted by its length.
@@ -90,6 +91,17 @@ pub(super) async fn admit_job(connection: &mut Connection<'_>, tenant: &Tenant, 
     }
     let queued = queued_by_callers(connection, tenant, quotas.queued_jobs).await?;
     within(Quota::QueuedJobs, queued, 1, quotas.queued_jobs.into())
+}
+
+/// Counts the queued jobs of a tenant that its callers queued: all but those made for sessions, up to `limit`.
+async fn queued_by_callers(connection: &mut Connection<'_>, tenant: &Tenant, limit: u32) -> Result<i64, Failure> {
+    let queued = query(
+        "SELECT count(*) AS queued FROM (SELECT 1 AS one FROM jobs WHERE tenant = $1 AND state = $2
+             AND NOT EXISTS (SELECT 1 FROM idempotency_keys WHERE idempotency_keys.job = jobs.job
+                             AND substr(idempotency_key, 1, 7) = $3) LIMIT $4) AS waiting",
+    );
+    let queued = queued.bind(tenant.as_str()).bind(JobState::Queued.as_str()).bind(FOR_SESSIONS);
+    connection.row(queued.bind(i64::from(limit))).await?.map_or(Ok(0), |row| row.get("queued"))
 }
 
 /// Adds to what a tenant keeps.

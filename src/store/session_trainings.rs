@@ -13,14 +13,13 @@ use futures_util::FutureExt;
 
 use super::audit::Actor;
 use super::error::Failure;
+use super::idempotency::FOR_SESSIONS;
 use super::job::{JobRow, NewJob};
 use super::jobs::{cancel, count, insert};
 use super::query::{Connection, Row, query};
 use super::quotas::Quotas;
 use super::tenant::Tenant;
-use super::training_names::{
-    FOR_SESSIONS, OF_SESSION, TrainingRequest, name, next_renewal, of_specification, queued_for_sessions,
-};
+use super::training_names::{OF_SESSION, TrainingRequest, name, next_renewal, of_specification, queued_for_sessions};
 use super::{Store, StoreError, turns};
 use crate::control::policy::content_hash;
 

@@ -3,6 +3,7 @@
 //! They are idempotency keys that no caller can send, since no header has a line break, and go with their job.
 
 use super::error::Failure;
+use super::idempotency::FOR_SESSIONS;
 use super::job::{JobKind, JobRow, NewJob};
 use super::job_state::JobState;
 use super::query::{Connection, query};
@@ -11,8 +12,6 @@ use crate::control::policy::content_hash;
 
 /// Before the request of a session.
 pub(super) const OF_SESSION: &str = "renewal\n";
-/// Before the specification of a training that was made for sessions.
-pub(super) const FOR_SESSIONS: &str = "shared\n";
 /// Before that of one which a caller queued.
 const OF_CALLER: &str = "trained\n";
 
@@ -68,21 +67,6 @@ pub(super) async fn queued_for_sessions(connection: &mut Connection<'_>, tenant:
     );
     let queued = queued.bind(tenant.as_str()).bind(JobState::Queued.as_str()).bind(FOR_SESSIONS);
     connection.row(queued).await?.map_or(Ok(0), |row| row.get("queued"))
-}
-
-/// Counts the queued jobs of a tenant that its callers queued: all but those made for sessions, up to `limit`.
-pub(super) async fn queued_by_callers(
-    connection: &mut Connection<'_>,
-    tenant: &Tenant,
-    limit: u32,
-) -> Result<i64, Failure> {
-    let queued = query(
-        "SELECT count(*) AS queued FROM (SELECT 1 AS one FROM jobs WHERE tenant = $1 AND state = $2
-             AND NOT EXISTS (SELECT 1 FROM idempotency_keys WHERE idempotency_keys.job = jobs.job
-                             AND substr(idempotency_key, 1, 7) = $3) LIMIT $4) AS waiting",
-    );
-    let queued = queued.bind(tenant.as_str()).bind(JobState::Queued.as_str()).bind(FOR_SESSIONS);
-    connection.row(queued.bind(i64::from(limit))).await?.map_or(Ok(0), |row| row.get("queued"))
 }
 
 /// Names the training that a caller queued by its specification.

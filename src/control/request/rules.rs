@@ -24,7 +24,7 @@ pub const LOG_RETURN: f64 = 5.0;
 /// Simulated bridge paths.
 pub const PATHS: std::ops::RangeInclusive<usize> = 100..=100_000;
 /// Bridge matrix of 30 million numbers: 240 MB.
-const BRIDGE_NUMBERS: usize = 30_000_000;
+pub const BRIDGE_NUMBERS: usize = 30_000_000;
 /// The same where a calibration reads them for each of a thousand records: about a second.
 const CALIBRATED_NUMBERS: usize = 3_000_000;
 /// Simulated returns of the design: 800 MB.
@@ -56,11 +56,6 @@ pub const FIXED_RADIUS: (f64, f64) = (0.0, 10.0);
 
 /// Checks every rule.
 ///
-/// The most returns of which a radius is simulated for one step by so many paths.
-pub fn largest_sample(paths: usize) -> usize {
-    (BRIDGE_NUMBERS / paths.max(1)).saturating_sub(1)
-}
-
 /// # Errors
 /// The first field, in the order of the request, that breaks its rule.
 pub fn check(specification: &Specification) -> Result<(), FieldError> {

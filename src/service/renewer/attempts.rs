@@ -1,0 +1,82 @@
+//! Where a renewal is, by the jobs that train its policy.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::service::error::ServiceError;
+use crate::service::live::Live;
+use crate::service::sessions::Sessions;
+use crate::store::{JobRow, JobState, Store, TrainingRequest};
+
+/// Where a renewal is that is due.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct RenewalDue {
+    /// Its number.
+    pub renewal: usize,
+    pub state: RenewalState,
+    /// The job that trains the policy, or last did; null before there is one.
+    pub job: Option<String>,
+    /// Why the last attempt failed.
+    pub error: Option<String>,
+    /// Jobs so far.
+    pub attempts: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RenewalState {
+    /// Its policy is about to be trained.
+    Due,
+    /// Its policy is trained.
+    Training,
+    /// The last attempt failed; the next one comes by itself. Until then the session goes on by its policy.
+    Failed,
+    /// Its policy is there, and about to be gone on by.
+    Trained,
+}
+
+/// The jobs that train the next policy of a session that is due.
+pub(super) struct Attempts {
+    pub number: usize,
+    pub count: usize,
+    pub last: Option<JobRow>,
+}
+
+impl Attempts {
+    pub async fn of(store: &Store, live: &Live) -> Result<Self, ServiceError> {
+        let (number, mut last, mut count) = (live.renewals + 1, None, 0);
+        while let Some(job) = store.job_by_key(&live.row.tenant, &request(live, number, count).key()).await? {
+            (last, count) = (Some(job), count + 1);
+        }
+        Ok(Attempts { number, count, last })
+    }
+
+    fn told(self) -> RenewalDue {
+        let state = match self.last.as_ref().map(|job| job.state) {
+            None => RenewalState::Due,
+            Some(JobState::Queued | JobState::Running) => RenewalState::Training,
+            Some(JobState::Failed | JobState::Cancelled) => RenewalState::Failed,
+            Some(JobState::Succeeded) => RenewalState::Trained,
+        };
+        let (job, error) = self.last.map_or((None, None), |row| (Some(row.job), row.error));
+        RenewalDue { renewal: self.number, state, job, error, attempts: self.count }
+    }
+}
+
+/// Returns a session's request for the policy of a renewal.
+pub(super) fn request(live: &Live, renewal: usize, attempt: usize) -> TrainingRequest {
+    TrainingRequest { session: live.row.session.clone(), renewal, attempt }
+}
+
+impl Sessions {
+    /// Where the next renewal of a session is; `None` where it is not due.
+    ///
+    /// # Errors
+    /// The store does not answer.
+    pub async fn renewal(&self, live: &Live) -> Result<Option<RenewalDue>, ServiceError> {
+        if !live.is_due() {
+            return Ok(None);
+        }
+        Ok(Some(Attempts::of(&self.store, live).await?.told()))
+    }
+}
