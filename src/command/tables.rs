@@ -14,8 +14,8 @@ pub fn estimates(strategy: &StrategyReport) -> Vec<(&'static str, Estimate)> {
         ("variance", utility.variance),
         ("quantile_20", utility.quantile_20),
         ("quantile_90", utility.quantile_90),
-        ("max", utility.max),
-        ("min", utility.min),
+        ("max", extreme(utility.max)),
+        ("min", extreme(utility.min)),
         ("certainty_equivalent", strategy.certainty_equivalent),
     ];
     found.extend(wealth(strategy));
@@ -27,6 +27,11 @@ pub fn estimates(strategy: &StrategyReport) -> Vec<(&'static str, Estimate)> {
     found
 }
 
+/// A figure without an interval.
+fn extreme(value: f64) -> Estimate {
+    Estimate { value, low: f64::NAN, high: f64::NAN }
+}
+
 /// Terminal wealth, and what it went through.
 fn wealth(strategy: &StrategyReport) -> [(&'static str, Estimate); 8] {
     let wealth = &strategy.wealth;
@@ -34,8 +39,8 @@ fn wealth(strategy: &StrategyReport) -> [(&'static str, Estimate); 8] {
         ("wealth_mean", wealth.mean),
         ("wealth_quantile_20", wealth.quantile_20),
         ("wealth_quantile_90", wealth.quantile_90),
-        ("wealth_max", wealth.max),
-        ("wealth_min", wealth.min),
+        ("wealth_max", extreme(wealth.max)),
+        ("wealth_min", extreme(wealth.min)),
         ("worst_twentieth", wealth.worst_twentieth),
         ("chance_of_loss", wealth.chance_of_loss),
         ("max_drawdown", wealth.max_drawdown),
@@ -61,8 +66,8 @@ pub fn screen(report: &EvaluationReport) -> String {
             wealth.mean,
             wealth.quantile_20,
             wealth.quantile_90,
-            wealth.min,
-            wealth.max,
+            extreme(wealth.min),
+            extreme(wealth.max),
             wealth.worst_twentieth,
         ];
         let figures: String = figures.iter().map(|figure| format!("{:>13.places$}", figure.value)).collect();
@@ -78,12 +83,17 @@ pub fn screen(report: &EvaluationReport) -> String {
     text + "\n" + &report.sentences.join("\n") + "\n"
 }
 
+/// A figure as CSV has it, nothing where there is none.
+pub fn shown(figure: f64) -> String {
+    if figure.is_nan() { String::new() } else { figure.to_string() }
+}
+
 /// One row a strategy and statistic.
 pub fn csv(report: &EvaluationReport) -> String {
     let mut csv = Csv::new(&["strategy", "statistic", "value", "low", "high"]);
     for strategy in &report.strategies {
         for (name, Estimate { value, low, high }) in estimates(strategy) {
-            let figures = [value, low, high].map(|figure| figure.to_string());
+            let figures = [value, low, high].map(shown);
             csv.row([strategy.strategy.clone(), name.to_owned()].into_iter().chain(figures));
         }
     }

@@ -23,6 +23,7 @@ pub mod law;
 pub mod law_distance;
 pub mod least_variance;
 pub mod levelling;
+pub mod long_run_mean;
 pub mod matern;
 pub mod minimise;
 pub mod moments;

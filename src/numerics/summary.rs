@@ -1,6 +1,7 @@
 //! Order statistics, and estimates with their intervals from clustered samples.
 
 use serde::{Deserialize, Serialize};
+use statrs::function::beta::checked_beta_reg;
 
 use super::student::student_two_sided;
 
@@ -18,6 +19,29 @@ pub fn interpolated_quantile(sorted: &[f64], share: f64) -> f64 {
     let index = (position as usize).min(sorted.len() - 1);
     let next = sorted[(index + 1).min(sorted.len() - 1)];
     sorted[index] + (position - index as f64) * (next - sorted[index])
+}
+
+/// The interval at `level` of a probability of which a share was seen in `count` independent trials, whole or not:
+///
+///   [B(tail; share count, count - share count + 1), B(1 - tail; share count + 1, count - share count)],   tail = (1 - level) / 2,
+///
+/// B(p; a, b) the quantile of the beta law. It holds at least as often as it says, and reaches beyond 0 and 1 where they were seen.
+/// Source: Clopper and Pearson (1934), Biometrika 26; for counts that are not whole Korn and Graubard (1998), Surv. Methodol. 24.
+pub fn share_interval(share: f64, count: f64, level: f64) -> [f64; 2] {
+    let (seen, missed, tail) = (share * count, (1.0 - share) * count, 0.5 * (1.0 - level));
+    let low = if seen > 0.0 { beta_quantile(tail, seen, missed + 1.0) } else { 0.0 };
+    let high = if missed > 0.0 { beta_quantile(1.0 - tail, seen + 1.0, missed) } else { 1.0 };
+    [low, high]
+}
+
+/// The quantile of the beta law, by bisection.
+fn beta_quantile(probability: f64, a: f64, b: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if checked_beta_reg(a, b, middle).is_ok_and(|below| below < probability) { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
 }
 
 /// A figure and the interval around it.
@@ -67,11 +91,19 @@ impl Clustered {
         Estimate { value, low: value - reach, high: value + reach }
     }
 
-    /// The share of values for which `holds`.
+    /// The share of values for which `holds`, within the interval of as many independent trials as tell as much: n p (1 - p) over the
+    /// variance of the shares of the units, n (t_(n-1) / t_(K-1))^2 of those where all or none hold.
+    /// Source: Korn and Graubard (1998), Confidence intervals for proportions with small expected number of positive counts estimated
+    /// from survey data, Surv. Methodol. 24.
     pub fn share<T>(&self, values: &[T], holds: impl Fn(&T) -> bool) -> Estimate {
         let shares: Vec<f64> = values.iter().map(|value| if holds(value) { 1.0 } else { 0.0 }).collect();
         let found = self.mean(&shares);
-        Estimate { low: found.low.max(0.0), high: found.high.min(1.0), ..found }
+        let (size, share) = (shares.len() as f64, found.value);
+        let error = (found.high - share) / self.spread;
+        let independent = if error > 0.0 { (share * (1.0 - share) / (error * error)).min(size) } else { size };
+        let fewer = (student_two_sided(self.level, size - 1.0) / self.spread).powi(2);
+        let [low, high] = share_interval(share, independent * fewer, self.level);
+        Estimate { value: share, low, high }
     }
 
     /// The mean squared deviation of all values from their mean.
@@ -103,44 +135,15 @@ impl Clustered {
         self.mean(&values.iter().map(|value| edge - (edge - value).max(0.0) / share).collect::<Vec<f64>>())
     }
 
-    /// The largest value of a group, averaged over groups, and the central interval of its exact bootstrap law: a group
-    /// at random, as many values of it drawn with replacement, so P(largest <= x) is the mean over groups of F(x)^group.
-    pub fn largest(&self, values: &[f64]) -> Estimate {
-        let size = self.group as f64;
-        let mut atoms: Vec<(f64, f64)> = Vec::new();
-        let mut sum = 0.0;
-        for group in values.chunks(self.group) {
-            let mut sorted = group.to_vec();
-            sorted.sort_by(|left, right| right.total_cmp(left));
-            sum += sorted[0];
-            for (rank, &value) in sorted.iter().enumerate() {
-                let (at_most, below) = ((size - rank as f64) / size, (size - rank as f64 - 1.0) / size);
-                let mass = at_most.powf(size) - below.powf(size);
-                if at_most.powf(size) < f64::EPSILON {
-                    break;
-                }
-                atoms.push((value, mass));
-            }
-        }
-        atoms.sort_by(|left, right| left.0.total_cmp(&right.0));
-        let groups = values.len() as f64 / size;
-        let at = |share: f64| {
-            let mut cumulative = 0.0;
-            let reached = atoms.iter().find(|(_, mass)| {
-                cumulative += mass / groups;
-                cumulative >= share
-            });
-            reached.or(atoms.last()).map_or(f64::NAN, |atom| atom.0)
-        };
-        let tail = 0.5 * (1.0 - self.level);
-        Estimate { value: sum / groups, low: at(tail), high: at(1.0 - tail) }
+    /// The largest value of a group, averaged over groups. It has no interval: a sample says next to nothing of what lies beyond it.
+    pub fn largest(&self, values: &[f64]) -> f64 {
+        let of_group = |group: &[f64]| group.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        values.chunks(self.group).map(of_group).sum::<f64>() * self.group as f64 / values.len() as f64
     }
 
     /// As [`Self::largest`], of the smallest.
-    pub fn smallest(&self, values: &[f64]) -> Estimate {
-        let mirrored: Vec<f64> = values.iter().map(|value| -value).collect();
-        let found = self.largest(&mirrored);
-        Estimate { value: -found.value, low: -found.high, high: -found.low }
+    pub fn smallest(&self, values: &[f64]) -> f64 {
+        -self.largest(&values.iter().map(|value| -value).collect::<Vec<f64>>())
     }
 }
 
@@ -164,8 +167,6 @@ mod tests {
         let sample = Clustered::new(4, 5, 0.95);
         assert_estimate(sample.mean(&VALUES), [0.98, 0.4392962226601318, 1.5207037773398682]);
         assert_estimate(sample.variance(&VALUES), [0.3906, 0.1398822021839391, 0.641317797816061]);
-        // Shares 1, 0.4, 0.8, 0.8 of the groups reach past 1 by t.
-        assert_estimate(sample.share(&VALUES, |value| *value <= 1.6), [0.75, 0.3495509549328149, 1.0]);
         let mut sorted = VALUES;
         sorted.sort_by(f64::total_cmp);
         assert_estimate(sample.quantile(&VALUES, &sorted, 0.9), [1.9, 1.2383380049902388, 2.2]);
@@ -183,6 +184,16 @@ mod tests {
         assert!((sample.lowest(&VALUES, 1.0).value - sample.mean(&VALUES).value).abs() < 1e-12);
     }
 
+    /// R: binom.test(3, 20, conf.level = 0.9), and the rule of three.
+    #[test]
+    fn shares_have_the_interval_of_clopper_and_pearson() {
+        let [low, high] = share_interval(0.15, 20.0, 0.9);
+        assert!((low - 0.042_169).abs() < 1e-5 && (high - 0.343_664).abs() < 1e-5, "{low} {high}");
+        assert_eq!(share_interval(0.0, 100.0, 0.9)[0], 0.0);
+        assert!((share_interval(0.0, 100.0, 0.9)[1] - (1.0 - 0.05_f64.powf(0.01))).abs() < 1e-12);
+        assert_eq!(share_interval(1.0, 100.0, 0.9)[1], 1.0);
+    }
+
     #[test]
     fn a_single_group_is_a_sample_of_its_values() {
         let found = Clustered::new(1, 20, 0.8).mean(&VALUES);
@@ -190,14 +201,36 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_has_its_bootstrap_law() {
+    fn the_largest_is_that_of_a_group_averaged() {
         let values: Vec<f64> = (1..=100).map(f64::from).collect();
-        // P(largest of 100 draws <= k) = (k / 100)^100: 0.0169 at 96, 0.0476 at 97, 0.366 at 99.
-        assert_estimate(Clustered::new(1, 100, 0.95).largest(&values), [100.0, 97.0, 100.0]);
-        assert_estimate(Clustered::new(1, 100, 0.95).smallest(&values), [1.0, 1.0, 4.0]);
-        // Two groups, one a thousand higher: the mean of two such laws, so 0.0238 at 97.
-        let both: Vec<f64> = values.iter().copied().chain(values.iter().map(|value| value + 1000.0)).collect();
-        assert_estimate(Clustered::new(2, 100, 0.95).largest(&both), [600.0, 98.0, 1100.0]);
+        assert_eq!(
+            [Clustered::new(1, 100, 0.95).largest(&values), Clustered::new(1, 100, 0.95).smallest(&values)],
+            [100.0, 1.0]
+        );
+        assert_eq!(Clustered::new(2, 50, 0.95).largest(&values), 75.0);
+    }
+
+    /// A share of 0.3 % of 100 values, which most samples do not show at all; one of 30 %; and one of 3 % that comes in whole groups,
+    /// of which one in ten has a third.
+    #[test]
+    fn intervals_of_shares_hold_the_truth_at_least_as_often_as_they_say() {
+        use rand::RngExt;
+        let mut generator = crate::numerics::streams::stream(2, "test", 0, 0);
+        let cases = [(1, 100, 0.003, 1.0), (1, 100, 0.3, 1.0), (30, 20, 0.3, 0.1)];
+        for (groups, group, chance, among) in cases {
+            let sample = Clustered::new(groups, group, 0.9);
+            let mut held = 0;
+            for _ in 0..500 {
+                let mut values = Vec::new();
+                for _ in 0..groups {
+                    let chance = if generator.random::<f64>() < among { chance } else { 0.0 };
+                    values.extend((0..group).map(|_| generator.random::<f64>() < chance));
+                }
+                let found = sample.share(&values, |hit| *hit);
+                held += i32::from(found.low <= chance * among && chance * among <= found.high);
+            }
+            assert!(held >= 435, "{groups} {chance}: {held} of 500");
+        }
     }
 
     #[test]

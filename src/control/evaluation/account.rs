@@ -3,8 +3,6 @@
 use crate::control::evaluation::rolling::Period;
 use crate::control::problem::actions::Band;
 use crate::control::problem::dynamics::Dynamics;
-use crate::control::problem::utility::{certainty_equivalent, utility};
-use crate::control::request::specification::UtilitySpecification;
 
 /// The books of one strategy: one entry a period, wealth with one more.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,6 +86,11 @@ impl Account {
         self.rolling_growth(year).step_by(year).collect()
     }
 
+    /// The mean share held in each whole year.
+    pub fn yearly_allocation(&self, year: usize) -> Vec<f64> {
+        self.allocations.chunks_exact(year).map(|held| held.iter().sum::<f64>() / year as f64).collect()
+    }
+
     /// The same of the years that begin with every period, one after another.
     pub fn rolling_growth(&self, year: usize) -> impl Iterator<Item = f64> {
         self.wealth.windows(year + 1).map(move |whole| whole[year] / whole[0])
@@ -127,12 +130,6 @@ pub fn mix_ended(periods: &[Dynamics], initial_wealth: f64, mix: f64, returns: &
         (ended.after(wealth, dynamics.contribution), holding)
     };
     periods.iter().zip(returns).fold((Ended::at(initial_wealth), 0.0), step).0
-}
-
-/// Certainty equivalent of mean utility over years that each start with `wealth`.
-pub fn yearly_certainty_equivalent(kind: UtilitySpecification, growth: &[f64], wealth: f64) -> f64 {
-    let total: f64 = growth.iter().map(|growth| utility(kind, wealth * growth)).sum();
-    certainty_equivalent(kind, total / growth.len() as f64)
 }
 
 /// Mean, volatility and Sharpe ratio of a year, from returns of its periods: `mean` and the ratio's excess over the bank
@@ -236,8 +233,5 @@ mod tests {
         assert!((annual.volatility - 0.02 * 2_f64.sqrt()).abs() < 1e-15);
         assert!((annual.sharpe_ratio - 2.0 * 0.015 / (0.005 * 2_f64.sqrt())).abs() < 1e-12);
         assert_eq!(Annual::of(&[0.01, 0.02], &[0.01, 0.02], 12.0).sharpe_ratio, 0.0);
-        let even = yearly_certainty_equivalent(UtilitySpecification::Power { risk_aversion: 2.0 }, &[0.8, 1.2], 100.0);
-        // Harmonic mean: 2 / (1/80 + 1/120).
-        assert!((even - 96.0).abs() < 1e-10);
     }
 }

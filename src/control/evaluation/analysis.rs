@@ -2,9 +2,13 @@
 
 use crate::control::evaluation::account::{Account, keep};
 use crate::control::evaluation::backtest_report::BacktestFigures;
-use crate::control::evaluation::resampling::{INITIAL_WEALTH, Resampled, Scale, Series};
+use crate::control::evaluation::resampling::{Resampled, Series};
 use crate::control::evaluation::rolling::{Decision, Period};
+use crate::control::evaluation::yearly_worth::{
+    INITIAL_WEALTH, MixBooks, Scale, YearlyWorth, at_once, present_at_once,
+};
 use crate::control::problem::actions::Band;
+use crate::numerics::long_run_mean::LongRunMean;
 
 /// One strategy: what it held, and what became of it.
 pub struct Line {
@@ -36,9 +40,13 @@ impl Line {
     /// The constant mix that holds on average what this line held: what its timing is measured against.
     pub fn hindsight(&self, periods: &[Period], cost: f64) -> Line {
         let share = self.account.mean_allocation();
-        let decision = Decision { band: Band::of(&[share]), radius: 0.0, source: None };
         let name = format!("constant {:.1} %", 100.0 * share);
-        Line { hindsight: true, ..Line::new(name, vec![decision; periods.len()], periods, cost) }
+        Line { hindsight: true, ..Line::constant(name, share, periods, cost) }
+    }
+
+    fn constant(name: String, share: f64, periods: &[Period], cost: f64) -> Line {
+        let decision = Decision { band: Band::of(&[share]), radius: 0.0, source: None };
+        Line::new(name, vec![decision; periods.len()], periods, cost)
     }
 
     /// Whether it holds one share throughout: such a line times nothing.
@@ -52,22 +60,26 @@ impl Analysis {
     /// Others are compared with line `main`; all trade at `cost`.
     pub fn of(lines: &[Line], main: usize, periods: &[Period], cost: f64, scale: &Scale) -> Self {
         let bank: Vec<f64> = periods.iter().map(|period| period.bank_return).collect();
-        let own_mix = |line: &Line| (!line.is_constant()).then(|| line.hindsight(periods, cost).account);
-        let mixes: Vec<Option<Account>> = lines.iter().map(own_mix).collect();
-        let series: Vec<Series> = lines
-            .iter()
-            .zip(&mixes)
-            .map(|(line, mix)| Series::of(&line.account, mix.as_ref(), scale.periods_per_year))
-            .collect();
+        let own_mix = |share: f64| Line::constant(String::new(), share, periods, cost).account;
+        let year = scale.periods_per_year;
+        let series: Vec<Series> = lines.iter().map(|line| Series::of(&line.account, year)).collect();
         let resampled = Resampled::of(&series, &bank, scale);
-        let figures = lines.iter().zip(&mixes).enumerate().map(|(index, (line, mix))| {
+        let worths: Vec<YearlyWorth> =
+            lines.iter().map(|line| YearlyWorth::new(scale.utility, &line.account.yearly_growth(year))).collect();
+        let ahead: Vec<LongRunMean> = worths.iter().map(|worth| worths[main].beyond(worth)).collect();
+        let beyond = |(line, worth): (&Line, &YearlyWorth)| {
+            let mix = (!line.is_constant()).then(|| MixBooks::new(line.account.mean_allocation(), own_mix))?;
+            Some(worth.beyond_own_mix(&line.account, &mix, scale))
+        };
+        let beyond = present_at_once(lines.iter().zip(&worths).map(beyond).collect(), scale.seed);
+        let figures = lines.iter().enumerate().zip(at_once(&ahead, scale.seed)).zip(beyond);
+        let figures = figures.map(|(((index, line), adaptive_ahead), beyond)| {
             let zero = line.account.allocations.iter().filter(|allocation| **allocation <= 0.0).count();
             BacktestFigures {
                 strategy: line.name.clone(),
                 hindsight: line.hindsight,
-                performance: resampled.performance(index, &line.account, mix.is_some()),
-                adaptive_ahead: resampled
-                    .estimate(|all| all[main].certainty_equivalent - all[index].certainty_equivalent),
+                performance: resampled.performance(index, &line.account, worths[index].estimate(), beyond),
+                adaptive_ahead,
                 all_bank_share: zero as f64 / line.decisions.len() as f64,
             }
         });

@@ -4,8 +4,8 @@ use jiff::civil::Date;
 
 use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::analysis::{Analysis, Line};
-use crate::control::evaluation::resampling::Scale;
 use crate::control::evaluation::rolling::{Decision, Period, Strategy, WalkForward};
+use crate::control::evaluation::yearly_worth::Scale;
 use crate::control::progress::Watch;
 use crate::control::request::backtest::BacktestRequest;
 use crate::control::request::framework::Framework;

@@ -60,16 +60,19 @@ pub struct BacktestChoices {
     pub seed: u64,
 }
 
-/// How the intervals were made: circular blocks of what was lived, the same for all strategies.
+/// How the intervals were made: of certainty equivalents from what each year adds to them, of chances from whole years, of other figures
+/// by circular blocks of what was lived, the same for all strategies.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BacktestIntervals {
-    /// Probability that an interval is meant to hold.
+    /// Probability that an interval is meant to hold; those of differences all hold at once with it.
     pub confidence: f64,
-    /// How many.
+    /// Differences from one strategy, whose intervals hold at once; those from own mixes are as many as have one.
+    pub comparisons: usize,
+    /// How many, where figures are resampled.
     pub resamples: usize,
-    /// Periods of a block.
+    /// Periods of a block of them.
     pub period_block: usize,
-    /// Years of a block, where whole years are resampled.
+    /// Neighbouring years that may depend on each other.
     pub year_block: usize,
 }
 

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::problem::utility::{marginal_utility, utility};
 use crate::control::request::evaluation::EvaluationRequest;
 use crate::control::request::framework::Framework;
 use crate::numerics::summary::Estimate;
@@ -21,12 +22,12 @@ pub struct EvaluationReport {
     pub reference: String,
     /// Frameworks first, then constant mixes, in the order of the request.
     pub strategies: Vec<StrategyReport>,
+    /// Terminal wealth of all-bank, from which utility is counted: it is 0 there, and grows as the logarithm of wealth does.
+    pub floor: f64,
     /// Common bin edges of terminal utility, ascending.
     pub histogram_edges: Vec<f64>,
     /// Common bin edges of terminal wealth, ascending and evenly apart.
     pub wealth_edges: Vec<f64>,
-    /// Terminal wealth of all in the bank.
-    pub banked: f64,
     /// In the order they were drawn.
     pub histories: Vec<HistoryReport>,
     /// What the figures say of each framework that changes its allocation.
@@ -57,7 +58,8 @@ pub struct StrategyReport {
     pub constant_mix: Option<f64>,
     /// The policy followed; null for constant mixes and where each history had its own.
     pub policy: Option<String>,
-    /// Of terminal wealth.
+    /// Utility of terminal wealth, counted from `floor`: `(U(x) - U(floor)) / (floor U'(floor))`, so that no digits are lost at high risk
+    /// aversion or wealth.
     pub utility: UtilityReport,
     /// Terminal wealth that is worth as much for certain.
     pub certainty_equivalent: Estimate,
@@ -88,10 +90,10 @@ pub struct UtilityReport {
     pub quantile_20: Estimate,
     /// Nine tenths of the paths end with less.
     pub quantile_90: Estimate,
-    /// Of the paths of one history, averaged over histories.
-    pub max: Estimate,
-    /// Of the paths of one history, averaged over histories.
-    pub min: Estimate,
+    /// Of the paths of one history, averaged over histories; an extreme has no interval.
+    pub max: f64,
+    /// Of the paths of one history, averaged over histories; an extreme has no interval.
+    pub min: f64,
 }
 
 /// Terminal wealth, and how it came to be.
@@ -103,10 +105,10 @@ pub struct WealthReport {
     pub quantile_20: Estimate,
     /// Nine tenths of the paths end with less.
     pub quantile_90: Estimate,
-    /// Of the paths of one history, averaged over histories.
-    pub max: Estimate,
-    /// Of the paths of one history, averaged over histories.
-    pub min: Estimate,
+    /// Of the paths of one history, averaged over histories; an extreme has no interval.
+    pub max: f64,
+    /// Of the paths of one history, averaged over histories; an extreme has no interval.
+    pub min: f64,
     /// The mean of the worst twentieth of the paths.
     pub worst_twentieth: Estimate,
     /// Counts of the bins between `wealth_edges`, without the paths that end as all in the bank does.
@@ -213,6 +215,27 @@ pub struct HistoryReport {
 }
 
 impl EvaluationReport {
+    /// The same with utilities as the request defines them, `U(floor) + floor U'(floor) u`.
+    pub fn in_utility(mut self) -> Self {
+        let kind = self.request.problem.utility;
+        let (origin, unit) = (utility(kind, self.floor), self.floor * marginal_utility(kind, self.floor));
+        let absolute = |value: f64| origin + unit * value;
+        for strategy in &mut self.strategies {
+            let found = &mut strategy.utility;
+            for estimate in [&mut found.mean, &mut found.quantile_20, &mut found.quantile_90] {
+                *estimate = estimate.mapped(absolute);
+            }
+            found.variance = found.variance.mapped(|variance| unit * unit * variance);
+            (found.max, found.min) = (absolute(found.max), absolute(found.min));
+            if let Some(difference) = &mut strategy.difference {
+                difference.utility = difference.utility.mapped(|apart| unit * apart);
+            }
+        }
+        let means = self.histories.iter_mut().flat_map(|history| &mut history.mean_utility);
+        means.chain(&mut self.histogram_edges).for_each(|value| *value = absolute(*value));
+        self
+    }
+
     /// The strategy of this name.
     pub fn strategy(&self, name: &str) -> Option<&StrategyReport> {
         self.strategies.iter().find(|strategy| strategy.strategy == name)

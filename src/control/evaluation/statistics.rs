@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::control::evaluation::account::mix_ended;
+use crate::control::evaluation::deciding_paths::few_decide;
 use crate::control::evaluation::paths::{Evaluation, Follower, HistoryStart, Lived, Outcomes};
 use crate::control::evaluation::report::{
     Costs, Coverage, CoverageAtSize, Difference, EvaluationReport, FORMAT, HistoryReport, OwnMix, PeriodReport,
@@ -11,8 +12,9 @@ use crate::control::evaluation::report::{
 use crate::control::evaluation::verdict::beside_own_mix;
 use crate::control::policy::content_hash;
 use crate::control::problem::dynamics::Dynamics;
-use crate::control::problem::utility::{RelativeUtility, utility};
+use crate::control::problem::utility::RelativeUtility;
 use crate::control::request::framework::Framework;
+use crate::control::request::specification::ProblemSpecification;
 use crate::numerics::summary::{Clustered, Estimate, interpolated_quantile};
 
 /// Bins of the histograms.
@@ -39,9 +41,9 @@ impl EvaluationReport {
         let wealth: Vec<Vec<f64>> = (0..count)
             .map(|index| outcomes.outcomes.iter().map(|outcome| outcome.ended[index].wealth).collect())
             .collect();
-        let kind = request.problem.utility;
-        let utilities: Vec<Vec<f64>> =
-            wealth.iter().map(|wealth| wealth.iter().map(|&wealth| utility(kind, wealth)).collect()).collect();
+        let (relative, floor) = relative_utility(&request.problem);
+        let value = |wealth: &f64| relative.value((wealth / floor).ln());
+        let utilities: Vec<Vec<f64>> = wealth.iter().map(|wealth| wealth.iter().map(value).collect()).collect();
         let (edges, wealth_edges) = (edges(&utilities), edges(&wealth));
         let reference = request.frameworks.iter().position(|&framework| framework == Framework::Adaptive).unwrap_or(0);
         let table = Table {
@@ -55,20 +57,21 @@ impl EvaluationReport {
             wealth_edges: &wealth_edges,
             reference,
         };
-        let (_, banked) = table.relative_utility();
         let strategies = (0..count).into_par_iter().map(|index| table.strategy(index));
         let strategies: Vec<StrategyReport> = strategies.collect::<serde_json::Result<_>>()?;
+        let names = strategies.iter().map(|strategy| strategy.strategy.as_str());
+        let few_decide = few_decide(names.zip(&wealth), relative, floor);
         Ok(EvaluationReport {
             format: FORMAT.to_owned(),
             reference: strategies.get(reference).map_or(String::new(), |strategy| strategy.strategy.clone()),
             histories: table.histories(),
-            sentences: strategies.iter().filter_map(sentence).collect(),
+            sentences: strategies.iter().filter_map(sentence).chain(few_decide).collect(),
             strategies,
             request: request.clone(),
             costs,
+            floor,
             histogram_edges: edges,
             wealth_edges,
-            banked,
         })
     }
 }
@@ -145,8 +148,8 @@ impl Table<'_> {
         let sorted = ascending(wealth);
         let put_in =
             problem.initial_wealth + (0..problem.horizon).map(|step| problem.contributions.at(step)).sum::<f64>();
-        let (_, banked) = self.relative_utility();
-        let is_beyond = |wealth: &f64| (wealth - banked).abs() > AT_BANK * banked;
+        let (_, floor) = self.relative_utility();
+        let is_beyond = |wealth: &f64| (wealth - floor).abs() > AT_BANK * floor;
         let histogram = binned(wealth.iter().copied().filter(is_beyond), self.wealth_edges);
         let falls: Vec<f64> = self.outcomes.outcomes.iter().map(|outcome| outcome.ended[index].fall).collect();
         WealthReport {
@@ -220,11 +223,8 @@ impl Table<'_> {
         OwnMix { allocation, beyond: self.apart(&self.wealth[index], &wealth) }
     }
 
-    /// Utility in units of the terminal wealth of all-bank, and that wealth.
     fn relative_utility(&self) -> (RelativeUtility, f64) {
-        let problem = &self.evaluation.request.problem;
-        let floor = Dynamics::of(problem)[0].floor(problem.initial_wealth, 0.0, problem.horizon);
-        (RelativeUtility::new(problem.utility, floor), floor)
+        relative_utility(&self.evaluation.request.problem)
     }
 
     fn relative_utilities(&self, wealth: &[f64]) -> Vec<f64> {
@@ -295,6 +295,12 @@ impl Table<'_> {
         };
         starts.map(report).collect()
     }
+}
+
+/// Utility in units of the terminal wealth of all-bank, and that wealth.
+fn relative_utility(problem: &ProblemSpecification) -> (RelativeUtility, f64) {
+    let floor = Dynamics::of(problem)[0].floor(problem.initial_wealth, 0.0, problem.horizon);
+    (RelativeUtility::new(problem.utility, floor), floor)
 }
 
 /// Whether changing the allocation earned anything.

@@ -106,6 +106,15 @@ impl RelativeUtility {
         }
     }
 
+    /// How much a path that ends at this log gain weighs in a mean utility: `W U'(W)`, W relative wealth.
+    pub fn weight(self, log_gain: f64) -> f64 {
+        match self {
+            RelativeUtility::Exponential { k } => (log_gain - k * log_gain.exp_m1()).min(LARGEST_EXPONENT).exp(),
+            RelativeUtility::Power { eta } => ((1.0 - eta) * log_gain).min(LARGEST_EXPONENT).exp(),
+            RelativeUtility::Log => 1.0,
+        }
+    }
+
     /// `-W U''(W) / U'(W)`.
     pub fn relative_aversion(self, wealth: f64) -> f64 {
         match self {
@@ -170,6 +179,15 @@ pub fn utility(utility: UtilitySpecification, wealth: f64) -> f64 {
             ((1.0 - risk_aversion) * wealth.ln()).exp_m1() / (1.0 - risk_aversion)
         }
         UtilitySpecification::Log {} => wealth.ln(),
+    }
+}
+
+/// U'(x).
+pub fn marginal_utility(utility: UtilitySpecification, wealth: f64) -> f64 {
+    match utility {
+        UtilitySpecification::Exponential { risk_aversion, .. } => (-risk_aversion * wealth).exp(),
+        UtilitySpecification::Power { risk_aversion } => wealth.powf(-risk_aversion),
+        UtilitySpecification::Log {} => 1.0 / wealth,
     }
 }
 

@@ -15,8 +15,10 @@ import { changing, ordinal } from "./verdict.js";
 
 /** Falls listed. */
 const FALLS = 5;
-/** Years below which no strategy is called better than another. */
-const FEWEST_YEARS = 10;
+/** Years below which no strategy is called better than another: a crash that comes once in ten is missing from many shorter records. */
+const FEWEST_YEARS = 30;
+/** A difference within a hundredth of a millionth of wealth is rounding. */
+const ROUNDING = 1e-6;
 /** Years that roll through the record: the first that it holds twice. */
 const ROLLING = [5, 1];
 /** With fewer returns the service is careful with an advice. */
@@ -120,10 +122,10 @@ function conclusions(told) {
   const [best] = real;
   const quoted = `\u201c${main.name}\u201d`;
   const said = [
-    `${best === main || !KNOWN.includes(best.strategy) ? `\u201c${best.name}\u201d` : best.name} is worth the most to this investor: a year from ${START} counts as a sure ${wealth(worth(best))}${best === bank ? "" : `, where all in the bank comes to ${wealth(worth(bank))}`}.`,
+    `${best === main || !KNOWN.includes(best.strategy) ? `\u201c${best.name}\u201d` : best.name} came to the most for this investor in this record: a year from ${START} counts as a sure ${wealth(worth(best))}${best === bank ? "" : `, where all in the bank comes to ${wealth(worth(bank))}`}.`,
   ];
   if (best !== main) said.push(`${quoted} comes ${ordinal(real.indexOf(main) + 1)} of ${real.length}, with ${wealth(worth(main))}.`);
-  if (whole_years < FEWEST_YEARS) said.push(`The record has ${counted(whole_years, "whole year")} to decide about, fewer than ${FEWEST_YEARS}: it does not tell the strategies apart.`);
+  if (whole_years < FEWEST_YEARS) said.push(`The record has ${counted(whole_years, "whole year")} to decide about, fewer than ${FEWEST_YEARS}: it does not tell the strategies apart. A crash that comes once in ten years is missing from many records so short.`);
   else said.push(apart(told, main, quoted));
   said.push(`The worst fall of ${quoted} was ${percent(main.max_drawdown)}, that of all in stocks ${percent(stocks.max_drawdown)}; from ${START} it came to ${wealth(main.final_wealth)}, all in stocks to ${wealth(stocks.final_wealth)}.`);
   if (whole_years >= FEWEST_YEARS && main.beyond_own_mix) said.push(changing({ name: quoted, allocation: main.mean_allocation, beyond: estimate(main.beyond_own_mix), shown: "the record does" }));
@@ -132,15 +134,16 @@ function conclusions(told) {
 }
 
 /** Ahead of whom the record shows it, behind whom, and who cannot be told from it. */
-function apart({ lines }, main, quoted) {
+function apart({ lines, intervals }, main, quoted) {
   const others = lines.filter((line) => line !== main);
-  const ahead = others.filter(({ adaptive_ahead: { interval } }) => interval[0] > 0);
-  const behind = others.filter(({ adaptive_ahead: { interval } }) => interval[1] < 0);
+  const ahead = others.filter(({ adaptive_ahead: { interval } }) => interval[0] > ROUNDING);
+  const behind = others.filter(({ adaptive_ahead: { interval } }) => interval[1] < -ROUNDING);
+  const compared = `${counted(others.length, "comparison")} at once, with ${percent(intervals.confidence, 0)} confidence`;
   const list = (some) => some.map(({ name }) => `\u201c${name}\u201d`).join(", ").replace(/, (?=[^,]*$)/, some.length > 1 && !some.at(-1).name.includes(",") ? " and " : ", ");
   const parts = [ahead.length > 0 && `ahead of ${list(ahead)}`, behind.length > 0 && `behind ${list(behind)}`].filter(Boolean);
-  if (parts.length === 0) return `The record cannot tell ${quoted} from any of the others.`;
+  if (parts.length === 0) return `The record cannot tell ${quoted} from any of the others (${compared}).`;
   const rest = others.length - ahead.length - behind.length;
-  return `The record shows ${quoted} ${parts.join(" and ")}${rest > 0 ? `; it cannot tell it from the other ${rest}` : ""}.`;
+  return `The record shows ${quoted} ${parts.join(" and ")}${rest > 0 ? `; it cannot tell it from the other ${rest}` : ""} (${compared}).`;
 }
 
 /** What is said of them, and what each came to. */

@@ -39,7 +39,7 @@ export function results({ lines, intervals, assets, unit }, sentences, more = ""
       [{ name: "Strategy", cell: ({ name }) => name }, ...columns.map(([key, name, format]) => ({ name, numeric: true, cell: (row) => format(row[key]) }))],
       rows,
     ),
-    h("p", { class: "note" }, `Ranges in the chart hold with ${percent(intervals.confidence, 0)} confidence as far as the past is one draw of what may come.${more} A loss is a year that ends with less than it began with, and the worst 5\u202f% are what the worst of them returned on average: years that begin with every ${unit} count, so that they overlap.`),
+    h("p", { class: "note" }, `Ranges in the chart hold with ${percent(intervals.confidence, 0)} confidence, each by itself, as far as coming years are like those seen.${more} A loss is a year that ends with less than it began with, and the worst 5\u202f% are what the worst of them returned on average: years that begin with every ${unit} count, so that they overlap.`),
   );
 }
 
@@ -58,7 +58,7 @@ export function ranges({ lines, intervals }, names, more) {
   ];
   const cell = (key, format) => (row) => (row[key] ? interval(estimate(row[key]), format) : "\u2013");
   return [
-    h("p", { class: "note" }, `Each range is the middle ${percent(intervals.confidence, 0)} of ${count(intervals.resamples)} circular block-bootstrap resamples, the same for all strategies: blocks of ${counted(intervals.period_block, "period")}, and of ${counted(intervals.year_block, "year")} for certainty equivalents and losses. ${more}`),
+    h("p", { class: "note" }, `Ranges hold with ${percent(intervals.confidence, 0)} confidence. Those of certainty equivalents rest on what each year adds, where ${counted(intervals.year_block, "year")} in a row may depend on each other; those of the differences hold all at once, ${count(intervals.comparisons)} of them from one strategy. A chance of loss counts whole years. The others come from ${count(intervals.resamples)} circular block-bootstrap resamples, the same for all strategies, in blocks of ${counted(intervals.period_block, "period")}, and of ${counted(intervals.year_block, "year")} for the worst years. ${more}`),
     table(
       "Estimates with their ranges",
       [{ name: "Strategy", cell: ({ strategy }) => strategy }, ...columns.map(([key, name, format]) => ({ name, numeric: true, cell: cell(key, format) }))],

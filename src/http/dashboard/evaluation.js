@@ -100,7 +100,7 @@ function conclusions({ reference }, ended) {
 }
 
 function results(report, ended) {
-  const money = (name, figure) => ({ name, numeric: true, cell: (row) => wealth(row.wealth[figure].value) });
+  const money = (name, figure) => ({ name, numeric: true, cell: ({ wealth: { [figure]: found } }) => wealth(found.value ?? found) });
   const share = (name, figure) => ({ name, numeric: true, cell: (row) => percent(row.wealth[figure].value) });
   return section(
     "What each is worth",
@@ -140,7 +140,7 @@ function foremost(ended, reference) {
 
 /** A histogram a strategy, in the bins that wealth was counted in, all on one scale; what ends as the bank does is a bar of its own,
  * and where every path does there is nothing to draw. */
-function spreads({ request, reference, wealth_edges: edges, banked }, ended) {
+function spreads({ request, reference, wealth_edges: edges, floor }, ended) {
   const spread = ended.filter((one) => one.banked < 1);
   if (spread.length === 0) return "";
   const domain = [edges[0], edges.at(-1)];
@@ -148,10 +148,10 @@ function spreads({ request, reference, wealth_edges: edges, banked }, ended) {
   const rest = spread.filter((one) => !shown.includes(one));
   const highest = (some) => Math.max(...some.flatMap((one) => [...one.shares, one.banked]));
   const top = highest(shown);
-  const marks = [{ name: "All in the bank", at: banked }];
+  const marks = [{ name: "All in the bank", at: floor }];
   const drawn = (some, top) =>
-    h("div", { class: "duo" }, some.map((one) => histogram({ title: one.name, shares: one.shares, point: { at: banked, share: one.banked, name: "as all in the bank" }, domain, top, colour: one.colour, marks })));
-  const dashed = ` The dashed line is all in the bank, ${wealth(banked)}; futures that end there are a bar of their own.`;
+    h("div", { class: "duo" }, some.map((one) => histogram({ title: one.name, shares: one.shares, point: { at: floor, share: one.banked, name: "as all in the bank" }, domain, top, colour: one.colour, marks })));
+  const dashed = ` The dashed line is all in the bank, ${wealth(floor)}; futures that end there are a bar of their own.`;
   const others = () => drawn(rest, Math.max(top, highest(rest)));
   return section(
     "How wealth spreads at the end",

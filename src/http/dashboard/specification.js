@@ -27,7 +27,7 @@ export const PAPER = {
 
 const MEANINGS = {
   adaptive: "It guards against the worst market that the returns seen still allow, and learns from every new one.",
-  static: "It guards against the worst market that the history still allows, and does not learn.",
+  static: "It guards against the worst market within the caution that the history asks for, and does not learn.",
   known_law: "It takes the market as known and guards against nothing.",
   plug_in: "It takes the returns seen for the whole truth, and learns.",
   parametric_static:
@@ -67,10 +67,10 @@ const trading = ({ trading_cost: cost }) =>
   cost > 0 ? `Trading costs ${percent(cost, 2)} of what is traded.` : "Trading is free.";
 
 /** The wealth whose utility is `value`. */
-export function worth({ kind, risk_aversion: aversion }, value) {
-  if (kind === "log") return Math.exp(value);
-  if (kind === "power") return (1 + (1 - aversion) * value) ** (1 / (1 - aversion));
-  return -Math.log1p(-aversion * value) / aversion;
+export function worth({ kind, risk_aversion: aversion }, value, floor) {
+  if (kind === "log") return floor * Math.exp(value);
+  if (kind === "power") return floor * (1 + (1 - aversion) * value) ** (1 / (1 - aversion));
+  return floor - Math.log1p(-aversion * floor * value) / aversion;
 }
 
 /** The rule of the radius in a few words. */

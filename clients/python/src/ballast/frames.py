@@ -240,7 +240,7 @@ def evaluation(report: wire.EvaluationReport) -> pd.DataFrame:
     ``certainty_equivalent`` and ``wealth_mean`` are currencies; ``utility_mean``, ``utility_variance`` and so on are
     of terminal utility; ``difference_certainty_equivalent`` and ``difference_utility`` are to the reference, for
     which they are NaN; ``beyond_own_mix`` is what changing the allocation earned, NaN for constant mixes. Each has its
-    interval in the columns with ``_low`` and ``_high``. Raises ``ImportError`` without pandas.
+    interval in the columns with ``_low`` and ``_high``, but for the extremes ``max`` and ``min``. Raises ``ImportError`` without pandas.
     """
     rows = []
     for strategy in report["strategies"]:
@@ -253,7 +253,8 @@ def evaluation(report: wire.EvaluationReport) -> pd.DataFrame:
         row |= _estimate("beyond_own_mix", own_mix.get("beyond"))
         for group in ("wealth", "utility"):
             for name, value in cast(dict[str, Any], strategy)[group].items():
-                row |= _estimate(f"{group}_{name}", value)
+                full = f"{group}_{name}"
+                row |= _estimate(full, value) if isinstance(value, Mapping) else {full: value}
         rows.append(row)
     return require_pandas().DataFrame(rows).set_index("strategy")
 

@@ -4,7 +4,9 @@ use super::report::{AssetsBacktestReport, AssetsFigures, AssetsPeriods, FORMAT};
 use super::words::sentences;
 use super::{AssetsLine, AssetsWalked};
 use crate::control::assets::advice::named;
-use crate::control::evaluation::resampling::{Resampled, Scale, Series, intervals};
+use crate::control::evaluation::backtest_report::BootstrapEstimate;
+use crate::control::evaluation::resampling::{Resampled, Series, intervals};
+use crate::control::evaluation::yearly_worth::{Scale, YearlyWorth, present_at_once};
 
 /// The place of 1/N, with all wealth in equal shares: the last but one.
 fn reference(lines: &[AssetsLine]) -> usize {
@@ -17,11 +19,12 @@ impl AssetsBacktestReport {
         let AssetsWalked { backtest, lines } = walked;
         let (record, choices) = (&backtest.record, &backtest.choices);
         let (year, seed) = (record.periods_per_year, choices.seed);
-        let series: Vec<Series> =
-            lines.iter().map(|line| Series::of(&line.account, line.own_mix.as_ref(), year)).collect();
+        let series: Vec<Series> = lines.iter().map(|line| Series::of(&line.account, year)).collect();
         let scale = Scale { periods_per_year: year, utility: backtest.utility(), seed };
         let resampled = Resampled::of(&series, backtest.bank(), &scale);
-        let strategies: Vec<AssetsFigures> = (0..lines.len()).map(|index| figures(walked, index, &resampled)).collect();
+        let performance = compared(lines, &scale).into_iter().enumerate();
+        let strategies: Vec<AssetsFigures> =
+            performance.map(|(index, compared)| figures(walked, index, compared, &resampled)).collect();
         let whole_years = backtest.lived().len() / year;
         AssetsBacktestReport {
             format: FORMAT.to_owned(),
@@ -31,7 +34,7 @@ impl AssetsBacktestReport {
             dates: backtest.dates().to_vec(),
             whole_years,
             choices: choices.clone(),
-            intervals: intervals(year),
+            intervals: intervals(year, lines.len() - 1),
             periods: lines.iter().map(|line| periods(&record.assets, line)).collect(),
             sentences: sentences(walked, &strategies, whole_years),
             strategies,
@@ -39,16 +42,42 @@ impl AssetsBacktestReport {
     }
 }
 
-fn figures(walked: &AssetsWalked, index: usize, resampled: &Resampled) -> AssetsFigures {
+/// The worth of a strategy, and by how much it exceeds equal shares, and those at its own average total.
+struct Compared {
+    worth: BootstrapEstimate,
+    beyond_equal: Option<BootstrapEstimate>,
+    beyond_own_mix: Option<BootstrapEstimate>,
+}
+
+fn compared(lines: &[AssetsLine], scale: &Scale) -> Vec<Compared> {
+    let worth =
+        |line: &AssetsLine| YearlyWorth::new(scale.utility, &line.account.yearly_growth(scale.periods_per_year));
+    let worths: Vec<YearlyWorth> = lines.iter().map(worth).collect();
+    let equal = reference(lines);
+    let ahead = worths.iter().enumerate().map(|(index, worth)| (index != equal).then(|| worth.beyond(&worths[equal])));
+    let beyond = lines
+        .iter()
+        .zip(&worths)
+        .map(|(line, worth)| line.own_mix.as_ref().map(|mix| worth.beyond_own_mix(&line.account, mix, scale)));
+    let ahead = present_at_once(ahead.collect(), scale.seed);
+    let beyond = present_at_once(beyond.collect(), scale.seed);
+    let all = worths.iter().zip(ahead).zip(beyond);
+    all.map(|((worth, beyond_equal), beyond_own_mix)| Compared {
+        worth: worth.estimate(),
+        beyond_equal,
+        beyond_own_mix,
+    })
+    .collect()
+}
+
+fn figures(walked: &AssetsWalked, index: usize, compared: Compared, resampled: &Resampled) -> AssetsFigures {
     let line = &walked.lines[index];
-    let equal = reference(&walked.lines);
     let assets = &walked.backtest.record.assets;
     let mean = |asset: usize| line.held.iter().map(|shares| shares[asset]).sum::<f64>() / line.held.len() as f64;
     AssetsFigures {
         strategy: line.name.clone(),
-        performance: resampled.performance(index, &line.account, line.own_mix.is_some()),
-        beyond_equal: (index != equal)
-            .then(|| resampled.estimate(|all| all[index].certainty_equivalent - all[equal].certainty_equivalent)),
+        performance: resampled.performance(index, &line.account, compared.worth, compared.beyond_own_mix),
+        beyond_equal: compared.beyond_equal,
         effective_assets: effective_assets(&line.held),
         mean_allocations: named(assets, &(0..assets.len()).map(mean).collect::<Vec<f64>>()),
     }

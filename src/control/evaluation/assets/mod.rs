@@ -11,7 +11,7 @@ use self::report::AssetsChoices;
 use self::rules::{AssetsStrategy, Rule, equal, strategies};
 use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::account::{Account, keep_assets};
-use crate::control::evaluation::resampling::INITIAL_WEALTH;
+use crate::control::evaluation::yearly_worth::{INITIAL_WEALTH, MixBooks};
 use crate::control::pool;
 use crate::control::progress::Watch;
 use crate::control::request::assets::{DATES, check_names, check_rows};
@@ -76,7 +76,7 @@ pub struct AssetsLine {
     /// Its books; an allocation is that in all assets together.
     pub account: Account,
     /// The books of equal shares at its own average total; none of equal shares.
-    pub own_mix: Option<Account>,
+    pub own_mix: Option<MixBooks>,
 }
 
 /// What was decided, and what became of it.
@@ -263,8 +263,8 @@ impl AssetsBacktest {
             |held: &[Vec<f64>]| keep_assets(held, self.lived(), self.bank(), self.choices.trading_cost, INITIAL_WEALTH);
         let account = keep(&held);
         let is_equal = matches!(strategy.rule, Rule::Equal { .. });
-        let mix = || vec![equal(self.record.assets.len(), account.mean_allocation()); held.len()];
-        let own_mix = (!is_equal).then(|| keep(&mix()));
+        let mix = |total| keep(&vec![equal(self.record.assets.len(), total); held.len()]);
+        let own_mix = (!is_equal).then(|| MixBooks::new(account.mean_allocation(), mix));
         let scale = strategy.rule.scale().unwrap_or_default();
         let radius = |period: usize| radii.get(period / self.choices.every).map_or(0.0, |radius| scale * radius);
         let name = strategy.name(|window| self.window_in_words(window));
@@ -277,9 +277,9 @@ mod tests {
     use super::report::AssetsBacktestReport;
     use super::*;
     use crate::control::evaluation::analysis::{Analysis, Line};
-    use crate::control::evaluation::backtest_report::BacktestFigures;
-    use crate::control::evaluation::resampling::Scale;
+    use crate::control::evaluation::backtest_report::{BacktestFigures, BootstrapEstimate};
     use crate::control::evaluation::rolling::{Decision, Period};
+    use crate::control::evaluation::yearly_worth::Scale;
     use crate::control::problem::actions::Band;
 
     const BANK: f64 = 0.002;
@@ -349,6 +349,9 @@ mod tests {
                 (beyond.is_some(), found.performance.beyond_own_mix.is_some()),
                 (strategy.starts_with("robust"), beyond_own_mix.is_some())
             );
+            // Its interval is wider beside more strategies.
+            let value = |found: BootstrapEstimate| BootstrapEstimate { value: found.value, interval: [found.value; 2] };
+            let beyond = beyond.map(|(found, one)| (value(found), value(one)));
             for (found, one) in estimates.into_iter().chain(beyond) {
                 let ends = found.interval.iter().zip(one.interval);
                 let apart =

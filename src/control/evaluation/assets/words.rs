@@ -3,7 +3,7 @@
 use super::report::AssetsFigures;
 use super::{AssetsLine, AssetsWalked};
 use crate::control::evaluation::backtest_report::BootstrapEstimate;
-use crate::control::evaluation::verdict::{cost, few_years, grouped, listed};
+use crate::control::evaluation::verdict::{all_at_once, cost, few_years, grouped, listed};
 
 /// How much of the past a strategy knows.
 pub fn window(window: Option<usize>, year: usize, noun: &str) -> String {
@@ -52,15 +52,16 @@ fn ranking(figures: &[AssetsFigures]) -> String {
 
 fn against_equal(figures: &[AssetsFigures]) -> String {
     let [ahead, behind, unclear] = of_each(figures, |figures| figures.beyond_equal);
+    let compared = all_at_once(figures.len() - 1);
     format!(
-        "By the interval of the difference, ahead of 1/N: {ahead}. Behind it: {behind}. Not to be told apart from it: {unclear}."
+        "By the intervals of the differences, {compared}, ahead of 1/N: {ahead}. Behind it: {behind}. Not to be told apart from it: {unclear}."
     )
 }
 
 fn against_own_mix(figures: &[AssetsFigures]) -> String {
     let [paid, cost, unclear] = of_each(figures, |figures| figures.performance.beyond_own_mix);
     format!(
-        "Against equal shares at their own average total, which nobody knew beforehand, choosing among assets and times paid for: \
+        "Against equal shares at their own average total, which nobody knew beforehand, by intervals that hold at once too, choosing among assets and times paid for: \
          {paid}. It cost: {cost}. The record shows neither for {unclear}."
     )
 }
