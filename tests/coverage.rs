@@ -55,6 +55,22 @@ fn two_returns_are_held_as_often_as_the_binomial_law_says() {
     assert!((found[1].lost.value - 1e4 * gained).abs() < 1e-6, "{} {}", found[1].lost.value, 1e4 * gained);
 }
 
+/// Twenty runs of 100 records whose radii rest on few bridges: what is covered differs between runs as the interval of each says.
+#[test]
+fn intervals_of_coverage_hold_for_other_seeds_too() {
+    let law = DrawnLaw::Continuous(ContinuousLaw::mixture(vec![(1.0, 0.01, 0.1)]));
+    let covered = |seed: u64| {
+        let rules = vec![RadiusRule::Bridge { alpha: 0.1, paths: 50, scale: 1.0 }];
+        let question = CoverageQuestion { records: 100, seed, ..question(rules) };
+        coverage(&law, &question).unwrap()[0].covered.value
+    };
+    let shares: Vec<f64> = (1..=20).map(covered).collect();
+    let mean = shares.iter().sum::<f64>() / 20.0;
+    let variance = shares.iter().map(|share| (share - mean).powi(2)).sum::<f64>() / 19.0;
+    // That of 100 independent records; 19 degrees of freedom exceed 1.9 times their mean once in a hundred.
+    assert!(variance < 1.9 * mean * (1.0 - mean) / 100.0, "{variance} {mean}: {shares:?}");
+}
+
 #[test]
 fn a_centre_mixed_with_the_law_itself_is_nearer_by_the_share_that_was_seen() {
     // Mixed with twenty returns of the law, twenty draws are half as far from it: at most 0.034 where 6 <= k <= 14.

@@ -91,6 +91,28 @@ fn losses_on_blocks_agree_with_brute_force() {
     );
 }
 
+/// Sixteen seeds: the deviation of the figure over them beside the standard error that each interval tells, and no interval reaches
+/// above 0.
+#[test]
+fn intervals_beyond_the_own_mix_are_as_wide_as_seeds_differ() {
+    let history = history(60);
+    let scales = [0.0, 0.5];
+    let found: Vec<FrontierReport> = (1..=16)
+        .map(|seed| report(&json!({ "problem": problem(&history), "scales": scales, "resamples": 100, "seed": seed })))
+        .collect();
+    for index in 0..scales.len() {
+        let beyond = |report: &FrontierReport| report.resampled[0].points[index].beyond_own_mix;
+        let values: Vec<f64> = found.iter().map(|report| beyond(report).value).collect();
+        let mean = values.iter().sum::<f64>() / 16.0;
+        let deviation = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / 15.0).sqrt();
+        // The lower end, which nothing cuts off: 1.66 standard errors of 100 records.
+        let told = found.iter().map(|report| (beyond(report).value - beyond(report).low) / 1.66).sum::<f64>() / 16.0;
+        // A deviation of sixteen errs by a fifth.
+        assert!((0.45..1.7).contains(&(deviation / told)), "{index}: {deviation} {told}");
+        assert!(found.iter().all(|report| beyond(report).high <= 0.0));
+    }
+}
+
 #[test]
 fn at_the_record_itself_it_advises_as_advise_does() {
     let history = history(60);

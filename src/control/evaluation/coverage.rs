@@ -8,6 +8,7 @@
 //!
 //! in basis points a period. All centres and rules see the same records.
 
+use rand::RngExt;
 use rayon::prelude::*;
 
 use crate::control::error::FieldError;
@@ -167,9 +168,11 @@ pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<BallC
     let bank = 1.0 + question.rate_per_step;
     let worth = |allocation: f64| prepared.worth(allocation, bank, utility);
     let (_, best) = maximise_concave_scalar(worth, 0.0, 1.0, ALLOCATION_TOLERANCE);
-    let kept = Kept::default();
     let of_record = |index: usize| -> Result<Vec<[f64; 4]>, FieldError> {
         let record = prepared.record(question, index);
+        // Bridges of its own, or all radii would err alike, and no interval over records would tell. Stream: (seed, "coverage
+        // radius", n, index).
+        let (kept, seed) = (Kept::default(), stream(question.seed, "coverage radius", question.size, index).random());
         let of_centre = |centre: &CentreSpecification| {
             let problem = ProblemSpecification {
                 horizon: 1,
@@ -180,7 +183,7 @@ pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<BallC
             let distance = prepared.distance(&Centre::frozen(&problem));
             let of_rule = |rule: &RadiusRule| {
                 let problem = ProblemSpecification { radius: Some(*rule), ..problem.clone() };
-                let specification = Specification::of(problem, question.seed).completed()?;
+                let specification = Specification::of(problem, seed).completed()?;
                 let (advice, _) = OnePeriod::new(&specification, kept.clone()).advise(0.0)?;
                 let lost = BASIS_POINTS * (best - worth(advice.allocation));
                 Ok([f64::from(u8::from(distance <= advice.radius)), advice.radius, lost, advice.allocation])

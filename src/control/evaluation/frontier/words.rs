@@ -16,7 +16,8 @@ pub(super) fn sentences(resampled: &[Resampled], evidence: f64, per_year: bool) 
         "The average return of the record lies {behind} the bank's by {errors:.1} standard errors: {told}. The first two figures are of markets with that average, the third of one with the bank's; which is true the record says no better than that."
     ));
     sentences.push(
-        "What did best on such records says next to nothing about the future: choose by how much loss from record to record you can bear."
+        "What did best on such records says next to nothing about the future, and the variation from record to record need not fall as \
+         caution grows: more of it speaks for itself only to those who doubt the premium."
             .to_owned(),
     );
     sentences
