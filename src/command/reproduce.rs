@@ -142,7 +142,7 @@ fn write_tables(folder: &Path, whole: &Reproduction) -> Result<(), String> {
                 let Some((_, Estimate { value, low, high })) = ours.iter().find(|(own, _)| own == name) else {
                     continue;
                 };
-                let figures = [*paper, *value, *low, *high].map(|figure| figure.to_string());
+                let figures = [*paper, *value, *low, *high].map(tables::shown);
                 csv.row(
                     [format!("{}", index + 1), strategy.strategy.clone(), (*name).to_owned()]
                         .into_iter()

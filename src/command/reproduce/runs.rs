@@ -5,14 +5,18 @@ use std::error::Error;
 use ballast::control::bellman::problem::Problem;
 use ballast::control::evaluation::paths::{Evaluation, Follower};
 use ballast::control::evaluation::report::EvaluationReport;
+use ballast::control::kept::Kept;
 use ballast::control::pool;
 use ballast::control::problem::sampling_law::continuous_law;
 use ballast::control::problem::utility::utility;
 use ballast::control::request::evaluation::EvaluationRequest;
 use ballast::control::request::framework::Framework;
+use ballast::control::request::specification::Specification;
+use ballast::control::uncertainty::radius::RadiusEstimator;
 use ballast::numerics::empirical::EmpiricalDistribution;
 use ballast::numerics::streams::stream;
 use ballast::numerics::summary::{Clustered, Estimate};
+use rand::RngExt;
 use serde::Serialize;
 use serde_json::json;
 
@@ -83,26 +87,31 @@ pub fn section(plan: &Plan, workshop: &Workshop) -> Result<Section, Box<dyn Erro
     for (table, histories) in TABLES.iter().zip(close) {
         cases.push(case(plan, workshop, &request, &followers, table.quantile, histories)?);
     }
-    Ok(Section { quantiles, all, cases })
+    Ok(Section { quantiles, all: all.in_utility(), cases })
 }
 
 /// Draws histories until each table has enough of its own, or patience ends; the quantiles of all, and the histories.
 fn seek(plan: &Plan, evaluation: &Evaluation) -> (Quantiles, [Vec<Vec<f64>>; 2]) {
     let request = &evaluation.request;
-    let sets = Problem::new(&request.specification(Framework::Adaptive, None)).sets;
+    let specification = request.specification(Framework::Adaptive, None);
+    let sets = Problem::new(&specification).sets;
     let law = continuous_law(&paper::mixture(), &request.problem);
+    // A history belongs to a table by the bridges that its policy has; for the law of Q each has bridges of its own, which makes them
+    // independent.
     let draw = |index: usize| {
         let mut generator = stream(request.seed, "reproduce-seek", index, 0);
         let history: Vec<f64> = (0..SAMPLE_SIZE).map(|_| law.draw(&mut generator)).collect();
-        let found = sets.measure(&EmpiricalDistribution::new(&history)).quantile.map_or(f64::NAN, |found| found.value);
-        (found, history)
+        let seen = EmpiricalDistribution::new(&history);
+        let quantile = |sets: &RadiusEstimator| sets.measure(&seen).quantile.map_or(f64::NAN, |found| found.value);
+        let own = Specification { seed: generator.random(), ..specification.clone() };
+        (quantile(&sets), quantile(&RadiusEstimator::new(&own, Kept::default())), history)
     };
     let mut quantiles: Vec<f64> = Vec::new();
     let mut close: [Vec<Vec<f64>>; 2] = Default::default();
     while quantiles.len() < plan.most_drawn && close.iter().any(|found| found.len() < plan.close_histories) {
         let batch = (quantiles.len()..quantiles.len() + BATCH).collect();
-        for (found, history) in pool::map(batch, draw) {
-            quantiles.push(found);
+        for (found, own, history) in pool::map(batch, draw) {
+            quantiles.push(own);
             for (table, close) in TABLES.iter().zip(&mut close) {
                 if (found / table.quantile - 1.0).abs() <= CLOSENESS {
                     close.push(history.clone());
@@ -138,7 +147,7 @@ fn case(
     let evaluation = Evaluation::starting_at(request.clone(), histories)?;
     let stage = format!("simulating the histories with Q near {target}");
     let (_, report) = workshop.compare(&stage, &evaluation, followers, 0.0)?;
-    Ok(Case { quantile: target, found, report: Some(report) })
+    Ok(Case { quantile: target, found, report: Some(report.in_utility()) })
 }
 
 /// How the gap to the known law closes as histories grow.
@@ -166,8 +175,8 @@ pub struct Slope {
     pub strategy: String,
     pub gap: &'static str,
     pub all: f64,
-    /// Between the two longest histories alone.
-    pub last: f64,
+    /// Between the two longest histories alone, with its interval.
+    pub last: Estimate,
 }
 
 pub fn study(plan: &Plan, workshop: &Workshop) -> Result<Study, Box<dyn Error>> {
@@ -178,21 +187,33 @@ pub fn study(plan: &Plan, workshop: &Workshop) -> Result<Study, Box<dyn Error>> 
     let mut slopes = Vec::new();
     for strategy in ["adaptive", "static"] {
         let own = || rows.iter().filter(|row: &&StudyRow| row.strategy == strategy);
-        for (gap, of) in [("value", value_gap as fn(&StudyRow) -> f64), ("realised", realised_gap)] {
-            let points: Vec<(f64, f64)> = own().map(|row| ((row.sample_size as f64).ln(), of(row).ln())).collect();
-            let last = slope(&points[points.len().saturating_sub(2)..]);
+        for (gap, of) in [("value", value_gap as fn(&StudyRow) -> Estimate), ("realised", realised_gap)] {
+            let gaps: Vec<(f64, Estimate)> = own().map(|row| ((row.sample_size as f64).ln(), of(row))).collect();
+            let points: Vec<(f64, f64)> = gaps.iter().map(|(size, gap)| (*size, gap.value.ln())).collect();
+            let last = last_slope(&gaps);
             slopes.push(Slope { strategy: strategy.to_owned(), gap, all: slope(&points), last });
         }
     }
     Ok(Study { rows, slopes })
 }
 
-fn value_gap(row: &StudyRow) -> f64 {
-    row.value_gap.value
+fn value_gap(row: &StudyRow) -> Estimate {
+    row.value_gap
 }
 
-fn realised_gap(row: &StudyRow) -> f64 {
-    row.realised_gap.value
+fn realised_gap(row: &StudyRow) -> Estimate {
+    row.realised_gap
+}
+
+/// The slope of ln gap between the two largest sizes, whose histories are independent: each gap adds the square of its reach.
+fn last_slope(gaps: &[(f64, Estimate)]) -> Estimate {
+    let last = &gaps[gaps.len().saturating_sub(2)..];
+    let points: Vec<(f64, f64)> = last.iter().map(|(size, gap)| (*size, gap.value.ln())).collect();
+    let value = slope(&points);
+    let reaches = last.iter().map(|(_, gap)| (0.5 * (gap.high - gap.low) / gap.value).powi(2)).sum::<f64>().sqrt();
+    let apart = points.last().map_or(0.0, |one| one.0) - points.first().map_or(0.0, |one| one.0);
+    let reach = reaches / apart;
+    Estimate { value, low: value - reach, high: value + reach }
 }
 
 fn study_size(plan: &Plan, workshop: &Workshop, sample_size: usize) -> Result<Vec<StudyRow>, Box<dyn Error>> {
@@ -206,7 +227,7 @@ fn study_size(plan: &Plan, workshop: &Workshop, sample_size: usize) -> Result<Ve
         let evaluation = Evaluation::new(request)?;
         let followers = workshop.train(&evaluation)?;
         let stage = format!("simulating histories of {sample_size} returns");
-        Ok(workshop.compare(&stage, &evaluation, &followers, 0.0)?.1)
+        Ok(workshop.compare(&stage, &evaluation, &followers, 0.0)?.1.in_utility())
     };
     let adaptive = sized(&[Framework::KnownLaw, Framework::Adaptive], plan.study_count)?;
     // A ladder of one input needs few points, and every history has its own.
@@ -248,5 +269,11 @@ mod tests {
         let points: Vec<(f64, f64)> =
             [20.0, 80.0, 320.0_f64].iter().map(|n| (n.ln(), (3.0 * n.powf(-0.5)).ln())).collect();
         assert!((super::slope(&points) + 0.5).abs() < 1e-12);
+        // Gaps of 2 and 1 at 80 and 320, each within a tenth: the reach is sqrt(0.01 + 0.01) / ln 4.
+        let gap = |value: f64| super::Estimate { value, low: 0.9 * value, high: 1.1 * value };
+        let last = super::last_slope(&[(80_f64.ln(), gap(2.0)), (320_f64.ln(), gap(1.0))]);
+        assert!(
+            (last.value + 0.5).abs() < 1e-12 && (last.high - last.value - 0.02_f64.sqrt() / 4_f64.ln()).abs() < 1e-12
+        );
     }
 }

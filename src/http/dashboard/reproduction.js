@@ -15,6 +15,8 @@ const BINS = 30;
 
 const four = (value) => tick(value, 0.0001);
 const estimate = (found) => interval(found, four);
+/** An extreme has no interval. */
+const statistic = (found) => (typeof found === "number" ? four(found) : estimate(found));
 const named = ({ strategy, framework, constant_mix }) => (framework ? (PAPER[framework] ?? strategy) : `${percent(constant_mix, 0)} in stocks`);
 const find = ({ strategies }, name) => strategies.find(({ strategy }) => strategy === name);
 const number = (name, cell) => ({ name, numeric: true, cell });
@@ -28,7 +30,7 @@ export function body({ plan, quick, sample_size, findings, section: found, study
       h("p", {}, `Bayraktar and Chen, Nonparametric Adaptive Robust Control Under Model Uncertainty, section 3: ${plan.horizon} steps, the bank pays 0.002 a step, exponential utility with risk aversion 0.01, wealth 100, a mixture of two normals, ${sample_size} returns of history, alpha 0.1. Ranges hold with 95 % confidence over initial histories.`),
       quick ? h("p", {}, "This is the quick run: tiny designs and few histories. Its figures mean little.") : "",
     ),
-    section("What holds and what does not", h("div", { class: "duo" }, verdicts("Agrees", findings.filter(({ agrees }) => agrees)), verdicts("Differs", findings.filter(({ agrees }) => !agrees)))),
+    section("What holds and what does not", h("div", { class: "duo" }, ["Agrees", "Differs", "Undecided"].map((title) => verdicts(title, findings.filter(({ verdict }) => verdict === title.toLowerCase()))))),
     quantiles(found),
     ...found.cases.map((one, index) => whole(one, index, printed[index], found)),
     mixes(found.all, printed),
@@ -76,8 +78,8 @@ function statistics(name, paper, own, all, report, everywhere) {
   const columns = [
     { name: "Terminal utility", cell: ([, label]) => label },
     number("Paper", ([, , k]) => four(paper[k])),
-    number(`Here, ${count(report.histories.length)} such histories of ${count(report.request.paths)} paths`, ([key]) => estimate(own.utility[key])),
-    number(`Here, ${count(everywhere.histories.length)} histories of ${count(everywhere.request.paths)} paths`, ([key]) => estimate(all.utility[key])),
+    number(`Here, ${count(report.histories.length)} such histories of ${count(report.request.paths)} paths`, ([key]) => statistic(own.utility[key])),
+    number(`Here, ${count(everywhere.histories.length)} histories of ${count(everywhere.request.paths)} paths`, ([key]) => statistic(all.utility[key])),
   ];
   return [h("h3", {}, name), table(name, columns, STATISTICS.map(([key, label], k) => [key, label, k]))];
 }
@@ -190,10 +192,10 @@ function convergence({ rows, slopes }) {
       ],
       rows,
     ),
-    h("h3", {}, "Fitted powers of the length of history; section 2.4 predicts \u22120.5"),
+    h("h3", {}, "Fitted powers of the length of history; section 2.4 predicts \u22120.5 for the value gap of adaptive"),
     table(
       "Fitted powers of the length of history",
-      [{ name: "Framework", cell: ({ strategy }) => PAPER[strategy] }, { name: "Gap", cell: ({ gap }) => gap }, number("All", ({ all }) => tick(all, 0.01)), number("Last two", ({ last }) => tick(last, 0.01))],
+      [{ name: "Framework", cell: ({ strategy }) => PAPER[strategy] }, { name: "Gap", cell: ({ gap }) => gap }, number("All", ({ all }) => tick(all, 0.01)), number("Last two", ({ last }) => interval(last, (value) => tick(value, 0.01)))],
       slopes,
     ),
   );
