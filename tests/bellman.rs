@@ -9,6 +9,7 @@ use ballast::control::bellman::next_value::NextValue;
 use ballast::control::bellman::problem::Problem;
 use ballast::control::bellman::solution::{Adversary, RobustSolution};
 use ballast::control::policy::advisor::Advisor;
+use ballast::control::policy::worst_case::most_cost;
 use ballast::control::problem::state::{Realised, State};
 use ballast::control::problem::utility::{RelativeUtility, utility};
 use ballast::control::request::learning::Learning;
@@ -302,6 +303,31 @@ fn the_multiplier_is_the_utility_lost_per_unit_of_radius() {
         // The slope of the utility changes by its curvature times the step, and utilities have thirteen digits.
         assert!((middle.1 / slope - 1.0).abs() < 1e-2, "{kind}: {} against {slope}", middle.1);
     }
+}
+
+/// Solved at the wider radius, with an allocation that moves: by a hundred slopes, beyond what is above the floor, where the slope
+/// alone would promise more than there is to lose.
+#[test]
+fn a_wider_ball_costs_at_most_what_is_said() {
+    let mut less_than_the_slope = 0;
+    for kind in utilities() {
+        for radius in [0.0005, 0.002, 0.004, 0.006] {
+            let request = json!({ "problem": { "horizon": 1, "rate_per_step": 0.002, "history": HISTORY, "utility": kind,
+                "radius": { "rule": "fixed", "radius": radius } } });
+            let solved = support::policies::advisor(request);
+            let state = State::new(&HISTORY, 100.0, Learning::default()).unwrap();
+            let at = |radius: f64| solved.explain_within(0, &state, radius);
+            let (advice, worst) = at(radius);
+            for wider in [0.0001, 0.001, 0.01] {
+                let cost = 1e4 * (advice.certainty_equivalent / at(radius + wider).0.certainty_equivalent).ln();
+                let said = most_cost(wider, worst.radius_cost, &advice);
+                // Allocations are found to 1e-6, which moves the worth by less.
+                assert!(cost <= said + 1e-3, "{kind} {radius} {wider}: {cost} of {said}");
+                less_than_the_slope += usize::from(said < 0.99e4 * wider * worst.radius_cost);
+            }
+        }
+    }
+    assert!(less_than_the_slope > 0);
 }
 
 /// Paper, section 2.4, for an order-1 ball: to first order a radius costs the largest slope of the payoff down from any

@@ -11,6 +11,8 @@ use crate::numerics::wasserstein::Move;
 
 /// Radius, in log-return, whose price the sentence tells.
 const RADIUS_UNIT: f64 = 0.001;
+/// Basis points of one.
+const BASIS_POINTS: f64 = 1e4;
 
 /// The law that is worst for the advised allocation: a transport of the ball's centre, or, in the parametric frameworks, a
 /// normal law.
@@ -18,7 +20,8 @@ const RADIUS_UNIT: f64 = 0.001;
 pub struct WorstCase {
     /// Lagrange multiplier of the uncertainty set: utility lost per unit of extra radius.
     pub multiplier: f64,
-    /// The same in log certainty equivalent: what one more unit of radius would cost.
+    /// The same in log certainty equivalent: the slope at this radius, of this period's ball alone. A wider ball costs at most that
+    /// times what it is wider by, and at most all that the advice is worth above the floor.
     pub radius_cost: f64,
     /// Empty in the parametric frameworks.
     pub transport: Vec<TransportedMass>,
@@ -133,6 +136,14 @@ fn moved(transport: &[TransportedMass]) -> (f64, Option<f64>) {
     (moved().map(|mass| mass.mass).sum(), moved().map(|mass| mass.moved_to).reduce(f64::min))
 }
 
+/// Basis points of the certainty equivalent that a ball of this period alone, wider by `wider`, costs at most: the worth is convex in
+/// the radius, so it falls by no more than its slope says, and never below the floor.
+/// Checked by: `tests/bellman.rs::a_wider_ball_costs_at_most_what_is_said`.
+pub fn most_cost(wider: f64, radius_cost: f64, advice: &Advice) -> f64 {
+    let above = (advice.certainty_equivalent / advice.floor).ln();
+    BASIS_POINTS * (wider * radius_cost).min(above).max(0.0)
+}
+
 fn transport_sentence(
     transport: &[TransportedMass],
     advice: &Advice,
@@ -145,16 +156,16 @@ fn transport_sentence(
     {
         format!(
             "Against an allocation of {:.1} %, the worst law within distance {:.4} of {middle} moves {:.1} % of \
-             the probability, down to a return of {:.1} % in one period; against that law the allocation is still worth \
-             {:.2} for certain at the horizon, and all-bank {:.2}. A radius wider by {RADIUS_UNIT} would cost {:.1} basis \
-             points of that.",
+             the probability, down to a return of {:.1} % in one period; against the worst laws of this period and of \
+             any later ones the allocation is still worth {:.2} for certain at the horizon, and all-bank {:.2}. A ball of this \
+             period alone wider by {RADIUS_UNIT} would cost at most {:.2} basis points of that.",
             100.0 * advice.allocation,
             advice.radius,
             100.0 * share,
             100.0 * lowest.exp_m1(),
             advice.certainty_equivalent,
             advice.floor,
-            1e4 * RADIUS_UNIT * radius_cost
+            most_cost(RADIUS_UNIT, radius_cost, advice)
         )
     } else {
         format!(
@@ -177,8 +188,8 @@ fn normal_sentence(worst: NormalLaw, estimate: NormalLaw, advice: &Advice) -> St
     }
     format!(
         "Against an allocation of {:.1} %, the worst normal law in the confidence region has a mean log-return of {:.2} % \
-         and a variance of {:.2e} a period, where {:.2} % and {:.2e} are estimated; against that law the allocation is still \
-         worth {:.2} for certain at the horizon, and all-bank {:.2}.",
+         and a variance of {:.2e} a period, where {:.2} % and {:.2e} are estimated; against the worst laws of this period and of any \
+         later ones the allocation is still worth {:.2} for certain at the horizon, and all-bank {:.2}.",
         100.0 * advice.allocation,
         100.0 * worst.mean,
         worst.variance,

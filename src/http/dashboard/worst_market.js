@@ -1,4 +1,4 @@
-// The worst market that the record still allows: what it assumes, in words, and the law itself.
+// The worst market that the advice guards against: what it assumes, in words, and the law itself.
 
 import { get } from "./api.js";
 import { disclosure, h, section } from "./dom.js";
@@ -36,7 +36,7 @@ export function worstMarket({ id, cautious, calendar: { unit }, leaving }, advic
     const anew = await get(`/action?session=${id}&explain=worst_case`, leaving);
     advice.checked(anew);
     const { worst_case } = anew;
-    paper.append(paperWords(anew));
+    paper.append(paperWords(anew, unit));
     if (worst_case.transport.length === 0) return [h("p", { class: "sentence" }, assumedNormal(worst_case, unit))];
     return [h("p", { class: "sentence" }, assumed(worst_case, unit, cautious)), lawChart(worst_case)];
   };
@@ -53,7 +53,7 @@ export function worstMarket({ id, cautious, calendar: { unit }, leaving }, advic
       then();
     },
   );
-  return section(cautious ? "The worst market your record still allows" : "The market it counts on", holder, disclosure("For the quant", () => paper));
+  return section(cautious ? "The worst market it guards against" : "The market it counts on", holder, disclosure("For the quant", () => paper));
 }
 
 /** Of a market whose returns are a bell curve: its average and its spread beside those seen. */
@@ -63,11 +63,13 @@ function assumedNormal({ normal, sentence }, unit) {
   return `It assumes that stocks return ${average} a ${unit} on average, give or take ${spread}, where ${seenAverage} and ${seenSpread} were seen (as log-returns).`;
 }
 
-function paperWords({ worst_case, radius, sample_size }) {
+function paperWords({ worst_case, radius, sample_size, certainty_equivalent, floor }, unit) {
   const { transport, radius_cost, multiplier, duality_gap } = worst_case;
   const moves = transport.filter(({ atom, moved_to }) => atom !== moved_to);
   const moved = moves.reduce((sum, { mass }) => sum + mass, 0);
   const law = transport.length === 0 ? "" : `The worst law within Wasserstein distance ${figures(radius, 3)} of the ${sample_size} returns seen moves ${percent(moved)} of the probability. `;
-  const words = `${law}A radius wider by 0.001 would cost ${significant(10 * radius_cost, 2)} basis points of the certainty equivalent. Multiplier of the ball ${significant(multiplier, 3)} (utility lost per unit of radius); duality gap ${significant(1e4 * Math.abs(duality_gap), 2)} bp.`;
+  // The worth is convex in the radius, and never below the floor.
+  const most = Math.max(0, Math.min(10 * radius_cost, 1e4 * Math.log(certainty_equivalent / floor)));
+  const words = `${law}A ball of this ${unit} alone wider by 0.001 would cost at most ${significant(most, 2)} basis points of the certainty equivalent. Multiplier of the ball ${significant(multiplier, 3)} (utility lost per unit of radius); duality gap ${significant(1e4 * Math.abs(duality_gap), 2)} bp.`;
   return h("p", { class: "note" }, words);
 }
