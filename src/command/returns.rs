@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use ballast::control::evaluation::account::Annual;
 use ballast::control::evaluation::assets::AssetsRecord;
 use ballast::control::evaluation::rolling::Period;
+use ballast::control::request::annualised::compounded;
 pub use ballast::control::request::frequency::Frequency;
 use ballast::returns::{Choices, Holds, Kind, Question, Reading, Record, Series, Unit, decoded, read};
 use clap::Args;
@@ -203,7 +204,7 @@ impl Returns {
 
     /// What was read, for a reader to see whether it is what he meant.
     pub fn sentence(&self) -> String {
-        let Annual { mean, volatility, .. } = self.annual();
+        let (Annual { mean, volatility, .. }, periods) = (self.annual(), self.periods_per_year as f64);
         let date = |row: Option<&Row>| row.map_or(String::new(), |row| row.date.clone());
         let noun = self.noun();
         let adjective = self.frequency.map_or(String::new(), |frequency| format!("{} ", frequency.adjective()));
@@ -218,10 +219,10 @@ impl Returns {
             self.column,
             self.periods_per_year,
             if self.periods_per_year == 1 { "" } else { "s" },
-            100.0 * mean,
+            100.0 * compounded(mean / periods, periods),
             100.0 * volatility,
             100.0 * self.rate(),
-            100.0 * self.rate() * self.periods_per_year as f64,
+            100.0 * compounded(self.rate(), periods),
             self.bank
         )
     }

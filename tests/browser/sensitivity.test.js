@@ -25,7 +25,7 @@ test("the sentences say what differs, in percent", () => {
     "Without its return of -8.6 % the advice would be 100 %. " +
       "After a return of -7.0 % the advice would be 0 %; after one of 6.0 % it would be 61.2 %. " +
       "A coming return of -6.2 % would take the advice to the bank, and a higher one would not. " +
-      "The record has paid 0.51 % a period beyond the bank; the advice leaves the bank at 0.44 %.",
+      "The record has paid 0.51 % a period beyond what the bank pays now; the advice leaves the bank at 0.44 %.",
   );
 });
 
@@ -55,7 +55,7 @@ test("how near is said first, by what an unusual period would do", () => {
   const moved = (low, high) => plain(headline({ allocation: 0.43, sensitivity: { next_return: { low: at(-0.07, low), high: at(0.06, high) } } }, "month"));
   assert.equal(moved(0, 0.612), "It is near to changing: an unusual month would move it by 43 points.");
   assert.equal(moved(0.4, 0.48), "It moves a little: an unusual month would move it by up to 5.0 points.");
-  assert.equal(moved(0.425, 0.44), "It is steady: hardly any month would move it by more than 2 points.");
+  assert.equal(moved(0.425, 0.44), "It is steady: nine in ten months would move it by less than 2 points.");
 });
 
 test("the page asks by itself, and says it", async () => {

@@ -55,7 +55,7 @@ fn near(Advised { advice, caution, sensitivity, warnings, .. }: &Advised, noun: 
         let present = percent(premium.present, 2);
         let needed = percent(needed, 2);
         told.push(format!(
-            "The record paid {present} a period beyond the bank; at {needed} the advice leaves the bank."
+            "The record paid {present} a period beyond what the bank pays now; at {needed} the advice leaves the bank."
         ));
     }
     told
@@ -82,7 +82,7 @@ fn trade(advice: &Advice, wealth: f64) -> String {
 }
 
 fn why(Advised { advice, worst_case, .. }: &Advised, noun: &str) -> String {
-    let among = format!("Against the worst law that the {} returns do not rule out", advice.sample_size);
+    let among = format!("Against the worst law in the ball around the {} returns", advice.sample_size);
     if advice.allocation <= 0.0 {
         return format!("{among}, nothing beats the bank.");
     }
@@ -190,7 +190,7 @@ mod tests {
         let told = |history: &[f64], holding, cost| told(&advised(history, holding, cost), 2000.0, "week");
         let falling = told(&[-0.01, -0.03], 0.5, 0.0);
         let first = "Hold nothing in the risky asset through the coming week: keep all wealth in the bank. Sell for \
-                     1000.00: 50.0 % is held now.\nAgainst the worst law that the 2 returns do not rule out, nothing beats \
+                     1000.00: 50.0 % is held now.\nAgainst the worst law in the ball around the 2 returns, nothing beats \
                      the bank.\n\n";
         assert!(falling.starts_with(first), "{falling}");
         assert!(told(&[-0.01, -0.03], 0.0, 0.0).contains("bank. Nothing is to be traded: nothing is held now.\n"));

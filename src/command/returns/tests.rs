@@ -23,7 +23,7 @@ fn the_sentence_says_what_was_read() {
     for (text, said) in [
         (
             "Date,Close,Adj Close\n2008-02-29,1,98.98\n2008-01-31,1,101\n2007-12-31,1,100\n",
-            "2 monthly returns of prices, 2008-01 to 2008-02, as in column Adj Close.\nA year of 12 months has a mean of -6.0 % \
+            "2 monthly returns of prices, 2008-01 to 2008-02, as in column Adj Close.\nA year of 12 months has a mean of -5.8 % \
              and a deviation of 7.3 %. The bank pays 0.100 % a month, 1.2 % a year, by --rate. The rows came newest first and \
              are turned round.",
         ),

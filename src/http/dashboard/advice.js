@@ -83,7 +83,7 @@ function order(action, place) {
 
 /** What the advice is worth even then, as the parts of a sentence. */
 export function why({ allocation, certainty_equivalent, floor }, { end, cautious }) {
-  const worst = "n the worst market your record still allows";
+  const worst = "n the worst market it guards against";
   const [even, market] = cautious ? [`Even i${worst}`, `I${worst}`] : Array(2).fill("If the market is what this policy takes it for");
   if (allocation === 0) return [`${market}, nothing beats the bank, which reaches `, h("b", {}, wealth(floor)), ` ${end}.`];
   return [

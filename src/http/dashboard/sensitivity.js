@@ -7,7 +7,7 @@ import { allocation, count, counted, percent, points } from "./format.js";
 /** Frameworks of policies that learn from returns; by the others no return changes the advice. */
 const LEARN = ["adaptive", "plug_in", "parametric_adaptive"];
 
-/** Of longer records the service does not tell it: no one return of so many makes a difference. */
+/** For longer records the service does not compute it. */
 const LONGEST = 360;
 
 const HEADING = "How near it is to changing";
@@ -16,7 +16,7 @@ const HEADING = "How near it is to changing";
 export function nearness({ id, session, policy, leaving, unit }) {
   const said = (words) => ({ element: section(HEADING, h("p", { class: "sentence" }, words)), ask: async () => {} });
   if (!LEARN.includes(policy.specification.problem.framework)) return said("No return changes it: the policy does not learn from what comes.");
-  if (session.sample_size > LONGEST) return said(`It is steady: it rests on ${count(session.sample_size)} returns, of which no single one makes a difference.`);
+  if (session.sample_size > LONGEST) return said(`It rests on ${count(session.sample_size)} returns. Whether a single one makes a difference is computed for records of up to ${count(LONGEST)}.`);
   const holder = h("div", { "aria-live": "polite" }, h("p", { class: "note" }, "Asking for the advice of some hundred other records\u2026"));
   const ask = async () => {
     try {
@@ -36,7 +36,7 @@ const [STEADY, NEAR] = [0.02, 0.1];
 /** How near, in one sentence. */
 export function headline({ allocation: told, sensitivity: { next_return } }, unit = "period") {
   const move = Math.max(...[next_return.low, next_return.high].map((end) => Math.abs(end.allocation - told)));
-  if (move < STEADY) return `It is steady: hardly any ${unit} would move it by more than ${points(STEADY, 0)}.`;
+  if (move < STEADY) return `It is steady: nine in ten ${unit}s would move it by less than ${points(STEADY, 0)}.`;
   const by = points(move, move < 0.1 ? 1 : 0);
   return move < NEAR ? `It moves a little: an unusual ${unit} would move it by up to ${by}.` : `It is near to changing: an unusual ${unit} would move it by ${by}.`;
 }
@@ -72,7 +72,7 @@ function coming({ allocation: told }, { to_bank, to_highest, low, high }, unit) 
 }
 
 function paying({ present, needed, periods_more }, unit) {
-  const paid = `The record has paid ${percent(present, 2)} a ${unit} beyond the bank`;
+  const paid = `The record has paid ${percent(present, 2)} a ${unit} beyond what the bank pays now`;
   if (needed === null) return [`${paid}; no other mean near it would part the bank from holding something.`];
   const leaves = `${paid}; the advice leaves the bank at ${percent(needed, 2)}.`;
   if (periods_more === 0) return [leaves];

@@ -82,7 +82,7 @@ export function severalWorst(action, assets, { unit }) {
       : `It takes most from ${most.name}: ${percent(most.worst, 2)} a ${unit} on average, where ${percent(most.seen, 2)} was seen.`;
   const number = (name, cell) => ({ name, numeric: true, cell });
   return section(
-    "The worst market your record still allows",
+    "The worst market it guards against",
     h("p", { class: "sentence" }, words),
     table(`Average return of each asset a ${unit}`, [
       { name: "Asset", cell: ({ name }) => name },

@@ -17,7 +17,7 @@ export function welcome() {
       { class: "steps" },
       step(
         "Train a policy",
-        "Give it the returns seen so far. It prepares for the worst market your record still allows, in seconds to minutes.",
+        "Give it the returns seen so far. It prepares for the worst market within your caution, in seconds to minutes.",
       ),
       step("Open a session", "A session is one investor: his wealth, and the returns he has lived through."),
       step(

@@ -96,9 +96,9 @@ pub struct NextAdvice {
 /// What the record pays beyond the bank, and what it would have to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Premium {
-    /// Mean log-return of the record less `ln(1 + rate_per_step)`, per period.
+    /// Mean simple return of the record, by its weights, less `rate_per_step`: what it paid a period beyond what the bank pays now.
     pub present: f64,
-    /// The same of the record with every return shifted by the amount at which the advice leaves the bank, to 1e-6: above
+    /// The same of the record with every log-return shifted by the amount at which the advice leaves the bank, to 1e-6: above
     /// `present` where all is in the bank now, else below it. Null where no shift within the distance between the lowest and the
     /// highest return, that leaves all of them in `support`, parts the two. In one period without trading cost the shift is
     /// `ln(1 + rate_per_step)` less the log of the least mean of e^Z in the ball. Checked by: tests/sensitivity.rs against that.

@@ -208,7 +208,12 @@ impl Asked<'_> {
     }
 
     fn present(&self) -> f64 {
-        self.problem.learning.mean(self.record, |log_return| log_return) - self.problem.rate_per_step.ln_1p()
+        self.premium(0.0)
+    }
+
+    /// The mean simple return of the record, every log-return shifted by as much, less what the bank pays.
+    fn premium(&self, shift: f64) -> f64 {
+        self.problem.learning.mean(self.record, |log_return| (log_return + shift).exp_m1()) - self.problem.rate_per_step
     }
 
     fn needed(&self) -> Option<f64> {
@@ -224,7 +229,7 @@ impl Asked<'_> {
             return None;
         }
         let [_, shift] = parted([far.min(0.0), far.max(0.0)], leaves);
-        Some(self.present() + shift)
+        Some(self.premium(shift))
     }
 
     fn periods_more(&self) -> Option<usize> {
