@@ -86,6 +86,22 @@ fn where_nothing_changes_hardly_any_session_is_alarmed() {
     }
 }
 
+/// Returns whose mean falls from the first reported on: the share of 400 sessions that are alarmed within 240 periods. A fall by two
+/// deviations is seen by most, one by a deviation by few where the record is short, and a premium that goes by none.
+#[test]
+fn a_lower_mean_is_seen_only_if_it_is_lower_by_far() {
+    for known in [36, 60, 120, 240] {
+        let share = |fall: f64| {
+            let lower = |period: usize, z: f64| if period > 0 { z - fall } else { z };
+            (0..400).filter(|&seed| bet(seed, known, 240, lower).1.is_some()).count() as f64 / 4.0
+        };
+        let [premium, half, one, two] = [0.125, 0.5, 1.0, 2.0].map(share);
+        println!("{known} returns known, mean lower by an eighth, a half, one and two: {premium} {half} {one} {two} %");
+        assert!(premium < 2.5 && half < 12.0 && two > 50.0, "{known}: {premium} {half} {one} {two}");
+        assert!(known > 60 || one < 25.0, "{known}: {one}");
+    }
+}
+
 /// Returns that are wider from the 25th on: how many of 400 sessions tell it within 240 periods, and after how many. Twice as
 /// wide ones are told by nearly all, in the median within 40 periods.
 #[test]
