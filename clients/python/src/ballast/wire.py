@@ -116,16 +116,21 @@ class AuditPage(TypedDict):
 
 
 class BacktestIntervals(TypedDict):
-    """How the intervals were made: circular blocks of what was lived, the same for all strategies."""
+    """
+    How the intervals were made: of certainty equivalents from what each year adds to them, of chances from whole years, of other figures
+    by circular blocks of what was lived, the same for all strategies.
+    """
 
     confidence: float
-    """Probability that an interval is meant to hold."""
+    """Probability that an interval is meant to hold; those of differences all hold at once with it."""
+    comparisons: int
+    """Differences from one strategy, whose intervals hold at once; those from own mixes are as many as have one."""
     resamples: int
-    """How many."""
+    """How many, where figures are resampled."""
     period_block: int
-    """Periods of a block."""
+    """Periods of a block of them."""
     year_block: int
-    """Years of a block, where whole years are resampled."""
+    """Neighbouring years that may depend on each other."""
 
 
 class BacktestPeriods(TypedDict):
@@ -705,10 +710,10 @@ class Premium(TypedDict):
     """What the record pays beyond the bank, and what it would have to."""
 
     present: float
-    """Mean log-return of the record less `ln(1 + rate_per_step)`, per period."""
+    """Mean simple return of the record, by its weights, less `rate_per_step`: what it paid a period beyond what the bank pays now."""
     needed: NotRequired[float | None]
     """
-    The same of the record with every return shifted by the amount at which the advice leaves the bank, to 1e-6: above
+    The same of the record with every log-return shifted by the amount at which the advice leaves the bank, to 1e-6: above
     `present` where all is in the bank now, else below it. Null where no shift within the distance between the lowest and the
     highest return, that leaves all of them in `support`, parts the two. In one period without trading cost the shift is
     `ln(1 + rate_per_step)` less the log of the least mean of e^Z in the ball. Checked by: tests/sensitivity.rs against that.
@@ -1060,10 +1065,10 @@ class UtilityReport(TypedDict):
     """A fifth of the paths end with less."""
     quantile_90: Estimate
     """Nine tenths of the paths end with less."""
-    max: Estimate
-    """Of the paths of one history, averaged over histories."""
-    min: Estimate
-    """Of the paths of one history, averaged over histories."""
+    max: float
+    """Of the paths of one history, averaged over histories; an extreme has no interval."""
+    min: float
+    """Of the paths of one history, averaged over histories; an extreme has no interval."""
 
 
 class UtilitySpecification1(TypedDict):
@@ -1107,10 +1112,10 @@ class WealthReport(TypedDict):
     """A fifth of the paths end with less."""
     quantile_90: Estimate
     """Nine tenths of the paths end with less."""
-    max: Estimate
-    """Of the paths of one history, averaged over histories."""
-    min: Estimate
-    """Of the paths of one history, averaged over histories."""
+    max: float
+    """Of the paths of one history, averaged over histories; an extreme has no interval."""
+    min: float
+    """Of the paths of one history, averaged over histories; an extreme has no interval."""
     worst_twentieth: Estimate
     """The mean of the worst twentieth of the paths."""
     histogram: list[int]
@@ -1844,7 +1849,10 @@ class WorstCase(TypedDict):
     multiplier: float
     """Lagrange multiplier of the uncertainty set: utility lost per unit of extra radius."""
     radius_cost: float
-    """The same in log certainty equivalent: what one more unit of radius would cost."""
+    """
+    The same in log certainty equivalent: the slope at this radius, of this period's ball alone. A wider ball costs at most that
+    times what it is wider by, and at most all that the advice is worth above the floor.
+    """
     transport: list[TransportedMass]
     """Empty in the parametric frameworks."""
     normal: NotRequired[WorstNormalLaw | None]
@@ -2369,7 +2377,10 @@ class StrategyReport(TypedDict):
     policy: NotRequired[str | None]
     """The policy followed; null for constant mixes and where each history had its own."""
     utility: UtilityReport
-    """Of terminal wealth."""
+    """
+    Utility of terminal wealth, counted from `floor`: `(U(x) - U(floor)) / (floor U'(floor))`, so that no digits are lost at high risk
+    aversion or wealth.
+    """
     certainty_equivalent: Estimate
     """Terminal wealth that is worth as much for certain."""
     wealth: WealthReport
@@ -2455,6 +2466,8 @@ class EvaluationReport(TypedDict):
     """The strategy that differences are taken against."""
     strategies: list[StrategyReport]
     """Frameworks first, then constant mixes, in the order of the request."""
+    floor: float
+    """Terminal wealth of all-bank, from which utility is counted: it is 0 there, and grows as the logarithm of wealth does."""
     histogram_edges: list[float]
     """Common bin edges of terminal utility, ascending."""
     wealth_edges: list[float]
