@@ -60,7 +60,7 @@ fn two_returns_are_held_as_often_as_the_binomial_law_says() {
 fn intervals_of_coverage_hold_for_other_seeds_too() {
     let law = DrawnLaw::Continuous(ContinuousLaw::mixture(vec![(1.0, 0.01, 0.1)]));
     let covered = |seed: u64| {
-        let rules = vec![RadiusRule::Bridge { alpha: 0.1, paths: 50, scale: 1.0 }];
+        let rules = vec![RadiusRule::Bridge { alpha: 0.1, paths: 100, scale: 1.0 }];
         let question = CoverageQuestion { records: 100, seed, ..question(rules) };
         coverage(&law, &question).unwrap()[0].covered.value
     };
