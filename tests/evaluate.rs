@@ -65,7 +65,7 @@ fn simulated(request: Value) -> (Evaluation, Vec<Follower>, Outcomes) {
 
 fn reported(request: Value) -> EvaluationReport {
     let (evaluation, followers, outcomes) = simulated(request);
-    EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS).unwrap().in_utility()
+    EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS).unwrap()
 }
 
 /// E[U] of all-stock: log wealth is a sum of ten draws, so normal given how many came from the first component.
@@ -92,7 +92,7 @@ const ALL_STOCK: f64 = 67.356_594_358_220_6;
 #[test]
 fn constant_mixes_have_their_exact_expectations() {
     let request = json!({ "frameworks": [], "constant_mixes": [0.0, 0.5, 1.0], "paths": 50_000, "level": 0.999 });
-    let report = reported(paper(request));
+    let report = reported(paper(request)).in_utility();
     let bank = report.strategy("all_bank").unwrap();
     // All-bank ends at 100 * 1.002^10 whatever happens.
     assert!((bank.utility.mean.value - 63.947_03).abs() < 5e-6, "{:?}", bank.utility.mean);
@@ -159,7 +159,7 @@ fn losses_and_falls_are_those_of_the_paths() {
 fn the_known_law_promises_its_value_and_keeps_it() {
     let request = json!({ "frameworks": ["known_law"], "constant_mixes": [1.0], "paths": 4000, "level": 0.999,
         "design": { "count": 100 } });
-    let report = reported(paper(request));
+    let report = reported(paper(request)).in_utility();
     let promised = 100.0 * -(-0.01 * report.histories[0].promised[0]).exp_m1();
     assert!((promised - 67.3600).abs() < 1e-3, "{promised}");
     let mean = report.strategies[0].utility.mean;
@@ -360,7 +360,7 @@ fn the_bridge_ball_covers_the_paper_s_law_less_often_than_it_promises() {
         "problem": { "horizon": 1 }, "frameworks": ["adaptive"], "constant_mixes": [],
         "histories": { "kind": "drawn", "count": 500 }, "paths": 100, "level": 0.999,
         "design": { "count": 10 } });
-    let report = reported(paper(request));
+    let report = reported(paper(request)).in_utility();
     let coverage = report.strategies[0].coverage.clone().unwrap();
     let covered = coverage.by_sample_size[0].covered;
     assert!((coverage.target.unwrap() - 0.9).abs() < 1e-12 && covered.high < 0.9, "{covered:?}");

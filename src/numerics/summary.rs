@@ -138,7 +138,7 @@ impl Clustered {
     /// The largest value of a group, averaged over groups. It has no interval: a sample says next to nothing of what lies beyond it.
     pub fn largest(&self, values: &[f64]) -> f64 {
         let of_group = |group: &[f64]| group.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        values.chunks(self.group).map(of_group).sum::<f64>() * self.group as f64 / values.len() as f64
+        values.chunks(self.group).map(of_group).sum::<f64>() / (values.len() as f64 / self.group as f64)
     }
 
     /// As [`Self::largest`], of the smallest.

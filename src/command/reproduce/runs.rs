@@ -29,6 +29,8 @@ use crate::command::compare::Workshop;
 pub const SAMPLE_SIZE: usize = 20;
 /// A history belongs to a table where its quantile is this close to the table's, relatively.
 pub const CLOSENESS: f64 = 0.02;
+/// Histories that share bridges; it divides a batch.
+const GROUP: usize = 50;
 /// Histories drawn before it is asked whether enough were found.
 const BATCH: usize = 2000;
 
@@ -96,15 +98,17 @@ fn seek(plan: &Plan, evaluation: &Evaluation) -> (Quantiles, [Vec<Vec<f64>>; 2])
     let specification = request.specification(Framework::Adaptive, None);
     let sets = Problem::new(&specification).sets;
     let law = continuous_law(&paper::mixture(), &request.problem);
-    // A history belongs to a table by the bridges that its policy has; for the law of Q each has bridges of its own, which makes them
-    // independent.
+    // A history belongs to a table by the bridges that its policy has. For the law of Q each group of them has bridges of its own, and
+    // is the unit of the intervals.
+    let kept = Kept::default();
     let draw = |index: usize| {
         let mut generator = stream(request.seed, "reproduce-seek", index, 0);
         let history: Vec<f64> = (0..SAMPLE_SIZE).map(|_| law.draw(&mut generator)).collect();
         let seen = EmpiricalDistribution::new(&history);
         let quantile = |sets: &RadiusEstimator| sets.measure(&seen).quantile.map_or(f64::NAN, |found| found.value);
-        let own = Specification { seed: generator.random(), ..specification.clone() };
-        (quantile(&sets), quantile(&RadiusEstimator::new(&own, Kept::default())), history)
+        let seed = stream(request.seed, "reproduce-seek", index / GROUP, 1).random();
+        let own = Specification { seed, ..specification.clone() };
+        (quantile(&sets), quantile(&RadiusEstimator::new(&own, kept.clone())), history)
     };
     let mut quantiles: Vec<f64> = Vec::new();
     let mut close: [Vec<Vec<f64>>; 2] = Default::default();
@@ -119,7 +123,7 @@ fn seek(plan: &Plan, evaluation: &Evaluation) -> (Quantiles, [Vec<Vec<f64>>; 2])
             }
         }
     }
-    let sample = Clustered::new(1, quantiles.len(), request.level);
+    let sample = Clustered::new(quantiles.len() / GROUP, GROUP, request.level);
     let mut sorted = quantiles.clone();
     sorted.sort_by(f64::total_cmp);
     let found = Quantiles {

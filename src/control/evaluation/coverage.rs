@@ -8,6 +8,8 @@
 //!
 //! in basis points a period. All centres and rules see the same records.
 
+use std::ops::RangeInclusive;
+
 use rand::RngExt;
 use rayon::prelude::*;
 
@@ -31,6 +33,8 @@ use crate::numerics::summary::{Clustered, Estimate};
 const BASIS_POINTS: f64 = 1e4;
 /// Of the best allocation for a law.
 const ALLOCATION_TOLERANCE: f64 = 1e-6;
+/// Groups of records, as many as divide them.
+const GROUPS: RangeInclusive<usize> = 10..=25;
 /// A record of one return over and over has no ball; it is drawn again, so often at most.
 const DRAWS: usize = 100;
 
@@ -168,11 +172,14 @@ pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<BallC
     let bank = 1.0 + question.rate_per_step;
     let worth = |allocation: f64| prepared.worth(allocation, bank, utility);
     let (_, best) = maximise_concave_scalar(worth, 0.0, 1.0, ALLOCATION_TOLERANCE);
+    // A group of records has bridges of its own and is the unit of the intervals: where all share one set all radii err alike, which
+    // no interval over records would tell.
+    let groups = GROUPS.rev().find(|count| question.records.is_multiple_of(*count)).unwrap_or(question.records);
+    let kept = Kept::default();
     let of_record = |index: usize| -> Result<Vec<[f64; 4]>, FieldError> {
         let record = prepared.record(question, index);
-        // Bridges of its own, or all radii would err alike, and no interval over records would tell. Stream: (seed, "coverage
-        // radius", n, index).
-        let (kept, seed) = (Kept::default(), stream(question.seed, "coverage radius", question.size, index).random());
+        // Stream: (seed, "coverage radius", n, group).
+        let seed = stream(question.seed, "coverage radius", question.size, index * groups / question.records).random();
         let of_centre = |centre: &CentreSpecification| {
             let problem = ProblemSpecification {
                 horizon: 1,
@@ -194,7 +201,7 @@ pub fn coverage(law: &DrawnLaw, question: &CoverageQuestion) -> Result<Vec<BallC
         Ok(balls?.concat())
     };
     let found = (0..question.records).into_par_iter().map(of_record).collect::<Result<Vec<_>, FieldError>>()?;
-    let sample = Clustered::new(question.records, 1, question.level);
+    let sample = Clustered::new(groups, question.records / groups, question.level);
     let of_ball = |ball: usize| {
         let figure = |figure: usize| found.iter().map(|record| record[ball][figure]).collect::<Vec<f64>>();
         BallCoverage {
