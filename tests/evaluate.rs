@@ -173,7 +173,7 @@ fn wealth_is_counted_in_its_own_bins_and_at_the_bank() {
     let cautious = json!({ "problem": { "radius": { "scale": 0.55 } }, "paths": 400 });
     let report = reported(small(cautious));
     let edges = &report.wealth_edges;
-    assert!(edges.len() == 41 && edges.is_sorted() && (report.banked - 100.0 * 1.002_f64.powi(4)).abs() < 1e-9);
+    assert!(edges.len() == 41 && edges.is_sorted() && (report.floor - 100.0 * 1.002_f64.powi(4)).abs() < 1e-9);
     let mut points = 0;
     for strategy in &report.strategies {
         let wealth = &strategy.wealth;
@@ -188,12 +188,12 @@ fn wealth_is_counted_in_its_own_bins_and_at_the_bank() {
             };
             let width = edges[1] - edges[0];
             let banked = |is_below: bool| if is_below { at_bank } else { 0 };
-            let below = up_to(quantile) + banked(report.banked < quantile - width);
-            let through = up_to(quantile + width) + banked(report.banked <= quantile + width);
+            let below = up_to(quantile) + banked(report.floor < quantile - width);
+            let through = up_to(quantile + width) + banked(report.floor <= quantile + width);
             assert!(below <= (share * 400.0) as usize + 1, "{}: {below} below {quantile}", strategy.strategy);
             assert!(through + 1 >= (share * 400.0) as usize, "{}: {through} to {quantile}", strategy.strategy);
         }
-        if high - low < 1e-9 * report.banked {
+        if high - low < 1e-9 * report.floor {
             assert!(at_bank >= 280, "{}: {at_bank} at the bank, between {low} and {high}", strategy.strategy);
             points += usize::from(at_bank < 400);
         }
