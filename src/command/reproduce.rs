@@ -22,7 +22,7 @@ pub struct Reproduce {
     /// Folder for reproduction.html, reproduction.json and the CSV files, created if absent
     #[arg(long)]
     out: PathBuf,
-    /// A small run that shows that everything works: tiny designs, few histories; its figures mean little
+    /// A small run that shows that everything works: tiny designs, few histories; too little for a verdict on the paper
     #[arg(long)]
     quick: bool,
 }
@@ -81,6 +81,14 @@ impl Plan {
             ..Plan::full()
         }
     }
+
+    /// Tells whether so much is computed that what differs from the paper differs by more than chance and coarse designs make it.
+    fn decides(&self) -> bool {
+        let Plan { count, bridges, histories, close_histories, study_histories, .. } = Plan::full();
+        let least = [count, bridges, histories, close_histories, study_histories];
+        let own = [self.count, self.bridges, self.histories, self.close_histories, self.study_histories];
+        own.iter().zip(least).all(|(own, least)| *own >= least)
+    }
 }
 
 /// Everything found.
@@ -100,7 +108,7 @@ pub fn run(arguments: &Reproduce) -> Result<(), Box<dyn Error>> {
     let section = runs::section(&plan, &workshop)?;
     let study = runs::study(&plan, &workshop)?;
     workshop.finish();
-    let findings = findings::all(&section, &study);
+    let findings = findings::all(&section, &study, &plan);
     let whole = Reproduction { seconds: workshop.seconds(), plan, findings, section, study };
     let html = page(&whole, arguments.quick)?;
     write(&arguments.out, "reproduction.html", &html)?;
@@ -136,7 +144,7 @@ fn write_tables(folder: &Path, whole: &Reproduction) -> Result<(), String> {
     let mut csv = Csv::new(&["table", "strategy", "statistic", "paper", "value", "low", "high"]);
     for (index, (case, table)) in whole.section.cases.iter().zip(&printed::TABLES).enumerate() {
         for strategy in case.report.iter().flat_map(|report| &report.strategies) {
-            let Some(column) = table.column(&strategy.strategy) else { continue };
+            let Some(column) = table.column(strategy.framework) else { continue };
             let ours = tables::estimates(strategy);
             for (name, paper) in printed::STATISTICS.iter().zip(column) {
                 let Some((_, Estimate { value, low, high })) = ours.iter().find(|(own, _)| own == name) else {
@@ -155,10 +163,11 @@ fn write_tables(folder: &Path, whole: &Reproduction) -> Result<(), String> {
     let mut csv = Csv::new(&["quantile"]);
     whole.section.quantiles.shown.iter().for_each(|quantile| csv.row([quantile]));
     write(folder, "quantiles.csv", &csv.into_text())?;
-    let mut csv = Csv::new(&["sample_size", "strategy", "radius", "gap", "value", "low", "high"]);
+    let mut csv = Csv::new(&["sample_size", "framework", "radius", "gap", "value", "low", "high"]);
     for row in &whole.study.rows {
         for (name, Estimate { value, low, high }) in [("value", row.value_gap), ("realised", row.realised_gap)] {
-            let names = [row.sample_size.to_string(), row.strategy.clone(), row.radius.to_string(), name.to_owned()];
+            let framework = row.framework.name().to_owned();
+            let names = [row.sample_size.to_string(), framework, row.radius.to_string(), name.to_owned()];
             csv.row(names.into_iter().chain([value, low, high].map(|figure| figure.to_string())));
         }
     }

@@ -7,6 +7,7 @@ pub mod calibration;
 pub mod chebyshev;
 pub mod cholesky;
 pub mod confidence_region;
+pub mod digits;
 pub(crate) mod dispatch;
 pub mod elementary;
 pub mod empirical;

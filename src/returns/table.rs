@@ -7,9 +7,9 @@ use jiff::civil::Date;
 
 use super::cells::Cell;
 use super::dates::{FORMS, Form, IN_DIGITS, YEAR, are_dates, heads_dates};
-use super::unit::names_percent;
 use super::number::is_number;
 use super::outcome::Stop;
+use super::unit::names_percent;
 use super::words::counted;
 
 type Row<'a> = Vec<Cell<'a>>;

@@ -3,9 +3,11 @@
 use std::fmt;
 
 use ballast::control::evaluation::report::{StrategyReport, UtilityReport};
+use ballast::control::request::framework::Framework;
 use ballast::numerics::summary::Estimate;
 use serde::Serialize;
 
+use super::Plan;
 use super::printed::{LOW_QUANTILE, MEAN_QUANTILE, QUANTILES, TABLES};
 use super::runs::{CLOSENESS, Quantiles, Section, Slope, Study};
 
@@ -40,7 +42,7 @@ impl fmt::Display for Finding {
         let verdict = match self.verdict {
             Verdict::Agrees => "Agrees",
             Verdict::Differs => "Differs",
-            Verdict::Undecided => "Undecided",
+            Verdict::Undecided => "Not enough to tell",
         };
         write!(f, "{verdict}: {} {}", self.statement, self.found)
     }
@@ -96,8 +98,16 @@ fn shown(estimate: Estimate) -> String {
     format!("{:.4} [{:.4}, {:.4}]", estimate.value, estimate.low, estimate.high)
 }
 
-/// Every statement, in the order of the paper.
-pub fn all(section: &Section, study: &Study) -> Vec<Finding> {
+/// Every statement, in the order of the paper; a run that is too small for a verdict gives none.
+pub fn all(section: &Section, study: &Study, plan: &Plan) -> Vec<Finding> {
+    let mut findings = compared(section, study);
+    if !plan.decides() {
+        findings.iter_mut().for_each(|finding| finding.verdict = Verdict::Undecided);
+    }
+    findings
+}
+
+fn compared(section: &Section, study: &Study) -> Vec<Finding> {
     let mut findings = quantiles(section);
     for (index, case) in section.cases.iter().enumerate() {
         let Some(report) = &case.report else {
@@ -111,9 +121,9 @@ pub fn all(section: &Section, study: &Study) -> Vec<Finding> {
             });
             continue;
         };
-        let strategy = |name| report.strategy(name);
+        let followed = |framework| report.framework(framework);
         if let (Some(adaptive), Some(known), Some(fixed)) =
-            (strategy("adaptive"), strategy("known_law"), strategy("static"))
+            (followed(Framework::Adaptive), followed(Framework::KnownLaw), followed(Framework::Static))
         {
             findings.extend(table(index, adaptive, known, fixed));
         }
@@ -217,7 +227,7 @@ fn all_bank(utility: &UtilityReport) -> Verdict {
 /// The paper states a speed for the value of the adaptive framework alone. Gaps of realised utility, and those of static, stand in
 /// the table of convergence without a verdict.
 fn slopes(study: &Study) -> Vec<Finding> {
-    let stated = study.slopes.iter().filter(|slope| slope.strategy == "adaptive" && slope.gap == "value");
+    let stated = study.slopes.iter().filter(|slope| slope.framework == Framework::Adaptive && slope.gap == "value");
     let finding = |slope: &Slope| Finding {
         verdict: equals(slope.last, -0.5, 0.0, TELLING),
         statement: "Section 2.4: the value of adaptive comes to that of the known law like t0 to the power -1/2."

@@ -1,5 +1,6 @@
 //! What the paper prints in its section 3.
 
+use ballast::control::request::framework::Framework;
 use serde::Serialize;
 
 /// Mean of the simulated quantiles at t0 = 20, alpha = 0.1.
@@ -40,11 +41,11 @@ pub const TABLES: [PrintedTable; 2] = [
 
 impl PrintedTable {
     /// The column of a strategy of ours.
-    pub fn column(&self, strategy: &str) -> Option<&[f64; 6]> {
-        match strategy {
-            "adaptive" => Some(&self.adaptive),
-            "known_law" => Some(&self.known_law),
-            "static" => Some(&self.static_robust),
+    pub fn column(&self, framework: Option<Framework>) -> Option<&[f64; 6]> {
+        match framework? {
+            Framework::Adaptive => Some(&self.adaptive),
+            Framework::KnownLaw => Some(&self.known_law),
+            Framework::Static => Some(&self.static_robust),
             _ => None,
         }
     }

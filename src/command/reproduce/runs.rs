@@ -165,7 +165,7 @@ pub struct Study {
 #[derive(Debug, Serialize)]
 pub struct StudyRow {
     pub sample_size: usize,
-    pub strategy: String,
+    pub framework: Framework,
     pub radius: f64,
     /// The known law's value less the framework's own robust value at the start, in utility: the paper's V - V*.
     pub value_gap: Estimate,
@@ -176,7 +176,7 @@ pub struct StudyRow {
 /// The slope of ln gap over ln t0, by least squares.
 #[derive(Debug, Serialize)]
 pub struct Slope {
-    pub strategy: String,
+    pub framework: Framework,
     pub gap: &'static str,
     pub all: f64,
     /// Between the two longest histories alone, with its interval.
@@ -189,13 +189,13 @@ pub fn study(plan: &Plan, workshop: &Workshop) -> Result<Study, Box<dyn Error>> 
         rows.extend(study_size(plan, workshop, sample_size)?);
     }
     let mut slopes = Vec::new();
-    for strategy in ["adaptive", "static"] {
-        let own = || rows.iter().filter(|row: &&StudyRow| row.strategy == strategy);
+    for framework in [Framework::Adaptive, Framework::Static] {
+        let own = || rows.iter().filter(|row: &&StudyRow| row.framework == framework);
         for (gap, of) in [("value", value_gap as fn(&StudyRow) -> Estimate), ("realised", realised_gap)] {
             let gaps: Vec<(f64, Estimate)> = own().map(|row| ((row.sample_size as f64).ln(), of(row))).collect();
             let points: Vec<(f64, f64)> = gaps.iter().map(|(size, gap)| (*size, gap.value.ln())).collect();
             let last = last_slope(&gaps);
-            slopes.push(Slope { strategy: strategy.to_owned(), gap, all: slope(&points), last });
+            slopes.push(Slope { framework, gap, all: slope(&points), last });
         }
     }
     Ok(Study { rows, slopes })
@@ -236,7 +236,7 @@ fn study_size(plan: &Plan, workshop: &Workshop, sample_size: usize) -> Result<Ve
     let adaptive = sized(&[Framework::KnownLaw, Framework::Adaptive], plan.study_count)?;
     // A ladder of one input needs few points, and every history has its own.
     let fixed = sized(&[Framework::KnownLaw, Framework::Static], plan.study_ladder)?;
-    let row = |report: &EvaluationReport| {
+    let row = |report: &EvaluationReport, framework: Framework| {
         let sample = Clustered::new(1, report.histories.len(), report.request.level);
         let kind = report.request.problem.utility;
         let gap = |history: &ballast::control::evaluation::report::HistoryReport| {
@@ -247,13 +247,13 @@ fn study_size(plan: &Plan, workshop: &Workshop, sample_size: usize) -> Result<Ve
             report.histories.iter().map(|history| history.mean_utility[0] - history.mean_utility[1]).collect();
         StudyRow {
             sample_size,
-            strategy: report.strategies[1].strategy.clone(),
+            framework,
             radius: report.histories.iter().map(|history| history.radius).sum::<f64>() / report.histories.len() as f64,
             value_gap: sample.mean(&value),
             realised_gap: sample.mean(&realised),
         }
     };
-    Ok(vec![row(&adaptive), row(&fixed)])
+    Ok(vec![row(&adaptive, Framework::Adaptive), row(&fixed, Framework::Static)])
 }
 
 /// Least squares.

@@ -9,7 +9,7 @@ import { colourOf, colourOfMix } from "./strategies.js";
 import { interval } from "./verdict.js";
 
 const STATISTICS = [["mean", "Mean"], ["variance", "Variance"], ["quantile_20", "20 % quantile"], ["quantile_90", "90 % quantile"], ["max", "Most"], ["min", "Least"]];
-/** Columns of the paper's tables and the strategies they are of. */
+/** Columns of the paper's tables and the frameworks they are of. */
 const PRINTED = { adaptive: ["adaptive", "Adaptive robust"], known_law: ["known_law", "True law"], static_robust: ["static", "Static robust"] };
 const BINS = 30;
 
@@ -17,8 +17,8 @@ const four = (value) => tick(value, 0.0001);
 const estimate = (found) => interval(found, four);
 /** An extreme has no interval. */
 const statistic = (found) => (typeof found === "number" ? four(found) : estimate(found));
-const named = ({ strategy, framework, constant_mix }) => (framework ? (PAPER[framework] ?? strategy) : `${percent(constant_mix, 0)} in stocks`);
-const find = ({ strategies }, name) => strategies.find(({ strategy }) => strategy === name);
+const named = ({ strategy }) => strategy;
+const find = ({ strategies }, wanted) => strategies.find(({ framework }) => framework === wanted);
 const number = (name, cell) => ({ name, numeric: true, cell });
 const note = (...words) => h("p", { class: "note" }, words);
 
@@ -28,9 +28,9 @@ export function body({ plan, quick, sample_size, findings, section: found, study
       "div",
       { class: "words" },
       h("p", {}, `Bayraktar and Chen, Nonparametric Adaptive Robust Control Under Model Uncertainty, section 3: ${plan.horizon} steps, the bank pays 0.002 a step, exponential utility with risk aversion 0.01, wealth 100, a mixture of two normals, ${sample_size} returns of history, alpha 0.1. Ranges hold with 95 % confidence over initial histories.`),
-      quick ? h("p", {}, "This is the quick run: tiny designs and few histories. Its figures mean little.") : "",
+      quick ? h("p", {}, "This is the quick run: tiny designs and few histories. It is too little for a verdict on the paper.") : "",
     ),
-    section("What holds and what does not", h("div", { class: "duo" }, ["Agrees", "Differs", "Undecided"].map((title) => verdicts(title, findings.filter(({ verdict }) => verdict === title.toLowerCase()))))),
+    section("What holds and what does not", h("div", { class: "duo" }, ["agrees", "differs", "undecided"].map((verdict) => verdicts(verdict, findings.filter((finding) => finding.verdict === verdict))))),
     quantiles(found),
     ...found.cases.map((one, index) => whole(one, index, printed[index], found)),
     mixes(found.all, printed),
@@ -39,8 +39,11 @@ export function body({ plan, quick, sample_size, findings, section: found, study
   ];
 }
 
-const verdicts = (title, some) =>
-  h("div", {}, h("h3", {}, `${title}: ${count(some.length)}`), h("ul", { class: `verdicts ${title.toLowerCase()}` }, some.map(({ statement, found }) => h("li", {}, h("b", {}, minus(statement)), " ", minus(found)))));
+const VERDICTS = { agrees: "Agrees", differs: "Differs", undecided: "Not enough to tell" };
+
+const verdicts = (verdict, some) =>
+  some.length > 0 &&
+  h("div", {}, h("h3", {}, `${VERDICTS[verdict]}: ${count(some.length)}`), h("ul", { class: `verdicts ${verdict}` }, some.map(({ statement, found }) => h("li", {}, h("b", {}, minus(statement)), " ", minus(found)))));
 
 function quantiles({ quantiles: { shown, drawn, mean }, all }) {
   const domain = [Math.min(...shown), Math.max(...shown)];
@@ -66,7 +69,7 @@ function quantiles({ quantiles: { shown, drawn, mean }, all }) {
 
 /** A table of the paper and its part of the second figure. */
 function whole({ quantile, found, report }, index, printed, { quantiles, all }) {
-  const tables = () => Object.entries(PRINTED).map(([column, [strategy, name]]) => statistics(`${name}, Q near ${quantile}`, printed[column], find(report, strategy), find(all, strategy), report, all));
+  const tables = () => Object.entries(PRINTED).map(([column, [framework, name]]) => statistics(`${name}, Q near ${quantile}`, printed[column], find(report, framework), find(all, framework), report, all));
   return section(
     `Table ${index + 1} and Figure 2, Q near ${quantile}`,
     note(`${count(found)} of ${count(quantiles.drawn)} simulated histories have a Q within 2 % of it${found > 0 ? `: one in ${count(Math.round(quantiles.drawn / found))}` : ""}.`),
@@ -89,7 +92,7 @@ function utilities({ strategies, histogram_edges: edges }) {
   const some = ["adaptive", "known_law"].map((name) => find({ strategies }, name)).filter(Boolean);
   const shares = ({ histogram: counts }) => counts.map((one) => one / counts.reduce((sum, other) => sum + other, 0));
   const top = Math.max(...some.flatMap(shares));
-  const drawn = (one) => histogram({ title: `Terminal utility: ${named(one).toLowerCase()}`, of: "Utility", format: (value) => tick(value, 0.1), shares: shares(one), domain: [edges[0], edges.at(-1)], top, colour: colourOf(one.strategy), marks: [] });
+  const drawn = (one) => histogram({ title: `Terminal utility: ${named(one).toLowerCase()}`, of: "Utility", format: (value) => tick(value, 0.1), shares: shares(one), domain: [edges[0], edges.at(-1)], top, colour: colourOf(one.framework), marks: [] });
   return h("div", { class: "duo" }, some.map(drawn));
 }
 
@@ -103,10 +106,10 @@ function mixes(all, printed) {
   const ranked = [...all.strategies].sort((one, other) => other.certainty_equivalent.value - one.certainty_equivalent.value);
   const held = (one) => ({
     name: named(one),
-    colour: colourOf(one.strategy),
+    colour: colourOf(one.framework),
     kind: "line",
     values: one.periods.map(({ allocation }) => allocation.mean),
-    band: one.strategy === "adaptive" ? one.periods.map(({ allocation }) => [allocation.quantile_10, allocation.quantile_90]) : null,
+    band: one.framework === "adaptive" ? one.periods.map(({ allocation }) => [allocation.quantile_10, allocation.quantile_90]) : null,
   });
   return section(
     "The frontier of constant mixes",
@@ -118,8 +121,8 @@ function mixes(all, printed) {
       y: { format: four, tick },
       series: [
         series("Constant mixes", colourOfMix(0.5), ({ constant }) => constant, { joined: true }),
-        ...deciding.map((one) => series(named(one), colourOf(one.strategy), (point) => point.one === one, { apart: true })),
-        series("Adaptive as printed", colourOf("constant"), (point) => point.paper, { apart: true }),
+        ...deciding.map((one) => series(named(one), colourOf(one.framework), (point) => point.one === one, { apart: true })),
+        series("Adaptive as printed", colourOf("own_mix"), (point) => point.paper, { apart: true }),
       ],
     }),
     table(
@@ -163,11 +166,11 @@ function coverage(all) {
 
 function convergence({ rows, slopes }) {
   const sizes = [...new Set(rows.map(({ sample_size }) => sample_size))].sort((one, other) => one - other);
-  const of = (strategy, gap) => sizes.map((size) => rows.find((row) => row.strategy === strategy && row.sample_size === size)?.[gap].value ?? null).map((value) => (value > 0 ? value : null));
+  const of = (framework, gap) => sizes.map((size) => rows.find((row) => row.framework === framework && row.sample_size === size)?.[gap].value ?? null).map((value) => (value > 0 ? value : null));
   const gaps = (gap, title) => {
     const adaptive = of("adaptive", gap);
     const rate = sizes.map((size) => adaptive[0] && adaptive[0] * (size / sizes[0]) ** -0.5);
-    const series = [["adaptive", adaptive], ["static", of("static", gap)]].map(([strategy, values]) => ({ colour: colourOf(strategy), name: PAPER[strategy], kind: "line", joined: true, values }));
+    const series = [["adaptive", adaptive], ["static", of("static", gap)]].map(([framework, values]) => ({ colour: colourOf(framework), name: PAPER[framework], kind: "line", joined: true, values }));
     return lineChart({
       title,
       height: 240,
@@ -185,7 +188,7 @@ function convergence({ rows, slopes }) {
       "Gaps to the known law, in terminal utility",
       [
         { name: "Returns of history", cell: ({ sample_size }) => count(sample_size) },
-        { name: "Framework", cell: ({ strategy }) => PAPER[strategy] },
+        { name: "Framework", cell: ({ framework }) => PAPER[framework] },
         number("Mean radius", ({ radius }) => four(radius)),
         number("Value gap", ({ value_gap }) => estimate(value_gap)),
         number("Realised gap", ({ realised_gap }) => estimate(realised_gap)),
@@ -195,7 +198,7 @@ function convergence({ rows, slopes }) {
     h("h3", {}, "Fitted powers of the length of history; section 2.4 predicts \u22120.5 for the value gap of adaptive"),
     table(
       "Fitted powers of the length of history",
-      [{ name: "Framework", cell: ({ strategy }) => PAPER[strategy] }, { name: "Gap", cell: ({ gap }) => gap }, number("All", ({ all }) => tick(all, 0.01)), number("Last two", ({ last }) => interval(last, (value) => tick(value, 0.01)))],
+      [{ name: "Framework", cell: ({ framework }) => PAPER[framework] }, { name: "Gap", cell: ({ gap }) => gap }, number("All", ({ all }) => tick(all, 0.01)), number("Last two", ({ last }) => interval(last, (value) => tick(value, 0.01)))],
       slopes,
     ),
   );

@@ -1,0 +1,43 @@
+//! Numbers in text.
+
+/// Writes a number to so many decimals, a zero without a sign.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    if is_zero(&text) { text.trim_start_matches('-').to_owned() } else { text }
+}
+
+/// Writes a number to so many decimals with its sign, a zero without one.
+pub fn signed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:+.decimals$}");
+    if is_zero(&text) { text.trim_start_matches(['-', '+']).to_owned() } else { text }
+}
+
+/// Decimals in which two numbers differ by five units of the last or more: at least `least`, and 6 at most.
+pub fn deciding(one: f64, other: f64, least: usize) -> usize {
+    let wanted = (5.0 / (one - other).abs()).log10().ceil();
+    if wanted.is_finite() { (wanted.max(0.0) as usize).clamp(least, 6.max(least)) } else { least }
+}
+
+fn is_zero(text: &str) -> bool {
+    text.chars().all(|character| !matches!(character, '1'..='9'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_rounds_to_zero_has_no_sign() {
+        assert_eq!(
+            [-0.004, -0.0, 0.004, -0.006, 1.0].map(|value| fixed(value, 2)),
+            ["0.00", "0.00", "0.00", "-0.01", "1.00"]
+        );
+        assert_eq!([-0.004, 0.004, 0.006, -1.5].map(|value| signed(value, 2)), ["0.00", "0.00", "+0.01", "-1.50"]);
+        assert_eq!(fixed(f64::NAN, 2), "NaN");
+    }
+
+    #[test]
+    fn two_numbers_have_the_digits_that_tell_them_apart() {
+        assert_eq!([0.5, 0.06, 0.004, 0.0, 1e-9].map(|apart| deciding(0.02, 0.02 + apart, 2)), [2, 2, 4, 2, 6]);
+    }
+}
