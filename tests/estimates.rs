@@ -212,7 +212,8 @@ fn walk_forwards(pool: &TrainingPool) {
         let strategies = backtest.plain_strategies();
         let common = Common::of(&strategies, Kept::new(estimate::kept_by_backtest(&backtest, THREADS)));
         let watch = Watch::unwatched();
-        let decide = |strategy| backtest.walk.decide_stretch(strategy, &backtest.periods, 0, &common, &watch).unwrap();
+        let decide =
+            |strategy| backtest.walk.decide_stretch(strategy, &backtest.periods, 0, &common, (&watch, &|| {})).unwrap();
         pool.install(|| pool::map(strategies, decide))
     });
     holds("a stretch", estimate::backtest(&backtest, THREADS).bytes(), taken);

@@ -35,13 +35,14 @@ fn periods(count: usize) -> Vec<Period> {
 
 fn decide(walk: &WalkForward, strategies: &[Strategy], periods: &[Period], threads: usize) -> Vec<Vec<Decision>> {
     let watch = Watch::unwatched();
-    let trained = AtomicUsize::new(0);
+    let solved = AtomicUsize::new(0);
     let pool = TrainingPool::new(threads).unwrap();
     let count = || {
-        trained.fetch_add(1, Ordering::Relaxed);
+        solved.fetch_add(1, Ordering::Relaxed);
     };
     let decisions = pool.install(|| walk.decide(strategies, periods, &watch, &count)).unwrap();
-    assert_eq!(trained.into_inner(), walk.trainings(strategies, periods));
+    // Progress moves with every step of a training, not only at its end.
+    assert_eq!(solved.into_inner(), walk.steps(strategies, periods));
     decisions
 }
 

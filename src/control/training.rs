@@ -113,10 +113,19 @@ impl Training {
     /// # Errors
     /// As [`Self::solve_step`].
     pub fn run(self, watch: &Watch) -> Result<Policy, TrainError> {
+        self.run_by_steps(watch, &|| ())
+    }
+
+    /// The policy of [`Self::run`]; calls `solved` after every step.
+    ///
+    /// # Errors
+    /// As [`Self::solve_step`].
+    pub fn run_by_steps(self, watch: &Watch, solved: &(dyn Fn() + Sync)) -> Result<Policy, TrainError> {
         let mut steps: Vec<StepSolution> = Vec::with_capacity(self.horizon());
         for step in (0..self.horizon()).rev() {
             let solution = self.solve_step(step, steps.last(), watch)?;
             steps.push(solution);
+            solved();
         }
         steps.reverse();
         Ok(self.into_policy(steps))

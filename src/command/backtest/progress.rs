@@ -1,4 +1,4 @@
-//! How many parts of the work are done: a bar on a terminal, elsewhere a line now and then.
+//! How many parts of the work are done, and how long the rest may take: a bar on a terminal, elsewhere a line now and then.
 
 use std::io::{IsTerminal, stderr};
 use std::sync::{Mutex, PoisonError};
@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+/// Until the first line with an estimate, which rests on what was done by then.
+const FIRST: Duration = Duration::from_secs(5);
 /// From one line to the next.
 const PAUSE: Duration = Duration::from_secs(30);
 
@@ -16,8 +18,8 @@ pub struct Parts {
     noun: &'static str,
     is_terminal: bool,
     started: Instant,
-    /// When the last line was written.
-    told: Mutex<Option<Instant>>,
+    /// When the next line is written.
+    next: Mutex<Instant>,
 }
 
 impl Parts {
@@ -28,22 +30,50 @@ impl Parts {
         {
             bar.set_style(style.progress_chars("=> "));
         }
-        Parts { bar, noun, is_terminal: stderr().is_terminal(), started: Instant::now(), told: Mutex::new(None) }
+        let started = Instant::now();
+        Parts { bar, noun, is_terminal: stderr().is_terminal(), started, next: Mutex::new(started + FIRST) }
     }
 
     pub fn one_more(&self) {
         self.bar.inc(1);
-        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.is_terminal || told.is_some_and(|at| at.elapsed() < PAUSE) {
+        let mut next = self.next.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.is_terminal || Instant::now() < *next {
             return;
         }
-        *told = Some(Instant::now());
+        *next = Instant::now() + PAUSE;
         let (done, all) = (self.bar.position(), self.bar.length().unwrap_or_default());
-        eprintln!("  {:>6.0} s  {done} of {all} {}", self.started.elapsed().as_secs_f64(), self.noun);
+        eprintln!("  {}", line(self.started.elapsed(), done, all, self.noun));
     }
 
     /// Takes the bar off the screen.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// Time spent, parts done, and what the others take if they take as long each.
+fn line(spent: Duration, done: u64, all: u64, noun: &str) -> String {
+    let left = spent.as_secs_f64() / done.max(1) as f64 * all.saturating_sub(done) as f64;
+    format!("{:>6.0} s  {done} of {all} {noun}, about {} left", spent.as_secs_f64(), in_words(left))
+}
+
+fn in_words(seconds: f64) -> String {
+    match seconds {
+        _ if seconds < 100.0 => format!("{seconds:.0} s"),
+        _ if seconds < 6000.0 => format!("{:.0} min", seconds / 60.0),
+        _ => format!("{:.1} h", seconds / 3600.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_is_estimated_from_what_is_done() {
+        let shown = |seconds, done, all| line(Duration::from_secs(seconds), done, all, "steps");
+        assert_eq!(shown(5, 10, 30), "     5 s  10 of 30 steps, about 10 s left");
+        assert_eq!(shown(60, 12, 252), "    60 s  12 of 252 steps, about 20 min left");
+        assert_eq!(shown(60, 12, 16_380), "    60 s  12 of 16380 steps, about 22.7 h left");
     }
 }

@@ -146,6 +146,11 @@ impl WalkForward {
         self.stretches(periods.len()) * strategies.iter().filter(|strategy| strategy.is_trained()).count()
     }
 
+    /// Steps of all these trainings.
+    pub fn steps(&self, strategies: &[Strategy], periods: &[Period]) -> usize {
+        self.trainings(strategies, periods) * self.horizon
+    }
+
     /// The training request of one stretch from the periods before it. The bank is taken to go on paying what it paid last.
     pub fn specification(&self, framework: Framework, alpha: f64, past: &[Period]) -> Specification {
         Specification {
@@ -169,7 +174,8 @@ impl WalkForward {
     }
 
     /// What each strategy holds through every period after the first window, on the current pool of threads.
-    /// The last stretch may be cut short. `trained` hears of every training done, in no order.
+    /// The last stretch may be cut short. `solved` is called after every step of a training, of which there are
+    /// [`Self::steps`].
     ///
     /// # Errors
     /// Returns or choices that break a rule of the specification; a training that fails; the stop signal.
@@ -178,17 +184,12 @@ impl WalkForward {
         strategies: &[Strategy],
         periods: &[Period],
         watch: &Watch,
-        trained: &(dyn Fn() + Sync),
+        solved: &(dyn Fn() + Sync),
     ) -> Result<Vec<Vec<Decision>>, TrainError> {
         let decided = |stretch: usize| -> Result<Vec<Vec<Decision>>, TrainError> {
             let common = Common::of(strategies, Kept::default());
-            let decided = |strategy: Strategy| {
-                let decided = self.decide_stretch(strategy, periods, stretch, &common, watch);
-                if strategy.is_trained() {
-                    trained();
-                }
-                decided
-            };
+            let decided =
+                |strategy: Strategy| self.decide_stretch(strategy, periods, stretch, &common, (watch, solved));
             pool::map(strategies.to_vec(), decided).into_iter().collect()
         };
         let stretches = (0..self.stretches(periods.len())).collect();
@@ -199,7 +200,8 @@ impl WalkForward {
         Ok(decisions)
     }
 
-    /// What one strategy holds from a training to the next; `common` is of its stretch.
+    /// What one strategy holds from a training to the next; `common` is of its stretch, and `solved` is called after every
+    /// step of the training.
     ///
     /// # Errors
     /// As [`Self::decide`].
@@ -209,7 +211,7 @@ impl WalkForward {
         periods: &[Period],
         stretch: usize,
         common: &Common,
-        watch: &Watch,
+        (watch, solved): (&Watch, &(dyn Fn() + Sync)),
     ) -> Result<Vec<Decision>, TrainError> {
         let start = self.window + stretch * self.every;
         let lived = &periods[start..periods.len().min(start + self.every)];
@@ -221,7 +223,8 @@ impl WalkForward {
         if matches!(strategy, Strategy::CostBlind { .. }) {
             specification.problem.trading_cost = 0.0;
         }
-        let policy = Training::among(&specification, common.kept.clone(), common.measured.clone())?.run(watch)?;
+        let training = Training::among(&specification, common.kept.clone(), common.measured.clone())?;
+        let policy = training.run_by_steps(watch, solved)?;
         let advisor = Advisor::with(policy, common.kept.clone());
         let returns: Vec<f64> = lived.iter().map(|period| period.log_return).collect();
         let decided = |Advice { band, radius, source, .. }| Decision { band, radius, source: Some(source) };

@@ -77,7 +77,8 @@ impl Worker {
             let common = Common::of(&strategies, kept.clone());
             let decide = |(index, strategy)| {
                 let step = (index < policies).then_some(stretch * policies + index);
-                let decided = || backtest.walk.decide_stretch(strategy, &backtest.periods, stretch, &common, &watch);
+                let decided =
+                    || backtest.walk.decide_stretch(strategy, &backtest.periods, stretch, &common, (&watch, &|| {}));
                 self.checkpointed(claimed, &checkpoints, step, decided)
             };
             let numbered = strategies.iter().copied().enumerate().collect();
