@@ -310,24 +310,53 @@ async fn a_short_record_is_said_to_be_short_and_a_steady_one_is_not_said_to_hang
     assert_eq!(asked(&app, &fixed).await["sensitivity"]["premium"]["periods_more"], Value::Null);
 }
 
+/// Leaves out 360 of 480 months in turn, whose range is that of leaving out every one; with as many bridges as there may be, few of the
+/// days are left out.
+#[tokio::test(flavor = "multi_thread")]
+async fn records_of_any_length_are_told_and_the_range_is_that_of_every_return() {
+    let app = App::start().await;
+    let bridge = |paths: usize, scale: f64| json!({ "rule": "bridge", "alpha": 0.1, "paths": paths, "scale": scale });
+    for (first, learning) in
+        [("1926-07", json!({ "kind": "equal" })), ("1970-01", json!({ "kind": "decay", "half_life": 90.0 }))]
+    {
+        let record = months(first, 480);
+        let problem = json!({ "rate_per_step": 0.003, "history": record, "learning": learning, "radius": bridge(50, 0.3),
+            "utility": { "kind": "power", "risk_aversion": 6.0 } });
+        let advised = asked(&app, &json!({ "problem": problem, "holding": 0.1, "sensitivity": true })).await;
+        let range = &advised["sensitivity"]["without_one"];
+        assert_eq!(range["tried"], 360, "{range}");
+        let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
+        for index in 0..record.len() {
+            let rest = [&record[..index], &record[index + 1..]].concat();
+            let without = allocation_of(&app, &problem, &rest).await;
+            (lowest, highest) = (lowest.min(without), highest.max(without));
+        }
+        assert!(
+            lowest > 0.0 && highest < 1.0 && highest - lowest > 0.005,
+            "the test shows nothing: {lowest} {highest}"
+        );
+        let [low, high] = ["lowest", "highest"].map(|end| number(&range[end]["allocation"]));
+        assert!(
+            (low - lowest).abs().max((high - highest).abs()) < 0.01 * (highest - lowest),
+            "{range} {lowest} {highest}"
+        );
+    }
+    let days: Vec<f64> = (0..3000).map(|day| 0.0004 + 0.01 * (1.7 * f64::from(day)).sin()).collect();
+    let problem = json!({ "rate_per_step": 0.0001, "history": days, "radius": bridge(9000, 1.0) });
+    let advised = asked(&app, &json!({ "problem": problem, "sensitivity": true })).await;
+    let tried = number(&advised["sensitivity"]["without_one"]["tried"]);
+    assert!((32.0..=40.0).contains(&tried), "{tried}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn what_would_take_seconds_or_say_nothing_is_refused_by_name() {
     let mut app = App::start().await;
-    let long: Vec<f64> = (0..361).map(|index| 0.001 * f64::from(index % 50)).collect();
-    let bridge = |paths: usize| json!({ "rule": "bridge", "alpha": 0.1, "paths": paths, "scale": 1.0 });
     let normal =
         json!({ "kind": "gaussian_mixture", "components": [{ "weight": 1.0, "mean": 0.0, "variance": 0.01 }] });
-    for (problem, rule) in [
-        (json!({ "rate_per_step": 0.002, "history": long }), "above 360 returns: here they are 361"),
-        (
-            json!({ "rate_per_step": 0.002, "history": &long[..100], "radius": bridge(28_801) }),
-            "above 2880000 returns times problem.radius.paths",
-        ),
-        (
-            json!({ "rate_per_step": 0.002, "history": HISTORY, "framework": "known_law", "law": normal }),
-            "under the framework known_law",
-        ),
-    ] {
+    for (problem, rule) in [(
+        json!({ "rate_per_step": 0.002, "history": HISTORY, "framework": "known_law", "law": normal }),
+        "under the framework known_law",
+    )] {
         let (status, refused) = app.post("/advise", &json!({ "problem": problem, "sensitivity": true })).await;
         assert_eq!((status.as_u16(), &refused["field"]), (422, &json!("sensitivity")), "{refused}");
         assert!(refused["rule"].as_str().unwrap().contains(rule), "{refused}");

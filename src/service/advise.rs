@@ -70,7 +70,9 @@ impl Advise {
     /// A field breaks a rule.
     pub fn answer(self) -> Result<Advised, FieldError> {
         let checked = self.checked()?;
-        checked.answered(&OnePeriod::new(&checked.specification, Kept::default()))
+        let investor = OnePeriod::new(&checked.specification, Kept::default());
+        checked.check_sensitivity(&investor)?;
+        checked.answered(&investor)
     }
 
     fn checked(mut self) -> Result<Checked, FieldError> {
@@ -90,6 +92,10 @@ impl Advise {
 }
 
 impl Checked {
+    fn check_sensitivity(&self, investor: &OnePeriod) -> Result<(), FieldError> {
+        if self.asks_sensitivity { investor.check_sensitivity() } else { Ok(()) }
+    }
+
     fn answered(&self, investor: &OnePeriod) -> Result<Advised, FieldError> {
         let (advice, worst_case) = investor.advise(self.holding)?;
         let sensitivity = self.asks_sensitivity.then(|| investor.sensitivity(self.holding, &advice)).transpose()?;
@@ -101,14 +107,11 @@ impl Checked {
 
 impl Sessions {
     /// # Errors
-    /// A field breaks a rule; the radius asks for more memory than can be kept, or the sensitivity for too much time; no turn
-    /// to solve.
+    /// A field breaks a rule; the radius asks for more memory than can be kept; no turn to solve.
     pub async fn advise(&self, tenant: &Tenant, question: Advise) -> Result<Advised, ServiceError> {
         let checked = question.checked()?;
         let investor = self.policies.one_period(&checked.specification)?;
-        if checked.asks_sensitivity {
-            investor.check_sensitivity()?;
-        }
+        checked.check_sensitivity(&investor)?;
         Ok(self.resolving.run(tenant, move || checked.answered(&investor)).await??)
     }
 }

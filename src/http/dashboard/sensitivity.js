@@ -7,16 +7,12 @@ import { allocation, count, counted, percent, points } from "./format.js";
 /** Frameworks of policies that learn from returns; by the others no return changes the advice. */
 const LEARN = ["adaptive", "plug_in", "parametric_adaptive"];
 
-/** For longer records the service does not compute it. */
-const LONGEST = 360;
-
 const HEADING = "How near it is to changing";
 
 /** `{element, ask()}`: the section, and what fills it from `/action`. */
-export function nearness({ id, session, policy, leaving, unit }) {
+export function nearness({ id, policy, leaving, unit }) {
   const said = (words) => ({ element: section(HEADING, h("p", { class: "sentence" }, words)), ask: async () => {} });
   if (!LEARN.includes(policy.specification.problem.framework)) return said("No return changes it: the policy does not learn from what comes.");
-  if (session.sample_size > LONGEST) return said(`It rests on ${count(session.sample_size)} returns. Whether a single one makes a difference is computed for records of up to ${count(LONGEST)}.`);
   const holder = h("div", { "aria-live": "polite" }, h("p", { class: "note" }, "Asking for the advice of some hundred other records\u2026"));
   const ask = async () => {
     try {
@@ -71,10 +67,14 @@ function coming({ allocation: told }, { to_bank, to_highest, low, high }, unit) 
   ].filter(Boolean);
 }
 
+/** Decimals in which two numbers differ by five units of the last or more: from 2 to 6. */
+const deciding = (one, other) => (one === other ? 2 : Math.min(6, Math.max(2, Math.ceil(Math.log10(5 / Math.abs(one - other))))));
+
 function paying({ present, needed, periods_more }, unit) {
-  const paid = `The record has paid ${percent(present, 2)} a ${unit} beyond what the bank pays now`;
+  const digits = needed === null ? 2 : deciding(100 * present, 100 * needed);
+  const paid = `The record has paid ${percent(present, digits)} a ${unit} beyond what the bank pays now`;
   if (needed === null) return [`${paid}; no other mean near it would part the bank from holding something.`];
-  const leaves = `${paid}; the advice leaves the bank at ${percent(needed, 2)}.`;
+  const leaves = `${paid}; the advice leaves the bank at ${percent(needed, digits)}.`;
   if (periods_more === 0) return [leaves];
   if (periods_more === null) return [leaves, `No number of ${unit}s like those seen, up to ${count(10000)}, would do.`];
   return [leaves, `About ${counted(periods_more, `more ${unit}`)} like those seen would do as well.`];

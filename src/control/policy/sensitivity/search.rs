@@ -9,16 +9,21 @@ use crate::control::pool;
 use crate::control::problem::state::State;
 use crate::control::request::radius_rule::RadiusRule;
 use crate::control::request::rules;
-use crate::control::request::specification::{Interval, ProblemSpecification};
+use crate::control::request::specification::{Interval, ProblemSpecification, Specification};
 use crate::numerics::empirical::EmpiricalDistribution;
 use crate::numerics::summary::interpolated_quantile;
 
-/// Longest record whose sensitivity is told: thirty years of months.
-pub const LONGEST_RECORD: usize = 360;
-/// Largest product of the numbers of returns and of simulated bridges: four times that of the longest record at the default.
-pub const MOST_BRIDGED: usize = 2_880_000;
-/// Largest product of the numbers of returns and of design points: that of 250 returns at the default.
-pub const MOST_DESIGNED: usize = 250_000;
+/// Returns that are left out in turn, at most: all of thirty years of months.
+const MOST_LEFT_OUT: usize = 360;
+/// Returns that are left out in turn, at least, however long a step takes.
+const FEWEST_LEFT_OUT: usize = 32;
+/// The product of the numbers of returns and of simulated bridges up to which [`MOST_LEFT_OUT`] returns are left out: a step then takes
+/// about 10 ms. A step that takes longer is solved without fewer returns.
+const CHEAP_BRIDGED: usize = 2_880_000;
+/// The product of the numbers of returns and of design points that is as cheap: that of 250 returns at the default.
+const CHEAP_DESIGNED: usize = 250_000;
+/// Largest product of the numbers of returns and of design points: three times the cheap one.
+pub const MOST_DESIGNED: usize = 750_000;
 /// Quantiles of the record at which a next return is tried.
 const QUANTILES: [f64; 2] = [0.05, 0.95];
 /// How far a next return may lie beyond the extremes of the record, as a share of the distance between them.
@@ -42,6 +47,8 @@ struct Asked<'a> {
     problem: &'a ProblemSpecification,
     /// The highest allocation that may be advised.
     highest: f64,
+    /// Design points by which the step after is known.
+    design: usize,
     /// The allocation were the record another.
     of: &'a (dyn Fn(&[f64]) -> f64 + Sync),
     /// The allocation were the radius another.
@@ -50,8 +57,8 @@ struct Asked<'a> {
 
 impl Advisor {
     /// The sensitivity of `advice`, which was found by `mode` for the period after `step` observed periods in `state`, whose law
-    /// is that of `record`. Cost: as many pieces of advice as the record has distinct returns, and some 130 more, on the rayon
-    /// pool this is called from.
+    /// is that of `record`. Cost: as many pieces of advice as returns are left out, at most 360, and some 130 more, on the rayon pool
+    /// this is called from.
     pub fn sensitivity(
         &self,
         step: usize,
@@ -78,19 +85,32 @@ impl Advisor {
         let within = |radius: f64| self.explain_within(step, state, radius).0.allocation;
         let problem = &self.specification().problem;
         let highest = self.highest_action(step, state);
-        Asked { record, advice, problem, highest, of, within: &within }.sensitivity()
+        let design = self.designed();
+        Asked { record, advice, problem, highest, design, of, within: &within }.sensitivity()
+    }
+
+    /// Design points by which the value after a step is known; none where the step is the last.
+    fn designed(&self) -> usize {
+        let Specification { problem, design, .. } = self.specification();
+        if problem.horizon == 1 { 0 } else { design.count.unwrap_or_default() }
     }
 
     /// Checks that the sensitivity of advice from `returns` returns can be told at a bounded cost.
     ///
     /// # Errors
-    /// Under the name `sensitivity`: the framework does not learn from returns; too many of them, of simulated bridges, or of
-    /// design points.
+    /// Under the name `sensitivity`: the framework does not learn from returns; too many of them times design points.
     pub fn check_sensitivity(&self, returns: usize) -> Result<(), FieldError> {
         let problem = &self.specification().problem;
         check_learning(problem, problem.framework.learns())?;
-        let design = if problem.horizon == 1 { 0 } else { self.specification().design.count.unwrap_or_default() };
-        check_cost(problem, returns, design)
+        let found = returns.saturating_mul(self.designed());
+        if found <= MOST_DESIGNED {
+            return Ok(());
+        }
+        let rule = format!(
+            "must be left out above {MOST_DESIGNED} returns times design.count: here they are {found}. Ask POST /advise for the \
+             sensitivity over the same returns, or train with a smaller design.count"
+        );
+        Err(FieldError::new("sensitivity", true, rule))
     }
 }
 
@@ -105,27 +125,6 @@ pub(in crate::control::policy) fn check_learning(
     let rule =
         format!("must be left out: under the framework {} no return changes the advice", problem.framework.name());
     Err(FieldError::new("sensitivity", true, rule))
-}
-
-/// Checks what the sensitivity of a record of `returns` returns costs, where the step after is known by `design` points.
-pub(in crate::control::policy) fn check_cost(
-    problem: &ProblemSpecification,
-    returns: usize,
-    design: usize,
-) -> Result<(), FieldError> {
-    let paths = problem.radius_rule().paths();
-    let of_returns = |count: usize| returns.saturating_mul(count);
-    for (found, most, what) in [
-        (returns, LONGEST_RECORD, "returns"),
-        (of_returns(paths), MOST_BRIDGED, "returns times problem.radius.paths"),
-        (of_returns(design), MOST_DESIGNED, "returns times design.count"),
-    ] {
-        if found > most {
-            let rule = format!("must be left out above {most} {what}: here they are {found}");
-            return Err(FieldError::new("sensitivity", true, rule));
-        }
-    }
-    Ok(())
 }
 
 impl Asked<'_> {
@@ -145,6 +144,8 @@ impl Asked<'_> {
         let alike =
             |one: usize, other: usize| !self.problem.learning.decays() && self.record[one] == self.record[other];
         order.dedup_by(|later, first| alike(*later, *first));
+        let order = self.telling(order);
+        let tried = order.len();
         let found = pool::map(order, |index| {
             let rest = [&self.record[..index], &self.record[index + 1..]].concat();
             rules::history("history", &rest, self.problem.learning).ok()?;
@@ -153,11 +154,45 @@ impl Asked<'_> {
         });
         let by_allocation = |one: &&LeftOut, other: &&LeftOut| one.allocation.total_cmp(&other.allocation);
         let left_out = || found.iter().flatten();
-        Some(WithoutOne { lowest: *left_out().min_by(by_allocation)?, highest: *left_out().max_by(by_allocation)? })
+        let (lowest, highest) = (*left_out().min_by(by_allocation)?, *left_out().max_by(by_allocation)?);
+        Some(WithoutOne { lowest, highest, tried })
+    }
+
+    /// Picks the returns that move the advice the most, where leaving out each would take too long: half of them are furthest from
+    /// the mean by their weight, and the others lie evenly between by their rank, since the advice changes smoothly with the return
+    /// left out. `order` is ascending by return, and so is what is left of it.
+    fn telling(&self, order: Vec<usize>) -> Vec<usize> {
+        let most = self.most_left_out();
+        if order.len() <= most {
+            return order;
+        }
+        let (weights, mean) = (self.problem.learning.weights(self.record.len()), self.mean());
+        let pull = |rank: &usize| weights[order[*rank]] * (self.record[order[*rank]] - mean).abs();
+        let mut ranks: Vec<usize> = (0..order.len()).collect();
+        ranks.sort_by(|one, other| pull(other).total_cmp(&pull(one)));
+        let mut between = ranks.split_off(most.div_ceil(2));
+        between.sort_unstable();
+        let evenly = most - ranks.len();
+        ranks.extend((0..evenly).map(|index| between[index * (between.len() - 1) / (evenly - 1)]));
+        ranks.sort_unstable();
+        ranks.into_iter().map(|rank| order[rank]).collect()
+    }
+
+    /// Returns that are left out in turn: fewer where a step takes longer.
+    fn most_left_out(&self) -> usize {
+        let returns = self.record.len() as f64;
+        let bridged = returns * self.problem.radius_rule().paths() as f64 / CHEAP_BRIDGED as f64;
+        let designed = returns * self.design as f64 / CHEAP_DESIGNED as f64;
+        let most = MOST_LEFT_OUT as f64 / bridged.max(designed).max(1.0);
+        (most as usize).max(FEWEST_LEFT_OUT)
+    }
+
+    fn mean(&self) -> f64 {
+        self.problem.learning.mean(self.record, |log_return| log_return)
     }
 
     /// The end of the range that is further from the advice, where that is far, or one of the two is the bank alone.
-    fn hangs_on_one(&self, WithoutOne { lowest, highest }: WithoutOne) -> Option<Caution> {
+    fn hangs_on_one(&self, WithoutOne { lowest, highest, .. }: WithoutOne) -> Option<Caution> {
         let told = self.advice.allocation;
         let change = |left_out: &LeftOut| (left_out.allocation - told).abs();
         let is_another = |left_out: &LeftOut| {
