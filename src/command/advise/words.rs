@@ -5,6 +5,7 @@ use std::fmt::Write;
 use ballast::control::policy::advice::{Advice, AdviceSource};
 use ballast::control::policy::sensitivity::{NextAdvice, Return, Sensitivity};
 use ballast::control::policy::worst_case::WorstCase;
+use ballast::numerics::digits;
 use ballast::service::advise::Advised;
 
 /// Less than this is not traded: what is printed would not show it.
@@ -34,11 +35,14 @@ fn near(Advised { advice, caution, sensitivity, warnings, .. }: &Advised, noun: 
     told.extend(caution.iter().map(|caution| caution.sentence.clone()));
     let Some(Sensitivity { without_one, next_return, premium, .. }) = sensitivity else { return told };
     if let Some(range) = without_one {
-        let [low, high] = [range.lowest, range.highest].map(|end| percent(end.allocation, 1));
-        told.push(format!("With any one return left out the advice would lie between {low} and {high}."));
+        let ends = [range.lowest, range.highest].map(|end| end.allocation);
+        let [low, high] = apart(ends, 1);
+        let tried =
+            if range.tried < advice.sample_size { format!(" ({} were tried)", range.tried) } else { String::new() };
+        told.push(format!("With any one return left out{tried} the advice would lie between {low} and {high}."));
     }
-    let after = |next: NextAdvice| (percent(next.simple_return, 1), percent(next.allocation, 1));
-    let ((low, then_low), (high, then_high)) = (after(next_return.low), after(next_return.high));
+    let [low, high] = [next_return.low, next_return.high].map(|next: NextAdvice| percent(next.simple_return, 1));
+    let [then_low, then_high] = apart([next_return.low, next_return.high].map(|next| next.allocation), 1);
     told.push(format!("After a next return of {low} it would be {then_low}, after one of {high} {then_high}."));
     let crossing = |to: Option<Return>, what: &str| {
         to.map(|to| format!("A next return of {} would take it to {what}.", percent(to.simple_return, 1)))
@@ -52,8 +56,7 @@ fn near(Advised { advice, caution, sensitivity, warnings, .. }: &Advised, noun: 
     });
     told.extend(crossing(next_return.to_highest, "the most that may be held"));
     if let Some(needed) = premium.needed {
-        let present = percent(premium.present, 2);
-        let needed = percent(needed, 2);
+        let [present, needed] = apart([premium.present, needed], 2);
         told.push(format!(
             "The record paid {present} a period beyond what the bank pays now; at {needed} the advice leaves the bank."
         ));
@@ -100,11 +103,15 @@ fn worst(worst: &WorstCase, noun: &str) -> String {
     let Some((share, lowest)) = moved.filter(|(share, _)| *share > 0.0) else {
         return "No law among them does worse than the returns seen.".into();
     };
-    let one_in = (1.0 / share).round();
+    let (one_in, size) = ((1.0 / share).round(), percent(lowest.exp_m1().abs(), 0));
+    let is_many = one_in < 3.0;
+    if lowest >= 0.0 {
+        let best = if is_many { format!("{} of {noun}s", percent(share, 0)) } else { format!("{noun} in {one_in}") };
+        return format!("That law counts the best {best} as only {size}.");
+    }
     let often =
-        if one_in < 3.0 { format!("{} of all {noun}s", percent(share, 0)) } else { format!("one {noun} in {one_in}") };
-    let (change, lowest) = (if lowest < 0.0 { "loses" } else { "gains" }, percent(lowest.exp_m1().abs(), 0));
-    format!("That law makes {often} worse than it was: the worst of them {change} {lowest}.")
+        if is_many { format!("{} of all {noun}s", percent(share, 0)) } else { format!("one {noun} in {one_in}") };
+    format!("That law makes {often} worse than it was: the worst of them loses {size}.")
 }
 
 /// Name, figure and meaning.
@@ -140,7 +147,13 @@ fn money(amount: f64) -> String {
 }
 
 fn percent(share: f64, decimals: usize) -> String {
-    format!("{:.decimals$} %", 100.0 * share)
+    format!("{} %", digits::fixed(100.0 * share, decimals))
+}
+
+/// Two shares in the digits that tell them apart, `least` decimals or more.
+fn apart(shares: [f64; 2], least: usize) -> [String; 2] {
+    let decimals = digits::deciding(100.0 * shares[0], 100.0 * shares[1], least);
+    shares.map(|share| percent(share, decimals))
 }
 
 fn signed(share: f64) -> String {
@@ -170,7 +183,9 @@ mod tests {
         let words = "That law makes 60 % of all days worse than it was: the worst of them loses 2 %.";
         assert_eq!(worst(&two, "day"), words);
         let gain = law(&[stays(0.25), (0.5, 1.03_f64.ln(), 0.25)]);
-        assert!(worst(&gain, "year").ends_with("one year in 4 worse than it was: the worst of them gains 3 %."));
+        assert_eq!(worst(&gain, "year"), "That law counts the best year in 4 as only 3 %.");
+        let most = law(&[stays(0.5), (0.5, 1.03_f64.ln(), 0.5)]);
+        assert_eq!(worst(&most, "day"), "That law counts the best 50 % of days as only 3 %.");
         assert_eq!(worst(&law(&[stays(0.0)]), "year"), "No law among them does worse than the returns seen.");
     }
 

@@ -154,15 +154,18 @@ fn transport_sentence(
     if let (share, Some(lowest)) = moved(transport)
         && share > 0.0
     {
+        let moves = if lowest >= 0.0 {
+            format!("counts the best {:.1} % of the periods as only {:.1} %", 100.0 * share, 100.0 * lowest.exp_m1())
+        } else {
+            let lowest = 100.0 * lowest.exp_m1();
+            format!("moves {:.1} % of the probability, down to a return of {lowest:.1} % in one period", 100.0 * share)
+        };
         format!(
-            "Against an allocation of {:.1} %, the worst law within distance {:.4} of {middle} moves {:.1} % of \
-             the probability, down to a return of {:.1} % in one period; against the worst laws of this period and of \
-             any later ones the allocation is still worth {:.2} for certain at the horizon, and all-bank {:.2}. A ball of this \
-             period alone wider by {RADIUS_UNIT} would cost at most {:.2} basis points of that.",
+            "Against an allocation of {:.1} %, the worst law within distance {:.4} of {middle} {moves}; against the worst laws \
+             of this period and of any later ones the allocation is still worth {:.2} for certain at the horizon, and all-bank {:.2}. \
+             A ball of this period alone wider by {RADIUS_UNIT} would cost at most {:.2} basis points of that.",
             100.0 * advice.allocation,
             advice.radius,
-            100.0 * share,
-            100.0 * lowest.exp_m1(),
             advice.certainty_equivalent,
             advice.floor,
             most_cost(RADIUS_UNIT, radius_cost, advice)

@@ -23,9 +23,11 @@ export function assumed({ transport }, unit, cautious = true) {
   const verb = (mass, word) => (mass > 0.6 ? word : `${word}s`);
   const more = rest >= LITTLE ? `, and that ${often(rest)} ${verb(rest, "bring")} less than the like did` : "";
   const mass = share(deep);
-  return lowest <= 0
-    ? `It assumes that ${often(mass)} ${verb(mass, "lose")} ${size(lowest)}${more}.`
-    : `It assumes that ${often(mass)} ${verb(mass, "gain")} ${size(lowest)} only, where those seen gained more${more}.`;
+  if (lowest > 0) {
+    const cut = share(moves);
+    return `It counts the best ${cut > 0.4 ? `${percent(cut, 0)} of ${unit}s` : `${unit} in ${oneIn(cut)}`} as only ${size(lowest)}.`;
+  }
+  return `It assumes that ${often(mass)} ${verb(mass, "lose")} ${size(lowest)}${more}.`;
 }
 
 /** The section; the robust step takes a while, so it comes after the rest of the page stands. `then()` when it has. */
