@@ -72,6 +72,14 @@ test("two sessions of other months are lined up by their dates, from where both 
   assert.equal(common(apart, lined(apart)), null);
 });
 
+test("a session's page has the return of the comparison, whatever money came and went", async () => {
+  await go(`#/sessions/${other}`);
+  await page.getByText(/since the start/).waitFor();
+  const words = plain(await page.locator("main").innerText());
+  const change = (100 * ((1 - 0.003) * 1.02 * 0.9 - 1)).toFixed(1);
+  assert.ok(words.includes(`${change} % since the start, time-weighted; 50.00 added in all`), words);
+});
+
 test("policies that differ are never said to be the same", async () => {
   const problem = { horizon: 4, rate_per_step: 0.002, history: HISTORY, radius: { rule: "bridge", alpha: 0.1, scale: 0.3 } };
   const design = { count: 40 };

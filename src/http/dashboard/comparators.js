@@ -35,8 +35,11 @@ export function mixed(history, share) {
 /** Wealth at the start and after each observed period of the session itself, as it stands. */
 export const wealths = (history) => [history.initial_wealth, ...history.observations.map((row) => (row.now ?? row).wealth)];
 
-/** How far wealth lies below its highest so far, 0 or less, with money that comes and goes taken out. */
-export function falls(history, wealth = wealths(history)) {
-  let level = 1;
-  return belowHighest(wealth.map((value, index) => (index === 0 ? 1 : (level *= (value - addedIn(history, index)) / wealth[index - 1]))));
+/** What 100 at the start has become after each period, with money that comes and goes taken out: the time-weighted return. */
+export function grown(history, wealth = wealths(history)) {
+  let level = 100;
+  return wealth.map((value, index) => (index === 0 ? level : (level *= (value - addedIn(history, index)) / wealth[index - 1])));
 }
+
+/** How far wealth lies below its highest so far, 0 or less, with money that comes and goes taken out. */
+export const falls = (history, wealth = wealths(history)) => belowHighest(grown(history, wealth));

@@ -4,11 +4,11 @@ import { heldInAll, orders } from "./advised.js";
 import { get } from "./api.js";
 import { beside, LETTERS } from "./beside.js";
 import { lineChart } from "./chart.js";
-import { falls, risky, wealths } from "./comparators.js";
+import { falls, grown, risky } from "./comparators.js";
 import { differences, rows as asked } from "./compare_policies.js";
 import { LEAST_FALL, LEAST_SHARE } from "./course.js";
 import { h, section } from "./dom.js";
-import { addedIn, netAdded } from "./flows.js";
+import { netAdded } from "./flows.js";
 import { allocation, count, percent, percentTick, points, tick, wealth } from "./format.js";
 import { called } from "./naming.js";
 import { calendar } from "./periods.js";
@@ -33,14 +33,6 @@ async function read(id, leaving) {
   ]);
   const { problem } = policy.specification;
   return { session, history, policy, problem, action, calendar: calendar(history, problem.periods_per_year), grown: grown(history) };
-}
-
-/** What 100 at the start has become after each period, without what was added or taken. */
-function grown(history) {
-  const wealth = wealths(history);
-  const levels = [100];
-  for (let period = 1; period < wealth.length; period++) levels.push((levels[period - 1] * (wealth[period] - addedIn(history, period))) / wealth[period - 1]);
-  return levels;
 }
 
 /** What the two hold beside the bank, in words. */

@@ -2,10 +2,10 @@
 
 import { adviceView } from "./advice.js";
 import { get, offers, remove } from "./api.js";
-import { risky } from "./comparators.js";
+import { grown, risky } from "./comparators.js";
 import { holdings, wealthCourse, worstFallFact } from "./course.js";
 import { announce, facts, h, section } from "./dom.js";
-import { banked, netAdded, standing } from "./flows.js";
+import { addedIn, banked, netAdded, standing } from "./flows.js";
 import { pressed } from "./form.js";
 import { allocation, count, counted, percent, points, short, wealth } from "./format.js";
 import { asking } from "./frontier.js";
@@ -129,8 +129,9 @@ function place({ session, history, policy, calendar }, { period }) {
 function figures(shown, action) {
   const { session, history, calendar } = shown;
   const put = netAdded(history);
-  const change = (session.wealth - put) / history.initial_wealth - 1;
-  const apart = put === 0 ? "" : `, ${put > 0 ? "beside" : "after"} ${wealth(Math.abs(put))} ${put > 0 ? "added" : "withdrawn"}`;
+  const change = grown(history).at(-1) / 100 - 1;
+  const moved = history.observations.some((_, index) => addedIn(history, index + 1) !== 0);
+  const apart = moved ? `, time-weighted; ${wealth(Math.abs(put))} ${put < 0 ? "withdrawn" : "added"} in all` : "";
   const end = session.rolling ? "a horizon of the policy from now" : `at the end of ${calendar.inText(session.horizon)}`;
   const caution = action && points(action.radius * shown.cautionScale, 2);
   return h(

@@ -189,11 +189,10 @@ function listed(entries, { ticks, advice, sorted, sort }) {
   ], entries);
 }
 
-/** What the last period made of wealth, what was added with it. */
-function change({ wealth: now, wealth_change }) {
+/** How wealth changed by the last period, with what was added: an amount, since as a share it would be no return. */
+function change({ wealth_change }) {
   if (wealth_change === null || wealth_change === undefined) return "\u2013";
-  const plus = wealth_change > 0 ? "+" : "";
-  return [`${plus}${percent(wealth_change / (now - wealth_change))}`, h("span", { class: "under" }, `${plus}${wealth(wealth_change)}`)];
+  return `${wealth_change > 0 ? "+" : ""}${wealth(wealth_change)}`;
 }
 
 /** The last day reported, and when the next report is due or how late it is. */
