@@ -49,7 +49,7 @@ async fn a_job_reports_what_the_command_reports() {
     let reported = report(&app, &job).await;
     // Of the main line the mix is a line of its own, kept with the same cost.
     let strategies = reported["strategies"].as_array().unwrap();
-    let own = strategies.iter().find(|strategy| strategy["strategy"] == "adaptive, alpha 0.9").unwrap();
+    let own = strategies.iter().find(|strategy| strategy["strategy"] == "Cautious, learns, 10 %").unwrap();
     let mix = strategies.iter().find(|strategy| strategy["hindsight"] == true).unwrap();
     assert_eq!(own["beyond_own_mix"]["value"], mix["adaptive_ahead"]["value"]);
     assert!(own["annual_turnover"]["value"].as_f64() > Some(0.0) && mix["beyond_own_mix"].is_null(), "{own} {mix}");
@@ -76,7 +76,7 @@ async fn a_job_reports_what_the_command_reports() {
         reported["strategies"].as_array().unwrap().iter().map(|one| one["strategy"].as_str().unwrap()).collect();
     assert_eq!(
         names[..4],
-        ["adaptive, alpha 0.3", "adaptive, alpha 0.9", "cost-blind, alpha 0.9", "static, alpha 0.9"]
+        ["Cautious, learns, 70 %", "Cautious, learns, 10 %", "Cautious, blind to costs", "Cautious, fixed"]
     );
     assert_eq!((&reported["dates"][0], reported["dates"].as_array().unwrap().len()), (&json!("2013-01"), 8));
     // Something was held, and its wealth follows from it by hand in the first quarter.
@@ -87,7 +87,7 @@ async fn a_job_reports_what_the_command_reports() {
         100.0 * (1.0 - 0.001 * allocation) * ((1.0 - allocation) * (1.0 + bank[12]) + allocation * (1.0 + risky[12]));
     assert!((wealth / by_hand - 1.0).abs() < 1e-12, "{wealth} {by_hand}");
     // Two years of quarters hold five years that begin with a quarter; a twentieth of them is a quarter of the worst.
-    let stock = names.iter().position(|name| *name == "all-stock").unwrap();
+    let stock = names.iter().position(|name| *name == "All in stocks").unwrap();
     let ends = reported["periods"][stock]["wealth"].as_array().unwrap().iter().map(|value| value.as_f64().unwrap());
     let course: Vec<f64> = std::iter::once(100.0).chain(ends).collect();
     let years: Vec<f64> = (0..5).map(|start| course[start + 4] / course[start] - 1.0).collect();
@@ -96,6 +96,55 @@ async fn a_job_reports_what_the_command_reports() {
     let value = |figure: &str| strategies[stock][figure]["value"].as_f64().unwrap();
     assert!((value("worst_twentieth") - worst).abs() < 1e-12, "{years:?} {}", strategies[stock]);
     assert!((value("chance_of_loss") - lost).abs() < 1e-12, "{years:?} {}", strategies[stock]);
+}
+
+/// Years end with the last period: of 21 quarters after the window the first counts in no year, and a crash in the last one counts.
+/// The terminal, the table and the report give each strategy one name and one place.
+#[test]
+fn the_last_year_ends_with_the_record_and_every_output_ranks_alike() {
+    let folder = tempfile::tempdir().unwrap();
+    let risky: Vec<f64> =
+        (0..33).map(|quarter| if quarter == 32 { -0.3 } else { [0.03, 0.05, 0.04][quarter % 3] }).collect();
+    let date = |quarter: usize| format!("{}-{:02}", 2010 + quarter / 4, 3 * (quarter % 4) + 3);
+    let rows: String =
+        risky.iter().enumerate().map(|(quarter, back)| format!("{},{back},0.002\n", date(quarter))).collect();
+    let file = folder.path().join("returns.csv");
+    std::fs::write(&file, format!("date,return,rf\n{rows}")).unwrap();
+    let out = folder.path().join("report");
+    let done = Command::new(env!("CARGO_BIN_EXE_ballast"))
+        .args(["backtest".as_ref(), file.as_os_str(), "--out".as_ref(), out.as_os_str()])
+        .args("--window 12 --horizon 1 --count 10 --alpha 0.3,0.9".split(' '))
+        .output()
+        .unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let printed = String::from_utf8(done.stdout).unwrap();
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
+    let report: Value = serde_json::from_str(&read("report.json")).unwrap();
+    assert_eq!((&report["whole_years"], &report["uncounted_periods"]), (&json!(5), &json!(1)));
+    let uncounted = "The first quarter counts in no year: years end with the last quarter.";
+    assert!(printed.contains(uncounted) && read("report.html").contains(uncounted), "{printed}");
+    let strategies = report["strategies"].as_array().unwrap();
+    let worth = |one: &Value| one["yearly_certainty_equivalent"]["value"].as_f64().unwrap();
+    let stock = strategies.iter().find(|one| one["kind"] == "all_stock").unwrap();
+    // Power utility with risk aversion 3: the certainty equivalent is the mean of x^-2, to the power of -1/2.
+    let year = |quarters: &[f64]| quarters.iter().map(|back| 1.0 + back).product::<f64>();
+    let years: Vec<f64> = risky[13..].chunks(4).map(year).collect();
+    let by_hand = 100.0 * (years.iter().map(|growth| growth.powi(-2)).sum::<f64>() / 5.0).powf(-0.5);
+    assert!((worth(stock) - by_hand).abs() < 1e-9, "{} {by_hand}", worth(stock));
+    let table = read("strategies.csv");
+    for one in strategies {
+        let name = one["strategy"].as_str().unwrap();
+        let above = strategies.iter().filter(|other| other["hindsight"] == false && worth(other) > worth(one)).count();
+        let place = (one["hindsight"] == false).then_some(above + 1);
+        assert_eq!(one["place"], json!(place), "{one}");
+        let cell = if name.contains(',') { format!("\"{name}\"") } else { name.to_owned() };
+        assert_eq!(table.contains(&format!("{cell},place,")), place.is_some(), "{name} in {table}");
+        assert!(place.is_none_or(|place| table.contains(&format!("{cell},place,{place},"))), "{name} in {table}");
+    }
+    let (main, place) = (strategies[1]["strategy"].as_str().unwrap(), &strategies[1]["place"]);
+    assert!(
+        printed.contains(&format!("With “{main}” a year from 100")) && printed.contains(&format!("place {place} of 7"))
+    );
 }
 
 /// Log-returns and simple returns are one record, as are a rate and a list of it; without dates a period is a period.
@@ -252,7 +301,7 @@ async fn a_walk_forward_of_several_assets_is_cancelled_and_warned_of() {
     assert_eq!((&ended["state"], &ended["report"]), (&json!("cancelled"), &Value::Null), "{ended}");
 }
 
-/// 1/N by hand, with what trading costs; what the others hold is by name, within the whole.
+/// Equal shares by hand, with what trading costs; what the others hold is by name, within the whole.
 #[test]
 fn a_file_of_several_assets_is_walked_by_the_command() {
     let folder = tempfile::tempdir().unwrap();
@@ -272,7 +321,7 @@ fn a_file_of_several_assets_is_walked_by_the_command() {
     assert_eq!((report["dates"].as_array().unwrap().len(), &report["dates"][0]), (16, &json!("2013-01")));
     let names: Vec<&str> =
         report["strategies"].as_array().unwrap().iter().map(|one| one["strategy"].as_str().unwrap()).collect();
-    assert_eq!((names.len(), names[0], names[16]), (18, "robust scaled_one, scale 0.5, 3 years", "1/N"));
+    assert_eq!((names.len(), names[0], names[16]), (18, "Robust, half the caution, knows 3 years", "Equal shares"));
 
     let (mut wealth, mut held) = (100.0, [0.0, 0.0]);
     let mut highest: f64 = 100.0;

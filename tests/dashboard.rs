@@ -162,6 +162,27 @@ async fn a_file_that_is_not_there_is_a_problem_that_names_it() {
 
 /// Works offline and under the policy: nothing inline, nothing from elsewhere, no markup made from text.
 #[test]
+fn the_page_calls_frameworks_what_reports_call_them() {
+    use ballast::control::evaluation::names::framework_name;
+    use ballast::control::request::framework::Framework::{
+        Adaptive, KnownLaw, ParametricAdaptive, ParametricStatic, PlugIn, Static,
+    };
+    let words = String::from_utf8(files()["specification.js"].clone()).unwrap();
+    let named = words.split("export const FRAMEWORKS = {").nth(1).unwrap().split('}').next().unwrap();
+    for framework in [Adaptive, Static, KnownLaw, PlugIn, ParametricStatic, ParametricAdaptive] {
+        let line = format!("{}: \"{}\"", framework.name(), framework_name(framework));
+        assert!(named.contains(&line), "{line} is not in {named}");
+    }
+    // Every other strategy is called what its report calls it.
+    for (name, bytes) in files() {
+        let text = String::from_utf8_lossy(&bytes);
+        for own in ["\"Trusts the record\"", "\"Least variance\"", "\"Robust, sup norm\"", "blind to costs"] {
+            assert!(name == "specification.js" || !text.contains(own), "{name} has a name of its own: {own}");
+        }
+    }
+}
+
+#[test]
 fn no_file_reaches_beyond_the_service() {
     const NAMESPACE: &str = "http://www.w3.org/2000/svg";
     for (name, bytes) in files() {

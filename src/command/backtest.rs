@@ -265,9 +265,9 @@ impl Shown {
 /// Decides every period, keeps the books, and measures them.
 fn walk(args: &BacktestArgs, returns: Returns) -> Result<Shown, BacktestError> {
     let backtest = args.backtest(&returns)?;
-    let trainings = Parts::new(backtest.trainings(), "trainings");
-    let walked = args.pool()?.install(|| backtest.run(&Watch::unwatched(), &|| trainings.one_more()))?;
-    trainings.finish();
+    let steps = Parts::new(backtest.steps(), "steps of trainings");
+    let walked = args.pool()?.install(|| backtest.run(&Watch::unwatched(), &|| steps.one_more()))?;
+    steps.finish();
     let report = BacktestReport::new(&walked);
     Ok(Shown { walked, report, returns })
 }
@@ -320,7 +320,7 @@ mod tests {
         assert_eq!(files::periods(&one).lines().count(), 1 + 12 * one.walked.lines.len());
         assert_eq!(one.report.whole_years, 1);
         let page = one.page().unwrap();
-        assert!(page.contains("adaptive, alpha 0.9") && page.contains("Trading costs 10 bp"), "{page}");
+        assert!(page.contains("Cautious, learns, 10 %") && page.contains("Trading costs 10 bp"), "{page}");
         assert!(page.contains("The whole years are 1, fewer than 10"), "{page}");
     }
 
@@ -332,7 +332,7 @@ mod tests {
         let BacktestReport { choices, strategies, whole_years, dates, .. } = &shown.report;
         assert_eq!((choices.window, choices.every, choices.horizon, *whole_years), (24, 2, 3, 1));
         assert_eq!(dates.as_ref().unwrap()[0], "2006-03");
-        let stock = strategies.iter().find(|figures| figures.strategy == "all-stock").unwrap();
+        let stock = strategies.iter().find(|figures| figures.strategy == "All in stocks").unwrap();
         let mean = (24..28).map(risky_return).sum::<f64>() / 4.0;
         assert!((stock.performance.annual_mean.value - 4.0 * mean).abs() < 1e-12, "{stock:?}");
         assert_eq!(files::periods(&shown).lines().nth(1).unwrap().split(',').next(), Some("2006-03"));

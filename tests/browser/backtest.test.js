@@ -7,6 +7,8 @@ import { browser, call, service } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
 import { plain, usable, visitQuiet } from "./page.js";
 
+const { ordinal } = await dashboardModule("verdict.js");
+
 const QUARTERS = 56;
 const WINDOW = 8;
 /** Quarters from March 2004 on, the newest first, in percent. */
@@ -95,6 +97,10 @@ test("it is followed to its end, and what it says comes first", async () => {
   assert.equal(worths.length, 9);
   assert.match(words, /which nobody knew beforehand: it is given no place among the others\./);
   assert.deepEqual(worths, [...worths].sort((one, other) => other - one));
+  // Each has one name and one place, here as in the report.
+  assert.deepEqual(shown.slice(1).map(([name]) => name).sort(), report.strategies.map(({ strategy }) => plain(strategy)).sort());
+  const main = report.strategies[1];
+  if (main.place > 1) assert.ok(words.includes(`comes ${ordinal(main.place)} of 8`), `${main.place}: ${words}`);
   const mixed = report.strategies.find(({ strategy }) => strategy === "60/40");
   const row = shown.find(([name]) => name === "60/40");
   assert.deepEqual(row.slice(1, 5), [mixed.yearly_certainty_equivalent.value.toFixed(2), mixed.final_wealth.toFixed(2), percent(mixed.annual_mean.value), percent(mixed.annual_volatility.value)]);
@@ -216,7 +222,7 @@ test("a record of several assets is asked for, and its report shows what was hel
   for (const sentence of told.sentences) assert.ok(words.includes(plain(sentence)), sentence);
   const shown = await cells("Strategies, by what a year of each is worth");
   assert.equal(shown.length, 1 + told.strategies.length);
-  const equal = told.strategies.find(({ strategy }) => strategy === "1/N");
+  const equal = told.strategies.find(({ strategy }) => strategy === "Equal shares");
   const row = shown.find(([name]) => name === "Equal shares");
   assert.deepEqual([row[1], row[2], row[9]], [equal.yearly_certainty_equivalent.value.toFixed(2), equal.final_wealth.toFixed(2), "2.0"]);
   assert.doesNotMatch(words, /undefined|NaN|null/);

@@ -10,9 +10,9 @@ const { colourOf, colourOfLevel, colourOfMix } = await dashboardModule("strategi
 
 /** Strategies that stand on a page together, as reports call them. */
 const PAGES = [
-  ["adaptive", "static", "plug_in", "known_law", "parametric_adaptive", "parametric_static", "all-bank", "60/40", "all-stock"],
-  ["static", "plug-in", "cost-blind", "constant", "60/40", "all-stock", "all-bank"],
-  ["robust scaled_one", "robust sup", "static scaled_one", "plug-in", "minimum variance", "inverse volatility", "1/N", "60 % 1/N"],
+  ["adaptive", "static", "plug_in", "known_law", "parametric_adaptive", "parametric_static", "all_bank", "sixty_forty", "all_stock"],
+  ["static", "plug_in", "cost_blind", "own_mix", "sixty_forty", "all_stock", "all_bank"],
+  ["robust", "robust_sup", "robust_static", "plug_in", "minimum_variance", "inverse_volatility", "equal_shares", "sixty_equal"],
 ];
 
 test("every strategy has a colour, no two of a page the same, and the same ones on every page", () => {
@@ -21,10 +21,10 @@ test("every strategy has a colour, no two of a page the same, and the same ones 
     assert.ok(colours.every((colour) => colour >= 0), `${names} have ${colours}`);
     assert.equal(new Set(colours).size, names.length, `${names} have ${colours}`);
   }
-  for (const [one, other] of [["plug_in", "plug-in"], ["static", "static scaled_one"], ["all-stock", "1/N"]]) assert.equal(colourOf(one), colourOf(other));
+  for (const [one, other] of [["static", "robust_static"], ["all_stock", "equal_shares"]]) assert.equal(colourOf(one), colourOf(other));
   const mixes = Array.from({ length: 11 }, (_, tenth) => colourOfMix(tenth / 10));
   assert.equal(new Set(mixes).size, 11, `${mixes}`);
-  assert.deepEqual([mixes[0], mixes[6], mixes[10]], ["all-bank", "60/40", "all-stock"].map(colourOf));
+  assert.deepEqual([mixes[0], mixes[6], mixes[10]], ["all_bank", "sixty_forty", "all_stock"].map(colourOf));
   for (const count of [1, 2, 3]) {
     const levels = Array.from({ length: count }, (_, index) => colourOfLevel(index, count));
     assert.equal(levels[Math.min(1, count - 1)], colourOf("adaptive"));

@@ -127,7 +127,7 @@ def test_a_walk_forward_is_frames(ballast: Ballast) -> None:
     assert list(wealth.columns) == list(table.index)
     assert wealth.index.tolist() == pd.date_range("2022-01", periods=4, freq="QS").tolist()
     assert wealth.iloc[-1].to_dict() == pytest.approx(table["final_wealth"].to_dict(), rel=1e-12)
-    assert walked.periods("allocation")["all-stock"].tolist() == [1.0] * 4
+    assert walked.periods("allocation")["All in stocks"].tolist() == [1.0] * 4
     with pytest.raises(ValueError, match="figure is 'return': must be one of wealth, allocation"):
         walked.periods("return")  # type: ignore[arg-type]
     # A report as `ballast backtest` writes it, of periods without dates.
@@ -140,11 +140,11 @@ def test_an_evaluation_is_a_frame(ballast: Ballast) -> None:
     report, table = evaluation.report(), evaluation.frame()
     bank, half = report["strategies"]
     assert list(table.index) == [bank["strategy"], half["strategy"]]
-    assert table.loc["mix_0.5", "wealth_mean_high"] == half["wealth"]["mean"]["high"]
-    assert table.loc["mix_0.5", "utility_quantile_20"] == half["utility"]["quantile_20"]["value"]
-    ahead = table["certainty_equivalent"] - table.loc["all_bank", "certainty_equivalent"]
-    assert table.loc["mix_0.5", "difference_certainty_equivalent"] == pytest.approx(ahead["mix_0.5"])
-    assert table.loc["all_bank"].filter(like="difference").isna().all()
+    assert table.loc["50 % in stocks", "wealth_mean_high"] == half["wealth"]["mean"]["high"]
+    assert table.loc["50 % in stocks", "utility_quantile_20"] == half["utility"]["quantile_20"]["value"]
+    ahead = table["certainty_equivalent"] - table.loc["All in the bank", "certainty_equivalent"]
+    assert table.loc["50 % in stocks", "difference_certainty_equivalent"] == pytest.approx(ahead["50 % in stocks"])
+    assert table.loc["All in the bank"].filter(like="difference").isna().all()
 
 
 def test_a_frontier_is_a_frame(ballast: Ballast) -> None:
@@ -171,7 +171,7 @@ def test_pictures_show_the_frames(ballast: Ballast) -> None:
     lines = {line.get_label(): line for line in walked.plot().get_lines()}
     wealth = walked.periods()
     assert set(wealth.columns) <= set(lines)
-    assert list(lines["all-stock"].get_ydata()) == wealth["all-stock"].tolist()  # type: ignore[arg-type]
+    assert list(lines["All in stocks"].get_ydata()) == wealth["All in stocks"].tolist()  # type: ignore[arg-type]
     # The names of the strategies stand beside the lines, on the figure.
     axes = walked.plot()
     axes.figure.draw_without_rendering()  # type: ignore[union-attr]

@@ -37,12 +37,12 @@ def test_a_table_walked_forward_is_frames_by_strategy_by_date_and_by_asset(balla
         estimate = one[name]
         ends = [strategies.iloc[0][column] for column in (name, f"{name}_low", f"{name}_high")]
         assert ends == [estimate["value"], *estimate["interval"]]
-    assert "mean_allocations" not in strategies and strategies.loc["1/N", "final_wealth"] > 100.0
+    assert "mean_allocations" not in strategies and strategies.loc["Equal shares", "final_wealth"] > 100.0
 
     wealth = job.periods()
     assert list(wealth.columns) == list(strategies.index) and len(wealth) == len(report["dates"]) == 8
-    assert wealth["1/N"].iloc[-1] == strategies.loc["1/N", "final_wealth"]
-    assert (job.periods("radius")["1/N"] == 0.0).all() and wealth.index.equals(job.periods("traded").index)
+    assert wealth["Equal shares"].iloc[-1] == strategies.loc["Equal shares", "final_wealth"]
+    assert (job.periods("radius")["Equal shares"] == 0.0).all() and wealth.index.equals(job.periods("traded").index)
     with pytest.raises(ValueError, match="must be one of wealth, radius, traded"):
         job.periods("allocation")
 
@@ -51,12 +51,12 @@ def test_a_table_walked_forward_is_frames_by_strategy_by_date_and_by_asset(balla
     with pytest.raises(ValueError, match="strategies has 'adaptive': must be of robust"):
         job.plot(strategies=["adaptive"])
     lines = {line.get_label(): line for line in job.plot().get_lines()}
-    assert list(lines["1/N"].get_ydata()) == wealth["1/N"].tolist()  # type: ignore[arg-type]
+    assert list(lines["Equal shares"].get_ydata()) == wealth["Equal shares"].tolist()  # type: ignore[arg-type]
 
-    held = job.held("1/N")
+    held = job.held("Equal shares")
     assert list(held.columns) == ["energy", "health"] and (held == 0.5).all().all() and held.index.equals(wealth.index)
     means = job.held()
-    assert means.loc["1/N"].tolist() == pytest.approx([0.5, 0.5]) and list(means.index) == list(strategies.index)
+    assert means.loc["Equal shares"].tolist() == pytest.approx([0.5, 0.5]) and list(means.index) == list(strategies.index)
     with pytest.raises(ValueError, match="must be one of robust"):
         frames.held(report, "adaptive")
 

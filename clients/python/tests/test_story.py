@@ -276,7 +276,7 @@ def test_the_client_reaches_every_operation(ballast: Ballast, network: Network, 
     assert ballast.training(training.id).cancel().job["state"] == "succeeded"
     assert ballast.health()["status"] == "ok"
     evaluation = compare(ballast)
-    assert ballast.evaluation(evaluation.id).report()["reference"] == "all_bank"
+    assert ballast.evaluation(evaluation.id).report()["reference"] == "All in the bank"
     walked = walk(ballast)
     assert ballast.walk_forward(walked.id).report()["choices"]["window"] == 8
     tried = ballast.frontier(
@@ -313,7 +313,7 @@ def test_what_if_supposes_and_touches_nothing(session: Session) -> None:
 def test_an_evaluation_ends_in_a_report(ballast: Ballast) -> None:
     report = compare(ballast).report()
     bank, half = report["strategies"]
-    assert bank["strategy"] == "all_bank"
+    assert bank["strategy"] == "All in the bank"
     # Every path of the bank ends alike, up to rounding.
     assert bank["utility"]["variance"]["value"] == pytest.approx(0.0, abs=1e-20)
     assert half["utility"]["mean"]["low"] <= half["utility"]["mean"]["value"] <= half["utility"]["mean"]["high"]
@@ -322,12 +322,12 @@ def test_an_evaluation_ends_in_a_report(ballast: Ballast) -> None:
 def test_a_walk_forward_ends_in_a_report(ballast: Ballast) -> None:
     report = walk(ballast, alpha=[0.5]).report()
     assert (report["frequency"], report["dates"]) == ("quarterly", ["2022-01", "2022-04", "2022-07", "2022-10"])
-    stock = next(line for line in report["periods"] if line["strategy"] == "all-stock")
+    stock = next(line for line in report["periods"] if line["strategy"] == "All in stocks")
     wealth = 100.0
     for quarter, found in zip(range(8, 12), stock["wealth"], strict=True):
         wealth *= 1.02 + 0.03 * math.sin(1.7 * quarter)
         assert found == pytest.approx(wealth, rel=1e-12)
-    assert report["sentences"][0].startswith("adaptive, alpha 0.5: ")
+    assert report["sentences"][0].startswith("With “Cautious, learns” a year from 100 ")
 
 
 def test_a_frontier_tells_what_caution_costs(ballast: Ballast) -> None:

@@ -77,6 +77,7 @@ pub fn strategies(strategies: &[BacktestFigures]) -> String {
             estimated("yearly_certainty_equivalent", figures.performance.yearly_certainty_equivalent),
             estimated("adaptive_ahead", figures.adaptive_ahead),
         ];
+        all.extend(figures.place.map(|place| plain("place", place as f64)));
         all.extend(of_returns(&figures.performance));
         all.extend(figures.performance.beyond_own_mix.map(|beyond| estimated("beyond_own_mix", beyond)));
         all.extend(of_wealth(&figures.performance));

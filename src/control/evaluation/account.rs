@@ -81,20 +81,27 @@ impl Account {
         self.allocations.iter().sum::<f64>() / self.allocations.len() as f64
     }
 
-    /// Wealth at the end of each whole year per unit at its start.
+    /// Wealth at the end of each whole year per unit at its start. The last year ends with the last period, and the
+    /// [`uncounted_periods`] before the first year count in none.
     pub fn yearly_growth(&self, year: usize) -> Vec<f64> {
-        self.rolling_growth(year).step_by(year).collect()
+        self.rolling_growth(year).skip(uncounted_periods(self.traded.len(), year)).step_by(year).collect()
     }
 
-    /// The mean share held in each whole year.
+    /// The mean share held in each of these years.
     pub fn yearly_allocation(&self, year: usize) -> Vec<f64> {
-        self.allocations.chunks_exact(year).map(|held| held.iter().sum::<f64>() / year as f64).collect()
+        let counted = &self.allocations[uncounted_periods(self.allocations.len(), year)..];
+        counted.chunks_exact(year).map(|held| held.iter().sum::<f64>() / year as f64).collect()
     }
 
-    /// The same of the years that begin with every period, one after another.
+    /// Growth of wealth in the years that begin with every period, one after another.
     pub fn rolling_growth(&self, year: usize) -> impl Iterator<Item = f64> {
         self.wealth.windows(year + 1).map(move |whole| whole[year] / whole[0])
     }
+}
+
+/// How many of the first of so many periods count in no year, because years end with the last period.
+pub fn uncounted_periods(periods: usize, year: usize) -> usize {
+    periods % year
 }
 
 /// Where the wealth of a strategy ends on a path, and how far it fell on the way.
@@ -190,7 +197,15 @@ mod tests {
         assert!((account.drawdowns()[2] - (1.0 - second / 109.9475)).abs() < 1e-12);
         assert_eq!(account.drawdowns()[..2], [0.0, 0.0]);
         assert_eq!(account.yearly_growth(3), [account.wealth[3] / 100.0]);
-        assert_eq!(account.yearly_growth(2).len(), 1);
+        // The last two months are a year, and the first counts in none.
+        assert_eq!(account.yearly_growth(2), [account.wealth[3] / account.wealth[1]]);
+    }
+
+    #[test]
+    fn growth_and_shares_are_of_the_same_years() {
+        let account =
+            Account { wealth: vec![8.0, 4.0, 2.0, 6.0, 6.0, 9.0], allocations: vec![1.0, 0.1, 0.3, 0.5, 0.7], traded: vec![0.0; 5] };
+        assert_eq!((account.yearly_growth(2), account.yearly_allocation(2)), (vec![1.5, 1.5], vec![0.2, 0.6]));
     }
 
     /// Shares of 10 % and 30 % of two assets with the same returns are 40 % of one. From then on a trade from one to the other costs

@@ -4,6 +4,7 @@ use jiff::civil::Date;
 
 use crate::control::error::{FieldError, TrainError};
 use crate::control::evaluation::analysis::{Analysis, Line};
+use crate::control::evaluation::names::{StrategyKind, at_level, mix_name};
 use crate::control::evaluation::rolling::{Decision, Period, Strategy, WalkForward};
 use crate::control::evaluation::yearly_worth::Scale;
 use crate::control::progress::Watch;
@@ -28,8 +29,8 @@ pub struct Backtest {
     pub periods_per_year: usize,
     /// The whole record.
     pub periods: Vec<Period>,
-    /// Names and what they stand for: the adaptive ones first, in the order of their levels.
-    pub strategies: Vec<(String, Strategy)>,
+    /// Kinds and names, and what they stand for: the adaptive ones first, in the order of their levels.
+    pub strategies: Vec<((StrategyKind, String), Strategy)>,
     days: Vec<Date>,
 }
 
@@ -111,11 +112,6 @@ impl Backtest {
         main_level(&self.request)
     }
 
-    /// The name of the same, trained as if trading were free.
-    pub fn blind_line(&self) -> String {
-        blind_line(&self.request)
-    }
-
     /// What the strategies are, without their names.
     pub fn plain_strategies(&self) -> Vec<Strategy> {
         self.strategies.iter().map(|(_, strategy)| *strategy).collect()
@@ -137,12 +133,17 @@ impl Backtest {
         problem.warnings().into_iter().map(|warning| warning.of_walk(self.request.returns().0)).collect()
     }
 
-    /// Decides every period on the current pool and keeps the books; `trained` hears of every training done.
+    /// Steps of all their trainings.
+    pub fn steps(&self) -> usize {
+        self.walk.steps(&self.plain_strategies(), &self.periods)
+    }
+
+    /// Decides every period on the current pool and keeps the books; `solved` is called after every one of the [`steps`](Self::steps).
     ///
     /// # Errors
     /// As [`WalkForward::decide`].
-    pub fn run(self, watch: &Watch, trained: &(dyn Fn() + Sync)) -> Result<Walked, TrainError> {
-        let decisions = self.walk.decide(&self.plain_strategies(), &self.periods, watch, trained)?;
+    pub fn run(self, watch: &Watch, solved: &(dyn Fn() + Sync)) -> Result<Walked, TrainError> {
+        let decisions = self.walk.decide(&self.plain_strategies(), &self.periods, watch, solved)?;
         Ok(self.walked(decisions))
     }
 
@@ -164,24 +165,24 @@ fn main_level(request: &BacktestRequest) -> usize {
     usize::from(request.alpha.len() > 1)
 }
 
-fn blind_line(request: &BacktestRequest) -> String {
-    format!("cost-blind, alpha {}", request.alpha[main_level(request)])
-}
-
-fn strategies(request: &BacktestRequest) -> Vec<(String, Strategy)> {
-    let adaptive =
-        request.alpha.iter().map(|&alpha| (format!("adaptive, alpha {alpha}"), Strategy::Adaptive { alpha }));
+fn strategies(request: &BacktestRequest) -> Vec<((StrategyKind, String), Strategy)> {
+    let plain = |kind: StrategyKind, strategy: Strategy| ((kind, kind.name().to_owned()), strategy);
+    let adaptive = request.alpha.iter().map(|&alpha| match request.alpha[..] {
+        [_] => plain(StrategyKind::Adaptive, Strategy::Adaptive { alpha }),
+        _ => ((StrategyKind::Adaptive, at_level(alpha)), Strategy::Adaptive { alpha }),
+    });
+    let mix = |kind: StrategyKind, share: f64| ((kind, mix_name(share)), Strategy::Mix { share });
     let alpha = request.alpha[main_level(request)];
     let knows_cost = request.trading_cost > 0.0 && !request.cost_blind;
-    let blind = knows_cost.then(|| (blind_line(request), Strategy::CostBlind { alpha }));
+    let blind = knows_cost.then(|| plain(StrategyKind::CostBlind, Strategy::CostBlind { alpha }));
     adaptive
         .chain(blind)
         .chain([
-            (format!("static, alpha {alpha}"), Strategy::Static { alpha }),
-            ("plug-in".into(), Strategy::PlugIn),
-            ("60/40".into(), Strategy::Mix { share: 0.6 }),
-            ("all-stock".into(), Strategy::Mix { share: 1.0 }),
-            ("all-bank".into(), Strategy::Mix { share: 0.0 }),
+            plain(StrategyKind::Static, Strategy::Static { alpha }),
+            plain(StrategyKind::PlugIn, Strategy::PlugIn),
+            mix(StrategyKind::SixtyForty, 0.6),
+            mix(StrategyKind::AllStock, 1.0),
+            mix(StrategyKind::AllBank, 0.0),
         ])
         .collect()
 }

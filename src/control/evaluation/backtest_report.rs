@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::control::evaluation::names::StrategyKind;
 use crate::control::request::centre::CentreSpecification;
 
 /// Name and version of the report's form.
@@ -19,8 +20,10 @@ pub struct BacktestReport {
     pub periods_per_year: usize,
     /// Of the periods decided about, those after the first window; null where the periods have none.
     pub dates: Option<Vec<String>>,
-    /// Whole years decided about, whose utility is taken.
+    /// Whole years decided about, whose utility is taken; the last ends with the last period.
     pub whole_years: usize,
+    /// The first periods decided about, fewer than a year, which count in none of them.
+    pub uncounted_periods: usize,
     /// As completed.
     pub choices: BacktestChoices,
     /// How the intervals were made.
@@ -119,8 +122,12 @@ pub struct Performance {
 pub struct BacktestFigures {
     /// Its name.
     pub strategy: String,
+    /// Its kind.
+    pub kind: StrategyKind,
     /// Whether it was chosen with what only the end could tell.
     pub hindsight: bool,
+    /// Its place by `yearly_certainty_equivalent`, 1 the best; equal ones share it. Null in hindsight.
+    pub place: Option<usize>,
     /// As of every strategy; its own mix is a constant one.
     #[serde(flatten)]
     pub performance: Performance,

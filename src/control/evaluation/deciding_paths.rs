@@ -1,5 +1,6 @@
 //! How many of the simulated paths decide what a strategy is worth for certain.
 
+use crate::control::evaluation::names::quoted;
 use crate::control::problem::utility::RelativeUtility;
 
 /// Fewer paths than these say little of a mean.
@@ -25,7 +26,7 @@ pub fn few_decide<'a>(
         count = wealth.len();
         let deciding = effective_number(wealth.iter().map(|wealth| utility.weight((wealth / floor).ln())));
         if deciding < FEW_PATHS.min(0.5 * count as f64) {
-            named.push(format!("{name} ({deciding:.0})"));
+            named.push(format!("{} ({deciding:.0})", quoted(name)));
         }
     }
     (!named.is_empty()).then(|| {

@@ -8,6 +8,7 @@ pub mod backtest_report;
 pub mod coverage;
 pub mod deciding_paths;
 pub mod frontier;
+pub mod names;
 pub mod paths;
 pub mod report;
 pub mod resampling;

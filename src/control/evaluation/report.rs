@@ -50,7 +50,7 @@ pub struct Costs {
 /// One strategy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StrategyReport {
-    /// `adaptive`, `mix_0.5`, `all_bank` and the like.
+    /// Its name: `Cautious, learns`, `50 % in stocks`, `All in the bank` and the like.
     pub strategy: String,
     /// Null for constant mixes.
     pub framework: Option<Framework>,
@@ -234,6 +234,11 @@ impl EvaluationReport {
         let means = self.histories.iter_mut().flat_map(|history| &mut history.mean_utility);
         means.chain(&mut self.histogram_edges).for_each(|value| *value = absolute(*value));
         self
+    }
+
+    /// The strategy that follows policies of this framework.
+    pub fn framework(&self, framework: Framework) -> Option<&StrategyReport> {
+        self.strategies.iter().find(|strategy| strategy.framework == Some(framework))
     }
 
     /// The strategy of this name.

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use crate::control::evaluation::account::mix_ended;
 use crate::control::evaluation::deciding_paths::few_decide;
+use crate::control::evaluation::names::{framework_name, mix_name};
 use crate::control::evaluation::paths::{Evaluation, Follower, HistoryStart, Lived, Outcomes};
 use crate::control::evaluation::report::{
     Costs, Coverage, CoverageAtSize, Difference, EvaluationReport, FORMAT, HistoryReport, OwnMix, PeriodReport,
@@ -126,8 +127,10 @@ impl Table<'_> {
         let utilities = self.utilities[index].as_slice();
         let policy = advisor.map(|advisor| advisor.policy().to_json()).transpose()?;
         Ok(StrategyReport {
-            strategy: follower
-                .map_or_else(|| mix_name(mix.unwrap_or_default()), |follower| follower.framework.name().to_owned()),
+            strategy: follower.map_or_else(
+                || mix_name(mix.unwrap_or_default()),
+                |follower| framework_name(follower.framework).to_owned(),
+            ),
             framework: follower.map(|follower| follower.framework),
             constant_mix: mix,
             policy: policy.map(|json| content_hash(&json)),
@@ -312,10 +315,6 @@ fn sentence(strategy: &StrategyReport) -> Option<String> {
 /// True where the framework's uncertainty set is a Wasserstein ball.
 fn has_ball(framework: Framework) -> bool {
     matches!(framework, Framework::Adaptive | Framework::Static)
-}
-
-fn mix_name(mix: f64) -> String {
-    if mix == 0.0 { "all_bank".to_owned() } else { format!("mix_{mix}") }
 }
 
 /// The derivative at `value` of wealth over the floor, exp(u^{-1}).

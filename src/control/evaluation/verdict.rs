@@ -6,10 +6,12 @@ use crate::control::evaluation::backtest::{Backtest, Walked};
 use crate::control::evaluation::backtest_report::{
     BacktestChoices, BacktestFigures, BacktestPeriods, BacktestReport, BootstrapEstimate, FORMAT,
 };
+use crate::control::evaluation::names::{StrategyKind, quoted};
 use crate::control::evaluation::resampling::intervals;
 use crate::control::evaluation::rolling::Decision;
 use crate::control::evaluation::yearly_worth::CONFIDENCE;
 use crate::control::policy::advice::AdviceSource;
+use crate::numerics::digits::{fixed, signed};
 
 /// Below it years say too little about the next one: a crash that comes once in ten years is missing from 35 % of the records of ten
 /// years, 12 % of those of twenty and 4 % of those of thirty, and an interval counts only what was seen.
@@ -22,6 +24,7 @@ pub fn sentences(walked: &Walked) -> Vec<String> {
     let Walked { backtest, lines, analysis } = walked;
     let (figures, main) = (&analysis.figures, backtest.main_line());
     let mut sentences = vec![ranking(figures, main)];
+    sentences.extend(uncounted(analysis.uncounted_periods, backtest.noun()));
     let others = figures.iter().enumerate().filter(|(index, _)| *index != main).map(|(_, other)| other);
     match few_years(analysis.years) {
         Some(sentence) => sentences.push(sentence),
@@ -36,7 +39,7 @@ pub fn sentences(walked: &Walked) -> Vec<String> {
     sentences.push(guard(&lines[main], backtest.noun()));
     let blind = backtest.request.cost_blind;
     let known =
-        if blind { "no policy knows of it" } else { "policies are trained with it, but for the cost-blind one" };
+        if blind { "no policy knows of it" } else { "policies are trained with it, but for the one blind to costs" };
     sentences.push(cost(backtest.request.trading_cost, known));
     sentences
 }
@@ -52,18 +55,28 @@ pub fn few_years(years: usize) -> Option<String> {
     (years < FEWEST_YEARS).then(sentence)
 }
 
+/// The periods that count in no year; none where there are none.
+pub fn uncounted(periods: usize, noun: &str) -> Option<String> {
+    let first = match periods {
+        0 => return None,
+        1 => format!("The first {noun} counts"),
+        _ => format!("The first {periods} {noun}s count"),
+    };
+    Some(format!("{first} in no year: years end with the last {noun}."))
+}
+
 fn ranking(figures: &[BacktestFigures], main: usize) -> String {
     let value = |figures: &BacktestFigures| figures.performance.yearly_certainty_equivalent.value;
-    let real: Vec<&BacktestFigures> = figures.iter().filter(|figures| !figures.hindsight).collect();
-    let ahead = real.iter().filter(|other| value(other) > value(&figures[main])).count();
-    let best = real.iter().max_by(|a, b| value(a).total_cmp(&value(b)));
-    let best = best.map_or(String::new(), |best| format!(" The first is {} with {:.2}.", best.strategy, value(best)));
+    let main = &figures[main];
+    let placed = figures.iter().filter(|figures| figures.place.is_some()).count();
+    let best = figures.iter().find(|figures| figures.place == Some(1)).filter(|_| main.place != Some(1));
+    let best =
+        best.map_or(String::new(), |best| format!(" The first is {} with {:.2}.", quoted(&best.strategy), value(best)));
     format!(
-        "{}: a year from 100 counts as {:.2} for certain, place {} of {}.{best}",
-        figures[main].strategy,
-        value(&figures[main]),
-        ahead + 1,
-        real.len()
+        "With {} a year from 100 counts as {:.2} for certain, place {} of {placed}.{best}",
+        quoted(&main.strategy),
+        value(main),
+        main.place.unwrap_or(placed)
     )
 }
 
@@ -102,6 +115,7 @@ pub fn grouped<'a>(differences: impl Iterator<Item = (&'a str, BootstrapEstimate
 
 /// Names one after the other.
 pub fn listed(names: &[&str]) -> String {
+    let names: Vec<String> = names.iter().map(|name| quoted(name)).collect();
     if names.is_empty() { "none".into() } else { names.join("; ") }
 }
 
@@ -114,9 +128,13 @@ pub fn beside_own_mix(strategy: &str, allocation: f64, value: f64, [low, high]: 
         () => format!("{witness} not show that changing the allocation did anything"),
     };
     format!(
-        "Against a constant mix of its own average allocation, {:.1} %, which nobody knew beforehand, {strategy} differs \
-         by {value:+.2} [{low:.2}, {high:.2}]: {verdict}.",
-        100.0 * allocation
+        "Against a constant mix of its own average allocation, {:.1} %, which nobody knew beforehand, {} differs \
+         by {} [{}, {}]: {verdict}.",
+        100.0 * allocation,
+        quoted(strategy),
+        signed(value, 2),
+        fixed(low, 2),
+        fixed(high, 2)
     )
 }
 
@@ -153,9 +171,9 @@ fn holding(figures: &BacktestFigures, backtest: &Backtest) -> String {
 }
 
 fn drawdown(figures: &[BacktestFigures], main: usize) -> Option<String> {
-    let stock = figures.iter().find(|figures| figures.strategy == "all-stock")?;
+    let stock = figures.iter().find(|figures| figures.kind == StrategyKind::AllStock)?;
     Some(format!(
-        "Its largest fall from a peak was {:.1} %, where all-stock fell {:.1} %; 100 became {:.0}, with all-stock {:.0}.",
+        "Its largest fall from a peak was {:.1} %, that of all in stocks {:.1} %; 100 became {:.0}, all in stocks {:.0}.",
         100.0 * figures[main].performance.max_drawdown,
         100.0 * stock.performance.max_drawdown,
         figures[main].performance.final_wealth,
@@ -195,6 +213,7 @@ impl BacktestReport {
             periods_per_year: backtest.periods_per_year,
             dates: backtest.dates(),
             whole_years: analysis.years,
+            uncounted_periods: analysis.uncounted_periods,
             choices: BacktestChoices {
                 window: walk.window,
                 every: walk.every,
@@ -236,12 +255,14 @@ mod tests {
     use super::*;
     use crate::control::evaluation::backtest_report::Performance;
 
-    fn figures(strategy: &str, value: f64, ahead: [f64; 2], hindsight: bool) -> BacktestFigures {
+    fn figures(strategy: &str, value: f64, ahead: [f64; 2], place: Option<usize>) -> BacktestFigures {
         let at = |value: f64, interval| BootstrapEstimate { value, interval };
         let none = at(0.0, [0.0; 2]);
         BacktestFigures {
             strategy: strategy.into(),
-            hindsight,
+            kind: if place.is_none() { StrategyKind::OwnMix } else { StrategyKind::Adaptive },
+            hindsight: place.is_none(),
+            place,
             performance: Performance {
                 yearly_certainty_equivalent: at(value, [value - 1.0, value + 1.0]),
                 beyond_own_mix: None,
@@ -263,19 +284,21 @@ mod tests {
     #[test]
     fn the_verdict_follows_the_figures_either_way() {
         let all = [
-            figures("adaptive, alpha 0.1", 103.0, [0.0; 2], false),
-            figures("all-bank", 104.0, [-1.5, -0.5], false),
-            figures("plug-in", 101.0, [1.0, 3.0], false),
-            figures("60/40", 103.5, [-1.5, 0.5], false),
-            figures("constant 25.0 %", 105.0, [-3.0, -1.0], true),
+            figures("Cautious, learns", 103.0, [0.0; 2], Some(3)),
+            figures("All in the bank", 104.0, [-1.5, -0.5], Some(1)),
+            figures("Trusts the record", 101.0, [1.0, 3.0], Some(4)),
+            figures("60/40", 103.5, [-1.5, 0.5], Some(2)),
+            figures("Hindsight: 25.0 % in stocks", 105.0, [-3.0, -1.0], None),
         ];
         assert_eq!(
             ranking(&all, 0),
-            "adaptive, alpha 0.1: a year from 100 counts as 103.00 for certain, place 3 of 4. The first is all-bank with 104.00."
+            "With “Cautious, learns” a year from 100 counts as 103.00 for certain, place 3 of 4. The first is “All in the \
+             bank” with 104.00."
         );
         assert_eq!(
             against(all[1..4].iter()),
-            "By the intervals of the differences, of which all 3 hold at once with 90 % confidence, it is better than: plug-in. Worse than: all-bank. Not to be told apart from: 60/40."
+            "By the intervals of the differences, of which all 3 hold at once with 90 % confidence, it is better than: “Trusts \
+             the record”. Worse than: “All in the bank”. Not to be told apart from: “60/40”."
         );
         assert_eq!(timing(&all, 0), None);
         let timed = |low: f64, high: f64| {
@@ -295,7 +318,16 @@ mod tests {
             [named("a", 1.0, 2.0), named("b", -2.0, -1.0), named("c", -1.0, 1.0), named("d", 0.5, 1.0), all[1].clone()];
         assert_eq!(
             timing_of_others(&some, 0),
-            "Against such mixes of their own, by intervals that hold at once too, changing the allocation paid for: d. It cost: b. The record shows neither for: c."
+            "Against such mixes of their own, by intervals that hold at once too, changing the allocation paid for: “d”. It \
+             cost: “b”. The record shows neither for: “c”."
         );
+    }
+
+    #[test]
+    fn the_periods_that_count_in_no_year_are_named() {
+        let of = |periods| uncounted(periods, "month");
+        assert_eq!(of(0), None);
+        assert_eq!(of(1).unwrap(), "The first month counts in no year: years end with the last month.");
+        assert_eq!(of(11).unwrap(), "The first 11 months count in no year: years end with the last month.");
     }
 }

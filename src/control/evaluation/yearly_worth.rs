@@ -70,6 +70,11 @@ impl YearlyWorth {
         BootstrapEstimate { value: mean.value(), interval: mean.interval(CONFIDENCE) }
     }
 
+    /// Its place among `worths`, 1 the best, by the certainty equivalent; equal ones share it.
+    pub fn place<'a>(&self, worths: impl Iterator<Item = &'a YearlyWorth>) -> usize {
+        1 + worths.filter(|other| other.certainty_equivalent > self.certainty_equivalent).count()
+    }
+
     /// By how much it exceeds another of the same years.
     pub fn beyond(&self, other: &YearlyWorth) -> LongRunMean {
         let parts: Vec<f64> = self.parts.iter().zip(&other.parts).map(|(own, other)| own - other).collect();
@@ -140,6 +145,12 @@ mod tests {
             let found = (weighted(index, 1e-6) - weighted(index, -1e-6)) / 2e-6;
             assert!((found - part).abs() < 1e-5 * part.abs(), "{found} {part}");
         }
+    }
+
+    #[test]
+    fn equal_worths_share_a_place() {
+        let worths = [1.1, 1.2, 1.1, 0.9].map(|growth| YearlyWorth::new(UtilitySpecification::Log {}, &[growth, 1.0]));
+        assert_eq!(worths.each_ref().map(|worth| worth.place(worths.iter())), [2, 1, 2, 4]);
     }
 
     /// Shares that change from year to year for no reason: the truth is the average loss against the mix of the expected share, and

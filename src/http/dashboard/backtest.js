@@ -8,7 +8,7 @@ import { h, quantSection, section, table } from "./dom.js";
 import { select } from "./form.js";
 import { allocation, count, counted, figures, minus, percent, percentTick, tick, wealth } from "./format.js";
 import { dated, unitOf } from "./periods.js";
-import { FRAMEWORKS, investorWords, percentName } from "./specification.js";
+import { investorWords } from "./specification.js";
 import { colourOf, colourOfLevel } from "./strategies.js";
 import { belowHighest, compounded, grouped, places, returnsOf, rolling, worstFalls } from "./track.js";
 import { changing, ordinal } from "./verdict.js";
@@ -23,7 +23,7 @@ const ROUNDING = 1e-6;
 const ROLLING = [5, 1];
 /** With fewer returns the service is careful with an advice. */
 const SHORT_RECORD = 24;
-const KNOWN = ["all-bank", "60/40", "all-stock"];
+const KNOWN = ["all_bank", "sixty_forty", "all_stock"];
 
 /** The report with what is said and drawn of it. */
 const tell = (report) => ({ ...report, ...(report.assets ? ofAssets(report) : ofOne(report)), unit: unitOf(report.periods_per_year), times: times(report) });
@@ -38,29 +38,8 @@ export function body(report) {
 /** The strategies of one asset; `market` is what they are held against, `known` who stands beside each, `main` who most is said of. */
 function ofOne(report) {
   const told = { ...report, lines: lines(report) };
-  const beside = KNOWN.map((name) => known(told, name));
-  return { lines: told.lines, known: beside, market: known(told, "all-stock"), main: mainOf(told), held: "Share held in stocks" };
-}
-
-/** A strategy's kind, by its name in the report. */
-const kindOf = (strategy) => strategy.replace(/[ ,].*/, "");
-
-function named({ strategy, mean_allocation }, { choices }) {
-  const level = /alpha (.+)$/.exec(strategy)?.[1];
-  switch (kindOf(strategy)) {
-    case "adaptive":
-      return choices.alpha.length > 1 ? `${FRAMEWORKS.adaptive}, ${percentName(1 - level)}` : FRAMEWORKS.adaptive;
-    case "static":
-      return FRAMEWORKS.static;
-    case "plug-in":
-      return FRAMEWORKS.plug_in;
-    case "cost-blind":
-      return "Learns, blind to costs";
-    case "constant":
-      return `Hindsight: ${percent(mean_allocation)} in stocks`;
-    default:
-      return { "all-stock": "All in stocks", "all-bank": "All in the bank" }[strategy] ?? strategy;
-  }
+  const beside = KNOWN.map((kind) => known(told, kind));
+  return { lines: told.lines, known: beside, market: known(told, "all_stock"), main: mainOf(told), held: "Share held in stocks" };
 }
 
 /** Every strategy with its name, its colour and its wealth from the start on, in the order of the report. */
@@ -69,13 +48,13 @@ const lines = (report) =>
     ...figures,
     periods: report.periods[index],
     wealth: [START, ...report.periods[index].wealth],
-    name: named(figures, report),
-    colour: kindOf(figures.strategy) === "adaptive" ? colourOfLevel(index, report.choices.alpha.length) : colourOf(kindOf(figures.strategy)),
+    name: figures.strategy,
+    colour: figures.kind === "adaptive" ? colourOfLevel(index, report.choices.alpha.length) : colourOf(figures.kind),
   }));
 
 /** The one that most is said about: the second cautious one that learns, or the only one. */
 const mainOf = ({ lines, choices }) => lines[Math.min(1, choices.alpha.length - 1)];
-const known = ({ lines }, name) => lines.find(({ strategy }) => strategy === name);
+const known = ({ lines }, wanted) => lines.find(({ kind }) => kind === wanted);
 
 /** Where the start and the end of each period stand on an axis, in years, and what they are called. */
 function times({ dates, periods_per_year, periods }) {
@@ -114,17 +93,18 @@ function walked({ choices, lines, unit, times }) {
 
 /** What the figures say. */
 function conclusions(told) {
-  const { lines, whole_years } = told;
+  const { lines, whole_years, uncounted_periods } = told;
   const main = mainOf(told);
-  const [bank, stocks] = [known(told, "all-bank"), known(told, "all-stock")];
+  const [bank, stocks] = [known(told, "all_bank"), known(told, "all_stock")];
   const worth = ({ yearly_certainty_equivalent: { value } }) => value;
-  const real = lines.filter(({ hindsight }) => !hindsight).sort((one, other) => worth(other) - worth(one));
-  const [best] = real;
+  const real = lines.filter(({ place }) => place !== null);
+  const best = main.place === 1 ? main : real.find(({ place }) => place === 1);
   const quoted = `\u201c${main.name}\u201d`;
   const said = [
-    `${best === main || !KNOWN.includes(best.strategy) ? `\u201c${best.name}\u201d` : best.name} came to the most for this investor in this record: a year from ${START} counts as a sure ${wealth(worth(best))}${best === bank ? "" : `, where all in the bank comes to ${wealth(worth(bank))}`}.`,
+    `${best === main || !KNOWN.includes(best.kind) ? `\u201c${best.name}\u201d` : best.name} came to the most for this investor in this record: a year from ${START} counts as a sure ${wealth(worth(best))}${best === bank ? "" : `, where all in the bank comes to ${wealth(worth(bank))}`}.`,
   ];
-  if (best !== main) said.push(`${quoted} comes ${ordinal(real.indexOf(main) + 1)} of ${real.length}, with ${wealth(worth(main))}.`);
+  if (best !== main) said.push(`${quoted} comes ${ordinal(main.place)} of ${real.length}, with ${wealth(worth(main))}.`);
+  if (uncounted_periods > 0) said.push(`The first ${uncounted_periods === 1 ? `${told.unit} counts` : `${counted(uncounted_periods, told.unit)} count`} in no year: years end with the last ${told.unit}.`);
   if (whole_years < FEWEST_YEARS) said.push(`The record has ${counted(whole_years, "whole year")} to decide about, fewer than ${FEWEST_YEARS}: it does not tell the strategies apart. A crash that comes once in ten years is missing from many records so short.`);
   else said.push(apart(told, main, quoted));
   said.push(`The worst fall of ${quoted} was ${percent(main.max_drawdown)}, that of all in stocks ${percent(stocks.max_drawdown)}; from ${START} it came to ${wealth(main.final_wealth)}, all in stocks to ${wealth(stocks.final_wealth)}.`);

@@ -7,24 +7,9 @@ import { investorWords } from "./specification.js";
 import { stackedChart } from "./stacked.js";
 import { colourOf } from "./strategies.js";
 
-const EQUAL = "1/N";
-const KNOWN = [EQUAL, "60 % 1/N"];
-const NAMES = { "robust scaled_one": "Robust", "robust sup": "Robust, sup norm", "static scaled_one": "Chosen once a stretch", "plug-in": "Trusts the record", "minimum variance": "Least variance", "inverse volatility": "Inverse volatility", "1/N": "Equal shares", "60 % 1/N": "60 % in equal shares" };
+const KNOWN = ["equal_shares", "sixty_equal"];
 
 const sum = (numbers) => numbers.reduce((all, number) => all + number, 0);
-
-/** A strategy's kind, by its name in the report. */
-const familyOf = (strategy) => strategy.split(", ")[0];
-
-/** In words: what it is, how much of the radius it takes, and how much of the past it knows. */
-function named(strategy) {
-  const [family, ...rest] = strategy.split(", ");
-  const scale = rest.find((part) => part.startsWith("scale "));
-  const window = rest.find((part) => !part.startsWith("scale "));
-  const caution = scale === "scale 0.5" ? "half the caution" : scale && scale !== "scale 1" ? scale : null;
-  const knows = window && (window === "all" ? "knows all" : `knows ${window}`);
-  return [NAMES[family] ?? family, caution, knows].filter(Boolean).join(", ");
-}
 
 /** The strategies as the page of one asset has them; `market` is what they are held against, `known` who stands beside each. */
 export function ofAssets(report) {
@@ -36,11 +21,11 @@ export function ofAssets(report) {
       ...figures,
       periods: { ...periods, allocation: totals },
       wealth: [START, ...periods.wealth],
-      name: named(figures.strategy),
-      colour: colourOf(familyOf(figures.strategy)),
+      name: figures.strategy,
+      colour: colourOf(figures.kind),
     };
   });
-  const known = KNOWN.map((name) => lines.find(({ strategy }) => strategy === name));
+  const known = KNOWN.map((wanted) => lines.find(({ kind }) => kind === wanted));
   return { lines, known, market: known[0], main: lines[0], held: "Share held in all assets" };
 }
 
@@ -74,6 +59,6 @@ export function heldOfAssets({ assets, times }, line) {
 /** Estimates with their ranges. */
 export function quantOfAssets(told) {
   const { alpha, seed } = told.choices;
-  const beside = { beyond_equal: "More than 1/N", beyond_own_mix: "Beyond 1/N at its own total" };
+  const beside = { beyond_equal: "More than equal shares", beyond_own_mix: "Beyond equal shares at its own total" };
   return quantSection("Ranges and ratios", () => h("div", {}, ranges(told, beside, `Alpha ${alpha}, seed ${count(seed)}.`)));
 }

@@ -11,9 +11,9 @@ import { worstFalls } from "./track.js";
 
 /** What the session is measured by, each held through the same returns; 60/40 as people call it. */
 export const besides = (history) => [
-  { name: "All in the bank", share: 0, colour: colourOf("all-bank") },
-  { name: "60/40", share: 0.6, colour: colourOf("60/40") },
-  { name: `All in ${risky(history)}`, share: 1, colour: colourOf("all-stock") },
+  { name: "All in the bank", share: 0, colour: colourOf("all_bank") },
+  { name: "60/40", share: 0.6, colour: colourOf("sixty_forty") },
+  { name: `All in ${risky(history)}`, share: 1, colour: colourOf("all_stock") },
 ];
 /** Charts above each other start at one line. */
 const GUTTER = 64;

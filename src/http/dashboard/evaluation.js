@@ -6,7 +6,7 @@ import { allocation, count, counted, duration, figures, minus, percent, percentT
 import { histogram } from "./histogram.js";
 import { intervalChart } from "./interval_chart.js";
 import { unitOf } from "./periods.js";
-import { FRAMEWORKS, investorWords, PAPER } from "./specification.js";
+import { investorWords, PAPER } from "./specification.js";
 import { colourOf, colourOfMix } from "./strategies.js";
 import { changing, interval, ordinal } from "./verdict.js";
 
@@ -19,11 +19,7 @@ export function body(report, policyLink) {
   return [compared(report, policyLink), results(report, ended), spreads(report, ended), courses(report), quant(report, ended)];
 }
 
-const named = ({ framework, constant_mix }) => {
-  if (framework) return FRAMEWORKS[framework];
-  if (constant_mix === 0 || constant_mix === 1) return constant_mix === 0 ? "All in the bank" : "All in stocks";
-  return `${percent(constant_mix, 0)} in stocks`;
-};
+const named = ({ strategy }) => strategy;
 
 const coloured = ({ framework, constant_mix }) => (framework ? colourOf(framework) : colourOfMix(constant_mix));
 
@@ -52,7 +48,7 @@ function compared({ request, histories, strategies }, policyLink) {
   const drawn = request.histories.kind === "drawn";
   const records = drawn ? `, after each of ${counted(histories.length, "record")} drawn from the market` : `, after a record of ${counted(problem.history.length, "return")}`;
   const followed = strategies.filter(({ policy }) => policy && Object.values(request.policies).includes(policy));
-  const links = followed.map(({ policy, framework }, index) => [index > 0 ? ", " : "", `\u201c${FRAMEWORKS[framework]}\u201d is `, policyLink(policy)]);
+  const links = followed.map(({ policy, strategy }, index) => [index > 0 ? ", " : "", `\u201c${strategy}\u201d is `, policyLink(policy)]);
   return h(
     "div",
     { class: "words" },

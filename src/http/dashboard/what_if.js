@@ -50,7 +50,7 @@ function charts(solved, { radius, allocation: advised }, cautionScale, unit) {
         start: own,
         x,
         y: { format: wealth, tick },
-        series: [line("", (point) => point.certainty_equivalent), line("All in the bank", ({ floor }) => floor, { bare: true, colour: colourOf("all-bank") })],
+        series: [line("", (point) => point.certainty_equivalent), line("All in the bank", ({ floor }) => floor, { bare: true, colour: colourOf("all_bank") })],
       }),
     ),
   ];

@@ -9,6 +9,7 @@ use crate::command::backtest::files::{estimated, figures, of_returns, of_wealth,
 pub fn strategies(report: &AssetsBacktestReport) -> String {
     let of = |one: &AssetsFigures| {
         let mut all = vec![estimated("yearly_certainty_equivalent", one.performance.yearly_certainty_equivalent)];
+        all.push(plain("place", one.place as f64));
         all.extend(one.beyond_equal.map(|beyond| estimated("beyond_equal", beyond)));
         all.extend(one.performance.beyond_own_mix.map(|beyond| estimated("beyond_own_mix", beyond)));
         all.extend(of_returns(&one.performance));

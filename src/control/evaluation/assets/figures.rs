@@ -4,11 +4,12 @@ use super::report::{AssetsBacktestReport, AssetsFigures, AssetsPeriods, FORMAT};
 use super::words::sentences;
 use super::{AssetsLine, AssetsWalked};
 use crate::control::assets::advice::named;
+use crate::control::evaluation::account::uncounted_periods;
 use crate::control::evaluation::backtest_report::BootstrapEstimate;
 use crate::control::evaluation::resampling::{Resampled, Series, intervals};
 use crate::control::evaluation::yearly_worth::{Scale, YearlyWorth, present_at_once};
 
-/// The place of 1/N, with all wealth in equal shares: the last but one.
+/// The index of equal shares of all wealth: the last but one.
 fn reference(lines: &[AssetsLine]) -> usize {
     lines.len() - 2
 }
@@ -25,25 +26,26 @@ impl AssetsBacktestReport {
         let performance = compared(lines, &scale).into_iter().enumerate();
         let strategies: Vec<AssetsFigures> =
             performance.map(|(index, compared)| figures(walked, index, compared, &resampled)).collect();
-        let whole_years = backtest.lived().len() / year;
         AssetsBacktestReport {
             format: FORMAT.to_owned(),
             assets: record.assets.clone(),
             frequency: record.frequency.adjective().to_owned(),
             periods_per_year: year,
             dates: backtest.dates().to_vec(),
-            whole_years,
+            whole_years: backtest.lived().len() / year,
+            uncounted_periods: uncounted_periods(backtest.lived().len(), year),
             choices: choices.clone(),
             intervals: intervals(year, lines.len() - 1),
             periods: lines.iter().map(|line| periods(&record.assets, line)).collect(),
-            sentences: sentences(walked, &strategies, whole_years),
+            sentences: sentences(walked, &strategies),
             strategies,
         }
     }
 }
 
-/// The worth of a strategy, and by how much it exceeds equal shares, and those at its own average total.
+/// The worth of a strategy and its place, and by how much it exceeds equal shares, and those at its own average total.
 struct Compared {
+    place: usize,
     worth: BootstrapEstimate,
     beyond_equal: Option<BootstrapEstimate>,
     beyond_own_mix: Option<BootstrapEstimate>,
@@ -63,6 +65,7 @@ fn compared(lines: &[AssetsLine], scale: &Scale) -> Vec<Compared> {
     let beyond = present_at_once(beyond.collect(), scale.seed);
     let all = worths.iter().zip(ahead).zip(beyond);
     all.map(|((worth, beyond_equal), beyond_own_mix)| Compared {
+        place: worth.place(worths.iter()),
         worth: worth.estimate(),
         beyond_equal,
         beyond_own_mix,
@@ -76,6 +79,8 @@ fn figures(walked: &AssetsWalked, index: usize, compared: Compared, resampled: &
     let mean = |asset: usize| line.held.iter().map(|shares| shares[asset]).sum::<f64>() / line.held.len() as f64;
     AssetsFigures {
         strategy: line.name.clone(),
+        kind: line.strategy.rule.kind(),
+        place: compared.place,
         performance: resampled.performance(index, &line.account, compared.worth, compared.beyond_own_mix),
         beyond_equal: compared.beyond_equal,
         effective_assets: effective_assets(&line.held),

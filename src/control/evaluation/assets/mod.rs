@@ -278,6 +278,7 @@ mod tests {
     use super::*;
     use crate::control::evaluation::analysis::{Analysis, Line};
     use crate::control::evaluation::backtest_report::{BacktestFigures, BootstrapEstimate};
+    use crate::control::evaluation::names::StrategyKind;
     use crate::control::evaluation::rolling::{Decision, Period};
     use crate::control::evaluation::yearly_worth::Scale;
     use crate::control::problem::actions::Band;
@@ -322,11 +323,11 @@ mod tests {
         let walked = walk(record(3, 30, |_, period| log_return(0, period)));
         let lived: Vec<Period> =
             (12..30).map(|period| Period { log_return: log_return(0, period), bank_return: BANK }).collect();
-        let names = ["1/N", "60 % 1/N", "robust scaled_one, scale 0.5, 3 years"];
+        let names = ["Equal shares", "60 % in equal shares", "Robust, half the caution, knows 3 years"];
         let line = |name: &str| {
             let decision = |share: &f64| Decision { band: Band::of(&[*share]), radius: 0.0, source: None };
             let decisions = named(&walked, name).account.allocations.iter().map(decision).collect();
-            Line::new(name.into(), decisions, &lived, COST)
+            Line::new((StrategyKind::Adaptive, name.into()), decisions, &lived, COST)
         };
         let lines = names.map(line);
         assert!(lines[2].account.allocations.iter().all(|share| (0.05..1.0).contains(share)), "{:?}", lines[2].account);
@@ -347,7 +348,7 @@ mod tests {
             let beyond = found.performance.beyond_own_mix.zip(*beyond_own_mix);
             assert_eq!(
                 (beyond.is_some(), found.performance.beyond_own_mix.is_some()),
-                (strategy.starts_with("robust"), beyond_own_mix.is_some())
+                (strategy.starts_with("Robust"), beyond_own_mix.is_some())
             );
             // Its interval is wider beside more strategies.
             let value = |found: BootstrapEstimate| BootstrapEstimate { value: found.value, interval: [found.value; 2] };
@@ -369,7 +370,7 @@ mod tests {
     #[test]
     fn plug_in_is_best_by_direct_search_and_robust_holds_less() {
         let walked = walk(record(2, 24, log_return));
-        let plug_in = &named(&walked, "plug-in, all").held[0];
+        let plug_in = &named(&walked, "Trusts the record, knows all").held[0];
         let rows = &walked.backtest.record.rows[..12];
         let mean = |shares: [f64; 2]| {
             let wealth = |row: &Vec<f64>| {
@@ -383,8 +384,10 @@ mod tests {
         // Twelve periods of a hundredth of a basis point.
         assert!(mean([plug_in[0], plug_in[1]]) > best - 12.0 * 2.0 * 1e-6, "{plug_in:?}");
         let total = |name: &str| named(&walked, name).account.allocations[0];
-        assert!(total("robust sup, scale 1, all") < total("robust sup, scale 0.5, all"));
-        assert!(total("robust sup, scale 0.5, all") < plug_in.iter().sum());
+        assert!(
+            total("Robust, sup norm, full caution, knows all") < total("Robust, sup norm, half the caution, knows all")
+        );
+        assert!(total("Robust, sup norm, half the caution, knows all") < plug_in.iter().sum());
     }
 
     #[test]
@@ -414,12 +417,12 @@ mod tests {
     #[test]
     fn static_keeps_its_shares_for_a_year_and_radii_are_those_of_its_start() {
         let walked = walk(record(2, 22, log_return));
-        let kept = named(&walked, "static scaled_one, scale 0.5, all");
+        let kept = named(&walked, "Robust, rarely renewed, half the caution, knows all");
         assert!(kept.held.len() == 10 && kept.held.chunks(4).all(|year| year.iter().all(|held| *held == year[0])));
         assert_ne!(kept.held[3], kept.held[4]);
-        let robust = named(&walked, "robust scaled_one, scale 0.5, all");
+        let robust = named(&walked, "Robust, half the caution, knows all");
         assert_eq!((&kept.held[0], &kept.radii), (&robust.held[0], &robust.radii));
-        let wide = named(&walked, "robust scaled_one, scale 1, all");
+        let wide = named(&walked, "Robust, full caution, knows all");
         assert!(wide.radii.iter().zip(&robust.radii).all(|(one, half)| (one - 2.0 * half).abs() < 1e-12));
         // Of one fund at least: its bridges' quantile over the root of the number of returns.
         let rows = &walked.backtest.record.rows[..16];

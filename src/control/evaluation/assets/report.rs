@@ -6,6 +6,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::control::evaluation::backtest_report::{BacktestIntervals, BootstrapEstimate, Performance};
+use crate::control::evaluation::names::StrategyKind;
 
 /// Name and version of the report's form.
 pub const FORMAT: &str = "ballast-backtest-assets-1";
@@ -23,8 +24,10 @@ pub struct AssetsBacktestReport {
     pub periods_per_year: usize,
     /// Of the periods decided about.
     pub dates: Vec<String>,
-    /// Whole years decided about, whose utility is taken.
+    /// Whole years decided about, whose utility is taken; the last ends with the last period.
     pub whole_years: usize,
+    /// The first periods decided about, fewer than a year, which count in none of them.
+    pub uncounted_periods: usize,
     /// As completed.
     pub choices: AssetsChoices,
     /// How the intervals were made.
@@ -59,6 +62,10 @@ pub struct AssetsChoices {
 pub struct AssetsFigures {
     /// Its name.
     pub strategy: String,
+    /// Its kind.
+    pub kind: StrategyKind,
+    /// Its place by `yearly_certainty_equivalent`, 1 the best; equal ones share it.
+    pub place: usize,
     /// As of every strategy; its own mix is equal shares at its own average total, and an allocation that in all assets together.
     #[serde(flatten)]
     pub performance: Performance,

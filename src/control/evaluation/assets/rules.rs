@@ -3,6 +3,7 @@
 use super::AssetsBacktest;
 use crate::control::assets::{AssetsLaw, AssetsSolution, AssetsStep};
 use crate::control::error::TrainError;
+use crate::control::evaluation::names::{StrategyKind, caution_in_words};
 use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::progress::Watch;
@@ -67,16 +68,17 @@ pub fn strategies(windows: &[Option<usize>]) -> Vec<AssetsStrategy> {
 }
 
 impl Rule {
-    /// In words, without its scale.
-    pub fn family(self) -> String {
+    /// Its kind, whatever its scale.
+    pub fn kind(self) -> StrategyKind {
         match self {
-            Rule::Robust { scale: 0.0, .. } => "plug-in".into(),
-            Rule::Robust { norm, .. } => format!("robust {}", norm_name(norm)),
-            Rule::Static { norm, .. } => format!("static {}", norm_name(norm)),
-            Rule::MinimumVariance => "minimum variance".into(),
-            Rule::InverseVolatility => "inverse volatility".into(),
-            Rule::Equal { share: 1.0 } => "1/N".into(),
-            Rule::Equal { share } => format!("{} % 1/N", 100.0 * share),
+            Rule::Robust { scale: 0.0, .. } => StrategyKind::PlugIn,
+            Rule::Robust { norm: GroundNorm::ScaledOne, .. } => StrategyKind::Robust,
+            Rule::Robust { norm: GroundNorm::Sup, .. } => StrategyKind::RobustSup,
+            Rule::Static { .. } => StrategyKind::RobustStatic,
+            Rule::MinimumVariance => StrategyKind::MinimumVariance,
+            Rule::InverseVolatility => StrategyKind::InverseVolatility,
+            Rule::Equal { share: 1.0 } => StrategyKind::EqualShares,
+            Rule::Equal { .. } => StrategyKind::SixtyEqual,
         }
     }
 
@@ -89,13 +91,6 @@ impl Rule {
     }
 }
 
-fn norm_name(norm: GroundNorm) -> &'static str {
-    match norm {
-        GroundNorm::ScaledOne => "scaled_one",
-        GroundNorm::Sup => "sup",
-    }
-}
-
 /// Shares that are the same in every asset.
 pub fn equal(assets: usize, share: f64) -> Vec<f64> {
     vec![share / assets as f64; assets]
@@ -104,12 +99,12 @@ pub fn equal(assets: usize, share: f64) -> Vec<f64> {
 impl AssetsStrategy {
     /// In words; `known` says of the window what it is.
     pub fn name(&self, known: impl Fn(Option<usize>) -> String) -> String {
-        let scale = self.rule.scale().map_or(String::new(), |scale| format!(", scale {scale}"));
+        let caution = self.rule.scale().map_or(String::new(), |scale| format!(", {}", caution_in_words(scale)));
         let window = match self.rule {
             Rule::Equal { .. } => String::new(),
-            _ => format!(", {}", known(self.window)),
+            _ => format!(", knows {}", known(self.window)),
         };
-        format!("{}{scale}{window}", self.rule.family())
+        format!("{}{caution}{window}", self.rule.kind().name())
     }
 
     /// Shares of wealth in every period decided about; `radii` are those of the stretches. `done` hears of every stretch.

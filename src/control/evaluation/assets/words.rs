@@ -2,8 +2,10 @@
 
 use super::report::AssetsFigures;
 use super::{AssetsLine, AssetsWalked};
+use crate::control::evaluation::account::uncounted_periods;
 use crate::control::evaluation::backtest_report::BootstrapEstimate;
-use crate::control::evaluation::verdict::{all_at_once, cost, few_years, grouped, listed};
+use crate::control::evaluation::names::{StrategyKind, quoted};
+use crate::control::evaluation::verdict::{all_at_once, cost, few_years, grouped, listed, uncounted};
 
 /// How much of the past a strategy knows.
 pub fn window(window: Option<usize>, year: usize, noun: &str) -> String {
@@ -16,9 +18,12 @@ pub fn window(window: Option<usize>, year: usize, noun: &str) -> String {
 }
 
 /// One statement each, the most important first.
-pub fn sentences(walked: &AssetsWalked, figures: &[AssetsFigures], whole_years: usize) -> Vec<String> {
+pub fn sentences(walked: &AssetsWalked, figures: &[AssetsFigures]) -> Vec<String> {
+    let (lived, record) = (walked.backtest.lived().len(), &walked.backtest.record);
     let mut sentences = vec![ranking(figures)];
-    match few_years(whole_years) {
+    let left_out = uncounted_periods(lived, record.periods_per_year);
+    sentences.extend(uncounted(left_out, record.frequency.noun()));
+    match few_years(lived / record.periods_per_year) {
         Some(sentence) => sentences.push(sentence),
         None => sentences.extend([against_equal(figures), against_own_mix(figures)]),
     }
@@ -37,16 +42,19 @@ pub fn sentences(walked: &AssetsWalked, figures: &[AssetsFigures], whole_years: 
 fn ranking(figures: &[AssetsFigures]) -> String {
     let value = |figures: &AssetsFigures| figures.performance.yearly_certainty_equivalent.value;
     let equal = figures.iter().find(|figures| figures.beyond_equal.is_none());
-    let best = figures.iter().max_by(|a, b| value(a).total_cmp(&value(b)));
+    let best = figures.iter().find(|figures| figures.place == 1);
     let Some((equal, best)) = equal.zip(best) else { return String::new() };
-    let place = 1 + figures.iter().filter(|other| value(other) > value(equal)).count();
+    let best = if equal.place == 1 {
+        String::new()
+    } else {
+        format!(" The first is {} with {:.2}.", quoted(&best.strategy), value(best))
+    };
     format!(
-        "A year from 100 counts as {:.2} for certain with 1/N, equal shares in all assets, at place {place} of {}. The first is {} \
-         with {:.2}.",
+        "With {} of all assets a year from 100 counts as {:.2} for certain, place {} of {}.{best}",
+        quoted(&equal.strategy),
         value(equal),
-        figures.len(),
-        best.strategy,
-        value(best)
+        equal.place,
+        figures.len()
     )
 }
 
@@ -54,7 +62,8 @@ fn against_equal(figures: &[AssetsFigures]) -> String {
     let [ahead, behind, unclear] = of_each(figures, |figures| figures.beyond_equal);
     let compared = all_at_once(figures.len() - 1);
     format!(
-        "By the intervals of the differences, {compared}, ahead of 1/N: {ahead}. Behind it: {behind}. Not to be told apart from it: {unclear}."
+        "By the intervals of the differences, {compared}, ahead of equal shares: {ahead}. Behind them: {behind}. Not to be told \
+         apart from them: {unclear}."
     )
 }
 
@@ -81,16 +90,16 @@ fn ranges(
     decimals: usize,
     unit: &str,
 ) -> String {
-    let mut families: Vec<(String, [f64; 2])> = Vec::new();
+    let mut families: Vec<(StrategyKind, [f64; 2])> = Vec::new();
     for (line, figures) in lines.iter().zip(figures) {
-        let (family, Some(value)) = (line.strategy.rule.family(), of(figures)) else { continue };
+        let (family, Some(value)) = (line.strategy.rule.kind(), of(figures)) else { continue };
         match families.iter_mut().find(|(name, _)| *name == family) {
             Some((_, [low, high])) => (*low, *high) = (low.min(value), high.max(value)),
             None => families.push((family, [value; 2])),
         }
     }
-    let told = |(family, ends): &(String, [f64; 2])| {
-        let [low, high] = ends.map(|end| format!("{end:.decimals$}"));
+    let told = |(family, ends): &(StrategyKind, [f64; 2])| {
+        let ([low, high], family) = (ends.map(|end| format!("{end:.decimals$}")), quoted(family.name()));
         if low == high { format!("{family} {low}{unit}") } else { format!("{family} {low} to {high}{unit}") }
     };
     families.iter().map(told).collect::<Vec<String>>().join("; ")
