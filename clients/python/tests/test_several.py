@@ -46,8 +46,8 @@ def test_a_table_walked_forward_is_frames_by_strategy_by_date_and_by_asset(balla
     with pytest.raises(ValueError, match="must be one of wealth, radius, traded"):
         job.periods("allocation")
 
-    names = [line.get_label() for line in job.plot(strategies=["1/N", strategies.index[0]]).get_lines()]
-    assert names == ["1/N", strategies.index[0]]
+    names = [line.get_label() for line in job.plot(strategies=["Equal shares", strategies.index[0]]).get_lines()]
+    assert names == ["Equal shares", strategies.index[0]]
     with pytest.raises(ValueError, match="strategies has 'adaptive': must be of robust"):
         job.plot(strategies=["adaptive"])
     lines = {line.get_label(): line for line in job.plot().get_lines()}
