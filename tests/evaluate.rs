@@ -179,7 +179,7 @@ fn wealth_is_counted_in_its_own_bins_and_at_the_bank() {
         let wealth = &strategy.wealth;
         let (counts, at_bank) = (&wealth.histogram, wealth.at_bank);
         assert_eq!(counts.iter().sum::<usize>() + at_bank, 400, "{}", strategy.strategy);
-        assert!(edges[0] <= wealth.min.value && wealth.max.value <= edges[40], "{}", strategy.strategy);
+        assert!(edges[0] <= wealth.min && wealth.max <= edges[40], "{}", strategy.strategy);
         let [low, high] = [wealth.quantile_20.value, wealth.quantile_90.value];
         // Bins that end below a quantile hold no more than its share, and those up to it no less.
         for (quantile, share) in [(low, 0.2), (high, 0.9)] {
