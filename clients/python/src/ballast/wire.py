@@ -228,7 +228,7 @@ CareReason: TypeAlias = Literal["overdue", "renewal", "alarm", "ending"]
 """Why a session needs care."""
 
 
-CautionCode: TypeAlias = Literal["short_record", "one_return", "waiting"]
+CautionCode: TypeAlias = Literal["short_record", "one_return", "not_certified", "waiting"]
 """The reasons."""
 
 
@@ -361,8 +361,10 @@ ConstantMix: TypeAlias = float
 
 class ExpectedError(TypedDict):
     """
-    Root mean square errors of the value that a step serves, over the design's own law of its states, in basis points of the
-    certainty equivalent.
+    Root mean square errors of the value that a step serves, in basis points of the certainty equivalent: over the design's own law
+    of its states, at the holdings it was solved at. They say nothing of states that this law seldom visits, such as those after a
+    return beyond the record, where the value may be off by a hundred times as much, nor of the first step of a design that starts
+    at one law.
     """
 
     own: float
@@ -970,6 +972,10 @@ class Spread(TypedDict):
     """Nine tenths of the paths have less."""
 
 
+StrategyKind: TypeAlias = Literal["adaptive", "cost_blind", "static", "plug_in", "sixty_forty", "all_stock", "all_bank", "own_mix", "robust", "robust_sup", "robust_static", "minimum_variance", "inverse_volatility", "equal_shares", "sixty_equal"]
+"""A kind of strategy that walks through a record, which decides its colour and its sentences."""
+
+
 class SurrogateDiagnostics(TypedDict):
     """A fitted surrogate in figures."""
 
@@ -1132,12 +1138,20 @@ class WealthReport(TypedDict):
 
 
 class WithoutOne(TypedDict):
-    """The range of the advice over the records that lack one return."""
+    """
+    The range of the advice over the records that lack one return.
+
+    Each distinct return is left out in turn. Of a record of more than 360, or of fewer where a step takes long, the returns that move
+    the advice the most are: those furthest from the mean by their weight, and others evenly between by their rank. Checked by:
+    tests/sensitivity.rs against leaving out every one.
+    """
 
     lowest: LeftOut
     """The lowest advice, and the return whose absence gives it."""
     highest: LeftOut
     """The highest advice, and the return whose absence gives it."""
+    tried: int
+    """Returns left out in turn."""
 
 
 class WorstLawSummary(TypedDict):
@@ -1246,6 +1260,10 @@ class AssetsFigures(Performance):
 
     strategy: str
     """Its name."""
+    kind: StrategyKind
+    """Its kind."""
+    place: int
+    """Its place by `yearly_certainty_equivalent`, 1 the best; equal ones share it."""
     beyond_equal: NotRequired[BootstrapEstimate | None]
     effective_assets: NotRequired[float | None]
     """`(sum a)^2 / sum a^2`, the mean over the periods in which anything is held; null where nothing ever is."""
@@ -1289,8 +1307,12 @@ class BacktestFigures(Performance):
 
     strategy: str
     """Its name."""
+    kind: StrategyKind
+    """Its kind."""
     hindsight: bool
     """Whether it was chosen with what only the end could tell."""
+    place: NotRequired[int | None]
+    """Its place by `yearly_certainty_equivalent`, 1 the best; equal ones share it. Null in hindsight."""
     adaptive_ahead: BootstrapEstimate
     """The certainty equivalent of the main adaptive strategy less that of this one."""
     all_bank_share: float
@@ -1515,6 +1537,8 @@ class OneStep(TypedDict):
     """No allocation is worth more than this."""
     worst_means: dict[str, WorstMean]
     """What the worst law makes of each asset."""
+    caution: NotRequired[list[Caution]]
+    """What to know before the allocation is followed; left out where there is nothing."""
 
 
 class OpenSession(TypedDict):
@@ -1949,7 +1973,10 @@ class AssetsAdvice(TypedDict):
     radius: float
     """Radius of the ball, in log-return."""
     radius_factor: float
-    """What of it is there for all funds at once: the radius of the fund of inverse volatilities is multiplied by it."""
+    """
+    Factor by which the radius of the fund of inverse volatilities is widened to hold for all funds at once. It errs low: by little
+    where assets move together, by more than a tenth for a dozen that are independent.
+    """
     sample_size: int
     """Number of dates seen."""
     worst_means: dict[str, WorstMean]
@@ -1980,7 +2007,9 @@ class AssetsBacktestReport(TypedDict):
     dates: list[str]
     """Of the periods decided about."""
     whole_years: int
-    """Whole years decided about, whose utility is taken."""
+    """Whole years decided about, whose utility is taken; the last ends with the last period."""
+    uncounted_periods: int
+    """The first periods decided about, fewer than a year, which count in none of them."""
     choices: AssetsChoices
     """As completed."""
     intervals: BacktestIntervals
@@ -2032,7 +2061,9 @@ class BacktestReport(TypedDict):
     dates: NotRequired[list[str] | None]
     """Of the periods decided about, those after the first window; null where the periods have none."""
     whole_years: int
-    """Whole years decided about, whose utility is taken."""
+    """Whole years decided about, whose utility is taken; the last ends with the last period."""
+    uncounted_periods: int
+    """The first periods decided about, fewer than a year, which count in none of them."""
     choices: BacktestChoices
     """As completed."""
     intervals: BacktestIntervals
@@ -2370,7 +2401,7 @@ class StrategyReport(TypedDict):
     """One strategy."""
 
     strategy: str
-    """`adaptive`, `mix_0.5`, `all_bank` and the like."""
+    """Its name: `Cautious, learns`, `50 % in stocks`, `All in the bank` and the like."""
     framework: NotRequired[Framework | None]
     constant_mix: NotRequired[float | None]
     """The allocation of a constant mix."""
@@ -2472,8 +2503,6 @@ class EvaluationReport(TypedDict):
     """Common bin edges of terminal utility, ascending."""
     wealth_edges: list[float]
     """Common bin edges of terminal wealth, ascending and evenly apart."""
-    banked: float
-    """Terminal wealth of all in the bank."""
     histories: list[HistoryReport]
     """In the order they were drawn."""
     sentences: list[str]
