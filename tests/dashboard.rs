@@ -160,7 +160,6 @@ async fn a_file_that_is_not_there_is_a_problem_that_names_it() {
     assert!(example.as_str().is_some_and(|text| text.starts_with("month,market_return,risk_free_return\n")));
 }
 
-/// Works offline and under the policy: nothing inline, nothing from elsewhere, no markup made from text.
 #[test]
 fn the_page_calls_frameworks_what_reports_call_them() {
     use ballast::control::evaluation::names::framework_name;
@@ -182,6 +181,7 @@ fn the_page_calls_frameworks_what_reports_call_them() {
     }
 }
 
+/// Works offline and under the policy: nothing inline, nothing from elsewhere, no markup made from text.
 #[test]
 fn no_file_reaches_beyond_the_service() {
     const NAMESPACE: &str = "http://www.w3.org/2000/svg";

@@ -6,12 +6,14 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use ballast::control::error::TrainError;
+use ballast::control::evaluation::names::framework_name;
 use ballast::control::evaluation::paths::{Evaluation, Follower, Outcome, Outcomes};
 use ballast::control::evaluation::report::{Costs, EvaluationReport};
 use ballast::control::pool::TrainingPool;
 use ballast::control::problem::utility::utility;
 use ballast::control::progress::Watch;
 use ballast::control::request::evaluation::EvaluationRequest;
+use ballast::control::request::framework::Framework;
 use ballast::numerics::summary::Estimate;
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -253,7 +255,7 @@ fn differences_are_paired() {
     let (evaluation, followers, outcomes) =
         simulated(small(json!({ "frameworks": ["plug_in"], "constant_mixes": [0.4, 0.5], "paths": 400 })));
     let report = EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS).unwrap().in_utility();
-    assert_eq!((report.reference.as_str(), report.strategies[0].difference.is_none()), ("plug_in", true));
+    assert_eq!((report.reference.as_str(), report.strategies[0].difference.is_none()), ("Trusts the record", true));
     let kind = evaluation.request.problem.utility;
     let apart = |outcome: &Outcome| utility(kind, outcome.ended[1].wealth) - utility(kind, outcome.ended[0].wealth);
     let mean = outcomes.outcomes.iter().map(apart).sum::<f64>() / 400.0;
@@ -382,7 +384,8 @@ fn every_framework_takes_part_whatever_its_default_radius_rule() {
     let (evaluation, followers, outcomes) = simulated(request);
     let report = EvaluationReport::new(&evaluation, &followers, &outcomes, COSTS).unwrap();
     for (strategy, name) in report.strategies.iter().zip(names) {
-        assert_eq!(strategy.strategy, name);
+        assert_eq!(strategy.framework.map(Framework::name), Some(name));
+        assert_eq!(Some(strategy.strategy.as_str()), strategy.framework.map(framework_name));
         // A Wasserstein ball is what coverage speaks of, and a set frozen at its history has a policy for each.
         assert_eq!(strategy.coverage.is_some(), ["adaptive", "static"].contains(&name), "{name}");
         assert_eq!(strategy.policy.is_none(), ["static", "parametric_static"].contains(&name), "{name}");

@@ -321,7 +321,7 @@ mod tests {
         assert_eq!(one.report.whole_years, 1);
         let page = one.page().unwrap();
         assert!(page.contains("Cautious, learns, 10 %") && page.contains("Trading costs 10 bp"), "{page}");
-        assert!(page.contains("The whole years are 1, fewer than 10"), "{page}");
+        assert!(page.contains("The whole years are 1, fewer than 30"), "{page}");
     }
 
     /// Two trainings make the year after the window; figures of a year count its four quarters.

@@ -203,8 +203,11 @@ mod tests {
 
     #[test]
     fn growth_and_shares_are_of_the_same_years() {
-        let account =
-            Account { wealth: vec![8.0, 4.0, 2.0, 6.0, 6.0, 9.0], allocations: vec![1.0, 0.1, 0.3, 0.5, 0.7], traded: vec![0.0; 5] };
+        let account = Account {
+            wealth: vec![8.0, 4.0, 2.0, 6.0, 6.0, 9.0],
+            allocations: vec![1.0, 0.1, 0.3, 0.5, 0.7],
+            traded: vec![0.0; 5],
+        };
         assert_eq!((account.yearly_growth(2), account.yearly_allocation(2)), (vec![1.5, 1.5], vec![0.2, 0.6]));
     }
 

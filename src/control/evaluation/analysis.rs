@@ -67,7 +67,8 @@ impl Analysis {
     /// Others are compared with line `main`; all trade at `cost`.
     pub fn of(lines: &[Line], main: usize, periods: &[Period], cost: f64, scale: &Scale) -> Self {
         let bank: Vec<f64> = periods.iter().map(|period| period.bank_return).collect();
-        let own_mix = |share: f64| Line::constant((StrategyKind::OwnMix, own_mix_name(share)), share, periods, cost).account;
+        let own_mix =
+            |share: f64| Line::constant((StrategyKind::OwnMix, own_mix_name(share)), share, periods, cost).account;
         let year = scale.periods_per_year;
         let series: Vec<Series> = lines.iter().map(|line| Series::of(&line.account, year)).collect();
         let resampled = Resampled::of(&series, &bank, scale);

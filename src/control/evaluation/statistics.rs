@@ -125,12 +125,10 @@ impl Table<'_> {
         let mix = index.checked_sub(self.followers.len()).and_then(|mix| request.mixes().get(mix)).copied();
         let advisor = follower.and_then(|follower| follower.advisor.as_ref());
         let utilities = self.utilities[index].as_slice();
+        let named = |follower: &Follower| framework_name(follower.framework).to_owned();
         let policy = advisor.map(|advisor| advisor.policy().to_json()).transpose()?;
         Ok(StrategyReport {
-            strategy: follower.map_or_else(
-                || mix_name(mix.unwrap_or_default()),
-                |follower| framework_name(follower.framework).to_owned(),
-            ),
+            strategy: follower.map_or_else(|| mix_name(mix.unwrap_or_default()), named),
             framework: follower.map(|follower| follower.framework),
             constant_mix: mix,
             policy: policy.map(|json| content_hash(&json)),

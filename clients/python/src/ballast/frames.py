@@ -217,7 +217,7 @@ def held(report: wire.AssetsBacktestReport, strategy: str | None = None) -> pd.D
     for told in report["periods"]:
         if told["strategy"] == strategy:
             return _by_date(report, told["allocations"])[assets]
-    names = ", ".join(told["strategy"] for told in report["periods"])
+    names = "; ".join(told["strategy"] for told in report["periods"])
     raise ValueError(f"strategy is {strategy!r}: must be one of {names}")
 
 

@@ -34,7 +34,7 @@ def walk_forward(
         strategies = list(worth.index[:_LINES])
         title = f"the {_LINES} of {len(worth)} worth most" if len(worth) > _LINES else None
     elif unknown := next((name for name in strategies if name not in wealth), None):
-        raise ValueError(f"strategies has {unknown!r}: must be of {', '.join(wealth)}")
+        raise ValueError(f"strategies has {unknown!r}: must be of {'; '.join(wealth)}")
     axes = _axes(ax, (10.0, 5.0))
     for place, name in enumerate(strategies):
         style = _STYLES[place // _LINES % len(_STYLES)]
