@@ -84,7 +84,10 @@ fn what_is_wrong_is_said_by_line_or_option() {
         (&["advise", MARKET, "--trading-cost", "0.2"], "--trading-cost is 0.2: must be a number in [0, 0.1]"),
         (&["advise", MARKET, "--half-life", "0.5"], "--half-life is 0.5: must be a number in [1, "),
         (&["advise", MARKET, "--risk-aversion", "0.5"], "--risk-aversion is 0.5: must lie in [1, 100]"),
-        (&["backtest", MARKET, "--out", file, "--window", "1100"], "the file is 1109 periods: must hold at least 1112"),
+        (
+            &["backtest", MARKET, "--out", file, "--window", "1100"],
+            "--window is 1100: must be at most 1097: the record has 1109 periods",
+        ),
     ] {
         let output = ballast(arguments);
         assert_eq!(output.status.code(), Some(1), "{output:?}");

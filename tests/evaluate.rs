@@ -172,7 +172,7 @@ fn the_known_law_promises_its_value_and_keeps_it() {
 /// paths is, be it at a point.
 #[test]
 fn wealth_is_counted_in_its_own_bins_and_at_the_bank() {
-    let cautious = json!({ "problem": { "radius": { "scale": 0.55 } }, "paths": 400 });
+    let cautious = json!({ "problem": { "radius": { "scale": 0.7 } }, "paths": 400 });
     let report = reported(small(cautious));
     let edges = &report.wealth_edges;
     assert!(edges.len() == 41 && edges.is_sorted() && (report.floor - 100.0 * 1.002_f64.powi(4)).abs() < 1e-9);
@@ -224,7 +224,7 @@ fn the_own_mix_is_what_a_constant_mix_of_the_average_allocation_earns() {
         assert!((found - expected).abs() < 1e-9, "{own:?} {apart:?}");
     }
     assert!(
-        report.sentences.len() == 1 && report.sentences[0].contains("plug_in differs by"),
+        report.sentences.len() == 1 && report.sentences[0].contains("“Trusts the record” differs by"),
         "{:?}",
         report.sentences
     );
@@ -517,6 +517,6 @@ fn a_quick_reproduction_gives_no_verdict() {
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let printed = String::from_utf8(done.stdout).unwrap();
     let findings: Vec<&str> = printed.lines().take_while(|line| !line.is_empty()).collect();
-    assert!(findings.len() > 8 && findings.iter().all(|line| line.starts_with("Not enough to tell: ")), "{printed}");
+    assert!(findings.len() > 6 && findings.iter().all(|line| line.starts_with("Not enough to tell: ")), "{printed}");
     assert!(!printed.contains("-0.00 ") && !printed.contains("-0.00,"), "{printed}");
 }

@@ -80,7 +80,7 @@ fn a_frequency_that_the_dates_do_not_say_is_an_option() {
     let halves = "date,ret\n2000-06-30,0.04\n2000-12-31,-0.02\n2001-06-30,0.05\n2001-12-31,0.03\n";
     let asked = parse(halves, &Choices::default(), None).unwrap_err().to_string();
     assert!(asked.contains("\n  --gaps true: ") && asked.ends_with(YEAR), "{asked}");
-    let gaps = Choices { gaps: Some(true), ..Choices::default() };
+    let gaps = Choices { gaps: Some(true), unit: Some(Unit::Fraction), ..Choices::default() };
     let read = parse(halves, &gaps, Some(2)).unwrap();
     assert!(read.sentence().starts_with("4 returns, 2000-06-30 to 2001-12-31, "), "{}", read.sentence());
     // Without --periods-per-year each answer would be refused.

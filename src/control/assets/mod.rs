@@ -161,7 +161,7 @@ impl AssetsStep {
     /// more than the best growth seen.
     fn at_least_the_bank(&self, found: AssetsSolution) -> AssetsSolution {
         let most = self.growths.iter().copied().fold(1.0, f64::max).ln();
-        let bound = if found.bound < most { found.bound } else { most };
+        let bound = if found.bound < most && found.bound >= found.value { found.bound } else { most };
         if found.value >= 0.0 || self.total.lowest > 0.0 {
             return AssetsSolution { value: found.value.min(bound), bound, ..found };
         }

@@ -9,8 +9,9 @@ use crate::control::problem::actions::ActionInterval;
 use crate::control::problem::dynamics::Dynamics;
 use crate::control::problem::holdings::Holdings;
 use crate::control::problem::state::State;
+use crate::control::request::framework::Framework;
 use crate::control::request::rules::LOG_RETURN;
-use crate::control::request::specification::{ProblemSpecification, Specification};
+use crate::control::request::specification::{ProblemSpecification, Specification, UtilitySpecification};
 use crate::control::request::withdrawals::check_bank;
 use crate::control::surrogate::features::{FeatureSelection, Features, LawSummary};
 use crate::control::uncertainty::UncertaintySet;
@@ -97,6 +98,25 @@ impl Problem {
         let liquidated = state.wealth * self.dynamics(0).liquidation(state.holding);
         let periods = &self.periods[..self.periods.len() - 1];
         check_bank(periods, liquidated).map_err(|rule| FieldError::new("wealth", state.wealth, rule))
+    }
+
+    /// Returns the derivative of U at the floor times the floor, which turns relative utility into utility.
+    pub fn utility_at_floor(&self, step: usize, state: &State) -> f64 {
+        let floor = self.floor(step, state);
+        match self.specification.problem.utility {
+            UtilitySpecification::Exponential { risk_aversion, .. } => floor * (-risk_aversion * floor).exp(),
+            UtilitySpecification::Power { risk_aversion } => floor.powf(1.0 - risk_aversion),
+            UtilitySpecification::Log {} => 1.0,
+        }
+    }
+
+    /// Whether some law in a ball of this radius takes all that an allocation holds: all wealth, under power utility and without a least
+    /// return. A surrogate that is off by little may advise it; the step solved anew never does.
+    pub fn is_ruined(&self, radius: f64, allocation: f64) -> bool {
+        let problem = &self.specification.problem;
+        let has_ball = matches!(problem.framework, Framework::Adaptive | Framework::Static) && radius > 0.0;
+        let is_power = matches!(problem.utility, UtilitySpecification::Power { .. });
+        has_ball && is_power && problem.support.is_none() && allocation >= 1.0
     }
 
     /// The most that the floor gain of a state at `step` can be: that of the best return of its centre in every period. The

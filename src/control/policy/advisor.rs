@@ -15,8 +15,7 @@ use crate::control::kept::Kept;
 use crate::control::policy::worst_case::WorstCase;
 use crate::control::problem::actions::Band;
 use crate::control::problem::state::{Realised, State};
-use crate::control::request::framework::Framework;
-use crate::control::request::specification::{Specification, UtilitySpecification};
+use crate::control::request::specification::Specification;
 use crate::control::surrogate::stored::{Solution, StepSurrogates};
 use crate::control::uncertainty::radius::Measure;
 
@@ -215,7 +214,7 @@ impl Advisor {
         let source = if radius == own { AdviceSource::Resolved } else { AdviceSource::ResolvedOtherRadius };
         let predicted = self.predict(step, state, own);
         let (advice, solution) = self.resolved(&Asked { step, state, radius, source }, &predicted);
-        let (centre, scale) = (&self.specification().problem.centre, self.utility_per_radius(step, state));
+        let (centre, scale) = (&self.specification().problem.centre, self.problem.utility_at_floor(step, state));
         let worst =
             solution.map_or_else(WorstCase::unknown, |solution| WorstCase::of(&solution, &advice, centre, scale));
         (advice, worst)
@@ -300,27 +299,20 @@ impl Advisor {
                 let prediction = holdings.at(&predictions, state.holding);
                 let total = dynamics.total(state.wealth, holdings.within(state.holding));
                 let gain = value.clamped_gain(prediction, total) + holdings.beyond(dynamics, state.holding, in_hand);
-                // Beyond the largest gain that was solved the prediction is cut, and what is cut is not known.
+                // What is cut off above the largest gain that was solved is not known.
                 let cut = value.beyond_solved(prediction, total);
-                let spread = value.gain_spread(prediction, deviation * stored.value.scale, total).max(cut);
-                let is_solved = cut <= 0.0 && !self.is_ruined(radius, &ends);
+                let is_solved = cut <= 0.0 && !ends.iter().any(|end| self.problem.is_ruined(radius, *end));
                 Prediction {
                     band: Band::of(&ends),
                     floor_gain: gain.min(largest),
-                    deviation: spread.min(largest),
+                    deviation: value
+                        .gain_spread(prediction, deviation * stored.value.scale, total)
+                        .max(cut)
+                        .min(largest),
                     in_design: deviation <= stored.deviation_limit && is_finite && is_solved && self.pays(step, state),
                 }
             }
         }
-    }
-
-    /// Whether some law in the ball takes all that an end of the band holds: all wealth, under power utility and without a least
-    /// return. A process that is off by little may say so, and the step solved anew never does.
-    fn is_ruined(&self, radius: f64, ends: &[f64]) -> bool {
-        let problem = &self.specification().problem;
-        let has_ball = matches!(problem.framework, Framework::Adaptive | Framework::Static) && radius > 0.0;
-        let is_power = matches!(problem.utility, UtilitySpecification::Power { .. });
-        has_ball && problem.support.is_none() && is_power && ends.iter().any(|end| *end >= 1.0)
     }
 
     /// Whether `state` is the one state that a single-state step was solved at.
@@ -331,16 +323,6 @@ impl Advisor {
         let trained = self.specification().design.wealth.map_or(problem.initial_wealth, |wealth| wealth.min);
         let same_wealth = !problem.depends_on_wealth() || state.wealth == trained;
         same_law && same_wealth
-    }
-
-    /// Relative utility to utility: the derivative of U at the floor times the floor.
-    fn utility_per_radius(&self, step: usize, state: &State) -> f64 {
-        let floor = self.problem.floor(step, state);
-        match self.specification().problem.utility {
-            UtilitySpecification::Exponential { risk_aversion, .. } => floor * (-risk_aversion * floor).exp(),
-            UtilitySpecification::Power { risk_aversion } => floor.powf(1.0 - risk_aversion),
-            UtilitySpecification::Log {} => 1.0,
-        }
     }
 
     /// Sample size, moments, quantile and radius of a state.

@@ -145,8 +145,12 @@ pub fn usual_window(wanted: usize, found: usize, year: usize) -> usize {
 /// Refuses a window that was asked for and leaves no year of the record to live through.
 pub fn too_long(window: usize, found: usize, year: usize) -> FieldError {
     let most = found.saturating_sub(year);
-    let rule =
-        format!("must be at most {most}: the record has {found} periods, of which a year of {year} is lived through");
+    let rule = match most {
+        0 | 1 => format!("has no room: the record has {found} periods, and a year of {year} is lived through"),
+        _ => format!(
+            "must be at most {most}: the record has {found} periods, of which a year of {year} is lived through"
+        ),
+    };
     FieldError::new("window", window, rule)
 }
 
