@@ -387,7 +387,7 @@ async fn ten_years_of_a_live_session_equal_the_backtest() {
         assert_eq!(status, 200, "{action}");
         assert_eq!(number(&action["allocation"]), decision.band.low, "period {period}");
         assert_eq!(number(&action["radius"]), decision.radius, "period {period}");
-        let right = json!({ "log_return": month.log_return, "rate": month.bank_return });
+        let right = json!({ "log_return": month.log_return, "rate": month.bank_return, "confirm": true });
         let (status, observed) = app.report(period, right.clone()).await;
         assert_eq!(status, 200, "{observed}");
         assert_eq!(number(&observed["wealth"]), account.wealth[period], "period {period}");

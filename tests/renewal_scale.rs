@@ -221,7 +221,7 @@ async fn a_session_whose_next_policy_is_late_waits_and_goes_on_by_the_last_step(
     let listed = app.get("/sessions?search=late").await.1;
     let row = &listed["sessions"][0];
     assert_eq!(json!([row["state"], row["care"]]), json!(["waiting", ["renewal"]]));
-    assert_eq!(json!([listed["care"]["active"], listed["care"]["renewal"]]), json!([1, 1]));
+    assert_eq!(json!([listed["care"]["sessions"], listed["care"]["renewal"]]), json!([1, 1]));
     for (state, total) in [("waiting", 1), ("care", 1), ("renewal", 1), ("active", 0), ("completed", 0)] {
         assert_eq!(app.get(&format!("/sessions?state={state}")).await.1["total"], total, "{state}");
     }

@@ -126,7 +126,8 @@ def test_a_session_that_renews_itself_is_replayed_as_the_walk_forward_walks(ball
 def test_a_renewal_that_fails_ends_a_replay(session: Session, network: Network) -> None:
     due = '{"renewal": {"renewal": 1, "state": "failed", "job": "job_x", "attempts": 1}, "renew": {"every": 1}'
     state = (
-        ', "renewals": 0, "policy": "p", "horizon": 3, "corrections": 0, "state": "waiting", "period": 2, "wealth": 1.0, "holding": 0.0}'
+        ', "renewals": 0, "policy": "p", "horizon": 3, "corrections": 0, '
+        '"state": "waiting", "period": 2, "wealth": 1.0, "holding": 0.0}'
     )
     network.answer(200, text=due + state)
     network.answer(200, text=due + state)

@@ -100,7 +100,9 @@ def test_what_cannot_be_meant_of_several_assets_is_refused(ballast: Ballast) -> 
 
 
 def test_what_a_vendor_writes_beside_a_price_is_no_asset(ballast: Ballast) -> None:
-    quotes = pd.DataFrame({"Close": [100.0, 101.0, 99.5, 102.0], "Adj Close": [90.0, 91.0, 89.5, 92.0]}, index=MONTHS[:4])
+    quotes = pd.DataFrame(
+        {"Close": [100.0, 101.0, 99.5, 102.0], "Adj Close": [90.0, 91.0, 89.5, 92.0]}, index=MONTHS[:4]
+    )
     quotes = quotes.assign(Open=[99.0, 100.5, 101.0, 99.0], Volume=[120300, 133200, 120900, 140100])
     with pytest.raises(ValueError, match="returns holds one asset, in column Adj Close: assets must name several"):
         ballast.advise_assets(quotes, rate_per_step=0.001, **ONCE)

@@ -239,8 +239,9 @@ def evaluation(report: wire.EvaluationReport) -> pd.DataFrame:
 
     ``certainty_equivalent`` and ``wealth_mean`` are currencies; ``utility_mean``, ``utility_variance`` and so on are
     of terminal utility; ``difference_certainty_equivalent`` and ``difference_utility`` are to the reference, for
-    which they are NaN; ``beyond_own_mix`` is what changing the allocation earned, NaN for constant mixes. Each has its
-    interval in the columns with ``_low`` and ``_high``, but for the extremes ``max`` and ``min``. Raises ``ImportError`` without pandas.
+    which they are NaN; ``beyond_own_mix`` is what changing the allocation earned, NaN for constant mixes. Each has
+    its interval in the columns with ``_low`` and ``_high``, but for the extremes ``max`` and ``min``. Raises
+    ``ImportError`` without pandas.
     """
     rows = []
     for strategy in report["strategies"]:

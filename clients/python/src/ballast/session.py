@@ -80,10 +80,10 @@ class _Session(Labelled):
     ) -> wire.Action:
         """The robust allocation for the coming period.
 
-        ``mode="resolve"`` solves the robust step anew at the exact state; ``explain="worst_case"`` does too, and shows
-        the law it is robust against. ``sensitivity=True`` says how near the allocation is to changing. Raises
-        :class:`SessionCompleted` after the horizon. A session that waits for its next policy is advised by the last step of
-        the one it has, which the answer's ``caution`` says.
+        ``mode="resolve"`` solves the robust step anew at the exact state; ``explain="worst_case"`` does too, and
+        shows the law it is robust against. ``sensitivity=True`` says how near the allocation is to changing. Raises
+        :class:`SessionCompleted` after the horizon. A session that waits for its next policy is advised by the last
+        step of the one it has, which the answer's ``caution`` says.
         """
         params = {"session": self.id, "mode": mode, "explain": explain, "sensitivity": "true" if sensitivity else None}
         return cast(wire.Action, await self._transport.json("GET", "/action", params=params))
@@ -141,9 +141,9 @@ class _Session(Labelled):
         entry of ``returns``, as ``dates`` are.
 
         What is on record is meant, so no report of it is doubted. Each carries the number of its period, so the same
-        call again, be it after :class:`Unreachable`, reports nothing twice and answers the same. A record that goes on
-        where the session stands has ``period=session.period``. A session that renews itself is waited for wherever a renewal is due: what is
-        advised does not depend on how long trainings take.
+        call again, be it after :class:`Unreachable`, reports nothing twice and answers the same. A record that goes
+        on where the session stands has ``period=session.period``. A session that renews itself is waited for wherever
+        a renewal is due: what is advised does not depend on how long trainings take.
 
         The rows have the index of ``returns`` where that is a pandas object, and else the periods. The columns are
         those of :func:`ballast.frames.history`, as they were told. Raises ``ValueError`` where an argument breaks a
