@@ -614,7 +614,6 @@ fn faulty_walks_of_assets() -> Vec<(&'static str, Value, &'static str)> {
         ("windows", json!([8, 8]), "windows"),
         ("windows", json!([1]), "windows"),
         ("windows", json!([9]), "windows"),
-        ("windows", json!([null]), "simple_returns"),
         ("every", json!(0), "every"),
         ("every", json!(2001), "every"),
         ("alpha", json!(1.0), "alpha"),

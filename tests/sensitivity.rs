@@ -320,7 +320,7 @@ async fn records_of_any_length_are_told_and_the_range_is_that_of_every_return() 
         [("1926-07", json!({ "kind": "equal" })), ("1970-01", json!({ "kind": "decay", "half_life": 90.0 }))]
     {
         let record = months(first, 480);
-        let problem = json!({ "rate_per_step": 0.003, "history": record, "learning": learning, "radius": bridge(50, 0.3),
+        let problem = json!({ "rate_per_step": 0.003, "history": record, "learning": learning, "radius": bridge(100, 0.3),
             "utility": { "kind": "power", "risk_aversion": 6.0 } });
         let advised = asked(&app, &json!({ "problem": problem, "holding": 0.1, "sensitivity": true })).await;
         let range = &advised["sensitivity"]["without_one"];

@@ -141,7 +141,7 @@ test("a session is opened, observed, and the same after a reload", async () => {
     await page.getByRole("slider", { name: "Returns seen and the worst market" }).waitFor();
     await page.getByRole("slider", { name: "Worth as much as a sure, by caution" }).waitFor();
     // The receipt of the report is told once.
-    return (await page.locator("main").innerText()).replace(/.* is recorded\. Wealth .*\n+/, "");
+    return (await page.locator("main").innerText()).replace(/.* is recorded\. Wealth .*\n+/, "").replace(/\n+/g, "\n");
   };
   const before = await shown();
   await page.reload();

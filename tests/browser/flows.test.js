@@ -62,7 +62,7 @@ test("a session says what is added at the end of the period, reckons with it, an
   const { wealth } = await call(ballast.url, `/sessions/${session}`);
   assert.equal(wealth.toFixed(2), foretold);
   await page.getByText("At the end of the period 8.25 is withdrawn.").first().waitFor();
-  assert.match(await main(), /beside 5\.00 added/);
+  assert.match(await main(), /time-weighted; 5\.00 added in all/);
 });
 
 test("what the form says will be refused is refused in the same words", async () => {

@@ -4,6 +4,7 @@ use std::fmt;
 
 use ballast::control::evaluation::report::{StrategyReport, UtilityReport};
 use ballast::control::request::framework::Framework;
+use ballast::numerics::digits::fixed;
 use ballast::numerics::summary::Estimate;
 use serde::Serialize;
 
@@ -233,9 +234,12 @@ fn slopes(study: &Study) -> Vec<Finding> {
         statement: "Section 2.4: the value of adaptive comes to that of the known law like t0 to the power -1/2."
             .to_owned(),
         found: format!(
-            "Here the fitted power of its gap is {:.2}, and {:.2} [{:.2}, {:.2}] between the two longest histories. While the \
+            "Here the fitted power of its gap is {}, and {} [{}, {}] between the two longest histories. While the \
              ball keeps the investor in the bank the gap stands still, so short histories flatten the fit.",
-            slope.all, slope.last.value, slope.last.low, slope.last.high
+            fixed(slope.all, 2),
+            fixed(slope.last.value, 2),
+            fixed(slope.last.low, 2),
+            fixed(slope.last.high, 2)
         ),
     };
     stated.map(finding).collect()

@@ -17,7 +17,7 @@ pub(super) fn sentences(resampled: &[Resampled], evidence: f64, per_year: bool) 
     ));
     sentences.push(
         "What did best on such records says next to nothing about the future, and the variation from record to record need not fall as \
-         caution grows: more of it speaks for itself only to those who doubt the premium."
+         caution grows: more of it speaks for itself only to those who doubt that average."
             .to_owned(),
     );
     sentences
