@@ -222,7 +222,7 @@ mod tests {
     #[test]
     fn an_element_too_many_is_no_fault_of_the_syntax() {
         let body = r#"{"problem": {"history": [], "action_interval": [0, 1, 2]}}"#;
-        assert_eq!(json::<Specification>(body.as_bytes()).unwrap_err().kind, "/problems/invalid-field");
+        assert_eq!(json::<Specification>(body.as_bytes()).unwrap_err().kind.as_ref(), "/problems/invalid-field");
         let (field, _, rule) = refused(body);
         assert_eq!((field.as_str(), rule.as_str()), ("problem.action_interval", "must have fewer elements"));
     }

@@ -45,7 +45,7 @@ impl From<ServiceError> for Problem {
                 let problem = problem(Kind::Unconfirmed);
                 let Some(first) = doubts.first() else { return problem };
                 let named = problem.naming(first.field.clone(), first.value.clone(), first.rule());
-                Problem { doubts: Some(doubts.into()), ..named }
+                Problem { doubts: Some(Box::new(Doubts(doubts))), ..named }
             }
             ServiceError::PastHorizon { given, horizon } => {
                 problem(Kind::SessionCompleted).naming("period", given, format!("must be at most {horizon}"))

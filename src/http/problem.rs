@@ -13,7 +13,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::control::error::FieldError;
-use crate::service::gate::Doubt;
+use crate::service::gate::{Doubt, Doubts};
 use crate::service::metrics::PROBLEMS;
 
 /// What went wrong, chosen by what the client should do next.
@@ -118,8 +118,8 @@ impl ProblemKind {
 pub struct Problem {
     /// Stable reference of the kind of problem: `/problems/<slug>`.
     #[serde(rename = "type")]
-    #[schema(example = "/problems/invalid-field")]
-    pub kind: String,
+    #[schema(value_type = String, example = "/problems/invalid-field")]
+    pub kind: Box<str>,
     #[schema(example = "A field breaks a rule")]
     pub title: &'static str,
     #[schema(example = 422)]
@@ -142,7 +142,7 @@ pub struct Problem {
     /// All that is doubted in a report; with `confirm` it is recorded.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<Vec<Doubt>>)]
-    pub doubts: Option<Box<[Doubt]>>,
+    pub doubts: Option<Box<Doubts>>,
     /// When to ask again, where that is known; shown as `Retry-After`.
     #[serde(skip)]
     pub retry_after: Option<Duration>,
@@ -166,7 +166,7 @@ impl Problem {
     pub fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
         let (slug, status, title) = kind.entry();
         Problem {
-            kind: format!("/problems/{slug}"),
+            kind: format!("/problems/{slug}").into(),
             title,
             status: status.as_u16(),
             detail: shortened(&detail.into(), SHOWN_SENTENCE).into(),

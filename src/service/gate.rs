@@ -75,7 +75,8 @@ impl Doubt {
 }
 
 /// Every doubt of a report.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(transparent)]
 pub struct Doubts(pub Vec<Doubt>);
 
 impl fmt::Display for Doubts {

@@ -31,7 +31,7 @@ test("the sentences say what differs, in percent", () => {
 
 test("a premium has the digits that decide", () => {
   const premium = { present: 0.00021, needed: 0.000198, periods_more: 0 };
-  assert.match(said({ ...near, sensitivity: { ...near.sensitivity, premium } }), /paid 0\.0210 % a period beyond the bank; the advice leaves the bank at 0\.0198 %\.$/);
+  assert.match(said({ ...near, sensitivity: { ...near.sensitivity, premium } }), /paid 0\.0210 % a period beyond what the bank pays now; the advice leaves the bank at 0\.0198 %\.$/);
 });
 
 test("who is in the bank is told what it would take, and what never would", () => {

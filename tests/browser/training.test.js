@@ -143,8 +143,13 @@ test("one record has one mean and one deviation, from its reading to its policy"
   await page.getByLabel("Months ahead").fill("2");
   await small();
   await page.getByLabel("Bank return per month, %").fill("0.2");
+  const answered = page.waitForResponse((response) => response.url().endsWith("/train"));
   await train().click();
-  await page.getByRole("link", { name: "See the policy" }).first().click({ timeout: 60_000 });
+  const { job } = await (await answered).json();
+  let now;
+  do now = await call(ballast.url, `/jobs/${job}`);
+  while (now.finished_ms === null);
+  await go(`#/policies/${now.policy}`);
   const told = page.getByText(/^The record holds 12 returns/);
   await told.waitFor();
   const words = plain(await told.innerText());

@@ -177,7 +177,9 @@ export function centreInWords({ kind, bandwidth, half_life, weight } = {}, unit 
 
 /** What was asked for, a sentence a choice; `annualised` is what the service says by the year, where it does. */
 export function inWords({ problem }, annualised) {
-  const { mean, deviation } = moments(problem.history.map(Math.expm1));
+  const { mean, deviation: ofAll } = moments(problem.history.map(Math.expm1));
+  // As where the record is read: a sample's, by one return less.
+  const deviation = ofAll * Math.sqrt(problem.history.length / (problem.history.length - 1));
   const limit = problem.action_interval[1];
   const unit = unitOf(problem.periods_per_year);
   const guarded = caution(problem) === "none" ? "" : ` Its caution: ${caution(problem)}.`;
