@@ -91,7 +91,11 @@ def test_a_session_of_several_assets_is_a_frame_for_each_figure(ballast: Ballast
     fund = ballast.train_assets(
         table, kind="log", rate_per_step=0.0, horizon=3, radius={"rule": "fixed", "radius": 1e-4}, design={"count": 20}
     ).session()
-    fund.observe(simple_returns={"stocks": 0.1, "bonds": -0.01}, executed_allocations={"stocks": 0.25, "bonds": 0.5})
+    fund.observe(
+        simple_returns={"stocks": 0.1, "bonds": -0.01},
+        executed_allocations={"stocks": 0.25, "bonds": 0.5},
+        confirm=True,
+    )
     fund.observe(missing=True)
     then = fund.assets_frame()
     assert (
@@ -102,7 +106,7 @@ def test_a_session_of_several_assets_is_a_frame_for_each_figure(ballast: Ballast
     told = fund.history()["observations"][0]["assets"]
     assert fund.assets_frame("holding").loc[1].to_dict() == told["holdings"]  # type: ignore[index]
     assert fund.assets_frame("advised_allocation").loc[1].to_dict() == told["advised_allocations"]  # type: ignore[index]
-    fund.correct(1, "a slip", simple_returns={"stocks": 0.2, "bonds": 0.0})
+    fund.correct(1, "a slip", simple_returns={"stocks": 0.2, "bonds": 0.0}, confirm=True)
     assert fund.assets_frame("log_return").loc[1].tolist() == pytest.approx([math.log(1.2), 0.0])
     pd.testing.assert_frame_equal(fund.assets_frame(as_of="then"), then)
     with pytest.raises(ValueError, match="figure is 'wealth': must be one of simple_return, log_return"):

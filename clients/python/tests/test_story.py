@@ -98,10 +98,10 @@ def test_a_session_of_several_assets(ballast: Ballast) -> None:
     advised = frames.allocation(session.assets_action())
     assert set(advised.index) == {"stocks", "bonds"} and 0.0 < advised.sum() <= 1.0
     held = advised * 0.5
-    session.observe(simple_returns=pd.Series({"stocks": 0.1, "bonds": -0.01}), executed_allocations=held)
+    session.observe(simple_returns=pd.Series({"stocks": 0.1, "bonds": -0.01}), executed_allocations=held, confirm=True)
     assert session.wealth == pytest.approx(100.0 + 100.0 * (0.1 * held["stocks"] - 0.01 * held["bonds"]))
     assert session.observed is not None and session.observed["assets"]["one_step"]["bound"] > 0.0  # type: ignore[index]
-    session.correct(1, "a slip", simple_returns={"stocks": 0.2, "bonds": 0.0}, executed_allocations=held)
+    session.correct(1, "a slip", simple_returns={"stocks": 0.2, "bonds": 0.0}, executed_allocations=held, confirm=True)
     assert session.wealth == pytest.approx(100.0 + 20.0 * held["stocks"])
 
 
