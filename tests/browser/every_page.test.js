@@ -57,7 +57,7 @@ test("every view where there is something, of one asset and of several", async (
   const { job: running } = await call(ballast.url, "/train", { problem: { ...problem, horizon: 200 }, design: { count: 1000 } });
   await fetch(`${ballast.url}/jobs/${stopped}/cancel`, { method: "POST" });
   const places = [
-    ...["#/", "#/jobs", "#/policies", "#/sessions/new", "#/evaluations", "#/evaluations/new", `#/train?like=${one}`, `#/train?newer=${several}`, `#/report?sessions=${lived},${other}`],
+    ...["#/", "#/jobs", "#/policies", "#/sessions/new", "#/evaluations", "#/evaluations/new", `#/train?like=${one}`, `#/train?newer=${several}`, `#/report?sessions=${lived},${other}`, `#/renew?sessions=${lived}`],
     ...[one, several].map((policy) => `#/policies/${policy}`),
     ...[lived, other].map((session) => `#/sessions/${session}`),
     ...Object.entries({ ...jobs, evaluations: [...jobs.evaluations, stopped] }).flatMap(([at, all]) => all.map((job) => `#/${at}/${job}`)),
