@@ -21,7 +21,7 @@ struct CommandLine {
 }
 
 /// Its threads take little of the address space, and so do those of SQLite, which it serves too: a service whose address
-/// space is limited lives (`tests/memory.rs`).
+/// space is limited lives (`tests/operation/memory.rs`).
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

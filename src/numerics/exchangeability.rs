@@ -5,7 +5,7 @@
 //! martingale that starts at 1, so the chance that it ever reaches c is at most 1/c (Ville).
 //! Sources: Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World (2005), sections 2 and 7; the mixture is that of
 //! Vovk, Nouretdinov and Gammerman, Testing exchangeability on-line (2003).
-//! Checked by: `tests/exchangeability.rs`.
+//! Checked by: `tests/solver/exchangeability.rs`.
 
 use super::empirical::EmpiricalDistribution;
 

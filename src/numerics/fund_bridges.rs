@@ -14,7 +14,7 @@
 //! The largest over all funds is searched over the single assets, equal shares, inverse volatilities and twenty fixed draws, then
 //! between the fund that is largest most often where it matters and the single assets. A finite search errs low: by
 //! little where assets move together, and by more than a tenth for a dozen independent ones, where thousands of funds differ (see the
-//! test `the_joint_factor_of_independent_assets_errs_low` in `tests/assets.rs`).
+//! test `the_joint_factor_of_independent_assets_errs_low` in `tests/solver/assets.rs`).
 
 use rand::RngExt;
 use rand_distr::StandardNormal;

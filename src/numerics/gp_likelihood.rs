@@ -31,7 +31,7 @@ pub fn log_likelihood_and_gradient(
 /// `unit` holds the length scales l, the signal variance 1 and the noise ratio nu. `None` when A is singular to working
 /// precision. One factorisation and one inverse: cost O(n^3), and O(n^2 d) for the contraction.
 /// Source: Rasmussen and Williams 2006, eqs. (2.30) and (5.9).
-/// Checked by: tests/gp.rs, gradients_equal_those_of_scikit_learn.
+/// Checked by: tests/solver/gp.rs, gradients_equal_those_of_scikit_learn.
 pub(super) fn likelihood(
     inputs: &DMatrix<f64>,
     targets: &[Vec<f64>],

@@ -3,7 +3,7 @@
 //!
 //! Text does not say what its numbers are. What follows from them is taken and told in a sentence; what does not follow is
 //! asked; and a cell that cannot be meant is refused by its line, its column and its value. Nothing is passed over in silence:
-//! an investor who is misread gets wrong advice that looks right. Checked by: `tests/returns.rs`.
+//! an investor who is misread gets wrong advice that looks right. Checked by: `tests/service/returns.rs`.
 
 mod bank;
 mod cells;

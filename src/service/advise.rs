@@ -64,7 +64,7 @@ struct Checked {
 
 impl Advise {
     /// The answer, found in this process for its own user: no store, no turns, and the memory that it takes.
-    /// Checked by: `tests/advise_file.rs`.
+    /// Checked by: `tests/project/advise_file.rs`.
     ///
     /// # Errors
     /// A field breaks a rule.

@@ -152,7 +152,7 @@ fn off_calendar(last: Date, next: Date, periods: f64, day: Date) -> Option<Doubt
 }
 
 /// Doubts a log-return z that lies far from a record of mean m and standard deviation s: |z - m| > 4 s, at any size.
-/// Checked by: `tests/gate.rs::a_return_far_from_the_record_is_doubted_at_any_size`.
+/// Checked by: `tests/service/gate.rs::a_return_far_from_the_record_is_doubted_at_any_size`.
 pub(super) fn of_return(field: &str, value: f64, (mean, deviation): (f64, f64), log_return: f64) -> Option<Doubt> {
     let distance = (log_return - mean).abs();
     if distance <= (UNUSUAL_DEVIATIONS * deviation).max(ROUNDING) {

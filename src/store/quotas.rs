@@ -8,7 +8,7 @@
 //! session takes the room of all its observations when it is opened: no return that an investor reports is ever refused
 //! for a quota, nor is what a worker finished. Checkpoints are not counted; they go with the end of their job.
 //!
-//! Checked by: `tests/quotas.rs`, `tests/store_model.rs`.
+//! Checked by: `tests/service/quotas.rs`, `tests/service/store_model.rs`.
 
 use super::codec::to_sql;
 use super::error::{Failure, OverQuota, Quota};

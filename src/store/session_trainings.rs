@@ -7,7 +7,7 @@
 //! A training made for sessions that none requests any more is cancelled. Few of them wait in a tenant's queue at a time, and
 //! none counts among the jobs that its callers may queue.
 //!
-//! Checked by: `tests/renewal_scale.rs`.
+//! Checked by: `tests/operation/renewal_scale.rs`.
 
 use futures_util::FutureExt;
 

@@ -8,7 +8,7 @@
 //! Over PostgreSQL, claims that meet pass over a tenant that another serves or that is just queueing; it keeps its number,
 //! and with it its place. Cost of a claim: one look into an index for each tenant passed over, whatever is queued.
 //!
-//! Checked by: `tests/turns.rs`, `tests/store_model.rs`.
+//! Checked by: `tests/service/turns.rs`, `tests/service/store_model.rs`.
 
 use super::error::Failure;
 use super::job::JobRow;

@@ -6,7 +6,7 @@
 //! root, a loop device, strace or PostgreSQL say so where they have to be left out; under `BALLAST_RELIABILITY=required`
 //! none may be.
 //!
-//! Not here: random lists of operations against a model of the store, which `tests/store_model.rs` runs on both engines.
+//! Not here: random lists of operations against a model of the store, which `tests/service/store_model.rs` runs on both engines.
 
 mod caller;
 mod damage;

@@ -61,7 +61,7 @@ impl AssetsAdvice {
     /// seed of its simulations.
     /// Cost: that of [`AssetsStep::solve`], twice where a return may fall below those seen, and of the joint factor under `bridge`
     /// and `calibrated`.
-    /// Checked by: `tests/advise.rs::several_assets_are_advised_by_name_as_solved_directly` and
+    /// Checked by: `tests/service/advise.rs::several_assets_are_advised_by_name_as_solved_directly` and
     /// `the_crash_is_what_a_floor_at_the_lowest_return_takes_away`.
     pub fn of(problem: &AssetsProblem, fund: &ProblemSpecification, of_fund: f64, seed: u64) -> Self {
         let rows = &problem.history;

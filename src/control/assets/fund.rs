@@ -5,7 +5,7 @@
 //! e^(z_i)`, is what the policy knows of the assets: the state's law is that of the zetas of all dates, its radius holds for all
 //! funds at once, and the advice is the policy's share times theta. A proposal takes the place of the composition held only where
 //! the policy values it as much (see [`guarded`]): then the policy's certainty equivalent at the fund held is a promise, whatever
-//! proposes. Checked by: `tests/funds.rs::the_promise_at_the_fund_held_is_kept_and_broken_without_the_guard`.
+//! proposes. Checked by: `tests/service/funds.rs::the_promise_at_the_fund_held_is_kept_and_broken_without_the_guard`.
 //!
 //! Where trading costs, a proposal must also pay for the way there, by a rule that is no optimum: what the policy gains by it, an
 //! equal part of that each period left, must be more than what the trade costs beyond that of staying.

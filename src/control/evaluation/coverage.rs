@@ -162,7 +162,7 @@ fn accepted(log_return: f64) -> f64 {
 /// What each ball of the question does under `law`: centre by centre, and of each rule by rule. Cost: a robust step for each record
 /// and ball.
 ///
-/// Checked by: `tests/coverage.rs`.
+/// Checked by: `tests/solver/coverage.rs`.
 ///
 /// # Errors
 /// A centre or a rule that a training would not take either.

@@ -1,7 +1,7 @@
 //! The names of strategies: one set for the terminal, tables, the wire, Python and the page.
 //!
 //! Every report carries the name as `strategy` and the kind beside it; nothing else makes a name. Checked by:
-//! `tests/dashboard.rs::the_page_calls_frameworks_what_reports_call_them`.
+//! `tests/project/dashboard.rs::the_page_calls_frameworks_what_reports_call_them`.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

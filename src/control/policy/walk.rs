@@ -32,14 +32,14 @@ impl Iterator for Walk<'_> {
 impl Advisor {
     /// Returns from which on a record is as long as any to what is learned of it: its effective size is within a hundredth of what
     /// that tends to, from where laws move on and their precision does not. `None` where it grows for ever.
-    /// Checked by: `tests/learning.rs::the_first_step_serves_every_law_once_the_record_has_settled`.
+    /// Checked by: `tests/solver/learning.rs::the_first_step_serves_every_law_once_the_record_has_settled`.
     pub fn settled_from(&self) -> Option<usize> {
         self.specification().problem.learning.settled_from(SETTLED)
     }
 
     /// Checks that [`Self::advise`] at step 0 serves every period of an investor who starts from so many returns: its surrogates were
     /// trained over laws such as he meets, and nothing but the law tells one period from another.
-    /// Checked by: `tests/learning.rs::a_session_that_cannot_roll_is_refused`.
+    /// Checked by: `tests/solver/learning.rs::a_session_that_cannot_roll_is_refused`.
     ///
     /// # Errors
     /// The rule that is broken.

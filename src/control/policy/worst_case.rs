@@ -138,7 +138,7 @@ fn moved(transport: &[TransportedMass]) -> (f64, Option<f64>) {
 
 /// Basis points of the certainty equivalent that a ball of this period alone, wider by `wider`, costs at most: the worth is convex in
 /// the radius, so it falls by no more than its slope says, and never below the floor.
-/// Checked by: `tests/bellman.rs::a_wider_ball_costs_at_most_what_is_said`.
+/// Checked by: `tests/solver/bellman.rs::a_wider_ball_costs_at_most_what_is_said`.
 pub fn most_cost(wider: f64, radius_cost: f64, advice: &Advice) -> f64 {
     let above = (advice.certainty_equivalent / advice.floor).ln();
     BASIS_POINTS * (wider * radius_cost).min(above).max(0.0)

@@ -14,7 +14,7 @@
 //! in the bank, and bounds the actions by `1 - D / (x (1 - c))`.
 //!
 //! The simulator, live sessions and the books of a backtest call these functions; the tables of the robust step hold the same
-//! formulas over many returns at once (`control/bellman/gain_field.rs`), which `tests/bellman.rs` compares.
+//! formulas over many returns at once (`control/bellman/gain_field.rs`), which `tests/solver/bellman.rs` compares.
 
 use crate::control::problem::actions::Band;
 use crate::control::request::specification::ProblemSpecification;

@@ -36,7 +36,7 @@ pub struct Centre {
 ///   centre = ( sum_j w_j sum_k m_k delta_(z_j + h x_k) + sum_i v_i delta_(y_i) ) / ( sum_j w_j + sum_i v_i )
 ///
 /// with x and m the nodes and masses of the Gauss-Hermite rule and h the bandwidth. What lies beyond the returns accepted is put at
-/// their bounds. Checked by: `tests/centre.rs` against draws.
+/// their bounds. Checked by: `tests/solver/centre.rs` against draws.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Centring {
     /// Steps h x_k away from a return, ascending, and m_k.

@@ -718,7 +718,7 @@ class Premium(TypedDict):
     The same of the record with every log-return shifted by the amount at which the advice leaves the bank, to 1e-6: above
     `present` where all is in the bank now, else below it. Null where no shift within the distance between the lowest and the
     highest return, that leaves all of them in `support`, parts the two. In one period without trading cost the shift is
-    `ln(1 + rate_per_step)` less the log of the least mean of e^Z in the ball. Checked by: tests/sensitivity.rs against that.
+    `ln(1 + rate_per_step)` less the log of the least mean of e^Z in the ball. Checked by: tests/solver/sensitivity.rs against that.
     """
     periods_more: NotRequired[int | None]
     """
@@ -1143,7 +1143,7 @@ class WithoutOne(TypedDict):
 
     Each distinct return is left out in turn. Of a record of more than 360, or of fewer where a step takes long, the returns that move
     the advice the most are: those furthest from the mean by their weight, and others evenly between by their rank. Checked by:
-    tests/sensitivity.rs against leaving out every one.
+    tests/solver/sensitivity.rs against leaving out every one.
     """
 
     lowest: LeftOut
@@ -1493,7 +1493,7 @@ class NextReturn(TypedDict):
     more, within `support` where there is one: at 49 of them, evenly, and between neighbours of which one is advised an end of
     the action interval and the other is not, by halving, to 1e-6. The advice need not rise with the return, for one far out
     widens the radius whichever side it lies on: of several crossings the one nearest to the median is told, and a pair of them
-    between two neighbours is missed. Checked by: tests/sensitivity.rs on a finer grid.
+    between two neighbours is missed. Checked by: tests/solver/sensitivity.rs on a finer grid.
     """
 
     range: list[float]

@@ -75,7 +75,7 @@ impl Frontier {
     }
 
     /// The report. Cost: a robust step for each scale and resample.
-    /// Checked by: `tests/frontier.rs`.
+    /// Checked by: `tests/service/frontier.rs`.
     ///
     /// # Errors
     /// [`TrainError::Stopped`] soon after the stop signal; an asset that moves too rarely to be drawn.
@@ -160,7 +160,7 @@ impl Frontier {
     ///   worth(a_i) - worth(mean a) - worth'(mean a) (a_i - mean a).
     ///
     /// The average is one over the same records: without the last part it would be taken for known.
-    /// Checked by: `tests/frontier.rs::intervals_beyond_the_own_mix_are_as_wide_as_seeds_differ`.
+    /// Checked by: `tests/service/frontier.rs::intervals_beyond_the_own_mix_are_as_wide_as_seeds_differ`.
     fn beyond_own_mix<'a>(
         &self,
         law: &RecordLaw,
@@ -223,7 +223,7 @@ impl Frontier {
 
     /// Standard errors that the mean simple return of the record, in the fund of inverse volatilities, lies above the bank's:
     /// `(mean - r) sqrt(n) / s`, s the sample deviation.
-    /// Checked by: `tests/frontier.rs::at_the_record_itself_it_advises_as_advise_does`.
+    /// Checked by: `tests/service/frontier.rs::at_the_record_itself_it_advises_as_advise_does`.
     fn evidence(&self) -> f64 {
         let rows = &self.question.assets.history;
         let returns: Vec<f64> =

@@ -31,7 +31,7 @@ pub struct Sensitivity {
 ///
 /// Each distinct return is left out in turn. Of a record of more than 360, or of fewer where a step takes long, the returns that move
 /// the advice the most are: those furthest from the mean by their weight, and others evenly between by their rank. Checked by:
-/// tests/sensitivity.rs against leaving out every one.
+/// tests/solver/sensitivity.rs against leaving out every one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct WithoutOne {
     /// The lowest advice, and the return whose absence gives it.
@@ -61,7 +61,7 @@ pub struct LeftOut {
 /// more, within `support` where there is one: at 49 of them, evenly, and between neighbours of which one is advised an end of
 /// the action interval and the other is not, by halving, to 1e-6. The advice need not rise with the return, for one far out
 /// widens the radius whichever side it lies on: of several crossings the one nearest to the median is told, and a pair of them
-/// between two neighbours is missed. Checked by: tests/sensitivity.rs on a finer grid.
+/// between two neighbours is missed. Checked by: tests/solver/sensitivity.rs on a finer grid.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct NextReturn {
     /// The lowest and the highest log-return tried.
@@ -107,7 +107,7 @@ pub struct Premium {
     /// The same of the record with every log-return shifted by the amount at which the advice leaves the bank, to 1e-6: above
     /// `present` where all is in the bank now, else below it. Null where no shift within the distance between the lowest and the
     /// highest return, that leaves all of them in `support`, parts the two. In one period without trading cost the shift is
-    /// `ln(1 + rate_per_step)` less the log of the least mean of e^Z in the ball. Checked by: tests/sensitivity.rs against that.
+    /// `ln(1 + rate_per_step)` less the log of the least mean of e^Z in the ball. Checked by: tests/solver/sensitivity.rs against that.
     pub needed: Option<f64>,
     /// More returns, of the law of those seen, after which the advice leaves the bank: the least number m at which the step with
     /// the radius times sqrt(n / (n + m)) advises anything. 0 where it has left already; null where it does not within 10000
@@ -115,7 +115,7 @@ pub struct Premium {
     pub periods_more: Option<usize>,
 }
 
-/// The reasons to be careful with an advice, as far as they were asked for. Checked by: tests/sensitivity.rs.
+/// The reasons to be careful with an advice, as far as they were asked for. Checked by: tests/solver/sensitivity.rs.
 pub fn cautions(advice: &Advice, sensitivity: Option<&Sensitivity>) -> Vec<Caution> {
     let short = Caution::short_record(advice.sample_size, advice.effective_size);
     short.into_iter().chain(sensitivity.and_then(|found| found.caution.clone())).collect()

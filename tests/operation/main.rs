@@ -1,0 +1,13 @@
+//! Crowds, kills, races and memory: real processes, several at a time, under clocks.
+
+#[macro_use]
+#[path = "../support/mod.rs"]
+mod support;
+
+mod abuse;
+mod connections;
+mod lists;
+mod memory;
+mod process;
+mod renewal_scale;
+mod replicas;

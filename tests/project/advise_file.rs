@@ -1,0 +1,158 @@
+//! `ballast advise` reads a file and answers what `POST /advise` answers; its transcript in the README is true.
+
+use std::process::{Command, Output, Stdio};
+
+use crate::support::App;
+use serde_json::{Value, json};
+
+const MARKET: &str = "data/us_market_monthly.csv";
+
+fn ballast(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
+    command.current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// Columns 1 and 2 of the last rows of the bundled file.
+fn last(count: usize) -> Vec<[f64; 2]> {
+    let file = std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(MARKET)).unwrap();
+    let number = |field: Option<&str>| field.unwrap().parse().unwrap();
+    let mut rows: Vec<[f64; 2]> = file
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').skip(1))
+        .map(|mut fields| [number(fields.next()), number(fields.next())])
+        .collect();
+    rows.split_off(rows.len() - count)
+}
+
+/// As `head` does, which has read enough: nothing is told of it.
+#[test]
+fn who_reads_no_further_is_no_fault() {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
+    command.current_dir(env!("CARGO_MANIFEST_DIR")).args(["advise", MARKET]);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), text(&output.stderr).contains("panicked")), (Some(141), false), "{output:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn it_answers_what_the_service_answers_to_the_last_bit() {
+    let app = App::start().await;
+    let rows = last(480);
+    let history: Vec<f64> = rows.iter().map(|[risky, _]| risky.ln_1p()).collect();
+    let (equal, decay) = (json!({ "kind": "equal" }), json!({ "kind": "decay", "half_life": 240.0 }));
+    for (rate, learning, arguments) in
+        [(rows[479][1], equal, &[][..]), (0.0015, decay, &["--rate", "0.0015", "--half-life", "240"])]
+    {
+        let usual = ["advise", MARKET, "--window", "480", "--risk-aversion", "4.5", "--trading-cost", "0.004"];
+        let more = ["--wealth", "80", "--holding", "0.25", "--json"];
+        let output = ballast(&[&usual, &more[..], arguments].concat());
+        assert!(output.status.success(), "{output:?}");
+        let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let problem = json!({ "history": history, "rate_per_step": rate, "periods_per_year": 12,
+            "trading_cost": 0.004, "learning": learning,
+            "utility": { "kind": "power", "risk_aversion": 4.5 } });
+        let question = json!({ "problem": problem, "wealth": 80.0, "holding": 0.25 });
+        let (status, expected) = app.post("/advise", &question).await;
+        assert_eq!((status.as_u16(), &found), (200, &expected));
+        assert!(found["allocation"].as_f64().unwrap() > 0.0, "{found}");
+        assert!(text(&output.stderr).starts_with("480 monthly returns, 1978-12 to 2018-11, "), "{output:?}");
+    }
+}
+
+#[test]
+fn what_is_wrong_is_said_by_line_or_option() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("returns.csv");
+    std::fs::write(&path, "date,return\n2008-01,0.01\n2008-02,-0.04\n2008-03,0.02\n2008-05,0.02\n").unwrap();
+    let file = path.to_str().unwrap();
+    for (arguments, said) in [
+        (&["advise", file][..], "the file does not say what the bank pays"),
+        (&["advise", file, "--rate", "0.001"], "line 5: date is \"2008-05\": must be the month after 2008-03"),
+        (&["advise", "no such file"], "reading no such file: "),
+        (&["advise", MARKET, "--window", "2000"], "--window is 2000 of 1109: must be"),
+        (&["advise", MARKET, "--rate", "2"], "--rate is 2: must be"),
+        (&["advise", MARKET, "--holding", "1.5"], "--holding is 1.5: must be a number in [0, 1]"),
+        (&["advise", MARKET, "--wealth", "0"], "--wealth is 0: must be a number in"),
+        (&["advise", MARKET, "--trading-cost", "0.2"], "--trading-cost is 0.2: must be a number in [0, 0.1]"),
+        (&["advise", MARKET, "--half-life", "0.5"], "--half-life is 0.5: must be a number in [1, "),
+        (&["advise", MARKET, "--risk-aversion", "0.5"], "--risk-aversion is 0.5: must lie in [1, 100]"),
+        (
+            &["backtest", MARKET, "--out", file, "--window", "1100"],
+            "--window is 1100: must be at most 1097: the record has 1109 periods",
+        ),
+    ] {
+        let output = ballast(arguments);
+        assert_eq!(output.status.code(), Some(1), "{output:?}");
+        assert!(text(&output.stderr).starts_with(&format!("ballast: {said}")), "{output:?}");
+    }
+}
+
+#[test]
+fn more_days_than_a_radius_is_simulated_for_need_a_window() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("days.csv");
+    let first = jiff::civil::date(1970, 1, 1);
+    let day = |day: i64| {
+        format!("{},{}\n", first.checked_add(jiff::Span::new().days(day)).unwrap(), 0.001 * (day % 7 - 3) as f64)
+    };
+    std::fs::write(&path, format!("date,return\n{}", (0..15_000).map(day).collect::<String>())).unwrap();
+    let asked = ["advise", path.to_str().unwrap(), "--rate", "0"];
+    let refused = ballast(&asked);
+    assert_eq!(
+        text(&refused.stderr),
+        "ballast: the file is 15000 returns: must be at most 14999, as the radius is not simulated for more: --window 14999 \
+         uses the last ones\n"
+    );
+    let named = ballast(&[&asked[..], &["--window", "15000"]].concat());
+    assert!(text(&named.stderr).starts_with("ballast: --window is 15000 returns: must be at most 14999"), "{named:?}");
+    let answered = ballast(&[&asked[..], &["--window", "14999"]].concat());
+    assert!(text(&answered.stdout).starts_with("14999 daily returns, 1970-01-02 to 2011-01-25, "), "{answered:?}");
+}
+
+#[test]
+fn the_readme_shows_what_it_prints() {
+    const COMMAND: &str = "\ncargo run --release -- advise ";
+    let readme = std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap();
+    let line = readme[readme.find(COMMAND).unwrap() + COMMAND.len()..].lines().next().unwrap();
+    let arguments: Vec<&str> =
+        ["advise"].into_iter().chain(line.split('#').next().unwrap().split_whitespace()).collect();
+    let output = ballast(&arguments);
+    assert!(output.status.success(), "{output:?}");
+    let printed = text(&output.stdout);
+    assert!(readme.contains(&format!("```text\n{printed}```")), "the README does not show\n{printed}");
+}
+
+/// Runs what a page shows after `$ ` where its commands are those of `ballast advise`, in a folder with `data/` of its own.
+#[cfg(unix)]
+#[test]
+fn the_pages_show_what_it_prints() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let binaries = std::path::Path::new(env!("CARGO_BIN_EXE_ballast")).parent().unwrap().to_str().unwrap();
+    let path = format!("{binaries}:{}", std::env::var("PATH").unwrap());
+    let mut shown = 0;
+    for page in ["docs/concepts.md", "docs/first-advice.md"] {
+        let page = std::fs::read_to_string(root.join(page)).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        std::os::unix::fs::symlink(root.join("data"), folder.path().join("data")).unwrap();
+        let run = |line: &str| {
+            let mut shell = Command::new("sh");
+            shell.args(["-c", &format!("exec 2>&1\n{line}")]).current_dir(folder.path()).env("PATH", &path);
+            text(&shell.output().unwrap().stdout)
+        };
+        page.lines().filter(|line| line.starts_with("cut ")).for_each(|line| drop(run(line)));
+        for block in page.split("```text\n$ ").skip(1) {
+            let block = format!("$ {}", block.split("```").next().unwrap());
+            let (commands, printed): (Vec<&str>, Vec<&str>) = block.lines().partition(|line| line.starts_with("$ "));
+            let found: String = commands.iter().map(|command| run(&command[2..])).collect();
+            assert_eq!(found.lines().collect::<Vec<&str>>(), printed, "{commands:?}");
+            shown += 1;
+        }
+    }
+    assert_eq!(shown, 5);
+}

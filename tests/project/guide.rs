@@ -1,0 +1,66 @@
+//! The documents of the project as the binary serves them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use crate::support::App;
+use reqwest::StatusCode;
+
+/// What stands between `before` and the next quotation mark, wherever it does.
+fn quoted(page: &str, before: &str) -> Vec<String> {
+    page.split(before).skip(1).filter_map(|rest| rest.split('"').next().map(str::to_owned)).collect()
+}
+
+async fn text(app: &App, address: &str) -> String {
+    let answer = app.client.get(format!("{}{address}", app.url)).send().await.expect("an answer");
+    assert_eq!(answer.status(), StatusCode::OK, "{address}");
+    String::from_utf8_lossy(&answer.bytes().await.expect("a body")).into_owned()
+}
+
+#[tokio::test]
+async fn every_link_of_every_page_leads_to_what_is_served() {
+    let app = App::start().await;
+    let start = text(&app, "/guide").await;
+    let mut pages = BTreeMap::new();
+    for address in quoted(&start, "<li><a href=\"").into_iter().filter(|link| link.starts_with("/guide/")) {
+        let page = text(&app, &address).await;
+        pages.insert(address, page);
+    }
+    assert_eq!(pages["/guide/start"], start);
+    let named: BTreeMap<&String, BTreeSet<String>> =
+        pages.iter().map(|(address, page)| (address, quoted(page, " id=\"").into_iter().collect())).collect();
+    let mut served = BTreeSet::new();
+    for (address, page) in &pages {
+        for link in quoted(page, " href=\"").into_iter().chain(quoted(page, " src=\"")) {
+            if link.starts_with("https://") {
+                continue;
+            }
+            let (path, at) = link.split_once('#').unwrap_or((&link, ""));
+            let path = if path.is_empty() { address.as_str() } else { path };
+            assert!(path.starts_with('/'), "{address}: {link}");
+            if !pages.contains_key(path) && served.insert(path.to_owned()) {
+                text(&app, path).await;
+            }
+            assert!(at.is_empty() || named[&path.to_owned()].contains(at), "{address}: no heading {link}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn every_document_is_a_page_without_script() {
+    let app = App::start().await;
+    let start = text(&app, "/guide").await;
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    for entry in std::fs::read_dir(folder).expect("the documents") {
+        let name = entry.expect("an entry").file_name().into_string().expect("UTF-8");
+        let Some(name) = name.strip_suffix(".md") else { continue };
+        assert!(start.contains(&format!("href=\"/guide/{name}\"")), "{name} is in no list");
+        let page = text(&app, &format!("/guide/{name}")).await;
+        assert!(page.contains("<h1") && page.contains("aria-current=\"page\"") && !page.contains("<script"), "{name}");
+    }
+    let (status, problem) = app.get("/guide/nothing").await;
+    assert_eq!((status, &problem["field"]), (StatusCode::NOT_FOUND, &"file".into()), "{problem}");
+    let answer = app.client.get(format!("{}/guide/requests", app.url)).send().await.expect("an answer");
+    let policy = answer.headers()["content-security-policy"].to_str().expect("ASCII").to_owned();
+    assert!(policy.contains("default-src 'none'") && !policy.contains("script-src"), "{policy}");
+}

@@ -1,0 +1,20 @@
+//! What is written about the project, built into it and printed by it.
+
+#[macro_use]
+#[path = "../support/mod.rs"]
+mod support;
+
+mod advise_file;
+mod architecture;
+mod dashboard;
+mod demo;
+mod dependencies;
+mod docs;
+mod guide;
+mod loadtest;
+mod monitoring;
+mod openapi;
+mod paper_map;
+mod policy_format;
+mod threat_model;
+mod upgrade;

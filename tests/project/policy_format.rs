@@ -1,0 +1,220 @@
+//! `docs/policy-format.md` says all there is to say of an exported policy: a program in another language that follows it
+//! (`tests/evaluate_policy.py`, the standard library alone) answers what the service answers.
+
+use std::io::Write;
+use std::process::{Command, Stdio};
+
+use crate::support::policies::advisor;
+use ballast::control::policy::advice::AdviceSource;
+use ballast::control::policy::advisor::{AdviceMode, Advisor};
+use ballast::control::problem::state::{Realised, State};
+use serde_json::{Value, json};
+
+const HISTORY: [f64; 8] = [0.021, -0.034, 0.052, 0.043, -0.008, 0.017, 0.029, -0.011];
+
+/// What `tests/evaluate_policy.py` makes of `asked`.
+fn python(arguments: &[&str], asked: &Value) -> Value {
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/evaluate_policy.py");
+    let mut command = Command::new(std::env::var("PYTHON").unwrap_or("python3".into()));
+    command.arg(script).args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut child = command.spawn().expect("python3");
+    child.stdin.take().unwrap().write_all(asked.to_string().as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{asked}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Two steps of 25 design points.
+fn policy(framework: &str, utility: Value, radius: Value, surrogate: Value) -> Value {
+    json!({
+        "problem": { "framework": framework, "horizon": 3, "rate_per_step": 0.002, "history": HISTORY, "utility": utility, "radius": radius },
+        "design": { "count": 25 }, "surrogate": surrogate
+    })
+}
+
+/// Every feature of the page's table is in one of these, under every utility, target and rule of the radius.
+fn policies() -> Vec<Value> {
+    let exponential = || json!({ "kind": "exponential", "risk_aversion": 0.02 });
+    let power = || json!({ "kind": "power", "risk_aversion": 3.0 });
+    let bridge = || json!({ "rule": "bridge", "alpha": 0.5, "paths": 200, "scale": 0.1 });
+    let six = || json!({ "moment_count": 6 });
+    // The ball of some states reaches past the lowest return that there can be, which is still better than this bank.
+    let mut bounded = policy("adaptive", power(), json!({ "rule": "fixed", "radius": 0.056 }), json!({}));
+    bounded["problem"]["support"] = json!({ "min": -0.04, "max": 0.3 });
+    bounded["problem"]["rate_per_step"] = json!(-0.045);
+    let mut known = policy("known_law", power(), Value::Null, json!({}));
+    known["problem"]["law"] = json!({ "kind": "gaussian_mixture",
+        "components": [{ "weight": 1.0, "mean": 0.01, "variance": 0.002 }] });
+    let chi_square = || json!({ "rule": "chi_square", "alpha": 0.5 });
+    let concentration = json!({ "rule": "concentration", "alpha": 0.1, "C": 1.0, "c": 4000.0 });
+    let value = json!({ "target": "value" });
+    let raw_value = json!({ "target": "value", "features": "raw_moments", "moment_count": 3 });
+    let costly = |framework: &str, utility: Value, surrogate: Value| {
+        let mut costly = policy(framework, utility, bridge(), surrogate);
+        costly["problem"]["trading_cost"] = json!(0.01);
+        costly["problem"]["action_interval"] = json!([0.0, 0.7]);
+        costly
+    };
+    let flowing = |mut of: Value, contributions: Value| {
+        of["problem"]["contributions"] = contributions;
+        of
+    };
+    let decaying = |mut of: Value| {
+        of["problem"]["learning"] = json!({ "kind": "decay", "half_life": 3.5 });
+        of
+    };
+    let centred = |mut of: Value, centre: Value| {
+        of["problem"]["centre"] = centre;
+        of
+    };
+    let mixed = || json!({ "kind": "mixed", "history": [0.03, -0.05], "weight": 6.0 });
+    vec![
+        centred(policy("adaptive", power(), bridge(), six()), mixed()),
+        centred(policy("adaptive", power(), json!({ "rule": "root_n", "kappa": 0.02 }), json!({})), mixed()),
+        centred(policy("adaptive", power(), bridge(), json!({})), json!({ "kind": "smoothed", "bandwidth": 0.02 })),
+        decaying(policy("adaptive", power(), bridge(), six())),
+        decaying(policy("adaptive", exponential(), json!({ "rule": "root_n", "kappa": 0.02 }), raw_value.clone())),
+        decaying(policy("plug_in", power(), bridge(), json!({}))),
+        decaying(policy("parametric_adaptive", exponential(), chi_square(), json!({}))),
+        flowing(policy("adaptive", power(), bridge(), json!({})), json!(12.0)),
+        flowing(policy("adaptive", exponential(), bridge(), value.clone()), json!([30.0, -60.0, 10.0])),
+        flowing(
+            policy("static", json!({ "kind": "log" }), bridge(), json!({ "features": "raw_moments" })),
+            json!(-8.0),
+        ),
+        flowing(costly("adaptive", power(), value.clone()), json!([-20.0, -5.0, 30.0])),
+        costly("adaptive", power(), json!({})),
+        costly("adaptive", exponential(), json!({})),
+        costly("plug_in", power(), value.clone()),
+        costly("static", exponential(), json!({})),
+        costly("static", power(), json!({})),
+        policy("adaptive", exponential(), bridge(), six()),
+        policy("adaptive", power(), bridge(), value.clone()),
+        policy("adaptive", exponential(), json!({ "rule": "root_n", "kappa": 0.02 }), value),
+        policy("adaptive", json!({ "kind": "log" }), concentration, json!({})),
+        policy("plug_in", exponential(), bridge(), json!({})),
+        policy("plug_in", json!({ "kind": "log" }), bridge(), raw_value),
+        policy("adaptive", exponential(), bridge(), json!({ "features": "raw_moments" })),
+        policy("static", exponential(), bridge(), json!({})),
+        policy("parametric_adaptive", exponential(), chi_square(), json!({})),
+        policy("parametric_static", power(), chi_square(), json!({})),
+        bounded,
+        known,
+    ]
+}
+
+/// Seen in the two periods after the history.
+const SEEN: [f64; 2] = [0.03, -0.02];
+
+/// States of every step: along a path, and one of another wealth.
+fn states(solved: &Advisor) -> Vec<(usize, State)> {
+    let start = solved.initial_state(None, None).unwrap();
+    let first = solved.advance(0, &start, &Realised::of(0.6, SEEN[0]));
+    let other = State { wealth: 91.0, holding: 0.83, ..first.clone() };
+    let second = solved.advance(1, &first, &Realised::of(0.3, SEEN[1]));
+    vec![(0, start), (1, first), (1, other), (2, second)]
+}
+
+fn question(solved: &Advisor, step: usize, state: &State) -> Value {
+    let returns = [&HISTORY, &SEEN[..step]].concat();
+    let mut question = json!({ "step": step, "wealth": state.wealth, "holding": state.holding, "returns": returns });
+    let problem = solved.policy().problem(Default::default());
+    if problem.specification.problem.radius.as_ref().is_some_and(|rule| json!(rule)["rule"] == "bridge") {
+        let radii = problem.sets.radii(&state.law, solved.radius(state));
+        (question["radius"], question["radius_ahead"]) = (json!(radii.radius), json!(radii.radius_ahead));
+    }
+    question
+}
+
+/// Names of the features that some step of the policy is given.
+fn features(document: &Value) -> Vec<String> {
+    let steps = document["steps"].as_array().unwrap();
+    let lists = steps.iter().map(|step| &step["diagnostics"]["value"]["features"]);
+    lists.filter_map(Value::as_array).flatten().map(|name| name.as_str().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn another_program_that_follows_the_page_answers_what_the_service_answers() {
+    let (mut seen, mut from_surrogates, mut singles) = (Vec::new(), 0, 0);
+    for request in policies() {
+        let solved = advisor(request.clone());
+        let document: Value = serde_json::from_slice(&solved.policy().to_json().unwrap()).unwrap();
+        seen.extend(features(&document));
+        let states = states(&solved);
+        let questions: Vec<Value> = states.iter().map(|(step, state)| question(&solved, *step, state)).collect();
+        let answers = python(&[], &json!({ "policy": document, "questions": questions }));
+        assert_eq!(answers.as_array().unwrap().len(), states.len());
+        for ((step, state), answer) in states.iter().zip(answers.as_array().unwrap()) {
+            let what = format!("{request} step {step} wealth {}", state.wealth);
+            let number = |field: &str| answer[field].as_f64().unwrap_or_else(|| panic!("{what}: {answer}"));
+            // A sum of 25 weights that cancel: up to 1e6 times the rounding of the result.
+            let agree = |field: &str, found: f64| {
+                let apart = (found - number(field)).abs();
+                assert!(apart < 1e-8 * (1.0 + found.abs()), "{what}: {field} {found} and {answer}");
+            };
+            agree("floor_gain", solved.surrogate(*step, state).1);
+            let advice = solved.advise(*step, state, AdviceMode::Surrogate);
+            if advice.source == AdviceSource::PolicySurrogate {
+                agree("allocation", advice.allocation);
+                agree("certainty_equivalent", advice.certainty_equivalent);
+                from_surrogates += 1;
+            }
+            let solution = &document["steps"][*step]["solution"];
+            match answer["deviation"].as_f64() {
+                None => singles += 1,
+                Some(deviation) => {
+                    assert_eq!(answer["in_design"], json!(advice.in_design), "{what}: {answer} {advice:?}");
+                    if solved.specification().surrogate.target == Default::default() {
+                        let scaled = deviation * solution["value"]["scale"].as_f64().unwrap();
+                        // A difference of two variances: the root of its rounding, times what the Cholesky factor loses.
+                        assert!((advice.surrogate_sd - scaled).abs() < 1e-6, "{what}: {scaled} {advice:?}");
+                    }
+                }
+            }
+        }
+    }
+    let page = include_str!("../../docs/policy-format.md");
+    let named = ["log_wealth", "mean", "log_standard_deviation", "skewness", "log_kurtosis", "shape_5", "shape_6"];
+    let of_the_ball = ["log_radius", "radius_trend", "robust_merton_ratio", "worst_law_merton_ratio"];
+    for name in named.into_iter().chain(of_the_ball) {
+        assert!(page.contains(&format!("`{name}`")), "the page does not say what {name} is");
+        assert!(seen.iter().any(|seen| seen == name), "no policy of the test has {name}: {seen:?}");
+    }
+    for name in seen {
+        let name = if name.starts_with("moment_") { "moment_k".into() } else { name };
+        assert!(page.contains(&format!("`{name}`")), "the page does not say what {name} is");
+    }
+    println!("{from_surrogates} advices from surrogates, {singles} single states");
+    assert!(from_surrogates > 24 && singles > 8, "the test must reach both kinds of step");
+}
+
+#[test]
+fn another_program_finds_the_bridge_radius_with_random_numbers_of_its_own() {
+    let (alpha, paths) = (0.1, 20_000);
+    let bridge = json!({ "rule": "bridge", "alpha": alpha, "paths": paths, "scale": 0.7 });
+    for learning in [json!({ "kind": "equal" }), json!({ "kind": "decay", "half_life": 20.0 })] {
+        let mut request = policy("adaptive", json!({ "kind": "log" }), bridge.clone(), json!({}));
+        request["problem"]["horizon"] = json!(2);
+        request["problem"]["learning"] = learning.clone();
+        let problem =
+            ballast::control::bellman::problem::Problem::new(&crate::support::policies::specification(request));
+        let law = problem.specification.problem.learning.law(&HISTORY);
+        let measure = problem.sets.measure(&law);
+        let radii = problem.sets.radii(&law, measure.radius);
+        let asked = json!({ "learning": learning, "returns": HISTORY, "alpha": alpha, "paths": paths });
+        let found = python(&["bridge"], &asked);
+        let own_error = measure.quantile.unwrap().standard_error;
+        let sizes = [law.effective_size(), law.effective_sizes_ahead()[0]];
+        for (which, radius, size) in [("now", radii.radius, sizes[0]), ("ahead", radii.radius_ahead, sizes[1])] {
+            let number = |field: &str| found[which][field].as_f64().unwrap();
+            let quantile = radius * size.sqrt() / 0.7;
+            // Either simulation has its error, and four of both together pass one seed in 16,000.
+            let allowed = 4.0 * own_error.hypot(number("standard_error"));
+            assert!((quantile - number("value")).abs() < allowed, "{learning} {which}: {quantile} and {found}");
+            // An error of four in a hundred would show.
+            assert!(allowed < 0.04 * quantile, "{learning} {which}: {allowed} of {quantile}");
+        }
+        let trend = radii.radius_ahead / radii.radius;
+        assert!(trend < 0.97, "{trend}");
+    }
+}

@@ -1,0 +1,32 @@
+//! The service over HTTP and its store, in this process and with the real binary.
+
+#[macro_use]
+#[path = "../support/mod.rs"]
+mod support;
+
+mod account;
+mod advise;
+mod audit;
+mod backtest;
+mod backup;
+mod bad_input;
+mod encryption;
+mod frontier;
+mod funds;
+mod gate;
+mod keys;
+mod labels;
+mod lives;
+mod no_stale_law;
+mod overview;
+mod quotas;
+mod renewal;
+mod reports;
+mod returns;
+mod sessions;
+mod solve_turns;
+mod store;
+mod store_model;
+mod traces;
+mod turns;
+mod what_if;

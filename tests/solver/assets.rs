@@ -1,0 +1,513 @@
+//! The one-step problem of several assets: against direct solutions, one asset, and laws of its own ball.
+
+use ballast::control::assets::{AssetsLaw, AssetsSolution, AssetsStep};
+use ballast::control::policy::advisor::Advisor;
+use ballast::control::problem::actions::ActionInterval;
+use ballast::control::problem::utility::RelativeUtility;
+use ballast::control::progress::Watch;
+use ballast::control::request::specification::{Specification, UtilitySpecification};
+use ballast::control::training::Training;
+use ballast::numerics::bridge::Quantile;
+use ballast::numerics::fund_bridges::{FundBridges, fund_returns};
+use ballast::numerics::levelling::{Ground, inverse_volatility};
+use ballast::numerics::streams::stream;
+use ballast::numerics::wasserstein::WassersteinBall;
+use microlp::{ComparisonOp, LinearExpr, OptimizationDirection, Problem, SolveOutcome};
+use rand::RngExt;
+use serde_json::{Value, json};
+
+/// A hundredth of a percent.
+const BP: f64 = 1e-4;
+const WHOLE: ActionInterval = ActionInterval { lowest: 0.0, highest: 1.0 };
+
+fn rows(value: &Value) -> Vec<Vec<f64>> {
+    serde_json::from_value(value.clone()).unwrap()
+}
+
+fn ground(name: &str, returns: &[Vec<f64>]) -> Ground {
+    match name {
+        "sup" => Ground::Sup,
+        _ => Ground::Weighted(inverse_volatility(returns)),
+    }
+}
+
+fn utility(case: &Value) -> RelativeUtility {
+    let risk_aversion = case["risk_aversion"].as_f64().unwrap();
+    let floor = case["wealth"].as_f64().unwrap() * (1.0 + case["rate_per_step"].as_f64().unwrap());
+    let utility = match case["utility"].as_str().unwrap() {
+        "power" => UtilitySpecification::Power { risk_aversion },
+        "log" => UtilitySpecification::Log {},
+        _ => UtilitySpecification::exponential(risk_aversion),
+    };
+    RelativeUtility::new(utility, floor)
+}
+
+fn certified(solution: &AssetsSolution) {
+    let gap = solution.bound - solution.value;
+    // The contract: a hundredth of a hundredth of a percent.
+    assert!((0.0..0.01 * BP).contains(&gap), "{} hundredths of a percent apart: {solution:?}", gap / BP);
+}
+
+#[test]
+fn direct_solutions_are_met() {
+    let oracle: Value = serde_json::from_str(include_str!("../data/assets.json")).unwrap();
+    let cases = oracle["cases"].as_array().unwrap();
+    assert_eq!(cases.len(), 26);
+    for (index, case) in cases.iter().enumerate() {
+        let returns = rows(&case["returns"]);
+        let law = AssetsLaw {
+            returns: &returns,
+            radius: case["radius"].as_f64().unwrap(),
+            floor: case["floor"].as_f64().unwrap_or(f64::NEG_INFINITY),
+        };
+        let ground = ground(case["norm"].as_str().unwrap(), &returns);
+        let step = AssetsStep::new(law, ground, utility(case), case["rate_per_step"].as_f64().unwrap(), WHOLE);
+        let solution = step.solve(None);
+        certified(&solution);
+        let expected = case["log_certainty_equivalent_over_bank"].as_f64().unwrap();
+        assert!((solution.value - expected).abs() < 0.02 * BP, "{index}: {} {expected}", solution.value / BP);
+        let allocation: Vec<f64> = serde_json::from_value(case["allocation"].clone()).unwrap();
+        let apart = solution.allocation.iter().zip(&allocation).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        // Where the value is flat, another allocation of the same value.
+        let worth = step.worth(&allocation).value;
+        assert!(
+            apart < 0.005 || (solution.value - worth).abs() < 0.002 * BP,
+            "{index}: {:?} {allocation:?}",
+            solution.allocation
+        );
+    }
+}
+
+/// Log-returns of `assets` with a common part, of deviation 0.05 a period and mean 0.008 to 0.016.
+fn sample(assets: usize, dates: usize, seed: usize) -> Vec<Vec<f64>> {
+    let mut random = stream(11, "assets", seed, 0);
+    let mut normal = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+    let row = |_| {
+        let common = normal();
+        let own = |asset: usize| 0.008 * (1.0 + asset as f64 / assets as f64) + 0.035 * (common + normal());
+        (0..assets).map(own).collect()
+    };
+    (0..dates).map(row).collect()
+}
+
+const POWER: RelativeUtility = RelativeUtility::Power { eta: 3.0 };
+const UTILITIES: [RelativeUtility; 3] = [POWER, RelativeUtility::Log, RelativeUtility::Exponential { k: 2.0 }];
+
+fn step(returns: &[Vec<f64>], ground: &Ground, utility: RelativeUtility, radius: f64, floor: f64) -> AssetsStep {
+    AssetsStep::new(AssetsLaw { returns, radius, floor }, ground.clone(), utility, 0.002, WHOLE)
+}
+
+fn without_floor(returns: &[Vec<f64>], ground: &Ground, utility: RelativeUtility, radius: f64) -> AssetsStep {
+    step(returns, ground, utility, radius, f64::NEG_INFINITY)
+}
+
+#[test]
+fn identical_columns_are_one_asset() {
+    let oracle: Value = serde_json::from_str(include_str!("../data/last_step.json")).unwrap();
+    let mut checked = 0;
+    for case in oracle["cases"].as_array().unwrap() {
+        let history: Vec<f64> = serde_json::from_value(case["history"].clone()).unwrap();
+        for assets in [1, 3] {
+            let returns: Vec<Vec<f64>> = history.iter().map(|z| vec![*z; assets]).collect();
+            let even = Ground::Weighted(vec![1.0 / assets as f64; assets]);
+            for ground in [Ground::Sup, even] {
+                let radius = case["radius"].as_f64().unwrap();
+                let law = AssetsLaw { returns: &returns, radius, floor: f64::NEG_INFINITY };
+                let rate = case["rate_per_step"].as_f64().unwrap();
+                let step = AssetsStep::new(law, ground, utility(case), rate, WHOLE);
+                let solution = step.solve(None);
+                certified(&solution);
+                let bank = case["wealth"].as_f64().unwrap() * (1.0 + rate);
+                let expected = (case["certainty_equivalent"].as_f64().unwrap() / bank).ln();
+                // The oracle states 1e-7.
+                assert!((solution.value - expected).abs() < 0.02 * BP, "{case}: {solution:?}");
+                let total: f64 = solution.allocation.iter().sum();
+                let share = case["allocation"].as_f64().unwrap();
+                let flat =
+                    || (step.worth(&vec![share / assets as f64; assets]).value - solution.value).abs() < 0.002 * BP;
+                assert!((total - share).abs() < 0.005 || flat(), "{case}: {solution:?}");
+                checked += 1;
+            }
+        }
+    }
+    assert_eq!(checked, 72 * 4);
+}
+
+/// The law of a static framework is the same in every period, and under power and log utility nothing else of the past counts: with
+/// T - t periods left the policy of the best fund promises T - t times what one step gains.
+#[test]
+fn a_static_policy_promises_the_gain_of_one_step_for_every_period_left() {
+    const HORIZON: usize = 6;
+    let returns = sample(3, 60, 4);
+    for (utility, relative) in
+        [(json!({ "kind": "power", "risk_aversion": 3.0 }), POWER), (json!({ "kind": "log" }), RelativeUtility::Log)]
+    {
+        let solution = without_floor(&returns, &Ground::Sup, relative, 0.003).solve(None);
+        certified(&solution);
+        let total: f64 = solution.allocation.iter().sum();
+        assert!(solution.value > BP && total < 1.0, "{solution:?}");
+        let fund: Vec<f64> = solution.allocation.iter().map(|share| share / total).collect();
+        let specification: Specification = serde_json::from_value(json!({ "problem": { "framework": "static",
+            "horizon": HORIZON, "rate_per_step": 0.002, "utility": utility, "history": fund_returns(&returns, &fund),
+            "radius": { "rule": "fixed", "radius": 0.003 } } }))
+        .unwrap();
+        let advisor = Advisor::new(Training::new(&specification).unwrap().run(&Watch::unwatched()).unwrap());
+        let lived = [0.03, -0.08, 0.01, 0.0, 0.05, -0.02];
+        let promised = advisor.walk(advisor.initial_state(None, None).unwrap(), &lived);
+        let promised: Vec<f64> = promised.map(|advice| (advice.certainty_equivalent / advice.floor).ln()).collect();
+        assert_eq!(promised.len(), HORIZON);
+        for (step, gained) in promised.iter().enumerate() {
+            let expected = (HORIZON - step) as f64 * solution.value;
+            assert!((gained - expected).abs() < 0.01 * BP, "{step}: {} {}", gained / BP, expected / BP);
+        }
+    }
+}
+
+#[test]
+fn the_order_of_assets_and_those_not_held_change_nothing() {
+    let returns = sample(4, 40, 1);
+    let weights = inverse_volatility(&returns);
+    let order = [2, 0, 3, 1];
+    let turned = |row: &[f64]| order.map(|asset| row[asset]).to_vec();
+    let turned_returns: Vec<Vec<f64>> = returns.iter().map(|row| turned(row)).collect();
+    for utility in UTILITIES {
+        for (ground, other) in
+            [(Ground::Sup, Ground::Sup), (Ground::Weighted(weights.clone()), Ground::Weighted(turned(&weights)))]
+        {
+            let one = without_floor(&returns, &ground, utility, 0.004).solve(None);
+            let two = without_floor(&turned_returns, &other, utility, 0.004).solve(None);
+            certified(&one);
+            assert!((one.value - two.value).abs() < 0.002 * BP, "{one:?} {two:?}");
+            let apart = |(a, b): (&f64, &f64)| (a - b).abs() < 0.005;
+            assert!(turned(&one.allocation).iter().zip(&two.allocation).all(apart), "{one:?} {two:?}");
+        }
+        // The first two alone, and with two that are not held.
+        let fewer: Vec<Vec<f64>> = returns.iter().map(|row| row[..2].to_vec()).collect();
+        for (ground, less) in
+            [(Ground::Sup, Ground::Sup), (Ground::Weighted(weights.clone()), Ground::Weighted(weights[..2].to_vec()))]
+        {
+            let all = without_floor(&returns, &ground, utility, 0.004).worth(&[0.2, 0.3, 0.0, 0.0]);
+            let two = without_floor(&fewer, &less, utility, 0.004).worth(&[0.2, 0.3]);
+            // Sums of the same numbers.
+            assert!(
+                (all.value - two.value).abs() < 1e-12 && (all.primal - two.primal).abs() < 1e-12,
+                "{all:?} {two:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn another_asset_never_lowers_the_value_and_a_wider_ball_never_raises_it() {
+    let returns = sample(5, 60, 2);
+    let weights = inverse_volatility(&returns);
+    for utility in UTILITIES {
+        for sup in [true, false] {
+            let value = |assets: usize, radius: f64| {
+                let some: Vec<Vec<f64>> = returns.iter().map(|row| row[..assets].to_vec()).collect();
+                let ground = if sup { Ground::Sup } else { Ground::Weighted(weights[..assets].to_vec()) };
+                let solution = without_floor(&some, &ground, utility, radius).solve(None);
+                certified(&solution);
+                solution.value
+            };
+            let values: Vec<f64> = (1..=5).map(|assets| value(assets, 0.003)).collect();
+            // What a certified value may fall short by.
+            assert!(values.windows(2).all(|pair| pair[1] > pair[0] - 0.01 * BP), "{values:?}");
+            let values = [0.0, 0.001, 0.004, 0.016].map(|radius| value(5, radius));
+            assert!(values.windows(2).all(|pair| pair[1] < pair[0] + 0.01 * BP), "{values:?}");
+        }
+    }
+}
+
+/// The worst expectation over laws on a grid of moves of two assets, up and down: the transport programme, with a mass for each atom
+/// and place, solved by a library. The masses of an atom sum to its own, and their distances to the radius at most.
+fn by_programme(
+    returns: &[Vec<f64>],
+    ground: &Ground,
+    utility: RelativeUtility,
+    radius: f64,
+    allocation: &[f64],
+) -> f64 {
+    let offsets: Vec<f64> = (-20..=600).map(|index| f64::from(index) * 0.005).collect();
+    // Distance and utility of every place on the grid, atom by atom; both assets together as finely as one alone.
+    let places = |row: &Vec<f64>| {
+        let mut places = Vec::new();
+        for &first in &offsets {
+            for &second in offsets.iter().step_by(4).chain([&first]) {
+                let cost = match ground {
+                    Ground::Sup => first.abs().max(second.abs()),
+                    Ground::Weighted(weights) => weights[0] * first.abs() + weights[1] * second.abs(),
+                };
+                let growth = |z: f64, down: f64| (z - down).exp() / 1.002 - 1.0;
+                let wealth = 1.0 + allocation[0] * growth(row[0], first) + allocation[1] * growth(row[1], second);
+                places.push((cost, utility.at(wealth).0));
+            }
+        }
+        places
+    };
+    let mut programme = Problem::new(OptimizationDirection::Minimize);
+    let mut distance = LinearExpr::empty();
+    for row in returns {
+        let mut mass = LinearExpr::empty();
+        for (cost, utility) in places(row) {
+            let moved = programme.add_var(utility, (0.0, f64::INFINITY));
+            mass.add(moved, 1.0);
+            distance.add(moved, cost);
+        }
+        programme.add_constraint(mass, ComparisonOp::Eq, 1.0 / returns.len() as f64);
+    }
+    programme.add_constraint(distance, ComparisonOp::Le, radius);
+    let SolveOutcome::Solution(worst) = programme.solve().unwrap() else { unreachable!("no limit is set") };
+    worst.objective()
+}
+
+#[test]
+fn what_an_allocation_is_worth_agrees_with_the_transport_programme() {
+    let returns = sample(2, 3, 3);
+    for (ground, utility) in [
+        (Ground::Sup, POWER),
+        (Ground::Weighted(vec![0.6, 0.4]), POWER),
+        (Ground::Weighted(vec![0.3, 0.7]), RelativeUtility::Log),
+        (Ground::Weighted(vec![0.5, 0.5]), RelativeUtility::Exponential { k: 2.0 }),
+    ] {
+        let worth = without_floor(&returns, &ground, utility, 0.02).worth(&[0.25, 0.3]);
+        assert!((worth.primal - worth.value).abs() < 1e-9, "{worth:?}");
+        let programme = utility.inverse(by_programme(&returns, &ground, utility, 0.02, &[0.25, 0.3]));
+        // The grid holds fewer laws, so that its worst is no worse; it misses the least by the square of its step.
+        let above = programme - worth.value;
+        assert!(above > -1e-9 && above < 4e-6, "{ground:?} {utility:?}: {programme} {worth:?}");
+    }
+}
+
+#[test]
+fn all_in_is_worth_nothing_to_power_utility_and_the_radius_less_to_log_utility() {
+    let returns = sample(2, 20, 6);
+    let worth = |utility| without_floor(&returns, &Ground::Sup, utility, 0.02).worth(&[0.4, 0.6]).value;
+    assert_eq!(worth(POWER), f64::NEG_INFINITY);
+    let fund = |row: &Vec<f64>| (0.4 * row[0].exp() + 0.6 * row[1].exp()).ln();
+    let mean = returns.iter().map(fund).sum::<f64>() / returns.len() as f64;
+    // Log utility is a straight line in the fund's log-return: every law that spends the radius is as bad.
+    assert!((worth(RelativeUtility::Log) - (mean - 1.002_f64.ln() - 0.02)).abs() < 1e-9);
+}
+
+/// Log-returns and risk aversions drawn over what may be asked: an allocation is the best within a hundredth of a basis point, or
+/// the answer warns; and no allocation tried is worth more than the bound.
+#[test]
+fn whatever_the_risk_aversion_the_best_is_found_or_the_answer_warns() {
+    let mut warned = Vec::new();
+    for case in 0..120 {
+        let mut random = stream(17, "risk aversions", case, 0);
+        let mut draw = |low: f64, high: f64| low * (high / low).powf(random.random::<f64>());
+        let (assets, dates) = (draw(2.0, 8.99) as usize, draw(12.0, 120.0) as usize);
+        let (eta, scale) = (draw(2.0, 200.0), draw(0.1, 3.0));
+        let returns = sample(assets, dates, 100 + case);
+        let ground = if case % 2 == 0 { Ground::Sup } else { Ground::Weighted(inverse_volatility(&returns)) };
+        let utility =
+            if case % 3 == 0 { RelativeUtility::Exponential { k: eta } } else { RelativeUtility::Power { eta } };
+        let step = without_floor(&returns, &ground, utility, scale * 0.05 / (dates as f64).sqrt());
+        let solution = step.solve(None);
+        let gap = solution.bound - solution.value;
+        assert!(gap >= 0.0, "{case}: {solution:?}");
+        assert_eq!(solution.caution().is_some(), gap > 0.01 * BP, "{case}: {solution:?}");
+        if gap > 0.01 * BP {
+            warned.push((case, eta, assets, dates, gap / BP));
+        }
+        // Small shares of all, which is where the best lies at a high risk aversion.
+        for share in [0.003, 0.01, 0.03, 0.1, 0.3] {
+            let tried = step.worth(&vec![share / assets as f64; assets]);
+            assert!(
+                tried.value <= solution.value.max(solution.bound) + 1e-9,
+                "{case}, {share}: {tried:?} {solution:?}"
+            );
+        }
+    }
+    assert!(warned.len() <= 6, "{} of 120: {warned:?}", warned.len());
+}
+
+#[test]
+fn the_bounds_hold_between_the_bounds_of_the_total_and_with_a_floor() {
+    let returns = sample(3, 50, 4);
+    let ground = Ground::Weighted(inverse_volatility(&returns));
+    let total = ActionInterval { lowest: 0.3, highest: 0.7 };
+    for floor in [-0.3, f64::NEG_INFINITY] {
+        for utility in UTILITIES {
+            let law = AssetsLaw { returns: &returns, radius: 0.01, floor };
+            let step = AssetsStep::new(law, ground.clone(), utility, 0.002, total);
+            let solution = step.solve(None);
+            certified(&solution);
+            let sum: f64 = solution.allocation.iter().sum();
+            assert!((0.3 - 1e-5..=0.7).contains(&sum), "{solution:?}");
+            // No allocation tried is worth more than the bound, and the solution is worth what it says.
+            let worth = step.worth(&solution.allocation);
+            assert!((worth.value - solution.value).abs() < 0.01 * BP && worth.primal - worth.value < 1e-9, "{worth:?}");
+            for tried in [[0.1, 0.1, 0.1], [0.3, 0.2, 0.2], [0.0, 0.0, 0.5], [0.0, 0.35, 0.35], [0.4, 0.0, 0.0]] {
+                assert!(step.worth(&tried).primal < solution.bound + 1e-9, "{tried:?} {solution:?}");
+            }
+            // From a similar step, the same answer.
+            let near = step.solve(Some(&solution));
+            assert!((near.value - solution.value).abs() < 0.002 * BP, "{near:?} {solution:?}");
+        }
+    }
+}
+
+/// Twenty years of twelve industries at which the adversary's crash of all atoms is about to go at the best price: a search that
+/// takes the crash for the small move beside it never closes.
+#[test]
+fn a_window_at_which_the_crash_comes_and_goes_is_certified() {
+    let file = include_str!("../../data/us_industries_monthly.csv");
+    let lines = file.lines().filter(|line| !line.starts_with('#')).skip(1);
+    let row = |line: &str| line.split(',').skip(1).take(12).map(|cell| cell.parse::<f64>().unwrap().ln_1p()).collect();
+    let all: Vec<Vec<f64>> = lines.map(row).collect();
+    let returns = &all[716 - 240..716];
+    let deviation = |asset: usize| {
+        let mean = returns.iter().map(|row| row[asset]).sum::<f64>() / 240.0;
+        (returns.iter().map(|row| (row[asset] - mean).powi(2)).sum::<f64>() / 240.0).sqrt()
+    };
+    let radius = 1.3 * (0..12).map(deviation).sum::<f64>() / 12.0 / 240.0_f64.sqrt();
+    for ground in [Ground::Weighted(inverse_volatility(returns)), Ground::Sup] {
+        let law = AssetsLaw { returns, radius, floor: f64::NEG_INFINITY };
+        let solution = AssetsStep::new(law, ground, POWER, 0.003, WHOLE).solve(None);
+        certified(&solution);
+        assert!(solution.value > BP, "{solution:?}");
+    }
+}
+
+#[test]
+fn a_large_radius_at_a_fixed_total_leads_to_inverse_volatilities() {
+    let returns: Vec<Vec<f64>> = sample(3, 60, 5).iter().map(|row| vec![0.5 * row[0], row[1], 1.5 * row[2]]).collect();
+    let weights = inverse_volatility(&returns);
+    let total = ActionInterval { lowest: 0.2, highest: 0.2 };
+    let apart = |radius: f64| {
+        let law = AssetsLaw { returns: &returns, radius, floor: f64::NEG_INFINITY };
+        let step = AssetsStep::new(law, Ground::Weighted(weights.clone()), RelativeUtility::Log, 0.002, total);
+        let solution = step.solve(None);
+        certified(&solution);
+        let apart = |(share, weight): (&f64, &f64)| (share / 0.2 - weight).abs();
+        solution.allocation.iter().zip(&weights).map(apart).fold(0.0, f64::max)
+    };
+    let found = [0.0, 0.005, 0.02, 0.06].map(apart);
+    assert!(found[0] > 0.3 && found[3] < 0.1 && found[3] < found[2] && found[2] < found[0], "{found:?}");
+}
+
+/// A coin of 5.002 % and -4.998 % beyond the bank: Kelly's share is p / b - q / a, worth some 8e-8 in the logarithm.
+#[test]
+fn a_premium_that_is_just_above_what_is_told_apart_is_taken() {
+    let (up, down) = (0.050_02_f64, 0.049_98_f64);
+    let returns: Vec<Vec<f64>> = [1.0 + up, 1.0 - down].iter().map(|growth| vec![(1.002 * growth).ln()]).collect();
+    let kelly = 0.5 / down - 0.5 / up;
+    let best = 0.5 * (kelly * up).ln_1p() + 0.5 * (-kelly * down).ln_1p();
+    assert!((7.9e-8..8.1e-8).contains(&best), "{best}");
+    let solution = without_floor(&returns, &Ground::Sup, RelativeUtility::Log, 0.0).solve(None);
+    // A search ends where its bounds are 1e-8 apart.
+    assert!((solution.value - best).abs() < 2e-8 && solution.allocation[0] > 0.0, "{best} {solution:?}");
+}
+
+/// At the corners of what may be asked: whatever becomes of a search, what is told is finite, in order, and never less than the bank.
+#[test]
+fn extremes_are_answered_with_bounds_in_order() {
+    let mut held = 0;
+    for (assets, dates) in [(2, 2), (2, 9), (30, 12), (7, 40)] {
+        let calm = sample(assets, dates, 3);
+        let wild: Vec<Vec<f64>> =
+            calm.iter().map(|row| row.iter().map(|z| (60.0 * z).clamp(-5.0, 5.0)).collect()).collect();
+        let tiny: Vec<Vec<f64>> = calm.iter().map(|row| row.iter().map(|z| 1e-5 * z).collect()).collect();
+        for returns in [&calm, &wild, &tiny] {
+            for utility in [
+                POWER,
+                RelativeUtility::Power { eta: 100.0 },
+                RelativeUtility::Log,
+                RelativeUtility::Exponential { k: 1e3 },
+            ] {
+                for (radius, floor) in [(0.0, f64::NEG_INFINITY), (10.0, f64::NEG_INFINITY), (1e-9, -5.0), (10.0, -5.0)]
+                {
+                    for ground in [Ground::Sup, Ground::Weighted(inverse_volatility(returns))] {
+                        let told = step(returns, &ground, utility, radius, floor).solve(None);
+                        let total: f64 = told.allocation.iter().sum();
+                        assert!(told.value >= 0.0 && told.bound >= told.value && told.bound < 6.0, "{told:?}");
+                        assert!((0.0..=1.0 + 1e-9).contains(&total), "{told:?}");
+                        assert!(
+                            told.allocation.iter().chain(&told.mean_moves).all(|number| number.is_finite()),
+                            "{told:?}"
+                        );
+                        held += usize::from(total > 0.01);
+                    }
+                }
+            }
+        }
+    }
+    assert!(held > 50, "{held}");
+}
+
+#[test]
+fn a_ball_restricted_to_its_sample_has_the_worst_law_of_another_program() {
+    // The unit test of SDDP.jl's Wasserstein risk measure: of a payoff, the least is worst.
+    let ball = WassersteinBall { support: &[0.3, 0.4, 0.5, 0.6], masses: &[0.2, 0.4, 0.1, 0.3], radius: 0.1 };
+    let mut masses = [0.0_f64; 4];
+    for moved in ball.worst_law(&[1.2, 1.3, 1.1, 0.6]).moves {
+        masses[moved.to] += moved.mass;
+    }
+    for (found, expected) in masses.iter().zip([1.0 / 6.0, 0.0, 0.0, 5.0 / 6.0]) {
+        assert!((found - expected).abs() < 1e-12, "{masses:?}");
+    }
+}
+
+#[test]
+fn the_joint_factor_agrees_with_an_independent_simulation() {
+    let oracle: Value = serde_json::from_str(include_str!("../data/slices.json")).unwrap();
+    let cases = oracle["cases"].as_array().unwrap();
+    assert_eq!(cases.len(), 3);
+    for case in cases {
+        let returns = rows(&case["returns"]);
+        let funds: Vec<Vec<f64>> = rows(&case["slices"]);
+        let alpha = case["alpha"].as_f64().unwrap();
+        let bridges = FundBridges::simulate(&returns, 20_000, 3);
+        let check = |found: Quantile, expected: &Value, error: &Value| {
+            let allowed = 4.0 * found.standard_error.hypot(error.as_f64().unwrap());
+            let expected = expected.as_f64().unwrap();
+            assert!((found.value - expected).abs() < allowed + 1e-8, "{found:?} {expected}");
+        };
+        for (index, fund) in funds.iter().enumerate() {
+            check(bridges.quantile(fund, alpha), &case["quantiles"][index], &case["quantile_standard_errors"][index]);
+        }
+        check(bridges.factor_among(&funds, alpha), &case["joint_factor"], &case["joint_factor_standard_error"]);
+        // The search finds more funds than these.
+        assert!(bridges.joint_factor(alpha).value > 0.98 * case["joint_factor"].as_f64().unwrap());
+    }
+}
+
+/// Fifteen hundred funds differ by more than the search of the joint factor sees where assets are independent: a quantile over
+/// more funds is higher, which is what the documentation of the factor says.
+#[test]
+fn the_joint_factor_of_independent_assets_errs_low() {
+    let factors = |common: f64| {
+        let mut random = stream(23, "joint factor", 0, 0);
+        let mut normal = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+        let row = |_| {
+            let all = normal();
+            (0..12).map(|_| 0.04 * (common.sqrt() * all + (1.0 - common).sqrt() * normal())).collect()
+        };
+        let returns: Vec<Vec<f64>> = (0..60).map(row).collect();
+        let mut random = stream(24, "funds", 0, 0);
+        // Even draws among funds of few assets and of many.
+        let fund = |index: usize| {
+            let shares: Vec<f64> = (0..12)
+                .map(|_| {
+                    if random.random::<f64>() < 0.2 + 0.2 * (index % 5) as f64 {
+                        -random.random::<f64>().ln()
+                    } else {
+                        0.0
+                    }
+                })
+                .collect();
+            let total: f64 = shares.iter().sum();
+            (total > 0.0).then(|| shares.iter().map(|share| share / total).collect::<Vec<f64>>())
+        };
+        let funds: Vec<Vec<f64>> = (0..1500).filter_map(fund).collect();
+        let bridges = FundBridges::simulate(&returns, 1000, 3);
+        (bridges.joint_factor(0.1).value, bridges.factor_among(&funds, 0.1).value)
+    };
+    let (independent, among) = factors(0.0);
+    assert!((1.05..1.25).contains(&(among / independent)), "{independent} {among}");
+    let (together, among) = factors(0.6);
+    assert!(among / together < 1.05, "{together} {among}");
+}

@@ -1,0 +1,26 @@
+//! The mathematics: every solver, law and surrogate against something independent of it.
+
+#[macro_use]
+#[path = "../support/mod.rs"]
+mod support;
+
+mod accuracy;
+mod assets;
+mod bellman;
+mod centre;
+mod contributions;
+mod control;
+mod controlled;
+mod costs;
+mod coverage;
+mod design;
+mod evaluate;
+mod exchangeability;
+mod gp;
+mod learning;
+mod parametric;
+mod sensitivity;
+mod streams;
+mod surrogate;
+mod transport;
+mod walk_forward;
