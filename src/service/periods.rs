@@ -175,23 +175,18 @@ impl Periods {
             Change::Insert => {
                 let (report, corrections) = (correction.report(), vec![self.corrections]);
                 self.all.insert(index, Period { report, acknowledged: None, stands: false, entry, corrections });
-                self.move_composed(index, |after| after + 1);
+                for (after, composed) in self.composed.split_off(&(index + 1)) {
+                    self.composed.insert(after + 1, composed);
+                }
             }
             Change::Remove => {
                 self.all.remove(index);
-                self.move_composed(index, |after| after - 1);
+                // What was told since rests on the period, so it falls with it.
+                self.composed.split_off(&(index + 1));
             }
         }
         self.all.iter_mut().skip(index).for_each(|period| period.stands = false);
         Ok(())
-    }
-
-    /// Keeps what was told of several assets after more than `index` periods beside the periods that it followed.
-    fn move_composed(&mut self, index: usize, moved: impl Fn(usize) -> usize) {
-        for (after, composed) in std::mem::take(&mut self.composed) {
-            let after = if after > index { moved(after) } else { after };
-            self.composed.entry(after).or_default().extend(composed);
-        }
     }
 
     /// The first period that is not as it was acknowledged, from 0; the number of periods where all are.
