@@ -155,6 +155,9 @@ impl From<RoleName> for Role {
     }
 }
 
+/// What the process ends with where a second signal cuts its drain short: that of a process ended by SIGTERM.
+const ASKED_TWICE: i32 = 143;
+
 pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     let traces = traces::start()?;
     let mut config = Config { listen: arguments.listen, ..Config::new("") };
@@ -188,11 +191,17 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     // Nobody has to read it: the log says it too.
     let _ = std::io::stdout().write_all(told.as_bytes());
     tokio::spawn(async move {
-        tokio::select! {
-            _ = terminate.recv() => {}
-            _ = interrupt.recv() => {}
-        }
+        let mut signalled = async || {
+            tokio::select! {
+                _ = terminate.recv() => {}
+                _ = interrupt.recv() => {}
+            }
+        };
+        signalled().await;
         shutdown.begin();
+        // Whoever asks twice does not wait for the drain.
+        signalled().await;
+        std::process::exit(ASKED_TWICE);
     });
     running.ended().await;
     traces.end().await;

@@ -3,6 +3,8 @@
 use rayon::prelude::*;
 use thiserror::Error;
 
+use crate::numerics::interruption;
+
 /// A pool of threads that give way to every other; work installed on it is spread over them.
 pub struct TrainingPool(rayon::ThreadPool);
 
@@ -45,9 +47,28 @@ fn give_way() {
 
 const LOWEST_PRIORITY: i32 = 19;
 
-/// `work` done on every item, in their order, on the pool this is called from.
+/// Items that each thread has of a watched map between two checkpoints.
+const ITEMS_BETWEEN: usize = 2;
+
+/// `work` done on every item, in their order, on the pool this is called from. Watched work passes a checkpoint every few items.
 pub fn map<T: Send, R: Send>(items: Vec<T>, work: impl Fn(T) -> R + Sync + Send) -> Vec<R> {
-    items.into_par_iter().map(work).collect()
+    let carried = interruption::carried();
+    if !carried.is_watched() {
+        return items.into_par_iter().map(work).collect();
+    }
+    let (mut items, mut done) = (items.into_iter(), Vec::new());
+    while items.len() > 0 {
+        interruption::checkpoint();
+        let few: Vec<T> = items.by_ref().take(ITEMS_BETWEEN * rayon::current_num_threads()).collect();
+        done.par_extend(few.into_par_iter().map(|item| carried.within(|| work(item))));
+    }
+    done
+}
+
+/// Both parts, beside each other on the pool this is called from.
+pub fn join<A: Send, B: Send>(one: impl FnOnce() -> A + Send, other: impl FnOnce() -> B + Send) -> (A, B) {
+    let carried = interruption::carried();
+    rayon::join(|| carried.within(one), || carried.within(other))
 }
 
 #[cfg(test)]

@@ -20,6 +20,7 @@ pub mod gp;
 pub mod gp_fit;
 pub mod gp_likelihood;
 pub mod grown_bridges;
+pub mod interruption;
 pub mod law;
 pub mod law_distance;
 pub mod least_variance;

@@ -1,47 +1,67 @@
 //! Work that requests cause, bounded and taken in turn over tenants.
 //!
-//! There are common places, which anybody takes while they are free, and a few more for guests: tenants none of whose work
-//! is under way. Whoever finds no place waits in his tenant's queue, and a place that becomes free goes to the tenants in
-//! turn. So how much one tenant has queued changes nothing for another, and one that is alone with his question begins at
-//! once beside a long piece of another's: work cannot be interrupted, but the processors are shared by the system, which is
-//! the only fair turn there is with one common place and a piece of half a second in it.
+//! A piece of work begins in one of the first places and has it for [`MOMENT`] at most. What takes longer goes on in one of the
+//! places for long work, of which there are fewer than processors, and gives it up to the next one each [`SHIFT`]. So whoever asks
+//! something short waits for moments of others, however long their questions are, and long questions share what is left.
+//! Whoever finds no place waits in the queue of the tenant, and a place that becomes free goes to the tenants in turn.
 //!
-//! Who has waited too long is told to come back. Not done, and why: turns weighed by how long a tenant's pieces take (a
-//! tenant of long pieces gets more than his share of the common places, and delays nobody else's first piece).
+//! A piece whose caller is gone, by a time limit, a closed connection or the end of the service, ends at its next checkpoint (see
+//! [`interruption`]). Whoever has waited too long for a first place is told to come back.
+//! Checked by: the tests below and `tests/operation/interruption.rs`.
 
 use std::collections::{HashMap, VecDeque};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use tokio::sync::oneshot;
+use tokio::runtime::Handle;
+use tokio::sync::{oneshot, watch};
 use tracing::Instrument;
 
 use super::error::ServiceError;
 use super::spans;
+use crate::numerics::interruption::{self, Stopped, Watcher};
 use crate::store::Tenant;
+
+/// How long a piece has its first place: most questions end within it.
+const MOMENT: Duration = Duration::from_millis(100);
+/// How long a piece has a place for long work while others wait for one.
+const SHIFT: Duration = Duration::from_millis(250);
+/// Long pieces that may wait for such a place, each on a thread of its own.
+const LONG_WAITING: usize = 32;
+/// Those of one tenant.
+const LONG_WAITING_OF_ONE: usize = 8;
 
 /// Runs blocking work, so much of it at a time.
 #[derive(Clone)]
 pub(super) struct Bounded {
     /// What the work is, in traces and metrics.
     pub name: &'static str,
-    turns: Arc<Mutex<Turns>>,
+    /// Pieces that may begin at a time.
+    pub first: usize,
+    lines: Arc<[Mutex<Line>; 2]>,
     wait: Duration,
 }
 
 /// How many pieces of work may be under way.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Size {
-    /// Of anybody.
-    pub common: usize,
-    /// Of tenants with nothing else under way, beyond the common ones.
-    pub guests: usize,
+    /// In their first moment.
+    pub first: usize,
+    /// After it.
+    pub long: usize,
 }
 
-struct Turns {
-    size: Size,
-    /// Work under way, by tenant; none of them 0.
-    running: HashMap<Tenant, usize>,
+/// For whom places are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    First,
+    Long,
+}
+
+/// Places of one kind, and who waits for them.
+struct Line {
+    free: usize,
     /// Tenants that wait, whose turn is next first; each has a queue.
     ring: VecDeque<Tenant>,
     queues: HashMap<Tenant, VecDeque<oneshot::Sender<Place>>>,
@@ -50,16 +70,28 @@ struct Turns {
 /// The right to work, given up when dropped.
 struct Place {
     bounded: Bounded,
+    kind: Kind,
+}
+
+/// A piece of work under way.
+struct Piece {
+    bounded: Bounded,
     tenant: Tenant,
+    /// Closed once the caller is gone.
+    caller: watch::Receiver<()>,
+    /// Whether too many long pieces wait for this one to go on.
+    is_refused: AtomicBool,
+    /// `None` while it waits.
+    place: Mutex<Option<(Place, Instant)>>,
 }
 
 impl Bounded {
-    pub(super) fn new(name: &'static str, size: Size, wait: Duration) -> Self {
-        let turns = Turns { size, running: HashMap::new(), ring: VecDeque::new(), queues: HashMap::new() };
-        Bounded { name, turns: Arc::new(Mutex::new(turns)), wait }
+    pub(super) fn new(name: &'static str, Size { first, long }: Size, wait: Duration) -> Self {
+        let line = |free| Mutex::new(Line { free, ring: VecDeque::new(), queues: HashMap::new() });
+        Bounded { name, first, lines: Arc::new([line(first), line(long)]), wait }
     }
 
-    /// Runs `work` on a thread that may block. Its place is taken until it ends, even where the caller goes away.
+    /// Runs `work` on a thread that may block. It ends early where the future is dropped.
     ///
     /// # Errors
     /// [`ServiceError::Busy`] where no place became free in time; a panic of `work`.
@@ -68,130 +100,147 @@ impl Bounded {
         tenant: &Tenant,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let place = self.place(tenant).instrument(spans::of_turn()).await?;
-        let working = tokio::task::spawn_blocking(move || {
-            let answer = work();
-            drop(place);
-            answer
+        let place = self.first_place(tenant).instrument(spans::of_turn()).await?;
+        let (here, caller) = watch::channel(());
+        let piece = Arc::new(Piece {
+            bounded: self.clone(),
+            tenant: tenant.clone(),
+            caller,
+            is_refused: AtomicBool::new(false),
+            place: Mutex::new(Some((place, Instant::now()))),
         });
-        working.instrument(spans::of_work(self.name)).await.map_err(ServiceError::internal)
+        let working = tokio::task::spawn_blocking(move || interruption::watched(piece, work));
+        let done = working.instrument(spans::of_work(self.name)).await.map_err(ServiceError::internal)?;
+        drop(here);
+        done.map_err(|Stopped| ServiceError::Busy)
     }
 
-    /// Pieces that may be under way at a time, those of guests aside.
-    pub(super) fn places(&self) -> usize {
-        self.lock().size.common
-    }
-
-    /// Requests that wait for a place.
+    /// Pieces that wait for a place.
     pub(super) fn waiting(&self) -> usize {
-        let turns = self.lock();
-        turns.queues.values().flatten().filter(|waiting| !waiting.is_closed()).count()
+        [Kind::First, Kind::Long].map(|kind| self.line(kind).waiting()).into_iter().sum()
     }
 
-    async fn place(&self, tenant: &Tenant) -> Result<Place, ServiceError> {
-        let granted = {
-            let mut turns = self.lock();
-            if turns.take(tenant) {
-                return Ok(Place { bounded: self.clone(), tenant: tenant.clone() });
-            }
-            turns.queue(tenant)
-        };
+    async fn first_place(&self, tenant: &Tenant) -> Result<Place, ServiceError> {
+        let asked = self.line(Kind::First).ask(tenant);
+        let Some(granted) = asked else { return Ok(self.place(Kind::First)) };
         let granted = tokio::time::timeout(self.wait, granted).await;
         granted.map_err(|_| ServiceError::Busy)?.map_err(ServiceError::internal)
     }
 
-    fn lock(&self) -> MutexGuard<'_, Turns> {
+    fn place(&self, kind: Kind) -> Place {
+        Place { bounded: self.clone(), kind }
+    }
+
+    fn line(&self, kind: Kind) -> MutexGuard<'_, Line> {
         // No code panics while holding the lock.
-        self.turns.lock().unwrap_or_else(PoisonError::into_inner)
+        self.lines[kind as usize].lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Drop for Place {
     fn drop(&mut self) {
-        let granted = {
-            let mut turns = self.bounded.lock();
-            turns.give_up(&self.tenant);
-            turns.next()
-        };
-        if let Some((tenant, waiting)) = granted {
-            // Who stopped waiting in this instant drops it, and so hands it on.
-            drop(waiting.send(Place { bounded: self.bounded.clone(), tenant }));
+        let next = self.bounded.line(self.kind).give_back();
+        if let Some(waiting) = next {
+            // Whoever stopped waiting in this instant drops it, and so hands it on.
+            drop(waiting.send(self.bounded.place(self.kind)));
         }
     }
 }
 
-impl Turns {
-    fn may(&self, tenant: &Tenant) -> bool {
-        let running: usize = self.running.values().sum();
-        let is_guest = !self.running.contains_key(tenant);
-        running < self.size.common || (is_guest && running < self.size.common + self.size.guests)
+impl Watcher for Piece {
+    fn is_stopped(&self) -> bool {
+        self.is_refused.load(Ordering::Relaxed) || self.caller.has_changed().is_err()
     }
 
-    /// Takes a place where there is one, and nobody has waited longer for it.
-    fn take(&mut self, tenant: &Tenant) -> bool {
-        let free = self.may(tenant) && !self.queues.contains_key(tenant);
-        if free {
-            *self.running.entry(tenant.clone()).or_default() += 1;
+    fn give_way(&self) {
+        let mut held = self.place.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some((Place { kind, .. }, since)) = &mut *held else { return };
+        let share = if *kind == Kind::First { MOMENT } else { SHIFT };
+        if since.elapsed() < share {
+            return;
         }
-        free
+        let granted = {
+            let mut line = self.bounded.line(Kind::Long);
+            let waiting = line.waiting();
+            if *kind == Kind::Long && waiting == 0 {
+                *since = Instant::now();
+                return;
+            }
+            if waiting >= LONG_WAITING || line.waiting_of(&self.tenant) >= LONG_WAITING_OF_ONE {
+                self.is_refused.store(true, Ordering::Relaxed);
+                return;
+            }
+            line.ask(&self.tenant)
+        };
+        *held = None;
+        let place = match granted {
+            None => Some(self.bounded.place(Kind::Long)),
+            Some(granted) => self.wait_for(granted),
+        };
+        *held = place.map(|place| (place, Instant::now()));
     }
+}
 
-    fn queue(&mut self, tenant: &Tenant) -> oneshot::Receiver<Place> {
+impl Piece {
+    /// `None` where the caller went away first.
+    fn wait_for(&self, granted: oneshot::Receiver<Place>) -> Option<Place> {
+        let mut caller = self.caller.clone();
+        Handle::current().block_on(async {
+            tokio::select! {
+                granted = granted => granted.ok(),
+                _ = caller.changed() => None,
+            }
+        })
+    }
+}
+
+impl Line {
+    /// Takes a place where there is one, and nobody has waited longer for it: `None`. Else waits for it.
+    fn ask(&mut self, tenant: &Tenant) -> Option<oneshot::Receiver<Place>> {
+        if self.free > 0 && self.ring.is_empty() {
+            self.free -= 1;
+            return None;
+        }
         let (waiting, granted) = oneshot::channel();
         let queue = self.queues.entry(tenant.clone()).or_default();
         if queue.is_empty() {
             self.ring.push_back(tenant.clone());
         }
-        queue.retain(|waiting| !waiting.is_closed());
         queue.push_back(waiting);
-        granted
+        Some(granted)
     }
 
-    fn give_up(&mut self, tenant: &Tenant) {
-        if let Some(running) = self.running.get_mut(tenant) {
-            *running -= 1;
-            if *running == 0 {
-                self.running.remove(tenant);
-            }
-        }
-    }
-
-    /// Takes the place that became free for whoever is next; the tenant goes to the end of the ring.
-    fn next(&mut self) -> Option<(Tenant, oneshot::Sender<Place>)> {
-        let mut skipped = VecDeque::new();
-        let mut found = None;
+    /// Whoever has the place that became free next; the tenant goes to the end of the ring.
+    fn give_back(&mut self) -> Option<oneshot::Sender<Place>> {
         while let Some(tenant) = self.ring.pop_front() {
-            if !self.may(&tenant) {
-                skipped.push_back(tenant);
-                continue;
+            let Some(queue) = self.queues.get_mut(&tenant) else { continue };
+            queue.retain(|waiting| !waiting.is_closed());
+            let first = queue.pop_front();
+            if queue.is_empty() {
+                self.queues.remove(&tenant);
+            } else {
+                self.ring.push_back(tenant);
             }
-            let Some(waiting) = self.first(&tenant) else { continue };
-            *self.running.entry(tenant.clone()).or_default() += 1;
-            if self.queues.contains_key(&tenant) {
-                self.ring.push_back(tenant.clone());
+            if first.is_some() {
+                return first;
             }
-            found = Some((tenant, waiting));
-            break;
         }
-        skipped.append(&mut self.ring);
-        self.ring = skipped;
-        found
+        self.free += 1;
+        None
     }
 
-    /// The first of a tenant who still waits; without anybody left the queue is gone.
-    fn first(&mut self, tenant: &Tenant) -> Option<oneshot::Sender<Place>> {
-        let queue = self.queues.get_mut(tenant)?;
-        queue.retain(|waiting| !waiting.is_closed());
-        let first = queue.pop_front();
-        if queue.is_empty() {
-            self.queues.remove(tenant);
-        }
-        first
+    fn waiting(&self) -> usize {
+        self.queues.keys().map(|tenant| self.waiting_of(tenant)).sum()
+    }
+
+    fn waiting_of(&self, tenant: &Tenant) -> usize {
+        self.queues.get(tenant).map_or(0, |queue| queue.iter().filter(|waiting| !waiting.is_closed()).count())
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::AtomicU64;
     use std::sync::mpsc;
 
     use super::*;
@@ -200,8 +249,8 @@ mod tests {
         name.parse().unwrap()
     }
 
-    fn bounded(common: usize, guests: usize) -> Bounded {
-        Bounded::new("work", Size { common, guests }, Duration::from_secs(60))
+    fn bounded(first: usize, long: usize) -> Bounded {
+        Bounded::new("work", Size { first, long }, Duration::from_secs(60))
     }
 
     /// Work that ends when told to, and says what it is when it begins.
@@ -217,15 +266,41 @@ mod tests {
         Held { release, done: tokio::spawn(async move { bounded.run(&of, work).await }) }
     }
 
+    /// Work that passes checkpoints and counts them, until `enough`.
+    fn busy(
+        bounded: &Bounded,
+        of: &str,
+        enough: u64,
+    ) -> (Arc<AtomicU64>, tokio::task::JoinHandle<Result<(), ServiceError>>) {
+        let (passed, bounded, of) = (Arc::new(AtomicU64::new(0)), bounded.clone(), tenant(of));
+        let counted = passed.clone();
+        let work = move || {
+            while counted.load(Ordering::Relaxed) < enough {
+                interruption::checkpoint();
+                std::thread::sleep(Duration::from_millis(1));
+                counted.fetch_add(1, Ordering::Relaxed);
+            }
+        };
+        (passed, tokio::spawn(async move { bounded.run(&of, work).await }))
+    }
+
+    fn free(bounded: &Bounded) -> [usize; 2] {
+        [Kind::First, Kind::Long].map(|kind| {
+            let line = bounded.line(kind);
+            assert!(line.ring.is_empty() && line.queues.is_empty());
+            line.free
+        })
+    }
+
     async fn until(mut reached: impl FnMut() -> bool) {
         while !reached() {
-            tokio::task::yield_now().await;
+            tokio::time::sleep(Duration::from_millis(1)).await;
         }
     }
 
     #[tokio::test]
     async fn work_past_the_bound_is_refused_and_done_once_there_is_room() {
-        let bounded = Bounded::new("work", Size { common: 1, guests: 0 }, Duration::from_millis(20));
+        let bounded = Bounded::new("work", Size { first: 1, long: 1 }, Duration::from_millis(20));
         let (begun, begins) = mpsc::channel();
         let first = hold(&bounded, "north", &begun, "first");
         until(|| begins.try_recv().is_ok()).await;
@@ -234,12 +309,12 @@ mod tests {
         first.release.send(()).unwrap();
         assert!(first.done.await.unwrap().unwrap());
         assert_eq!(bounded.run(&tenant("north"), || 7).await.unwrap(), 7);
-        assert!(bounded.lock().running.is_empty() && bounded.lock().queues.is_empty());
+        assert_eq!(free(&bounded), [1, 1]);
     }
 
     #[tokio::test]
     async fn a_queue_of_one_tenant_puts_off_another_by_one_turn() {
-        let bounded = bounded(1, 0);
+        let bounded = bounded(1, 1);
         let (begun, begins) = mpsc::channel();
         let mut held = HashMap::new();
         for number in 0..5 {
@@ -265,30 +340,54 @@ mod tests {
         assert_eq!(order, ["north 0", "north 1", "south 0", "north 2", "south 1", "north 3", "north 4"]);
     }
 
+    /// The first moment over, long pieces share one place, and what begins meanwhile begins at once.
     #[tokio::test]
-    async fn a_tenant_alone_with_his_question_does_not_wait_for_anothers() {
+    async fn long_work_leaves_its_place_and_takes_turns() {
         let bounded = bounded(1, 1);
-        let (begun, begins) = mpsc::channel();
-        let held = [0, 1].map(|number| hold(&bounded, "north", &begun, &number.to_string()));
-        until(|| bounded.waiting() == 1).await;
-        assert_eq!(bounded.run(&tenant("south"), || 7).await.unwrap(), 7);
-        let mut first = None;
-        until(|| {
-            first = begins.try_recv().ok();
-            first.is_some()
-        })
-        .await;
-        // The place of guests is not for those who have one.
-        assert_eq!((first.as_deref(), begins.try_recv().is_err(), bounded.waiting()), (Some("0"), true, 1));
-        held.iter().for_each(|held| held.release.send(()).unwrap());
-        for held in held {
-            assert!(held.done.await.unwrap().unwrap());
+        let (north, north_done) = busy(&bounded, "north", u64::MAX);
+        let (south, south_done) = busy(&bounded, "south", u64::MAX);
+        let (east, east_done) = busy(&bounded, "east", 20);
+        east_done.await.unwrap().unwrap();
+        assert_eq!(east.load(Ordering::Relaxed), 20);
+        for piece in [&north, &south, &north, &south] {
+            let before = piece.load(Ordering::Relaxed);
+            until(|| piece.load(Ordering::Relaxed) > before + 10).await;
         }
+        for done in [north_done, south_done] {
+            done.abort();
+            assert!(done.await.unwrap_err().is_cancelled());
+        }
+        until(|| bounded.lines.iter().all(|line| line.lock().unwrap().free == 1)).await;
+        assert_eq!(free(&bounded), [1, 1]);
+    }
+
+    #[tokio::test]
+    async fn long_work_of_one_tenant_is_bounded() {
+        let bounded = bounded(1, 1);
+        let mut all: Vec<_> = (0..LONG_WAITING_OF_ONE + 2).map(|_| busy(&bounded, "north", u64::MAX).1).collect();
+        until(|| all.iter().any(tokio::task::JoinHandle::is_finished)).await;
+        let first = all.iter().position(tokio::task::JoinHandle::is_finished).unwrap();
+        assert!(matches!(all.swap_remove(first).await.unwrap(), Err(ServiceError::Busy)));
+        assert!(busy(&bounded, "south", 500).1.await.unwrap().is_ok());
+        all.iter().for_each(tokio::task::JoinHandle::abort);
+        until(|| bounded.lines.iter().all(|line| line.lock().unwrap().free == 1)).await;
+    }
+
+    #[tokio::test]
+    async fn work_whose_caller_went_away_ends() {
+        let bounded = bounded(1, 1);
+        let (passed, done) = busy(&bounded, "north", u64::MAX);
+        until(|| passed.load(Ordering::Relaxed) > 0).await;
+        done.abort();
+        until(|| bounded.line(Kind::First).free == 1).await;
+        let ended = passed.load(Ordering::Relaxed);
+        tokio::time::sleep(Duration::from_millis(30)).await;
+        assert_eq!(passed.load(Ordering::Relaxed), ended);
     }
 
     #[tokio::test]
     async fn who_went_away_is_passed_over() {
-        let bounded = bounded(1, 0);
+        let bounded = bounded(1, 1);
         let (begun, begins) = mpsc::channel();
         let first = hold(&bounded, "north", &begun, "first");
         until(|| begins.try_recv().is_ok()).await;
@@ -301,6 +400,6 @@ mod tests {
         first.release.send(()).unwrap();
         last.release.send(()).unwrap();
         assert!(first.done.await.unwrap().unwrap() && last.done.await.unwrap().unwrap());
-        assert!(bounded.lock().running.is_empty() && bounded.lock().queues.is_empty());
+        assert_eq!(free(&bounded), [1, 1]);
     }
 }

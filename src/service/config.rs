@@ -90,12 +90,12 @@ pub struct Config {
     /// Largest request body, in bytes: an exported policy of a few thousand design points fits.
     pub body_limit_bytes: usize,
     pub request_timeout: Duration,
-    /// Robust steps solved at a time for `mode=resolve` and `explain`; more wait.
+    /// Robust steps begun at a time for `mode=resolve` and `explain`; more wait.
     pub resolve_limit: usize,
-    /// Allocations and observations computed at a time; more wait.
+    /// Allocations and observations begun at a time; more wait.
     pub advice_limit: usize,
-    /// Either of them computed beyond that for tenants with nothing else under way.
-    pub guest_limit: usize,
+    /// Either of them at a time of those that take long.
+    pub long_limit: usize,
     /// A request that has waited this long for its turn is told to come back.
     pub turn_wait: Duration,
     /// Time given to open requests once the service is asked to stop.
@@ -130,10 +130,10 @@ impl Config {
             connections_of_address: None,
             body_limit_bytes: 64 << 20,
             request_timeout: Duration::from_secs(30),
-            resolve_limit: cores.div_ceil(2),
+            resolve_limit: cores,
             advice_limit: 2 * cores,
-            // With as many more on the processors a guest takes three times what it takes alone, no longer.
-            guest_limit: 2 * cores,
+            // The other processors are for what begins.
+            long_limit: cores.div_ceil(2),
             turn_wait: Duration::from_secs(2),
             drain: Duration::from_secs(25),
             lease: Duration::from_secs(30),

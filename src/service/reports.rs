@@ -56,7 +56,7 @@ impl Sessions {
     /// The list is empty or too long, or names a session twice; nothing is recorded then.
     pub async fn report_all(&self, caller: &Caller, reports: Vec<Observe>) -> Result<Vec<Reported>, ServiceError> {
         check(&reports)?;
-        let lane = Arc::new(Semaphore::new(self.resolving.places()));
+        let lane = Arc::new(Semaphore::new(self.resolving.first));
         let doubts = self.peer_doubts(caller, &reports).await;
         let elements = reports.into_iter().zip(doubts).enumerate().map(|(index, (report, peer_doubts))| {
             let report = Observe { peer_doubts, ..report };

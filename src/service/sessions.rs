@@ -138,7 +138,7 @@ impl Sessions {
         memory: &Memory,
         due: Sender<Name>,
     ) -> Self {
-        let size = |common| Size { common, guests: config.guest_limit };
+        let size = |first| Size { first, long: config.long_limit };
         let advising = Bounded::new("advise", size(config.advice_limit), config.turn_wait);
         let resolving = Bounded::new("solve", size(config.resolve_limit), config.turn_wait);
         // Two generations are kept.

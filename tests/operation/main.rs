@@ -6,6 +6,7 @@ mod support;
 
 mod abuse;
 mod connections;
+mod interruption;
 mod lists;
 mod memory;
 mod process;

@@ -276,7 +276,7 @@ async fn an_opening_repeated_under_its_key_opens_one_session() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_burst_of_resolves_is_told_to_come_back_and_starves_nobody() {
     let mut app = App::configured(|config| {
-        (config.resolve_limit, config.guest_limit, config.turn_wait) = (0, 0, Duration::from_millis(50));
+        (config.resolve_limit, config.turn_wait) = (0, Duration::from_millis(50));
     })
     .await;
     app.train(&specification(2)).await;

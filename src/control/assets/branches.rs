@@ -8,6 +8,7 @@
 
 use super::AssetsStep;
 use crate::control::problem::utility::RelativeUtility;
+use crate::numerics::interruption;
 use crate::numerics::levelling::{Levelling, Phase};
 
 /// Newton steps for a local minimum, which it is approached from one side by; they double the digits from the third or so on.
@@ -129,6 +130,7 @@ impl Branches {
     }
 
     fn start(&mut self, step: &AssetsStep) {
+        interruption::checkpoint();
         self.assets = step.assets();
         self.first.clear();
         self.first.push(0);

@@ -43,6 +43,7 @@ use crate::control::problem::state::State;
 use crate::control::problem::utility::RelativeUtility;
 use crate::control::surrogate::policy_target::policy_target;
 use crate::control::uncertainty::{Reach, UncertaintySet};
+use crate::numerics::interruption;
 use crate::numerics::minimise::maximise_concave_scalar;
 
 /// Doublings of an uncertified window, at most: sixteen times the first reach takes a return to e^-9.6.
@@ -197,6 +198,7 @@ fn best_response<F: Field, T>(
 ) -> T {
     let (mut reach, mut growths) = (Reach::FIRST, 0);
     loop {
+        interruption::checkpoint();
         let field = field_at(set.exact_returns(reach));
         let mut pricing: Box<dyn Pricing + '_> = match set {
             UncertaintySet::Point(centre) => Box::new(TransportPricing::new(centre, 0.0, &field)),

@@ -131,7 +131,7 @@ impl Asked<'_> {
     fn sensitivity(&self) -> Sensitivity {
         let without_one = self.without_one();
         let next_return = self.next_return();
-        let (needed, periods_more) = rayon::join(|| self.needed(), || self.periods_more());
+        let (needed, periods_more) = pool::join(|| self.needed(), || self.periods_more());
         let premium = Premium { present: self.present(), needed, periods_more };
         let caution = without_one.and_then(|range| self.hangs_on_one(range));
         Sensitivity { without_one, next_return, premium, caution }
@@ -222,7 +222,7 @@ impl Asked<'_> {
             Some(parted([nearest[0], nearest[1]], |log_return| is_above(self.after(log_return))))
         };
         let (bank, top) =
-            rayon::join(|| crossing(&is_invested), || crossing(&|allocation| allocation >= self.highest - AT_AN_END));
+            pool::join(|| crossing(&is_invested), || crossing(&|allocation| allocation >= self.highest - AT_AN_END));
         let next = |index: usize| {
             let Return { log_return, simple_return } = Return::of(quantile(QUANTILES[index]));
             let allocation = told[grid.len() + index];

@@ -1,0 +1,115 @@
+//! Questions that take long: they stop when nobody waits for them, keep nobody else waiting, and do not outlive the process.
+
+use std::os::unix::process::ExitStatusExt;
+use std::process::{Child, Command};
+use std::time::{Duration, Instant};
+
+use crate::support::App;
+use crate::support::patience::within;
+use serde_json::{Value, json};
+
+/// The largest question of several assets that is taken: some minutes of work.
+fn largest() -> Value {
+    let (dates, assets) = (2000, 30);
+    let mut state = 7_u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let history: Vec<Vec<f64>> = (0..dates).map(|_| (0..assets).map(|_| 0.006 + 0.12 * uniform()).collect()).collect();
+    let names: Vec<String> = (0..assets).map(|asset| format!("asset {asset}")).collect();
+    json!({ "problem": { "assets": names, "history": history, "rate_per_step": 0.002 } })
+}
+
+fn service() -> (Child, App) {
+    let folder = tempfile::tempdir().unwrap();
+    let (child, url) = crate::support::process::serve(|command| {
+        command.arg("--data").arg(folder.path());
+    });
+    (child, App::at(url, folder))
+}
+
+/// Seconds of processor that the process has used.
+fn processor_seconds(child: &Child) -> f64 {
+    const TICKS_A_SECOND: f64 = 100.0;
+    let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id())).unwrap();
+    let after_name = stat.rsplit(')').next().unwrap();
+    let ticks = after_name.split_whitespace().skip(11).take(2).map(|ticks| ticks.parse::<f64>().unwrap());
+    ticks.sum::<f64>() / TICKS_A_SECOND
+}
+
+fn terminate(child: &Child) {
+    assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
+}
+
+/// A call under way.
+type Call = tokio::task::JoinHandle<reqwest::Result<reqwest::Response>>;
+
+/// So many of the largest questions, once all are being solved.
+async fn asked(app: &App, child: &Child, count: usize) -> Vec<Call> {
+    let (question, before) = (largest(), processor_seconds(child));
+    let calls: Vec<_> = (0..count)
+        .map(|_| tokio::spawn(app.client.post(format!("{}/advise", app.url)).json(&question).send()))
+        .collect();
+    while processor_seconds(child) < before + 0.3 * count as f64 {
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    calls
+}
+
+#[cfg_attr(not(target_os = "linux"), ignore = "reads /proc")]
+#[tokio::test(flavor = "multi_thread")]
+async fn what_nobody_waits_for_stops() {
+    let (mut child, app) = service();
+    let calls = asked(&app, &child, 1).await;
+    calls.iter().for_each(Call::abort);
+    tokio::time::sleep(within(Duration::from_millis(500))).await;
+    let stopped = processor_seconds(&child);
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    let since = processor_seconds(&child) - stopped;
+    assert!(since < 0.2, "{since} s of processor for nobody");
+    terminate(&child);
+    assert!(child.wait().unwrap().success());
+}
+
+#[cfg_attr(not(target_os = "linux"), ignore = "reads /proc")]
+#[tokio::test(flavor = "multi_thread")]
+async fn long_questions_keep_no_short_one_waiting() {
+    let (mut child, app) = service();
+    let history: Vec<f64> = (0..120).map(|k| 0.006 + 0.03 * f64::sin(7.0 * f64::from(k))).collect();
+    let short = json!({ "problem": { "history": history, "rate_per_step": 0.002 } });
+    let time = async || {
+        let asked = Instant::now();
+        let (status, advised) = app.post("/advise", &short).await;
+        assert_eq!(status, 200, "{advised}");
+        asked.elapsed()
+    };
+    time().await;
+    let idle = time().await.max(time().await);
+    let calls = asked(&app, &child, 6).await;
+    let mut busy: Vec<Duration> = Vec::new();
+    for _ in 0..9 {
+        busy.push(time().await);
+    }
+    busy.sort();
+    // Two cores, of which the long ones have one: three times leaves room for a slow machine.
+    assert!(busy[4] < within(3 * idle + Duration::from_millis(100)), "{busy:?}, idle {idle:?}");
+    calls.iter().for_each(Call::abort);
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+#[cfg_attr(not(target_os = "linux"), ignore = "reads /proc")]
+#[tokio::test(flavor = "multi_thread")]
+async fn a_second_signal_ends_the_process_at_once() {
+    let (mut child, app) = service();
+    let _calls = asked(&app, &child, 1).await;
+    terminate(&child);
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    assert!(child.try_wait().unwrap().is_none(), "the caller is given the time of the drain");
+    terminate(&child);
+    let asked = Instant::now();
+    let status = child.wait().unwrap();
+    assert!(asked.elapsed() < within(Duration::from_secs(1)), "{:?}", asked.elapsed());
+    assert_eq!((status.code(), status.signal()), (Some(143), None));
+}
