@@ -1,17 +1,15 @@
 // A session's page gives one advice, that of `/action`; the step solved anew is a check of it, told behind a fold.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
+import { ballast, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 
-let ballast, chromium, page, session;
+let session;
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
   const radius = { rule: "bridge", alpha: 0.1, scale: 0.2 };
   const policy = await trained(ballast.url, {
     problem: { horizon: 4, rate_per_step: 0.002, utility: { kind: "exponential", risk_aversion: 0.01 }, history: HISTORY, radius },
@@ -19,11 +17,6 @@ before(async () => {
   });
   ({ session } = await call(ballast.url, "/sessions", { policy }));
   await call(ballast.url, "/observe", { session, period: 1, simple_return: 0.004 });
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 /** The page where the policy advises `read` and the step solved anew `anew`. */

@@ -2,10 +2,11 @@
 
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
-import { after, before, test } from "node:test";
-import { browser, call, service } from "./ballast.js";
+import { test } from "node:test";
+import { call } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
 import { plain, usable, visitQuiet } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 const { ordinal } = await dashboardModule("verdict.js");
 
@@ -18,18 +19,7 @@ const date = (k) => `${2004 + Math.floor(k / 4)}-${String(3 * (k % 4) + 3).padSt
 const rows = RETURNS.map((back, k) => `${date(k)},${back},${RATES[k]}`).reverse();
 const TEXT = `quarter,fund,rf\n${rows.join("\n")}\n`;
 
-let ballast, chromium, page, report;
-
-before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
-});
+let report;
 
 const main = async () => plain(await page.locator("main").innerText());
 const cells = async (name) => {

@@ -2,22 +2,20 @@
 
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
 import { plain, usable } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 const RETURNS = [0.04, -0.1, 0.02];
 const DATES = ["2008-01-31", "2008-02-29", "2008-03-31"];
 const RATE = 0.002;
 
-let ballast, chromium, page, session, policy;
+let session, policy;
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
   policy = await trained(ballast.url, {
     problem: { horizon: 6, rate_per_step: RATE, history: HISTORY, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } },
     design: { count: 40 },
@@ -29,11 +27,6 @@ before(async () => {
     price *= 1 + simple_return;
     await call(ballast.url, "/observe", { session, period: index + 1, price, previous_price, date: DATES[index], executed_allocation: 0.5, confirm: true });
   }
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 const main = async () => plain(await page.locator("main").innerText());

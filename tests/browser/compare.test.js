@@ -1,19 +1,17 @@
 // Two policies or two sessions side by side, reached by ticking two rows of their list.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
 import { plain, usable, visitQuiet } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 
-let ballast, chromium, page, careful, bold, one, other;
+let careful, bold, one, other;
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
   const problem = { horizon: 4, rate_per_step: 0.002, history: HISTORY, radius: { rule: "bridge", alpha: 0.1, scale: 0.3 } };
   const design = { count: 40 };
   careful = await trained(ballast.url, { problem, design });
@@ -23,11 +21,6 @@ before(async () => {
     for (const [index, simple_return] of wealth.entries())
       await call(ballast.url, "/observe", { session, period: index + 1, simple_return, executed_allocation: held, confirm: true, flow: index === 1 ? 50 : 0, date: `2008-0${index + 1}-28` });
   }
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 const rows = async () => {

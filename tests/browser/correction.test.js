@@ -1,16 +1,14 @@
 // A period put right on the page of its session: what was reported and told stays beside what stands.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
 import { plain } from "./page.js";
+import { ballast, page } from "./scene.js";
 
-let ballast, chromium, page, session;
+let session;
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
   const policy = await trained(ballast.url, {
     problem: {
       horizon: 4,
@@ -23,11 +21,6 @@ before(async () => {
   ({ session } = await call(ballast.url, "/sessions", { policy }));
   for (const [period, simple_return] of [[1, 0.01], [2, -0.03]])
     await call(ballast.url, "/observe", { session, period, simple_return, executed_allocation: 0.5, date: `2008-0${period}-28` });
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 const main = async () => plain(await page.locator("main").innerText());

@@ -2,21 +2,20 @@
 // The tests follow each other on one page, as that person would.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service } from "./ballast.js";
+import { before, test } from "node:test";
+import { call } from "./ballast.js";
 import { visit } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 /** Nothing that is waited for takes longer, in milliseconds. */
 const PATIENCE = 60_000;
 const RETURNS = [1.31, -4.42, 2.1, 3.3, -1.2, 0.8, 4.5, -2.7, 1.6, 0.2, 2.4, -0.9];
 const FILE = `month;market return\n${RETURNS.map((value, index) => `2020-${index + 1};${String(value).replace(".", ",")}`).join("\n")}\n`;
 
-let ballast, chromium, page, policy, session, twin, evaluation;
+let policy, session, twin, evaluation;
 const faults = [];
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
   page.setDefaultTimeout(PATIENCE);
   page.on("pageerror", (error) => faults.push(error.message));
   page.on("console", (message) => message.type() === "error" && faults.push(message.text()));
@@ -28,11 +27,6 @@ before(async () => {
       request.url() === "about:blank" ||
       faults.push(`asked for ${request.url()}`),
   );
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 const heading = (text) => page.getByRole("heading", { level: 1, name: text });

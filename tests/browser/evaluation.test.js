@@ -1,19 +1,17 @@
 // The page of an evaluation: sentences first, wealth, one colour a strategy, histograms on one scale.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
 import { plain, usable } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 const HISTORY = Array.from({ length: 24 }, (_, k) => 0.01 + 0.05 * Math.sin(1.7 * k));
 
-let ballast, chromium, page, policy, report, evaluation;
+let policy, report, evaluation;
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
   const problem = { horizon: 3, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY };
   const design = { count: 40 };
   policy = await trained(ballast.url, { problem, design });
@@ -29,11 +27,6 @@ before(async () => {
   report = await call(ballast.url, `/jobs/${evaluation}/report`);
   await page.goto(`${ballast.url}/#/evaluations/${evaluation}`);
   await page.getByRole("table", { name: "How wealth ended, by what it is worth" }).waitFor();
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 test("what was compared, on which policy and for whom, comes first, and then what came of it", async () => {

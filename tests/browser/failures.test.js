@@ -1,30 +1,23 @@
 // Buttons whose service is gone: why nothing came of a press stands beside them, and they can be pressed again.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
 import { visit, visitQuiet } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 const PROBLEM = { horizon: 4, rate_per_step: 0.002, history: HISTORY, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } };
 const SILENT = "The service did not answer. Is it running?";
 
-let ballast, chromium, page, policy, session;
+let policy, session;
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
   page.on("dialog", (dialog) => dialog.accept());
   policy = await trained(ballast.url, { problem: PROBLEM, design: { count: 20 } });
   ({ session } = await call(ballast.url, "/sessions", { policy }));
   await call(ballast.url, "/observe", { session, period: 1, simple_return: 0.01, date: "2008-01-31" });
   await call(ballast.url, `/sessions/${session}/corrections`, { correction: 1, period: 1, reason: "a slip", simple_return: 0.02 });
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 const go = (hash) => visitQuiet(page, `${ballast.url}/#/${hash}`);

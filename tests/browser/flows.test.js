@@ -1,24 +1,12 @@
 // Money that comes and goes, and trading that costs, on the pages of a policy and of its session.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { test } from "node:test";
+import { call, trained } from "./ballast.js";
 import { plain, visit } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
-
-let ballast, chromium, page;
-
-before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
-});
 
 const main = async () => plain(await page.locator("main").innerText());
 

@@ -1,25 +1,18 @@
 // What is reported is asked about before it is recorded wrongly, and what was not recorded says so.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
 import { plain, usable, visitQuiet } from "./page.js";
+import { ballast, chromium, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 
-let ballast, chromium, page, policy;
+let policy;
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
   policy = await trained(ballast.url, { problem: { horizon: 12, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY }, design: { count: 12 } });
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 const open = async (name) => (await call(ballast.url, "/sessions", { policy, name })).session;

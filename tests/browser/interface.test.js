@@ -1,15 +1,13 @@
 // The page /docs in a browser: it shows bodies, defaults and examples, and asks for nothing from elsewhere.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service } from "./ballast.js";
+import { before, test } from "node:test";
+import { call } from "./ballast.js";
+import { ballast, page } from "./scene.js";
 
-let ballast, chromium, page;
 const faults = [];
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
   page.setDefaultTimeout(60_000);
   page.on("pageerror", (error) => faults.push(error.message));
   page.on("console", (message) => message.type() === "error" && faults.push(message.text()));
@@ -18,11 +16,6 @@ before(async () => {
     if (protocol !== "data:" && origin !== ballast.url) faults.push(`asked for ${request.url()}`);
   });
   await page.goto(`${ballast.url}/docs`);
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 test("every call is listed, and every problem", async () => {

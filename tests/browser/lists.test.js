@@ -1,15 +1,16 @@
 // Lists longer than a page: everything in them can be reached, and what does not stand there is said to be missing.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
+import { ballast, page } from "./scene.js";
 
 const SESSIONS = 211;
 /** More than a page of every list that the dashboard asks for. */
 const JOBS = 205;
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 
-let ballast, chromium, page, policy, oldest, evaluation;
+let policy, oldest, evaluation;
 
 const ended = async (job) => {
   for (;;) {
@@ -20,9 +21,6 @@ const ended = async (job) => {
 };
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
   const problem = { horizon: 2, rate_per_step: 0.002, history: HISTORY };
   const design = { count: 20 };
   ({ policy } = await ended((await call(ballast.url, "/train", { problem, design })).job));
@@ -43,11 +41,6 @@ before(async () => {
     });
     await fetch(`${ballast.url}/jobs/${job}/cancel`, { method: "POST" });
   }
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 async function go(hash) {

@@ -1,21 +1,19 @@
 // A session of 500 periods: its page stands within a second, and stays short.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
 import { usable, visitQuiet } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 const PERIODS = 500;
 /** From the address until the last part of the page stands, in milliseconds; what other programs do, only some rounds wait for. */
 const DRAWN = 1000;
 const ROUNDS = 20;
 
-let ballast, chromium, page, session;
+let session;
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
   const history = Array.from({ length: 40 }, (_, k) => 0.005 + 0.04 * Math.sin(1.7 * k));
   // One that rolls needs no horizon of 500 periods to be trained.
   const problem = { horizon: 2, rate_per_step: 0.001, periods_per_year: 252, history, learning: { kind: "decay", half_life: 4 }, radius: { rule: "bridge", alpha: 0.5, scale: 0.1 } };
@@ -26,11 +24,6 @@ before(async () => {
     const date = new Date(first + 86_400_000 * period).toISOString().slice(0, 10);
     await call(ballast.url, "/observe", { session, period, simple_return: 0.01 * Math.sin(3 * period), date });
   }
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 const address = () => `${ballast.url}/#/sessions/${session}`;

@@ -1,27 +1,20 @@
 // The page in a manager's words and in percent; the paper's words stand behind folds.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
 import { plain, usable, visitQuiet } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 /** What stops a reader who is no mathematician. */
 const PAPER = /certainty equivalent|miscoverage|\balpha\b|surrogate|duality|lengthscale|design point|\bWasserstein|worst law|robust|multiplier|log-utility|\bradius\b/i;
 
-let ballast, chromium, page, policy;
+let policy;
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
   const problem = { horizon: 3, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY, radius: { rule: "bridge", alpha: 0.2, scale: 0.1 } };
   policy = await trained(ballast.url, { problem, design: { count: 40 } });
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);

@@ -1,9 +1,10 @@
 // Ten thousand sessions: the overview stands as soon as that of a few, and whoever needs care is found among all.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
 import { visitQuiet } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 const SESSIONS = 10_000;
 /** The service takes so many reports in one call. */
@@ -15,12 +16,7 @@ const SOON = 300;
 const ROUNDS = 5;
 const DAY = 86_400_000;
 
-let ballast, chromium, page;
-
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
   const policy = await trained(ballast.url, { problem: { horizon: 3, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY }, design: { count: 20 } });
   const sessions = [];
   const open = async () => {
@@ -36,11 +32,6 @@ before(async () => {
     const reports = sessions.slice(start, start + AT_ONCE).map((session, index) => ({ session, period: 1, simple_return: 0.01, date: day(index % 100 === 0 ? 180 : 5) }));
     await call(ballast.url, "/observe", reports);
   }
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 /** How long it takes at the least, in milliseconds, from `act` until `seen` holds, after each `visit`. */

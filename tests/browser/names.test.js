@@ -1,24 +1,17 @@
 // What policies and sessions are called: given where they are made, changed where they stand, and said wherever they are meant.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
 import { usable, visitQuiet } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 
-let ballast, chromium, page, policy, session;
+let policy, session;
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
   policy = await trained(ballast.url, { problem: { horizon: 3, rate_per_step: 0.002, history: HISTORY }, design: { count: 20 } });
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);

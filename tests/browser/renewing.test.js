@@ -1,27 +1,20 @@
 // Sessions that go on by another policy: one that is there, or the same trained anew on the returns seen.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
 import { plain, usable, visitQuiet } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002, 0.03, -0.02];
 
-let ballast, chromium, page, short, long;
+let short, long;
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
   const of = (horizon, name, more = {}) => trained(ballast.url, { problem: { horizon, rate_per_step: 0.002, periods_per_year: 12, history: HISTORY, ...more }, design: { count: 20 }, name });
   short = await of(2, "Short");
   long = await of(12, "Long");
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);

@@ -1,28 +1,21 @@
 // A month for many clients at once: pasted by name, looked over, recorded, and what was refused kept for another try.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
 import { plain, usable, visitQuiet } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 const HISTORY = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002];
 const NAMES = ["Ada", "Grace Hopper", "Twin", "Twin", ""];
 
-let ballast, chromium, page, sessions;
+let sessions;
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
   const policy = await trained(ballast.url, { problem: { horizon: 3, rate_per_step: 0.002, history: HISTORY }, design: { count: 20 } });
   sessions = [];
   for (const name of NAMES) sessions.push((await call(ballast.url, "/sessions", { policy, name })).session);
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 const short = (id) => id.replace(/^[a-z]+_/, "").slice(0, 10);

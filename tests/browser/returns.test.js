@@ -1,22 +1,10 @@
 // Returns on the page: what is pasted, dropped or typed is read as what it is, told, asked about or refused.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service } from "./ballast.js";
+import { test } from "node:test";
+import { call } from "./ballast.js";
 import { usable } from "./page.js";
-
-let ballast, chromium, page;
-
-before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
-});
+import { ballast, page } from "./scene.js";
 
 const area = () => page.locator('textarea[name="problem.history"]');
 const note = () => page.locator("#f-problem-history-note");
@@ -160,7 +148,7 @@ test("what a file says of the bank is taken where that is wanted", async () => {
 
 test("a deviation above 30 % a period is not taken without a word", async () => {
   await pasted("500 -60 90 -30");
-  await note().getByText("standard deviation of 258.26 % a period and a mean of 1500.00 % a year").waitFor();
+  await note().getByText("give a standard deviation of 258.26 % a period").waitFor();
   assert.deepEqual(await history(), []);
   await page.getByRole("radio", { name: /^Yes, take them so/ }).check();
   await page.getByRole("button", { name: "Read it so" }).click();

@@ -2,10 +2,11 @@
 
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
-import { after, before, test } from "node:test";
-import { browser, call, service, trained } from "./ballast.js";
+import { before, test } from "node:test";
+import { call, trained } from "./ballast.js";
 import { dashboardModule } from "./modules.js";
 import { plain, usable, visitQuiet } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 const ASSETS = ["World", "Bonds A/B", "Gold"];
 const HISTORY = [
@@ -14,22 +15,15 @@ const HISTORY = [
 ];
 const COST = 0.001;
 
-let ballast, chromium, page, session;
+let session;
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
   page.setDefaultTimeout(10_000);
   const policy = await trained(ballast.url, {
     problem: { assets: ASSETS, horizon: 4, rate_per_step: 0.001, periods_per_year: 12, history: HISTORY, trading_cost: COST, radius: { rule: "bridge", alpha: 0.5, scale: 0.05 } },
     design: { count: 20 },
   });
   ({ session } = await call(ballast.url, "/sessions", { policy, wealth: 250_000, name: "Trust" }));
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 const go = () => visitQuiet(page, `${ballast.url}/#/sessions/${session}`);

@@ -1,8 +1,9 @@
 // A policy trained on 5,000 returns: its surface is drawn and redrawn while the page stays free.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service } from "./ballast.js";
+import { before, test } from "node:test";
+import { call } from "./ballast.js";
+import { ballast, page } from "./scene.js";
 
 /** What the page does is long in every round; what other programs on the machine do, in some. */
 const ROUNDS = 20;
@@ -10,11 +11,9 @@ const RETURNS = 5000;
 /** From the address on, and from a tick of a slider on, in milliseconds. */
 const [DRAWN, TICK] = [1000, 100];
 
-let ballast, chromium, page, policy;
+let policy;
 
 before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
   page.setDefaultTimeout(60_000);
   const history = Array.from(
     { length: RETURNS },
@@ -33,11 +32,6 @@ before(async () => {
     assert.ok(["queued", "running"].includes(now.state), now.error);
     await new Promise((resolve) => setTimeout(resolve, 200));
   }
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
 });
 
 const map = () => page.getByRole("application", { name: /Share held in stocks/ });

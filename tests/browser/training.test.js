@@ -1,25 +1,13 @@
 // The form of a training: the calendar and the bank rate as people know them, what may be a mistake, and what is kept of it half filled.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
-import { browser, call, service } from "./ballast.js";
+import { test } from "node:test";
+import { call } from "./ballast.js";
 import { accessible, plain, usable, visitQuiet } from "./page.js";
+import { ballast, page } from "./scene.js";
 
 const RETURNS = [0.0131, -0.0442, 0.021, 0.033, -0.012, 0.008, 0.045, -0.027, 0.016, 0.002, 0.03, -0.02];
 const DATED = RETURNS.map((value, k) => `2024-${String(k + 1).padStart(2, "0")}-28,${value}`).join("\n");
-
-let ballast, chromium, page;
-
-before(async () => {
-  [ballast, chromium] = await Promise.all([service(), browser()]);
-  page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
-  page.setDefaultTimeout(20_000);
-});
-
-after(async () => {
-  await chromium?.close();
-  await ballast?.stop();
-});
 
 const go = (hash) => visitQuiet(page, `${ballast.url}/${hash}`);
 const record = () => page.getByLabel("Returns or prices");
