@@ -209,6 +209,20 @@ test("those ticked are deleted at once after one question, and what stays is nam
   assert.deepEqual([asked.length, await page.locator("main .error").count(), await page.getByRole("button", { name: /^Delete/ }).count()], [3, 0, 0]);
 });
 
+test("on a telephone a session is a card, on which what is to be done is in sight", async () => {
+  await page.setViewportSize({ width: 390, height: 844 });
+  await go("");
+  for (const name of ["To hold", "To trade", "State"]) {
+    const cell = page.locator(`tbody td[data-name="${name}"]`).first();
+    const { x, width } = await cell.boundingBox();
+    assert.ok(x >= 0 && x + width <= 390, `${name}: ${x} to ${x + width}`);
+    assert.equal(await cell.evaluate((shown) => getComputedStyle(shown, "::before").content), `"${name}"`);
+  }
+  assert.equal(await page.locator(".listing .table").evaluate(({ scrollWidth, clientWidth }) => scrollWidth - clientWidth), 0);
+  await page.getByRole("button", { name: "Last report" }).waitFor();
+  await page.setViewportSize({ width: 1280, height: 900 });
+});
+
 test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {
   await usable(page, go);
 });

@@ -30,7 +30,7 @@ export function table(caption, columns, rows) {
   const cell = (row, column, index) =>
     h(
       index === 0 ? "th" : "td",
-      { scope: index === 0 ? "row" : null, class: column.numeric ? "number" : null },
+      { scope: index === 0 ? "row" : null, class: column.numeric ? "number" : null, "data-name": index === 0 ? null : column.label ?? column.name },
       column.cell(row),
     );
   return h(

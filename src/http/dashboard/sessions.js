@@ -165,7 +165,7 @@ function listed(entries, { ticks, advice, sorted, sort }) {
     const [up, down] = [sorted === column, sorted === `-${column}`];
     const mark = up ? "\u2191" : down ? "\u2193" : "";
     const button = h("button", { class: "link sorting", onclick: () => sort(column) }, words, h("span", { "aria-hidden": "true" }, ` ${mark}`));
-    return { name: button, sorted: up ? "ascending" : down ? "descending" : null };
+    return { name: button, label: words, sorted: up ? "ascending" : down ? "descending" : null };
   };
   return table("Sessions", [
     {
