@@ -146,10 +146,10 @@ test("who gets what is shown before, and what came of it after", async () => {
   await page.getByRole("button", { name: "Report for 3" }).click();
   await page.getByRole("heading", { name: "What came of it" }).waitFor();
   const told = await rows("Outcomes");
-  assert.match(told[0], /^Ada \w+ 1\.20 % recorded as period 1 /);
+  assert.match(told[1], /^Ada \w+ 1\.20 % recorded as period 1 /);
   // What is to be done now stands beside each name.
   await page.getByRole("table", { name: "Outcomes" }).getByText(/^(Buy|Sell) [\d.]+$|^Nothing$/).first().waitFor();
-  assert.match(told[1], /^Grace Hopper \w+ 90\.00 % Line 2: A return of 90\.00 % lies [\d.]+ standard deviations from the record\. – –$/);
+  assert.match(told[0], /^Grace Hopper \w+ 90\.00 % Line 2: A return of 90\.00 % lies [\d.]+ standard deviations from the record\. – –$/);
   await page.getByText("2 returns are recorded, and 3 left above for another try.").first().waitFor();
   assert.equal(await lines().inputValue(), "Grace Hopper 90\nTwin 1\nNobody 2");
   const [ada] = await observed(0);
@@ -269,6 +269,20 @@ test("returns that seem to be fractions are not recorded before it is said what 
 test("a column that is not understood is named, with those that are", async () => {
   await lines().fill("client,return,colour\nAda,1,red");
   await page.getByText(/^Nothing is read from the column “colour”\. A column is called client, return, held, rate, flow, wealth, date, period or like an asset/).waitFor();
+});
+
+test("of a long list the first hundred lines are drawn, those that cannot be sent before the others, and all where that is wanted", async () => {
+  await go("#/report");
+  const drawn = page.getByRole("table", { name: "Returns to report" }).locator("tbody tr");
+  await lines().fill(["Ada 1.2", ...Array.from({ length: 499 }, (_, k) => `Nobody${k} 1`)].join("\n"));
+  await page.getByLabel("the next period is meant", { exact: false }).check();
+  await page.getByRole("button", { name: "Report for 1" }).waitFor();
+  assert.equal(await drawn.count(), 100);
+  assert.match(await drawn.first().innerText(), /^Nobody0/);
+  assert.match(await drawn.last().innerText(), /^Nobody99/);
+  await page.getByRole("button", { name: "Show all 500" }).click();
+  assert.equal(await drawn.count(), 500);
+  assert.match(await drawn.last().innerText(), /^Ada/);
 });
 
 test("axe finds nothing, in light, in dark, at 200 % and at 320 pixels, and nothing scrolls sideways", async () => {

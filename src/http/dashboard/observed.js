@@ -10,6 +10,7 @@ import { addedIn, rateIn, standing } from "./flows.js";
 import { pressed } from "./form.js";
 import { allocation, count, figures, moment, percent, short, wealth } from "./format.js";
 import { policyLink } from "./naming.js";
+import { firstOf } from "./pages.js";
 import { day } from "./periods.js";
 import { save } from "./picture.js";
 import { assetReturns, assetsHeld } from "./several_fields.js";
@@ -44,8 +45,7 @@ export function observed(shown) {
       ],
       some,
     );
-  const holder = h("div", {}, told(rows.slice(0, NEWEST)));
-  const all = h("button", { class: "quiet", onclick: () => (holder.replaceChildren(told(rows)), all.remove()) }, `Show all ${count(rows.length)}`);
+  const { holder, all } = firstOf(rows, NEWEST, told);
   const quant = () =>
     table(
       "Observed periods in the words of the paper",
@@ -64,7 +64,7 @@ export function observed(shown) {
     h(
       "p",
       { class: "foot" },
-      rows.length > NEWEST ? all : null,
+      all,
       h("button", { class: "quiet", onclick: () => save(csv(shown), file, "text/csv") }, "Save as CSV"),
     ),
     corrections(shown),

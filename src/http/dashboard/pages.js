@@ -37,6 +37,14 @@ export async function all(path, name, signal) {
   return found;
 }
 
+/** What `draw` makes of the first `most` rows, and a button that shows `all`, null where those are all. */
+export function firstOf(rows, most, draw) {
+  const holder = h("div", {}, draw(rows.slice(0, most)));
+  if (rows.length <= most) return { holder, all: null };
+  const all = h("button", { type: "button", class: "quiet", onclick: () => (holder.replaceChildren(draw(rows)), all.remove()) }, `Show all ${count(rows.length)}`);
+  return { holder, all };
+}
+
 /** The line below a list of which `shown` entries stand, named by `nouns`, one and many: what is missing, and a button that `add`s it. */
 export function foot(pages, nouns, shown, add) {
   const line = h("p", { class: "note" });

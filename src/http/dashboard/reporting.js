@@ -8,7 +8,7 @@ import { fileDrop } from "./file_drop.js";
 import { area, fieldset, input, pressed, refusal, select } from "./form.js";
 import { count, counted, percent, wealth } from "./format.js";
 import { called, headed } from "./naming.js";
-import { all } from "./pages.js";
+import { all, firstOf } from "./pages.js";
 import { dayOf, isoDay, lastEnd } from "./periods.js";
 import { problemWords } from "./problem_words.js";
 import { finder, HEADS, inUnit, LATELY, otherUnit, readLines, written } from "./report_lines.js";
@@ -268,25 +268,34 @@ function besides({ report }) {
 
 const isBeside = ({ report }) => Object.keys(report).some((name) => !["simple_return", "simple_returns", "period"].includes(name));
 
+/** So many rows are drawn at once: a list of thousands would be drawn anew at every letter. */
+const DRAWN = 100;
+
+const firstFew = (rows, draw) => {
+  const { holder, all } = firstOf(rows, DRAWN, draw);
+  return [holder, all && h("p", { class: "foot" }, all)];
+};
+
 /** Lines that cannot be sent stand first, each with the reason below the name. */
 const previewed = (rows) =>
-  table("Returns to report", [
+  firstFew([...rows].sort((one, other) => Number(one.trouble === null) - Number(other.trouble === null)), (some) => table("Returns to report", [
     { name: "Session", cell: (row) => [h("div", { class: "said" }, who(row)), row.trouble ? wrongLine(row.line, row.trouble) : null] },
     { name: "Period", numeric: true, cell: ({ entry, report }) => (entry ? count(report.period ?? entry.period) : "\u2013") },
     { name: "Return", numeric: true, cell: returned },
     ...(rows.some(isBeside) ? [{ name: "Also", cell: besides }] : []),
-  ], [...rows].sort((one, other) => Number(one.trouble === null) - Number(other.trouble === null)));
+  ], some));
 
 const outcomes = (told, advice) => {
   const isRecorded = ({ answer }) => answer.status === 200;
   const now = (name) => (row) => (isRecorded(row) ? advice.of(row.entry)[name] : "\u2013");
-  return table("Outcomes", [
+  const failedFirst = [...told].sort((one, other) => Number(isRecorded(one)) - Number(isRecorded(other)));
+  return firstFew(failedFirst, (some) => table("Outcomes", [
     { name: "Session", cell: who },
     { name: "Return", numeric: true, cell: returned },
     { name: "Outcome", cell: ({ line, answer }) => (answer.status === 200 ? `recorded as period ${count(answer.period)}` : wrongLine(line, refused(answer.problem))) },
     { name: "To hold", numeric: true, cell: now("hold") },
     { name: "To trade", numeric: true, cell: now("trade") },
-  ], told);
+  ], some));
 };
 
 const wrongLine = (line, words) => h("span", { class: "under wrong" }, `Line ${count(line)}: ${words}`);
