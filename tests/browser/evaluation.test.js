@@ -38,6 +38,10 @@ test("what was compared, on which policy and for whom, comes first, and then wha
   const best = report.strategies.reduce((best, one) => (one.certainty_equivalent.value > best.certainty_equivalent.value ? one : best));
   assert.ok(words.includes(`is worth the most to this investor: as much as a sure ${best.certainty_equivalent.value.toFixed(2)}`), words);
   assert.match(words, /ends with less than was put in in \d+ % of the futures; the worst 5 % of them end with [\d.]+ on average\./);
+  const main = report.strategies.find(({ strategy }) => strategy === report.reference);
+  assert.notEqual(main, best);
+  assert.match(words, /Here the record is the truth, so caution can only cost\. What it may save shows where the histories are drawn from the market\./);
+  assert.deepEqual(await page.locator("tbody th b").allInnerTexts(), ["Cautious, learns"]);
   assert.doesNotMatch(words, /utility|Variance|Less adaptive|undefined|NaN/);
 });
 

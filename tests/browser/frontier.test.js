@@ -27,6 +27,10 @@ test("a session's page asks, and the report is drawn with its sentences and a ta
     assert.doesNotMatch(shown, /basis point|premium|\bscale\b/);
     assert.equal(await page.locator("main svg").count(), 3);
     assert.equal(await page.getByRole("table").count(), 3);
+    // What is lost is drawn on one scale from nothing on.
+    const scales = await page.locator("main svg").evaluateAll((drawings) => drawings.map((drawing) => [...drawing.querySelectorAll("text.tick:not(.name)")].map(({ textContent }) => textContent)));
+    assert.match(scales[0][0], /^0(\.0+)?$/);
+    assert.deepEqual(scales.slice(1), [scales[0], scales[0]]);
     assert.ok(!/undefined|NaN|null/.test(shown), shown);
     await usable(page, () => {});
     await page.goto(`${ballast.url}/#/jobs`);

@@ -69,11 +69,14 @@ function compared({ request, histories, strategies }, policyLink) {
 const LAWS = { bootstrap: "the record itself, smoothed", gaussian_mixture: "a mixture of bell curves", student_t: "a Student law, of heavier tails than a bell curve" };
 const drawnFrom = (law) => LAWS[law?.kind] ?? "the market it was asked for";
 
+/** Whether futures are drawn from the very record that the policies know. */
+const isTrue = ({ histories, problem: { law } }) => histories.kind !== "drawn" && law?.kind === "bootstrap";
+
 /** A name within a sentence. */
 const called = ({ framework, name }) => (framework ? `\u201c${name}\u201d` : name);
 
 /** What the figures say. */
-function conclusions({ reference }, ended) {
+function conclusions({ reference, request }, ended) {
   const [best] = ended;
   const bank = ended.find(({ constant_mix }) => constant_mix === 0);
   const stocks = ended.find(({ constant_mix }) => constant_mix === 1);
@@ -87,6 +90,7 @@ function conclusions({ reference }, ended) {
     const { low, high } = best.difference?.certainty_equivalent ?? { low: -1, high: 1 };
     const far = low > 0 || high < 0 ? "" : ", by so little that these futures cannot tell the two apart";
     said.push(`${called(main)} comes ${ordinal(place)} of ${ended.length}, worth ${sure(main)}${far}.`);
+    if (isTrue(request)) said.push("Here the record is the truth, so caution can only cost. What it may save shows where the histories are drawn from the market.");
   }
   if (main) {
     const beside = stocks && stocks !== main ? ` All in stocks does so in ${percent(stocks.wealth.chance_of_loss.value, 0)}, with ${wealth(stocks.wealth.worst_twentieth.value)}.` : "";
@@ -103,14 +107,14 @@ function results(report, ended) {
     h("div", { class: "words" }, conclusions(report, ended).map((sentence) => h("p", {}, sentence))),
     intervalChart({
       title: "Worth as much as a sure",
-      rows: ended.map(({ name, colour, certainty_equivalent }) => ({ name, colour, ...certainty_equivalent })),
+      rows: ended.map(({ name, colour, strategy, certainty_equivalent }) => ({ name, colour, isMain: strategy === report.reference, ...certainty_equivalent })),
       format: wealth,
       tick,
     }),
     table(
       "How wealth ended, by what it is worth",
       [
-        { name: "Strategy", cell: ({ name }) => name },
+        { name: "Strategy", cell: ({ name, strategy }) => (strategy === report.reference ? h("b", {}, name) : name) },
         { name: "Worth as much as a sure", numeric: true, cell: ({ certainty_equivalent }) => wealth(certainty_equivalent.value) },
         money("Average", "mean"),
         share("Chance of loss", "chance_of_loss"),

@@ -1,6 +1,7 @@
 // What more or less caution would lose on records like the one at hand: asked for, and the report of it.
 
 import { post } from "./api.js";
+import { extent } from "./chart.js";
 import { h, section, table } from "./dom.js";
 import { pressed } from "./form.js";
 import { minus, percent, tick } from "./format.js";
@@ -8,7 +9,9 @@ import { intervalChart } from "./interval_chart.js";
 
 export function body(report) {
   const words = h("div", { class: "words" }, report.sentences.map((sentence) => h("p", {}, minus(sentence))));
-  return [words, ...report.resampled.map((resampled) => drawn(report, resampled))];
+  // One scale for all laws, from nothing lost on.
+  const domain = extent(report.resampled.flatMap(({ points }) => points.flatMap(({ lost: { low, high } }) => [low, high])), [0]);
+  return [words, ...report.resampled.map((resampled) => drawn(report, resampled, domain))];
 }
 
 const TITLES = {
@@ -22,7 +25,7 @@ const inPercent = (value) => tick(value / 100, 0.001);
 const scaled = (scale) => ({ 0: "No caution", 1: "This caution" })[scale] ?? `${scale} times it`;
 
 /** One law: what each scale loses, and how much that varies. */
-function drawn({ own, per_year }, { bootstrap, best, points: scales }) {
+function drawn({ own, per_year }, { bootstrap, best, points: scales }, domain) {
   const title = TITLES[bootstrap.kind](bootstrap);
   const total = (shares) => shares.reduce((sum, share) => sum + share, 0);
   const lost = `Lost ${per_year ? "a year" : "a period"}, %`;
@@ -31,7 +34,7 @@ function drawn({ own, per_year }, { bootstrap, best, points: scales }) {
   return section(
     title,
     h("p", { class: "note" }, `Who knows this market holds ${percent(total(best))}.`),
-    intervalChart({ title: lost, noun: "Caution", rows: rows.map(({ name, lost }) => ({ name, ...lost })), format: inPercent, tick: (value, step) => tick(value / 100, step / 100) }),
+    intervalChart({ title: lost, noun: "Caution", rows: rows.map(({ name, lost }) => ({ name, ...lost })), domain, format: inPercent, tick: (value, step) => tick(value / 100, step / 100) }),
     table(
       `${title}: ${lost.toLowerCase()}, at each multiple of the caution`,
       [

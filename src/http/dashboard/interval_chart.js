@@ -7,13 +7,12 @@ const LINE = 26;
 /** The same where a name has a line of its own. */
 const TWO = 42;
 
-/** `rows`: `{name, value, low, high, colour}`; `noun` says what has the names. */
-export function intervalChart({ title, noun = "Strategy", rows, format, tick }) {
+/** `rows`: `{name, value, low, high, colour, isMain}`; `noun` says what has the names, `domain` from where to where the scale goes. */
+export function intervalChart({ title, noun = "Strategy", rows, format, tick, domain = extent(rows.flatMap(({ low, high }) => [low, high])) }) {
   const names = 20 + 7.2 * Math.max(...rows.map(({ name }) => name.length));
   /** Beside their names the ranges have no room. */
   const narrow = (width) => names > 0.55 * width;
   const line = (width) => (narrow(width) ? TWO : LINE);
-  const domain = extent(rows.flatMap(({ low, high }) => [low, high]));
   const holder = plot((width) => line(width) * rows.length + 34, (width) => {
     const left = narrow(width) ? 8 : names;
     const bottom = line(width) * rows.length + 4;
@@ -28,10 +27,10 @@ export function intervalChart({ title, noun = "Strategy", rows, format, tick }) 
           tick(place, grain(places)),
         ),
       ]),
-      rows.map(({ name, value, low, high, colour = 0 }, index) => {
+      rows.map(({ name, value, low, high, colour = 0, isMain = false }, index) => {
         const y = line(width) * (index + (narrow(width) ? 0.75 : 0.5)) + 2;
         return [
-          s("text", { class: "tick name", x: 0, y: narrow(width) ? y - 16 : y, dy: "0.32em" }, name),
+          s("text", { class: `tick name${isMain ? " main" : ""}`, x: 0, y: narrow(width) ? y - 16 : y, dy: "0.32em" }, name),
           s("line", { class: `range s${colour}`, x1: x(low), x2: Math.max(x(high), x(low) + 1), y1: y, y2: y }),
           s("circle", { class: `dot s${colour}`, cx: x(value), cy: y, r: 4.5 }),
         ];
