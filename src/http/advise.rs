@@ -3,13 +3,14 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use axum::Json;
 use axum::extract::State;
+use axum::response::Response;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::access::{By, Heavy};
+use super::bodies;
 use super::decode;
 use super::extract::JsonBytes;
 use super::problem::Problem;
@@ -49,17 +50,19 @@ pub async fn advise(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,
     JsonBytes(bytes): JsonBytes,
-) -> Result<Json<AdviseAnswer>, Problem> {
+) -> Result<Response, Problem> {
     let started = Instant::now();
     let (sessions, tenant) = (&service.sessions, &caller.tenant);
     let (answer, mode) = match question(&bytes)? {
-        AdviseQuestion::Asset(asked) => (AdviseAnswer::Asset(sessions.advise(tenant, asked).await?.into()), "advise"),
+        AdviseQuestion::Asset(asked) => {
+            (sessions.advise(tenant, asked).await?.map(|advised| AdviseAnswer::Asset(advised.into())), "advise")
+        }
         AdviseQuestion::Assets(asked) => {
-            (AdviseAnswer::Assets(sessions.advise_assets(tenant, asked).await?.into()), "advise_assets")
+            (AdviseAnswer::Assets(sessions.advise_assets(tenant, asked).await?.into()).into(), "advise_assets")
         }
     };
     metrics::histogram!(ACTION_SECONDS, "mode" => mode).record(started.elapsed().as_secs_f64());
-    Ok(Json(answer))
+    bodies::written(answer).await
 }
 
 /// What tells whether a question says its horizon, and whether it names assets.

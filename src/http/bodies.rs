@@ -7,15 +7,18 @@
 use std::convert::Infallible;
 use std::sync::Arc;
 
+use axum::Json;
 use axum::body::{Body, Bytes};
 use axum::extract::Request;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use futures_util::stream;
+use serde::Serialize;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::problem::{Problem, ProblemKind};
-use crate::service::memory::Document;
+use crate::service::error::ServiceError;
+use crate::service::memory::Large;
 
 /// Bodies up to this size are not counted, and larger ones in units of it.
 const UNIT: usize = 64 << 10;
@@ -59,8 +62,21 @@ impl Bodies {
     }
 }
 
+/// A value as the answer. What is large is written where nobody waits for the thread, and leaves in parts.
+///
+/// # Errors
+/// It cannot be written as JSON.
+pub async fn written<T: Serialize + Send + 'static>(Large { value, room }: Large<T>) -> Result<Response, Problem> {
+    if room.is_none() {
+        return Ok(Json(value).into_response());
+    }
+    let writing = tokio::task::spawn_blocking(move || serde_json::to_vec(&value));
+    let bytes = writing.await.map_err(ServiceError::internal)?.map_err(ServiceError::internal)?;
+    Ok(sent(Large { value: bytes, room }))
+}
+
 /// A document as the answer, in parts: its memory is held until the last of them is taken from it, however slowly a client reads.
-pub fn sent(Document { bytes, room }: Document) -> Response {
+pub fn sent(Large { value: bytes, room }: Large<Vec<u8>>) -> Response {
     let headers =
         [(header::CONTENT_TYPE, "application/json".to_owned()), (header::CONTENT_LENGTH, bytes.len().to_string())];
     let parts = stream::unfold((Bytes::from(bytes), room), async |(mut left, room)| {

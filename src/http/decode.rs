@@ -1,10 +1,15 @@
 //! From bytes to a typed request, naming the field, the value and the rule when they disagree.
 
-use serde::de::DeserializeOwned;
+use std::borrow::Cow;
+use std::fmt;
+
+use serde::de::{DeserializeOwned, DeserializeSeed, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 use serde_json::Value;
+use serde_json::value::RawValue;
 use serde_path_to_error::{Path, Segment};
 
-use super::problem::{Problem, ProblemKind};
+use super::problem::{Problem, ProblemKind, SHOWN_VALUE, shortened};
 use crate::control::error::FieldError;
 
 /// What is meant by fields that must be given because no default is right for all.
@@ -35,7 +40,8 @@ pub fn json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
 /// As [`json`], of an object: a list would be read as its fields in their order.
 pub fn object<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
     if bytes.trim_ascii_start().starts_with(b"[") {
-        let error = FieldError::new("body", json::<Value>(bytes)?, "must be an object");
+        json::<IgnoredAny>(bytes)?;
+        let error = FieldError::new("body", at(bytes, "").unwrap_or_default(), "must be an object");
         return Err(Problem::of_field(ProblemKind::InvalidField, error));
     }
     json(bytes)
@@ -51,10 +57,11 @@ pub fn parameters<T: DeserializeOwned>(pairs: Vec<(String, String)>) -> Result<T
         }
         object.insert(name, Value::String(value));
     }
-    let given = Value::Object(object.clone());
+    let given = object.clone();
     serde_path_to_error::deserialize(Value::Object(object)).map_err(|error| {
         let (path, message) = (dotted(error.path()), error.into_inner().to_string());
-        Problem::of_field(ProblemKind::InvalidQuery, located(&given, path, &message))
+        let value_of = |field: &str| given.get(field).map(Value::to_string);
+        Problem::of_field(ProblemKind::InvalidQuery, located(value_of, path, &message))
     })
 }
 
@@ -97,17 +104,23 @@ fn whole(number: &[u8]) -> &[u8] {
 
 /// Valid JSON of the wrong shape.
 fn mismatch(bytes: &[u8], path: String, cause: &serde_json::Error) -> Problem {
-    let given = serde_json::from_slice(bytes).unwrap_or(Value::Null);
-    Problem::of_field(ProblemKind::InvalidField, located(&given, path, &without_position(cause)))
+    let value_of = |field: &str| at(bytes, field);
+    Problem::of_field(ProblemKind::InvalidField, located(value_of, path, &without_position(cause)))
 }
 
 /// The parser stops at an element too many as at a byte too many, and at a list where it wants a word; the body is JSON
 /// all the same.
 fn misshapen(bytes: &[u8], path: &str, cause: &serde_json::Error) -> Option<Problem> {
     const ELEMENT_TOO_MANY: &str = "trailing characters";
-    let given: Value = serde_json::from_slice(bytes).ok()?;
-    let value = lookup(&given, path).unwrap_or(&given);
-    let rule = match without_position(cause).as_str() {
+    const NO_NUMBER: &str = "number out of range";
+    let message = without_position(cause);
+    // What is passed over is not read as a number, so it would be no fault of the syntax.
+    if message == NO_NUMBER {
+        return None;
+    }
+    serde_json::from_slice::<IgnoredAny>(bytes).ok()?;
+    let value = at(bytes, path).or_else(|| at(bytes, ""))?;
+    let rule = match message.as_str() {
         ELEMENT_TOO_MANY => "must have fewer elements".to_owned(),
         expected => format!("must have another type: {expected}"),
     };
@@ -116,7 +129,7 @@ fn misshapen(bytes: &[u8], path: &str, cause: &serde_json::Error) -> Option<Prob
 }
 
 /// Names the field a message of serde is about: unknown and missing fields stand in the message, not in the path.
-fn located(given: &Value, path: String, message: &str) -> FieldError {
+fn located(value_of: impl Fn(&str) -> Option<String>, path: String, message: &str) -> FieldError {
     let mut field = path;
     let mut rule = message.to_owned();
     for (marker, meaning) in [("unknown field `", "is not a field here"), ("missing field `", "must be given")] {
@@ -132,7 +145,7 @@ fn located(given: &Value, path: String, message: &str) -> FieldError {
             },
         };
     }
-    let value = lookup(given, &field).map_or("null".to_owned(), Value::to_string);
+    let value = value_of(&field).unwrap_or("null".to_owned());
     let field = if field.is_empty() { "body".to_owned() } else { field };
     FieldError::new(field, value, rule)
 }
@@ -179,13 +192,89 @@ fn dotted(path: &Path) -> String {
     text
 }
 
-fn lookup<'a>(given: &'a Value, field: &str) -> Option<&'a Value> {
-    field.split(['.', '[']).filter(|part| !part.is_empty()).try_fold(given, |value, part| {
-        match part.strip_suffix(']') {
-            Some(index) => value.get(index.parse::<usize>().ok()?),
-            None => value.get(part),
+/// The text of the value at a dotted path, as far as a problem shows it. What is not on the path is passed over: a tree of a large
+/// body would take ten times its bytes.
+fn at(bytes: &[u8], field: &str) -> Option<String> {
+    let path: Vec<&str> = field.split(['.', '[']).filter(|part| !part.is_empty()).collect();
+    Along(&path).deserialize(&mut serde_json::Deserializer::from_slice(bytes)).ok()?
+}
+
+/// The way from a value to one inside it.
+struct Along<'a>(&'a [&'a str]);
+
+impl<'de> DeserializeSeed<'de> for Along<'_> {
+    type Value = Option<String>;
+
+    fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<Self::Value, D::Error> {
+        if self.0.is_empty() {
+            let text = <&RawValue>::deserialize(reader)?.get();
+            return Ok(Some(match text.len() <= SHOWN_VALUE {
+                true => serde_json::from_str::<Value>(text).map_or(text.to_owned(), |value| value.to_string()),
+                false => shortened(text, SHOWN_VALUE + 1),
+            }));
         }
-    })
+        reader.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Along<'_> {
+    type Value = Option<String>;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("a value")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut fields: A) -> Result<Self::Value, A::Error> {
+        let mut found = None;
+        while let Some(name) = fields.next_key::<Cow<'de, str>>()? {
+            if name == self.0[0] {
+                found = fields.next_value_seed(Along(&self.0[1..]))?;
+            } else {
+                fields.next_value::<IgnoredAny>()?;
+            }
+        }
+        Ok(found)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut elements: A) -> Result<Self::Value, A::Error> {
+        let wanted = self.0[0].strip_suffix(']').and_then(|index| index.parse::<usize>().ok());
+        let (mut found, mut index) = (None, 0);
+        loop {
+            let is_there = if wanted == Some(index) {
+                elements.next_element_seed(Along(&self.0[1..]))?.map(|value| found = value)
+            } else {
+                elements.next_element::<IgnoredAny>()?.map(drop)
+            };
+            if is_there.is_none() {
+                return Ok(found);
+            }
+            index += 1;
+        }
+    }
+
+    fn visit_unit<E>(self) -> Result<Self::Value, E> {
+        Ok(None)
+    }
+
+    fn visit_bool<E>(self, _: bool) -> Result<Self::Value, E> {
+        Ok(None)
+    }
+
+    fn visit_f64<E>(self, _: f64) -> Result<Self::Value, E> {
+        Ok(None)
+    }
+
+    fn visit_u64<E>(self, _: u64) -> Result<Self::Value, E> {
+        Ok(None)
+    }
+
+    fn visit_i64<E>(self, _: i64) -> Result<Self::Value, E> {
+        Ok(None)
+    }
+
+    fn visit_str<E>(self, _: &str) -> Result<Self::Value, E> {
+        Ok(None)
+    }
 }
 
 #[cfg(test)]

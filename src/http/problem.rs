@@ -151,7 +151,7 @@ pub struct Problem {
 /// Longest text shown of a field's name, of a value and of a sentence, in characters: refused text is the caller's own and
 /// may hold megabytes.
 const SHOWN_FIELD: usize = 120;
-const SHOWN_VALUE: usize = 80;
+pub const SHOWN_VALUE: usize = 80;
 const SHOWN_SENTENCE: usize = 400;
 
 /// `text` itself where it is no longer than `limit` characters, else its start.

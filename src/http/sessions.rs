@@ -12,6 +12,7 @@ use utoipa::ToSchema;
 
 use super::access::{self, Asked, By, Live, Read};
 use super::action::ActionAnswer;
+use super::bodies;
 use super::extract::{Id, JsonBody};
 use super::jobs::idempotency_key;
 use super::problem::Problem;
@@ -21,12 +22,12 @@ use crate::service::Service;
 use crate::service::action::Question;
 use crate::service::allowance::Class;
 use crate::service::answer::Corrected;
+use crate::service::explain::Explain;
 use crate::service::history::History;
 use crate::service::metrics::ACTION_SECONDS;
 use crate::service::plan::{Renew, Renewed};
 use crate::service::report::Correct;
 use crate::service::sessions::Start;
-use crate::service::what_if::Explain;
 use crate::store::{Labels, Relabel};
 
 /// Open a session.
@@ -82,8 +83,8 @@ pub async fn history(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Read>,
     Id(id): Id,
-) -> Result<Json<History>, Problem> {
-    Ok(Json(service.sessions.history(&caller.tenant, &id, &caller.turn).await?))
+) -> Result<Response, Problem> {
+    bodies::written(service.sessions.history(&caller.tenant, &id, &caller.turn).await?).await
 }
 
 /// Report a period anew, put in one that was skipped or take one out: exactly once, durable before it is answered. What was
@@ -196,10 +197,7 @@ impl access::Question for Ask {
         (status = 404, description = "There is no such session.", body = Problem, content_type = "application/problem+json"),
         (status = 409, description = "The session has reached its horizon.", body = Problem, content_type = "application/problem+json"),
         (status = 422, description = "The sensitivity of this session is not told.", body = Problem, content_type = "application/problem+json")))]
-pub async fn action(
-    State(service): State<Arc<Service>>,
-    Asked(caller, ask): Asked<Ask>,
-) -> Result<Json<ActionAnswer>, Problem> {
+pub async fn action(State(service): State<Arc<Service>>, Asked(caller, ask): Asked<Ask>) -> Result<Response, Problem> {
     let (mode, label) = match (ask.explain, ask.mode) {
         (Some(Explain::WorstCase), _) => (AdviceMode::Resolve, "explain"),
         (None, Some(Mode::Resolve)) => (AdviceMode::Resolve, "resolve"),
@@ -211,5 +209,5 @@ pub async fn action(
     let started = Instant::now();
     let action = service.sessions.action(&caller.tenant, &ask.session, question, &caller.turn).await?;
     metrics::histogram!(ACTION_SECONDS, "mode" => label).record(started.elapsed().as_secs_f64());
-    Ok(Json(ActionAnswer::new(ask.session, action)))
+    bodies::written(action.map(|action| ActionAnswer::new(ask.session, action))).await
 }

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use axum::Json;
 use axum::extract::State;
+use axum::response::Response;
 
 use super::access::{By, Heavy};
+use super::bodies;
 use super::extract::JsonBody;
 use super::problem::Problem;
 use crate::service::Service;
@@ -28,9 +29,9 @@ pub async fn what_if(
     State(service): State<Arc<Service>>,
     By(caller, _): By<Heavy>,
     JsonBody(request): JsonBody<WhatIf>,
-) -> Result<Json<WhatIfAnswer>, Problem> {
+) -> Result<Response, Problem> {
     let started = Instant::now();
     let answer = service.sessions.what_if(&caller.tenant, request).await?;
     metrics::histogram!(ACTION_SECONDS, "mode" => "what_if").record(started.elapsed().as_secs_f64());
-    Ok(Json(answer))
+    bodies::written(answer).await
 }

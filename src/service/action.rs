@@ -3,7 +3,9 @@
 use super::allowance::HeavyTurn;
 use super::assets::Assets;
 use super::error::ServiceError;
+use super::explain::ATOM_BYTES;
 use super::live::Live;
+use super::memory::Large;
 use super::periods::{Passage, Periods};
 use super::sessions::Sessions;
 use crate::control::error::FieldError;
@@ -48,7 +50,7 @@ impl Sessions {
         session: &str,
         question: Question,
         turn: &HeavyTurn,
-    ) -> Result<Action, ServiceError> {
+    ) -> Result<Large<Action>, ServiceError> {
         let mut held = self.hold(tenant, session).await;
         let live = held.current(&self.rows(tenant, session)).await?;
         live.goes_on()?;
@@ -57,13 +59,13 @@ impl Sessions {
         let surrogate = mode == AdviceMode::Surrogate && !explain;
         if let Some(advice) = live.advice.clone().filter(|_| surrogate && !sensitivity) {
             let assets = live.standing.assets.clone();
-            return Ok(Action { period, advice, assets, worst_case: None, sensitivity: None, waiting });
+            return Ok(Action { period, advice, assets, worst_case: None, sensitivity: None, waiting }.into());
         }
         let means = self.means(tenant, live, turn).await?;
         if surrogate && !sensitivity {
             let advice = live.surrogate_advice(&means).await?.clone();
             let assets = live.standing.assets.clone();
-            return Ok(Action { period, advice, assets, worst_case: None, sensitivity: None, waiting });
+            return Ok(Action { period, advice, assets, worst_case: None, sensitivity: None, waiting }.into());
         }
         let advisor = means.advisor;
         let (mut state, step, assets) = (live.standing.state.clone(), live.step(), live.standing.assets.clone());
@@ -74,6 +76,8 @@ impl Sessions {
         }
         drop(held);
         turn.begin().await?;
+        let shown = if explain { state.law.sample_size() } else { 0 };
+        let room = self.memory.answers(shown * ATOM_BYTES).await?;
         let solving = self.resolving.run(tenant, move || {
             let (advice, worst_case) = match explain {
                 true => {
@@ -86,7 +90,7 @@ impl Sessions {
             let sensitivity = record.map(|record| advisor.sensitivity(step, &state, &record, (&advice, mode)));
             Action { period, advice, assets, worst_case, sensitivity, waiting }
         });
-        solving.await
+        Ok(Large { value: solving.await?, room })
     }
 
     /// The state of a session and the returns that it has seen, in their order, both as of the entries that `live` knows.
@@ -98,7 +102,7 @@ impl Sessions {
             let rule = "must be left out: it is not told of several assets";
             return Err(FieldError::new("sensitivity", true, rule).into());
         }
-        let mut facts = self.facts(tenant, &live.row.session).await?;
+        let Large { value: mut facts, room: _room } = self.facts(tenant, &live.row.session).await?;
         // What another process recorded since then is of the next question.
         facts.entries.truncate(live.seen.entries());
         advisor.check_sensitivity(live.standing.state.law.sample_size())?;

@@ -4,6 +4,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::error::ServiceError;
+use super::explain::ATOM_BYTES;
+use super::memory::Large;
 use super::sessions::Sessions;
 use crate::control::error::FieldError;
 use crate::control::kept::Kept;
@@ -108,10 +110,12 @@ impl Checked {
 impl Sessions {
     /// # Errors
     /// A field breaks a rule; the radius asks for more memory than can be kept; no turn to solve.
-    pub async fn advise(&self, tenant: &Tenant, question: Advise) -> Result<Advised, ServiceError> {
+    pub async fn advise(&self, tenant: &Tenant, question: Advise) -> Result<Large<Advised>, ServiceError> {
         let checked = question.checked()?;
         let investor = self.policies.one_period(&checked.specification)?;
         checked.check_sensitivity(&investor)?;
-        Ok(self.resolving.run(tenant, move || checked.answered(&investor)).await??)
+        let shown = checked.specification.problem.history.len();
+        let room = self.memory.answers(shown * ATOM_BYTES).await?;
+        Ok(Large { value: self.resolving.run(tenant, move || checked.answered(&investor)).await??, room })
     }
 }

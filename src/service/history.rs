@@ -12,6 +12,7 @@ use super::assets::{Composed, ObservedAssets};
 use super::content::read;
 use super::error::ServiceError;
 use super::known::KnownReturns;
+use super::memory::Large;
 use super::periods::{Passage, Period, Periods, Step};
 use super::plan::{Plan, Renew, Renewed};
 use super::report::{Correct, Report};
@@ -126,8 +127,13 @@ impl Sessions {
     ///
     /// # Errors
     /// There is no such session; too much is solved already.
-    pub async fn history(&self, tenant: &Tenant, session: &str, turn: &HeavyTurn) -> Result<History, ServiceError> {
-        let facts = self.facts(tenant, session).await?;
+    pub async fn history(
+        &self,
+        tenant: &Tenant,
+        session: &str,
+        turn: &HeavyTurn,
+    ) -> Result<Large<History>, ServiceError> {
+        let Large { value: facts, room } = self.facts(tenant, session).await?;
         let (mut corrections, mut renewals) = (Vec::new(), Vec::new());
         for entry in &facts.entries {
             match entry.kind {
@@ -160,7 +166,7 @@ impl Sessions {
         let measured = tokio::task::spawn_blocking(move || first.radius(&start)).await;
         let (assets, composed) = assets.map(|planned| (planned.names, planned.composed)).unzip();
         let SessionRow { session, policy, initial_wealth, initial_holding, initial_history: history, .. } = facts.row;
-        Ok(History {
+        let value = History {
             session,
             policy,
             terms,
@@ -173,7 +179,8 @@ impl Sessions {
             observations,
             corrections,
             renewals,
-        })
+        };
+        Ok(Large { value, room })
     }
 
     /// Of each period from `first` on, the first that is not as it was acknowledged. Each waits its turn to be advised by itself, so

@@ -10,7 +10,7 @@ use super::error::ServiceError;
 use super::idempotency;
 use super::identity;
 use super::keys::Caller;
-use super::memory::{Document, Memory};
+use super::memory::{Large, Memory};
 use super::progress::{Progress, ProgressBoard};
 use crate::control::estimate;
 use crate::control::evaluation::assets::AssetsBacktest;
@@ -265,12 +265,12 @@ impl Jobs {
     ///
     /// # Errors
     /// There is no such job, or it has no report (yet); other large answers leave no room for it.
-    pub async fn report(&self, tenant: &Tenant, job: &str) -> Result<Document, ServiceError> {
+    pub async fn report(&self, tenant: &Tenant, job: &str) -> Result<Large<Vec<u8>>, ServiceError> {
         let unknown = || ServiceError::unknown("report", job);
         let bytes = self.store.report_bytes(tenant, job).await?.ok_or_else(unknown)?;
         let room = self.memory.answers(bytes).await?;
         let report = self.store.report(tenant, job).await?.ok_or_else(unknown)?;
-        Ok(Document { bytes: report.into_bytes(), room })
+        Ok(Large { value: report.into_bytes(), room })
     }
 
     /// # Errors

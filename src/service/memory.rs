@@ -222,10 +222,24 @@ impl Memory {
     }
 }
 
-/// A document to be sent, with the memory that it takes until it is.
-pub struct Document {
-    pub bytes: Vec<u8>,
+/// What takes much memory, with the room reserved for it until it is dropped or sent.
+pub struct Large<T> {
+    pub value: T,
     pub room: Option<Reserved>,
+}
+
+impl<T> From<T> for Large<T> {
+    /// Of what is small.
+    fn from(value: T) -> Self {
+        Large { value, room: None }
+    }
+}
+
+impl<T> Large<T> {
+    /// The value made into another that takes as much.
+    pub fn map<U>(self, make: impl FnOnce(T) -> U) -> Large<U> {
+        Large { value: make(self.value), room: self.room }
+    }
 }
 
 impl fmt::Display for Memory {

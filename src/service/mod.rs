@@ -21,6 +21,7 @@ mod days;
 pub mod drift;
 mod due;
 pub mod error;
+pub mod explain;
 pub mod fund_advice;
 pub mod gate;
 pub mod history;

@@ -6,7 +6,7 @@ use tokio::sync::Semaphore;
 
 use super::error::ServiceError;
 use super::keys::Caller;
-use super::memory::{Document, Memory};
+use super::memory::{Large, Memory};
 use crate::control::error::FieldError;
 use crate::control::estimate::{self, Footprint};
 use crate::control::kept::{Kept, Key};
@@ -49,11 +49,11 @@ impl Policies {
     ///
     /// # Errors
     /// There is no such policy; other large answers leave no room for it.
-    pub async fn document(&self, tenant: &Tenant, policy: &str) -> Result<Document, ServiceError> {
+    pub async fn document(&self, tenant: &Tenant, policy: &str) -> Result<Large<Vec<u8>>, ServiceError> {
         let room = self.memory.answers(self.stored(tenant, policy).await?.bytes).await?;
         let row = self.store.policy_to_send(tenant, policy).await?;
         let row = row.ok_or_else(|| ServiceError::unknown("policy", policy))?;
-        Ok(Document { bytes: row.json, room })
+        Ok(Large { value: row.json, room })
     }
 
     async fn stored(&self, tenant: &Tenant, policy: &str) -> Result<Stored, ServiceError> {

@@ -14,6 +14,7 @@ use super::drift::{self, DriftLevel};
 use super::error::ServiceError;
 use super::keys::Caller;
 use super::live::{Live, measured};
+use super::memory::Large;
 use super::periods::Periods;
 use super::plan::Plan;
 use super::report::{Correct, Observe};
@@ -90,7 +91,7 @@ impl Sessions {
         let (tenant, content) = (&caller.tenant, json(correct)?);
         let mut held = self.hold(tenant, session).await;
         loop {
-            let facts = self.facts(tenant, session).await?;
+            let Large { value: facts, room: _room } = self.facts(tenant, session).await?;
             let mut periods = Periods::of(&facts)?;
             if is_repeat(EntryKind::Correction, number, periods.corrections)? {
                 return self.repeat(session, EntryKind::Correction, number, &content).await;

@@ -12,6 +12,7 @@ use super::allowance::HeavyTurn;
 use super::content::json;
 use super::error::ServiceError;
 use super::live::{Live, measured};
+use super::memory::Large;
 use super::periods::Periods;
 use super::plan::{MOST_RENEWALS, Plan, Renew, Renewed, check_window};
 use super::recording::{is_repeat, numbered};
@@ -41,7 +42,7 @@ impl Sessions {
         let content = json(renew)?;
         let mut held = self.hold(tenant, session).await;
         loop {
-            let facts = self.facts(tenant, session).await?;
+            let Large { value: facts, room: _room } = self.facts(tenant, session).await?;
             let periods = Periods::of(&facts)?;
             if is_repeat(EntryKind::Renewal, number, periods.renewals())? {
                 return self.repeat(session, EntryKind::Renewal, number, &content).await;

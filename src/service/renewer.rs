@@ -21,6 +21,7 @@ use super::clock::Clock;
 use super::error::ServiceError;
 use super::jobs::Jobs;
 use super::live::Live;
+use super::memory::Large;
 use super::metrics::RENEWALS;
 use super::periods::Periods;
 use super::plan::{Renew, Renewing};
@@ -226,7 +227,7 @@ impl Renewer {
     async fn train(&self, live: &Live, renew: Renewing, attempts: &Attempts) -> Result<Left, ServiceError> {
         let (tenant, session) = (&live.row.tenant, &live.row.session);
         let advisor = self.sessions.advisor(tenant, live).await?;
-        let facts = self.sessions.facts(tenant, session).await?;
+        let Large { value: facts, room: _room } = self.sessions.facts(tenant, session).await?;
         let wealth = live.standing.state.wealth;
         let specify = move || {
             let periods = Periods::of(&facts)?;

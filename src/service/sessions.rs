@@ -26,7 +26,7 @@ use super::identity;
 use super::keys::Caller;
 use super::known::KnownReturns;
 use super::live::{Live, Means, SESSION_BYTES};
-use super::memory::Memory;
+use super::memory::{Large, Memory};
 use super::plan::{Plan, Renewing};
 use super::policies::Policies;
 use super::slots::{Generation, Held, Slots, Source};
@@ -44,6 +44,8 @@ use crate::store::{CreateSession, Relabel, RequestKey, SessionFacts, SessionRow,
 const PROMPT_ENTRIES: usize = 520;
 /// Log-returns of a start that make each of them as long again.
 const RETURNS_AN_ENTRY: usize = 2000;
+/// Entries are held as rows and as what is read from them.
+const FORMS_OF_ENTRIES: usize = 2;
 
 /// Whose session it is, and its name.
 pub(super) type Name = (Tenant, String);
@@ -122,6 +124,7 @@ pub struct Sessions {
     pub(super) store: Store,
     pub(super) clock: Clock,
     pub(super) policies: Arc<Policies>,
+    pub(super) memory: Memory,
     slots: Arc<Slots<Name, Live>>,
     /// Told of sessions that became due to be renewed.
     pub(super) due: Sender<Name>,
@@ -144,7 +147,7 @@ impl Sessions {
         // Two generations are kept.
         let weight = memory.for_sessions() / 2;
         let slots = Arc::new(Slots::new(Generation { slots: weight / SESSION_BYTES, weight }));
-        Sessions { store, clock, policies, slots, due, advising, resolving }
+        Sessions { store, clock, policies, memory: memory.clone(), slots, due, advising, resolving }
     }
 
     /// Opens a session. The same key and start again give the same session as it was opened.
@@ -305,9 +308,14 @@ impl Sessions {
         self.slots.hold((tenant.clone(), session.to_owned())).await
     }
 
-    pub(super) async fn facts(&self, tenant: &Tenant, session: &str) -> Result<SessionFacts, ServiceError> {
+    /// A session and its entries, once other large answers leave room for them; the room is held as long as they are.
+    ///
+    /// # Errors
+    /// There is no such session; there is no room in time.
+    pub(super) async fn facts(&self, tenant: &Tenant, session: &str) -> Result<Large<SessionFacts>, ServiceError> {
+        let room = self.memory.answers(FORMS_OF_ENTRIES * self.store.entry_bytes(session).await?).await?;
         let facts = self.store.session_facts(tenant, session).await?;
-        facts.ok_or_else(|| ServiceError::unknown("session", session))
+        Ok(Large { value: facts.ok_or_else(|| ServiceError::unknown("session", session))?, room })
     }
 }
 
@@ -326,13 +334,14 @@ impl Source<Live> for Rows<'_> {
     }
 
     async fn read(&self) -> Result<Live, ServiceError> {
-        let facts = self.sessions.facts(self.tenant, self.session).await?;
+        let Large { value: facts, room } = self.sessions.facts(self.tenant, self.session).await?;
         let is_prompt =
             facts.entries.len() * (1 + facts.row.initial_history.len() / RETURNS_AN_ENTRY) <= PROMPT_ENTRIES;
         let live = match is_prompt {
             true => Live::replayed(facts)?,
             false => self.sessions.advising.run(self.tenant, move || Live::replayed(facts)).await??,
         };
+        drop(room);
         self.sessions.weigh(&live);
         Ok(live)
     }

@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::error::ServiceError;
+use super::explain::{self, ATOM_BYTES, Explain};
 use super::live::Live;
+use super::memory::Large;
 use super::report::{OF_ONE, OF_SEVERAL, Report, log_return_of, none_of};
 use super::sessions::Sessions;
 use super::what_if_assets::{AssetsWhatIfPoint, Supposition};
@@ -54,12 +56,6 @@ pub struct WhatIf {
     pub explain: Option<Explain>,
     /// One of the above over a range instead; every point is solved.
     pub sweep: Option<Sweep>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Explain {
-    WorstCase,
 }
 
 /// Exactly one range.
@@ -269,19 +265,23 @@ impl Sessions {
     ///
     /// # Errors
     /// A field breaks a rule, there is no such session, it has reached its horizon, or too much waits already.
-    pub async fn what_if(&self, tenant: &Tenant, request: WhatIf) -> Result<WhatIfAnswer, ServiceError> {
+    pub async fn what_if(&self, tenant: &Tenant, request: WhatIf) -> Result<Large<WhatIfAnswer>, ServiceError> {
         let hypotheses = request.hypotheses()?;
         let live = self.get(tenant, &request.session).await?;
         live.goes_on()?;
+        let explained = explain::atoms(request.explain, hypotheses.len(), live.standing.state.law.sample_size())?;
+        let assets = live.standing.assets.as_ref().map_or(1, |assets| assets.names.len());
+        let room = self.memory.answers(explained * assets * ATOM_BYTES).await?;
         let several = live.standing.assets.is_some();
         request.fits(several)?;
         if several {
             let mut points = self.suppose_of_assets(tenant, &request, &live, hypotheses).await?;
             let session = request.session;
-            return Ok(match (request.sweep, points.pop()) {
+            let value = match (request.sweep, points.pop()) {
                 (None, Some(point)) => WhatIfAnswer::OneOfAssets { session, point: Box::new(point) },
                 (_, last) => WhatIfAnswer::SweepOfAssets { session, points: points.into_iter().chain(last).collect() },
-            });
+            };
+            return Ok(Large { value, room });
         }
         let advisor = self.advisor(tenant, &live).await?;
         let mode = request.mode();
@@ -298,10 +298,11 @@ impl Sessions {
             points.push(WhatIfPoint::new(period, &hypothesis, supposed, request.explain));
         }
         let session = request.session;
-        match (request.sweep, points.pop()) {
-            (None, Some(point)) => Ok(WhatIfAnswer::One { session, point: Box::new(point) }),
-            (_, last) => Ok(WhatIfAnswer::Sweep { session, points: points.into_iter().chain(last).collect() }),
-        }
+        let value = match (request.sweep, points.pop()) {
+            (None, Some(point)) => WhatIfAnswer::One { session, point: Box::new(point) },
+            (_, last) => WhatIfAnswer::Sweep { session, points: points.into_iter().chain(last).collect() },
+        };
+        Ok(Large { value, room })
     }
 
     /// The same of several assets, point by point.

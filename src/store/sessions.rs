@@ -97,6 +97,17 @@ impl Store {
         Ok(Some(SessionFacts { row, entries, seen: Seen { head, change } }))
     }
 
+    /// Bytes of the entries of a session; none where it is no session.
+    pub async fn entry_bytes(&self, session: &str) -> Result<usize, StoreError> {
+        let sum = query(
+            "SELECT CAST(coalesce(sum(octet_length(content_json) + octet_length(answer_json)), 0) AS BIGINT) AS bytes
+             FROM entries WHERE session = $1",
+        );
+        let summed = |rows: &[Row]| rows.first().map_or(Ok(0), |row| row.get("bytes"));
+        let bytes: i64 = self.read("measuring entries", sum.bind(session), summed).await?;
+        Ok(usize::try_from(bytes).unwrap_or_default())
+    }
+
     /// Deletes a session of a tenant and its entries. False where there was none.
     pub async fn delete_session(&self, tenant: &Tenant, session: &str) -> Result<bool, StoreError> {
         let (tenant, name, actor) = (tenant.clone(), session.to_owned(), self.actor.clone());

@@ -11,7 +11,7 @@ use ballast::service::memory::MemoryLimit;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 use tokio::io::AsyncWriteExt;
-use tokio::net::TcpSocket;
+use tokio::net::{TcpSocket, TcpStream};
 
 /// The address space of the process under attack, in kibibytes: 900 MB.
 const ADDRESS_SPACE_KIB: usize = 900_000;
@@ -151,6 +151,55 @@ async fn imported_policies_asked_once_each_stay_within_the_budget() {
     child.wait().unwrap();
 }
 
+/// Clients that send a request and read next to nothing of the answer.
+async fn slow_readers(app: &App, count: usize, request: &str) -> Vec<TcpStream> {
+    let address = app.url.strip_prefix("http://").unwrap().parse().unwrap();
+    let mut held = Vec::new();
+    for _ in 0..count {
+        let socket = TcpSocket::new_v4().unwrap();
+        socket.set_recv_buffer_size(4096).unwrap();
+        let mut stream = socket.connect(address).await.unwrap();
+        stream.write_all(request.as_bytes()).await.unwrap();
+        held.push(stream);
+    }
+    held
+}
+
+/// Thirty clients ask for a sweep whose laws are some 10 MB, and read next to nothing of it; a wider sweep is refused with the
+/// numbers.
+#[tokio::test(flavor = "multi_thread")]
+async fn sweeps_that_explain_are_bounded_and_take_no_more_than_their_part() {
+    const RETURNS: usize = 2000;
+    let (mut child, mut app) = confined(&["--memory-limit", "400MiB"]);
+    app.train(&crate::support::specification(2)).await;
+    let history: Vec<f64> = (0..RETURNS).map(|k| 0.002 + 0.02 * f64::sin(k as f64)).collect();
+    let (status, opened) = app.post("/sessions", &json!({ "policy": app.policy, "history": history })).await;
+    assert_eq!(status, StatusCode::CREATED, "{opened}");
+    let sweep = |points: usize| {
+        let range = json!({ "from": 0.5, "to": 1.5, "points": points });
+        json!({ "session": opened["session"], "explain": "worst_case", "sweep": { "radius_scale": range } })
+    };
+    let (status, refused) = app.post("/what-if", &sweep(51)).await;
+    assert_eq!((status, &refused["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!("explain")), "{refused}");
+    assert!(refused["rule"].as_str().unwrap().contains("51 times 2000"), "{refused}");
+    let (status, answer) = app.post("/what-if", &sweep(50)).await;
+    assert_eq!(status, StatusCode::OK, "{answer}");
+    let written = answer.to_string().len();
+    assert!((4 << 20..=10 << 20).contains(&written), "{written} bytes");
+    let (before, body) = (resident(&child), sweep(50).to_string());
+    let head = format!(
+        "POST /what-if HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n",
+        body.len()
+    );
+    let held = slow_readers(&app, 30, &(head + &body)).await;
+    tokio::time::sleep(Duration::from_secs(4)).await;
+    let taken = resident(&child).saturating_sub(before);
+    assert!(taken < 60 << 20, "{taken} bytes for thirty slow readers");
+    drop(held);
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
 /// Forty clients ask for a document of some 10 MB and read next to nothing of it: none keeps all of it in memory.
 #[tokio::test(flavor = "multi_thread")]
 async fn answers_that_are_read_slowly_take_no_more_than_their_part() {
@@ -161,16 +210,7 @@ async fn answers_that_are_read_slowly_take_no_more_than_their_part() {
     assert_eq!(status, StatusCode::CREATED, "{imported}");
     let path = format!("/policies/{}/export", imported["policy"].as_str().unwrap());
     let before = resident(&child);
-    let address = app.url.strip_prefix("http://").unwrap().parse().unwrap();
-    let mut held = Vec::new();
-    for _ in 0..40 {
-        let socket = TcpSocket::new_v4().unwrap();
-        socket.set_recv_buffer_size(4096).unwrap();
-        let mut stream = socket.connect(address).await.unwrap();
-        let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n");
-        stream.write_all(request.as_bytes()).await.unwrap();
-        held.push(stream);
-    }
+    let held = slow_readers(&app, 40, &format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n")).await;
     tokio::time::sleep(Duration::from_secs(2)).await;
     // One document at a time, twice while it is read, and what forty connections take.
     let taken = resident(&child).saturating_sub(before);

@@ -1,0 +1,35 @@
+//! Worst-case laws shown with an answer, and how much of them.
+
+use serde::Deserialize;
+use utoipa::ToSchema;
+
+use crate::control::error::FieldError;
+
+/// Points of a sweep times returns of the law up to which their worst-case laws are shown: some 10 MB.
+const MOST_EXPLAINED: usize = 100_000;
+/// An atom of a worst-case law takes as much, written.
+pub(super) const ATOM_BYTES: usize = 100;
+
+/// What is shown beside an allocation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Explain {
+    WorstCase,
+}
+
+/// Returns of all the worst-case laws that an answer of so many points shows. Checked by:
+/// `tests/operation/memory.rs::sweeps_that_explain_are_bounded_and_take_no_more_than_their_part`.
+///
+/// # Errors
+/// A sweep shows more than [`MOST_EXPLAINED`].
+pub(super) fn atoms(explain: Option<Explain>, points: usize, returns: usize) -> Result<usize, FieldError> {
+    let shown = if explain.is_some() { points * returns } else { 0 };
+    if shown <= MOST_EXPLAINED || points == 1 {
+        return Ok(shown);
+    }
+    let rule = format!(
+        "must be left out above {MOST_EXPLAINED} points times returns: here they are {points} times {returns}. Explain the points \
+         that matter one by one, or fewer of them"
+    );
+    Err(FieldError::new("explain", "worst_case", rule))
+}
