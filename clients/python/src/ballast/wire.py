@@ -374,6 +374,7 @@ class ExpectedError(TypedDict):
 
 
 Explain: TypeAlias = Literal["worst_case"]
+"""What is shown beside an allocation."""
 
 
 FeatureMap: TypeAlias = Literal["standardized", "raw_moments"]
