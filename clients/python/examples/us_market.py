@@ -45,16 +45,16 @@ def main() -> None:
             rows.append((month, action["radius"], action["allocation"], realised, session.wealth))
 
     table = pd.DataFrame(rows, columns=["month", "radius", "allocation", "return", "wealth"]).set_index("month")
-    table["all-bank"] = [INITIAL_WEALTH * (1 + rate) ** period for period in range(1, len(table) + 1)]
-    table["all-stock"] = INITIAL_WEALTH * (1 + table["return"]).cumprod()
+    table["All in the bank"] = [INITIAL_WEALTH * (1 + rate) ** period for period in range(1, len(table) + 1)]
+    table["All in stocks"] = INITIAL_WEALTH * (1 + table["return"]).cumprod()
     print(f"The year {YEAR}, month by month (the bank pays {100 * rate:.2f} % throughout):")
     print(shown(table))
 
 
 def shown(table: pd.DataFrame) -> str:
     """The table in the columns of the demo."""
-    head = "{:<8} {:>8} {:>11} {:>10} {:>9} {:>9} {:>10}".format(table.index.name, *table.columns)
-    line = "{:<8} {:>8.4f} {:>11.3f} {:>8.2f} % {:>9.2f} {:>9.2f} {:>10.2f}"
+    head = "{:<8} {:>8} {:>11} {:>10} {:>9} {:>16} {:>14}".format(table.index.name, *table.columns)
+    line = "{:<8} {:>8.4f} {:>11.3f} {:>8.2f} % {:>9.2f} {:>16.2f} {:>14.2f}"
     in_percent = table.assign(**{"return": 100 * table["return"]})
     return "\n".join([head, *(line.format(*row) for row in in_percent.itertuples())])
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use ballast::control::evaluation::assets::AssetsRecord;
+use ballast::control::evaluation::names::StrategyKind;
 use ballast::returns::Choices;
 use serde_json::json;
 
@@ -83,7 +84,8 @@ async fn live_through(
 ) -> Result<(), DemoError> {
     println!("\nThe year {YEAR}, month by month, with the share of wealth in each:");
     let names: String = record.assets.iter().map(|name| format!(" {name:>10}")).collect();
-    println!("{:<8}{names} {:>8} {:>9} {:>9}", "month", "in all", "wealth", "1/N");
+    let equal_shares = StrategyKind::EqualShares.name();
+    println!("{:<8}{names} {:>8} {:>9} {equal_shares:>13}", "month", "in all", "wealth");
     let (mut wealth, mut equal, mut traded) = (INITIAL_WEALTH, INITIAL_WEALTH, 0.0);
     for month in start..start + HORIZON {
         let told: AssetsAdvice = advice(api, session, false).await?;
@@ -93,7 +95,7 @@ async fn live_through(
         equal *= 1.0 + returns.values().sum::<f64>() / returns.len() as f64;
         traded += told.trade.values().map(|share| share.abs()).sum::<f64>();
         let held: String = told.allocation.values().map(|share| format!(" {share:>10.3}")).collect();
-        println!("{:<8}{held} {:>8.3} {wealth:>9.2} {equal:>9.2}", record.dates[month], told.total);
+        println!("{:<8}{held} {:>8.3} {wealth:>9.2} {equal:>13.2}", record.dates[month], told.total);
     }
     println!(
         "\nWhat it cost: {INITIAL_WEALTH} became {wealth:.2}. Equal shares of all wealth became {equal:.2}, and the bank would have paid \

@@ -1,5 +1,6 @@
 //! The story the demo tells: what was known before 2008, what the investor was told, what became of him.
 
+use ballast::control::evaluation::names::StrategyKind;
 use serde_json::json;
 
 use super::DemoError;
@@ -93,8 +94,14 @@ async fn compare_januaries(api: &ApiClient, market: &Returns, count: usize) -> R
 async fn live_through(api: &ApiClient, session: &str, past: &Past, year: &[Row]) -> Result<Option<Advice>, DemoError> {
     println!("\nThe year {YEAR}, month by month (the bank pays {:.2} % throughout):", 100.0 * past.rate);
     println!(
-        "{:<8} {:>8} {:>11} {:>10} {:>9} {:>9} {:>10}",
-        "month", "radius", "allocation", "return", "wealth", "all-bank", "all-stock"
+        "{:<8} {:>8} {:>11} {:>10} {:>9} {:>16} {:>14}",
+        "month",
+        "radius",
+        "allocation",
+        "return",
+        "wealth",
+        StrategyKind::AllBank.name(),
+        StrategyKind::AllStock.name()
     );
     let (mut all_bank, mut all_stock, mut last) = (INITIAL_WEALTH, INITIAL_WEALTH, None);
     for (index, month) in year.iter().enumerate() {
@@ -103,7 +110,7 @@ async fn live_through(api: &ApiClient, session: &str, past: &Past, year: &[Row])
         all_bank *= 1.0 + past.rate;
         all_stock *= 1.0 + month.risky_return;
         println!(
-            "{:<8} {:>8.4} {:>11.3} {:>8.2} % {wealth:>9.2} {all_bank:>9.2} {all_stock:>10.2}",
+            "{:<8} {:>8.4} {:>11.3} {:>8.2} % {wealth:>9.2} {all_bank:>16.2} {all_stock:>14.2}",
             month.date,
             told.radius,
             told.allocation,

@@ -12,7 +12,7 @@ use super::Plan;
 use super::printed::{LOW_QUANTILE, MEAN_QUANTILE, QUANTILES, TABLES};
 use super::runs::{CLOSENESS, Quantiles, Section, Slope, Study};
 
-/// Terminal utility of all-bank, 100 (1 - exp(-1.002^10)).
+/// Terminal utility of all wealth in the bank, 100 (1 - exp(-1.002^10)).
 const ALL_BANK: f64 = 63.947_03;
 
 /// Paths behind the paper's own figures, whose sampling error counts too.
@@ -181,7 +181,9 @@ fn table(index: usize, adaptive: &StrategyReport, known: &StrategyReport, fixed:
     vec![
         Finding {
             verdict: all_bank(&fixed.utility),
-            statement: format!("Table {number}: static robust is all-bank, {ALL_BANK:.5} without variance."),
+            statement: format!(
+                "Table {number}: the static robust investor stays in the bank and earns {ALL_BANK:.5} without variance."
+            ),
             found: format!("Here {} with variance {:.1e}.", shown(fixed.utility.mean), fixed.utility.variance.value),
         },
         Finding {

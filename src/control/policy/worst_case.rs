@@ -162,8 +162,8 @@ fn transport_sentence(
         };
         format!(
             "Against an allocation of {:.1} %, the worst law within distance {:.4} of {middle} {moves}; against the worst laws \
-             of this period and of any later ones the allocation is still worth {:.2} for certain at the horizon, and all-bank {:.2}. \
-             A ball of this period alone wider by {RADIUS_UNIT} would cost at most {:.2} basis points of that.",
+             of this period and of any later ones the allocation is still worth {:.2} for certain at the horizon, where the bank \
+             alone pays {:.2}. A ball of this period alone wider by {RADIUS_UNIT} would cost at most {:.2} basis points of that worth.",
             100.0 * advice.allocation,
             advice.radius,
             advice.certainty_equivalent,
@@ -192,7 +192,7 @@ fn normal_sentence(worst: NormalLaw, estimate: NormalLaw, advice: &Advice) -> St
     format!(
         "Against an allocation of {:.1} %, the worst normal law in the confidence region has a mean log-return of {:.2} % \
          and a variance of {:.2e} a period, where {:.2} % and {:.2e} are estimated; against the worst laws of this period and of any \
-         later ones the allocation is still worth {:.2} for certain at the horizon, and all-bank {:.2}.",
+         later ones the allocation is still worth {:.2} for certain at the horizon, where the bank alone pays {:.2}.",
         100.0 * advice.allocation,
         100.0 * worst.mean,
         worst.variance,
