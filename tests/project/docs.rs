@@ -368,6 +368,29 @@ fn the_defaults_are_those_of_a_training() {
     assert!(missing.is_empty(), "no default of {missing:?}");
 }
 
+/// First cells of all rows of tables whose first column has this heading.
+fn first_cells<'a>(page: &'a str, heading: &str) -> Vec<&'a str> {
+    let first = |line: &'a str| line.strip_prefix("| ").and_then(|line| line.split(" | ").next());
+    let tables = page.split("\n\n").filter(|table| first(table) == Some(heading));
+    tables.flat_map(|table| table.lines().skip(2).filter_map(first)).collect()
+}
+
+#[test]
+fn results_call_strategies_what_reports_call_them() {
+    let (page, names) = (read("docs/results.md"), read("src/control/evaluation/names.rs"));
+    let is_name = |text: &str| names.contains(&format!("=> \"{text}\"")) || text.ends_with(" % in stocks");
+    // A name may go on with a level, a caution or a window.
+    let ends = |cell: &str| cell.match_indices(',').map(|(at, _)| at).chain([cell.len()]).collect::<Vec<usize>>();
+    let cells = first_cells(&page, "strategy");
+    assert!(cells.len() >= 40, "{cells:?}");
+    for cell in cells {
+        assert!(ends(cell).into_iter().any(|end| is_name(&cell[..end])), "docs/results.md: no report has a {cell}");
+    }
+    for other in ["all-bank", "all-stock", "plug-in", "1/n"] {
+        assert!(!page.to_lowercase().contains(other), "docs/results.md calls a strategy {other}");
+    }
+}
+
 /// The code that the sections of `docs/measurements.md` measure, and when.
 fn measured() -> Vec<(String, Date, Vec<String>)> {
     let page = read("docs/measurements.md");
