@@ -44,6 +44,10 @@ pub struct Serve {
     /// A job whose worker has been silent this long is taken over by another.
     #[arg(long, env = "BALLAST_LEASE_SECONDS", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..=3600))]
     lease_seconds: u16,
+    /// Seconds between a stop signal and the end of accepting: the service is not ready and answers still, until whoever
+    /// balances callers has seen it.
+    #[arg(long, env = "BALLAST_DRAIN_DELAY", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=600))]
+    drain_delay: u16,
     /// Threads that train, at the lowest priority. Default: every core.
     #[arg(long, env = "BALLAST_TRAINING_THREADS", value_parser = clap::value_parser!(u16).range(1..=1024))]
     training_threads: Option<u16>,
@@ -183,26 +187,34 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     config.memory_limit = arguments.memory_limit.map_or(config.memory_limit, |Size(bytes)| MemoryLimit::chosen(bytes));
     let shutdown = Shutdown::new();
     let (mut terminate, mut interrupt) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
-    let running = http::serve(config, shutdown.clone()).await?;
+    let (delay, signalled) = (Duration::from_secs(arguments.drain_delay.into()), shutdown.clone());
+    tokio::spawn(async move {
+        let mut asked = async || {
+            tokio::select! {
+                _ = terminate.recv() => {}
+                _ = interrupt.recv() => {}
+            }
+        };
+        asked().await;
+        signalled.announce();
+        let drained = async {
+            tokio::time::sleep(delay).await;
+            signalled.begin();
+            std::future::pending::<()>().await;
+        };
+        // Whoever asks twice waits for nothing.
+        tokio::select! {
+            () = drained => {}
+            () = asked() => std::process::exit(ASKED_TWICE),
+        }
+    });
+    let running = http::serve(config, shutdown).await?;
     let mut told = format!("listening on {}://{}\n", running.scheme, running.address);
     if let Some(address) = running.operations {
         told += &format!("for operators on {}://{address}\n", running.scheme);
     }
     // Nobody has to read it: the log says it too.
     let _ = std::io::stdout().write_all(told.as_bytes());
-    tokio::spawn(async move {
-        let mut signalled = async || {
-            tokio::select! {
-                _ = terminate.recv() => {}
-                _ = interrupt.recv() => {}
-            }
-        };
-        signalled().await;
-        shutdown.begin();
-        // Whoever asks twice does not wait for the drain.
-        signalled().await;
-        std::process::exit(ASKED_TWICE);
-    });
     running.ended().await;
     traces.end().await;
     Ok(())

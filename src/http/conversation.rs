@@ -63,7 +63,11 @@ pub async fn hold<S>(
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
     let connection = held.connection.clone();
-    let service = service_fn(move |request| answer(connection.clone(), local, patience, application.clone(), request));
+    let shutdown = stopping.shutdown.clone();
+    let service = service_fn(move |request| {
+        let leaving = shutdown.clone();
+        answer((connection.clone(), leaving), local, patience, application.clone(), request)
+    });
     let stream = TokioIo::new(Patient::new(stream, patience, held.connection.clone()));
     let serving = http1::Builder::new()
         .timer(TokioTimer::new())
@@ -91,7 +95,7 @@ async fn unused_at_the_end(shutdown: &Shutdown, connection: &Connection) {
 }
 
 async fn answer(
-    connection: Arc<Connection>,
+    (connection, shutdown): (Arc<Connection>, Shutdown),
     local: SocketAddr,
     patience: Patience,
     mut application: Router,
@@ -119,7 +123,7 @@ async fn answer(
         connection.leave();
     }
     let is_old = connection.requests() >= patience.requests || connection.age() >= patience.age;
-    if !is_whole || is_old || connection.place == Place::Probes {
+    if !is_whole || is_old || shutdown.is_announced() || connection.place == Place::Probes {
         response.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
     } else {
         let keep_alive = HeaderValue::from_str(&format!("timeout={}", patience.between.as_secs()));

@@ -49,7 +49,7 @@ impl Door {
     }
 
     /// Lets callers in until the shutdown begins.
-    pub async fn open(self, manners: Manners, shutdown: &Shutdown, stopping: &GracefulShutdown) {
+    pub async fn open(&self, manners: Manners, shutdown: &Shutdown, stopping: &GracefulShutdown) {
         loop {
             let accepted = tokio::select! {
                 accepted = self.listener.accept() => accepted,

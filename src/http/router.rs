@@ -8,6 +8,7 @@ use axum::extract::{Request, State};
 use axum::http::{HeaderMap, Method, Uri, header};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Redirect, Response};
+use axum::routing::get;
 use axum::{Extension, Router};
 use futures_util::FutureExt;
 use tracing::Instrument;
@@ -125,6 +126,16 @@ pub fn application(service: Arc<Service>, config: &Config) -> Router {
 /// The operator's part of it.
 pub fn for_operators(service: Arc<Service>, config: &Config) -> Router {
     guarded(publishing(operators()), service, config)
+}
+
+/// What is answered while the service starts: that the process lives, and that it is not ready. Each connection is for one answer.
+pub fn starting() -> Router {
+    let not_yet = || async {
+        let problem = Problem::new(ProblemKind::Overloaded, "the service is starting");
+        ([(header::CONNECTION, "close")], problem)
+    };
+    let alive = || async { ([(header::CONNECTION, "close")], operations::livez().await) };
+    Router::new().route("/livez", get(alive)).fallback(not_yet)
 }
 
 /// With the description at hand. Not the users' routes, which have no need of it and are asked most.

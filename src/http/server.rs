@@ -50,6 +50,8 @@ pub enum ServeError {
     Encryption(#[from] TlsError),
     #[error("cannot start the service")]
     Start(#[from] ServiceError),
+    #[error("asked to stop before the service had started")]
+    Stopped,
 }
 
 /// A server at work.
@@ -103,7 +105,14 @@ async fn start(config: Config, shutdown: Shutdown) -> Result<Running, ServeError
         None => None,
     };
     let (address, operations) = (door.address, back_door.as_ref().map(|door| door.address));
-    let service = Service::start(&config, Clock::system(), shutdown.clone()).await?;
+    let starting = manners(router::starting(), bounds(&config), &config, &encryption);
+    let service = tokio::select! {
+        service = Service::start(&config, Clock::system(), shutdown.clone()) => service?,
+        // Another's migration may take minutes, and probes ask meanwhile.
+        _ = open((&door, starting.clone()), back_door.as_ref().map(|door| (door, starting)), &shutdown) => {
+            return Err(ServeError::Stopped);
+        }
+    };
     let scheme = if encryption.is_some() { "https" } else { "http" };
     tracing::info!(%address, scheme, store = %config.store, role = ?config.role, "listening");
     let front = manners(router::application(service.clone(), &config), bounds(&config), &config, &encryption);
@@ -139,6 +148,18 @@ fn manners(application: Router, bounds: Bounds, config: &Config, encryption: &Op
     Manners { application, connections: Connections::new(bounds), patience, encryption: encryption.clone() }
 }
 
+/// Lets callers in by both doors until the shutdown begins, and gives what ends their connections.
+async fn open(front: (&Door, Manners), back: Option<(&Door, Manners)>, shutdown: &Shutdown) -> GracefulShutdown {
+    let stopping = GracefulShutdown::new();
+    let behind = async {
+        if let Some((door, manners)) = back {
+            door.open(manners, shutdown, &stopping).await;
+        }
+    };
+    tokio::join!(front.0.open(front.1, shutdown, &stopping), behind);
+    stopping
+}
+
 /// Everything that answers.
 struct Doors {
     front: (Door, Manners),
@@ -150,14 +171,11 @@ impl Doors {
     async fn run(self, service: Arc<Service>, drain: Duration) {
         let upkeep = tokio::spawn(telemetry::keep_up(self.front.1.connections.clone()));
         let fresh = self.certificate.map(|certificate| tokio::spawn(certificate.keep_fresh()));
-        let stopping = GracefulShutdown::new();
         let ((front, manners), back) = (self.front, self.back);
-        let behind = async {
-            if let Some((door, manners)) = back {
-                door.open(manners, &service.shutdown, &stopping).await;
-            }
-        };
-        tokio::join!(front.open(manners, &service.shutdown, &stopping), behind);
+        let stopping =
+            open((&front, manners), back.as_ref().map(|(door, manners)| (door, manners.clone())), &service.shutdown)
+                .await;
+        drop((front, back));
         tracing::info!("stopping: draining connections");
         if tokio::time::timeout(drain, stopping.shutdown()).await.is_err() {
             tracing::warn!("some connections were still open at the end of the drain");

@@ -166,7 +166,7 @@ impl Service {
     /// # Errors
     /// Which of the two is not so.
     pub async fn ready(&self) -> Result<(), ServiceError> {
-        if self.shutdown.has_begun() {
+        if self.shutdown.is_announced() {
             return Err(ServiceError::Draining);
         }
         Ok(self.store.ping().await?)

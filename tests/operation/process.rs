@@ -9,6 +9,7 @@ use crate::support::{App, specification};
 use ballast::store::{JobRow, JobState, Store};
 use reqwest::Client;
 use serde_json::{Value, json};
+use sqlx::Connection;
 
 /// `Config::drain`: the time an operator gives the process to end.
 const DRAIN: Duration = Duration::from_secs(25);
@@ -211,4 +212,56 @@ async fn a_worker_that_cannot_claim_says_so_once_a_second_until_it_can() {
     crate::support::execute(folder.path(), "ALTER TABLE hidden RENAME TO jobs").await;
     let mut process = Process { child, app: App::at(url, folder) };
     process.app.train(&specification(1)).await;
+}
+
+/// Between the signal and the end of accepting everything is answered, but for readiness, and connections close.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_service_that_leaves_says_so_before_it_stops_accepting() {
+    let folder = tempfile::tempdir().unwrap();
+    let (child, url) = crate::support::process::serve(|command| {
+        command.args(["--drain-delay", "2", "--data"]).arg(folder.path());
+    });
+    let mut process = Process { child, app: App::at(url, folder) };
+    let pid = process.child.id().to_string();
+    assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
+    let left = Instant::now();
+    until("readiness to end", async || (process.app.get("/readyz").await.0 == 503).then_some(())).await;
+    let answer = process.app.client.get(format!("{}/sessions", process.app.url)).send().await.unwrap();
+    assert_eq!((answer.status().as_u16(), answer.headers()["connection"].to_str().unwrap()), (200, "close"));
+    assert_eq!(process.app.get("/livez").await.0, 200);
+    assert!(process.child.wait().unwrap().success());
+    assert!(left.elapsed() >= Duration::from_secs(2), "{:?}", left.elapsed());
+}
+
+/// While another process changes the schema, the service that waits for it is alive, is not ready, and can be stopped.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_service_that_starts_is_alive_and_not_ready() {
+    let Some(database) = crate::support::postgres::database().await else { return };
+    let mut other = sqlx::PgConnection::connect(&database).await.unwrap();
+    sqlx::query("BEGIN").execute(&mut other).await.unwrap();
+    sqlx::query("CREATE TABLE _sqlx_migrations (version BIGINT)").execute(&mut other).await.unwrap();
+    let address = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let start = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
+        command.args(["serve", "--store", &database, "--listen", &address.to_string()]);
+        command.env("RUST_LOG", "off").stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    };
+    let client = Client::new();
+    let status = async |path: &str| {
+        let asked = client.get(format!("http://{address}{path}")).send().await;
+        asked.map_or(0, |answer| answer.status().as_u16())
+    };
+    let mut stopped = start();
+    until("life", async || (status("/livez").await == 200).then_some(())).await;
+    assert_eq!((status("/readyz").await, status("/sessions").await), (503, 503));
+    assert!(Command::new("kill").args(["-TERM", &stopped.id().to_string()]).status().unwrap().success());
+    let asked = Instant::now();
+    assert!(!stopped.wait().unwrap().success());
+    assert_within(Duration::from_secs(5), asked, "a start that is asked to stop");
+    let mut started = start();
+    until("life", async || (status("/livez").await == 200).then_some(())).await;
+    sqlx::query("ROLLBACK").execute(&mut other).await.unwrap();
+    until("readiness", async || (status("/readyz").await == 200).then_some(())).await;
+    started.kill().unwrap();
+    started.wait().unwrap();
 }
