@@ -1,8 +1,8 @@
 //! What the heading of a column says of its numbers, by its words alone, in any case and in the languages of vendors' files.
 
-/// Headings of the risky asset, the best first: what counts dividends before what may not. Programs write these, and nothing
-/// is asked beside them.
-pub const VALUES: [&str; 24] = [
+/// Headings of the risky asset before those of `PRICES`, the best first: what counts dividends before what may not. Programs write
+/// these, and nothing is asked beside them.
+const HEADINGS: [&str; 14] = [
     "return",
     "returns",
     "riskyreturn",
@@ -17,16 +17,6 @@ pub const VALUES: [&str; 24] = [
     "close",
     "closelast",
     "price",
-    "nav",
-    "schlusskurs",
-    "kurs",
-    "cloture",
-    "cl\u{f4}ture",
-    "dernier",
-    "zamkniecie",
-    "zamkni\u{119}cie",
-    "settle",
-    "last",
 ];
 /// Words of a heading of returns.
 const RETURNS: [&str; 15] = [
@@ -46,7 +36,7 @@ const RETURNS: [&str; 15] = [
     "rendement",
     "wertentwicklung",
 ];
-/// Words of a heading of prices.
+/// Words of a heading of prices, and headings of them by themselves, the best first.
 const PRICES: [&str; 11] = [
     "nav",
     "kurs",
@@ -208,6 +198,11 @@ pub fn core(name: &str) -> String {
         words.retain(|word| word != "px" && !CURRENCIES.contains(&word.as_str()));
     }
     words.concat()
+}
+
+/// Headings of the risky asset, the best first.
+pub fn headings() -> impl Iterator<Item = &'static str> {
+    HEADINGS.into_iter().chain(PRICES)
 }
 
 /// The reason why a column of this heading holds neither returns nor prices of an asset, as the end of a sentence.

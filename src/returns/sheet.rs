@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 use super::cells::{Cell, MOST_LINES, Rows};
 use super::choices::Choices;
 use super::dates::{are_dates, heads_dates};
-use super::heading::{VALUES, aside, core};
+use super::heading::{aside, core, headings};
 use super::months::MonthsOfYears;
 use super::number::{is_number, looks_numeric};
 use super::outcome::Stop;
@@ -187,11 +187,11 @@ impl<'a> Sheet<'a> {
     fn best(&self) -> Option<&Column<'a>> {
         let may_be = |column: &&Column| column.holds == Holds::Values || column.holds == Holds::Other;
         let of = |is_blank: bool| {
-            let named = |wanted: &&str| {
-                let is = |column: &&Column| column.given().is_empty() == is_blank && core(&column.name) == **wanted;
+            let named = |wanted: &str| {
+                let is = |column: &&Column| column.given().is_empty() == is_blank && core(&column.name) == wanted;
                 self.columns.iter().filter(may_be).find(is)
             };
-            VALUES.iter().find_map(named)
+            headings().find_map(named)
         };
         of(false).or_else(|| of(true))
     }
@@ -271,7 +271,8 @@ fn columns<'a>(rows: Vec<Vec<Cell<'a>>>, heading: Option<Vec<Cell>>) -> Result<V
 fn judge(columns: &mut [Column]) {
     let is_date = |column: &Column| {
         let given = column.given();
-        !given.is_empty() && !VALUES.contains(&core(&column.name).as_str()) && are_dates(&given, false)
+        let core = core(&column.name);
+        !given.is_empty() && headings().all(|heading| heading != core) && are_dates(&given, false)
     };
     let is_dates: Vec<bool> = columns.iter().map(is_date).collect();
     // What looks like dates in no known form is set aside where nothing else is dates.
