@@ -86,8 +86,8 @@ pub struct Choices {
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gaps: Option<bool>,
-    /// Whether what is unusual of an asset is right: a deviation above 30 % a period or 150 % a year, a mean above 100 % a year,
-    /// or a return far from all others
+    /// Whether what is unusual of an asset is right: a deviation above 30 % a period or 150 % a year, a mean above 100 % a year
+    /// beyond chance, or a return far from all others
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unusual: Option<bool>,

@@ -1,9 +1,10 @@
 //! What a reading implies that no asset, or hardly any, has: whoever reads so is asked, in days as in years.
 
-use super::moments::{middle, moments, spread};
-use super::words::percent;
+use super::moments::{middle, moments, spread, sure_mean};
+use super::words::{percent, percent_a_year};
 
-/// A standard deviation a period and a year, and a mean a year, above which a reading holds only where a person confirms it.
+/// A standard deviation a period and a year, and a mean a year beyond chance, above which a reading holds only where a person
+/// confirms it.
 const DOUBTFUL_DEVIATION: f64 = 0.3;
 const DOUBTFUL_YEARLY_DEVIATION: f64 = 1.5;
 const DOUBTFUL_YEARLY_MEAN: f64 = 1.0;
@@ -22,15 +23,15 @@ const MIDDLE_AROUND_ONE: std::ops::RangeInclusive<f64> = 0.9..=1.1;
 /// The mean and the deviation that are unusual, in words.
 pub fn unusual_moments(simple: &[f64], periods: f64) -> Option<String> {
     let (mean, deviation) = moments(simple);
-    let (mean_per_year, deviation_per_year) = (mean * periods, deviation * periods.sqrt());
+    let deviation_per_year = deviation * periods.sqrt();
     let mut found = Vec::new();
     if deviation > DOUBTFUL_DEVIATION {
         found.push(format!("a standard deviation of {} a period", percent(deviation)));
     } else if deviation_per_year > DOUBTFUL_YEARLY_DEVIATION {
         found.push(format!("a standard deviation of {} a year", percent(deviation_per_year)));
     }
-    if mean_per_year.abs() > DOUBTFUL_YEARLY_MEAN {
-        found.push(format!("a mean of {} a year", percent(mean_per_year)));
+    if sure_mean(simple) * periods > DOUBTFUL_YEARLY_MEAN {
+        found.push(format!("a mean of {} a year", percent_a_year(mean, periods)));
     }
     (!found.is_empty()).then(|| found.join(" and "))
 }

@@ -1,8 +1,12 @@
 //! Mean, deviation and their robust forms: a column is judged by the bulk of its numbers, and one odd cell among them does not
 //! move the judgement.
 
+use crate::numerics::student::student_two_sided;
+
 /// The standard deviation of a normal law, in median distances from its middle.
 const DEVIATIONS: f64 = 1.4826;
+/// A mean lies so often within its error.
+const CONFIDENCE: f64 = 0.95;
 /// One number of so many may be odd.
 const ODD_SHARE: usize = 20;
 /// Of fewer numbers each counts.
@@ -14,6 +18,17 @@ pub fn moments(values: &[f64]) -> (f64, f64) {
     let mean = values.iter().sum::<f64>() / count;
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     (mean, (squares / (count - 1.0).max(1.0)).sqrt())
+}
+
+/// How large the mean is beyond what chance gives so few numbers: its size less half its interval by Student's law. Of one number
+/// chance gives any; of numbers that do not vary, nothing.
+pub fn sure_mean(values: &[f64]) -> f64 {
+    let (mean, deviation) = moments(values);
+    let count = values.len() as f64;
+    if count < 2.0 {
+        return 0.0;
+    }
+    mean.abs() - student_two_sided(CONFIDENCE, count - 1.0) * deviation / count.sqrt()
 }
 
 /// The median; 0 of no numbers.

@@ -3,10 +3,10 @@
 use super::cells::Cell;
 use super::choices::{Choices, Unit};
 use super::kind::{Beside, Numbers};
-use super::moments::{bulk, middle, moments, odd};
+use super::moments::{bulk, middle, moments, odd, sure_mean};
 use super::number::significant;
 use super::outcome::Stop;
-use super::words::percent;
+use super::words::{percent, percent_a_year};
 
 /// Numbers whose standard deviation, as written, is below the first are fractions, above the second percent.
 const SURELY_FRACTIONS: f64 = 0.1;
@@ -17,9 +17,8 @@ const LARGEST_MEAN: f64 = 0.2;
 const NO_DEVIATION: f64 = 3.0;
 const LARGE_DEVIATION: f64 = 0.75;
 const SMALL_DEVIATION: f64 = 0.001;
-/// A mean a year that few assets have, taken as fractions, and how far from nothing it must lie, in standard errors.
+/// A mean a year that few assets have, taken as fractions.
 const LARGE_YEARLY_MEAN: f64 = 0.35;
-const SURE_ERRORS: f64 = 2.0;
 /// So few numbers may all have two decimals by chance.
 const FEW: usize = 6;
 /// No gains since the start are in the middle of a record so large as fractions.
@@ -67,9 +66,8 @@ impl Numbers<'_> {
         if self.is_percent(&bulk, beside) && self.is_percent(&self.values, beside) {
             return Ok(Unit::Percent);
         }
-        let (mean, deviation) = moments(&bulk);
-        let is_calm = deviation < SURELY_FRACTIONS && !self.is_percent(&bulk, beside);
-        let doubt = if is_calm { self.calm(mean, deviation, beside) } else { Some(String::new()) };
+        let is_calm = moments(&bulk).1 < SURELY_FRACTIONS && !self.is_percent(&bulk, beside);
+        let doubt = if is_calm { self.calm(&bulk, beside) } else { Some(String::new()) };
         doubt.map_or(Ok(Unit::Fraction), |doubt| Err(self.ask_unit(&doubt)))
     }
 
@@ -96,19 +94,18 @@ impl Numbers<'_> {
 
     /// Why numbers that vary little may be a calm record in percent, as a sentence: what they would come to as fractions is
     /// more than assets and banks do, or they are written as percents are. `None` where they are what fractions look like.
-    /// The bulk of them, of this `mean` and `deviation`, decides.
-    fn calm(&self, mean: f64, deviation: f64, beside: &Beside) -> Option<String> {
+    /// The `bulk` of them decides.
+    fn calm(&self, bulk: &[f64], beside: &Beside) -> Option<String> {
         let Beside { periods, is_dated, bank } = *beside;
-        let (mean_per_year, deviation_per_year) = (mean * periods, deviation * periods.sqrt());
-        let error = deviation / (self.values.len() as f64).sqrt();
+        let deviation_per_year = moments(bulk).1 * periods.sqrt();
         let (all_mean, all_deviation) = moments(&self.values);
         let is_period = beside.noun();
         let told = |what: String| {
             let of = if is_dated { String::new() } else { format!(", if each is of a {is_period}") };
             Some(format!(" As fractions {what}{of}."))
         };
-        if mean_per_year.abs() > LARGE_YEARLY_MEAN && mean.abs() > SURE_ERRORS * error {
-            return told(format!("they average {} a year", percent(all_mean * periods)));
+        if self.earns_too_much(bulk, periods) {
+            return told(format!("they average {} a year", percent_a_year(all_mean, periods)));
         }
         if is_dated && deviation_per_year > LARGE_DEVIATION {
             return told(format!("their deviation is {} a year", percent(all_deviation * periods.sqrt())));
@@ -121,5 +118,14 @@ impl Numbers<'_> {
             None if is_coarse(&self.cells) => told("all of them are whole percents".to_owned()),
             None => None,
         }
+    }
+    /// Tells whether numbers as fractions average more a year than few assets do, and that beyond chance, or beyond chance more than
+    /// they deviate in a year, which only what hardly earns does. A handful of returns averages more by chance alone; an odd one
+    /// among them hides nothing, since the first is told of the bulk.
+    fn earns_too_much(&self, bulk: &[f64], periods: f64) -> bool {
+        let beyond_chance = |values: &[f64]| sure_mean(values) * periods;
+        let deviation_per_year = moments(&self.values).1 * periods.sqrt();
+        moments(bulk).0.abs() * periods > LARGE_YEARLY_MEAN
+            && (beyond_chance(bulk) > LARGE_YEARLY_MEAN || beyond_chance(&self.values) > deviation_per_year)
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::support::App;
-use ballast::returns::{Choices, Reading, Record, decoded, read};
+use ballast::returns::{Choices, Kind, Reading, Record, decoded, read};
 use serde_json::{Value, json};
 
 fn folder() -> PathBuf {
@@ -178,6 +178,35 @@ fn every_file_of_a_vendor_is_read_asked_about_or_refused_as_it_must_be() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
+}
+
+/// Months of US stocks, in a run without dates.
+fn months(of: impl Fn(f64) -> f64, count: usize) -> Vec<String> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/us_market_monthly.csv");
+    let text = std::fs::read_to_string(path).unwrap();
+    let cell = |line: &str| format!("{:.5}", of(line.split(',').nth(1).unwrap().parse().unwrap()));
+    let cells: Vec<String> = text.lines().skip(1).map(cell).collect();
+    cells.windows(count).step_by(count / 3).map(|window| window.join(" ")).collect()
+}
+
+/// What few numbers average tells little of what they are: of stocks as fractions few runs are asked about, of a calm fund in
+/// percent (0.05 % a month, give or take 0.04 %) most.
+#[test]
+fn short_runs_are_asked_about_where_they_may_be_percent_and_seldom_elsewhere() {
+    for (count, most_of_stocks, fewest_of_calm) in [(4, 0.09, 0.5), (6, 0.08, 0.7), (12, 0.03, 0.85), (24, 0.02, 0.9)] {
+        let asked = |texts: Vec<String>| {
+            let said = Choices::from(Kind::Simple);
+            let is_average = |text: &&String| match read(text, &said) {
+                Reading::Asked { questions, .. } => {
+                    questions[0].asks == "unit" && questions[0].question.contains("they average")
+                }
+                _ => false,
+            };
+            texts.iter().filter(is_average).count() as f64 / texts.len() as f64
+        };
+        let (stocks, calm) = (asked(months(|back| back, count)), asked(months(|back| 0.05 + 0.8 * back, count)));
+        assert!(stocks < most_of_stocks && calm > fewest_of_calm, "{count}: {stocks} {calm}");
+    }
 }
 
 /// A generator of its own, so that a failure can be repeated.

@@ -174,9 +174,6 @@ async def reading_of(
     said: wire.Choices = {**(choices or {})}
     if kind is not None:
         said["kind"] = kind
-        if not isinstance(held, str) and not held.is_headed and kind != "price":
-            # Numbers of a program are fractions, as everywhere here; what varies too much for that is asked about.
-            said.setdefault("unit", "fraction")
     reading = await _reading(transport, text, said)
     if isinstance(held, str) or "kind" in said or (held.is_headed and name != "history"):
         return reading
