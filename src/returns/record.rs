@@ -9,7 +9,8 @@ use super::dates::told;
 use super::kind::{Returns, called};
 use super::moments::moments;
 use super::sheet::ColumnFound;
-use super::words::percent;
+use super::words::{percent, percent_a_year};
+use crate::control::request::annualised::compounded;
 use crate::control::request::frequency::Frequency;
 
 /// Returns of one asset or several, oldest first.
@@ -62,7 +63,7 @@ pub struct Series {
     pub mean: f64,
     /// Their standard deviation.
     pub deviation: f64,
-    /// Mean times the periods of a year.
+    /// Mean of a year, compounded: `(1 + mean)^p - 1` of p periods.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_per_year: Option<f64>,
     /// Deviation times the square root of the periods of a year.
@@ -153,7 +154,7 @@ impl Series {
         let Returns { kind, unit, simple, logarithmic } = returns;
         let (simple_returns, log_returns) = (last(simple), last(logarithmic));
         let (mean, deviation) = moments(&simple_returns);
-        let mean_per_year = periods_per_year.map(|periods| mean * periods as f64);
+        let mean_per_year = periods_per_year.map(|periods| compounded(mean, periods as f64));
         let deviation_per_year = periods_per_year.map(|periods| deviation * (periods as f64).sqrt());
         Series { column, kind, unit, log_returns, simple_returns, mean, deviation, mean_per_year, deviation_per_year }
     }
@@ -185,15 +186,16 @@ impl Record {
         format!("{latest}{adjective} {what}{span}{place}{turned}.")
     }
 
-    /// "Mean 0.51 % and deviation 4.30 % a month, 6.12 % and 14.90 % a year."
+    /// "Mean 0.51 % and deviation 4.30 % a month, 6.29 % and 14.90 % a year."
     fn figures(&self) -> Vec<String> {
         let noun = self.frequency.map_or("period", Frequency::noun);
         let of = |series: &Series| {
-            let Series { column, mean, deviation, mean_per_year, deviation_per_year, .. } = series;
+            let Series { column, mean, deviation, deviation_per_year, .. } = series;
             let of = if self.series.len() > 1 { format!("{column}: mean") } else { "Mean".to_owned() };
-            let yearly = mean_per_year.zip(*deviation_per_year).filter(|_| self.frequency != Some(Frequency::Yearly));
-            let yearly = yearly.map_or(String::new(), |(mean, deviation)| {
-                format!(", {} and {} a year", percent(mean), percent(deviation))
+            let yearly = self.periods_per_year.zip(*deviation_per_year);
+            let yearly = yearly.filter(|_| self.frequency != Some(Frequency::Yearly));
+            let yearly = yearly.map_or(String::new(), |(periods, deviation)| {
+                format!(", {} and {} a year", percent_a_year(*mean, periods as f64), percent(deviation))
             });
             format!("{of} {} and deviation {} a {noun}{yearly}.", percent(*mean), percent(*deviation))
         };

@@ -123,11 +123,11 @@ test("a key that expires is told so over the page, and what was typed is kept wh
   await page.evaluate(() => sessionStorage.removeItem("ballast-key"));
 });
 
-test("one record has one mean and one deviation, from its reading to its policy", async () => {
+test("one record has one mean and one deviation, of a month and of a year, from its reading to its policy", async () => {
   await go("#/train");
   await record().fill(DATED);
   const read = plain(await page.getByText(/^12 monthly/).first().innerText());
-  const [, mean, deviation] = /Mean ([\d.]+) % and deviation ([\d.]+) % a month/.exec(read);
+  const [, mean, deviation, ofYear, deviationOfYear] = /Mean ([\d.]+) % and deviation ([\d.]+) % a month, ([\d.]+) % and ([\d.]+) % a year/.exec(read);
   await page.getByLabel("Months ahead").fill("2");
   await small();
   await page.getByLabel("Bank return per month, %").fill("0.2");
@@ -141,5 +141,5 @@ test("one record has one mean and one deviation, from its reading to its policy"
   const told = page.getByText(/^The record holds 12 returns/);
   await told.waitFor();
   const words = plain(await told.innerText());
-  assert.ok(words.includes(`mean ${mean} %, standard deviation ${deviation} % a month.`), `${words} for ${read}`);
+  assert.ok(words.includes(`mean ${mean} %, standard deviation ${deviation} % a month. That is ${ofYear} % a year, compounded, with a deviation of ${deviationOfYear} %.`), `${words} for ${read}`);
 });

@@ -14,7 +14,7 @@ pub struct Annualised {
     pub rate: f64,
     /// What the asset paid, compounded: `m^p - 1`, m the mean of `e^z` over the log-returns z of the history.
     pub mean_return: f64,
-    /// Standard deviation of the history's simple returns, of independent periods: `sqrt(p)` times that of one.
+    /// Standard deviation of the history's simple returns, a sample's, of independent periods: `sqrt(p)` times that of one.
     pub deviation: f64,
 }
 
@@ -24,10 +24,12 @@ impl ProblemSpecification {
     /// Checked by: `a_year_of_known_periods_is_what_its_prices_say`.
     pub fn annualised(&self) -> Option<Annualised> {
         let periods = self.periods_per_year?;
+        let simple: Vec<f64> = self.history.iter().map(|z| z.exp_m1()).collect();
+        let count = simple.len() as f64;
         Some(Annualised {
             rate: compounded(self.rate_per_step, periods),
             mean_return: compounded(self.mean_return(), periods),
-            deviation: periods.sqrt() * deviation(&self.history.iter().map(|z| z.exp_m1()).collect::<Vec<f64>>()),
+            deviation: (periods * count / (count - 1.0).max(1.0)).sqrt() * deviation(&simple),
         })
     }
 
@@ -57,7 +59,7 @@ mod tests {
     use super::*;
 
     /// Prices that go up by a fifth or down by a tenth, each half of the time: 5 % on average. In two periods wealth grows by
-    /// 1.05^2, the bank's by 1.01^2; a return lies 15 % off its mean.
+    /// 1.05^2, the bank's by 1.01^2; a return lies 15 % off its mean, so that a sample of two deviates by sqrt(2) as much.
     #[test]
     fn a_year_of_known_periods_is_what_its_prices_say() {
         let mut problem = ProblemSpecification::of(vec![1.2_f64.ln(), 0.9_f64.ln()], 0.01);
@@ -66,7 +68,7 @@ mod tests {
         let Annualised { rate, mean_return, deviation } = problem.annualised().unwrap();
         // Roundings of numbers near 1.
         assert!((rate - 0.0201).abs() < 1e-15 && (mean_return - 0.1025).abs() < 1e-15, "{rate} {mean_return}");
-        assert!((deviation - 2.0_f64.sqrt() * 0.15).abs() < 1e-15, "{deviation}");
+        assert!((deviation - 0.3).abs() < 1e-15, "{deviation}");
     }
 
     #[test]

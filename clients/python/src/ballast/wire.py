@@ -18,7 +18,7 @@ class Annualised(TypedDict):
     mean_return: float
     """What the asset paid, compounded: `m^p - 1`, m the mean of `e^z` over the log-returns z of the history."""
     deviation: float
-    """Standard deviation of the history's simple returns, of independent periods: `sqrt(p)` times that of one."""
+    """Standard deviation of the history's simple returns, a sample's, of independent periods: `sqrt(p)` times that of one."""
 
 
 Asset: TypeAlias = str
@@ -1370,8 +1370,8 @@ class Choices(TypedDict):
     """Whether a record from which periods are missing is taken as it is, without the rows that have no number"""
     unusual: NotRequired[bool | None]
     """
-    Whether what is unusual of an asset is right: a deviation above 30 % a period or 150 % a year, a mean above 100 % a year,
-    or a return far from all others
+    Whether what is unusual of an asset is right: a deviation above 30 % a period or 150 % a year, a mean above 100 % a year
+    beyond chance, or a return far from all others
     """
     excess: NotRequired[bool | None]
     """Whether the returns are those beyond the bank, to which what its column says is added"""
@@ -1678,7 +1678,7 @@ class Series(TypedDict):
     deviation: float
     """Their standard deviation."""
     mean_per_year: NotRequired[float | None]
-    """Mean times the periods of a year."""
+    """Mean of a year, compounded: `(1 + mean)^p - 1` of p periods."""
     deviation_per_year: NotRequired[float | None]
     """Deviation times the square root of the periods of a year."""
 
