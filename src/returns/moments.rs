@@ -20,7 +20,7 @@ pub fn moments(values: &[f64]) -> (f64, f64) {
     (mean, (squares / (count - 1.0).max(1.0)).sqrt())
 }
 
-/// How large the mean is beyond what chance gives so few numbers: its size less half its interval by Student's law. Of one number
+/// Size of the mean beyond what chance gives so few numbers: its size less half its interval by Student's law. Of one number
 /// chance gives any; of numbers that do not vary, nothing.
 pub fn sure_mean(values: &[f64]) -> f64 {
     let (mean, deviation) = moments(values);

@@ -11,7 +11,7 @@ pub fn percent(fraction: f64) -> String {
     format!("{} %", if shown == "-0.00" { "0.00" } else { &shown })
 }
 
-/// The return of a year whose `periods` earn `mean` each, compounded.
+/// Return of a year whose `periods` earn `mean` each, compounded.
 pub fn percent_a_year(mean: f64, periods: f64) -> String {
     let a_year = compounded(mean, periods);
     if a_year > BEYOND_ALL { format!("more than {}", percent(BEYOND_ALL)) } else { percent(a_year) }

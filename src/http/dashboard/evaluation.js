@@ -69,7 +69,7 @@ function compared({ request, histories, strategies }, policyLink) {
 const LAWS = { bootstrap: "the record itself, smoothed", gaussian_mixture: "a mixture of bell curves", student_t: "a Student law, of heavier tails than a bell curve" };
 const drawnFrom = (law) => LAWS[law?.kind] ?? "the market it was asked for";
 
-/** Whether futures are drawn from the very record that the policies know. */
+/** Tells whether futures are drawn from the very record that the policies know. */
 const isTrue = ({ histories, problem: { law } }) => histories.kind !== "drawn" && law?.kind === "bootstrap";
 
 /** A name within a sentence. */

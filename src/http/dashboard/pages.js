@@ -37,7 +37,7 @@ export async function all(path, name, signal) {
   return found;
 }
 
-/** What `draw` makes of the first `most` rows, and a button that shows `all`, null where those are all. */
+/** A holder of what `draw` makes of the first `most` rows, and a button that shows `all`, null where those are all. */
 export function firstOf(rows, most, draw) {
   const holder = h("div", {}, draw(rows.slice(0, most)));
   if (rows.length <= most) return { holder, all: null };
