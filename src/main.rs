@@ -54,6 +54,8 @@ enum Command {
     Backup(backup::Backup),
     /// Make a data folder of a backup, verified.
     Restore(backup::Restore),
+    /// Put one damaged thing of a data folder back from a backup, while no service runs.
+    Repair(backup::Repair),
     /// Exit 0 if a running service is ready, else 1.
     Healthcheck(healthcheck::Healthcheck),
     /// Measure this machine's speed and accuracy.
@@ -113,6 +115,7 @@ async fn outcome() -> ExitCode {
         Command::Check(arguments) => check::run(arguments).await,
         Command::Backup(arguments) => backup::run(arguments).await,
         Command::Restore(arguments) => backup::restore(arguments).await,
+        Command::Repair(arguments) => backup::repair(arguments).await,
         Command::Healthcheck(arguments) => healthcheck::run(&arguments),
         Command::Openapi => {
             print!("{}", ballast::http::description_json());

@@ -32,13 +32,13 @@ pub async fn run(arguments: Audit) -> Result<(), Box<dyn std::error::Error>> {
     let ring = keys::open(arguments.store).await?;
     let filter = AuditFilter { tenant: arguments.tenant, object: arguments.object };
     let mut out = std::io::stdout().lock();
-    writeln!(out, "time\ttenant\tkey\troles\taction\tobject\toutcome")?;
+    writeln!(out, "time\ttenant\tkey\troles\taction\tobject\toutcome\tnumber\tseal")?;
     let (mut left, mut after) = (arguments.limit, None);
     while left > 0 {
         let page = ring.deeds(&filter, PAGE.min(left), after).await?;
-        for AuditRow { tenant, key, roles, deed, object, outcome, at_ms, .. } in &page {
+        for AuditRow { tenant, key, roles, deed, object, outcome, at_ms, number, seal, .. } in &page {
             let (time, key) = (moments::shown(Some(*at_ms)), if key.is_empty() { "-" } else { key });
-            writeln!(out, "{time}\t{tenant}\t{key}\t{roles}\t{deed}\t{object}\t{outcome}")?;
+            writeln!(out, "{time}\t{tenant}\t{key}\t{roles}\t{deed}\t{object}\t{outcome}\t{number}\t{seal}")?;
         }
         after = page.iter().map(|row| row.sequence).filter(|sequence| *sequence > 0).min();
         if after.is_none() || page.len() < PAGE.min(left) {

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
+use ballast::service::clock::Clock;
 use ballast::service::config::StoreLocation;
-use ballast::store;
+use ballast::store::{self, Damage};
 use clap::Args;
 
 use super::store_location::StoreArgs;
@@ -15,6 +16,33 @@ pub struct Backup {
     /// The file to write; it may not exist.
     #[arg(long)]
     out: PathBuf,
+    #[command(flatten)]
+    damage: DamageArgs,
+}
+
+/// How damage of single things is treated.
+#[derive(Debug, Args)]
+struct DamageArgs {
+    /// Go on over damaged things, which are reported and copied as they are.
+    #[arg(long)]
+    skip_damaged: bool,
+}
+
+impl From<DamageArgs> for Damage {
+    fn from(arguments: DamageArgs) -> Self {
+        if arguments.skip_damaged { Damage::Skipped } else { Damage::Refused }
+    }
+}
+
+#[derive(Debug, Args)]
+pub struct Repair {
+    /// A session, a policy or a key, as `check` and the log name it; or `totals`, which are summed anew.
+    thing: String,
+    /// A file made by `ballast backup` while the thing was sound.
+    #[arg(long)]
+    from: Option<PathBuf>,
+    #[command(flatten)]
+    store: StoreArgs,
 }
 
 #[derive(Debug, Args)]
@@ -25,6 +53,8 @@ pub struct Restore {
     /// `--data` names the folder to make; it may not hold a database.
     #[command(flatten)]
     store: StoreArgs,
+    #[command(flatten)]
+    damage: DamageArgs,
 }
 
 /// # Errors
@@ -33,8 +63,9 @@ pub async fn run(arguments: Backup) -> Result<(), Box<dyn std::error::Error>> {
     let StoreLocation::Folder(folder) = arguments.store.location()? else {
         return Err("PostgreSQL is backed up by its own pg_dump --format=custom (docs/operating.md)".into());
     };
-    store::backup(&folder, &arguments.out, &mut |sound| println!("{sound}")).await?;
-    println!("sound, and on the disk as {}", arguments.out.display());
+    let mut report = Report::default();
+    store::backup(&folder, &arguments.out, arguments.damage.into(), &mut |line| report.tell(&line)).await?;
+    println!("{}, and on the disk as {}", report.verdict(), arguments.out.display());
     Ok(())
 }
 
@@ -44,7 +75,42 @@ pub async fn restore(arguments: Restore) -> Result<(), Box<dyn std::error::Error
     let StoreLocation::Folder(folder) = arguments.store.location()? else {
         return Err("PostgreSQL is restored by its own pg_restore (docs/operating.md)".into());
     };
-    store::restore(&arguments.from, &folder, &mut |sound| println!("{sound}")).await?;
-    println!("sound, and on the disk in {}", folder.display());
+    let mut report = Report::default();
+    store::restore(&arguments.from, &folder, arguments.damage.into(), &mut |line| report.tell(&line)).await?;
+    println!("{}, and on the disk in {}", report.verdict(), folder.display());
     Ok(())
+}
+
+/// # Errors
+/// The store is PostgreSQL, a process holds the folder, or the backup has not what would make the thing sound.
+pub async fn repair(arguments: Repair) -> Result<(), Box<dyn std::error::Error>> {
+    let StoreLocation::Folder(folder) = arguments.store.location()? else {
+        return Err("PostgreSQL is repaired by its own tools (docs/operating.md)".into());
+    };
+    let thing = match (arguments.thing.as_str(), &arguments.from) {
+        ("totals", None) => store::Repair::Totals,
+        ("totals", Some(_)) => return Err("totals are summed anew, and no backup has them: leave out --from".into()),
+        (_, None) => return Err("--from must name a backup in which the thing is sound".into()),
+        (name, Some(from)) => store::Repair::Thing { name, from },
+    };
+    let rows = store::repair(&folder, thing, Clock::system().now_milliseconds()).await?;
+    println!("{} is sound: {rows} rows were put right", arguments.thing);
+    Ok(())
+}
+
+/// Prints lines, and counts the damaged things among them.
+#[derive(Default)]
+struct Report {
+    damaged: usize,
+}
+
+impl Report {
+    fn tell(&mut self, line: &str) {
+        self.damaged += usize::from(line.starts_with("damaged: "));
+        println!("{line}");
+    }
+
+    fn verdict(&self) -> String {
+        if self.damaged == 0 { "sound".to_owned() } else { format!("with {} damaged things", self.damaged) }
+    }
 }

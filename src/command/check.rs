@@ -18,7 +18,7 @@ pub struct Check {
 }
 
 /// # Errors
-/// The first damage, or what kept it from being looked for.
+/// How much is damaged, or what kept it from being looked for.
 pub async fn run(arguments: Check) -> Result<(), Box<dyn std::error::Error>> {
     let inspection = match (arguments.backup, arguments.store.location()?) {
         (Some(file), _) => Inspection::of_backup(&file).await?,

@@ -7,7 +7,7 @@ use ballast::control::error::FieldError;
 use ballast::service::clock::Clock;
 use ballast::service::config::StoreLocation;
 use ballast::service::keys::{REFRESH, Secret, issue, rotate};
-use ballast::store::{KeyRing, KeyRole, KeyRoles, KeyRow, Tenant};
+use ballast::store::{KeyRing, KeyRole, KeyRoles, KeyRow, StoredKeys, Tenant};
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::moments;
@@ -167,13 +167,16 @@ fn reveal(secret: &Secret) -> Result<(), Box<dyn std::error::Error>> {
 
 async fn list(arguments: List) -> Result<(), Box<dyn std::error::Error>> {
     let ring = open(arguments.store).await?;
-    let rows = ring.list().await?;
+    let StoredKeys { sound, damaged } = ring.list().await?;
     ring.close().await;
     let mut out = std::io::stdout().lock();
     writeln!(out, "key\ttenant\troles\tcreated\texpires\trevoked")?;
-    for KeyRow { key, tenant, roles, created_ms, expires_ms, revoked_ms, .. } in rows {
+    for KeyRow { key, tenant, roles, created_ms, expires_ms, revoked_ms, .. } in sound {
         let [created, expires, revoked] = [Some(created_ms), expires_ms, revoked_ms].map(moments::shown);
         writeln!(out, "{key}\t{tenant}\t{roles}\t{created}\t{expires}\t{revoked}")?;
+    }
+    for what in damaged {
+        writeln!(out, "{what} is damaged and lets nobody in; ballast repair restores it")?;
     }
     Ok(())
 }

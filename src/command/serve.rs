@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use ballast::http;
 use ballast::service::allowance::Limits;
-use ballast::service::audit::AuditKept;
 use ballast::service::config::{Config, DAY, Role, TlsFiles};
 use ballast::service::memory::{MemoryLimit, Size};
 use ballast::service::shutdown::Shutdown;
@@ -38,6 +37,10 @@ pub struct Serve {
     /// Listen where others reach it even while the store holds no key.
     #[arg(long, env = "BALLAST_ALLOW_ANONYMOUS", value_parser = FalseyValueParser::new())]
     allow_anonymous: bool,
+    /// Do not start while the store holds no key, as if its folder is lost or its database rolled back. A folder that had
+    /// keys is always one that needs them.
+    #[arg(long, env = "BALLAST_REQUIRE_KEYS", value_parser = FalseyValueParser::new())]
+    require_keys: bool,
     /// What this replica does.
     #[arg(long, env = "BALLAST_ROLE", value_enum, default_value_t = RoleName::All)]
     role: RoleName,
@@ -69,16 +72,10 @@ struct AuditArgs {
     /// Days that an entry of the audit is kept.
     #[arg(long, env = "BALLAST_AUDIT_DAYS", default_value_t = 400, value_parser = clap::value_parser!(u16).range(1..))]
     audit_days: u16,
-    /// Entries that are kept of one tenant; the oldest are dropped first.
-    #[arg(long, env = "BALLAST_AUDIT_ENTRIES", default_value_t = 250_000, value_parser = clap::value_parser!(u32).range(1..))]
+    /// Changes that one key may make within these days: their entries are kept, so further changes are refused; 0: any
+    /// number.
+    #[arg(long, env = "BALLAST_AUDIT_ENTRIES", default_value_t = Quotas::default().audit_entries)]
     audit_entries: u32,
-}
-
-impl From<AuditArgs> for AuditKept {
-    fn from(arguments: AuditArgs) -> Self {
-        let age = Duration::from_hours(24 * u64::from(arguments.audit_days));
-        AuditKept { age, entries: arguments.audit_entries }
-    }
 }
 
 /// What one tenant may keep, and for how long.
@@ -166,13 +163,17 @@ pub async fn run(arguments: Serve) -> Result<(), Box<dyn std::error::Error>> {
     let traces = traces::start()?;
     let mut config = Config { listen: arguments.listen, ..Config::new("") };
     config.store = arguments.store.location()?;
-    config.allow_anonymous = arguments.allow_anonymous;
+    (config.allow_anonymous, config.require_keys) = (arguments.allow_anonymous, arguments.require_keys);
     let limits = arguments.limits;
     config.limits = Limits::new([limits.rate_live, limits.rate_heavy, limits.rate_read], limits.heavy_calls.into());
-    config.audit = arguments.audit.into();
+    config.retain_audit = DAY * arguments.audit.audit_days.into();
     let quotas = arguments.quotas;
-    config.quotas =
-        Quotas { queued_jobs: quotas.quota_queued_jobs, sessions: quotas.quota_sessions, bytes: quotas.quota_bytes };
+    config.quotas = Quotas {
+        queued_jobs: quotas.quota_queued_jobs,
+        sessions: quotas.quota_sessions,
+        bytes: quotas.quota_bytes,
+        audit_entries: arguments.audit.audit_entries,
+    };
     config.retain_jobs = (quotas.retain_jobs_days > 0).then(|| DAY * quotas.retain_jobs_days.into());
     config.limits.streams_of_one = limits.streams.into();
     config.connection_limit = limits.connections as usize;

@@ -42,6 +42,11 @@ pub struct AuditEntry {
     /// What came of it.
     #[schema(example = "deleted, with 12 entries")]
     pub outcome: String,
+    /// From 1 among the entries of its key in this tenant; of `session.observe`, among the entries of its session.
+    pub number: i64,
+    /// SHA-256 over the entry and the seal of the one before, in hexadecimal digits: a copy of it shows later that the entry and
+    /// all before it are what they were.
+    pub seal: String,
 }
 
 /// A page of the audit, newest first.
@@ -62,6 +67,8 @@ impl From<AuditRow> for AuditEntry {
             action: row.deed,
             object: row.object,
             outcome: row.outcome,
+            number: row.number,
+            seal: row.seal,
         }
     }
 }

@@ -62,7 +62,9 @@ impl From<ServiceError> for Problem {
                 problem(Kind::TooManyRequests).naming("rate", class.name(), rule).to_be_asked_again_in(wait)
             }
             // Said at the start, before anybody asks.
-            error @ ServiceError::NobodyAsked { .. } => Problem::new(Kind::Internal, error.to_string()),
+            error @ (ServiceError::NobodyAsked { .. } | ServiceError::KeysLost { .. } | ServiceError::KeysRequired) => {
+                Problem::new(Kind::Internal, error.to_string())
+            }
             ServiceError::JobNotEnded { job } => {
                 problem(Kind::JobNotEnded).naming("job", job, "must name a job that has ended")
             }
@@ -95,8 +97,12 @@ fn of_quota(over: OverQuota) -> Problem {
         Quota::QueuedJobs => (ProblemKind::QueueFull, "wait for queued jobs, or cancel some"),
         Quota::Sessions => (ProblemKind::QuotaExceeded, "delete sessions"),
         Quota::Bytes => (ProblemKind::QuotaExceeded, "delete ended jobs, sessions or policies"),
+        Quota::AuditEntries => {
+            (ProblemKind::QuotaExceeded, "go on with another key, or wait until older ones are past --audit-days")
+        }
     };
     let option = over.quota.option();
-    let rule = format!("must be at most {}, over all keys of the tenant: {remedy}, or raise --{option}", over.limit);
+    let of = if over.quota == Quota::AuditEntries { "of this key" } else { "over all keys of the tenant" };
+    let rule = format!("must be at most {}, {of}: {remedy}, or raise --{option}", over.limit);
     Problem::new(kind, format!("{over}: {remedy}")).naming(option, over.kept + over.wanted, rule)
 }

@@ -34,11 +34,14 @@ pub async fn livez() -> &'static str {
 /// Whether the store answers and the service takes work.
 #[utoipa::path(get, path = "/readyz", tag = "operations",
     responses(
-        (status = 200, description = "It does.", body = String, content_type = "text/plain"),
+        (status = 200, description = "It does. If the clock of its machine is wrong, that is said too.", body = String, content_type = "text/plain"),
         (status = 503, description = "Draining, or the store does not answer.", body = Problem, content_type = "application/problem+json")))]
-pub async fn readyz(State(service): State<Arc<Service>>) -> Result<&'static str, Problem> {
+pub async fn readyz(State(service): State<Arc<Service>>) -> Result<String, Problem> {
     service.ready().await?;
-    Ok("ok")
+    Ok(match service.clock_skew_seconds() {
+        0 => "ok".to_owned(),
+        ahead => format!("ok, but the clock of this machine is {ahead} seconds ahead: nothing is deleted by age"),
+    })
 }
 
 /// Both, with detail.

@@ -168,6 +168,9 @@ impl From<CareCounts> for CareCount {
 #[derive(Debug, Serialize, ToSchema)]
 pub struct SessionPage {
     pub sessions: Vec<SessionEntry>,
+    /// Sessions of this page that are not what was written: nothing of them is shown, and a call for one gets 500 until an
+    /// operator has restored it.
+    pub damaged: Vec<String>,
     /// Sessions that match, on all pages together.
     pub total: usize,
     /// Who needs care among those that `search` and `tag` find, in whatever `state`; null on later pages.
@@ -194,10 +197,10 @@ pub async fn list(
 ) -> Result<Json<SessionPage>, Problem> {
     let asked = asked.read()?;
     let found = service.sessions.list(&caller.tenant, asked.clone()).await?;
-    let last = found.sessions.last().filter(|_| found.sessions.len() == asked.limit);
-    let next = last.map(|last| cursor(&asked, &last.row.place));
+    let next = found.last.as_ref().map(|place| cursor(&asked, place));
     let sessions = found.sessions.into_iter().map(SessionEntry::from).collect();
-    Ok(Json(SessionPage { sessions, total: found.total, care: found.care.map(CareCount::from), next }))
+    let (damaged, care) = (found.damaged, found.care.map(CareCount::from));
+    Ok(Json(SessionPage { sessions, damaged, total: found.total, care, next }))
 }
 
 fn refused(field: &str, value: &str, rule: impl Into<String>) -> Problem {

@@ -1,30 +1,17 @@
 //! What was done, as an admin asks for it, and how long it is kept.
 
+use std::collections::HashMap;
+use std::sync::Arc;
 use std::time::Duration;
 
-use super::clock::Clock;
 use super::error::ServiceError;
 use super::shutdown::Shutdown;
-use crate::store::{AuditBounds, AuditFilter, AuditRow, Store};
+use super::timekeeper::Timekeeper;
+use crate::store::{AuditEnd, AuditFilter, AuditRow, Store, Tenant};
 
 /// The audit of the store.
 pub struct Audit {
     store: Store,
-}
-
-/// How long entries are kept; the newest of a tenant always is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct AuditKept {
-    pub age: Duration,
-    /// Of one tenant.
-    pub entries: u32,
-}
-
-impl Default for AuditKept {
-    /// A year and the time to look at it; a hundred megabytes of one tenant.
-    fn default() -> Self {
-        AuditKept { age: Duration::from_hours(400 * 24), entries: 250_000 }
-    }
 }
 
 impl Audit {
@@ -46,31 +33,42 @@ impl Audit {
     }
 }
 
-/// Entries past their bounds stay no longer than this.
+/// Between two looks at what is past its age.
 const ROUND: Duration = Duration::from_hours(1);
-/// Between two transactions that drop entries, so that others come between them.
-const PAUSE: Duration = Duration::from_secs(1);
 
-/// Drops entries past their bounds until the shutdown begins.
-pub(super) async fn keep_bounded(store: Store, clock: Clock, kept: AuditKept, shutdown: Shutdown) {
-    let age_ms = i64::try_from(kept.age.as_millis()).unwrap_or(i64::MAX);
+/// Until the shutdown begins, drops entries that are past the age, and tells the log where each chain ends: who changes
+/// the database by hand, seals and all, does not change what the log says of it.
+pub(super) async fn keep_bounded(store: Store, time: Arc<Timekeeper>, age: Duration, shutdown: Shutdown) {
+    let age_ms = i64::try_from(age.as_millis()).unwrap_or(i64::MAX);
+    let mut logged = HashMap::new();
     loop {
-        let now_ms = clock.now_milliseconds();
-        let bounds = AuditBounds { before_ms: now_ms.saturating_sub(age_ms), entries: kept.entries.into() };
-        let pause = match store.cut_audit(bounds, now_ms).await {
-            Ok(0) => ROUND,
-            Ok(dropped) => {
-                tracing::info!(dropped, "entries of the audit past their bounds");
-                PAUSE
-            }
-            Err(error) => {
-                tracing::warn!(error = &error as &dyn std::error::Error, "the audit is not cut");
-                ROUND
+        let cut = async {
+            match time.time_to_delete_by().await? {
+                Some(now_ms) => store.cut_audit(now_ms.saturating_sub(age_ms), now_ms).await,
+                None => Ok(0),
             }
         };
+        match cut.await {
+            Ok(0) => {}
+            Ok(dropped) => tracing::info!(dropped, "entries of the audit past their age"),
+            Err(error) => tracing::warn!(error = &error as &dyn std::error::Error, "the audit is not cut"),
+        }
+        match store.audit_ends().await {
+            Ok(ends) => log_ends(ends, &mut logged),
+            Err(error) => tracing::warn!(error = &error as &dyn std::error::Error, "the ends of the audit"),
+        }
         tokio::select! {
             () = shutdown.begun() => return,
-            () = tokio::time::sleep(pause) => {}
+            () = tokio::time::sleep(ROUND) => {}
+        }
+    }
+}
+
+/// Logs each end that is another than the one `logged` last.
+fn log_ends(ends: Vec<AuditEnd>, logged: &mut HashMap<(Tenant, String), i64>) {
+    for AuditEnd { tenant, chain, number, seal } in ends {
+        if logged.insert((tenant.clone(), chain.clone()), number) != Some(number) {
+            tracing::info!(%tenant, chain, number, seal, "the audit ends");
         }
     }
 }

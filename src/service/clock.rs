@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use jiff::Timestamp;
@@ -29,6 +30,12 @@ impl Clock {
             let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
             i64::try_from(since_epoch.as_millis()).unwrap_or(i64::MAX)
         })
+    }
+
+    /// This clock, moved by `ahead_ms` backwards, which may change.
+    pub(super) fn behind(&self, ahead_ms: Arc<AtomicI64>) -> Self {
+        let clock = self.clone();
+        Clock::new(move || clock.now_milliseconds().saturating_sub(ahead_ms.load(Ordering::Relaxed)))
     }
 
     /// Milliseconds since 1970-01-01 UTC.

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::allowance::Limits;
-use super::audit::AuditKept;
 use super::memory::MemoryLimit;
 use crate::store::{PostgresUrl, Quotas};
 
@@ -71,8 +70,11 @@ pub struct Config {
     pub hosts: Vec<String>,
     /// Whether an address that others reach may be listened on while the store holds no key.
     pub allow_anonymous: bool,
+    /// If true, a store without a key is not served at all.
+    pub require_keys: bool,
     pub limits: Limits,
-    pub audit: AuditKept,
+    /// How long entries of the audit are kept.
+    pub retain_audit: Duration,
     /// What every tenant may keep.
     pub quotas: Quotas,
     /// Ended jobs are deleted after this time; never where there is none.
@@ -118,8 +120,9 @@ impl Config {
             allow_plaintext: false,
             hosts: Vec::new(),
             allow_anonymous: false,
+            require_keys: false,
             limits: Limits::default(),
-            audit: AuditKept::default(),
+            retain_audit: 400 * DAY,
             quotas: Quotas::default(),
             retain_jobs: Some(30 * DAY),
             store: StoreLocation::Folder(data.into()),

@@ -1,6 +1,7 @@
 //! Why a use case could not be done.
 
 use std::net::SocketAddr;
+use std::path::PathBuf;
 
 use thiserror::Error;
 
@@ -39,6 +40,14 @@ pub enum ServiceError {
         "{address} can be reached by others and the store holds no key: make one with `ballast keys create`, listen on loopback, or say --allow-anonymous"
     )]
     NobodyAsked { address: SocketAddr },
+    #[error(
+        "{} says that the store had keys, and it holds none: restore its database, make a key with `ballast keys create`, or remove that file to answer without keys", mark.display()
+    )]
+    KeysLost { mark: PathBuf },
+    #[error(
+        "--require-keys is given and the store holds no key: make one with `ballast keys create`, or give the store that has them"
+    )]
+    KeysRequired,
     #[error("the service is shutting down")]
     Draining,
     #[error("too many requests of this kind wait already")]

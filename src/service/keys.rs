@@ -6,8 +6,8 @@
 //! A request costs one hash and one look into memory. The store is asked every [`REFRESH`] instead, so a key made or
 //! revoked beside this process, or on another replica, counts within that time. While the store does not answer, what was
 //! known last holds; nothing else that needs the store answers then either. A key that expires is turned away at that
-//! moment whatever the store does: when is known beforehand, and is told by this process's own clock, as that of a
-//! certificate is. A key is rotated without a gap: its successor is in force before it expires itself.
+//! moment whatever the store does: when is known beforehand, by the clock of the store. A key is rotated without a gap: its
+//! successor is in force before it expires itself.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
@@ -21,9 +21,10 @@ use super::clock::Clock;
 use super::error::ServiceError;
 use super::identity;
 pub use super::secret::{PREFIX, Secret};
-use super::shutdown::Shutdown;
 use crate::control::error::FieldError;
-use crate::store::{Actor, KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, Store, StoreError, Successor, Tenant};
+use crate::store::{
+    Actor, KeyRing, KeyRole, KeyRoles, KeyRow, NewKey, Rotate, Store, StoreError, StoredKeys, Successor, Tenant,
+};
 
 /// A key made or revoked elsewhere counts within this time.
 pub const REFRESH: Duration = Duration::from_millis(500);
@@ -211,6 +212,8 @@ struct Known {
     by_hash: HashMap<[u8; 8], Arc<Caller>>,
     /// Keys that expired or were revoked, likewise.
     ended: HashMap<[u8; 8], KeyRow>,
+    /// Keys that are not what was written.
+    damaged: Vec<String>,
     allowances: HashMap<Tenant, Arc<Allowance>>,
 }
 
@@ -219,7 +222,7 @@ impl Keys {
         let allowance = Arc::new(Allowance::new(&limits));
         let anybody = Some(Caller::new(Tenant::default(), None, allowance.clone(), clock.clone()));
         let allowances = HashMap::from([(Tenant::default(), allowance)]);
-        let known = Known { anybody, by_hash: HashMap::new(), ended: HashMap::new(), allowances };
+        let known = Known { anybody, by_hash: HashMap::new(), ended: HashMap::new(), damaged: Vec::new(), allowances };
         let keys = Keys { store, limits, clock, known: RwLock::new(known) };
         keys.refresh().await?;
         Ok(keys)
@@ -275,9 +278,22 @@ impl Keys {
 
     /// Looks into the store.
     pub(super) async fn refresh(&self) -> Result<(), StoreError> {
-        let rows = self.store.keys().await?;
-        self.known.write().unwrap_or_else(PoisonError::into_inner).become_those(rows, &self.limits, &self.clock);
+        let keys = self.store.keys().await?;
+        let mut known = self.known.write().unwrap_or_else(PoisonError::into_inner);
+        if keys.damaged != known.damaged {
+            tracing::error!(damaged = ?keys.damaged, "keys that are damaged let nobody in");
+        }
+        let was_open = known.anybody.is_some();
+        known.become_those(keys, &self.limits, &self.clock);
+        if was_open && known.anybody.is_none() {
+            self.store.mark_keys()?;
+        }
         Ok(())
+    }
+
+    /// Keys that are not what was written.
+    pub(super) fn damaged(&self) -> Vec<String> {
+        self.read().damaged.clone()
     }
 
     fn read(&self) -> std::sync::RwLockReadGuard<'_, Known> {
@@ -287,14 +303,16 @@ impl Keys {
 }
 
 impl Known {
-    fn become_those(&mut self, rows: Vec<KeyRow>, limits: &Limits, clock: &Clock) {
-        if !rows.is_empty()
+    /// A key that is damaged closes as the first one does, and is none itself.
+    fn become_those(&mut self, keys: StoredKeys, limits: &Limits, clock: &Clock) {
+        if !keys.is_empty()
             && let Some(anybody) = self.anybody.take()
         {
             anybody.revoked.store(true, Ordering::Relaxed);
         }
         let mut before = std::mem::take(&mut self.by_hash);
-        for row in rows {
+        self.damaged = keys.damaged;
+        for row in keys.sound {
             let start = start(&row.hash);
             if row.has_ended(clock.now_milliseconds()) {
                 self.ended.insert(start, row);
@@ -314,19 +332,6 @@ impl Known {
         }
         for gone in before.into_values() {
             gone.revoked.store(true, Ordering::Relaxed);
-        }
-    }
-}
-
-/// Refreshes until the shutdown begins.
-pub(super) async fn keep_fresh(keys: Arc<Keys>, shutdown: Shutdown) {
-    loop {
-        tokio::select! {
-            () = shutdown.begun() => return,
-            () = tokio::time::sleep(REFRESH) => {}
-        }
-        if let Err(error) = keys.refresh().await {
-            tracing::warn!(error = &error as &dyn std::error::Error, "the keys known last stay in force");
         }
     }
 }
@@ -363,6 +368,7 @@ mod tests {
     }
 
     fn known(keys: &Keys, rows: Vec<KeyRow>) {
+        let rows = StoredKeys { sound: rows, damaged: Vec::new() };
         keys.known.write().unwrap().become_those(rows, &keys.limits, &keys.clock);
     }
 
@@ -401,6 +407,20 @@ mod tests {
         assert!(holder.has_ended());
         assert_eq!(keys.admit(Some("a")).unwrap_err(), Turned::WrongKey { of: Some("north".parse().unwrap()) });
         assert_eq!(keys.admit(None).unwrap_err(), Turned::NoKey);
+    }
+
+    #[tokio::test]
+    async fn a_damaged_key_lets_nobody_in_and_hides_no_other() {
+        let (_folder, keys) = keys().await;
+        let damaged = |sound, what: &str| StoredKeys { sound, damaged: vec![what.to_owned()] };
+        let become_those = |found| keys.known.write().unwrap().become_those(found, &keys.limits, &keys.clock);
+        become_those(damaged(Vec::new(), "key key_of_a"));
+        assert_eq!(keys.admit(None).unwrap_err(), Turned::NoKey);
+        known(&keys, vec![row("a", "north", None), row("b", "north", None)]);
+        let [a, b] = ["a", "b"].map(|text| keys.admit(Some(text)).unwrap());
+        become_those(damaged(vec![row("b", "north", Some(1)), row("c", "south", None)], "key key_of_a"));
+        assert!(a.has_ended() && b.has_ended() && keys.admit(Some("c")).is_ok());
+        assert_eq!(keys.admit(Some("a")).unwrap_err(), Turned::WrongKey { of: None });
     }
 
     #[tokio::test]

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use metrics::{Unit, counter, describe_counter, describe_gauge, describe_histogram};
+use metrics::{Unit, counter, describe_counter, describe_gauge, describe_histogram, gauge};
 
 use super::keys::KeyFigures;
 use crate::store::StoreError;
@@ -36,6 +36,7 @@ pub const JOBS_EXPIRED: &str = "ballast_jobs_expired_total";
 pub const STORE_BYTES: &str = "ballast_store_bytes";
 pub const STORE_FREE_BYTES: &str = "ballast_store_free_bytes";
 pub const STORE_LOG_BYTES: &str = "ballast_store_log_bytes";
+pub const CLOCK_SKEW_SECONDS: &str = "ballast_clock_skew_seconds";
 pub const DISK_LEFT_BYTES: &str = "ballast_disk_left_bytes";
 
 /// Upper bounds of the buckets of training steps, in seconds: milliseconds to an hour.
@@ -128,7 +129,18 @@ pub fn describe() {
     describe_gauge!(STORE_FREE_BYTES, Unit::Bytes, "Of the database, pages that hold nothing; over a folder.");
     describe_gauge!(STORE_LOG_BYTES, Unit::Bytes, "Size of the write-ahead log; over a folder.");
     describe_gauge!(DISK_LEFT_BYTES, Unit::Bytes, "Room left on the disk of the database; over a folder.");
+    describe_gauge!(
+        CLOCK_SKEW_SECONDS,
+        Unit::Seconds,
+        "How far this machine's clock is ahead of the database's, or over a folder of the newest moment stored; 0 within a minute, or a day."
+    );
+    gauge!(CLOCK_SKEW_SECONDS).set(0.0);
     metrics::counter!(JOBS_EXPIRED).absolute(0);
+}
+
+/// Records how far the clock is ahead of the one it should be.
+pub fn record_skew(seconds: i64) {
+    gauge!(CLOCK_SKEW_SECONDS).set(seconds as f64);
 }
 
 /// Records how old the oldest jobs are at `now_ms` and what room the store takes.

@@ -22,6 +22,7 @@ pub mod drift;
 mod due;
 pub mod error;
 pub mod explain;
+mod fresh_keys;
 pub mod fund_advice;
 pub mod gate;
 pub mod history;
@@ -55,6 +56,7 @@ mod slots;
 pub mod spans;
 mod standing;
 mod sync;
+mod timekeeper;
 mod trainer;
 mod upkeep;
 pub mod what_if;
@@ -74,6 +76,7 @@ use policies::Policies;
 use renewer::Renewer;
 use sessions::Sessions;
 use shutdown::Shutdown;
+use timekeeper::Timekeeper;
 use trainer::Trainer;
 
 use crate::control::error::FieldError;
@@ -92,6 +95,7 @@ pub struct Service {
     memory: Memory,
     store: Store,
     clock: Clock,
+    time: Arc<Timekeeper>,
     trainer: Option<Trainer>,
 }
 
@@ -113,12 +117,22 @@ impl Service {
         };
         let store = store.with_quotas(config.quotas);
         exit_on_fatal(store.clone());
+        let time = Arc::new(Timekeeper::new(store.clone(), clock));
+        // The first look, before anything is dated.
+        time.time_to_delete_by().await?;
+        let clock = time.clock();
         let keys = Arc::new(Keys::load(store.clone(), config.limits.clone(), clock.clone()).await?);
         if keys.are_absent() && !config.allow_anonymous && !config.listen.ip().to_canonical().is_loopback() {
             return Err(ServiceError::NobodyAsked { address: config.listen });
         }
-        tokio::spawn(keys::keep_fresh(keys.clone(), shutdown.clone()));
-        tokio::spawn(upkeep::keep_tidy(store.clone(), clock.clone(), config.retain_jobs, shutdown.clone()));
+        if keys.are_absent() {
+            refuse_lost_keys(&store, config)?;
+            tracing::warn!(
+                "the store holds no key: every caller is answered, as the tenant default, and may do everything"
+            );
+        }
+        tokio::spawn(fresh_keys::keep_fresh(keys.clone(), shutdown.clone()));
+        tokio::spawn(upkeep::keep_tidy(store.clone(), time.clone(), config.retain_jobs, shutdown.clone()));
         let memory = Memory::new(config.memory_limit);
         tracing::info!(memory_limit_bytes = config.memory_limit.bytes, "memory: {memory}");
         let jobs = Jobs::new(store.clone(), clock.clone(), memory.clone(), config.training_threads);
@@ -129,12 +143,25 @@ impl Service {
         let renewer = Renewer { store: store.clone(), clock: clock.clone(), sessions: renewing, jobs: queueing };
         tokio::spawn(renewer.run(told, shutdown.clone()));
         let audit = Audit::new(store.clone());
-        tokio::spawn(audit::keep_bounded(store.clone(), clock.clone(), config.audit, shutdown.clone()));
+        tokio::spawn(audit::keep_bounded(store.clone(), time.clone(), config.retain_audit, shutdown.clone()));
         let start =
             || Trainer::start(config, store.clone(), clock.clone(), jobs.board(), memory.clone(), shutdown.clone());
         let trainer = config.role.runs_jobs().then(start).transpose()?;
         let names = Names::new(store.clone());
-        Ok(Arc::new(Service { audit, jobs, keys, names, policies, sessions, shutdown, memory, store, clock, trainer }))
+        Ok(Arc::new(Service {
+            audit,
+            jobs,
+            keys,
+            names,
+            policies,
+            sessions,
+            shutdown,
+            memory,
+            store,
+            clock,
+            time,
+            trainer,
+        }))
     }
 
     /// Queues an evaluation. The same key and request again give the same job.
@@ -172,6 +199,11 @@ impl Service {
         Ok(self.store.ping().await?)
     }
 
+    /// How many seconds this machine's clock is ahead of the one it should be; 0 if it is right enough to delete by.
+    pub fn clock_skew_seconds(&self) -> i64 {
+        self.time.skew_seconds()
+    }
+
     /// Jobs in each state, and the number of sessions.
     ///
     /// # Errors
@@ -201,6 +233,16 @@ impl Service {
             trainer.join().await;
         }
         self.store.close().await;
+    }
+}
+
+/// # Errors
+/// The store is to have a key, or had one, and has none.
+fn refuse_lost_keys(store: &Store, config: &Config) -> Result<(), ServiceError> {
+    match store.key_mark() {
+        Some(mark) => Err(ServiceError::KeysLost { mark }),
+        None if config.require_keys => Err(ServiceError::KeysRequired),
+        None => Ok(()),
     }
 }
 

@@ -8,8 +8,11 @@ use super::content::read;
 use super::drift::DriftLevel;
 use super::due::{first_day, next_day};
 use super::error::ServiceError;
+use super::metrics;
 use super::sessions::Sessions;
-use crate::store::{Care, CareCounts, SessionList, SessionQuery, SessionSummary, Tenant, Today};
+use crate::store::{
+    Care, CareCounts, SessionList, SessionPlace, SessionQuery, SessionSummary, StoreError, Tenant, Today,
+};
 
 /// A session of a list, and where it stands by its last entry.
 #[derive(Debug)]
@@ -27,6 +30,10 @@ pub struct Listed {
 #[derive(Debug)]
 pub struct Overview {
     pub sessions: Vec<Listed>,
+    /// Sessions of the page that are not what was written: nothing of them is shown.
+    pub damaged: Vec<String>,
+    /// The place of the last row, sound or not, if the page is full.
+    pub last: Option<SessionPlace>,
     pub total: usize,
     /// Of those that match in whatever state, on the first page.
     pub care: Option<CareCounts>,
@@ -49,7 +56,15 @@ impl Sessions {
                 Some(_) => Ok(None),
             }
         };
-        let (SessionList { sessions, total }, care) = tokio::try_join!(self.store.sessions(tenant, &asked), counted)?;
+        let (SessionList { sessions, damaged, last, total }, care) =
+            tokio::try_join!(self.store.sessions(tenant, &asked), counted)?;
+        let damaged = damaged.into_iter().map(|(session, what)| {
+            let error = StoreError::Corrupt { what };
+            metrics::count_failure(&error);
+            tracing::error!(session, error = &error as &dyn std::error::Error, "a list leaves a session out");
+            session
+        });
+        let damaged = damaged.collect();
         let listed = |row: SessionSummary| {
             let stands: Option<Stands> = row.last.as_ref().map(|(answer, _)| read(answer)).transpose()?;
             let said = stands.and_then(|stands| stands.date);
@@ -68,6 +83,6 @@ impl Sessions {
             Ok(Listed { row, stands, next, care })
         };
         let sessions = sessions.into_iter().map(listed).collect::<Result<_, ServiceError>>()?;
-        Ok(Overview { sessions, total, care })
+        Ok(Overview { sessions, damaged, last, total, care })
     }
 }

@@ -3,11 +3,12 @@
 //! A little at a time: each step is a short transaction among those of the callers. Replicas may all do it; they pass
 //! over what another is at.
 
+use std::sync::Arc;
 use std::time::Duration;
 
-use super::clock::Clock;
 use super::metrics as names;
 use super::shutdown::Shutdown;
+use super::timekeeper::Timekeeper;
 use crate::store::{Store, StoreError};
 
 /// Between two looks at what expired and what is free.
@@ -22,13 +23,10 @@ const PAGES: u32 = 256;
 const FREE_KEPT: u64 = 4 << 20;
 
 /// Keeps the store tidy until the service ends. Without `retain_jobs` ended jobs stay.
-pub(super) async fn keep_tidy(store: Store, clock: Clock, retain_jobs: Option<Duration>, shutdown: Shutdown) {
+pub(super) async fn keep_tidy(store: Store, time: Arc<Timekeeper>, retain_jobs: Option<Duration>, shutdown: Shutdown) {
+    let mut is_skewed = false;
     while !shutdown.has_begun() {
-        let expired_before = retain_jobs.map(|retained| {
-            let retained = i64::try_from(retained.as_millis()).unwrap_or(i64::MAX);
-            clock.now_milliseconds().saturating_sub(retained)
-        });
-        let pause = match step(&store, expired_before).await {
+        let pause = match step(&store, &time, retain_jobs).await {
             Ok(true) => SHORT_PAUSE,
             Ok(false) => PAUSE,
             Err(error) => {
@@ -36,6 +34,11 @@ pub(super) async fn keep_tidy(store: Store, clock: Clock, retain_jobs: Option<Du
                 PAUSE
             }
         };
+        let skew_seconds = time.skew_seconds();
+        if (skew_seconds != 0) != is_skewed {
+            is_skewed = !is_skewed;
+            tracing::warn!(skew_seconds, "the clock of this machine; nothing is deleted by age while it is wrong");
+        }
         tokio::select! {
             () = shutdown.begun() => {}
             () = tokio::time::sleep(pause) => {}
@@ -44,9 +47,12 @@ pub(super) async fn keep_tidy(store: Store, clock: Clock, retain_jobs: Option<Du
 }
 
 /// One step; whether there is more to do.
-async fn step(store: &Store, expired_before: Option<i64>) -> Result<bool, StoreError> {
-    let expired = match expired_before {
-        Some(expired_before) => store.expire_jobs(expired_before, JOBS).await?,
+async fn step(store: &Store, time: &Timekeeper, retain_jobs: Option<Duration>) -> Result<bool, StoreError> {
+    let expired = match time.time_to_delete_by().await?.zip(retain_jobs) {
+        Some((now_ms, retained)) => {
+            let retained_ms = i64::try_from(retained.as_millis()).unwrap_or(i64::MAX);
+            store.expire_jobs(now_ms.saturating_sub(retained_ms), JOBS).await?
+        }
         None => 0,
     };
     if expired > 0 {

@@ -1,62 +1,335 @@
-//! Whether the chains of the audit are whole.
+//! The chains that entries of the audit are in: how they grow, how they are cut, whether they are whole.
+//!
+//! The entries of a key are a chain: they are numbered from 1, and each is sealed over the seal of the one before. The end
+//! of a chain and the place where it was cut stand beside it under a seal of their own, and how many chains there are under
+//! another. A check therefore finds an entry that was altered, taken out or slipped in, entries missing at either end, and
+//! a chain that is gone. Nothing of it is hidden by going on: an end that is damaged keeps the seal that does not fit.
+//!
+//! Each key has a chain of its own. Who writes to a chain waits for the commit of whoever wrote to it before, which keys
+//! need not do for each other.
+//!
+//! [`Store::cut_audit`] drops entries by age and by nothing else, so no number of changes drives out what was done before:
+//! a caller who has made as many entries as [`Quotas`] admits within that age changes nothing more. A chain is cut once
+//! its oldest entry is a day past the age, so at most once a day, and keeps the seal at which it was cut. The cut is itself
+//! an entry, in the chain of the service.
 
-use super::audit::{AuditRow, missing};
-use super::error::Failure;
-use super::query::{Query, Row, query};
+use futures_util::FutureExt;
+
+use super::audit::{Actor, AuditRow, Deed, entry};
+use super::codec::{Seal, hexadecimal};
+use super::error::{Failure, Quota};
+use super::query::{Connection, Query, Row, query};
+use super::quotas::{self, Quotas};
+use super::tenant::Tenant;
+use super::{Store, StoreError};
+
+/// Entries of one chain dropped in one transaction, so that others are not kept waiting.
+const CUT_AT_ONCE: i64 = 5_000;
+/// How far past its age the oldest entry of a chain is before the chain is cut.
+const MARGIN_MS: i64 = 24 * 60 * 60 * 1000;
+
+/// The end of a chain.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AuditEnd {
+    pub tenant: Tenant,
+    pub chain: String,
+    pub number: i64,
+    /// The seal of the last entry, in hexadecimal digits.
+    pub seal: String,
+}
+
+impl Store {
+    /// Lists the end of each chain.
+    pub async fn audit_ends(&self) -> Result<Vec<AuditEnd>, StoreError> {
+        let end = |row: &Row| {
+            let Chain { tenant, chain, end, end_seal, .. } = Chain::from_row(row)?;
+            Ok(AuditEnd { tenant: Tenant::stored(&tenant), chain, number: end, seal: hexadecimal(&end_seal) })
+        };
+        self.list("reading the audit", chains(), |rows| rows.iter().map(end).collect()).await
+    }
+
+    /// Drops entries from before `before_ms` of every chain whose oldest is a day older still; their number. The newest
+    /// entry of a chain stays whatever its age, so that the end is there to be compared.
+    pub async fn cut_audit(&self, before_ms: i64, now_ms: i64) -> Result<u64, StoreError> {
+        let aged = query(
+            "SELECT audit_chains.tenant, audit_chains.chain FROM audit_chains
+             JOIN audit ON audit.tenant = audit_chains.tenant AND audit.chain = audit_chains.chain
+                           AND audit.number = audit_chains.cut_number + 1
+             WHERE audit_chains.cut_number + 1 < audit_chains.number AND audit.at_ms < $1 ORDER BY place",
+        );
+        let names = |row: &Row| Ok((row.get("tenant")?, row.get("chain")?));
+        let aged = aged.bind(before_ms.saturating_sub(MARGIN_MS));
+        let found: Vec<(String, String)> =
+            self.list("reading the audit", aged, |rows| rows.iter().map(names).collect()).await?;
+        let (mut dropped, mut failed) = (0, None);
+        for of in found {
+            match self.cut_chain(of, before_ms, now_ms).await {
+                Ok(cut) => dropped += cut,
+                // One chain that is damaged keeps none of the others.
+                Err(error) => failed = Some(error),
+            }
+        }
+        failed.map_or(Ok(dropped), Err)
+    }
+
+    async fn cut_chain(&self, of: (String, String), before_ms: i64, now_ms: i64) -> Result<u64, StoreError> {
+        let mut dropped = 0;
+        loop {
+            let of = of.clone();
+            let cut = self.write("cutting the audit", move |connection| cut(connection, of, before_ms, now_ms).boxed());
+            let cut = cut.await?;
+            dropped += cut;
+            if cut < CUT_AT_ONCE.unsigned_abs() {
+                return Ok(dropped);
+            }
+        }
+    }
+}
+
+/// Writes an entry; in the transaction of what it tells of.
+///
+/// # Errors
+/// The caller's chain has as many entries as `quotas` admits; the transaction is to be undone.
+pub(super) async fn record(
+    connection: &mut Connection<'_>,
+    (quotas, actor): (Quotas, &Actor),
+    tenant: &Tenant,
+    deed: Deed,
+    object: &str,
+    outcome: &str,
+) -> Result<(), Failure> {
+    // The chain is held from here on, so that no two entries follow the same one.
+    let mut chain = Chain::hold(connection, tenant, actor.chain()).await?;
+    if actor.is_caller() {
+        quotas::within(Quota::AuditEntries, chain.end - chain.number, 1, quotas.audit_entries.into())?;
+    }
+    let is_sound = chain.verify().is_ok();
+    let mut row = AuditRow {
+        sequence: 0,
+        tenant: tenant.clone(),
+        key: actor.key.to_string(),
+        roles: actor.roles.to_string(),
+        deed: deed.as_str().to_owned(),
+        object: object.to_owned(),
+        outcome: outcome.to_owned(),
+        at_ms: actor.at_ms,
+        number: chain.end + 1,
+        seal: String::new(),
+    };
+    let seal = row.chained(&chain.end_seal).finish();
+    row.seal = hexadecimal(&seal);
+    let insert = query(
+        "INSERT INTO audit (tenant, chain, number, access_key, roles, deed, object, outcome, at_ms, previous, seal)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11)",
+    );
+    let insert = insert
+        .bind(tenant.as_str())
+        .bind(actor.chain())
+        .bind(row.number)
+        .bind(row.key)
+        .bind(row.roles)
+        .bind(row.deed)
+        .bind(row.object)
+        .bind(row.outcome)
+        .bind(row.at_ms)
+        .bind(chain.end_seal)
+        .bind(seal.clone());
+    connection.execute(insert).await?;
+    (chain.end, chain.end_seal) = (row.number, seal);
+    if is_sound {
+        chain.own_seal = chain.seal().finish();
+    }
+    let end = query("UPDATE audit_chains SET number = $1, end_seal = $2, seal = $3 WHERE tenant = $4 AND chain = $5");
+    let end = end.bind(chain.end).bind(chain.end_seal).bind(chain.own_seal);
+    connection.execute(end.bind(tenant.as_str()).bind(actor.chain())).await.map(drop)
+}
+
+async fn cut(
+    mut connection: Connection<'_>,
+    (tenant, name): (String, String),
+    before_ms: i64,
+    now_ms: i64,
+) -> Result<u64, Failure> {
+    let connection = &mut connection;
+    let tenant = Tenant::stored(&tenant);
+    let mut chain = Chain::hold(connection, &tenant, &name).await?;
+    // A damaged end would be sound again.
+    chain.verify()?;
+    let young = query("SELECT min(number) AS number FROM audit WHERE tenant = $1 AND chain = $2 AND at_ms >= $3");
+    let young = connection.row(young.bind(tenant.as_str()).bind(name.as_str()).bind(before_ms)).await?;
+    let young: Option<i64> = young.map_or(Ok(None), |row| row.get("number"))?;
+    let last = young.unwrap_or(chain.end).min(chain.end) - 1;
+    let last = last.min(chain.number + CUT_AT_ONCE);
+    if last <= chain.number {
+        return Ok(0);
+    }
+    let seal = query("SELECT seal FROM audit WHERE tenant = $1 AND chain = $2 AND number = $3");
+    let seal = connection.row(seal.bind(tenant.as_str()).bind(name.as_str()).bind(last)).await?;
+    let seal: Vec<u8> = seal.ok_or_else(|| Failure::Corrupt(entry(&name, tenant.as_str(), last)))?.get("seal")?;
+    let drop_them = query("DELETE FROM audit WHERE tenant = $1 AND chain = $2 AND number <= $3");
+    let dropped = connection.execute(drop_them.bind(tenant.as_str()).bind(name.as_str()).bind(last)).await?;
+    let outcome = format!("dropped {dropped} entries; the last had the seal {}", hexadecimal(&seal));
+    (chain.number, chain.cut_seal) = (last, seal);
+    let mark =
+        query("UPDATE audit_chains SET cut_number = $1, cut_seal = $2, seal = $3 WHERE tenant = $4 AND chain = $5");
+    let own_seal = chain.seal().finish();
+    let mark = mark.bind(last).bind(chain.cut_seal).bind(own_seal).bind(tenant.as_str()).bind(name.as_str());
+    connection.execute(mark).await?;
+    let (actor, object) = (Actor::service(now_ms), format!("entries to {last} of {name}"));
+    record(connection, (Quotas::NONE, &actor), &tenant, Deed::CutAudit, &object, &outcome).await?;
+    Ok(dropped)
+}
 
 /// The chains, with their ends.
 pub(super) fn chains() -> Query {
-    query("SELECT * FROM audit_chains ORDER BY tenant")
+    query("SELECT * FROM audit_chains ORDER BY place")
 }
 
-/// A chain on its way through a check.
+/// How many chains there are; no row before the first.
+pub(super) fn total() -> Query {
+    query("SELECT chains, seal FROM audit_total")
+}
+
+fn total_seal(chains: i64) -> Seal {
+    Seal::of("audit total").integer(chains)
+}
+
+/// Checks that `chains` are all that were ever begun.
+pub(super) fn verify_total(total: Option<&Row>, chains: i64) -> Result<(), Failure> {
+    let what = || "the number of chains of the audit".to_owned();
+    match total {
+        None if chains == 0 => Ok(()),
+        Some(row) if row.get::<i64>("chains")? == chains => {
+            total_seal(chains).verify(&row.get::<Vec<u8>>("seal")?, what)
+        }
+        _ => Err(Failure::Corrupt(what())),
+    }
+}
+
+/// A chain, on its way through a check from where it was cut.
 pub(super) struct Chain {
     pub tenant: String,
+    pub chain: String,
+    place: i64,
     /// Entries found so far, those cut among them.
-    pub number: i64,
-    seal: Vec<u8>,
+    number: i64,
+    cut_seal: Vec<u8>,
     end: i64,
     end_seal: Vec<u8>,
+    own_seal: Vec<u8>,
 }
 
 impl Chain {
     pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
         Ok(Chain {
             tenant: row.get("tenant")?,
+            chain: row.get("chain")?,
+            place: row.get("place")?,
             number: row.get("cut_number")?,
-            seal: row.get("cut_seal")?,
+            cut_seal: row.get("cut_seal")?,
             end: row.get("number")?,
-            end_seal: row.get("seal")?,
+            end_seal: row.get("end_seal")?,
+            own_seal: row.get("seal")?,
         })
+    }
+
+    /// The chain, begun if there is none, to be changed by this transaction alone.
+    async fn hold(connection: &mut Connection<'_>, tenant: &Tenant, chain: &str) -> Result<Self, Failure> {
+        let find = || {
+            let find = query("SELECT * FROM audit_chains WHERE tenant = $1 AND chain = $2");
+            find.bind(tenant.as_str()).bind(chain).for_update()
+        };
+        if let Some(row) = connection.row(find()).await? {
+            return Chain::from_row(&row);
+        }
+        // Held from here on, so that no two begin the same chain or have one place.
+        let hold = query(
+            "INSERT INTO audit_total (only, chains, seal) VALUES (1, 0, $1)
+             ON CONFLICT (only) DO UPDATE SET chains = audit_total.chains RETURNING chains",
+        );
+        let held = connection.row(hold.bind(total_seal(0).finish())).await?;
+        let place = 1 + held.map_or(Ok(0), |row| row.get::<i64>("chains"))?;
+        if let Some(row) = connection.row(find()).await? {
+            return Chain::from_row(&row);
+        }
+        let first = Seal::of("audit chain").text(tenant.as_str()).text(chain).finish();
+        let mut begun = Chain {
+            tenant: tenant.to_string(),
+            chain: chain.to_owned(),
+            place,
+            number: 0,
+            cut_seal: first.clone(),
+            end: 0,
+            end_seal: first.clone(),
+            own_seal: Vec::new(),
+        };
+        begun.own_seal = begun.seal().finish();
+        let begin = query(
+            "INSERT INTO audit_chains (tenant, chain, place, number, end_seal, cut_number, cut_seal, seal)
+             VALUES ($1, $2, $3, 0, $4, 0, $4, $5)",
+        );
+        let begin = begin.bind(tenant.as_str()).bind(chain).bind(place).bind(first).bind(begun.own_seal.clone());
+        connection.execute(begin).await?;
+        let count = query("UPDATE audit_total SET chains = $1, seal = $2").bind(place);
+        connection.execute(count.bind(total_seal(place).finish())).await?;
+        Ok(begun)
+    }
+
+    /// Over where it is cut and where it ends.
+    fn seal(&self) -> Seal {
+        Seal::of("audit end")
+            .text(&self.tenant)
+            .text(&self.chain)
+            .integer(self.place)
+            .integer(self.number)
+            .bytes(&self.cut_seal)
+            .integer(self.end)
+            .bytes(&self.end_seal)
+    }
+
+    /// Call before [`Chain::follow`].
+    pub(super) fn verify(&self) -> Result<(), Failure> {
+        self.seal().verify(&self.own_seal, || format!("the end of {} in the audit of {}", self.chain, self.tenant))
     }
 
     /// The entries that follow, no more than `limit`; what was added since the check began is not among them.
     pub(super) fn next(&self, limit: i64) -> Query {
-        let next =
-            query("SELECT * FROM audit WHERE tenant = $1 AND number > $2 AND number <= $3 ORDER BY number LIMIT $4");
-        next.bind(self.tenant.as_str()).bind(self.number).bind(self.end).bind(limit)
+        let next = query(
+            "SELECT * FROM audit WHERE tenant = $1 AND chain = $2 AND number > $3 AND number <= $4
+             ORDER BY number LIMIT $5",
+        );
+        let next = next.bind(self.tenant.as_str()).bind(self.chain.as_str());
+        next.bind(self.number).bind(self.end).bind(limit)
     }
 
     pub(super) fn is_whole(&self) -> bool {
-        self.number == self.end
+        self.number >= self.end
     }
 
-    /// Goes on over what [`Chain::next`] found.
-    pub(super) fn follow(&mut self, rows: &[Row]) -> Result<(), Failure> {
-        if rows.is_empty() {
-            return Err(missing(&self.tenant, self.number + 1));
-        }
+    /// Goes on over what [`Chain::next`] found; what is damaged among it.
+    pub(super) fn follow(&mut self, rows: &[Row]) -> Result<Vec<String>, Failure> {
+        let named = |number| entry(&self.chain, &self.tenant, number);
+        let mut damage = Vec::new();
+        let mut sequence = None;
         for row in rows {
-            AuditRow::from_row(row)?;
             let (number, previous): (i64, Vec<u8>) = (row.get("number")?, row.get("previous")?);
-            if number != self.number + 1 || previous != self.seal {
-                return Err(missing(&self.tenant, self.number + 1));
+            let at: i64 = row.get("sequence")?;
+            if number != self.number + 1 {
+                damage.push(named(self.number + 1));
+            } else if previous != self.cut_seal || sequence.is_some_and(|before| before >= at) {
+                damage.push(named(number));
+            } else if let Err(failure) = AuditRow::from_row(row) {
+                damage.push(failure.damage()?);
             }
-            (self.number, self.seal) = (number, row.get("seal")?);
+            sequence = Some(at);
+            (self.number, self.cut_seal) = (number, row.get("seal")?);
         }
-        if self.is_whole() && self.seal != self.end_seal {
-            return Err(missing(&self.tenant, self.end));
+        if rows.is_empty() {
+            damage.push(named(self.number + 1));
+            self.number = self.end;
+        } else if self.is_whole() && self.cut_seal != self.end_seal {
+            damage.push(named(self.end));
         }
-        Ok(())
+        Ok(damage)
     }
 }

@@ -15,22 +15,44 @@ use std::path::{Path, PathBuf};
 use sqlx::Connection;
 
 use super::check::Inspection;
-use super::error::{Failure, StoreError};
-use super::sqlite::opening::{DATABASE, connect, inspect, lock, migrate, opening, unusable, version};
+use super::error::{Failure, StoreError, unusable};
+use super::sqlite::held::unstamp;
+use super::sqlite::opening::{DATABASE, connect, inspect, lock, migrate, opening, version};
+
+/// How a copy with damaged things in it is treated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Damage {
+    /// There is none.
+    Refused,
+    /// It is kept, with them as they are; each is told.
+    Skipped,
+}
+
+impl Damage {
+    /// The outcome of a check, where it found damage.
+    fn accept(self, checked: Result<(), StoreError>) -> Result<(), StoreError> {
+        match checked {
+            Err(StoreError::Damaged { .. }) if self == Damage::Skipped => Ok(()),
+            checked => checked,
+        }
+    }
+}
 
 /// Copies the database of `dir` into the new file `out`, readable by its owner alone, and verifies the copy, telling what
 /// was verified. A process may hold the folder and write.
 ///
 /// # Errors
-/// `out` or `out.partial` exists, the database or its copy is damaged, or the disk fails; nothing is left at `out`.
-pub async fn backup(dir: &Path, out: &Path, tell: &mut impl FnMut(String)) -> Result<(), StoreError> {
+/// `out` or `out.partial` exists, the file or, unless that is skipped, a thing in it is damaged, or the disk fails; nothing is
+/// left at `out`.
+pub async fn backup(dir: &Path, out: &Path, damage: Damage, tell: &mut impl FnMut(String)) -> Result<(), StoreError> {
     refuse_existing(out)?;
     let partial = beside(out, ".partial");
     let made = OpenOptions::new().write(true).create_new(true).mode(0o600).open(&partial);
     drop(made.map_err(|error| unusable(&partial, error))?);
     let copied = async {
         copy(dir, &partial).await?;
-        Inspection::of_backup(&partial).await?.run(tell).await?;
+        unstamp(&partial)?;
+        damage.accept(Inspection::of_backup(&partial).await?.run(tell).await)?;
         publish(&partial, out)
     };
     let copied = copied.await;
@@ -45,9 +67,9 @@ pub async fn backup(dir: &Path, out: &Path, tell: &mut impl FnMut(String)) -> Re
 /// what was verified.
 ///
 /// # Errors
-/// `dir` holds a database or is held by a process, the backup is damaged or of a later release, or the disk fails; `dir`
+/// `dir` holds a database or is held by a process, the backup is damaged, unless that is skipped, or of a later release, or the disk fails; `dir`
 /// then has no database.
-pub async fn restore(from: &Path, dir: &Path, tell: &mut impl FnMut(String)) -> Result<(), StoreError> {
+pub async fn restore(from: &Path, dir: &Path, damage: Damage, tell: &mut impl FnMut(String)) -> Result<(), StoreError> {
     let held = lock(dir)?;
     let (database, partial) = (dir.join(DATABASE), dir.join(DATABASE).with_extension("partial"));
     for taken in [database.clone(), beside(&database, "-wal"), beside(&database, "-journal")] {
@@ -64,7 +86,7 @@ pub async fn restore(from: &Path, dir: &Path, tell: &mut impl FnMut(String)) -> 
         }
         migrate(&mut connection).await?;
         connection.close().await.map_err(opening)?;
-        Inspection::of_backup(&partial).await?.run(tell).await?;
+        damage.accept(Inspection::of_backup(&partial).await?.run(tell).await)?;
         publish(&partial, &database)
     };
     let restored = restored.await;

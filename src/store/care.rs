@@ -3,7 +3,7 @@
 use super::codec::from_sql;
 use super::error::Failure;
 use super::query::{Row, query};
-use super::statement::{HORIZON, IS_WAITING, OBSERVATIONS, Statement};
+use super::statement::{ANSWER, HORIZON, IS_WAITING, OBSERVATIONS, Statement};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
 
@@ -89,15 +89,17 @@ pub(super) fn needs(statement: &mut Statement, care: Care, today: &Today) {
             [],
         ),
         Care::Alarm => statement
-            .and("coalesce(json_extract(json_extract(last.answer_json, '$.drift'), '$.level') = 'alarm', 1 = 0)", []),
+            .and(&format!("coalesce(json_extract(json_extract({ANSWER}, '$.drift'), '$.level') = 'alarm', 1 = 0)"), []),
         Care::Renewal => statement.and(IS_WAITING, []),
         Care::Overdue if today.first_days.is_empty() => statement.and("1 = 0", []),
         Care::Overdue => {
             statement.and("coalesce(CASE", []);
             for FirstDay { periods_per_year, date, begin_ms } in &today.first_days {
                 statement.and(
-                    " WHEN policies.periods_per_year = ? THEN coalesce(json_extract(last.answer_json, '$.date') < ?,
-                      coalesce(last.created_ms, sessions.created_ms) < ?)",
+                    &format!(
+                        " WHEN policies.periods_per_year = ? THEN coalesce(json_extract({ANSWER}, '$.date') < ?,
+                      coalesce(last.created_ms, sessions.created_ms) < ?)"
+                    ),
                     [(*periods_per_year).into(), date.as_str().into(), (*begin_ms).into()],
                 );
             }

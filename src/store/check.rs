@@ -1,10 +1,9 @@
 //! Whether what is stored is what was written: every row is read once, every seal and every hash computed anew.
 //!
 //! It reads only, over a connection of its own, a page of rows at a time, so it runs beside a process that writes: what
-//! is added or deleted meanwhile is sound or gone. It ends at the first damage, since what else is wrong is found after
-//! that is mended. Cost: one pass over the database, and memory for one policy or one session.
+//! is added or deleted meanwhile is sound or gone. Damage of one thing does not end it: it lists all. Cost: one pass over the database, and memory for one policy or one session.
 //!
-//! Not found: a session that lost its last entries, whole rows and nothing else (see the head of [`super`]).
+//! Not found: a session that lost its last entries, whole rows, observations and nothing else (see the head of [`super`]).
 
 use std::path::Path;
 
@@ -12,7 +11,9 @@ use sqlx::SqliteConnection;
 use sqlx::postgres::PgConnection;
 
 use super::audit_chain::{self, Chain};
-use super::error::{Failure, StoreError};
+use super::codec::to_sql;
+use super::entries::EntryRow;
+use super::error::{Cause, Failure, StoreError};
 use super::job::JobRow;
 use super::keys::KeyRow;
 use super::query::{Connection, Query, Row, query};
@@ -25,7 +26,7 @@ const DOING: &str = "checking the store";
 const PAGE: i64 = 256;
 
 /// Each tenant with its totals and what its rows sum to; of a row $1 bytes beside what it holds, of an entry $2.
-const TOTALS: &str = "
+pub(super) const TOTALS: &str = "
     WITH parts (tenant, sessions, bytes) AS (
         SELECT tenant, 0, $1 FROM jobs
         UNION ALL SELECT tenant, 0, octet_length(json) + octet_length(labels_json)
@@ -41,12 +42,48 @@ const TOTALS: &str = "
            usage.bytes AS kept, CAST(sums.bytes AS BIGINT) AS summed
     FROM usage FULL JOIN sums ON sums.tenant = usage.tenant";
 
+/// Sessions of which the audit has more corrections or renewals than there are entries.
+const UNRECORDED: &str = "
+    SELECT DISTINCT object FROM (
+        SELECT object, CASE deed WHEN 'session.correct' THEN 'correction' ELSE 'renewal' END AS kind, count(*) AS recorded
+        FROM audit WHERE deed IN ('session.correct', 'session.renew') GROUP BY object, deed) AS changes
+    JOIN sessions ON sessions.session = changes.object
+    WHERE recorded > (SELECT count(*) FROM entries WHERE entries.session = object AND entries.kind = changes.kind)
+    ORDER BY object";
+
+/// The parts of a check, in its order.
+#[derive(Debug, Clone, Copy)]
+enum Part {
+    File,
+    Policies,
+    Jobs,
+    Sessions,
+    Totals,
+    Keys,
+    Audit,
+}
+
+impl Part {
+    const ALL: [Part; 7] =
+        [Part::File, Part::Policies, Part::Jobs, Part::Sessions, Part::Totals, Part::Keys, Part::Audit];
+}
+
 /// A store about to be checked.
-pub struct Inspection(Reader);
+pub struct Inspection {
+    reader: Reader,
+    /// The things that are not what was written, so far.
+    damage: Vec<String>,
+}
 
 enum Reader {
     Sqlite(SqliteConnection),
     Postgres(PgConnection),
+}
+
+impl From<Reader> for Inspection {
+    fn from(reader: Reader) -> Self {
+        Inspection { reader, damage: Vec::new() }
+    }
 }
 
 impl Inspection {
@@ -55,7 +92,7 @@ impl Inspection {
     /// # Errors
     /// There is none, or it cannot be read.
     pub async fn of_folder(dir: &Path) -> Result<Self, StoreError> {
-        sqlite::opening::inspect(dir).await.map(|connection| Inspection(Reader::Sqlite(connection)))
+        sqlite::opening::inspect(dir).await.map(|connection| Reader::Sqlite(connection).into())
     }
 
     /// A [`backup`](super::backup), which nobody writes to.
@@ -63,31 +100,36 @@ impl Inspection {
     /// # Errors
     /// As [`Inspection::of_folder`].
     pub async fn of_backup(file: &Path) -> Result<Self, StoreError> {
-        sqlite::opening::inspect_file(file).await.map(|connection| Inspection(Reader::Sqlite(connection)))
+        sqlite::opening::inspect_file(file).await.map(|connection| Reader::Sqlite(connection).into())
     }
 
     /// # Errors
     /// The database is not reached.
     pub async fn of_database(url: &PostgresUrl) -> Result<Self, StoreError> {
-        postgres::inspect(url).await.map(|connection| Inspection(Reader::Postgres(connection)))
+        postgres::inspect(url).await.map(|connection| Reader::Postgres(connection).into())
     }
 
-    /// Checks everything, and tells a sentence for each kind of thing that is sound.
+    /// Checks everything, and tells a sentence for each kind of thing that is sound and for each thing that is not.
     ///
     /// # Errors
-    /// [`StoreError::Corrupt`] names the first damage; [`StoreError::NewerSchema`] and [`StoreError::OlderSchema`] say that
+    /// [`StoreError::Damaged`] counts what is damaged; [`StoreError::NewerSchema`] and [`StoreError::OlderSchema`] say that
     /// another release must check it.
     pub async fn run(mut self, tell: &mut impl FnMut(String)) -> Result<(), StoreError> {
-        let damaged = |error| match error {
+        let version = self.schema().await.map_err(|error| match error {
             StoreError::Fatal { source, .. } => StoreError::Corrupt { what: format!("the database ({source})") },
             other => other,
-        };
-        tell(format!("schema {}: this binary's", self.schema().await.map_err(damaged)?));
-        self.rows(tell).await.map_err(|failure| damaged(failure.during(DOING)))
+        });
+        tell(format!("schema {}: this binary's", version?));
+        self.all(tell).await.map_err(|failure| failure.during(DOING))?;
+        let others = self.damage.len().saturating_sub(1);
+        match self.damage.into_iter().next() {
+            None => Ok(()),
+            Some(first) => Err(StoreError::Damaged { first, others }),
+        }
     }
 
     async fn schema(&mut self) -> Result<i64, StoreError> {
-        match &mut self.0 {
+        match &mut self.reader {
             Reader::Sqlite(connection) => {
                 migrations::require_newest(&migrations::sqlite(), sqlite::opening::version(connection).await?)
             }
@@ -97,56 +139,107 @@ impl Inspection {
         }
     }
 
-    async fn rows(&mut self, tell: &mut impl FnMut(String)) -> Result<(), Failure> {
-        if let Reader::Sqlite(_) = self.0 {
-            self.file().await?;
-            tell("the file: pages, indexes and references are whole".to_owned());
+    async fn all(&mut self, tell: &mut impl FnMut(String)) -> Result<(), Failure> {
+        for part in Part::ALL {
+            let before = self.damage.len();
+            // A part that cannot be read at all is damage of the file; the others may be read.
+            let found = self.part(part).await;
+            let sentence = self.note(found)?;
+            match (sentence, &self.damage[before..]) {
+                (Some(sentence), []) => tell(sentence),
+                (_, damage) => damage.iter().for_each(|what| tell(format!("damaged: {what}"))),
+            }
+            if self.damage.iter().any(|what| what.starts_with("the ")) && matches!(part, Part::File) {
+                // Rows of pages that are damaged need not be what the driver can read.
+                break;
+            }
         }
-        let policies = self.policies().await?;
-        tell(format!("policies: {policies}, each the bytes its name is the hash of"));
-        let (jobs, checkpoints) = self.jobs().await?;
-        tell(format!("jobs: {jobs}, with {checkpoints} checkpoints as sealed"));
-        let (sessions, entries) = self.sessions().await?;
-        tell(format!("sessions: {sessions}, with {entries} entries, as sealed and none missing between"));
-        let tenants = self.totals().await?;
-        tell(format!("totals: of {tenants} tenants, each the sum of what it keeps"));
-        let keys = self.read(query("SELECT * FROM access_keys ORDER BY sequence")).await?;
-        let keys: Vec<_> = keys.iter().map(KeyRow::from_row).collect::<Result<_, _>>()?;
-        tell(format!("keys: {}, each readable", keys.len()));
-        let (chains, entries) = self.audit().await?;
-        tell(format!("audit: {entries} entries in {chains} chains, as sealed and none missing"));
         Ok(())
     }
 
+    /// The value that was read, unless it is damaged.
+    fn note<T>(&mut self, read: Result<T, Failure>) -> Result<Option<T>, Failure> {
+        let failure = match read {
+            Ok(value) => return Ok(Some(value)),
+            Err(Failure::Engine(Cause::Fatal, error)) => Failure::Corrupt(format!("the database ({error})")),
+            Err(failure) => failure,
+        };
+        self.damage.push(failure.damage()?);
+        Ok(None)
+    }
+
+    /// Checks a part; a sentence that counts what it has.
+    async fn part(&mut self, part: Part) -> Result<String, Failure> {
+        Ok(match part {
+            Part::File => {
+                self.file().await?;
+                match self.reader {
+                    Reader::Sqlite(_) => "the file: pages, indexes and references are whole".to_owned(),
+                    Reader::Postgres(_) => "the file: checked by PostgreSQL itself".to_owned(),
+                }
+            }
+            Part::Policies => format!("policies: {}, each the bytes its name is the hash of", self.policies().await?),
+            Part::Jobs => {
+                let (jobs, checkpoints) = self.jobs().await?;
+                format!("jobs: {jobs}, with {checkpoints} checkpoints as sealed")
+            }
+            Part::Sessions => {
+                let (sessions, entries) = self.sessions().await?;
+                format!("sessions: {sessions}, with {entries} entries, as sealed and none missing between")
+            }
+            Part::Totals => format!("totals: of {} tenants, each the sum of what it keeps", self.totals().await?),
+            Part::Keys => {
+                let rows = self.read(query("SELECT * FROM access_keys ORDER BY sequence")).await?;
+                for row in &rows {
+                    self.note(KeyRow::from_row(row))?;
+                }
+                format!("keys: {}, each as sealed", rows.len())
+            }
+            Part::Audit => {
+                let (chains, entries) = self.audit().await?;
+                format!("audit: {entries} entries in {chains} chains, as sealed and none missing")
+            }
+        })
+    }
+
     async fn audit(&mut self) -> Result<(usize, usize), Failure> {
-        let (mut chains, mut entries) = (0, 0);
-        for row in self.read(audit_chain::chains()).await? {
-            let mut chain = Chain::from_row(&row)?;
+        let mut entries = 0;
+        let found = self.read(audit_chain::chains()).await?;
+        let total = self.read(audit_chain::total()).await?;
+        for row in &found {
+            let Some(mut chain) = self.note(Chain::from_row(row))? else { continue };
+            self.note(chain.verify())?;
             while !chain.is_whole() {
                 let page = self.read(chain.next(PAGE)).await?;
-                chain.follow(&page)?;
+                self.damage.extend(chain.follow(&page)?);
                 entries += page.len();
             }
-            chains += 1;
         }
-        Ok((chains, entries))
+        self.note(audit_chain::verify_total(total.first(), to_sql(found.len())))?;
+        for row in self.read(query(UNRECORDED)).await? {
+            self.damage.push(format!("the end of session {}", row.get::<String>("object")?));
+        }
+        Ok((found.len(), entries))
     }
 
     /// What SQLite knows of its file: the trees and indexes, and that no row refers to one that is not there.
     async fn file(&mut self) -> Result<(), Failure> {
-        let found = self.read(query("SELECT integrity_check AS found FROM pragma_integrity_check LIMIT 1")).await?;
-        let found: String = found.first().map_or(Ok("nothing".to_owned()), |row| row.get("found"))?;
-        if found != "ok" {
-            return Err(Failure::Corrupt(format!("the file of the database ({found})")));
+        if let Reader::Postgres(_) = self.reader {
+            return Ok(());
         }
-        let broken = query(r#"SELECT "table" AS child, parent FROM pragma_foreign_key_check LIMIT 1"#);
-        match self.read(broken).await?.first() {
-            None => Ok(()),
-            Some(row) => {
-                let (child, parent): (String, String) = (row.get("child")?, row.get("parent")?);
-                Err(Failure::Corrupt(format!("a reference from {child} to {parent}")))
+        let faults = "SELECT CAST(integrity_check AS TEXT) AS fault FROM pragma_integrity_check LIMIT 100";
+        for row in self.read(query(faults)).await? {
+            let fault: String = row.get("fault")?;
+            if fault != "ok" {
+                self.damage.push(format!("the file of the database ({fault})"));
             }
         }
+        let broken = r#"SELECT "table" AS child, parent FROM pragma_foreign_key_check LIMIT 100"#;
+        for row in self.read(query(broken)).await? {
+            let (child, parent): (String, String) = (row.get("child")?, row.get("parent")?);
+            self.damage.push(format!("a reference from {child} to {parent}"));
+        }
+        Ok(())
     }
 
     async fn policies(&mut self) -> Result<usize, Failure> {
@@ -154,8 +247,9 @@ impl Inspection {
         // One at a time: a policy may have megabytes.
         let next = "SELECT sequence, policy, json FROM policies WHERE sequence > $1 ORDER BY sequence LIMIT 1";
         while let Some(row) = self.read(query(next).bind(after)).await?.first() {
-            policies::verify(&row.get::<String>("policy")?, &row.get::<Vec<u8>>("json")?)?;
             (after, checked) = (row.get("sequence")?, checked + 1);
+            let bytes = row.get::<String>("policy").and_then(|policy| Ok((policy, row.get::<Vec<u8>>("json")?)));
+            self.note(bytes.and_then(|(policy, json)| policies::verify(&policy, &json)))?;
         }
         Ok(checked)
     }
@@ -168,9 +262,11 @@ impl Inspection {
             let Some(last) = page.last() else { return Ok((jobs, checkpoints)) };
             after = last.get("sequence")?;
             for row in &page {
-                let job = JobRow::from_row(row)?.job;
-                let rows = self.read(leases::checkpoints_of(&job)).await?;
-                checkpoints += leases::verified_checkpoints(&job, &rows)?.len();
+                let Some(JobRow { job, .. }) = self.note(JobRow::from_row(row))? else { continue };
+                for row in self.read(leases::checkpoints_of(&job)).await? {
+                    self.note(leases::verified_checkpoints(&job, std::slice::from_ref(&row)))?;
+                    checkpoints += 1;
+                }
             }
             jobs += page.len();
         }
@@ -184,9 +280,12 @@ impl Inspection {
             let Some(last) = page.last() else { return Ok((sessions, recorded)) };
             after = last.get("sequence")?;
             for row in &page {
-                let session = SessionRow::from_row(row)?.session;
+                self.note(SessionRow::from_row(row))?;
+                let Some(session) = self.note(row.get::<String>("session"))? else { continue };
                 let rows = self.read(entries::all_of(&session)).await?;
-                recorded += entries::numbered(&session, &rows)?.map_or(0, |rows| rows.len());
+                let (read, damage) = each(&session, &rows)?;
+                self.damage.extend(damage);
+                recorded += read;
             }
             sessions += page.len();
         }
@@ -199,17 +298,33 @@ impl Inspection {
             let [kept, summed]: [Option<i64>; 2] = [row.get("kept")?, row.get("summed")?];
             let [sessions, counted]: [Option<i64>; 2] = [row.get("sessions")?, row.get("counted")?];
             if kept.unwrap_or(0) != summed.unwrap_or(0) || sessions.unwrap_or(0) != counted.unwrap_or(0) {
-                return Err(Failure::Corrupt(format!("the total of tenant {}", row.get::<String>("tenant")?)));
+                self.damage.push(format!("the total of tenant {}", row.get::<String>("tenant")?));
             }
         }
         Ok(totals.len())
     }
 
     async fn read(&mut self, query: Query) -> Result<Vec<Row>, Failure> {
-        let mut connection = match &mut self.0 {
+        let mut connection = match &mut self.reader {
             Reader::Sqlite(connection) => Connection::Sqlite(connection),
             Reader::Postgres(connection) => Connection::Postgres(connection),
         };
         connection.rows(query).await
     }
+}
+
+/// How many entries of a session there are, and those among them that are damaged or missing.
+fn each(session: &str, rows: &[Row]) -> Result<(usize, Vec<String>), Failure> {
+    let (mut last, mut damage) = (0, Vec::new());
+    for row in rows {
+        let Some(entry) = row.get::<Option<i64>>("entry")? else { return Ok((0, damage)) };
+        if entry != last + 1 {
+            damage.push(format!("entry {} of session {session}", last + 1));
+        }
+        if let Err(failure) = EntryRow::from_row(row) {
+            damage.push(failure.damage()?);
+        }
+        last = entry;
+    }
+    Ok((rows.len(), damage))
 }

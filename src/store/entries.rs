@@ -7,8 +7,9 @@ use std::sync::LazyLock;
 
 use futures_util::FutureExt;
 
-use super::audit::{self, Actor, AuditRow, Deed};
-use super::codec::{Seal, from_sql, to_sql};
+use super::audit::{Actor, AuditRow, Deed};
+use super::audit_chain;
+use super::codec::{Seal, from_sql, hexadecimal, to_sql};
 use super::error::Failure;
 use super::head::Head;
 use super::postgres::Database;
@@ -73,7 +74,7 @@ impl EntryKind {
         }
     }
 
-    fn stored(text: &str) -> Result<Self, Failure> {
+    pub(super) fn stored(text: &str) -> Result<Self, Failure> {
         let all = [EntryKind::Observation, EntryKind::Correction, EntryKind::Renewal];
         let found = all.into_iter().find(|kind| kind.as_str() == text);
         found.ok_or_else(|| Failure::Corrupt(format!("an entry of the kind {text}")))
@@ -216,7 +217,7 @@ pub(super) async fn take_room(
     let widen = query("UPDATE sessions SET room = room + $1 WHERE session = $2");
     connection.execute(widen.bind(room).bind(session)).await?;
     quotas::take(connection, tenant, Usage::of_bytes(room.saturating_mul(ENTRY_BYTES)), quotas).await?;
-    audit::record(connection, &actor, tenant, deed, session, outcome).await
+    audit_chain::record(connection, (quotas, &actor), tenant, deed, session, outcome).await
 }
 
 const NAMES: &str = "session, entry, kind, number, content_json, answer_json, created_ms, access_key, seal";
@@ -315,6 +316,8 @@ impl EntryRow {
             object: observation.session,
             outcome: format!("period {} recorded", observation.number),
             at_ms: observation.created_ms,
+            number: to_sql(observation.entry),
+            seal: hexadecimal(&row.get::<Vec<u8>>("seal")?),
         })
     }
 
@@ -329,8 +332,13 @@ impl EntryRow {
             created_ms: row.get("created_ms")?,
             key: row.get("access_key")?,
         };
-        let seal: Vec<u8> = row.get("seal")?;
-        read.seal().verify(&seal, || format!("entry {} of session {}", read.entry, read.session))?;
-        Ok(read)
+        read.verified(&row.get::<Vec<u8>>("seal")?)
+    }
+
+    /// # Errors
+    /// [`Failure::Corrupt`] if this is not the entry that was sealed.
+    pub(super) fn verified(self, seal: &[u8]) -> Result<Self, Failure> {
+        self.seal().verify(seal, || format!("entry {} of session {}", self.entry, self.session))?;
+        Ok(self)
     }
 }

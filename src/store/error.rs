@@ -3,7 +3,7 @@
 mod postgres;
 mod sqlite;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use thiserror::Error;
@@ -28,6 +28,9 @@ pub enum StoreError {
         "the store has schema {found}, older than {known}, this binary's; a start of the service brings it up to date"
     )]
     OlderSchema { found: i64, known: i64 },
+    /// A file that the process holds is not the one of its name any more: what it writes is lost. The process must exit.
+    #[error("{} was moved, removed or replaced under the process that holds it; the process must restart", path.display())]
+    Replaced { path: PathBuf },
     /// Another process holds the folder.
     #[error("{} is locked by another process", path.display())]
     Locked { path: PathBuf },
@@ -37,6 +40,12 @@ pub enum StoreError {
     /// One stored thing is not what was written; everything else may be sound.
     #[error("{what} is damaged")]
     Corrupt { what: String },
+    /// Things that a check found not to be what was written.
+    #[error("{first} is damaged{}", and_others(*others))]
+    Damaged { first: String, others: usize },
+    /// A repair was refused.
+    #[error("nothing is repaired: {reason}")]
+    NotRepaired { reason: String },
     /// The folder or the lock file cannot be used.
     #[error("cannot use {}", path.display())]
     Folder { path: PathBuf, source: Arc<std::io::Error> },
@@ -51,12 +60,22 @@ pub enum StoreError {
     Migration { source: Arc<sqlx::migrate::MigrateError> },
 }
 
+fn and_others(count: usize) -> String {
+    match count {
+        0 => String::new(),
+        1 => ", and another thing is".to_owned(),
+        count => format!(", and {count} other things are"),
+    }
+}
+
 /// What a tenant may keep so much of and no more; how much is set in [`Quotas`](super::Quotas).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quota {
     QueuedJobs,
     Sessions,
     Bytes,
+    /// Entries that the audit keeps of one key.
+    AuditEntries,
 }
 
 /// A tenant would keep more than it may.
@@ -76,6 +95,7 @@ impl Quota {
             Quota::QueuedJobs => "quota-queued-jobs",
             Quota::Sessions => "quota-sessions",
             Quota::Bytes => "quota-bytes",
+            Quota::AuditEntries => "audit-entries",
         }
     }
 
@@ -84,6 +104,7 @@ impl Quota {
             Quota::QueuedJobs => "queued jobs",
             Quota::Sessions => "sessions",
             Quota::Bytes => "bytes",
+            Quota::AuditEntries => "entries of this key in the audit",
         }
     }
 }
@@ -91,12 +112,17 @@ impl Quota {
 impl StoreError {
     /// True where SQLite may have rolled the whole transaction back, so that nothing of its group can be kept.
     pub(super) fn ends_group(&self) -> bool {
-        matches!(self, StoreError::Full { .. } | StoreError::Fatal { .. } | StoreError::Unavailable { .. })
+        matches!(self, StoreError::Full { .. } | StoreError::Unavailable { .. }) || self.is_fatal()
     }
 
     pub fn is_fatal(&self) -> bool {
-        matches!(self, StoreError::Fatal { .. })
+        matches!(self, StoreError::Fatal { .. } | StoreError::Replaced { .. })
     }
+}
+
+/// A file or folder that the system does not give.
+pub(super) fn unusable(path: &Path, error: std::io::Error) -> StoreError {
+    StoreError::Folder { path: PathBuf::from(path), source: Arc::new(error) }
 }
 
 /// What an engine's error means to whoever waits for an answer, whichever engine it is.
@@ -125,6 +151,18 @@ impl Failure {
 
     pub(super) fn postgres(error: sqlx::Error) -> Self {
         Failure::Engine(postgres::cause(&error), error)
+    }
+
+    /// The damage of one stored thing.
+    ///
+    /// # Errors
+    /// It is no damage of one thing.
+    pub(super) fn damage(self) -> Result<String, Failure> {
+        match self {
+            Failure::Corrupt(what) => Ok(what),
+            Failure::Engine(Cause::DamagedRow, error) => Ok(format!("a row ({error})")),
+            other => Err(other),
+        }
     }
 
     pub(super) fn during(self, doing: &'static str) -> StoreError {

@@ -2,7 +2,8 @@
 
 use futures_util::FutureExt;
 
-use super::audit::{self, Actor, Deed};
+use super::audit::{Actor, Deed};
+use super::audit_chain;
 use super::codec::to_sql;
 use super::error::Failure;
 use super::job::{CreateJob, JobCounts, JobRow, NewJob, OldestJobs};
@@ -180,7 +181,7 @@ pub(super) async fn count(
 ) -> Result<JobRow, Failure> {
     quotas::take(connection, &new.tenant, Usage::of_bytes(bytes), quotas).await?;
     let outcome = format!("queued, {}", new.kind.as_str());
-    audit::record(connection, &actor, &new.tenant, Deed::QueueJob, &new.job, &outcome).await?;
+    audit_chain::record(connection, (quotas, &actor), &new.tenant, Deed::QueueJob, &new.job, &outcome).await?;
     let row = find(connection, &new.job).await?;
     row.ok_or_else(|| Failure::Corrupt(format!("the new job {}", new.job)))
 }
@@ -226,7 +227,7 @@ pub(super) async fn cancel(
         connection.execute(query("UPDATE jobs SET cancel_requested = TRUE WHERE job = $1").bind(job.as_str())).await?;
     }
     let outcome = if next.is_terminal() { "cancelled" } else { "asked to stop" };
-    audit::record(connection, &actor, &row.tenant, Deed::CancelJob, &job, outcome).await?;
+    audit_chain::record(connection, (Quotas::NONE, &actor), &row.tenant, Deed::CancelJob, &job, outcome).await?;
     find(connection, &job).await
 }
 

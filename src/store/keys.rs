@@ -6,9 +6,12 @@ use std::str::FromStr;
 
 use futures_util::FutureExt;
 
-use super::audit::{self, Actor, AuditFilter, AuditRow, Deed};
+use super::audit::{Actor, AuditFilter, AuditRow, Deed};
+use super::audit_chain;
+use super::codec::Seal;
 use super::error::Failure;
 use super::query::{Connection, Row, query};
+use super::quotas::Quotas;
 use super::tenant::Tenant;
 use super::{Engine, PostgresUrl, Store, StoreError, sqlite};
 use crate::control::error::FieldError;
@@ -76,6 +79,33 @@ pub struct KeyRow {
     pub expires_ms: Option<i64>,
 }
 
+/// The keys of a store, oldest first.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StoredKeys {
+    /// Revoked ones among them.
+    pub sound: Vec<KeyRow>,
+    /// Names of keys that are not as they were written, and let nobody in.
+    pub damaged: Vec<String>,
+}
+
+impl StoredKeys {
+    fn from_rows(rows: &[Row]) -> Result<Self, Failure> {
+        let mut keys = StoredKeys::default();
+        for row in rows {
+            match KeyRow::from_row(row) {
+                Ok(key) => keys.sound.push(key),
+                Err(failure) => keys.damaged.push(failure.damage()?),
+            }
+        }
+        Ok(keys)
+    }
+
+    /// True if there never was a key.
+    pub fn is_empty(&self) -> bool {
+        self.sound.is_empty() && self.damaged.is_empty()
+    }
+}
+
 /// The keys of a store, held beside whoever serves it.
 pub struct KeyRing(Store);
 
@@ -98,11 +128,13 @@ impl KeyRing {
 
     pub async fn create(&self, new: NewKey) -> Result<(), StoreError> {
         let actor = Actor::operator(new.created_ms);
-        self.0.write("creating a key", move |connection| create(connection, new, actor).boxed()).await
+        self.0.write("creating a key", move |connection| create(connection, new, actor).boxed()).await?;
+        // A service makes the mark too, where this cannot.
+        let _ = self.0.mark_keys();
+        Ok(())
     }
 
-    /// Every key, revoked ones among them, oldest first.
-    pub async fn list(&self) -> Result<Vec<KeyRow>, StoreError> {
+    pub async fn list(&self) -> Result<StoredKeys, StoreError> {
         self.0.keys().await
     }
 
@@ -135,17 +167,17 @@ impl KeyRing {
 }
 
 impl Store {
-    /// Every key, revoked ones among them, oldest first.
-    pub async fn keys(&self) -> Result<Vec<KeyRow>, StoreError> {
+    /// Every key, each verified by itself: one that is damaged hides no other.
+    pub async fn keys(&self) -> Result<StoredKeys, StoreError> {
         let all = query("SELECT * FROM access_keys ORDER BY sequence");
-        self.probe("reading the keys", all, |rows| rows.iter().map(KeyRow::from_row).collect()).await
+        self.probe("reading the keys", all, StoredKeys::from_rows).await
     }
 }
 
 async fn create(mut connection: Connection<'_>, new: NewKey, actor: Actor) -> Result<(), Failure> {
     let (tenant, key, outcome) = (new.tenant.clone(), new.key.clone(), format!("in force, {}", new.roles));
     insert(&mut connection, new).await?;
-    audit::record(&mut connection, &actor, &tenant, Deed::CreateKey, &key, &outcome).await
+    audit_chain::record(&mut connection, (Quotas::NONE, &actor), &tenant, Deed::CreateKey, &key, &outcome).await
 }
 
 /// The key, to be changed by this transaction alone.
@@ -158,26 +190,34 @@ async fn revoke(mut connection: Connection<'_>, key: String, now_ms: i64) -> Res
     let connection = &mut connection;
     let Some(row) = find(connection, &key).await? else { return Ok(false) };
     if row.revoked_ms.is_none() {
-        let revoke = query("UPDATE access_keys SET revoked_ms = $1 WHERE access_key = $2");
-        connection.execute(revoke.bind(now_ms).bind(key.as_str())).await?;
+        change(connection, &KeyRow { revoked_ms: Some(now_ms), ..row.clone() }).await?;
         let actor = Actor::operator(now_ms);
-        audit::record(connection, &actor, &row.tenant, Deed::RevokeKey, &key, "revoked").await?;
+        audit_chain::record(connection, (Quotas::NONE, &actor), &row.tenant, Deed::RevokeKey, &key, "revoked").await?;
     }
     Ok(true)
 }
 
+/// Stores when a key ends.
+async fn change(connection: &mut Connection<'_>, row: &KeyRow) -> Result<(), Failure> {
+    let change = query("UPDATE access_keys SET revoked_ms = $1, expires_ms = $2, seal = $3 WHERE access_key = $4");
+    let change = change.bind(row.revoked_ms).bind(row.expires_ms).bind(row.seal().finish()).bind(row.key.as_str());
+    connection.execute(change).await.map(drop)
+}
+
 async fn insert(connection: &mut Connection<'_>, new: NewKey) -> Result<(), Failure> {
     let insert = query(
-        "INSERT INTO access_keys (access_key, hash, tenant, roles, created_ms, expires_ms)
-         VALUES ($1, $2, $3, $4, $5, $6)",
+        "INSERT INTO access_keys (access_key, hash, tenant, roles, created_ms, expires_ms, seal)
+         VALUES ($1, $2, $3, $4, $5, $6, $7)",
     );
+    let seal = KeyRow::from(new.clone()).seal().finish();
     let insert = insert
         .bind(new.key)
         .bind(new.hash.to_vec())
         .bind(new.tenant.as_str())
         .bind(new.roles.to_string())
         .bind(new.created_ms)
-        .bind(new.expires_ms);
+        .bind(new.expires_ms)
+        .bind(seal);
     connection.execute(insert).await.map(|_| ())
 }
 
@@ -198,11 +238,10 @@ async fn rotate(
     let new = KeyRow { key: name, hash, created_ms, expires_ms, ..old.clone() };
     insert(connection, NewKey::from(new.clone())).await?;
     let expires_ms = old.expires_ms.map_or(old_expires_ms, |sooner| sooner.min(old_expires_ms));
-    let expire = query("UPDATE access_keys SET expires_ms = $1 WHERE access_key = $2");
-    connection.execute(expire.bind(expires_ms).bind(key.as_str())).await?;
-    let (actor, outcome) = (Actor::operator(created_ms), format!("succeeded by {}", new.key));
-    audit::record(connection, &actor, &old.tenant, Deed::RotateKey, &key, &outcome).await?;
     let old = KeyRow { expires_ms: Some(expires_ms), ..old };
+    change(connection, &old).await?;
+    let (actor, outcome) = (Actor::operator(created_ms), format!("succeeded by {}", new.key));
+    audit_chain::record(connection, (Quotas::NONE, &actor), &old.tenant, Deed::RotateKey, &key, &outcome).await?;
     Ok(Rotate::Rotated { old: Box::new(old), new: Box::new(new) })
 }
 
@@ -213,7 +252,26 @@ impl From<KeyRow> for NewKey {
     }
 }
 
+impl From<NewKey> for KeyRow {
+    fn from(new: NewKey) -> Self {
+        let NewKey { key, hash, tenant, roles, created_ms, expires_ms } = new;
+        KeyRow { key, hash, tenant, roles, created_ms, revoked_ms: None, expires_ms }
+    }
+}
+
 impl KeyRow {
+    /// Over all of it; a time that is not set is as far off as none comes.
+    fn seal(&self) -> Seal {
+        Seal::of("key")
+            .text(&self.key)
+            .bytes(&self.hash)
+            .text(self.tenant.as_str())
+            .text(&self.roles.to_string())
+            .integer(self.created_ms)
+            .integer(self.revoked_ms.unwrap_or(i64::MAX))
+            .integer(self.expires_ms.unwrap_or(i64::MAX))
+    }
+
     /// Whether it was revoked, or has expired by `now_ms`.
     pub fn has_ended(&self, now_ms: i64) -> bool {
         self.revoked_ms.is_some() || self.expires_ms.is_some_and(|expires_ms| expires_ms <= now_ms)
@@ -221,17 +279,19 @@ impl KeyRow {
 
     pub(super) fn from_row(row: &Row) -> Result<Self, Failure> {
         let key: String = row.get("access_key")?;
-        let damaged = |column: &str| Failure::Corrupt(format!("the {column} of key {key}"));
+        let what = || format!("key {key}");
         let roles: String = row.get("roles")?;
-        Ok(KeyRow {
-            hash: row.get::<Vec<u8>>("hash")?.try_into().map_err(|_| damaged("hash"))?,
+        let read = KeyRow {
+            hash: row.get::<Vec<u8>>("hash")?.try_into().map_err(|_| Failure::Corrupt(what()))?,
             tenant: Tenant::stored(&row.get::<String>("tenant")?),
-            roles: roles.parse().map_err(|_| damaged("roles"))?,
+            roles: roles.parse().map_err(|_| Failure::Corrupt(what()))?,
             created_ms: row.get("created_ms")?,
             revoked_ms: row.get("revoked_ms")?,
             expires_ms: row.get("expires_ms")?,
-            key,
-        })
+            key: key.clone(),
+        };
+        read.seal().verify(&row.get::<Vec<u8>>("seal")?, what)?;
+        Ok(read)
     }
 }
 

@@ -10,7 +10,8 @@ use futures_util::FutureExt;
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
-use super::audit::{self, Deed};
+use super::audit::Deed;
+use super::audit_chain;
 use super::error::Failure;
 use super::query::{Connection, Row, query};
 use super::quotas::{self, Usage};
@@ -168,7 +169,7 @@ impl Store {
                 };
                 let (labels, grown) = put(connection, &tenant, &object, &change).await?;
                 quotas::take(connection, &tenant, grown, quotas).await?;
-                audit::record(connection, &actor, &tenant, deed, &object, &told(&change)).await?;
+                audit_chain::record(connection, (quotas, &actor), &tenant, deed, &object, &told(&change)).await?;
                 Ok(Some(labels))
             }
             .boxed()

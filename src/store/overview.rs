@@ -3,12 +3,17 @@
 //! What a row tells of where its session stands is what its last entry answered, joined to it: nothing is kept twice, so
 //! that a row is never out of step with the entries, and an observation writes no more than its entry. Only what is listed
 //! is read; what pages are put in order by is read of every session that matches.
+//!
+//! What is shown was verified: the start of a session and its last entry by their seals. A session of which either is
+//! damaged is named, and nothing of it is shown.
 
 use super::care::{Care, CareCounts, Today, needs, needs_any};
 use super::codec::{from_sql, to_sql};
+use super::entries::{EntryKind, EntryRow};
 use super::error::Failure;
 use super::labels::Labels;
 use super::query::{Query, Row};
+use super::sessions::SessionRow;
 use super::statement::{HORIZON, IS_WAITING, OBSERVATIONS, Statement, TABLES};
 use super::tenant::Tenant;
 use super::{Store, StoreError};
@@ -105,22 +110,26 @@ pub struct SessionSummary {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionList {
     pub sessions: Vec<SessionSummary>,
+    /// Sessions of the page that are not what was written, and what of each.
+    pub damaged: Vec<(String, String)>,
+    /// The place of the last row, sound or not, if the page is full.
+    pub last: Option<SessionPlace>,
     pub total: usize,
 }
 
-const WEALTH: &str = "coalesce(CAST(json_extract(last.answer_json, '$.wealth') AS DOUBLE PRECISION),
-    sessions.initial_wealth)";
+const WEALTH: &str =
+    "coalesce(CAST(json_extract(CASE WHEN json_valid(last.answer_json) THEN last.answer_json END, '$.wealth')
+    AS DOUBLE PRECISION), sessions.initial_wealth)";
 
 impl Store {
     /// Sessions of a tenant.
     pub async fn sessions(&self, tenant: &Tenant, asked: &SessionQuery) -> Result<SessionList, StoreError> {
         let doing = "listing sessions";
         let (page, count) = (asked.page(tenant), asked.count(tenant));
-        let decode = |rows: &[Row]| rows.iter().map(|row| SessionSummary::from_row(row, asked.order)).collect();
+        let decode = |rows: &[Row]| asked.listed(rows);
         let counted = |rows: &[Row]| rows.first().map_or(Ok(0), |row| row.get::<i64>("total"));
-        let (sessions, total) =
-            futures_util::try_join!(self.list(doing, page, decode), self.list(doing, count, counted))?;
-        Ok(SessionList { sessions, total: usize::try_from(total).unwrap_or_default() })
+        let (list, total) = futures_util::try_join!(self.list(doing, page, decode), self.list(doing, count, counted))?;
+        Ok(SessionList { total: usize::try_from(total).unwrap_or_default(), ..list })
     }
 
     /// Counts what needs care among the sessions that match, in whatever state.
@@ -130,11 +139,27 @@ impl Store {
 }
 
 impl SessionQuery {
+    fn listed(&self, rows: &[Row]) -> Result<SessionList, Failure> {
+        let last = rows.last().filter(|_| rows.len() == self.limit);
+        let last = last.map(|row| self.order.place(row)).transpose()?;
+        let mut list = SessionList { sessions: Vec::new(), damaged: Vec::new(), last, total: 0 };
+        for row in rows {
+            match SessionSummary::from_row(row, self.order) {
+                Ok(session) => list.sessions.push(session),
+                Err(failure) => list.damaged.push((row.get("session")?, failure.damage()?)),
+            }
+        }
+        Ok(list)
+    }
+
     fn page(&self, tenant: &Tenant) -> Query {
         let key = self.order.key();
         let columns = format!(
-            "SELECT sessions.sequence, sessions.session, sessions.initial_wealth, sessions.initial_holding,
-                    sessions.created_ms, labels.name, labels.notes, labels.tags,
+            "SELECT sessions.sequence, sessions.session, sessions.tenant, sessions.policy AS first_policy,
+                    sessions.initial_wealth, sessions.initial_holding, sessions.history_seal,
+                    sessions.horizon AS first_horizon, sessions.plan_json, sessions.created_ms, sessions.seal,
+                    last.entry, last.kind, last.number, last.content_json, last.access_key, last.seal AS last_seal,
+                    labels.name, labels.notes, labels.tags,
                     coalesce(renewals.policy, sessions.policy) AS policy, called.name AS policy_name,
                     policies.periods_per_year, {HORIZON} AS horizon, {OBSERVATIONS} AS observations, sessions.due,
                     last.answer_json, last.created_ms AS reported_ms, {key} AS sort_key {TABLES}"
@@ -257,22 +282,58 @@ impl SessionSummary {
     fn from_row(row: &Row, order: SessionOrder) -> Result<Self, Failure> {
         let observations = from_sql(row.get("observations")?)?;
         let due = row.get::<Option<i64>>("due")?.map(from_sql).transpose()?;
-        let (answer, reported_ms): (Option<String>, Option<i64>) = (row.get("answer_json")?, row.get("reported_ms")?);
+        let start = start_of(row)?;
+        let last = last_of(row)?;
         Ok(SessionSummary {
-            session: row.get("session")?,
+            session: start.session,
             labels: Labels::from_row(row)?,
             policy: row.get("policy")?,
             policy_name: row.get::<Option<String>>("policy_name")?.unwrap_or_default(),
             periods_per_year: row.get("periods_per_year")?,
-            initial_wealth: row.get("initial_wealth")?,
-            initial_holding: row.get("initial_holding")?,
+            initial_wealth: start.initial_wealth,
+            initial_holding: start.initial_holding,
             horizon: from_sql(row.get("horizon")?)?,
-            created_ms: row.get("created_ms")?,
+            created_ms: start.created_ms,
             observations,
             is_due: due.is_some_and(|due| due <= observations),
             is_renewed: due.is_some(),
-            last: answer.zip(reported_ms),
+            last: last.map(|entry| (entry.answer_json, entry.created_ms)),
             place: order.place(row)?,
         })
     }
+}
+
+/// The start of a session, verified; its history is not read.
+fn start_of(row: &Row) -> Result<SessionRow, Failure> {
+    let start = SessionRow {
+        session: row.get("session")?,
+        tenant: Tenant::stored(&row.get::<String>("tenant")?),
+        policy: row.get("first_policy")?,
+        initial_wealth: row.get("initial_wealth")?,
+        initial_holding: row.get("initial_holding")?,
+        initial_history: Vec::new(),
+        horizon: from_sql(row.get("first_horizon")?)?,
+        plan_json: row.get("plan_json")?,
+        due: None,
+        created_ms: row.get("created_ms")?,
+    };
+    let seal = start.seal_with(&row.get::<Vec<u8>>("history_seal")?);
+    seal.verify(&row.get::<Vec<u8>>("seal")?, || format!("the start of session {}", start.session))?;
+    Ok(start)
+}
+
+/// The last entry that moved a session, verified; `None` before the first.
+fn last_of(row: &Row) -> Result<Option<EntryRow>, Failure> {
+    let Some(entry) = row.get::<Option<i64>>("entry")? else { return Ok(None) };
+    let last = EntryRow {
+        session: row.get("session")?,
+        entry: from_sql(entry)?,
+        kind: EntryKind::stored(&row.get::<String>("kind")?)?,
+        number: from_sql(row.get("number")?)?,
+        content_json: row.get("content_json")?,
+        answer_json: row.get("answer_json")?,
+        created_ms: row.get("reported_ms")?,
+        key: row.get("access_key")?,
+    };
+    last.verified(&row.get::<Vec<u8>>("last_seal")?).map(Some)
 }

@@ -3,7 +3,8 @@
 
 use futures_util::FutureExt;
 
-use super::audit::{self, Actor, Deed};
+use super::audit::{Actor, Deed};
+use super::audit_chain;
 use super::codec::to_sql;
 use super::error::Failure;
 use super::labels::{self, Labels};
@@ -73,7 +74,8 @@ impl Store {
             async move {
                 let is_new = insert(&mut connection, &tenant, &id, (json, year), created_ms, quotas).await?;
                 if is_new {
-                    audit::record(&mut connection, &actor, &tenant, Deed::ImportPolicy, &id, "stored").await?;
+                    audit_chain::record(&mut connection, (quotas, &actor), &tenant, Deed::ImportPolicy, &id, "stored")
+                        .await?;
                 }
                 Ok(is_new)
             }
@@ -218,7 +220,7 @@ async fn delete(
     let bytes = Usage::of_bytes(ROW_BYTES + row.get::<i64>("bytes")?);
     let bytes = bytes.and(labels::remove(connection, &tenant, &id).await?);
     quotas::change(connection, &tenant, bytes.given_back()).await?;
-    audit::record(connection, &actor, &tenant, Deed::DeletePolicy, &id, "deleted").await?;
+    audit_chain::record(connection, (Quotas::NONE, &actor), &tenant, Deed::DeletePolicy, &id, "deleted").await?;
     Ok(DeletePolicy::Deleted)
 }
 

@@ -30,16 +30,18 @@ pub struct Quotas {
     pub queued_jobs: u32,
     pub sessions: u32,
     pub bytes: u64,
+    /// Changes by one key that the audit keeps.
+    pub audit_entries: u32,
 }
 
 impl Quotas {
-    pub(super) const NONE: Quotas = Quotas { queued_jobs: 0, sessions: 0, bytes: 0 };
+    pub(super) const NONE: Quotas = Quotas { queued_jobs: 0, sessions: 0, bytes: 0, audit_entries: 0 };
 }
 
 impl Default for Quotas {
     /// Far above what a tenant needs: they stop loops gone wild, not users.
     fn default() -> Self {
-        Quotas { queued_jobs: 1_000, sessions: 1_000_000, bytes: 100 << 30 }
+        Quotas { queued_jobs: 1_000, sessions: 1_000_000, bytes: 100 << 30, audit_entries: 5_000_000 }
     }
 }
 
@@ -132,7 +134,7 @@ pub(super) async fn change(connection: &mut Connection<'_>, tenant: &Tenant, by:
     Ok(Usage { sessions: changed.get("sessions")?, bytes: changed.get("bytes")? })
 }
 
-fn within(quota: Quota, kept: i64, wanted: i64, limit: u64) -> Result<(), Failure> {
+pub(super) fn within(quota: Quota, kept: i64, wanted: i64, limit: u64) -> Result<(), Failure> {
     let (kept, wanted) = (u64::try_from(kept).unwrap_or_default(), u64::try_from(wanted).unwrap_or_default());
     if limit == 0 || wanted == 0 || kept.saturating_add(wanted) <= limit {
         return Ok(());

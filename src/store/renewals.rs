@@ -40,7 +40,8 @@ impl Store {
         let page = query(
             "SELECT sequence, tenant, session FROM sessions WHERE due IS NOT NULL AND sequence > $1
              AND due <= (SELECT CASE kind WHEN 'observation' THEN number
-                                ELSE CAST(json_extract(answer_json, '$.observed') AS BIGINT) END
+                                ELSE CAST(json_extract(CASE WHEN json_valid(answer_json) THEN answer_json END,
+                                                        '$.observed') AS BIGINT) END
                          FROM entries WHERE entries.session = sessions.session AND kind <> 'renewal'
                          ORDER BY entry DESC LIMIT 1)
              ORDER BY sequence LIMIT $2",

@@ -5,13 +5,14 @@
 
 use futures_util::FutureExt;
 
-use super::audit::{self, Actor, Deed};
+use super::audit::{Actor, Deed};
+use super::audit_chain;
 use super::codec::to_sql;
 use super::error::Failure;
 use super::job::JobRow;
 use super::jobs::find;
 use super::query::{Connection, query};
-use super::quotas::{self, ROW_BYTES, Usage};
+use super::quotas::{self, Quotas, ROW_BYTES, Usage};
 use super::tenant::Tenant;
 use super::{Engine, Store, StoreError};
 
@@ -84,7 +85,7 @@ async fn delete(
     };
     remove(connection, &row).await?;
     let outcome = format!("deleted, {}", row.state.as_str());
-    audit::record(connection, &actor, &tenant, Deed::DeleteJob, &job, &outcome).await?;
+    audit_chain::record(connection, (Quotas::NONE, &actor), &tenant, Deed::DeleteJob, &job, &outcome).await?;
     Ok(DeleteJob::Deleted)
 }
 

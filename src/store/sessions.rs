@@ -2,7 +2,8 @@
 
 use futures_util::FutureExt;
 
-use super::audit::{self, Actor, Deed};
+use super::audit::{Actor, Deed};
+use super::audit_chain;
 use super::codec::{Seal, decode_reals, encode_reals, from_sql, to_sql};
 use super::entries::EntryRow;
 use super::error::Failure;
@@ -122,6 +123,10 @@ impl Store {
     }
 }
 
+fn history_seal(history: &[f64]) -> Vec<u8> {
+    Seal::of("history").bytes(&encode_reals(history)).finish()
+}
+
 async fn create(
     mut connection: Connection<'_>,
     row: SessionRow,
@@ -153,7 +158,7 @@ async fn create(
     }
     quotas::take(connection, &row.tenant, usage, quotas).await?;
     let outcome = format!("opened under policy {}", row.policy);
-    audit::record(connection, &actor, &row.tenant, Deed::OpenSession, &row.session, &outcome).await?;
+    audit_chain::record(connection, (quotas, &actor), &row.tenant, Deed::OpenSession, &row.session, &outcome).await?;
     Ok(created)
 }
 
@@ -184,8 +189,8 @@ async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<Cre
     }
     let insert = query(
         "INSERT INTO sessions (session, policy, initial_wealth, initial_holding, initial_history, horizon, room, created_ms,
-                               seal, tenant, plan_json, due)
-         VALUES ($1, $2, $3, $4, $5, $6, $6, $7, $8, $9, $10, $11) ON CONFLICT (session) DO NOTHING",
+                               seal, tenant, plan_json, due, history_seal)
+         VALUES ($1, $2, $3, $4, $5, $6, $6, $7, $8, $9, $10, $11, $12) ON CONFLICT (session) DO NOTHING",
     );
     let insert = insert
         .bind(row.session.as_str())
@@ -198,7 +203,8 @@ async fn insert(connection: &mut Connection<'_>, row: &SessionRow) -> Result<Cre
         .bind(row.seal().finish())
         .bind(row.tenant.as_str())
         .bind(row.plan_json.as_str())
-        .bind(row.due.map(to_sql));
+        .bind(row.due.map(to_sql))
+        .bind(history_seal(&row.initial_history));
     let inserted = connection.execute(insert).await?;
     Ok(if inserted > 0 { CreateSession::Created } else { CreateSession::Exists })
 }
@@ -224,7 +230,7 @@ async fn delete(
     let usage = usage.and(labels::remove(connection, &tenant, &session).await?);
     quotas::change(connection, &tenant, usage.given_back()).await?;
     let outcome = format!("deleted, with {entries} entries");
-    audit::record(connection, &actor, &tenant, Deed::DeleteSession, &session, &outcome).await?;
+    audit_chain::record(connection, (Quotas::NONE, &actor), &tenant, Deed::DeleteSession, &session, &outcome).await?;
     Ok(true)
 }
 
@@ -240,13 +246,18 @@ impl SessionRow {
     }
 
     fn seal(&self) -> Seal {
+        self.seal_with(&history_seal(&self.initial_history))
+    }
+
+    /// Over the start, of whose history the seal alone is needed.
+    pub(super) fn seal_with(&self, history_seal: &[u8]) -> Seal {
         Seal::of("session")
             .text(&self.session)
             .text(self.tenant.as_str())
             .text(&self.policy)
             .real(self.initial_wealth)
             .real(self.initial_holding)
-            .bytes(&encode_reals(&self.initial_history))
+            .bytes(history_seal)
             .integer(to_sql(self.horizon))
             .text(&self.plan_json)
             .integer(self.created_ms)
@@ -269,6 +280,9 @@ impl SessionRow {
             session: session.clone(),
         };
         read.seal().verify(&row.get::<Vec<u8>>("seal")?, what)?;
+        if row.get::<Vec<u8>>("history_seal")? != history_seal(&read.initial_history) {
+            return Err(Failure::Corrupt(what()));
+        }
         Ok(read)
     }
 }

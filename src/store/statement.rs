@@ -15,14 +15,16 @@ pub(super) const TABLES: &str = "FROM sessions
     LEFT JOIN entries AS last ON last.session = sessions.session
          AND last.entry = (SELECT entry FROM entries AS made WHERE made.session = sessions.session
                            AND kind <> 'renewal' ORDER BY entry DESC LIMIT 1)";
+/// The answer of the last entry, unless it is damaged so that it cannot be read.
+pub(super) const ANSWER: &str = "CASE WHEN json_valid(last.answer_json) THEN last.answer_json END";
 pub(super) const HORIZON: &str = "coalesce(renewals.horizon, sessions.horizon)";
 /// Periods observed, as the last entry that moved the session says.
 pub(super) const OBSERVATIONS: &str = "coalesce(CASE last.kind WHEN 'observation' THEN last.number
-    ELSE CAST(json_extract(last.answer_json, '$.observed') AS BIGINT) END, 0)";
+    ELSE CAST(json_extract(CASE WHEN json_valid(last.answer_json) THEN last.answer_json END, '$.observed') AS BIGINT) END, 0)";
 /// Whether the next policy of a session is to be trained. Until it is there the session goes on, past its horizon too.
 pub(super) const IS_WAITING: &str = "(sessions.due IS NOT NULL AND sessions.due <=
     coalesce(CASE last.kind WHEN 'observation' THEN last.number
-    ELSE CAST(json_extract(last.answer_json, '$.observed') AS BIGINT) END, 0))";
+    ELSE CAST(json_extract(CASE WHEN json_valid(last.answer_json) THEN last.answer_json END, '$.observed') AS BIGINT) END, 0))";
 
 /// A statement under way: its text and its values.
 pub(super) struct Statement {

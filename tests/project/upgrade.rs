@@ -11,7 +11,7 @@
 use std::path::PathBuf;
 
 use crate::support::{App, specification};
-use ballast::store::{Inspection, Store, backup, restore};
+use ballast::store::{Damage, Inspection, Store, backup, restore};
 use serde_json::{Value, json};
 
 const RETURNS: [[f64; 2]; 2] = [[0.021, -0.034], [-0.012, 0.055]];
@@ -76,7 +76,7 @@ async fn write_the_fixture_of_the_newest_schema() {
     if database.exists() {
         std::fs::remove_file(&database).unwrap();
     }
-    backup(app.folder(), &database, &mut |_| {}).await.unwrap();
+    backup(app.folder(), &database, Damage::Refused, &mut |_| {}).await.unwrap();
     let recording = json!({ "key": key, "policy": app.policy, "answers": answers });
     std::fs::write(recorded, serde_json::to_string_pretty(&recording).unwrap() + "\n").unwrap();
 }
@@ -116,7 +116,7 @@ async fn every_schema_is_opened_and_advises_as_it_did() {
         let mut told = String::new();
         let restored = app.folder().join("restored");
         let mut tell = |line: String| told += &(line + "\n");
-        restore(&name.with_extension("sqlite"), &restored, &mut tell).await.unwrap();
+        restore(&name.with_extension("sqlite"), &restored, Damage::Refused, &mut tell).await.unwrap();
         assert!(told.contains("sessions: 2, with 4 entries") && told.contains("keys: 1"), "{told}");
         app.move_to("restored").await;
 

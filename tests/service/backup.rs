@@ -204,7 +204,7 @@ const DAMAGES: [(&str, &str); 7] = [
     ("UPDATE entries SET content_json = '{}' WHERE entry = 2", "entry 2 of session"),
     ("DELETE FROM entries WHERE entry = 1", "entry 1 of session"),
     ("UPDATE usage SET bytes = bytes + 1", "the total of tenant"),
-    ("UPDATE access_keys SET roles = 'root'", "the roles of key"),
+    ("UPDATE access_keys SET roles = 'root'", "key key_"),
 ];
 
 #[tokio::test]

@@ -23,7 +23,7 @@ fn assert_refused((status, problem): (StatusCode, Value), expected: u16, option:
     assert!(rule.contains(&format!("at most {limit},")) && rule.contains(&format!("--{option}")), "{problem}");
 }
 
-const QUOTAS: Quotas = Quotas { queued_jobs: 2, sessions: 2, bytes: 150_000 };
+const QUOTAS: Quotas = Quotas { queued_jobs: 2, sessions: 2, bytes: 150_000, audit_entries: 0 };
 
 #[tokio::test]
 async fn what_a_tenant_may_keep_is_refused_with_the_numbers() {

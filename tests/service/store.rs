@@ -7,7 +7,7 @@ use ballast::control::policy::content_hash;
 use ballast::store::{
     Append, AuditFilter, AuditRow, CreateJob, CreateSession, DeletePolicy, EntryKind, EntryRow, JobCounts, JobKind,
     JobOutcome, JobRow, JobState, NewJob, NewKey, Relabel, RequestKey, Rotate, Seen, SessionQuery, SessionRow, Store,
-    StoreError, Successor, Tenant,
+    StoreError, StoredKeys, Successor, Tenant,
 };
 use futures_util::future::join_all;
 
@@ -835,7 +835,7 @@ async fn tenants_see_only_their_own(place: &Place) {
 /// Over a folder, the store is open and holds the lock.
 async fn a_key_is_listed_and_revoked_beside_the_store(place: &Place) {
     let store = place.open().await;
-    assert_eq!(store.keys().await.unwrap(), []);
+    assert!(store.keys().await.unwrap().is_empty());
     let ring = place.key_ring().await.unwrap();
     let new = NewKey {
         key: "key_1".into(),
@@ -847,32 +847,48 @@ async fn a_key_is_listed_and_revoked_beside_the_store(place: &Place) {
     };
     ring.create(new.clone()).await.unwrap();
     assert!(ring.create(NewKey { key: "key_2".into(), ..new.clone() }).await.is_err(), "two keys of one text");
-    let rows = store.keys().await.unwrap();
-    assert_eq!(rows, ring.list().await.unwrap());
+    let rows = store.keys().await.unwrap().sound;
+    assert_eq!(rows, ring.list().await.unwrap().sound);
     assert_eq!((rows[0].hash, &rows[0].tenant, rows[0].revoked_ms), (new.hash, &new.tenant, None));
     assert_eq!(rows[0].roles.to_string(), "read,operate");
     let successor = Successor { key: "key_2".into(), hash: [8; 32], created_ms: 5, expires_ms: None };
     let Rotate::Rotated { old, new } = ring.rotate("key_1", successor.clone(), 50).await.unwrap() else { panic!() };
     assert_eq!((old.expires_ms, new.expires_ms), (Some(50), Some(105)), "as long as the one before was made for");
     assert_eq!((&new.tenant, &new.roles), (&old.tenant, &old.roles));
-    assert_eq!(store.keys().await.unwrap(), [*old, *new]);
+    assert_eq!(store.keys().await.unwrap().sound, [*old, *new.clone()]);
     let again = |created_ms| Successor { key: format!("key_{created_ms}"), created_ms, ..successor.clone() };
     assert!(ring.rotate("key_1", again(6), 60).await.is_err(), "two keys of one text");
-    assert_eq!(ring.list().await.unwrap()[0].expires_ms, Some(50), "all of a rotation or nothing");
+    assert_eq!(ring.list().await.unwrap().sound[0].expires_ms, Some(50), "all of a rotation or nothing");
     assert_eq!(ring.rotate("key_1", again(50), 60).await.unwrap(), Rotate::Ended);
     assert_eq!(ring.rotate("key_9", again(6), 60).await.unwrap(), Rotate::Absent);
     assert!(!ring.revoke("key_3", 4).await.unwrap());
     assert!(ring.revoke("key_1", 4).await.unwrap() && ring.revoke("key_1", 5).await.unwrap());
-    assert_eq!(store.keys().await.unwrap()[0].revoked_ms, Some(4));
+    assert_eq!(store.keys().await.unwrap().sound[0].revoked_ms, Some(4));
     ring.close().await;
     // The store writes on, and keys can be made where nobody serves it.
     queued(&store, "j1").await;
     store.close().await;
     let ring = place.key_ring().await.unwrap();
-    assert_eq!(ring.list().await.unwrap().len(), 2);
+    assert_eq!(ring.list().await.unwrap().sound.len(), 2);
     ring.close().await;
-    place.tamper("UPDATE access_keys SET roles = 'root' WHERE access_key = 'key_1'").await;
-    assert!(matches!(place.open().await.keys().await, Err(StoreError::Corrupt { .. })));
+    // Whatever is altered of a key, it is none, and the other is one still.
+    for (damage, mend) in [
+        ("roles = 'root'", "roles = 'read,operate'"),
+        ("roles = 'admin'", "roles = 'read,operate'"),
+        ("tenant = 'south'", "tenant = 'north'"),
+        ("revoked_ms = NULL", "revoked_ms = 4"),
+        ("expires_ms = NULL", "expires_ms = 50"),
+    ] {
+        place.tamper(&format!("UPDATE access_keys SET {damage} WHERE access_key = 'key_1'")).await;
+        let store = place.open().await;
+        let StoredKeys { sound, damaged } = store.keys().await.unwrap();
+        assert_eq!(
+            (sound.as_slice(), damaged.as_slice()),
+            ([*new.clone()].as_slice(), ["key key_1".to_owned()].as_slice())
+        );
+        store.close().await;
+        place.tamper(&format!("UPDATE access_keys SET {mend} WHERE access_key = 'key_1'")).await;
+    }
 }
 
 async fn a_session_moved_to_another_tenant_is_damaged(place: &Place) {

@@ -46,6 +46,9 @@ const lead = () =>
     "No session yet. A session is one investor who lives by a policy: report each return as it comes, and read what to hold next.",
   );
 
+/** Sessions that the store no longer has as they were written. */
+const damagedWords = (damaged) => (damaged.length === 0 ? "" : `. Damaged, to be restored by an operator: ${damaged.join(", ")}`);
+
 const filtered = ({ search, tag, state }) => Boolean(search || tag || state);
 
 /** What of `chosen` is other than where nothing is said. */
@@ -78,7 +81,7 @@ function overview(chosen, first, leaving) {
   const holder = h("div", { class: "listing" });
   const line = h("p", { class: "note", role: "status" });
   const more = h("button", { class: "quiet" }, "Show more");
-  let [entries, page, asking] = [[], first, new AbortController()];
+  let [entries, damaged, page, asking] = [[], [], first, new AbortController()];
   leaving.addEventListener("abort", () => asking.abort());
   const tellBeyond = () => (beyond.textContent = outsideWords(entries.filter(advice.isOutside).length));
   const sort = (column) => {
@@ -90,12 +93,13 @@ function overview(chosen, first, leaving) {
   const add = (now) => {
     page = now;
     entries.push(...page.sessions);
+    damaged.push(...page.damaged);
     for (const tag of page.sessions.flatMap(({ tags }) => tags)) known.add(tag);
     tags.replaceChildren(...[...known].sort().map((value) => h("option", { value })));
     holder.replaceChildren(entries.length > 0 ? listed(entries, { ticks, advice, sorted: chosen.sort, sort }) : h("p", {}, "No session matches."));
-    more.hidden = entries.length >= page.total || page.next === null;
+    more.hidden = entries.length + damaged.length >= page.total || page.next === null;
     tellBeyond();
-    line.textContent = `${count(entries.length)} of ${count(page.total)}`;
+    line.textContent = `${count(entries.length)} of ${count(page.total)}${damagedWords(damaged)}`;
   };
   const failed = (error) => {
     if (error.name !== "AbortError") line.textContent = error.message;
@@ -112,6 +116,7 @@ function overview(chosen, first, leaving) {
       const now = await read(chosen, null, signal);
       advice.forget();
       entries = [];
+      damaged = [];
       add(now);
     } catch (error) {
       failed(error);

@@ -2,6 +2,7 @@
 
 mod batch;
 mod changes;
+pub(super) mod held;
 pub(super) mod opening;
 mod operation;
 mod room;
@@ -46,10 +47,10 @@ impl Folder {
         Folder::over(dir, opening::open_beside(dir).await?)
     }
 
-    fn over(dir: &Path, opening::Opened { lock, writer, readers }: opening::Opened) -> Result<Folder, StoreError> {
+    fn over(dir: &Path, opening::Opened { held, writer, readers }: opening::Opened) -> Result<Folder, StoreError> {
         let (requests, receiver) = mpsc::channel(writer::QUEUE);
         let fatal = watch::Sender::new(None);
-        writer::start(writer, receiver, fatal.clone(), lock)?;
+        writer::start(writer, receiver, fatal.clone(), held)?;
         Ok(Folder { dir: dir.to_owned(), readers, requests, changes: Changes::new(changes::NUMBERS), fatal })
     }
 
@@ -60,6 +61,10 @@ impl Folder {
             return Err(StoreError::Unavailable { doing, source: None });
         }
         self.read(Purpose::Probes, doing, query("SELECT job FROM jobs LIMIT 1")).await.map(|_| ())
+    }
+
+    pub(super) fn dir(&self) -> &Path {
+        &self.dir
     }
 
     pub(super) async fn until_fatal(&self) -> StoreError {

@@ -1,8 +1,6 @@
 //! Opening a folder: the lock, the engine's age, the schema, the leases of the dead, the connections.
 
-use std::fs::{File, TryLockError};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::Path;
 use std::time::Duration;
 
 use sqlx::sqlite::{
@@ -10,8 +8,9 @@ use sqlx::sqlite::{
 };
 use sqlx::{ConnectOptions, Connection, SqliteConnection};
 
+use super::held::HeldFile;
 use super::write_ahead_log;
-use crate::store::error::{Failure, StoreError};
+use crate::store::error::{Failure, StoreError, unusable};
 use crate::store::job_state::JobState;
 use crate::store::migrations;
 use crate::store::query::Purpose;
@@ -35,9 +34,9 @@ const ADVICE_READERS: u32 = 4;
 const LIST_READERS: u32 = 2;
 const PROBE_READERS: u32 = 1;
 
-/// A folder, its schema up to date. It is ours where there is a lock.
+/// A folder, its schema up to date, with the files that are held of it: none if another process may hold it.
 pub(super) struct Opened {
-    pub lock: Option<File>,
+    pub held: Vec<HeldFile>,
     pub writer: SqliteConnection,
     pub readers: Readers,
 }
@@ -54,12 +53,15 @@ pub(super) async fn open(dir: &Path) -> Result<Opened, StoreError> {
     let lock = lock(dir)?;
     refuse_damaged_log(dir)?;
     let file = dir.join(DATABASE);
+    // The database too: a lock file that was removed is made anew by whoever comes second.
+    let mut database = HeldFile::lock(file.clone())?;
     let mut writer = connect(&file).await?;
     refuse_old_engine(&mut writer).await?;
     migrate(&mut writer).await?;
     end_leases(&mut writer).await?;
+    database.stamp(&mut writer).await?;
     empty_log(&mut writer).await?;
-    Ok(Opened { lock: Some(lock), writer, readers: Readers::of(&file) })
+    Ok(Opened { held: vec![lock, database], writer, readers: Readers::of(&file) })
 }
 
 /// As [`open`], without holding the folder and without touching what its holder does. The lock is needed only to bring
@@ -77,7 +79,7 @@ pub(super) async fn open_beside(dir: &Path) -> Result<Opened, StoreError> {
     }
     let mut writer = connect(&file).await?;
     refuse_old_engine(&mut writer).await?;
-    Ok(Opened { lock: None, writer, readers: Readers::of(&file) })
+    Ok(Opened { held: Vec::new(), writer, readers: Readers::of(&file) })
 }
 
 /// The database of a folder, whether or not a process holds it, to be read only.
@@ -96,7 +98,7 @@ pub(in crate::store) async fn inspect_file(file: &Path) -> Result<SqliteConnecti
     options.disable_statement_logging().connect().await.map_err(opening)
 }
 
-fn existing(file: &Path) -> Result<(), StoreError> {
+pub(in crate::store) fn existing(file: &Path) -> Result<(), StoreError> {
     file.metadata().map(drop).map_err(|error| unusable(file, error))
 }
 
@@ -145,20 +147,9 @@ fn readers(file: &Path, connections: u32) -> SqlitePool {
         .connect_lazy_with(options.disable_statement_logging())
 }
 
-pub(in crate::store) fn unusable(path: &Path, error: std::io::Error) -> StoreError {
-    StoreError::Folder { path: PathBuf::from(path), source: Arc::new(error) }
-}
-
-pub(in crate::store) fn lock(dir: &Path) -> Result<File, StoreError> {
+pub(in crate::store) fn lock(dir: &Path) -> Result<HeldFile, StoreError> {
     std::fs::create_dir_all(dir).map_err(|error| unusable(dir, error))?;
-    let path = dir.join(LOCK);
-    let file = File::options().create(true).truncate(false).write(true).open(&path);
-    let file = file.map_err(|error| unusable(&path, error))?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(StoreError::Locked { path }),
-        Err(TryLockError::Error(error)) => Err(unusable(&path, error)),
-    }
+    HeldFile::lock(dir.join(LOCK))
 }
 
 /// Looks at the log where nobody writes it; a process that holds the folder looked when it started.

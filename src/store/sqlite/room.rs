@@ -5,8 +5,8 @@ use std::path::Path;
 use futures_util::FutureExt;
 
 use super::Folder;
-use super::opening::{LOG, unusable};
-use crate::store::error::{Failure, StoreError};
+use super::opening::LOG;
+use crate::store::error::{Failure, StoreError, unusable};
 use crate::store::query::{Connection, Purpose, query};
 use crate::store::retention::Room;
 

@@ -6,12 +6,13 @@
 //! leave after the commit. Errors after which SQLite may have rolled back by itself (disk full, I/O) fail every operation
 //! that ran in the group; those that had not run yet go to the next one. After a fatal error the writer stops for good.
 
-use std::fs::File;
+use std::time::Duration;
 
 use sqlx::{Connection, SqliteConnection};
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::batch::{self, Appending, Waiting};
+use super::held::HeldFile;
 use super::operation::{Answer, Operation, Undo};
 use crate::store::entries::ROWS_AT_ONCE;
 use crate::store::error::{Failure, StoreError};
@@ -19,6 +20,8 @@ use crate::store::error::{Failure, StoreError};
 /// Operations in one transaction: the observations that one statement takes. A row then costs a hundredth of what it costs
 /// alone; more only adds waiting.
 const GROUP: usize = ROWS_AT_ONCE;
+/// A file that is held is looked at so often while nothing is written.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(500);
 /// Requests that may wait before callers do.
 pub(super) const QUEUE: usize = 1024;
 
@@ -34,26 +37,37 @@ pub(super) fn start(
     connection: SqliteConnection,
     requests: mpsc::Receiver<Request>,
     fatal: watch::Sender<Option<StoreError>>,
-    lock: Option<File>,
+    held: Vec<HeldFile>,
 ) -> Result<(), StoreError> {
     let unavailable = |_| StoreError::Unavailable { doing: "starting the writer", source: None };
-    let runtime = tokio::runtime::Builder::new_current_thread().build().map_err(unavailable)?;
-    let serving = move || runtime.block_on(serve(connection, requests, fatal, lock));
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().map_err(unavailable)?;
+    let serving = move || runtime.block_on(serve(connection, requests, fatal, held));
     std::thread::Builder::new().name("writer".into()).spawn(serving).map(drop).map_err(unavailable)
 }
 
 /// Serves requests until the last [`Folder`](super::Folder) is dropped, one closes it, or a write fails fatally.
-/// Holds the folder's lock, where it has it, as long as it can write.
+/// Holds the folder's files, where it has them, as long as it can write, and ends once one of them is another.
 async fn serve(
     mut connection: SqliteConnection,
     mut requests: mpsc::Receiver<Request>,
     fatal: watch::Sender<Option<StoreError>>,
-    lock: Option<File>,
+    held: Vec<HeldFile>,
 ) {
     let mut waiting = Waiting::default();
     let mut closed = Vec::new();
-    while !waiting.is_empty() || receive(&mut requests, &mut waiting, &mut closed).await {
-        if let Err(error) = commit_group(&mut connection, &mut waiting).await
+    let mut looks = tokio::time::interval(BETWEEN_LOOKS);
+    loop {
+        let end = tokio::select! {
+            biased;
+            _ = looks.tick() => verify(&held),
+            goes_on = receive(&mut requests, &mut waiting, &mut closed) => {
+                if !goes_on && waiting.is_empty() {
+                    break;
+                }
+                commit_group(&mut connection, &mut waiting, &held).await
+            }
+        };
+        if let Err(error) = end
             && (error.is_fatal() || has_lost_its_engine(&error))
         {
             fatal.send_replace(Some(error));
@@ -62,7 +76,7 @@ async fn serve(
     }
     // The commits are durable already; what closing adds is a shorter log to read at the next start.
     let _ = connection.close().await;
-    drop(lock);
+    drop(held);
     for closed in closed {
         let _ = closed.send(());
     }
@@ -73,12 +87,20 @@ fn has_lost_its_engine(error: &StoreError) -> bool {
     matches!(error, StoreError::Unavailable { source: Some(source), .. } if matches!(**source, sqlx::Error::WorkerCrashed))
 }
 
-/// Waits for a request and takes those behind it, a group at most. False once there will be no more.
+fn verify(held: &[HeldFile]) -> Result<(), StoreError> {
+    held.iter().try_for_each(HeldFile::verify)
+}
+
+/// Waits for a request, unless some wait already, and takes those behind it, a group at most. False once there will be no
+/// more.
 async fn receive(
     requests: &mut mpsc::Receiver<Request>,
     waiting: &mut Waiting,
     closed: &mut Vec<oneshot::Sender<()>>,
 ) -> bool {
+    if !waiting.is_empty() {
+        return true;
+    }
     let mut received = Vec::new();
     let count = requests.recv_many(&mut received, GROUP).await;
     for request in received {
@@ -98,9 +120,15 @@ async fn receive(
 ///
 /// # Errors
 /// What ended the group before its commit.
-async fn commit_group(connection: &mut SqliteConnection, waiting: &mut Waiting) -> Result<(), StoreError> {
+async fn commit_group(
+    connection: &mut SqliteConnection,
+    waiting: &mut Waiting,
+    held: &[HeldFile],
+) -> Result<(), StoreError> {
     let mut answers = Vec::new();
     let end = run_group(connection, waiting, &mut answers).await;
+    // What was committed to a file that is not there any more is not acknowledged.
+    let end = end.and_then(|()| verify(held));
     if end.is_err() {
         // Refused where SQLite rolled back by itself, which is as good.
         let _ = execute(connection, "ROLLBACK").await;

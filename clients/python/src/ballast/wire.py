@@ -105,6 +105,13 @@ class AuditEntry(TypedDict):
     """What it was done to."""
     outcome: str
     """What came of it."""
+    number: int
+    """From 1 among the entries of its key in this tenant; of `session.observe`, among the entries of its session."""
+    seal: str
+    """
+    SHA-256 over the entry and the seal of the one before, in hexadecimal digits: a copy of it shows later that the entry and
+    all before it are what they were.
+    """
 
 
 class AuditPage(TypedDict):
@@ -1729,6 +1736,11 @@ class SessionPage(TypedDict):
     """A page of sessions."""
 
     sessions: list[SessionEntry]
+    damaged: list[str]
+    """
+    Sessions of this page that are not what was written: nothing of them is shown, and a call for one gets 500 until an
+    operator has restored it.
+    """
     total: int
     """Sessions that match, on all pages together."""
     care: NotRequired[CareCount | None]

@@ -3,6 +3,14 @@
 -- What SQLite calls so, of paths as '$.field' alone.
 CREATE FUNCTION json_extract(document TEXT, path TEXT) RETURNS TEXT LANGUAGE SQL IMMUTABLE
     RETURN CAST(document AS json) ->> substr(path, 3);
+CREATE FUNCTION json_valid(document TEXT) RETURNS BOOLEAN LANGUAGE plpgsql IMMUTABLE STRICT AS $valid$
+BEGIN
+    PERFORM CAST(document AS json);
+    RETURN TRUE;
+EXCEPTION WHEN invalid_text_representation THEN
+    RETURN FALSE;
+END
+$valid$;
 
 CREATE TABLE jobs (
     sequence         BIGINT GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
@@ -97,6 +105,8 @@ CREATE TABLE sessions (
     initial_holding DOUBLE PRECISION NOT NULL,
     -- Doubles, little-endian, eight bytes each.
     initial_history BYTEA NOT NULL,
+    -- The SHA-256 of the history, so that a list need not read it.
+    history_seal    BYTEA NOT NULL,
     horizon         BIGINT NOT NULL,
     -- What else was fixed when it was opened.
     plan_json       TEXT NOT NULL,
@@ -179,13 +189,16 @@ CREATE TABLE access_keys (
     roles      TEXT NOT NULL,
     created_ms BIGINT NOT NULL,
     revoked_ms BIGINT,
-    expires_ms BIGINT
+    expires_ms BIGINT,
+    seal       BYTEA NOT NULL
 );
 
--- Who did what. The entries of a tenant are a chain: each is sealed over the seal of the one before.
+-- Who did what. The entries of a key are a chain: each is sealed over the seal of the one before.
 CREATE TABLE audit (
     sequence   BIGINT GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
     tenant     TEXT NOT NULL,
+    -- The key, or what stands for one.
+    chain      TEXT NOT NULL,
     number     BIGINT NOT NULL,
     access_key TEXT NOT NULL,
     roles      TEXT NOT NULL,
@@ -195,16 +208,34 @@ CREATE TABLE audit (
     at_ms      BIGINT NOT NULL,
     previous   BYTEA NOT NULL,
     seal       BYTEA NOT NULL,
-    UNIQUE (tenant, number)
+    UNIQUE (tenant, chain, number)
 );
 CREATE INDEX audit_by_tenant ON audit (tenant, sequence);
 CREATE INDEX audit_by_object ON audit (object, sequence);
 
 -- Where a chain ends, and where its oldest entries were cut off.
 CREATE TABLE audit_chains (
-    tenant     TEXT PRIMARY KEY,
+    tenant     TEXT NOT NULL,
+    chain      TEXT NOT NULL,
+    -- From 1 over all chains, in the order they were begun.
+    place      BIGINT NOT NULL UNIQUE,
     number     BIGINT NOT NULL,
-    seal       BYTEA NOT NULL,
+    end_seal   BYTEA NOT NULL,
     cut_number BIGINT NOT NULL,
-    cut_seal   BYTEA NOT NULL
+    cut_seal   BYTEA NOT NULL,
+    seal       BYTEA NOT NULL,
+    PRIMARY KEY (tenant, chain)
+);
+
+-- How many chains there are.
+CREATE TABLE audit_total (
+    only   BIGINT PRIMARY KEY CHECK (only = 1),
+    chains BIGINT NOT NULL,
+    seal   BYTEA NOT NULL
+);
+
+-- The newest moment that a folder's process knew of.
+CREATE TABLE heartbeat (
+    only  BIGINT PRIMARY KEY CHECK (only = 1),
+    at_ms BIGINT NOT NULL
 );

@@ -93,6 +93,8 @@ CREATE TABLE sessions (
     initial_wealth  ANY NOT NULL,
     initial_holding ANY NOT NULL,
     -- Doubles, little-endian, eight bytes each.
+    -- The SHA-256 of the history, so that a list need not read it.
+    history_seal    BLOB NOT NULL,
     initial_history BLOB NOT NULL,
     horizon         INTEGER NOT NULL,
     -- What else was fixed when it was opened.
@@ -176,13 +178,16 @@ CREATE TABLE access_keys (
     roles      TEXT NOT NULL,
     created_ms INTEGER NOT NULL,
     revoked_ms INTEGER,
-    expires_ms INTEGER
+    expires_ms INTEGER,
+    seal       BLOB NOT NULL
 ) STRICT;
 
--- Who did what. The entries of a tenant are a chain: each is sealed over the seal of the one before.
+-- Who did what. The entries of a key are a chain: each is sealed over the seal of the one before.
 CREATE TABLE audit (
     sequence   INTEGER PRIMARY KEY AUTOINCREMENT,
     tenant     TEXT NOT NULL,
+    -- The key, or what stands for one.
+    chain      TEXT NOT NULL,
     number     INTEGER NOT NULL,
     access_key TEXT NOT NULL,
     roles      TEXT NOT NULL,
@@ -192,16 +197,34 @@ CREATE TABLE audit (
     at_ms      INTEGER NOT NULL,
     previous   BLOB NOT NULL,
     seal       BLOB NOT NULL,
-    UNIQUE (tenant, number)
+    UNIQUE (tenant, chain, number)
 ) STRICT;
 CREATE INDEX audit_by_tenant ON audit (tenant, sequence);
 CREATE INDEX audit_by_object ON audit (object, sequence);
 
 -- Where a chain ends, and where its oldest entries were cut off.
 CREATE TABLE audit_chains (
-    tenant     TEXT PRIMARY KEY,
+    tenant     TEXT NOT NULL,
+    chain      TEXT NOT NULL,
+    -- From 1 over all chains, in the order they were begun.
+    place      INTEGER NOT NULL UNIQUE,
     number     INTEGER NOT NULL,
-    seal       BLOB NOT NULL,
+    end_seal   BLOB NOT NULL,
     cut_number INTEGER NOT NULL,
-    cut_seal   BLOB NOT NULL
+    cut_seal   BLOB NOT NULL,
+    seal       BLOB NOT NULL,
+    PRIMARY KEY (tenant, chain)
 ) STRICT, WITHOUT ROWID;
+
+-- How many chains there are.
+CREATE TABLE audit_total (
+    only   INTEGER PRIMARY KEY CHECK (only = 1),
+    chains INTEGER NOT NULL,
+    seal   BLOB NOT NULL
+) STRICT;
+
+-- The newest moment that a folder's process knew of.
+CREATE TABLE heartbeat (
+    only  INTEGER PRIMARY KEY CHECK (only = 1),
+    at_ms INTEGER NOT NULL
+) STRICT;

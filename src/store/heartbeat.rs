@@ -1,0 +1,37 @@
+//! The newest moment that a folder's process knew of, so that a clock that jumped is seen: a folder has no clock but its
+//! machine's. A database has its own.
+
+use futures_util::FutureExt;
+
+use super::query::{Row, query};
+use super::{Engine, Store, StoreError};
+
+impl Store {
+    /// The clock of the database, in milliseconds; `None` over a folder, which has none.
+    pub async fn database_time(&self) -> Result<Option<i64>, StoreError> {
+        match &self.engine {
+            Engine::Sqlite(_) => Ok(None),
+            Engine::Postgres(database) => database.time().await.map(Some),
+        }
+    }
+
+    /// The moment that was stored last.
+    pub async fn heartbeat(&self) -> Result<Option<i64>, StoreError> {
+        let found = |rows: &[Row]| rows.first().map(|row| row.get("at_ms")).transpose();
+        self.probe("reading the last heartbeat", query("SELECT at_ms FROM heartbeat"), found).await
+    }
+
+    pub async fn beat(&self, at_ms: i64) -> Result<(), StoreError> {
+        self.write("storing a heartbeat", move |mut connection| {
+            async move {
+                let beat = query(
+                    "INSERT INTO heartbeat (only, at_ms) VALUES (1, $1)
+                     ON CONFLICT (only) DO UPDATE SET at_ms = excluded.at_ms",
+                );
+                connection.execute(beat.bind(at_ms)).await.map(drop)
+            }
+            .boxed()
+        })
+        .await
+    }
+}

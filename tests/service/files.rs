@@ -1,0 +1,179 @@
+//! The files of a folder that is served: what becomes of the service once they are others.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command};
+use std::time::{Duration, Instant};
+
+use crate::support::patience::{assert_within, patience, until};
+use crate::support::{App, process, specification};
+use ballast::store::{Damage, Store, backup};
+use tempfile::TempDir;
+
+/// The exit code of a process whose store failed.
+const STORE_FAILED: i32 = 74;
+
+struct Served(Child, App);
+
+impl Served {
+    fn new() -> Served {
+        let folder = tempfile::tempdir().unwrap();
+        let data = folder.path().join("data");
+        let (child, url) = process::serve(|command| {
+            command.arg("--data").arg(data);
+        });
+        Served(child, App::at(url, folder))
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.1.folder().join("data").join(name)
+    }
+
+    async fn ended(&mut self) -> Option<i32> {
+        let child = &mut self.0;
+        until("the end of the process", async || child.try_wait().unwrap()).await.code()
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn moved(file: &Path) {
+    std::fs::rename(file, file.with_extension("moved")).unwrap();
+}
+
+fn removed(file: &Path) {
+    std::fs::remove_file(file).unwrap();
+}
+
+/// Another file has its name.
+fn replaced(file: &Path) {
+    let copy = file.with_extension("copy");
+    std::fs::copy(file, &copy).unwrap();
+    std::fs::rename(copy, file).unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_file_that_is_another_ends_the_service_before_it_acknowledges_more() {
+    let changes: [(&str, fn(&Path)); 6] = [
+        ("ballast.sqlite", moved),
+        ("ballast.sqlite", removed),
+        ("ballast.sqlite", replaced),
+        ("ballast.lock", moved),
+        ("ballast.lock", removed),
+        ("ballast.lock", replaced),
+    ];
+    for (name, change) in changes {
+        let mut served = Served::new();
+        served.1.train(&specification(2)).await;
+        served.1.open().await;
+        assert_eq!(served.1.observe(1, 0.01).await.0, 200);
+        let file = served.file(name);
+        change(&file);
+        let changed = Instant::now();
+        let request = serde_json::json!({ "session": served.1.session, "period": 2, "log_return": 0.01 });
+        let report = served.1.client.post(format!("{}/observe", served.1.url)).json(&request).send().await;
+        let status = report.map(|answer| answer.status().as_u16());
+        assert!(!matches!(status, Ok(200)), "{name} was changed and a report acknowledged: {status:?}");
+        assert_eq!(served.ended().await, Some(STORE_FAILED), "{name}");
+        assert_within(Duration::from_secs(2), changed, "the end");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_file_that_is_another_ends_a_service_that_nobody_asks() {
+    let mut served = Served::new();
+    removed(&served.file("ballast.sqlite"));
+    let changed = Instant::now();
+    assert_eq!(served.ended().await, Some(STORE_FAILED));
+    assert_within(Duration::from_secs(2), changed, "the end");
+}
+
+/// The file keeps its name and number, and has another's content.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_backup_copied_over_the_database_ends_the_service() {
+    let mut served = Served::new();
+    let copy = served.1.folder().join("copy.sqlite");
+    backup(&served.1.folder().join("data"), &copy, Damage::Refused, &mut |_| {}).await.unwrap();
+    std::fs::write(served.file("ballast.sqlite"), std::fs::read(copy).unwrap()).unwrap();
+    assert_eq!(served.ended().await, Some(STORE_FAILED));
+}
+
+fn serve_again(data: &Path) -> (Option<i32>, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
+    let command = command.args(["serve", "--listen", "127.0.0.1:0", "--data"]).arg(data).env_remove("BALLAST_STORE");
+    let output = command.output().unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn two_services_never_have_one_folder() {
+    let mut served = Served::new();
+    let data = served.1.folder().join("data");
+    let lock = served.file("ballast.lock");
+    // Stopped, the first does not see that its lock is gone.
+    let pid = rustix::process::Pid::from_child(&served.0);
+    rustix::process::kill_process(pid, rustix::process::Signal::STOP).unwrap();
+    removed(&lock);
+    let (code, said) = serve_again(&data);
+    assert!(code == Some(1) && said.contains("ballast.sqlite is locked by another process"), "{code:?}: {said}");
+    rustix::process::kill_process(pid, rustix::process::Signal::CONT).unwrap();
+    assert_eq!(served.ended().await, Some(STORE_FAILED));
+}
+
+fn ballast(arguments: &[&str], data: &Path) -> (Option<i32>, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ballast"));
+    let output = command.args(arguments).arg("--data").arg(data).env_remove("BALLAST_STORE").output().unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_folder_that_had_keys_is_not_served_without() {
+    let folder = TempDir::new().unwrap();
+    let data = folder.path().join("data");
+    let serve = ["serve", "--listen", "127.0.0.1:0"];
+    let (code, said) = ballast(&[&serve[..], &["--require-keys"]].concat(), &data);
+    assert!(code == Some(1) && said.contains("--require-keys") && said.contains("ballast keys create"), "{said}");
+    assert_eq!(ballast(&["keys", "create", "--role", "admin"], &data).0, Some(0));
+    // The database is lost, and one without keys made in its place.
+    for file in ["ballast.sqlite", "ballast.sqlite-wal", "ballast.sqlite-shm"] {
+        let _ = std::fs::remove_file(data.join(file));
+    }
+    let (code, said) = ballast(&serve, &data);
+    assert!(code == Some(1) && said.contains("ballast.keys says that the store had keys"), "{said}");
+    assert_eq!(ballast(&["keys", "create", "--role", "admin"], &data).0, Some(0));
+    let (child, url) = process::serve(|command| {
+        command.args(["--require-keys", "--data"]).arg(&data);
+    });
+    let served = Served(child, App::at(url, folder));
+    assert_eq!(served.1.get("/jobs").await.0, 401);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_service_that_is_open_says_so_in_its_log() {
+    let folder = TempDir::new().unwrap();
+    let log = folder.path().join("log");
+    let file = std::fs::File::create(&log).unwrap();
+    let data = folder.path().join("data");
+    let (child, url) = process::serve(|command| {
+        command.arg("--data").arg(data).stderr(file);
+    });
+    let _served = Served(child, App::at(url, folder));
+    let said = std::fs::read_to_string(log).unwrap();
+    assert!(said.contains("WARN") && said.contains("holds no key: every caller is answered"), "{said}");
+}
+
+/// Whoever closes a folder leaves it to the next.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_folder_that_was_closed_opens_again() {
+    let folder = TempDir::new().unwrap();
+    for _ in 0..3 {
+        let store = tokio::time::timeout(patience(), Store::open(folder.path())).await.unwrap().unwrap();
+        assert!(Store::open(folder.path()).await.is_err());
+        store.close().await;
+    }
+}
